@@ -18,9 +18,5 @@ def test_without_headings_there_is_no_row_of_them() -> None:
     table = TextTable("", ["", ""], [["a", "b"]])
     assert "<th" not in table.html()
     assert "<caption" not in table.html()
-    assert table.lines() == ["a  b"]
-
-
-def test_a_table_prints_twice_the_same() -> None:
-    table = TextTable("t", ["one", "two"], [["a", "b"]])
-    assert table.lines() == table.lines() == ["t", "one  two", "a    b"]
+    for _ in range(2):
+        assert table.lines() == ["a  b"]

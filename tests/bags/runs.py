@@ -1,6 +1,10 @@
 """Bags with exactly known content."""
 
+import resource
+from contextlib import contextmanager
+
 import numpy as np
+from mcap.writer import Writer
 
 from stickslip_ros.bags.recorder import QosProfile, Recorder
 from stickslip_ros.messages.codec import pack_joint_state, pack_wrench
@@ -50,6 +54,27 @@ def write_bag(directory, messages, *, topics=(), flush_every=0):
             recorder.write(channel(topic), data, stamp)
             if flush_every and number % flush_every == 0:
                 recorder.flush()
+
+
+@contextmanager
+def full_disk(size):
+    """Let no file grow beyond so many bytes: what fails is what fails on a full disk."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+
+
+@contextmanager
+def foreign_file(path, **options):
+    """Write a file as another recorder does."""
+    with path.open("wb") as stream:
+        writer = Writer(stream, **options)
+        writer.start(profile="ros2")
+        yield writer
+        writer.finish()
 
 
 def record(directory, states=STAMPS, forces=STAMPS):

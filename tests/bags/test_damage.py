@@ -89,6 +89,7 @@ def sound(tmp_path_factory):
             if number % (2 * PAIRS) == 2 * PAIRS - 1:
                 recorder.flush()
                 recorder.add_metadata(f"table {number}", {"number": str(number)})
+        recorder.attach("note", b"of nothing", "text/plain")
     file = SoundFile((directory / "bag_0.mcap").read_bytes())
     assert len(file.chunks) == CHUNKS
     return file
@@ -167,6 +168,7 @@ def check(content, file, path):
             assert recording.joint_states.stamp.tolist() == [s for s in read if s % 2 == 0]
             for name in (f"table {2 * PAIRS - 1}", "rosbag2"):
                 recording.metadata(name)
+            recording.attachment("note")
             assert recording.missing or len(read) == len(MESSAGES)
         report_of_bag(path)
     except StickslipError as error:

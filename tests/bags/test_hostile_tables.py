@@ -27,20 +27,8 @@ TIME = np.arange(300) * 1e-3
 SOUND = {"t": TIME, "x": 1e-4 * np.sin(60.0 * TIME), "u": np.cos(60.0 * TIME)}
 HEADING = b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM"
 CELLS, DOUBLES = 1, 6
-ODD_CELLS = (
-    "1e160",
-    "-1e308",
-    "1e-320",
-    "-0",
-    "inf",
-    "nan",
-    "",
-    "x",
-    "9" * 400,
-    "\0",
-    '"1"',
-    "1,2",
-)
+ODD_CELLS = ("1e160", "-1e308", "1e-320", "-0", "inf", "nan", "", "x", "\0", '"1"', "1,2",
+             "9" * 400)  # fmt: skip
 ODD_WORDS = (0, 1, 7, 9, 14, 15, 20, 2**31 - 1, 2**31, 2**32 - 1)
 
 
@@ -120,6 +108,7 @@ def test_a_file_beyond_a_limit_is_refused_in_a_sentence(
         ("t,x\n" + "1" * 3_000_000 + ",2\n", "columns and 2 names"),
         (",".join(map(str, range(20_000))) + "\n1\n", "2 to 10000 columns"),
         ("t,x\n1,2\n1,2,3\n", "number of columns changed"),
+        ("t,x\n1,2\n1\n", "number of columns changed"),
         ("t,x\n" + "1,2\n" * 600, "more than 1000 numbers"),
         ("t,x\n" + "1,-\n" * 600, "more than 1000 numbers"),
         ("\n\n", "it is empty"),
@@ -189,7 +178,7 @@ def changed(kind: str, chance: random.Random) -> bytes:
     return bytes(content)
 
 
-@examples(quick=40, thorough=1500, deadline=None)
+@examples(quick=40, thorough=1000, deadline=None)
 @given(seed=st.integers(0, 2**32))
 def test_a_csv_file_that_was_changed_is_measured_or_refused(
     tmp_path_factory: pytest.TempPathFactory, seed: int
@@ -198,7 +187,7 @@ def test_a_csv_file_that_was_changed_is_measured_or_refused(
 
 
 @pytest.mark.process
-@examples(quick=4, thorough=100, deadline=None)
+@examples(quick=3, thorough=25, deadline=None)
 @given(seed=st.integers(0, 2**32))
 def test_a_mat_file_that_was_changed_is_measured_or_refused(
     tmp_path_factory: pytest.TempPathFactory, seed: int
@@ -212,16 +201,3 @@ def measure_or_refuse(tmp_path_factory: pytest.TempPathFactory, kind: str, seed:
     with suppress(InvalidInputError):
         report = report_of_table(path, COLUMNS, slips=SlipThreshold(1e-5, within=1e7))
         assert report["samples"] <= len(TIME)
-
-
-@pytest.mark.process
-def test_a_mat_file_of_more_numbers_is_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    path = tmp_path / "log.mat"
-    savemat(path, SOUND)
-    monkeypatch.setattr("stickslip_ros.bags.table_file._MOST_NUMBERS", 3 * len(TIME))
-    assert len(table_of(path)["t"]) == len(TIME)
-    monkeypatch.setattr("stickslip_ros.bags.table_file._MOST_NUMBERS", 3 * len(TIME) - 1)
-    with pytest.raises(BagError, match="it has more than 899 numbers"):
-        table_of(path)

@@ -1,12 +1,22 @@
 import pytest
-from mcap.writer import CompressionType, Writer
+from mcap.writer import CompressionType
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 
 from stickslip_ros.bags.recorder import QosProfile, Recorder
 from stickslip_ros.bags.report import report_of_bag
 from stickslip_ros.errors import BagError, InvalidInputError
-from tests.bags.runs import PERIOD, SECOND, STAMPS, STATES, motion, record, state, write_bag
+from tests.bags.runs import (
+    PERIOD,
+    SECOND,
+    STAMPS,
+    STATES,
+    foreign_file,
+    motion,
+    record,
+    state,
+    write_bag,
+)
 
 
 def foreign_state(stamp):
@@ -89,9 +99,7 @@ def test_other_recorders_layouts_and_messages_give_the_same_report(tmp_path):
     """Joints in another order and among others, no efforts, late log times, other topics."""
     record(tmp_path / "bag", forces=[])
     path = tmp_path / "foreign.mcap"
-    with path.open("wb") as stream:
-        writer = Writer(stream, compression=CompressionType.ZSTD, chunk_size=10_000)
-        writer.start(profile="ros2")
+    with foreign_file(path, compression=CompressionType.ZSTD, chunk_size=10_000) as writer:
         schema = writer.register_schema("sensor_msgs/msg/JointState", "ros2msg", b"")
         other = writer.register_schema("std_msgs/msg/Float64", "ros2msg", b"")
         channel = writer.register_channel(STATES, "cdr", schema)
@@ -101,7 +109,6 @@ def test_other_recorders_layouts_and_messages_give_the_same_report(tmp_path):
             message = foreign_state(stamp) if stamp % 3 else state(stamp)
             writer.add_message(channel, late, message, late)
             writer.add_message(noise, late, bytes(12), late)
-        writer.finish()
     assert report_of_bag(path) == report_of_bag(tmp_path / "bag")
 
 

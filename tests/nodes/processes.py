@@ -5,6 +5,7 @@ import subprocess
 import sys
 from collections.abc import Generator, Mapping
 from contextlib import contextmanager
+from typing import Any
 
 _LISTENER = """
 import sys
@@ -26,7 +27,7 @@ class Processes:
 
     def __init__(self, environment: Mapping[str, str]) -> None:
         self._environment = environment
-        self._started: list[subprocess.Popen[bytes]] = []
+        self._started: list[subprocess.Popen[Any]] = []
 
     def node(self, name: str, **parameters: object) -> subprocess.Popen[bytes]:
         """Start one of our nodes in the namespace /test, or in the `namespace` given."""
@@ -37,6 +38,11 @@ class Processes:
             arguments += ["-p", f"{key.replace('__', '.')}:={value}"]
         return self._start(arguments)
 
+    def piped(self, node: str, *ros_arguments: str) -> subprocess.Popen[str]:
+        """Start one of our nodes as `ros2 run` does, and keep what it prints."""
+        command = ["-m", f"stickslip_ros.nodes.{node}", "--ros-args", *ros_arguments]
+        return self._start(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
     def stranger(self, reliability: str = "RELIABLE") -> subprocess.Popen[bytes]:
         """Start a node that only listens to the joint states, as `ros2 topic echo` does."""
         return self._start(["-c", _LISTENER, reliability])
@@ -44,10 +50,10 @@ class Processes:
     def end(self) -> None:
         for process in self._started:
             process.kill()
-            process.wait()
+            process.communicate()
 
-    def _start(self, arguments: list[str]) -> subprocess.Popen[bytes]:
-        process = subprocess.Popen([sys.executable, *arguments], env=self._environment)
+    def _start(self, arguments: list[str], **options: Any) -> subprocess.Popen[Any]:
+        process = subprocess.Popen([sys.executable, *arguments], env=self._environment, **options)
         self._started.append(process)
         return process
 

@@ -1,6 +1,7 @@
 """Recorded runs for tests that need one."""
 
 from pathlib import Path
+from typing import Any
 
 from stickslip_ros.bags.reader import Recording
 from stickslip_ros.messages.codec import pack_joint_state, pack_wrench
@@ -27,16 +28,21 @@ def record_states(bag: Path, count: int, step: int = SECOND // 100) -> str:
     return str(bag)
 
 
-def close_the_loop(graph: Graph, bag: Path, **plant_parameters: object) -> None:
-    """Record the closed loop in lockstep until the plant pauses by itself."""
+def start_loop(graph: Graph, bag: Path, **plant_parameters: object) -> tuple[Any, Any, Any]:
+    """Return analyzer, controller and plant, at work."""
     analyzer = graph.add(AnalyzerNode, bag=str(bag))
     controller = graph.add(WashoutControllerNode, wait_for=["analyzer"])
     graph.wait_until(lambda: analyzer.active and controller.active, "both active")
-    listeners = ["analyzer", "washout_controller"]
-    plant = graph.add(PlantNode, wait_for=listeners, **plant_parameters)
+    plant = graph.add(PlantNode, wait_for=["analyzer", "washout_controller"], **plant_parameters)
     graph.wait_until(lambda: plant.active, "plant active")
+    return analyzer, controller, plant
+
+
+def close_the_loop(graph: Graph, bag: Path, **plant_parameters: object) -> None:
+    """Record the closed loop in lockstep until the plant pauses by itself."""
+    _, _, plant = start_loop(graph, bag, **plant_parameters)
     graph.wait_until(lambda: not plant.active, "plant pauses")
-    for node in listeners[::-1]:
+    for node in ("washout_controller", "analyzer"):
         graph.deactivate(node)
 
 

@@ -2,8 +2,6 @@
 
 import json
 import re
-import resource
-from collections.abc import Callable, Iterator
 from itertools import pairwise
 from pathlib import Path
 
@@ -27,6 +25,7 @@ from stickslip_ros.nodes.base.managed import ERROR
 from stickslip_ros.nodes.plant import PlantNode
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
 from stickslip_ros.studies.recorded_drive import recorded_drive
+from tests.bags.runs import full_disk
 from tests.nodes.graph import PATIENCE, Graph
 
 _FIGURES = r"stick_slip: amplitude \d+\.?\d* mm, frequency \d+\.?\d* mHz, stick fraction 0\.\d{1,3}"
@@ -112,24 +111,6 @@ def test_a_curve_in_a_bag_that_is_none_makes_no_drive(tmp_path: Path) -> None:
             recorder.add_metadata("stickslip_ros/plant", parameters)
             recorder.add_metadata("stickslip_ros/curves", {"/none.csv": curve})
         assert recorded_drive(tmp_path / f"bag_{number}") is None
-
-
-def test_it_listens_only_while_it_is_active(graph: Graph) -> None:
-    """A plant that waits for it must not take it for ready before it is."""
-    analyzer = graph.add(AnalyzerNode, autostart=False)
-
-    def readers() -> int:
-        return analyzer.count_subscribers(JOINT_STATES.name)
-
-    analyzer.trigger_configure()
-    plant = graph.add(PlantNode, wait_for=["analyzer"], expects_control=False, pace="realtime")
-    assert readers() == 0
-    analyzer.trigger_activate()
-    graph.wait_until(lambda: plant.active, "plant active")
-    assert readers() == 1
-    graph.deactivate("plant")
-    graph.deactivate("analyzer")
-    graph.wait_until(lambda: readers() == 0, "it listens no more")
 
 
 def test_a_timer_that_is_due_when_it_stops_does_nothing(graph: Graph) -> None:
@@ -221,23 +202,14 @@ def test_what_has_arrived_when_it_stops_is_recorded_although_nothing_has_run(
         assert recording.joint_states.stamp.tolist() == stamps
 
 
-@pytest.fixture
-def file_size_limit() -> Iterator[Callable[[int], None]]:
-    """Limit the bytes of each file: a disk that is full fails in the same way."""
-    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    yield lambda limit: resource.setrlimit(resource.RLIMIT_FSIZE, (limit, hard))
-    resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
-
-
 def test_a_disk_that_is_full_before_the_topics_are_in_the_bag_leaves_none(
-    graph: Graph, tmp_path: Path, file_size_limit: Callable[[int], None]
+    graph: Graph, tmp_path: Path
 ) -> None:
     analyzer = graph.add(AnalyzerNode, bag=str(tmp_path / "bag"), autostart=False)
     analyzer.trigger_configure()
-    file_size_limit(4096)
-    for _ in range(3):
-        analyzer.trigger_activate()
-    file_size_limit(10_000_000)
+    with full_disk(4096):
+        for _ in range(3):
+            analyzer.trigger_activate()
     assert not analyzer.active
     assert list(tmp_path.iterdir()) == []
     analyzer.trigger_activate()
@@ -245,9 +217,7 @@ def test_a_disk_that_is_full_before_the_topics_are_in_the_bag_leaves_none(
     assert [path.name for path in tmp_path.iterdir()] == ["bag"]
 
 
-def test_on_a_full_disk_it_says_so_and_goes_on_measuring(
-    graph: Graph, tmp_path: Path, file_size_limit: Callable[[int], None]
-) -> None:
+def test_on_a_full_disk_it_says_so_and_goes_on_measuring(graph: Graph, tmp_path: Path) -> None:
     bag = tmp_path / "bag"
     analyzer = graph.add(AnalyzerNode, bag=str(bag), flush_period=0.01)
     graph.wait_until(lambda: analyzer.active, "analyzer active")
@@ -255,7 +225,6 @@ def test_on_a_full_disk_it_says_so_and_goes_on_measuring(
     parameters = {"expects_control": False, "duration": 60.0, "wait_for": ["analyzer"]}
     plant = graph.add(PlantNode, autostart=False, **parameters)
     plant.trigger_configure()
-    file_size_limit(100_000)
 
     def run() -> None:
         graph.wait_until(lambda: plant.active or plant.trigger_activate(), "plant active")
@@ -264,11 +233,11 @@ def test_on_a_full_disk_it_says_so_and_goes_on_measuring(
     def complaints() -> set[str]:
         return {s.message for heard in diagnostics for s in heard.status if s.level == ERROR}
 
-    run()
-    graph.wait_until(lambda: len(amplitudes) >= 7, "it goes on measuring")
-    graph.wait_until(complaints, "it says so")
-    file_size_limit(10_000_000)  # the middleware, too, needs files, in memory
-    graph.deactivate("analyzer")
+    with full_disk(100_000):
+        run()
+        graph.wait_until(lambda: len(amplitudes) >= 7, "it goes on measuring")
+        graph.wait_until(complaints, "it says so")
+    graph.deactivate("analyzer")  # the middleware, too, needs files, in memory
     (complaint,) = complaints()
     assert str(bag) in complaint
     assert "File too large" in complaint

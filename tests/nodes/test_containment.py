@@ -279,24 +279,18 @@ def wait_for_bag(directory: Path, run: subprocess.Popen[str]) -> None:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("arguments", [[], ["--composed"]])
+@pytest.mark.parametrize("command", [RUN, ["-c", LOOP]])
 def test_a_run_is_seen_by_local_tools_and_by_no_stranger(
-    start: Start, namespaces: Namespaces, tmp_path: Path, domain: int, arguments: list[str]
+    start: Start, namespaces: Namespaces, tmp_path: Path, domain: int, command: list[str]
 ) -> None:
-    run = start(namespaces.host, *RUN, *arguments)
-    wait_for_bag(tmp_path, run)
-    check_contained(run, OURS, start, namespaces, tmp_path, str(domain))
-
-
-@pytest.mark.long
-def test_a_closed_loop_is_seen_by_local_tools_and_by_no_stranger(
-    start: Start, namespaces: Namespaces, tmp_path: Path
-) -> None:
-    loop = start(namespaces.host, "-c", LOOP)
-    assert loop.stdout is not None
-    domain = loop.stdout.readline().strip()
-    ours = OURS - {"/feed_drive/bringup"}
-    check_contained(loop, ours, start, namespaces, tmp_path, domain)
+    run = start(namespaces.host, *command)
+    if command[0] == "-c":
+        assert run.stdout is not None
+        its_domain, ours = run.stdout.readline().strip(), OURS - {"/feed_drive/bringup"}
+    else:
+        wait_for_bag(tmp_path, run)
+        its_domain, ours = str(domain), OURS
+    check_contained(run, ours, start, namespaces, tmp_path, its_domain)
 
 
 @pytest.mark.long

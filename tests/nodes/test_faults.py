@@ -5,7 +5,6 @@ import signal
 import subprocess
 from collections.abc import Generator, Sequence
 from contextlib import ExitStack, contextmanager
-from itertools import permutations
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +19,7 @@ from stickslip_ros.messages.codec import unpack_header
 from stickslip_ros.messages.topics import CONTROL_FORCE, JOINT_STATES, RECORDED, Topic
 from tests.nodes.graph import PATIENCE, Graph, wait_for
 from tests.nodes.processes import Processes
+from tests.nodes.samples import Samples
 
 NODES = ("analyzer", "washout_controller", "plant")
 PERIOD = 1_000_000
@@ -36,7 +36,7 @@ class Trio:
             "wait_for": "[washout_controller, analyzer]",
         }
         self.bags: list[Path] = []
-        self._graph = graph
+        self.graph = graph
         self._processes = processes
         self._folder = folder
         self._running: dict[str, subprocess.Popen[bytes]] = {}
@@ -59,7 +59,7 @@ class Trio:
         """Stop nodes for so long, and wait until the loop is closed again."""
         for node in nodes:
             self.send(node, signal.SIGSTOP)
-        self.go_on(seconds)
+        self.graph.run_for(seconds)
         for node in nodes:
             self.send(node, signal.SIGCONT)
         self.wait_for_closed_loop()
@@ -73,24 +73,15 @@ class Trio:
             self.send(node, signal.SIGINT)
             assert self._running[node].wait(PATIENCE) == 0
 
-    def go_on(self, seconds: float) -> None:
-        """Listen for so long, of wall time."""
-        self._graph.run_for(seconds)
-
     def wait_for_closed_loop(self) -> None:
         """Wait until samples that come from now on are answered and recorded."""
         topics = (JOINT_STATES, CONTROL_FORCE, RECORDED)
         with ExitStack() as listening:
             states, forces, recorded = (listening.enter_context(self._heard(t)) for t in topics)
-            self._graph.wait_until(
+            self.graph.wait_until(
                 lambda: len(states & forces) > 20 and len(states & recorded) > 1,
                 "the loop is closed",
             )
-
-    def wait_for_samples(self, count: int) -> None:
-        """Wait until so many further samples have come."""
-        with self._heard(JOINT_STATES) as states:
-            self._graph.wait_until(lambda: len(states) >= count, "samples")
 
     @contextmanager
     def _heard(self, topic: Topic) -> Generator[set[int]]:
@@ -100,9 +91,9 @@ class Trio:
         def hear(message: Any) -> None:
             stamps.add(unpack_header(message))
 
-        reader = self._graph.subscribe(topic, hear)
+        reader = self.graph.subscribe(topic, hear)
         yield stamps
-        self._graph.observer.destroy_subscription(reader)
+        self.graph.observer.destroy_subscription(reader)
 
 
 @pytest.fixture
@@ -135,7 +126,7 @@ def test_a_killed_node_is_replaced(trio: Trio, processes: Processes) -> None:
     trio.wait_for_closed_loop()
 
     trio.send("washout_controller", signal.SIGKILL)
-    trio.wait_for_samples(100)
+    Samples(trio.graph).wait_for(100)
     trio.start("washout_controller")
     trio.wait_for_closed_loop()
 
@@ -161,7 +152,7 @@ def test_a_killed_node_is_replaced(trio: Trio, processes: Processes) -> None:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("order", list(permutations(NODES)))
+@pytest.mark.parametrize("order", [NODES, NODES[::-1], (NODES[1], NODES[2], NODES[0])])
 def test_every_order_of_start_loses_nothing(trio: Trio, order: tuple[str, ...]) -> None:
     for node in order:
         trio.start(node)
@@ -208,13 +199,13 @@ def test_in_real_time_what_a_stop_costs_is_counted(trio: Trio) -> None:
 def test_a_monkey_among_them(trio: Trio, pace: str) -> None:
     chance = random.Random(6)
     trio.plant |= {"pace": pace, "reply_timeout": 1.0}
-    for _ in range(12):
+    for _ in range(6):
         for node in chance.sample(NODES, chance.choice([1, 1, 1, 2, 3])):
             if trio.is_there(node):
                 trio.send(node, chance.choice([signal.SIGKILL, signal.SIGSTOP, signal.SIGCONT]))
             else:
                 trio.start(node)
-        trio.go_on(chance.choice([0.1, 0.5, 1.0, 2.0]))
+        trio.graph.run_for(chance.choice([0.1, 0.5, 1.0, 2.0]))
     for node in NODES:
         if trio.is_there(node):
             trio.send(node, signal.SIGCONT)

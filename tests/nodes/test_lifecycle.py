@@ -1,6 +1,5 @@
 """Repeated external life cycle transitions while the loop runs."""
 
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +15,6 @@ from stickslip_ros.nodes.base.managed import ManagedNode
 from stickslip_ros.nodes.plant import PlantNode
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
 from tests.nodes.graph import Graph
-from tests.nodes.processes import Processes
 
 ROUND = {
     Transition.TRANSITION_DEACTIVATE: "inactive",
@@ -56,20 +54,19 @@ def ends(graph: Graph) -> dict[object, tuple[int, int]]:
     }
 
 
-@pytest.fixture(params=["composed", pytest.param("processes", marks=pytest.mark.long)])
-def bring(request: pytest.FixtureRequest, graph: Graph) -> Callable[..., None]:
-    """Start a node in this process, or in one of its own."""
-    if request.param == "composed":
-        return lambda name, **parameters: graph.add(NODES[name], **parameters)
-    processes: Processes = request.getfixturevalue("processes")
-    return processes.node
-
-
-@pytest.mark.parametrize("rounds", [2, pytest.param(10, marks=pytest.mark.long)])
+@pytest.mark.parametrize("rounds", [2, pytest.param(5, marks=pytest.mark.long)])
 @pytest.mark.parametrize("pace", ["lockstep", "realtime"])
 def test_repeated_life_cycles_leave_one_of_each_and_time_continues(
-    graph: Graph, tmp_path: Path, bring: Callable[..., None], pace: str, rounds: int
+    request: pytest.FixtureRequest, graph: Graph, tmp_path: Path, pace: str, rounds: int
 ) -> None:
+    """Two in this process, or five of nodes in processes of their own."""
+
+    def bring(name: str, **parameters: object) -> None:
+        if rounds == 2:
+            graph.add(NODES[name], **parameters)
+        else:
+            request.getfixturevalue("processes").node(name, **parameters)
+
     bring("analyzer", bag=str(tmp_path / "bag"))
     bring("washout_controller", wait_for=["analyzer"])
     bring("plant", pace=pace, wait_for=["analyzer", "washout_controller"], reply_timeout=0.2)
@@ -112,3 +109,25 @@ def test_a_node_says_once_what_it_is_and_whom_it_waits_for(
     graph.wait_until(lambda: logged("paused"), "its second is over")
     assert said[-3:] == ["active", "finished: the last sample was reached", "paused"]
     assert len([line for line in said if line.startswith("waiting")]) == 1
+
+
+def test_who_is_waited_for_listens_only_while_it_is_active(graph: Graph) -> None:
+    """A plant must not take it for ready before it is."""
+    names = ["washout_controller", "analyzer"]
+    listeners = [graph.add(NODES[name], autostart=False) for name in names]
+    for node in listeners:
+        node.trigger_configure()
+    plant = graph.add(PlantNode, wait_for=names, duration=1.0)
+
+    def readers() -> int:
+        return plant.count_subscribers(JOINT_STATES.name)
+
+    assert readers() == 0
+    for node in listeners:
+        node.trigger_activate()
+    graph.wait_until(lambda: listeners[0]._answered == 101, "each sample is answered")
+    assert plant.diagnose()[2]["late_forces"] == 0
+    assert readers() == 2
+    for number, name in enumerate(names):
+        graph.deactivate(name)
+        graph.wait_until(lambda number=number: readers() == 1 - number, "it listens no more")

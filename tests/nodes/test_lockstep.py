@@ -2,18 +2,18 @@
 
 import time
 from collections.abc import Callable
-from itertools import pairwise
 from typing import Any
 
 import pytest
 
 from stickslip_ros.messages.codec import unpack_header
-from stickslip_ros.messages.topics import CONTROL_FORCE, DIAGNOSTICS, JOINT_STATES
+from stickslip_ros.messages.topics import CONTROL_FORCE, DIAGNOSTICS
 from stickslip_ros.nodes.base.managed import WARN
 from stickslip_ros.nodes.plant import PlantNode
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
 from tests.nodes.graph import Graph
 from tests.nodes.processes import Processes
+from tests.nodes.samples import Samples
 
 PERIOD = 10_000_000
 FIRST = 1_000_000_000
@@ -21,27 +21,16 @@ NO_FORCE = "no control force"
 SILENT_RECORDER = "the recorder has gone or is silent"
 
 
-class Watch:
-    """What the observer hears of a plant: samples with their times of arrival, health, logs."""
+class Watch(Samples):
+    """Further what the observer hears of a plant and its controller: forces, health, logs."""
 
     def __init__(self, graph: Graph, standard_error: Callable[[], str]) -> None:
-        self.arrivals: list[float] = []
-        self.states: list[bytes] = []
-        self.forces = graph.listen(CONTROL_FORCE, raw=True)
-        self._graph = graph
+        super().__init__(graph)
+        self.forces: list[int] = []
         self._diagnostics = graph.listen(DIAGNOSTICS)
         self._standard_error = standard_error
         self._logged = ""
-        graph.subscribe(JOINT_STATES, self._take)
-
-    def _take(self, message: bytes) -> None:
-        self.arrivals.append(time.monotonic())
-        self.states.append(message)
-
-    def for_samples(self, count: int) -> None:
-        """Wait until as many further samples have come."""
-        enough = len(self.states) + count
-        self._graph.wait_until(lambda: len(self.states) >= enough, f"{count} further samples")
+        graph.subscribe(CONTROL_FORCE, lambda message: self.forces.append(unpack_header(message)))
 
     def further_health(self, count: int) -> list[tuple[bytes, str]]:
         """Wait until the plant has reported on its health again; return levels and messages."""
@@ -65,10 +54,6 @@ class Watch:
             line for line in self._logged.splitlines() if "[test.plant]" in line and text in line
         ]
 
-    def longest_gap(self) -> float:
-        """Return the longest time, s, between two samples that follow each other."""
-        return max(b - a for a, b in pairwise(self.arrivals))
-
 
 @pytest.fixture
 def watch(graph: Graph, capfd: pytest.CaptureFixture[str]) -> Watch:
@@ -85,10 +70,6 @@ def add_plant(graph: Graph, controller: Any, *readers: str, **parameters: Any) -
     return plant
 
 
-def stamps(messages: list[bytes]) -> list[int]:
-    return [unpack_header(message) for message in messages]
-
-
 def grid(count: int) -> list[int]:
     return [FIRST + number * PERIOD for number in range(count)]
 
@@ -101,11 +82,11 @@ def test_a_killed_analyzer_holds_the_plant_up_once_and_no_longer_than_the_timeou
     analyzer = processes.node("analyzer")
     controller = graph.add(WashoutControllerNode, wait_for=["plant", "observer", "analyzer"])
     plant = add_plant(graph, controller, "analyzer", flow_window=200, reply_timeout=timeout)
-    watch.for_samples(500)
+    watch.wait_for(500)
     analyzer.kill()
     graph.wait_until(lambda: watch.log_lines(SILENT_RECORDER), "it is given up")
     began = time.monotonic()
-    watch.for_samples(2000)
+    watch.wait_for(2000)
     # Every window of samples would have taken the timeout.
     assert time.monotonic() - began < 10.0 * timeout
     for level, message in watch.further_health(2):
@@ -113,8 +94,8 @@ def test_a_killed_analyzer_holds_the_plant_up_once_and_no_longer_than_the_timeou
         assert SILENT_RECORDER in message
     plant.trigger_deactivate()
     figures = plant.diagnose()[2]
-    graph.wait_until(lambda: len(watch.states) == figures["samples"], "every sample is heard")
-    assert stamps(watch.states) == grid(figures["samples"])
+    graph.wait_until(lambda: len(watch.stamps) == figures["samples"], "every sample is heard")
+    assert watch.stamps == grid(figures["samples"])
     assert figures["late_forces"] == 0
     assert len(watch.log_lines(SILENT_RECORDER)) == 1
     assert watch.longest_gap() >= timeout
@@ -126,34 +107,32 @@ def test_a_controller_that_falls_silent_is_waited_for_once_and_taken_back(
     timeout = 1.0
     controller = graph.add(WashoutControllerNode, wait_for=["observer", "plant"])
     plant = add_plant(graph, controller, reply_timeout=timeout)
-    watch.for_samples(300)
+    watch.wait_for(100)
     assert plant.diagnose()[2]["late_forces"] == 0
 
     graph.deactivate("washout_controller")
     graph.wait_until(lambda: watch.log_lines(NO_FORCE), "it is given up")
-    given_up = len(watch.states)
-    watch.for_samples(1000)  # in vain, if every one of them took the timeout
+    given_up = len(watch.stamps)
+    watch.wait_for(500)  # in vain, if every one of them took the timeout
     for level, message in watch.further_health(2):
         assert level == WARN
         assert NO_FORCE in message
 
     controller.trigger_activate()
     graph.wait_until(
-        lambda: stamps(watch.forces[-1:]) > stamps(watch.states[given_up : given_up + 1]),
+        lambda: watch.forces[-1:] > watch.stamps[given_up : given_up + 1],
         "forces come again",
     )
-    watch.for_samples(10)
+    watch.wait_for(10)
     late = plant.diagnose()[2]["late_forces"]
-    watch.for_samples(1000)
+    watch.wait_for(300)
     plant.trigger_deactivate()
     _, message, figures = plant.diagnose()
-    assert figures["late_forces"] == late > 1000
-    graph.wait_until(lambda: len(watch.states) == figures["samples"], "every sample is heard")
-    graph.wait_until(
-        lambda: stamps(watch.forces[-1:]) == stamps(watch.states[-1:]), "the last one is answered"
-    )
-    assert stamps(watch.states) == grid(figures["samples"])
-    unanswered = set(stamps(watch.states)) - set(stamps(watch.forces))
+    assert figures["late_forces"] == late > 500
+    graph.wait_until(lambda: len(watch.stamps) == figures["samples"], "every sample is heard")
+    graph.wait_until(lambda: watch.forces[-1:] == watch.stamps[-1:], "the last one is answered")
+    assert watch.stamps == grid(figures["samples"])
+    unanswered = set(watch.stamps) - set(watch.forces)
     too_late = figures.get("dropped: answers a sample that has passed", 0)
     assert late == len(unanswered) + too_late
     assert NO_FORCE not in message

@@ -1,7 +1,6 @@
 """Parameters set over the network while the nodes run: refused by name or applied exactly."""
 
 import random
-import struct
 from collections.abc import Iterator
 from math import inf, isfinite
 from pathlib import Path
@@ -29,9 +28,9 @@ from stickslip_ros.nodes.plant import PlantNode
 from stickslip_ros.nodes.replay import ReplayNode
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
 from stickslip_ros.scenarios.parameter_field import parameters_of
-from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, ReplayParameters
 from tests.nodes.graph import Graph
-from tests.scenarios.values import UNKNOWN, bad_values, good_values
+from tests.scenarios import values
+from tests.scenarios.values import CONFLICTS, MODELS, UNKNOWN, bad_values, good_values
 
 SECOND = 1_000_000_000
 LEFT_OPEN = {
@@ -40,7 +39,6 @@ LEFT_OPEN = {
     "active": ("",),
 }
 """By state: what is fixed from which state on may still be set."""
-MODELS = {**NODE_PARAMETERS, "replay": ReplayParameters}
 NODES: dict[str, type[ManagedNode[Any]]] = {
     "plant": PlantNode,
     "washout_controller": WashoutControllerNode,
@@ -78,9 +76,8 @@ def told(graph: Graph, node: str) -> dict[str, Any]:
     return dict(zip(names, found, strict=True))
 
 
-def bits(values: dict[str, Any]) -> dict[str, Any]:
-    """What tells -0.0 from 0.0."""
-    return {n: struct.pack("d", v) if isinstance(v, float) else v for n, v in values.items()}
+def bits(parameters: dict[str, Any]) -> dict[str, Any]:
+    return {name: values.bits(value) for name, value in parameters.items()}
 
 
 def in_turn(node: Any) -> Iterator[str]:
@@ -92,14 +89,9 @@ def in_turn(node: Any) -> Iterator[str]:
     yield "active"
 
 
-@pytest.mark.parametrize(
-    ("name", "pace"),
-    [("plant", "realtime"), ("washout_controller", ""), ("analyzer", "")],
-)
-def test_bad_values_are_refused_in_every_state_and_change_nothing(
-    graph: Graph, name: str, pace: str
-) -> None:
-    given = {"pace": pace} if name == "plant" else {}
+@pytest.mark.parametrize("name", list(NODES)[:3])
+def test_bad_values_are_refused_in_every_state_and_change_nothing(graph: Graph, name: str) -> None:
+    given = {"pace": "realtime"} if name == "plant" else {}
     node = graph.add(NODES[name], autostart=False, **given)
     bad = [
         (parameter.name, value)
@@ -124,33 +116,22 @@ def test_good_values_are_taken_exactly_in_every_state(graph: Graph, name: str) -
     node = graph.add(NODES[name], autostart=False)
     known = list(parameters_of(MODELS[name]))
     states = in_turn(node) if name != "replay" else ["unconfigured"]  # it would want a bag
-    for state in states:
+    for state, choice in zip(states, (-1, -2, -1), strict=False):
         start = told(graph, name)
         settable = {p.name for p in known if p.fixed in LEFT_OPEN[state]}
-        for choice in (-1, -2):
-            changes = [(p.name, good_values(p)[max(choice, -len(good_values(p)))]) for p in known]
-            reasons = set_each(graph, name, *changes)
-            now = told(graph, name)
-            assert bits(now) == bits(node.parameters.flat())
-            for (parameter, value), reason in zip(changes, reasons, strict=True):
-                assert (
-                    bits(now)[parameter] == bits(start if reason else {parameter: value})[parameter]
-                )
-                refusals = [
-                    "must not exceed",
-                    "at least a thousandth",
-                    "must be the path of a CSV file",
-                    "must be above 0 and finite for a ",
-                    "must be at least friction.",
-                    "must be 0 with velocity = difference",
-                ]
-                allowed = refusals if reason else [""]
-                if parameter not in settable and value != start[parameter]:
-                    allowed += [f"{parameter} cannot be changed while the node is "]
-                    assert reason
-                assert any(part in reason for part in allowed), (state, parameter, value, reason)
-            assert set_all(graph, name, **{name: start[name] for name in settable}) == ""
-            assert bits(told(graph, name)) == bits(start)
+        changes = [(p.name, good_values(p)[max(choice, -len(good_values(p)))]) for p in known]
+        reasons = set_each(graph, name, *changes)
+        now = bits(told(graph, name))
+        assert now == bits(node.parameters.flat())
+        for (parameter, value), reason in zip(changes, reasons, strict=True):
+            assert now[parameter] == bits(start if reason else {parameter: value})[parameter]
+            allowed = CONFLICTS if reason else ("",)
+            if parameter not in settable and value != start[parameter]:
+                allowed += (f"{parameter} cannot be changed while the node is ",)
+                assert reason
+            assert any(part in reason for part in allowed), (state, parameter, value, reason)
+        assert set_all(graph, name, **{name: start[name] for name in settable}) == ""
+        assert bits(told(graph, name)) == bits(start)
 
 
 @pytest.mark.parametrize("name", ["plant", "replay"])
@@ -320,7 +301,7 @@ def test_thousands_of_changes_leave_the_motion_continuous(graph: Graph, pace: st
         SetParametersAtomically, "/test/plant/set_parameters_atomically"
     )
     draw = random.Random(1)
-    for _ in range(20):
+    for _ in range(10):
         changes = [drawn(draw) for _ in range(150)]
         request = SetParametersAtomically.Request(
             parameters=[message(*change) for change in dict(drawn(draw) for _ in range(3)).items()]

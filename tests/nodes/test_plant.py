@@ -64,8 +64,11 @@ def test_without_control_the_samples_are_those_of_the_loop_and_the_clock_shows_t
     assert times == columns.stamp.tolist()
 
 
-def test_jittered_forces_act_as_they_do_without_ros(graph: Graph) -> None:
+def test_jittered_forces_act_as_they_do_without_ros_and_overtaken_ones_are_published(
+    graph: Graph,
+) -> None:
     heard = graph.listen(JOINT_STATES, raw=True)
+    forces, dropped = graph.listen(CONTROL_FORCE, raw=True), graph.listen(DROPPED_FORCE, raw=True)
     network = {"force_delay": 0.013, "force_jitter": 0.035, "force_jitter_seed": 7}
     graph.add(WashoutControllerNode)
     listeners = ["observer", "washout_controller"]
@@ -82,6 +85,12 @@ def test_jittered_forces_act_as_they_do_without_ros(graph: Graph) -> None:
     columns, _ = joint_state_columns(heard)
     assert columns.position.tolist() == positions
 
+    graph.wait_until(lambda: len(forces) == 301, "301 forces")
+    overtaken = plant.diagnose()[2]["dropped: overtaken by a newer one"]
+    graph.wait_until(lambda: len(dropped) == overtaken, "all that were overtaken")
+    assert overtaken > 30
+    assert set(dropped) < set(forces)
+
 
 def test_it_runs_no_further_ahead_of_the_recorder_than_the_window(graph: Graph) -> None:
     heard = graph.listen(JOINT_STATES, raw=True)
@@ -97,20 +106,8 @@ def test_it_runs_no_further_ahead_of_the_recorder_than_the_window(graph: Graph) 
     graph.wait_until(lambda: len(heard) == 1001, "a recorder that went away is not waited for")
 
 
-def test_activated_again_it_starts_a_new_segment_where_it_stopped(graph: Graph) -> None:
-    heard = graph.listen(JOINT_STATES, raw=True)
-    plant = graph.add(PlantNode, expects_control=False, wait_for=["observer"], duration=1.0)
-    graph.wait_until(lambda: len(heard) == 101 and not plant.active, "first segment")
-    plant.trigger_activate()
-    graph.wait_until(lambda: len(heard) == 202 and not plant.active, "second segment")
-    columns, _ = joint_state_columns(heard)
-    assert np.diff(columns.stamp).tolist() == [SECOND // 100] * 201
-    assert columns.position[101] == columns.position[100]
-    assert columns.position[201] > columns.position[101] > 0.0
-
-
 @pytest.mark.parametrize(("pace", "enough"), [("lockstep", 200), ("realtime", 10)])
-def test_a_pause_is_no_end_and_does_not_count_as_duration(
+def test_a_pause_is_no_end_and_does_not_count_as_duration_and_the_motion_goes_on(
     graph: Graph, pace: str, enough: int
 ) -> None:
     heard = graph.listen(JOINT_STATES, raw=True)
@@ -123,51 +120,46 @@ def test_a_pause_is_no_end_and_does_not_count_as_duration(
     assert not paused["finished"]
     graph.observer.destroy_publisher(recorded)
     left = 300 - (paused["samples"] - 1)
-    for samples in (left + 1, 301):
+    segments = [paused["samples"]]
+    for duration, samples in ((3.0, left + 1), (0.0, 1), (0.3, 31)):
+        plant.set_parameters([Parameter("duration", value=duration)])
         plant.trigger_activate()
         graph.wait_until(lambda: not plant.active, "the plant pauses by itself")
         assert plant.diagnose()[2]["finished"]
         assert plant.diagnose()[2]["samples"] == samples
+        segments.append(samples)
+    graph.wait_until(lambda: len(heard) == sum(segments), "every sample is heard")
+    columns, _ = joint_state_columns(heard)
+    assert (np.diff(columns.stamp) == SECOND // 100).all() or pace == "realtime"
+    for first in np.cumsum(segments[:-1]):  # of a segment: the motion stood still
+        assert columns.position[first] == columns.position[first - 1]
 
 
-def test_a_run_shorter_than_a_batch_ends(graph: Graph) -> None:
+def test_what_comes_between_two_samples_acts_from_the_next_one(graph: Graph) -> None:
+    """A disturbance, which is told, parameters that change at once, and a reset; time goes on."""
     heard = graph.listen(JOINT_STATES, raw=True)
-    plant = graph.add(PlantNode, expects_control=False, wait_for=["observer"], duration=0.0)
-    graph.wait_until(lambda: len(heard) == 1 and not plant.active, "the only sample")
-    plant.set_parameters([Parameter("duration", value=0.3)])
-    plant.trigger_activate()
-    graph.wait_until(lambda: len(heard) == 32 and not plant.active, "every sample")
-
-
-def test_reset_returns_to_the_initial_state_and_time_goes_on(graph: Graph) -> None:
-    heard = graph.listen(JOINT_STATES, raw=True)
-    parameters = {"initial.position": 0.1, "wait_for": ["observer"]}
-    graph.add(PlantNode, **parameters)
-    force = answers(graph)
+    applied = graph.listen(APPLIED_DISTURBANCE, raw=True)
+    plant = graph.add(PlantNode, wait_for=["observer"], **{"initial.position": 0.1})
+    force, tap = answers(graph), graph.publisher(DISTURBANCE_FORCE, 1)
     graph.wait_until(lambda: len(heard) == 1, "sample 0")
+    tap.publish(pack_wrench(0, 0.5))
+    graph.wait_until(lambda: plant._loop.asked_disturbance == 0.5, "the disturbance came")
+    alone = {"friction.minimum": 0.5}
+    together = {"belt_speed": 1, "friction.static": 0.5, "friction.minimum": 0.45}
+    for values, taken in ((alone, False), (together, True)):
+        changes = [Parameter(name, value=value) for name, value in values.items()]
+        assert plant.set_parameters_atomically(changes).successful == taken
     force.publish(pack_wrench(SECOND, 0.0))
-    graph.wait_until(lambda: len(heard) == 2, "sample 1")
+    graph.wait_until(lambda: applied and len(heard) == 2, "sample 1, and the disturbance is told")
+    assert unpack_wrench(applied[0]) == (SECOND + SECOND // 100, 0.5)
     assert graph.call(Trigger, "/test/plant/reset", Trigger.Request()).success
     force.publish(pack_wrench(SECOND + SECOND // 100, 0.0))
     graph.wait_until(lambda: len(heard) == 3, "sample 2")
     columns, _ = joint_state_columns(heard)
+    assert columns.belt_velocity.tolist() == [0.4, 1.0, 1.0]
     assert columns.position[1] != 0.1
     assert columns.position[2] == 0.1
     assert columns.stamp[2] == SECOND + 2 * SECOND // 100
-
-
-def test_a_disturbance_acts_from_the_next_sample_and_is_told(graph: Graph) -> None:
-    heard = graph.listen(JOINT_STATES, raw=True)
-    applied = graph.listen(APPLIED_DISTURBANCE, raw=True)
-    plant = graph.add(PlantNode, wait_for=["observer"])
-    force = answers(graph)
-    tap = graph.publisher(DISTURBANCE_FORCE, 1)
-    graph.wait_until(lambda: len(heard) == 1, "sample 0")
-    tap.publish(pack_wrench(0, 0.5))
-    graph.wait_until(lambda: plant._loop.asked_disturbance == 0.5, "the disturbance came")
-    force.publish(pack_wrench(SECOND, 0.0))
-    graph.wait_until(lambda: applied, "the disturbance is told")
-    assert unpack_wrench(applied[0]) == (SECOND + SECOND // 100, 0.5)
 
 
 def test_the_truth_is_told_if_asked(graph: Graph) -> None:
@@ -194,22 +186,6 @@ def test_the_truth_is_told_if_asked(graph: Graph) -> None:
     assert forces == (0.0, 0.2)
 
 
-def test_parameters_that_change_at_once_act_from_the_next_sample(graph: Graph) -> None:
-    plant = graph.add(PlantNode, wait_for=["observer"])
-    heard = graph.listen(JOINT_STATES, raw=True)
-    force = answers(graph)
-    graph.wait_until(lambda: len(heard) == 1, "sample 0")
-    alone = {"friction.minimum": 0.5}
-    together = {"belt_speed": 1, "friction.static": 0.5, "friction.minimum": 0.45}
-    for values, taken in ((alone, False), (together, True)):
-        changes = [Parameter(name, value=value) for name, value in values.items()]
-        assert plant.set_parameters_atomically(changes).successful == taken
-    force.publish(pack_wrench(SECOND, 0.0))
-    graph.wait_until(lambda: len(heard) == 2, "sample 1")
-    columns, _ = joint_state_columns(heard)
-    assert columns.belt_velocity.tolist() == [0.4, 1.0]
-
-
 def test_a_motion_that_runs_away_deactivates_the_plant(graph: Graph) -> None:
     diagnostics = graph.listen(DIAGNOSTICS)
     parameters = {
@@ -229,23 +205,18 @@ def test_a_motion_that_runs_away_deactivates_the_plant(graph: Graph) -> None:
     assert not plant.active
 
 
-def test_realtime_keeps_the_stamps_on_the_grid_and_holds_late_forces(graph: Graph) -> None:
+def test_realtime_keeps_the_stamps_on_the_grid_and_its_pace_and_holds_late_forces(
+    graph: Graph,
+) -> None:
     heard = graph.listen(JOINT_STATES, raw=True)
-    plant = graph.add(PlantNode, pace="realtime", rate=200.0, duration=0.5, wait_for=["observer"])
+    timing = {"pace": "realtime", "rate": 200.0, "real_time_factor": 2.0}
+    plant = graph.add(PlantNode, duration=0.5, wait_for=["observer"], **timing)
     graph.wait_until(lambda: len(heard) == 101 and not plant.active, "half a second")
     columns, _ = joint_state_columns(heard)
     assert np.diff(columns.stamp).tolist() == [SECOND // 200] * 100
     assert plant._loop.late_forces == 100
-
-
-def test_the_real_time_factor_scales_the_pace(graph: Graph) -> None:
-    plant = graph.add(
-        PlantNode, pace="realtime", duration=2.0, real_time_factor=5.0, expects_control=False
-    )
-    graph.wait_until(lambda: hasattr(plant, "_pacer") and not plant.active, "two seconds")
     # It can be slower on a busy machine, never faster.
-    assert plant._pacer.steps_per_second <= 100.0 * 5.0 * 1.01
-    assert plant._loop.late_forces == 0
+    assert plant._pacer.steps_per_second <= 200.0 * 2.0 * 1.01
 
 
 @pytest.mark.parametrize("pace", ["lockstep", "realtime"])
@@ -269,16 +240,3 @@ def test_forces_that_do_not_act_are_published_as_they_were_sent(graph: Graph, pa
         force.publish(message)
     graph.wait_until(lambda: len(dropped) == 6, "what comes while it pauses")
     assert dropped[5] == sent[1]
-
-
-def test_forces_that_were_overtaken_are_published(graph: Graph) -> None:
-    dropped = graph.listen(DROPPED_FORCE, raw=True)
-    forces = graph.listen(CONTROL_FORCE, raw=True)
-    graph.add(WashoutControllerNode)
-    listeners = ["observer", "washout_controller"]
-    plant = graph.add(PlantNode, duration=3.0, wait_for=listeners, force_jitter=0.035)
-    graph.wait_until(lambda: len(forces) == 301 and not plant.active, "301 forces")
-    overtaken = plant.diagnose()[2]["dropped: overtaken by a newer one"]
-    graph.wait_until(lambda: len(dropped) == overtaken, "all of them")
-    assert overtaken > 30
-    assert set(dropped) < set(forces)

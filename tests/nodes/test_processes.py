@@ -4,7 +4,6 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
 from functools import partial
 from importlib import import_module
 from pathlib import Path
@@ -17,30 +16,7 @@ from stickslip_ros.messages.topics import JOINT_STATES
 from stickslip_ros.scenarios.parameter_field import known_parameters
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, ReplayParameters
 from tests.nodes.graph import PATIENCE, Graph
-
-Start = Callable[..., subprocess.Popen[str]]
-
-
-@pytest.fixture
-def start(process_environment: dict[str, str]) -> Iterator[Start]:
-    processes: list[subprocess.Popen[str]] = []
-
-    def start(node: str, *ros_arguments: str) -> subprocess.Popen[str]:
-        command = [sys.executable, "-m", f"stickslip_ros.nodes.{node}"]
-        process = subprocess.Popen(
-            [*command, "--ros-args", *ros_arguments],
-            env=process_environment,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-        )
-        processes.append(process)
-        return process
-
-    yield start
-    for process in processes:
-        process.kill()
-        process.communicate()
+from tests.nodes.processes import Processes
 
 
 def finish(process: subprocess.Popen[str], number: signal.Signals = signal.SIGINT) -> str:
@@ -58,16 +34,16 @@ def tells_of_both(bag: Path) -> bool:
 
 
 def test_nodes_started_singly_close_the_loop_and_the_bag(
-    graph: Graph, start: Start, tmp_path: Path
+    graph: Graph, processes: Processes, tmp_path: Path
 ) -> None:
     heard = graph.listen(JOINT_STATES, raw=True)
     here = ("-r", "__ns:=/test")
     file = tmp_path / "parameters.yaml"
     file.write_text("/**/plant: {ros__parameters: {belt_speed: 1, friction: {law: coulomb}}}\n")
-    analyzer = start("analyzer", *here, "-p", f"bag:={tmp_path / 'bag'}")
-    controller = start("washout_controller", *here)
+    analyzer = processes.piped("analyzer", *here, "-p", f"bag:={tmp_path / 'bag'}")
+    controller = processes.piped("washout_controller", *here)
     waiting = ("-p", "wait_for:=[washout_controller, analyzer]")
-    plant = start("plant", *here, "--params-file", str(file), *waiting)
+    plant = processes.piped("plant", *here, "--params-file", str(file), *waiting)
     graph.wait_until(lambda: len(heard) > 300, "the loop runs")
     graph.wait_until(partial(tells_of_both, tmp_path / "bag"), "it has asked for the parameters")
     finish(plant)
@@ -92,9 +68,9 @@ def test_nodes_started_singly_close_the_loop_and_the_bag(
     ],
 )
 def test_bad_parameters_end_the_process_with_one_line(
-    start: Start, node: str, arguments: tuple[str, ...], named: tuple[str, ...]
+    processes: Processes, node: str, arguments: tuple[str, ...], named: tuple[str, ...]
 ) -> None:
-    process = start(node, *arguments)
+    process = processes.piped(node, *arguments)
     _, errors = process.communicate(timeout=PATIENCE)
     assert process.returncode == 2, errors
     lines = [line for line in errors.splitlines() if line.strip()]
@@ -108,7 +84,6 @@ def test_bad_parameters_end_the_process_with_one_line(
     ("command", "imported"),
     [
         (["-m", "stickslip_ros.nodes.plant"], "rclpy"),
-        (["-m", "stickslip_ros.nodes.replay"], "rclpy"),
         (["plant_node"], "rclpy"),
         (["-m", "stickslip_ros.app.main", "simulate", "paper"], "difflib"),
     ],

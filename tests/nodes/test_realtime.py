@@ -4,49 +4,28 @@ import os
 import signal
 import time
 from fractions import Fraction
-from itertools import pairwise
+from itertools import product
 from pathlib import Path
 from threading import Lock
 
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
 
-from stickslip_ros.messages.codec import unpack_header
-from stickslip_ros.messages.topics import DIAGNOSTICS, JOINT_STATES
+from stickslip_ros.messages.topics import DIAGNOSTICS
 from stickslip_ros.nodes.pacing import RealtimePacer
 from stickslip_ros.physics.loop.sampled_loop import SampledLoop
 from stickslip_ros.physics.motion.motion import Motion
 from stickslip_ros.scenarios.parameters import PlantParameters
 from tests.nodes.graph import Graph
 from tests.nodes.processes import Processes
+from tests.nodes.samples import Samples
 
 
-class Samples:
-    """Stamps of the joint states that the observer hears, and when it heard them."""
-
-    def __init__(self, graph: Graph) -> None:
-        self.stamps: list[int] = []
-        self.arrivals: list[float] = []
-        self._graph = graph
-        graph.subscribe(JOINT_STATES, self._take)
-
-    def _take(self, message: bytes) -> None:
-        self.arrivals.append(time.monotonic())
-        self.stamps.append(unpack_header(message))
-
-    def wait_for(self, count: int) -> None:
-        """Wait until as many further samples have come."""
-        enough = len(self.stamps) + count
-        self._graph.wait_until(lambda: len(self.stamps) >= enough, f"{count} further samples")
-
-    def least_delay(self, first: int, last: int | None) -> float:
-        """Return by how much, s, the least late of these samples came after its stamp's time."""
-        return min(
-            arrival - (stamp - self.stamps[0]) * 1e-9
-            for arrival, stamp in zip(
-                self.arrivals[first:last], self.stamps[first:last], strict=True
-            )
-        )
+def least_delay(samples: Samples, first: int, last: int | None) -> float:
+    """Return by how much, s, the least late of these samples came after its stamp's time."""
+    start = samples.stamps[0]
+    pairs = zip(samples.arrivals[first:last], samples.stamps[first:last], strict=True)
+    return min(arrival - (stamp - start) * 1e-9 for arrival, stamp in pairs)
 
 
 def figure(health: list[DiagnosticArray], name: str) -> int:
@@ -87,19 +66,19 @@ def test_after_a_stall_every_sample_follows_at_once_and_the_schedule_stands(
     assert count > figure(health, "missed_deadlines") >= stall * rate - 5
     # The second half of the rest: by then the plant has caught up.
     after = (before + round(stall * rate) + count) // 2
-    delayed = samples.least_delay(after, None) - samples.least_delay(0, before)
+    delayed = least_delay(samples, after, None) - least_delay(samples, 0, before)
     assert abs(delayed) < 0.5 * stall
 
 
-@pytest.mark.parametrize("rate", [3.0, 1000.0 / 3.0, 1000.0, 44_100.0])
-@pytest.mark.parametrize("factor", [1.0, 0.1, 7.0])
-def test_after_millions_of_samples_the_deadline_is_exact(rate: float, factor: float) -> None:
+def test_after_millions_of_samples_the_deadline_is_exact() -> None:
     motion = Motion(PlantParameters().as_drive(), 0.0, 0.0)
-    loop = SampledLoop(motion, rate, 1_000_000_000)
-    pacer = RealtimePacer(loop, lambda _: None, lambda: None, Lock(), factor, lambda _: None)
-    for number in (1, 1_000_003, 3_600_000, 86_400_000):
-        exact = number / (Fraction(rate) * Fraction(factor))
-        assert abs(Fraction(pacer.deadline(number)) - Fraction(pacer.deadline(0)) - exact) < 1e-6
+    for rate, factor in product((3.0, 1000.0 / 3.0, 1000.0, 44_100.0), (1.0, 0.1, 7.0)):
+        loop = SampledLoop(motion, rate, 1_000_000_000)
+        pacer = RealtimePacer(loop, lambda _: None, lambda: None, Lock(), factor, lambda _: None)
+        first = Fraction(pacer.deadline(0))
+        for number in (1, 1_000_003, 3_600_000, 86_400_000):
+            exact = number / (Fraction(rate) * Fraction(factor))
+            assert abs(Fraction(pacer.deadline(number)) - first - exact) < 1e-6
 
 
 def processor_time(pid: int) -> float:
@@ -109,8 +88,14 @@ def processor_time(pid: int) -> float:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("reliability", ["RELIABLE", "BEST_EFFORT"])
-@pytest.mark.parametrize("end", [signal.SIGSTOP, signal.SIGKILL])
+@pytest.mark.parametrize(
+    ("end", "reliability"),
+    [
+        (signal.SIGSTOP, "RELIABLE"),
+        (signal.SIGSTOP, "BEST_EFFORT"),
+        (signal.SIGKILL, "RELIABLE"),
+    ],
+)
 def test_a_reader_that_is_stopped_or_killed_costs_the_plant_nothing(
     graph: Graph, processes: Processes, end: signal.Signals, reliability: str
 ) -> None:
@@ -138,5 +123,5 @@ def test_a_reader_that_is_stopped_or_killed_costs_the_plant_nothing(
     stranger.send_signal(end)
     samples.wait_for(1500)  # some effects take seconds to show
     assert any(relative_cost(1000) < 1.6 * usual for _ in range(5))
-    assert max(b - a for a, b in pairwise(samples.arrivals[first:])) < 0.9
+    assert samples.longest_gap(first) < 0.9
     assert samples.stamps == [samples.stamps[0] + n * 2_000_000 for n in range(len(samples.stamps))]

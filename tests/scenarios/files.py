@@ -1,11 +1,13 @@
 """Scenario files for the tests."""
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.scenarios.files import load_scenario
+from stickslip_ros.scenarios.parameters import PlantParameters
 
 
 def scenario_file(folder: Path, text: str) -> str:
@@ -18,6 +20,12 @@ def scenario_file(folder: Path, text: str) -> str:
 def section(pattern: str, parameters: str) -> str:
     """Return a section of a parameter file; `parameters` is a YAML mapping in braces."""
     return f'"{pattern}":\n  ros__parameters: {parameters}\n'
+
+
+def plant(**values: Any) -> PlantParameters:
+    """Return parameters of the plant; `__` in a name stands for a dot."""
+    flat = {name.replace("__", "."): value for name, value in values.items()}
+    return PlantParameters.validated(flat, "test")
 
 
 def refusal(path: str, *overrides: str, namespace: str = "/feed_drive") -> str:

@@ -1,12 +1,13 @@
 """Which controller a scenario uses, and its parameters."""
 
 import pickle
+from itertools import permutations
 from pathlib import Path
 
 import pytest
 
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.model.control import VelocityFeedback, Washout
+from stickslip_ros.physics.model.control import VelocityFeedback
 from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.scenarios.parameters import CONTROLLER_PARAMETERS
 from stickslip_ros.studies.plan import Axis
@@ -18,18 +19,15 @@ FEEDBACK = section("/**/velocity_feedback_controller", "{velocity_gain: -3000.0}
 WASHOUT = section("/**/washout_controller", "{linear_gain: -2000.0}")
 
 
-def test_without_a_section_it_is_the_default(tmp_path: Path) -> None:
-    path = scenario_file(tmp_path, section("/**/plant", "{mass: 2.0}"))
-    assert load_scenario(path).control_law == Washout()
-    assert load_scenario(path, ["plant.expects_control=false"]).control_law is None
-
-
 def test_the_nearest_section_of_a_controller_chooses_it(tmp_path: Path) -> None:
     scenario = load_scenario(scenario_file(tmp_path, BASE + FEEDBACK))
     assert scenario.control_law == VelocityFeedback(-3000.0)
     assert scenario.nodes == ("plant", "velocity_feedback_controller", "analyzer")
     assert list(scenario.as_dict()) == [*scenario.nodes]
-    assert load_scenario(scenario_file(tmp_path, BASE)).controller.law == "washout"
+    for text in (BASE, section("/**/plant", "{mass: 2.0}")):
+        path = scenario_file(tmp_path, text)
+        assert load_scenario(path).controller.law == "washout"
+        assert load_scenario(path, ["plant.expects_control=false"]).control_law is None
 
 
 def test_its_name_may_have_any_namespace_that_applies(tmp_path: Path) -> None:
@@ -74,13 +72,12 @@ def test_another_controller_takes_its_values_of_the_file(tmp_path: Path) -> None
     assert scenario.with_controller("washout") is scenario
 
 
-@pytest.mark.parametrize("law", CONTROLLER_PARAMETERS)
-def test_the_parameters_are_an_attribute_by_the_name_of_the_node(law: str) -> None:
-    scenario = load_scenario("feed_drive", controller=law)
-    assert getattr(scenario, f"{law}_controller") is scenario.controller
-    (other,) = CONTROLLER_PARAMETERS.keys() - {law}
-    assert not hasattr(scenario, f"{other}_controller")
-    assert pickle.loads(pickle.dumps(scenario)) == scenario
+def test_the_parameters_are_an_attribute_by_the_name_of_the_node() -> None:
+    for law, other in permutations(CONTROLLER_PARAMETERS):
+        scenario = load_scenario("feed_drive", controller=law)
+        assert getattr(scenario, f"{law}_controller") is scenario.controller
+        assert not hasattr(scenario, f"{other}_controller")
+        assert pickle.loads(pickle.dumps(scenario)) == scenario
 
 
 def test_what_is_no_law_or_not_in_use_is_refused() -> None:

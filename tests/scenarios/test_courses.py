@@ -11,15 +11,9 @@ from stickslip_ros.physics.model.courses import Impulse, Ramp, Sine, Step, Table
 from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.scenarios.parameter_field import Fixed, known_parameters
 from stickslip_ros.scenarios.parameters import PlantParameters
-from tests.scenarios.files import refusal, scenario_file, section
+from tests.scenarios.files import plant, refusal, scenario_file, section
 
 TABLE = "time,value\n0,0\n1,0.5\n3,-0.25\n"
-
-
-def plant(**values: object) -> PlantParameters:
-    return PlantParameters.validated(
-        {name.replace("__", "."): value for name, value in values.items()}, "test"
-    )
 
 
 def test_each_kind_gives_its_course() -> None:
@@ -130,3 +124,6 @@ def test_when_they_can_be_changed() -> None:
         assert known[f"{part}.amplitude"].fixed is Fixed.NEVER
     assert known["belt.kind"].fixed is known["load.kind"].fixed is Fixed.ACTIVE
     assert known["disturbance.kind"].fixed is Fixed.NEVER
+    for name in ("friction.file", "friction.reverse.file"):
+        assert known[name].fixed is Fixed.RUNNING
+        assert known[name].file

@@ -1,10 +1,8 @@
 """Friction as parameters: constants by direction, and measured curves from files."""
 
 import json
-import os
 from math import inf, isnan, nan
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -12,19 +10,14 @@ from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.model.constants import constants_of
 from stickslip_ros.physics.model.friction import LAWS, Directional, Exponential, Stribeck, Table
 from stickslip_ros.scenarios.files import load_scenario, parameter_file
-from stickslip_ros.scenarios.parameter_field import Fixed, known_parameters
+from stickslip_ros.scenarios.parameter_field import known_parameters
 from stickslip_ros.scenarios.parameters import PlantParameters
 from stickslip_ros.scenarios.schema import scenario_schema
 from stickslip_ros.scenarios.template import commented_file
-from tests.scenarios.files import refusal, scenario_file, section
+from tests.scenarios.files import plant, refusal, scenario_file, section
 
 CURVE = "0,0.4\n0.1,0.3\n0.5,0.25\n"
 POINTS = ((0.0, 0.4), (0.1, 0.3), (0.5, 0.25))
-
-
-def plant(**values: Any) -> PlantParameters:
-    flat = {name.replace("__", "."): value for name, value in values.items()}
-    return PlantParameters.validated(flat, "test")
 
 
 @pytest.fixture
@@ -54,6 +47,7 @@ def test_every_constant_has_one_for_backward_slip() -> None:
 
 def test_constants_for_backward_slip_make_a_law_of_two_directions() -> None:
     same = Stribeck(0.4, 0.25, 0.5)
+    assert plant() == plant(friction__reverse__static=float("nan"))
     assert plant().as_drive().friction == same
     assert plant(friction__reverse__static=nan).as_drive().friction == same
     assert plant(friction__reverse__slope=0.3).as_drive().friction == same  # of another law
@@ -75,11 +69,6 @@ def test_a_refusal_names_the_parameter() -> None:
         assert str(caught.value) == f"test: friction.{message}"
 
 
-def test_parameters_that_are_equal_compare_equal() -> None:
-    assert plant() == plant(friction__reverse__static=float("nan"))
-    assert load_scenario("paper") == load_scenario("paper")
-
-
 def test_the_names_of_a_drive_are_those_that_make_its_law() -> None:
     assert "friction.reverse.static" not in plant().drive_names()
     assert "friction.reverse.static" in plant(friction__reverse__static=0.3).drive_names()
@@ -90,14 +79,10 @@ def test_the_names_of_a_drive_are_those_that_make_its_law() -> None:
     assert two.as_drive().friction == Exponential(0.4, 0.25, 0.5, 0.0, 2.0)
 
 
-def test_a_scenario_shows_a_constant_of_backward_slip_where_it_is_given() -> None:
-    assert "reverse" not in repr(load_scenario("paper"))
-    shown = repr(load_scenario("paper", ["plant.friction.reverse.static=0.35"]))
-    assert "plant.friction.reverse.static" in shown
-
-
 def test_a_complete_file_gives_the_same_parameters(tmp_path: Path) -> None:
+    assert "reverse" not in repr(load_scenario("paper"))
     scenario = load_scenario("paper", ["plant.friction.reverse.static=0.35"])
+    assert "plant.friction.reverse.static" in repr(scenario)
     commented = scenario_file(tmp_path, commented_file(scenario, "A copy."))
     assert load_scenario(commented).plant == scenario.plant
     plain = scenario_file(tmp_path, parameter_file(scenario.as_dict()))
@@ -136,16 +121,6 @@ def test_what_a_file_may_look_like(curve: Path) -> None:
         assert law == Table(POINTS)
 
 
-def test_a_file_is_relative_to_the_scenario_file(curve: Path, tmp_path: Path) -> None:
-    path = scenario_file(
-        tmp_path, section("/**/plant", "{friction: {law: table, file: curve.csv}}")
-    )
-    scenario = load_scenario(path)
-    assert scenario.plant.friction.file == str(curve)
-    assert scenario.plant.as_drive().friction == Table(POINTS)
-    assert load_scenario(path, ["plant.mass=2"]).plant.friction.file == str(curve)
-
-
 def test_a_file_of_a_base_is_relative_to_the_base(curve: Path, tmp_path: Path) -> None:
     scenario_file(tmp_path, section("/**/plant", "{friction: {law: table, file: curve.csv}}"))
     own = tmp_path / "own"
@@ -154,16 +129,10 @@ def test_a_file_of_a_base_is_relative_to_the_base(curve: Path, tmp_path: Path) -
         own,
         section("/**/plant", "{mass: 2.0}") + section("/**/scenario", "{base: ../scenario.yaml}"),
     )
-    file = Path(load_scenario(path).plant.friction.file)
-    assert file.samefile(curve)
-    assert file.is_absolute()
-
-
-def test_a_file_is_given_where_the_node_is_started() -> None:
-    known = known_parameters(PlantParameters)
-    for name in ("friction.file", "friction.reverse.file"):
-        assert known[name].fixed is Fixed.RUNNING
-        assert known[name].file
+    for friction in (load_scenario(path, each).plant.friction for each in ([], ["plant.rate=9"])):
+        assert Path(friction.file).samefile(curve)
+        assert Path(friction.file).is_absolute()
+        assert friction.as_law() == Table(POINTS)
 
 
 def refused(path: Path) -> str:
@@ -203,15 +172,11 @@ def test_a_file_that_cannot_be_read_is_refused(curve: Path, tmp_path: Path) -> N
     )
     assert refused(tmp_path).endswith("it is not a regular file")
     assert refused(Path("/dev/zero")).endswith("it is not a regular file")
-    pipe = tmp_path / "pipe"
-    os.mkfifo(pipe)
-    assert refused(pipe).endswith("it is not a regular file")
     curve.write_bytes(b"\xff\xfe\x00")
     assert refused(curve).endswith("is refused: the file cannot be read: it is not UTF-8 text")
     curve.write_text("0,0.4\n" * 200_000)
     assert refused(curve).endswith("must have at most 1000000 bytes")
 
-
-def test_a_bad_file_for_backward_slip_is_refused_by_its_name(curve: Path, tmp_path: Path) -> None:
+    curve.write_text(CURVE)
     files = f"plant.friction.file={curve}", f"plant.friction.reverse.file={tmp_path / 'none.csv'}"
     assert "friction.reverse.file = " in refusal("paper", "plant.friction.law=table", *files)

@@ -18,6 +18,7 @@ from stickslip_ros.scenarios.parameters import (
     NodeParameters,
     PlantParameters,
 )
+from tests.examples import examples
 
 # Only while a node is not active; every physical parameter and gain can be set at any time.
 FIXED: dict[str, set[str]] = {
@@ -48,14 +49,6 @@ def test_defaults_and_what_may_change_while_active() -> None:
     )
 
 
-def test_every_parameter_is_described() -> None:
-    for model in NODE_PARAMETERS.values():
-        for parameter in parameters_of(model):
-            assert parameter.meaning.endswith(".")
-            assert parameter.kind in (bool, int, float, str, list)
-            assert not parameter.choices or parameter.default in parameter.choices
-
-
 def test_every_friction_law_can_be_chosen_and_made() -> None:
     assert known("plant")["friction.law"].choices == tuple(LAWS)
     for name, law in LAWS.items():
@@ -63,19 +56,6 @@ def test_every_friction_law_can_be_chosen_and_made() -> None:
             continue
         plant = PlantParameters.validated({"friction.law": name}, "test")
         assert type(plant.as_drive().friction) is law
-
-
-def test_the_constants_of_the_laws_are_parameters() -> None:
-    found = known("plant")
-    assert found["friction.curve"].meaning.endswith("(lugre, elasto_plastic, maxwell_slip).")
-    assert found["friction.curve"].bounds == "one of stribeck, coulomb, linear, exponential, table"
-    for name, default, bounds, meaning in (
-        ("static", 0.4, "at least 0", "Static (break-away) coefficient mu_s."),
-        ("viscous", 0.0, "", "Increase of the coefficient with speed (coulomb, exponential)."),
-        ("decay_speed", 0.5, "above 0", "Speed v_s of the decay from mu_s to mu_k (exponential)."),
-    ):
-        each = found[f"friction.{name}"]
-        assert (each.default, each.bounds, each.meaning) == (default, bounds, meaning)
 
 
 def test_a_law_gets_the_constants_of_its_formula() -> None:
@@ -145,6 +125,7 @@ def values_of(draw: st.DrawFn, model: type[NodeParameters]) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("node", NODE_PARAMETERS)
+@examples(quick=10, thorough=100)
 @given(data=st.data())
 def test_flat_values_give_the_parameters_again(node: str, data: st.DataObject) -> None:
     model = NODE_PARAMETERS[node]

@@ -4,30 +4,11 @@ import pytest
 
 from stickslip_ros.physics.measures.reading import SampleAssumptions
 from stickslip_ros.physics.model.actuator import IDEAL_ACTUATOR, Actuator
-from stickslip_ros.physics.model.constants import constants_of
 from stickslip_ros.physics.model.sensor import EXACT_SENSOR, MeasuredVelocity, Sensor
 from stickslip_ros.physics.motion import Motion
 from stickslip_ros.scenarios.files import load_scenario
-from stickslip_ros.scenarios.parameter_field import Fixed, known_parameters
 from stickslip_ros.scenarios.parameters import PlantParameters
 from tests.scenarios.files import refusal
-
-
-def test_their_constants_are_parameters_of_the_plant() -> None:
-    known = known_parameters(PlantParameters)
-    for part, fixed in ((Sensor, Fixed.ACTIVE), (Actuator, Fixed.NEVER)):
-        for name, constant in constants_of(part).items():
-            parameter = known[f"{part.__name__.lower()}.{name}"]
-            assert (parameter.unit, parameter.fixed) == (constant.unit, fixed)
-    assert known["sensor.velocity"].choices == ("exact", "difference")
-    assert known["sensor.difference_samples"].bounds == "at least 1"
-    assert not known["actuator.limit"].finite
-
-
-def test_they_are_ideal_by_default() -> None:
-    plant = PlantParameters()
-    assert plant.as_sensor() == EXACT_SENSOR
-    assert plant.as_drive().actuator == IDEAL_ACTUATOR
 
 
 def test_the_plant_has_the_parts_of_its_parameters() -> None:
@@ -39,6 +20,8 @@ def test_the_plant_has_the_parts_of_its_parameters() -> None:
         },
         "here",
     )
+    assert PlantParameters().as_sensor() == EXACT_SENSOR
+    assert PlantParameters().as_drive().actuator == IDEAL_ACTUATOR
     assert plant.as_sensor() == Sensor(0.25, velocity=MeasuredVelocity.DIFFERENCE)
     drive = plant.as_drive()
     assert drive.actuator == Actuator(time_constant=0.5)

@@ -16,12 +16,9 @@ def test_what_is_not_there() -> None:
         assert refusal(path).startswith(f"no scenario file {path}")
 
 
-def test_what_ships_is_found_with_its_ending_too() -> None:
-    assert load_scenario("feed_drive.yaml") == load_scenario("feed_drive")
-
-
 def test_a_file_comes_before_what_ships(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
+    assert load_scenario("feed_drive.yaml") == load_scenario("feed_drive")
     Path("feed_drive.yaml").write_text(section("/**/plant", "{mass: 7}"), encoding="utf-8")
     assert load_scenario("feed_drive.yaml").plant.mass == 7.0
     assert load_scenario("feed_drive").plant.mass == 100.0
@@ -65,22 +62,13 @@ def test_a_value_that_is_not_allowed(tmp_path: Path) -> None:
     finite = "must be a finite number"
     for node, name, value, shown, allowed in (
         ("plant", "mass", "0", "0", f"{finite} above 0 kg"),
-        ("plant", "damping", "-1e-9", "-1e-09", f"{finite} at least 0 N s/m"),
         ("plant", "rate", "1.1e9", "1100000000.0", "at least 1e-06 and at most 1e+09 Hz"),
-        ("plant", "flow_window", "199", "199", "whole number at least 200 and at most 4000 sam"),
-        ("plant", "mass", "1e31", "1e+31", f"{finite} at least 1e-30 and at most 1e+30 kg"),
-        ("plant", "belt_speed", "-1e31", "-1e+31", "at least -1e+30 and at most 1e+30 m/s"),
         ("plant", "belt_speed", ".nan", "nan", f"{finite} in m/s"),
-        ("plant", "duration", ".nan", "nan", "at least 0 s"),
-        ("washout_controller", "start_after", ".inf", "inf", f"{finite} at least 0 s"),
         ("plant", "disturbance.kind", "on", "True", "must be one of none, step, impulse, ramp"),
-        ("analyzer", "compression", "zip", "'zip'", "must be one of lz4, zstd, none"),
         ("plant", "mass", "'1'", "'1'", f"{finite} above 0 kg"),
-        ("plant", "mass", "~", "'~'", f"{finite} above 0 kg"),
         ("plant", "expects_control", "1", "1", "must be true or false"),
         ("plant", "wait_for", "[1]", "[1]", "must be a list of strings"),
         ("analyzer", "window", "20.0", "20.0", "must be a whole number"),
-        ("analyzer", "bag", "1", "1", "must be a string"),
     ):
         path = scenario_file(tmp_path, section(f"/**/{node}", f"{{{name}: {value}}}"))
         message = refusal(path)
@@ -111,9 +99,7 @@ def test_values_that_do_not_go_together(tmp_path: Path) -> None:
 
 def test_a_parameter_that_is_not_known(tmp_path: Path) -> None:
     for parameters, name, value, meant in (
-        ("{masss: 1}", "masss", "1", "did you mean mass?"),
         ("{friction: {statik: 0.4}}", "friction.statik", "0.4", "did you mean friction.static?"),
-        ("{friction: 0.4}", "friction", "0.4", "did you mean friction."),
         ("{mass: {kg: 1}}", "mass.kg", "1", "did you mean mass?"),
         ("{1: a}", "1", "'a'", "known are actuator.*, autostart,"),
     ):

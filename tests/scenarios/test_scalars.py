@@ -4,8 +4,6 @@ from math import isfinite, isnan
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from stickslip_ros.scenarios.files import load_scenario
 from tests.scenarios.conftest import ReadByRos
 from tests.scenarios.files import refusal, scenario_file, section
@@ -59,9 +57,3 @@ def test_a_scenario_reads_them_so(tmp_path: Path) -> None:
     for text in (".inf", "inf"):
         path = scenario_file(tmp_path, section("/**/plant", f"{{duration: {text}}}"))
         assert not isfinite(load_scenario(path).plant.duration)
-
-
-def test_pyyaml_alone_would_not() -> None:
-    """Why the loader has rules of its own."""
-    assert yaml.safe_load("1e3") == "1e3"
-    assert yaml.safe_load("1_000") == 1000

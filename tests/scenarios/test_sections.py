@@ -29,12 +29,16 @@ matching = [(namespace, p) for namespace, (these, _) in MATCHES.items() for p in
 not_matching = [(namespace, p) for namespace, (_, others) in MATCHES.items() for p in others]
 
 
-def test_a_section_applies_to_the_nodes_that_it_matches(tmp_path: Path) -> None:
+def test_a_section_applies_to_the_nodes_that_it_matches_for_ros_too(
+    tmp_path: Path, read_by_ros: ReadByRos
+) -> None:
     for namespace, pattern in matching:
         path = scenario_file(tmp_path, section(pattern, "{mass: 7.0}"))
         assert load_scenario(path, namespace=namespace).plant.mass == 7.0
+        assert read_by_ros(path, namespace) == {"mass": 7.0}, (namespace, pattern)
     for namespace, pattern in not_matching:
         path = scenario_file(tmp_path, section(pattern, "{mass: 7.0}"))
+        assert read_by_ros(path, namespace) == {}, (namespace, pattern)
         message = refusal(path, namespace=namespace)
         assert message.startswith(f"{path}: section /{pattern.strip('/')} matches no node")
         assert f"the nodes in namespace {namespace} are {', '.join(NODE_PARAMETERS)}" in message
@@ -47,13 +51,6 @@ def test_sections_of_other_nodes_are_left_alone_where_there_may_be_some(tmp_path
     assert str(scenario.path) == str(tmp_path / "scenario.yaml")
 
 
-def test_ros_agrees(tmp_path: Path, read_by_ros: ReadByRos) -> None:
-    for namespace, pattern in matching + not_matching:
-        path = scenario_file(tmp_path, section(pattern, "{mass: 7.0}"))
-        expected = {"mass": 7.0} if (namespace, pattern) in matching else {}
-        assert read_by_ros(path, namespace) == expected, (namespace, pattern)
-
-
 def test_a_section_for_all_gives_to_each_what_it_has(tmp_path: Path) -> None:
     parameters = "{use_sim_time: true, mass: 7.0, window: 5}"
     scenario = load_scenario(scenario_file(tmp_path, section("/**", parameters)))
@@ -61,17 +58,3 @@ def test_a_section_for_all_gives_to_each_what_it_has(tmp_path: Path) -> None:
     assert scenario.washout_controller.use_sim_time
     assert scenario.analyzer.use_sim_time
     assert (scenario.plant.mass, scenario.analyzer.window) == (7.0, 5)
-
-
-def test_the_later_section_counts_as_in_ros(tmp_path: Path, read_by_ros: ReadByRos) -> None:
-    for first, second in (("/**", "/**/plant"), ("/**/plant", "/**")):
-        text = section(first, "{mass: 7.0, rate: 50.0}") + section(second, "{mass: 8.0}")
-        path = scenario_file(tmp_path, text)
-        plant = load_scenario(path).plant
-        assert {"mass": plant.mass, "rate": plant.rate} == {"mass": 8.0, "rate": 50.0}
-        assert read_by_ros(path) == {"mass": 8.0, "rate": 50.0}
-
-
-def test_names_may_be_nested(tmp_path: Path) -> None:
-    text = "feed_drive:\n  plant:\n    ros__parameters:\n      friction: {static: 0.5}\n"
-    assert load_scenario(scenario_file(tmp_path, text)).plant.friction.static == 0.5

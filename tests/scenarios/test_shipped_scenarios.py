@@ -73,46 +73,10 @@ def test_a_scenario_is_found_in_an_installation(
     assert load_scenario("own").plant.mass == 7.0
 
 
-NUMBERS: dict[str, dict[str, dict[str, Any]]] = {
-    "feed_profile": {
-        "plant": {
-            "belt_speed": 0.0,
-            "belt.kind": "table",
-            "belt.file": str(CONFIG / "feed_profile.csv"),
-            "duration": 13.0,
-        },
-        "washout_controller": {"start_after": 4.0},
-    },
-    "vibrating_load": {
-        "plant": {"load.kind": "sine", "load.amplitude": 300.0, "load.frequency": 50.0},
-    },
-    "axis": {
-        "plant": {
-            "friction.law": "coulomb",
-            "mass": 95.154,
-            "stiffness": 0.0,
-            "damping": 0.0,
-            "normal_force": 1000.0,
-            "belt_speed": 0.0,
-            "bias_force": 3.1648,
-            "friction.static": 0.020144,
-            "friction.viscous": 0.1667061,
-            "friction.reverse.static": 0.0206277,
-            "friction.reverse.viscous": 0.2404236,
-            "disturbance.kind": "sine",
-            "disturbance.amplitude": 60.0,
-        },
-        "velocity_feedback_controller": {
-            "position_gain": -1370728.4554,  # 243.45 V/(m/s) 160.18 1/s 35.15065 N/V
-            "velocity_gain": -8557.426,
-            "force_limit": 351.5065,  # 10 V
-        },
-    },
-}
-
-
-def test_numbers_of_the_shipped_scenarios() -> None:
-    for name, nodes in NUMBERS.items():
-        found = load_scenario(name).as_dict()
-        for node, expected in nodes.items():
-            assert {parameter: found[node][parameter] for parameter in expected} == expected
+def test_the_axis_has_the_gains_of_its_drive() -> None:
+    """243.45 V/(m/s), 160.18 1/s and 35.15065 N/V, of at most 10 V, and no spring."""
+    axis = load_scenario("axis")
+    law = axis.controller.as_law()
+    assert law.velocity_gain == pytest.approx(-243.45 * 35.15065, rel=1e-6)
+    assert law.position_gain == pytest.approx(160.18 * law.velocity_gain, rel=1e-6)
+    assert (law.force_limit, axis.plant.stiffness) == (pytest.approx(10.0 * 35.15065), 0.0)

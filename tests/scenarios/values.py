@@ -1,10 +1,14 @@
 """Good and bad values for any parameter, derived from its model."""
 
 import re
+import struct
 from math import inf, nan
 from typing import Any
 
 from stickslip_ros.scenarios.parameter_field import Parameter
+from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, ReplayParameters
+
+MODELS = {**NODE_PARAMETERS, "replay": ReplayParameters}
 
 OF_EVERY_TYPE: list[Any] = [None, True, 7, 0.5, "no such word", [True], [7], [0.5], [b"\1"]]
 """One value of each type that ROS knows, a list of strings excepted."""
@@ -24,6 +28,23 @@ UNKNOWN: dict[str, Any] = {
     "x" * 10_000: 1.0,
 }
 """Names that no parameter has, among them such as are part of one."""
+
+
+CONFLICTS = (
+    "must not exceed",
+    "at least a thousandth",
+    "must be 0 or at least",
+    "must be above 0 and finite for a ",
+    "must be the path of a CSV file",
+    "must be at least friction.",
+    "must be 0 with velocity = difference",
+)
+"""Why a value is refused that is good, but not with the others."""
+
+
+def bits(value: Any) -> Any:
+    """Return what tells -0.0 from 0.0."""
+    return struct.pack("d", value) if isinstance(value, float) else value
 
 
 def bad_values(parameter: Parameter) -> list[Any]:

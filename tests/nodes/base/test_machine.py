@@ -17,6 +17,7 @@ from stickslip_ros.errors import InvalidInputError, RunError
 from stickslip_ros.nodes.base import machine
 from stickslip_ros.nodes.base.machine import lock_namespace, own_domain
 from stickslip_ros.nodes.base.network import prefer_prompt_middleware, this_machine_only
+from stickslip_ros.testing import ClosedLoop
 from tests.nodes.graph import wait_for
 from tests.testing import controllers
 
@@ -133,6 +134,16 @@ def test_a_domain_in_which_ros_runs_already_is_left_alone(
         participant.bind(("", 7400 + 250 * only_domain + 10))
         with pytest.raises(RunError):
             own_domain().__enter__()
+
+
+def test_a_loop_that_fails_leaves_its_domain_to_the_next(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Though the failure is kept, and with it all that it went through."""
+    monkeypatch.setattr(machine, "DOMAINS", machine.DOMAINS[-4:-2])  # one is for a look around
+    failures = []
+    for _ in range(3):
+        with pytest.raises(ZeroDivisionError) as failure, ClosedLoop("paper", controller=None):
+            raise ZeroDivisionError
+        failures.append(failure)
 
 
 @pytest.mark.parametrize("discovery_range", ["SUBNET", "LOCALHOST"])

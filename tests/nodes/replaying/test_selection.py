@@ -4,7 +4,6 @@ from math import inf
 from pathlib import Path
 
 import pytest
-from mcap.writer import Writer
 from rclpy.qos import (
     DurabilityPolicy,
     HistoryPolicy,
@@ -26,7 +25,7 @@ from stickslip_ros.nodes.replaying.selection import (
     recorded_profile,
 )
 from stickslip_ros.scenarios.parameters import ReplayParameters
-from tests.bags.runs import write_bag
+from tests.bags.runs import foreign_file, write_bag
 
 SECOND = 1_000_000_000
 STATES = "/drive/joint_states"
@@ -132,13 +131,10 @@ def test_topics_of_live_nodes_only_are_omitted_unless_requested(tmp_path: Path) 
 
 def foreign_bag(file: Path, types: dict[str, str]) -> str:
     """Write one message on each topic to a file as a recorder with other message types would."""
-    with file.open("wb") as stream:
-        writer = Writer(stream)
-        writer.start(profile="ros2")
+    with foreign_file(file) as writer:
         for topic, kind in types.items():
             schema = writer.register_schema(kind, "ros2msg", b"")
             writer.add_message(writer.register_channel(topic, "cdr", schema), 5, bytes(12), 5)
-        writer.finish()
     return str(file)
 
 
