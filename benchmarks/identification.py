@@ -28,7 +28,6 @@ from stickslip_ros.identification.findings import Findings
 from stickslip_ros.identification.identify import identify
 from stickslip_ros.identification.intervals import QUANTILE
 from stickslip_ros.identification.record import Record
-from stickslip_ros.physics.model.courses import Table
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import (
     Coulomb,
@@ -37,6 +36,7 @@ from stickslip_ros.physics.model.friction import (
     LuGre,
     Stribeck,
 )
+from stickslip_ros.physics.model.signals import table
 from stickslip_ros.physics.motion import Motion
 from stickslip_ros.versions import versions
 
@@ -86,7 +86,7 @@ def record(law: str, kind: str, seed: int, duration: float = DURATION) -> Record
         normal_force=NORMAL_FORCE,
         belt_speed=0.0,
         friction=LAWS[law],
-        belt=Table(times, speeds),
+        belt=table(list(zip(times, speeds, strict=True))),
     )
     belt = np.interp(PERIOD * np.arange(count), times, speeds)
     taps, gain = np.zeros(count), 0.0

@@ -10,7 +10,7 @@ Taylor series of the same motion in decimal arithmetic with 40 digits.
 
 A tick is the work of the plant per sample: a new force, then a step of 1 or 10 ms. Peer: a bare
 heyoka integrator of the same slipping motion with the same two terminal events. The peer of a tick
-with a course is the tick of the same drive without it.
+with a signal is the tick of the same drive without it.
 
 A tick of the loop also has the sensor, the washout controller and the actuator, of `feed_drive` at
 1 kHz. The peer of one with a sensor or an actuator is the same tick with ideal ones.
@@ -27,11 +27,10 @@ from scipy.integrate import solve_ivp
 
 from benchmarks.slices import Row, by_turns, compare_times, show
 from stickslip_ros.physics.loop.controller import answer
-from stickslip_ros.physics.model.course import Course
-from stickslip_ros.physics.model.courses import Ramp, Sine
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.drive_system import UNBOUNDED_SPEED
 from stickslip_ros.physics.model.friction import Stribeck
+from stickslip_ros.physics.model.signals import Signal, ramp, sine
 from stickslip_ros.physics.motion.motion import Motion
 from stickslip_ros.scenarios.files import load_scenario
 
@@ -51,9 +50,9 @@ ENCODER, DIFFERENCE = "sensor.position_resolution=1e-6", "sensor.velocity=differ
 State = tuple[float, float]
 
 
-def motion(belt_speed: float, **courses: Course) -> Motion:
+def motion(belt_speed: float, **signals: Signal) -> Motion:
     friction = Stribeck(STATIC, MINIMUM, MINIMUM_SPEED)
-    return Motion(Drive(1.0, DAMPING, 1.0, 1.0, belt_speed, friction, **courses), 0.0, 0.0)
+    return Motion(Drive(1.0, DAMPING, 1.0, 1.0, belt_speed, friction, **signals), 0.0, 0.0)
 
 
 def by_scipy(belt_speed: float, end: float) -> State:
@@ -218,12 +217,12 @@ def tick_row(step: float) -> Row:
     return compare_times(f"tick of {1e3 * step:g} ms", times, "bare heyoka", bare_times)
 
 
-def course_row(name: str, **courses: Course) -> Row:
+def signal_row(name: str, **signals: Signal) -> Row:
     step = 1e-2
-    with_course, without = motion(PURE_SLIP_SPEED, **courses), motion(PURE_SLIP_SPEED)
-    times, plain = by_turns(3 * ROUNDS, ticks(with_course, step), ticks(without, step))
+    with_signal, without = motion(PURE_SLIP_SPEED, **signals), motion(PURE_SLIP_SPEED)
+    times, plain = by_turns(3 * ROUNDS, ticks(with_signal, step), ticks(without, step))
     what = f"tick of {1e3 * step:g} ms, {name}"
-    return compare_times(what, times, "no course", plain, required=1.0 / 1.2)
+    return compare_times(what, times, "no signal", plain, required=1.0 / 1.2)
 
 
 def loop_ticks(*overrides: str) -> Callable[[], float]:
@@ -250,9 +249,9 @@ def measure() -> list[Row]:
     return [
         *(row for belt_speed in BELT_SPEEDS for row in motion_rows(belt_speed)),
         *(tick_row(step) for step in (1e-3, 1e-2)),
-        course_row("belt in a ramp", belt=Ramp(0.1, duration=1e4)),
-        course_row("belt in a sine", belt=Sine(0.02, frequency=0.3)),
-        course_row("load in a sine", load=Sine(0.1, frequency=0.3)),
+        signal_row("belt in a ramp", belt=ramp(0.1, duration=1e4)),
+        signal_row("belt in a sine", belt=sine(0.02, frequency=0.3)),
+        signal_row("load in a sine", load=sine(0.1, frequency=0.3)),
         part_row("encoder and difference", ENCODER, DIFFERENCE),
         part_row("the same with noise", ENCODER, DIFFERENCE, "sensor.position_noise=1e-7"),
         part_row("limit and rounding", "actuator.limit=500", "actuator.resolution=1"),

@@ -19,9 +19,9 @@ from stickslip_ros.identification.findings import Findings
 from stickslip_ros.identification.identify import identify
 from stickslip_ros.identification.record import Record, evenly_spaced
 from stickslip_ros.identification.refinement import Refinement, repetition_of
-from stickslip_ros.physics.model.courses import Table as Course
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import Coulomb, Directional, FrictionLaw, Table
+from stickslip_ros.physics.model.signals import table
 from stickslip_ros.physics.motion import Motion
 from stickslip_ros.plots.identification_table import identification_tables
 from tests.identification.axis_record import record as axis_record
@@ -213,7 +213,7 @@ def reversing(law: FrictionLaw) -> Record:
     random = np.random.default_rng(5)
     times = np.arange(0.0, 3.01, 0.5)
     speeds = 0.03 * (-1.0) ** np.arange(len(times))
-    belt = Course(tuple(times.tolist()), tuple(speeds.tolist()))
+    belt = table(list(zip(times.tolist(), speeds.tolist(), strict=True)))
     motion = Motion(Drive(100.0, 0.0, 1e6, 1000.0, 0.0, law, belt=belt), 1e-4, 0.0)
     count = 3000
     force, position = np.zeros(count), np.empty(count)

@@ -18,10 +18,10 @@ from stickslip_ros.messages.topics import CONTROL_FORCE, JOINT_STATES, REFERENCE
 from stickslip_ros.nodes.analyzer import AnalyzerNode
 from stickslip_ros.nodes.controller import ControllerNode
 from stickslip_ros.nodes.plant import PlantNode
-from stickslip_ros.physics.loop.reference import ReferenceCourse, ReferenceKind
 from stickslip_ros.physics.model.constants import constant
 from stickslip_ros.physics.model.control import CONTROL_LAWS, ControlLaw
 from stickslip_ros.physics.model.control.base import State
+from stickslip_ros.physics.model.signals import ramp, sine
 from stickslip_ros.samples import Reference, Sample
 from stickslip_ros.scenarios.parameters import (
     CONTROLLER_PARAMETERS,
@@ -178,9 +178,9 @@ def test_a_course_of_its_own_is_published_with_each_answer(
     forces = [loop.force((1 + n) * SECOND) for n in range(3)]
     assert forces == pytest.approx([0.0, 0.1, 1.1])
     graph.wait_until(lambda: len(loop.references) == 3, "references are heard")
-    expected = ReferenceCourse(ReferenceKind.RAMP, 0.4, 1.0, 4.0)
+    expected = ramp(0.4, 1.0, 4.0)
     for number, data in enumerate(loop.references):
-        assert data == pack_reference((1 + number) * SECOND, expected(number))
+        assert data == pack_reference((1 + number) * SECOND, expected.reference(number))
 
 
 def test_the_analyzer_records_references_and_the_parameters_of_the_controller(
@@ -210,7 +210,7 @@ def test_the_analyzer_records_references_and_the_parameters_of_the_controller(
     assert json.loads(kept["stiffness"]) == 7.0
     assert json.loads(kept["law"]) == "servo"
     assert references.stamp.tolist() == states.stamp.tolist() == forces.stamp.tolist()
-    law, motion = Servo(stiffness=7.0), ReferenceCourse(ReferenceKind.SINE, 0.2, frequency=2.0)
+    law, motion = Servo(stiffness=7.0), sine(0.2, frequency=2.0).reference
     for n in (0, 1, 57, len(forces) - 1):
         wanted = motion((int(states.stamp[n]) - SECOND) * 1e-9)
         assert (references.position[n], references.velocity[n]) == wanted[:2]

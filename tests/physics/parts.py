@@ -1,8 +1,7 @@
-"""Parts of the tests: friction laws, courses, control laws and an actuator."""
+"""Parts of the tests: friction laws, control laws and an actuator."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import inf, pi
 from typing import Any, ClassVar
 
 import numpy as np
@@ -10,10 +9,8 @@ import numpy as np
 from stickslip_ros.physics.model.actuator import Actuator
 from stickslip_ros.physics.model.constants import constant
 from stickslip_ros.physics.model.control import ControlLaw, LinearFeedback, Reference
-from stickslip_ros.physics.model.course import Course
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import FrictionLaw
-from stickslip_ros.physics.model.functions import sin
 from stickslip_ros.samples import Sample
 
 
@@ -36,41 +33,6 @@ class OneSided(FrictionLaw):
     @property
     def limits(self) -> tuple[Any, Any]:
         return self.static, self.backward
-
-
-@dataclass(frozen=True)
-class Swing(Course):
-    """Sine."""
-
-    amplitude: float = constant(0.0, "Amplitude.", "value")
-    frequency: float = constant(1.0, "Frequency.", "Hz")
-
-    def value(self, time: Any, switches: Sequence[Any]) -> Any:
-        return self.amplitude * sin(2.0 * pi * self.frequency * time)
-
-
-@dataclass(frozen=True)
-class Ramp(Course):
-    """Rises at a constant rate between two corners."""
-
-    switches: ClassVar[Sequence[str]] = ("before", "rising")
-    height: float = constant(0.1, "Height.", "value")
-    start: float = constant(1.0, "Start.", "s")
-    duration: float = constant(2.0, "Duration.", "s")
-
-    def value(self, time: Any, switches: Sequence[Any]) -> Any:
-        before, rising = switches
-        slope = (time - self.start) / self.duration
-        return self.height * (rising * slope + (1.0 - before - rising))
-
-    def switches_at(self, time: float) -> Sequence[float]:
-        if time < self.start:
-            return (1.0, 0.0)
-        return (0.0, 1.0 if time < self.start + self.duration else 0.0)
-
-    def next_switch_time(self, switches: Sequence[float]) -> float:
-        before, rising = switches
-        return self.start if before else self.start + self.duration if rising else inf
 
 
 @dataclass(frozen=True)

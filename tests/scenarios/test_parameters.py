@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.model.disturbance import Disturbance, DisturbanceKind
 from stickslip_ros.physics.model.friction import LAWS
 from stickslip_ros.scenarios.parameter_field import Parameter, parameters_of
 from stickslip_ros.scenarios.parameters import (
@@ -63,13 +62,6 @@ def test_a_law_gets_the_constants_of_its_formula() -> None:
     flat = {f"friction.{name}": value for name, value in values.items()}
     plant = PlantParameters.validated({"friction.law": "exponential", **flat}, "test")
     assert vars(plant.as_drive().friction) == {**values, "exponent": 1.0}
-
-
-def test_the_disturbance_of_a_plant() -> None:
-    values = {"kind": "sine", "amplitude": 3.0, "start": 1.0, "duration": 2.0, "frequency": 4.0}
-    flat = {f"disturbance.{name}": value for name, value in values.items()}
-    found = PlantParameters.validated(flat, "test").as_disturbance()
-    assert found == Disturbance(DisturbanceKind.SINE, 3.0, 1.0, 2.0, 4.0)
 
 
 def test_the_last_sample_of_a_plant() -> None:

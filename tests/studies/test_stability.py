@@ -6,8 +6,8 @@ import pytest
 
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.model.control import CONTROL_LAWS
-from stickslip_ros.physics.model.courses import Sine
 from stickslip_ros.physics.model.friction import Coulomb
+from stickslip_ros.physics.model.signals import sine
 from stickslip_ros.physics.theory.hopf import hopf_points
 from stickslip_ros.physics.theory.linear import expand
 from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop
@@ -140,7 +140,7 @@ def test_the_distance_from_the_hopf_speed() -> None:
         replace(FEED_DRIVE, friction=Coulomb(0.4)),
         replace(FEED_DRIVE, belt_speed=0.0),
         replace(FEED_DRIVE, stiffness=0.0),  # not covered by the theory, like the next one
-        replace(FEED_DRIVE, load=Sine(amplitude=100.0)),
+        replace(FEED_DRIVE, load=sine(amplitude=100.0)),
     ):
         assert hopf_ratio(drive) is None
         assert hopf_distance(drive) == ""

@@ -10,8 +10,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from stickslip_ros.errors import RunError
-from stickslip_ros.physics.loop.controller import Controller, answer
-from stickslip_ros.physics.loop.reference import ReferenceCourse, ReferenceKind
+from stickslip_ros.physics.loop.controller import (
+    Controller,
+    ReferenceSource,
+    answer,
+    no_reference,
+)
 from stickslip_ros.physics.loop.sampled_loop import SampledLoop
 from stickslip_ros.physics.model.constants import constant
 from stickslip_ros.physics.model.control import (
@@ -22,6 +26,7 @@ from stickslip_ros.physics.model.control import (
     Washout,
 )
 from stickslip_ros.physics.model.control.base import State
+from stickslip_ros.physics.model.signals import ramp, step
 from stickslip_ros.physics.motion import Motion
 from stickslip_ros.samples import Sample
 from tests.physics.drives import PAPER
@@ -65,7 +70,7 @@ class Constant(ControlLaw):
 
 LAWS = [Washout(2.0, -1.0, -1.0), VelocityFeedback(-1.0, -0.5), Integral(2.0)]
 laws = pytest.mark.parametrize("law", LAWS, ids=lambda law: law.name)
-RAMP = ReferenceCourse(ReferenceKind.RAMP, amplitude=1.0, start=0.5e-3, duration=4e-3)
+RAMP = ramp(1.0, start=0.5e-3, duration=4e-3).reference
 
 steps = st.lists(
     st.tuples(st.integers(1, 10**9), st.floats(-1.0, 1.0), st.floats(-1.0, 1.0)),
@@ -80,8 +85,8 @@ def at(stamp: int, position: float = 0.0, velocity: float = 0.0) -> Sample:
 
 def samples_of(moves: list[tuple[int, float, float]]) -> list[Sample]:
     stamp, samples = 0, list[Sample]()
-    for step, position, velocity in moves:
-        stamp += step
+    for elapsed, position, velocity in moves:
+        stamp += elapsed
         samples.append(at(stamp, position, velocity))
     return samples
 
@@ -200,13 +205,13 @@ def test_the_first_state_is_the_given_one_and_only_at_the_first_start() -> None:
     assert controller.state == (0.5, 0.5)
 
 
-@pytest.mark.parametrize("course", [None, RAMP])
+@pytest.mark.parametrize("reference", [no_reference, RAMP])
 @laws
 def test_a_controller_at_work_goes_to_another_process(
-    law: ControlLaw, course: ReferenceCourse | None
+    law: ControlLaw, reference: ReferenceSource
 ) -> None:
     assert pickle.loads(pickle.dumps(law)) == law
-    controller = Controller(law) if course is None else Controller(law, course)
+    controller = Controller(law, reference)
     for number in range(3):
         controller.answer(at(number * MILLISECOND, 0.1, 0.2 * number))
     copy: Controller = pickle.loads(pickle.dumps(controller))
@@ -261,9 +266,8 @@ def test_the_sample_after_a_failure_continues_from_the_last_good_one() -> None:
 def test_an_integral_of_the_error_follows_a_step() -> None:
     """Past the transient, spring force and friction are balanced at the reference."""
     drive = replace(PAPER, damping=1.0)
-    step = ReferenceCourse(ReferenceKind.STEP, amplitude=0.6, start=20.0)
     loop = SampledLoop(motion := Motion(drive, 0.0, 0.0), 50.0, 10**9)
-    controller = Controller(Integral(0.3), step)
+    controller = Controller(Integral(0.3), step(0.6, start=20.0).reference)
     ends: list[float] = []
     for number in range(5000):
         if number == 1000:

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from stickslip_ros.physics.loop.sampled_loop import SampledLoop
 from stickslip_ros.physics.model.actuator import Actuator
-from stickslip_ros.physics.model.disturbance import Disturbance, DisturbanceKind
+from stickslip_ros.physics.model.signals import step
 from stickslip_ros.physics.motion import Motion
 from tests.examples import examples
 from tests.physics.drives import PAPER
@@ -39,8 +39,7 @@ def test_a_command_is_limited_when_it_arrives_and_then_held(delay: float) -> Non
 
 def test_a_disturbance_is_not_limited() -> None:
     motion = Motion(replace(PAPER, actuator=Actuator(limit=0.1)), 0.0, 0.0)
-    step = Disturbance(DisturbanceKind.STEP, 5.0)
-    loop = SampledLoop(motion, 10.0, SECOND, disturbance=step)
+    loop = SampledLoop(motion, 10.0, SECOND, disturbance=step(5.0))
     loop.offer(SECOND, 3.0)
     loop.advance()
     assert motion.force == 5.1

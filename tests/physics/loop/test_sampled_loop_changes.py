@@ -5,8 +5,8 @@ from dataclasses import replace
 import pytest
 
 from stickslip_ros.physics.loop.sampled_loop import SampledLoop
-from stickslip_ros.physics.model.disturbance import Disturbance, DisturbanceKind
 from stickslip_ros.physics.model.friction import Linear
+from stickslip_ros.physics.model.signals import sine, step
 from stickslip_ros.physics.motion.motion import Motion
 from tests.physics.drives import PAPER
 
@@ -25,7 +25,7 @@ def acting(loop: SampledLoop, motion: Motion, samples: int) -> list[float]:
 def test_the_disturbance_of_the_scenario() -> None:
     motion = Motion(PAPER, 0.0, 0.0)
     # A quarter of a turn from sample to sample.
-    disturbance = Disturbance(DisturbanceKind.SINE, 0.5, 0.0, frequency=2.5)
+    disturbance = sine(0.5, frequency=2.5)
     loop = SampledLoop(motion, 10.0, SECOND, disturbance=disturbance)
     seen = [loop.disturbance]
     forces = []
@@ -53,8 +53,7 @@ def test_a_disturbance_that_is_asked_for_acts_from_the_next_sample_until_the_nex
 
 def test_the_delay_is_that_of_the_control_force_only() -> None:
     motion = Motion(PAPER, 0.0, 0.0)
-    step = Disturbance(DisturbanceKind.STEP, 0.5, start=0.1)
-    loop = SampledLoop(motion, 10.0, SECOND, force_delay=0.3, disturbance=step)
+    loop = SampledLoop(motion, 10.0, SECOND, force_delay=0.3, disturbance=step(0.5, start=0.1))
     assert acting(loop, motion, 3) == [0.0, 0.5, 0.5]
 
 
@@ -108,8 +107,7 @@ def test_a_diverging_motion_is_reported() -> None:
 
 def test_disturbances_and_control_add_up() -> None:
     motion = Motion(PAPER, 0.0, 0.0)
-    step = Disturbance(DisturbanceKind.STEP, 0.5, start=0.0)
-    loop = SampledLoop(motion, 10.0, SECOND, disturbance=step)
+    loop = SampledLoop(motion, 10.0, SECOND, disturbance=step(0.5))
     loop.disturb(0.25)
     loop.advance()
     loop.offer(loop.sample.stamp, 2.0)
@@ -121,7 +119,7 @@ def test_a_new_disturbance_of_the_scenario_acts_from_the_next_sample() -> None:
     motion = Motion(PAPER, 0.0, 0.0)
     loop = SampledLoop(motion, 10.0, SECOND)
     loop.advance()
-    loop.scenario_disturbance = Disturbance(DisturbanceKind.STEP, 0.5)
+    loop.follow_disturbance(step(0.5))
     assert loop.disturbance == 0.0
     assert acting(loop, motion, 2) == [0.0, 0.5]
 

@@ -1,4 +1,4 @@
-"""Random drives with courses of belt, load and disturbance, each with its reference.
+"""Random drives with signals of belt, load and disturbance, each with its reference.
 
 What the package gets, and the formulas of the reference, come from the same numbers.
 """
@@ -13,9 +13,6 @@ import numpy as np
 
 from stickslip_ros.physics.loop.sampled_loop import SampledLoop
 from stickslip_ros.physics.measures.breakpoints import Breakpoints
-from stickslip_ros.physics.model import courses
-from stickslip_ros.physics.model.course import NO_COURSE, Course
-from stickslip_ros.physics.model.disturbance import Disturbance, DisturbanceKind
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import (
     Coulomb,
@@ -26,14 +23,15 @@ from stickslip_ros.physics.model.friction import (
     Stribeck,
     Table,
 )
+from stickslip_ros.physics.model.signals import NO_SIGNAL, SIGNALS, Signal, table
 from stickslip_ros.physics.motion import RecordedMotion
 from tests.physics.motion import dop853
-from tests.physics.motion.dop853 import Array, Curve, Dop853Drive, Signal, Solution
+from tests.physics.motion.dop853 import Array, Curve, Dop853Drive, Solution
 
 KINDS = ("step", "impulse", "ramp", "sine", "trapezoid", "table")
 LAWS = ("stribeck", "coulomb", "linear", "exponential", "exponent", "table")
 PLACES = ("belt", "load", "disturbance", "together")
-"""Where the course of a kind acts; together with two of other kinds in the last case."""
+"""Where the signal of a kind acts; together with two of other kinds in the last case."""
 
 PERIODS = 20
 SAMPLES = 20
@@ -69,14 +67,14 @@ def random_law(name: str, draw: Random, speed: float) -> tuple[FrictionLaw, Curv
 
 
 @dataclass(frozen=True)
-class RandomCourse:
-    """A course as its constants, for the package and for the reference."""
+class RandomSignal:
+    """A signal as its constants, for the package and for the reference."""
 
     kind: str
     constants: Mapping[str, Any]
 
     @property
-    def signal(self) -> Signal:
+    def reference(self) -> dop853.Signal:
         made = {
             "none": dop853.none,
             "step": dop853.step,
@@ -88,31 +86,29 @@ class RandomCourse:
         }
         return made[self.kind](**self.constants)
 
-    def course(self, period: float) -> Course:
-        constants = dict(self.constants)
-        if self.kind == "none":
-            return NO_COURSE
-        if self.kind == "impulse":
-            del constants["duration"]
-        if self.kind == "table":
-            constants = {name: tuple(values) for name, values in constants.items()}
-        return courses.COURSES[self.kind](**constants).sampled(period)
-
     @property
-    def disturbance(self) -> Disturbance:
-        if self.kind == "table":
-            table = courses.Table(*map(tuple, self.constants.values()))
-            return Disturbance(DisturbanceKind.TABLE, table=table)
-        return Disturbance(DisturbanceKind(self.kind), **self.constants)
+    def packaged(self) -> Signal:
+        """The signal of the package."""
+        values = dict(self.constants)
+        match self.kind:
+            case "none":
+                return NO_SIGNAL
+            case "impulse":
+                values["period"] = values.pop("duration")
+            case "table":
+                return table(list(zip(values["times"], values["values"], strict=True)))
+            case _:
+                pass
+        return SIGNALS[self.kind](**values)
 
 
-NONE = RandomCourse("none", {})
+NONE = RandomSignal("none", {})
 
 
-def random_course(
+def random_signal(
     kind: str, size: float, sample: float, draw: Random, *, held: bool = False
-) -> RandomCourse:
-    """Return a course of a size at most; `sample` is the time from sample to sample, s.
+) -> RandomSignal:
+    """Return a signal of a size at most; `sample` is the time from sample to sample, s.
 
     Every other one has its corners at samples, and all that are `held` between samples.
     """
@@ -141,7 +137,7 @@ def random_course(
             numbers = {"times": times, "values": (amplitude * draw.uniform(-1, 1, 6)).tolist()}
         case _:
             pass
-    return RandomCourse(kind, numbers)
+    return RandomSignal(kind, numbers)
 
 
 @dataclass(frozen=True)
@@ -149,21 +145,21 @@ class RandomDrive:
     """A drive with its start, SI units."""
 
     plain: Drive
-    """Without courses."""
+    """Without signals."""
     forward: Curve
     backward: Curve
-    belt: RandomCourse
-    load: RandomCourse
-    force: RandomCourse
+    belt: RandomSignal
+    load: RandomSignal
+    force: RandomSignal
     position: float
     velocity: float
 
     @property
     def drive(self) -> Drive:
-        plain, sample = self.plain, self.sample
+        plain = self.plain
         return Drive(
             plain.mass, plain.damping, plain.stiffness, plain.normal_force, plain.belt_speed,
-            plain.friction, self.belt.course(sample), self.load.course(sample),
+            plain.friction, self.belt.packaged, self.load.packaged,
         )  # fmt: skip
 
     @property
@@ -185,9 +181,9 @@ class RandomDrive:
             plain.stiffness,
             self.forward,
             self.backward,
-            self.belt.signal.plus(plain.belt_speed),
-            self.load.signal.plus(plain.normal_force),
-            self.force.signal.held(self.sample, end),
+            self.belt.reference.plus(plain.belt_speed),
+            self.load.reference.plus(plain.normal_force),
+            self.force.reference.held(self.sample, end),
             **options,
         )
 
@@ -200,7 +196,7 @@ class RandomDrive:
         """Return the motion of the package: position and velocity at the samples, breakpoints."""
         motion = RecordedMotion(self.drive, self.position, self.velocity)
         loop = SampledLoop(
-            motion, 1.0 / self.sample, 0, expects_control=False, disturbance=self.force.disturbance
+            motion, 1.0 / self.sample, 0, expects_control=False, disturbance=self.force.packaged
         )
         samples = [loop.sample]
         samples += [loop.advance() for _ in range(round(periods * SAMPLES))]
@@ -212,7 +208,7 @@ def random_drive(
     seed: int, law: str, *, directional: bool, belt: str = "none", load: str = "none",
     force: str = "none",
 ) -> RandomDrive:  # fmt: skip
-    """Return a drive with a law, by direction or not, and courses of these kinds."""
+    """Return a drive with a law, by direction or not, and signals of these kinds."""
     names = ("none", *KINDS)
     draw = np.random.default_rng(
         [seed, LAWS.index(law), directional, *(names.index(kind) for kind in (belt, load, force))]
@@ -241,16 +237,16 @@ def random_drive(
         plain,
         forward,
         backward,
-        random_course(belt, 0.4 * speed, sample, draw) if belt != "none" else NONE,
-        random_course(load, normal, sample, draw) if load != "none" else NONE,
-        random_course(force, 0.5 * normal, sample, draw, held=True) if force != "none" else NONE,
+        random_signal(belt, 0.4 * speed, sample, draw) if belt != "none" else NONE,
+        random_signal(load, normal, sample, draw) if load != "none" else NONE,
+        random_signal(force, 0.5 * normal, sample, draw, held=True) if force != "none" else NONE,
         float(draw.choice([0.0, draw.uniform(-1.0, 1.0)]) * length),
         float(velocity),
     )
 
 
 def drive_of_place(seed: int, law: str, kind: str, place: str) -> RandomDrive:
-    """Return a drive with a course of a kind in a place; every other one has a law by direction."""
+    """Return a drive with a signal of a kind in a place; every other one has a law by direction."""
     number = KINDS.index(kind)
     others = [KINDS[(number + 1 + seed) % len(KINDS)], KINDS[(number + 2 + 2 * seed) % len(KINDS)]]
     parts = ("belt", "load", "force")

@@ -10,10 +10,11 @@ from scipy.optimize import brentq
 
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import Coulomb, Dahl, Stribeck
+from stickslip_ros.physics.model.signals import ramp
 from stickslip_ros.physics.motion import Motion, RecordedMotion
 from tests.physics.drives import FEED_DRIVE, PAPER
 from tests.physics.motion.dop853 import Dop853Drive, Function, Signal, level, none, stribeck
-from tests.physics.parts import Ramp, lag
+from tests.physics.parts import lag
 
 LAG = replace(PAPER, actuator=lag(0.7))
 SLOW = replace(FEED_DRIVE, actuator=lag(0.004))
@@ -137,7 +138,7 @@ CHANGES = {
     "belt": {"belt_speed": -0.01},
     "friction": {"friction": Stribeck(0.3, 0.2, 0.07)},
     "lag": {"actuator": lag(0.02)},
-    "courses": {"belt": Ramp(0.01, 0.0, 0.5)},
+    "signals": {"belt": ramp(0.01, duration=0.5)},
     "memory": {"friction": Dahl(0.4, bristle_stiffness=2e5)},
 }
 
@@ -173,7 +174,7 @@ def test_a_lag_may_come_and_go() -> None:
     assert motion.applied_force == pytest.approx(50.0, rel=1e-12)
 
 
-@pytest.mark.parametrize("drive", [FEED_DRIVE, replace(FEED_DRIVE, belt=Ramp(0.01, 0.0, 0.5))])
+@pytest.mark.parametrize("drive", [FEED_DRIVE, replace(FEED_DRIVE, belt=ramp(0.01, duration=0.5))])
 def test_drives_with_and_without_lag_of_one_class_do_not_share_equations(drive: Drive) -> None:
     ends: list[float] = []
     for actuator in (

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from stickslip_ros.physics.loop.sampled_loop import SampledLoop
-from stickslip_ros.physics.model.courses import Sine
+from stickslip_ros.physics.model import signals
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import Coulomb, Directional, Exponential
 from stickslip_ros.physics.motion import Motion, RecordedMotion
@@ -95,7 +95,7 @@ def test_a_force_that_is_just_too_large_does_not_stop_the_run(law: Coulomb | Exp
 HELD = [
     AXIS,
     replace(AXIS, friction=Exponential(0.03, 0.02, 0.01, 0.1), damping=20.0),
-    replace(AXIS, load=Sine(amplitude=50.0, frequency=3.0)),
+    replace(AXIS, load=signals.sine(amplitude=50.0, frequency=3.0)),
     replace(FEED_DRIVE, belt_speed=0.0),
     replace(FEED_DRIVE, belt_speed=0.0, bias_force=-40.0),
 ]
@@ -183,7 +183,7 @@ def test_random_axes_move_as_another_integrator_says(seed: int, belt_moves: bool
     swing, weight = (0.3 * unit, 0.2 * normal) if belt_moves else (0.0, 0.0)
     drive = Drive(
         mass, damping, 0.0, normal, 0.0, Directional(*laws), bias_force=bias,
-        **({"belt": Sine(swing, frequency=0.4), "load": Sine(weight, frequency=1.3)}
+        **({"belt": signals.sine(swing, frequency=0.4), "load": signals.sine(weight, frequency=1.3)}
         if belt_moves else {}),
     )  # fmt: skip
     forces = np.repeat(normal * rng.uniform(-0.9, 0.9, 30), rng.integers(5, 20, 30)).tolist()

@@ -10,17 +10,10 @@ import pytest
 
 from stickslip_ros.errors import RunError
 from stickslip_ros.physics.loop.sampled_loop import SampledLoop
-from stickslip_ros.physics.model.course import Course
-from stickslip_ros.physics.model.courses import (
-    COURSES,
-    Ramp,
-    Sine,
-    Step,
-    Trapezoid,
-)
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import LAWS as FRICTION_LAWS
 from stickslip_ros.physics.model.friction import Coulomb, Exponential
+from stickslip_ros.physics.model.signals import Signal, SignalKind, ramp, sine, step, trapezoid
 from stickslip_ros.physics.motion import Motion, RecordedMotion
 from tests.physics.drives import PAPER
 from tests.physics.motion import dop853
@@ -30,8 +23,8 @@ from tests.physics.motion.random_drives import (
     NONE,
     PERIODS,
     PLACES,
-    RandomCourse,
     RandomDrive,
+    RandomSignal,
     difference,
     drive_of_place,
     sticks_of,
@@ -84,7 +77,7 @@ def release(motion: Motion, longest: float) -> float:
 def test_a_slide_on_an_accelerating_belt_feels_its_inertia() -> None:
     """It sticks while m a + k a t^2/2 is below the friction that holds it."""
     acceleration = 0.1
-    belt = Ramp(amplitude=1.0, duration=1.0 / acceleration)
+    belt = ramp(amplitude=1.0, duration=1.0 / acceleration)
     motion = RecordedMotion(replace(REST, belt=belt), 0.0, 0.0)
     held = 0.4 - acceleration
     assert release(motion, 5.0) == pytest.approx((2.0 * held / acceleration) ** 0.5, abs=1e-9)
@@ -92,7 +85,7 @@ def test_a_slide_on_an_accelerating_belt_feels_its_inertia() -> None:
 
 @pytest.mark.parametrize(("height", "sticks"), [(0.39, True), (0.41, False), (-0.41, False)])
 def test_a_belt_that_accelerates_too_much_tears_it_loose(height: float, sticks: bool) -> None:
-    motion = Motion(replace(REST, belt=Ramp(height, duration=1.0)), 0.0, 0.0)
+    motion = Motion(replace(REST, belt=ramp(height, duration=1.0)), 0.0, 0.0)
     motion.advance(1e-3)
     assert motion.sticking is sticks
     expected = 1e-3 * (height if sticks else 0.4 * np.sign(height))
@@ -101,23 +94,23 @@ def test_a_belt_that_accelerates_too_much_tears_it_loose(height: float, sticks: 
 
 def test_a_load_and_an_accelerating_belt_together() -> None:
     """Broken loose where 0.05 (1 + t^2/2) reaches 0.4 (1 - t/10)."""
-    drive = replace(REST, belt=Ramp(1.0, duration=20.0), load=Ramp(-0.8, duration=8.0))
+    drive = replace(REST, belt=ramp(1.0, duration=20.0), load=ramp(-0.8, duration=8.0))
     motion = RecordedMotion(drive, 0.0, 0.0)
     expected = (-0.04 + (0.04**2 + 4.0 * 0.025 * 0.35) ** 0.5) / (2.0 * 0.025)
     assert release(motion, 5.0) == pytest.approx(expected, abs=1e-9)
 
 
 def test_a_step_of_the_belt_tears_a_sticking_slide_loose() -> None:
-    drive = replace(REST, belt_speed=0.1, belt=Step(0.2, start=0.5))
+    drive = replace(REST, belt_speed=0.1, belt=step(0.2, start=0.5))
     motion = RecordedMotion(drive, 0.0, 0.1)
     assert release(motion, 0.6) == pytest.approx(0.5, abs=1e-12)
     assert motion.belt_speed == pytest.approx(0.3)
 
 
-def test_courses_go_through_corners_at_the_samples_that_are_meant() -> None:
+def test_signals_go_through_corners_at_the_samples_that_are_meant() -> None:
     rate = 1000.0
     for number in range(1, 400, 7):
-        drive = replace(PAPER, belt=Step(0.1, start=number / rate, duration=2.0 / rate))
+        drive = replace(PAPER, belt=step(0.1, start=number / rate, duration=2.0 / rate))
         loop = SampledLoop(Motion(drive, 0.0, 0.0), rate, 0)
         speeds = [loop.sample.belt_velocity]
         speeds += [loop.advance().belt_velocity for _ in range(number + 3)]
@@ -125,7 +118,7 @@ def test_courses_go_through_corners_at_the_samples_that_are_meant() -> None:
         assert acting == [number, number + 1]
 
 
-@pytest.mark.parametrize("belt", [Sine(0.3, 0.1, 1.5, 2.0), Trapezoid(0.3, 0.25, 1.0, 3.0)])
+@pytest.mark.parametrize("belt", [sine(0.3, 0.1, 1.5, 2.0), trapezoid(0.3, 0.25, 1.0, 3.0)])
 def test_the_belt_position_is_the_exact_integral(belt: Any) -> None:
     drive, rate = replace(PAPER, belt=belt), 100.0
     loop = SampledLoop(Motion(drive, 0.0, 0.0), rate, 0)
@@ -137,8 +130,8 @@ def test_the_belt_position_is_the_exact_integral(belt: Any) -> None:
         assert sample.belt_velocity == pytest.approx(drive.belt_speed + belt.at(time), abs=1e-12)
 
 
-def test_a_reset_continues_the_courses_and_a_segment_starts_them() -> None:
-    drive = replace(REST, belt=Ramp(1.0, duration=10.0))
+def test_a_reset_continues_the_signals_and_a_segment_starts_them() -> None:
+    drive = replace(REST, belt=ramp(1.0, duration=10.0))
     motion = Motion(drive, 0.0, 0.0)
     motion.advance(2.0)
     motion.restart(0.0, 0.0)
@@ -153,18 +146,18 @@ def test_a_reset_continues_the_courses_and_a_segment_starts_them() -> None:
 
 @pytest.mark.parametrize(
     ("load", "time"),
-    [(Ramp(-2.0, duration=4.0), 2.0), (Step(-1.1, start=1.5), 1.5), (Step(-1.1), 0.0)],
+    [(ramp(-2.0, duration=4.0), 2.0), (step(-1.1, start=1.5), 1.5), (step(-1.1), 0.0)],
 )
 @pytest.mark.parametrize("velocity", [0.0, 0.4])
 def test_a_load_that_lifts_the_slide_ends_the_run(
-    load: Course, time: float, velocity: float
+    load: Signal, time: float, velocity: float
 ) -> None:
     with pytest.raises(RunError, match=f"the normal force falls below 0 N at {time:g}"):
         Motion(replace(PAPER, load=load), 0.0, velocity).advance(5.0)
 
 
 def test_a_load_may_take_all_of_the_normal_force() -> None:
-    motion = Motion(replace(REST, load=Trapezoid(-1.0, 1.0, 4.0, 1.0)), 0.1, 0.0)
+    motion = Motion(replace(REST, load=trapezoid(-1.0, 1.0, 4.0, 1.0)), 0.1, 0.0)
     motion.advance(3.0)
     assert not motion.sticking
     motion.advance(20.0)
@@ -175,20 +168,20 @@ def test_a_fast_belt_with_a_narrow_exponential() -> None:
     numbers = (0.4, 0.1, 0.003, 0.0, 1.0)
     law, curve = Exponential(*numbers), dop853.exponential(*numbers)
     plain = replace(PAPER, friction=law, belt_speed=0.0)
-    belt = RandomCourse("ramp", {"amplitude": 0.5, "start": 1.0, "duration": 6.0})
+    belt = RandomSignal("ramp", {"amplitude": 0.5, "start": 1.0, "duration": 6.0})
     drive = RandomDrive(plain, curve, curve, belt, NONE, NONE, 0.0, 0.0)
     check(drive, 4.0)
 
 
 def test_every_kind_and_every_law_is_tested() -> None:
-    assert {"none", *KINDS} == set(COURSES)
+    assert {"none", *KINDS} == {*SignalKind}
     assert {*LAWS} - {"exponent"} == {name for name, law in FRICTION_LAWS.items() if not law.states}
 
 
 def test_a_far_corner_costs_no_accuracy() -> None:
     """The margin of a corner does not count in the tolerance of the integration."""
-    near = replace(PAPER, belt=Step(0.1, start=500.0))
-    far = replace(PAPER, belt=Step(0.1, start=1e9))
+    near = replace(PAPER, belt=step(0.1, start=500.0))
+    far = replace(PAPER, belt=step(0.1, start=1e9))
     found: list[tuple[float, float]] = []
     for drive in (PAPER, near, far):
         motion = Motion(drive, 0.1, 0.0)

@@ -105,7 +105,7 @@ def balance(drive: RandomDrive) -> tuple[float, Works]:
         rate,
         0,
         expects_control=False,
-        disturbance=drive.force.disturbance,
+        disturbance=drive.force.packaged,
         advance=meter.advance,
     )
     while loop.sample_number < round(PERIODS * drive.plain.natural_period * rate):

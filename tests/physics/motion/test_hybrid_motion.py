@@ -1,4 +1,4 @@
-"""Properties of the motion of random drives: laws with and without memory, courses, control."""
+"""Properties of the motion of random drives: laws with and without memory, signals, control."""
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -15,9 +15,8 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.physics.model.constants import Scales, scaled
+from stickslip_ros.physics.model.constants import Scales
 from stickslip_ros.physics.model.control import WashoutGains
-from stickslip_ros.physics.model.course import NO_COURSE, Course
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.drive_system import SLIP, DriveSystem
 from stickslip_ros.physics.model.friction import (
@@ -29,11 +28,12 @@ from stickslip_ros.physics.model.friction import (
     Stribeck,
 )
 from stickslip_ros.physics.model.hybrid import HybridSystem, Mode
+from stickslip_ros.physics.model.signals import NO_SIGNAL, Signal, ramp, sine
 from stickslip_ros.physics.motion import Motion, RecordedMotion, compiled_flow
 from stickslip_ros.physics.motion.compiled_flow import flow_rates, parameter_values
 from stickslip_ros.physics.motion.variational import SensitiveMotion
 from tests.examples import examples
-from tests.physics.parts import Iwan, OneSided, Pieces, Ramp, Swing
+from tests.physics.parts import Iwan, OneSided, Pieces
 
 LAWS: list[FrictionLaw] = [
     Stribeck(0.4, 0.25, 0.5),
@@ -45,11 +45,11 @@ LAWS: list[FrictionLaw] = [
     Dahl(0.4, 20.0),
     Iwan(static=0.4),
 ]
-COURSES: list[tuple[Course, Course]] = [
-    (NO_COURSE, NO_COURSE),
-    (Swing(0.1, 0.2), NO_COURSE),
-    (NO_COURSE, Swing(0.3, 0.1)),
-    (Ramp(), Ramp(0.4)),
+SIGNALS: list[tuple[Signal, Signal]] = [
+    (NO_SIGNAL, NO_SIGNAL),
+    (sine(0.1, frequency=0.2), NO_SIGNAL),
+    (NO_SIGNAL, sine(0.3, frequency=0.1)),
+    (ramp(0.1, 1.0, 2.0), ramp(0.4, 1.0, 2.0)),
 ]
 GAINS = WashoutGains(0.5, -0.1, -0.05)
 
@@ -78,7 +78,7 @@ class Case(NamedTuple):
 def drive_of(
     law: FrictionLaw,
     belt_speed: float,
-    courses: tuple[Course, Course] = COURSES[0],
+    signals: tuple[Signal, Signal] = SIGNALS[0],
     damping: float = 0.05,
     scales: tuple[float, float, float] = (1.0, 1.0, 1.0),
 ) -> Drive:
@@ -93,8 +93,8 @@ def drive_of(
         normal,
         belt_speed * unit.speed,
         law.scaled(back.speed, back.length),
-        scaled(courses[0], back, "m/s"),
-        scaled(courses[1], back, "N"),
+        signals[0].scaled(back, "m/s"),
+        signals[1].scaled(back, "N"),
     )
 
 
@@ -114,7 +114,7 @@ def cases(draw: st.DrawFn) -> Case:
     drive = drive_of(
         draw(st.sampled_from(LAWS)),
         belt_speed,
-        draw(st.sampled_from(COURSES)),
+        draw(st.sampled_from(SIGNALS)),
         draw(st.sampled_from([0.0, 0.05, 0.3])),
         draw(st.sampled_from([(1.0, 1.0, 1.0), (100.0, 1e6, 1000.0), (0.5, 7e3, 2.0)])),
     )
@@ -186,10 +186,10 @@ def test_a_plain_drive_moves_as_any_other(case: Case) -> None:
 
 @pytest.mark.parametrize("scales", [(100.0, 1e6, 1000.0), (0.5, 7e3, 2.0)])
 def test_units_do_not_matter(scales: tuple[float, float, float]) -> None:
-    for law, courses, control in product(LAWS, COURSES, (None, GAINS)):
+    for law, signals, control in product(LAWS, SIGNALS, (None, GAINS)):
         ends: list[tuple[float, ...]] = []
         for units in ((1.0, 1.0, 1.0), scales):
-            drive = drive_of(law, 0.3, courses, scales=units)
+            drive = drive_of(law, 0.3, signals, scales=units)
             case = Case(drive, 0.5 * drive.length_scale, -0.2 * drive.speed_scale, None)
             case = case._replace(control=None if control is None else in_units_of(drive, control))
             motion = case.motion()
@@ -236,7 +236,7 @@ def test_nor_from_a_guard(law: FrictionLaw, belt_speed: float) -> None:
 @pytest.mark.parametrize("start", [0.0, 1.0, nextafter(1.0, 0.0), 3.0])
 @pytest.mark.parametrize("law", LAWS, ids=lambda law: law.name)
 def test_nor_from_a_corner(law: FrictionLaw, start: float) -> None:
-    drive = drive_of(law, 0.3, (Ramp(), Ramp(0.4)))
+    drive = drive_of(law, 0.3, (ramp(0.1, 1.0, 2.0), ramp(0.4, 1.0, 2.0)))
     motion = Motion(drive, 0.1, 0.2)
     motion.advance(start)
     check_phases(Case(drive, motion.position, motion.velocity, None))
@@ -322,7 +322,7 @@ def test_the_energy_gained_is_the_work_done(case: Case) -> None:
             motion.advance(instant - time)
             time, speed = instant, motion.velocity
             force = motion.friction_force + motion.applied_force - drive.damping * speed
-            if motion.sticking and drive.load == NO_COURSE:
+            if motion.sticking and drive.load == NO_SIGNAL:
                 limit = max(drive.friction.limits)
                 assert abs(motion.friction_force) <= limit * drive.normal_force * (1.0 + 1e-12)
             work += weight * (after - before) * force * speed

@@ -18,7 +18,7 @@ from tests.physics.motion import dop853
 from tests.physics.motion.dop853 import Dop853Drive, Signal
 from tests.physics.motion.random_drives import (
     LAWS,
-    RandomCourse,
+    RandomSignal,
     difference,
     random_drive,
     sticks_of,
@@ -49,7 +49,7 @@ def test_the_motion_is_that_of_an_independent_solver(
     drive = replace(
         drive,
         plain=replace(plain, belt_speed=belt_speed),
-        force=RandomCourse("step", constant),
+        force=RandomSignal("step", constant),
         position=0.0,
         velocity=0.0,
     )

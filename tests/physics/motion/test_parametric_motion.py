@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.physics.model.courses import Table
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import (
     Coulomb,
@@ -25,6 +24,7 @@ from stickslip_ros.physics.model.friction import (
 )
 from stickslip_ros.physics.model.plain_drive import drive_system
 from stickslip_ros.physics.model.scaled_drive import in_units_of
+from stickslip_ros.physics.model.signals import table
 from stickslip_ros.physics.motion import Motion
 from stickslip_ros.physics.motion.parametric_motion import ParametricMotion
 
@@ -41,7 +41,7 @@ LAWS: dict[str, FrictionLaw] = {
 START = (1e-4, -0.01)
 PERIOD = 1e-3
 FORCES = np.repeat(60.0 * np.random.default_rng(0).normal(size=30), 10).tolist()
-BELT = Table((0.0, 0.1, 0.2, 0.3), (0.02, 0.02, -0.03, 0.06))
+BELT = table([(0.0, 0.02), (0.1, 0.02), (0.2, -0.03), (0.3, 0.06)])
 
 
 def drive_of(law: str, *, moves: bool) -> Drive:

@@ -11,6 +11,7 @@ from stickslip_ros.physics.model.actuator import Actuator
 from stickslip_ros.physics.model.control import WashoutGains
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import Dahl
+from stickslip_ros.physics.model.signals import sine
 from stickslip_ros.physics.theory.closed_forms import CubicLoop
 from stickslip_ros.physics.theory.critical_gains import critical_gains, limit_cycle_from_hopf
 from stickslip_ros.physics.theory.cycle_bounds import (
@@ -27,12 +28,12 @@ from stickslip_ros.physics.theory.linear import expand
 from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop
 from stickslip_ros.physics.theory.sticking import sticking_onset
 from tests.physics.drives import PAPER
-from tests.physics.parts import OneSided, Swing
+from tests.physics.parts import OneSided
 
 GAINS = WashoutGains(2.0, -1.0, -1.0)
 
 
-SWING = Swing(amplitude=0.05)
+SWING = sine(0.05)
 REMEMBERS = replace(PAPER, friction=Dahl(static=0.4, bristle_stiffness=5.0))
 ONE_WAY = replace(PAPER, friction=OneSided())
 LOADED = replace(PAPER, load=SWING)
@@ -43,9 +44,9 @@ LAGGING = replace(PAPER, actuator=Actuator(time_constant=0.5))
 SENTENCES = {
     "memory": (REMEMBERS, "the friction law dahl has a memory (z)"),
     "one way": (ONE_WAY, "the friction law one_sided differs between forward and backward slip"),
-    "load": (LOADED, "the drive has a course of its load"),
+    "load": (LOADED, "the drive has a signal of its load"),
     "spring": (replace(PAPER, stiffness=0.0), "needs a spring: the drive has stiffness = 0 N/m"),
-    "belt and load": (CARRIED, "the drive has a course of its belt and its load"),
+    "belt and load": (CARRIED, "the drive has a signal of its belt and its load"),
 }
 
 Theory = Callable[[Drive], object]

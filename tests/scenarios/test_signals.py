@@ -1,4 +1,4 @@
-"""The courses of belt, load and disturbance in scenarios."""
+"""The signals of belt, load and disturbance in scenarios."""
 
 import pickle
 from pathlib import Path
@@ -6,32 +6,41 @@ from pathlib import Path
 import pytest
 
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.model.course import NO_COURSE
-from stickslip_ros.physics.model.courses import Impulse, Ramp, Sine, Step, Table, Trapezoid
+from stickslip_ros.physics.model.signals import (
+    NO_SIGNAL,
+    impulse,
+    ramp,
+    sine,
+    step,
+    table,
+    trapezoid,
+)
 from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.scenarios.parameter_field import Fixed, known_parameters
 from stickslip_ros.scenarios.parameters import PlantParameters
 from tests.scenarios.files import plant, refusal, scenario_file, section
 
+POINTS = table([(0.0, 0.0), (1.0, 0.5), (3.0, -0.25)])
 TABLE = "time,value\n0,0\n1,0.5\n3,-0.25\n"
 
 
-def test_each_kind_gives_its_course() -> None:
+def test_each_kind_gives_its_signal() -> None:
     constants = {"amplitude": 0.5, "start": 1.0, "duration": 4.0, "frequency": 2.0}
-    for part in ("belt", "load"):
-        assert getattr(plant().as_drive(), part) is NO_COURSE
+    for part in ("belt", "load", "disturbance"):
         given = {f"{part}.{name}": value for name, value in constants.items()}
-        for kind, course in {
-            "none": NO_COURSE,
-            "step": Step(0.5, 1.0, 4.0),
-            "impulse": Impulse(0.5, 1.0, 0.02),
-            "ramp": Ramp(0.5, 1.0, 4.0),
-            "sine": Sine(0.5, 1.0, 4.0, 2.0),
-            "trapezoid": Trapezoid(0.5, 1.0, 4.0, 2.0),
+        for kind, signal in {
+            "none": NO_SIGNAL,
+            "step": step(0.5, 1.0, 4.0),
+            "impulse": impulse(0.5, 0.02, 1.0),
+            "ramp": ramp(0.5, 1.0, 4.0),
+            "sine": sine(0.5, 1.0, 4.0, 2.0),
+            "trapezoid": trapezoid(0.5, 1.0, 4.0, 2.0),
         }.items():
             values = {**given, f"{part}.kind": kind, "rate": 50.0}
             parameters = PlantParameters.validated(values, "test")
-            assert getattr(parameters.as_drive(), part) == course
+            assert getattr(parameters, part).signal(parameters.period) == signal
+            if part != "disturbance":
+                assert getattr(parameters.as_drive(), part) == signal
 
 
 @pytest.mark.parametrize("part", ["belt", "load", "disturbance"])
@@ -40,8 +49,7 @@ def test_a_table_from_a_file_beside_the_scenario(tmp_path: Path, part: str) -> N
     text = section("/**/plant", f"{{{part}.kind: table, {part}.file: course.csv}}")
     scenario = load_scenario(scenario_file(tmp_path, text))
     assert getattr(scenario.plant, part).file == str(tmp_path / "course.csv")
-    course = getattr(scenario.plant, part).as_course(1.0)
-    assert course == Table((0.0, 1.0, 3.0), (0.0, 0.5, -0.25))
+    assert getattr(scenario.plant, part).signal(1.0) == POINTS
     assert pickle.loads(pickle.dumps(scenario)) == scenario
 
 
@@ -57,16 +65,16 @@ def test_a_file_of_an_override_is_relative_to_the_working_directory(
 
 
 def test_the_content_is_that_at_loading_unless_the_file_is_given_again(tmp_path: Path) -> None:
-    path, table = tmp_path / "course.csv", Table((0.0, 1.0, 3.0), (0.0, 0.5, -0.25))
+    path = tmp_path / "course.csv"
     path.write_text(TABLE)
     scenario = load_scenario("paper", ["plant.belt.kind=table", f"plant.belt.file={path}"])
     path.write_text("0,1\n")
     for name in ("plant.mass", "plant.belt.start"):
-        assert scenario.changed({name: 2.0}).plant.belt.table == table
+        assert scenario.changed({name: 2.0}).plant.belt.signal(1.0) == POINTS
     given = {"plant.belt.file": str(path)}
-    assert scenario.changed(given).plant.belt.table == Table((0.0,), (1.0,))
+    assert scenario.changed(given).plant.belt.signal(1.0) == table([(0.0, 1.0)])
     path.unlink()
-    assert scenario.plant.as_drive().belt == table
+    assert scenario.plant.as_drive().belt == POINTS
     with pytest.raises(InvalidInputError, match="the file cannot be read: No such file"):
         scenario.changed(given)
 
@@ -89,7 +97,7 @@ def test_bad_files_are_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("part", ["belt", "load", "disturbance"])
-def test_constants_that_make_no_course_are_refused(part: str) -> None:
+def test_constants_that_make_no_signal_are_refused(part: str) -> None:
     assert f"{part}.duration = inf s: must be above 0 and finite for a ramp" in refusal(
         "paper", f"plant.{part}.kind=ramp"
     )
