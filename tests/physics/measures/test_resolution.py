@@ -138,7 +138,9 @@ def test_few_samples_per_cycle_are_measured_or_said_to_be_too_few(
     assert every > 10 or found.regime is Regime.STICK_SLIP
 
 
-@pytest.mark.parametrize("count", [20, 24, 30, 40, 50])
+@pytest.mark.parametrize(
+    "count", [20, 30, *(pytest.param(each, marks=pytest.mark.long) for each in (24, 40, 50))]
+)
 def test_a_whole_number_of_samples_per_cycle_is_fitted_by_no_more_than_they_tell(
     count: int,
 ) -> None:

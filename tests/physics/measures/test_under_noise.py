@@ -152,19 +152,18 @@ def test_a_vibration_of_a_thousandth_of_the_belt_speed_is_none(
     assert (found.period is None) == (regime is Regime.EQUILIBRIUM)
 
 
-@pytest.mark.parametrize("direction", [-1.0, 1.0])
-def test_a_belt_that_moves_backward_gives_the_same(direction: float) -> None:
+def test_a_belt_that_moves_backward_gives_the_same() -> None:
     columns = samples(noise=1e-6)
     turned = replace(
         columns,
-        position=direction * columns.position,
-        velocity=direction * columns.velocity,
-        belt_velocity=direction * columns.belt_velocity,
+        position=-columns.position,
+        velocity=-columns.velocity,
+        belt_velocity=-columns.belt_velocity,
     )
     measures = measured(turned)
     assert measures.regime is Regime.STICK_SLIP
     assert measures.stick_fraction == pytest.approx(0.1001, abs=2e-3)
-    assert measures.midpoint == pytest.approx(direction * 326.3e-6, rel=1e-3)
+    assert measures.midpoint == pytest.approx(-326.3e-6, rel=1e-3)
 
 
 def test_lost_samples_and_impulses_change_little() -> None:
@@ -210,15 +209,18 @@ def test_a_slide_at_rest_shows_its_noise_as_nothing() -> None:
     assert stuck.regime is Regime.STUCK
 
 
-def test_the_cycles_before_a_gap_count_until_there_are_others() -> None:
-    for count, rounded in ((1, True), (3, False), (50, True)):
-        columns = samples(noise=1e-6, count=2000 + count)
-        if rounded:
-            columns = replace(columns, position=np.rint(columns.position / 1e-5) * 1e-5)
-        columns.stamp[2000:] += 12_345_678_901
-        measures = measured(columns)
-        assert measures.cycles == 20
-        assert measures.regime is Regime.STICK_SLIP
+@pytest.mark.parametrize(
+    ("count", "rounded"),
+    [(1, True), (3, False), *(pytest.param(50, each, marks=pytest.mark.long) for each in (0, 1))],
+)
+def test_the_cycles_before_a_gap_count_until_there_are_others(count: int, rounded: bool) -> None:
+    columns = samples(noise=1e-6, count=2000 + count)
+    if rounded:
+        columns = replace(columns, position=np.rint(columns.position / 1e-5) * 1e-5)
+    columns.stamp[2000:] += 12_345_678_901
+    measures = measured(columns)
+    assert measures.cycles == 20
+    assert measures.regime is Regime.STICK_SLIP
 
 
 def test_a_slide_that_is_held_before_a_gap_may_have_few_samples_after_it() -> None:
@@ -233,7 +235,7 @@ def test_the_memory_is_bounded() -> None:
     """A window has 1300 samples; twice as many are held at most, and a little."""
     meter = SampleMeter(20, reading=NOISY)
     columns, held = samples(noise=1e-6, count=8000), []
-    for repeat in range(10):
+    for repeat in range(4):
         meter.feed(replace(columns, stamp=columns.stamp + repeat * 8_000_000_000))
         held.append(meter.held)
     assert max(held) < 4000
