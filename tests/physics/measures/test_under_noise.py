@@ -71,16 +71,16 @@ def test_a_twentieth_of_the_study_agrees_with_it(case: study.Case) -> None:
 
 
 @examples(quick=3, thorough=30, deadline=None)
-@given(st.lists(st.integers(1, 1999), max_size=6).map(sorted))
+@given(st.lists(st.integers(1, 799), max_size=6).map(sorted))
 def test_blocks_of_any_length_give_the_same(starts: list[int]) -> None:
-    columns = samples(noise=1e-6)
-    meter = SampleMeter(20, reading=NOISY)
+    columns = samples(noise=1e-6, count=800)
+    meter = SampleMeter(6, reading=NOISY)
     cycles = [
         cycle
-        for start, end in zip([0, *starts], [*starts, 2000], strict=True)
+        for start, end in zip([0, *starts], [*starts, 800], strict=True)
         for cycle in meter.feed(columns[start:end])
     ]
-    whole = SampleMeter(20, reading=NOISY)
+    whole = SampleMeter(6, reading=NOISY)
     assert cycles == whole.feed(columns)
     assert meter.measures() == whole.measures()
 
@@ -152,19 +152,18 @@ def test_a_vibration_of_a_thousandth_of_the_belt_speed_is_none(
     assert (found.period is None) == (regime is Regime.EQUILIBRIUM)
 
 
-@pytest.mark.parametrize("direction", [-1.0, 1.0])
-def test_a_belt_that_moves_backward_gives_the_same(direction: float) -> None:
+def test_a_belt_that_moves_backward_gives_the_same() -> None:
     columns = samples(noise=1e-6)
     turned = replace(
         columns,
-        position=direction * columns.position,
-        velocity=direction * columns.velocity,
-        belt_velocity=direction * columns.belt_velocity,
+        position=-columns.position,
+        velocity=-columns.velocity,
+        belt_velocity=-columns.belt_velocity,
     )
     measures = measured(turned)
     assert measures.regime is Regime.STICK_SLIP
     assert measures.stick_fraction == pytest.approx(0.1001, abs=2e-3)
-    assert measures.midpoint == pytest.approx(direction * 326.3e-6, rel=1e-3)
+    assert measures.midpoint == pytest.approx(-326.3e-6, rel=1e-3)
 
 
 def test_lost_samples_and_impulses_change_little() -> None:
@@ -210,16 +209,18 @@ def test_a_slide_at_rest_shows_its_noise_as_nothing() -> None:
     assert stuck.regime is Regime.STUCK
 
 
-def test_the_cycles_before_a_gap_count_until_there_are_others() -> None:
-    for count in (1, 3, 50):
-        noisy = samples(noise=1e-6, count=2000 + count)
-        rounded = replace(noisy, position=np.rint(noisy.position / 1e-5) * 1e-5)
-        stamp = noisy.stamp.copy()
-        stamp[2000:] += 12_345_678_901
-        for columns in (noisy, rounded):
-            measures = measured(replace(columns, stamp=stamp))
-            assert measures.cycles == 20
-            assert measures.regime is Regime.STICK_SLIP
+@pytest.mark.parametrize(
+    ("count", "rounded"),
+    [(1, True), (3, False), *(pytest.param(50, each, marks=pytest.mark.long) for each in (0, 1))],
+)
+def test_the_cycles_before_a_gap_count_until_there_are_others(count: int, rounded: bool) -> None:
+    columns = samples(noise=1e-6, count=2000 + count)
+    if rounded:
+        columns = replace(columns, position=np.rint(columns.position / 1e-5) * 1e-5)
+    columns.stamp[2000:] += 12_345_678_901
+    measures = measured(columns)
+    assert measures.cycles == 20
+    assert measures.regime is Regime.STICK_SLIP
 
 
 def test_a_slide_that_is_held_before_a_gap_may_have_few_samples_after_it() -> None:
@@ -234,7 +235,7 @@ def test_the_memory_is_bounded() -> None:
     """A window has 1300 samples; twice as many are held at most, and a little."""
     meter = SampleMeter(20, reading=NOISY)
     columns, held = samples(noise=1e-6, count=8000), []
-    for repeat in range(10):
+    for repeat in range(4):
         meter.feed(replace(columns, stamp=columns.stamp + repeat * 8_000_000_000))
         held.append(meter.held)
     assert max(held) < 4000

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from math import inf
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -204,6 +204,33 @@ class RandomDrive:
         return found, motion.take_breakpoints()
 
 
+class Units(NamedTuple):
+    """Scales of a drive, SI units."""
+
+    mass: float
+    rate: float
+    normal: float
+
+    @property
+    def stiffness(self) -> float:
+        return self.mass * self.rate**2
+
+    @property
+    def length(self) -> float:
+        return self.normal / self.stiffness
+
+    @property
+    def speed(self) -> float:
+        return self.length * self.rate
+
+    def belt_speed(self, draw: Random) -> float:
+        return float(draw.choice([0.0, 0.1, 0.2, 0.3, -0.1, -0.2]) * self.speed)
+
+
+def random_units(draw: Random) -> Units:
+    return Units(*(float(10.0 ** draw.uniform(*ends)) for ends in ((-2, 3), (-1, 3), (-2, 4))))
+
+
 def random_drive(
     seed: int, law: str, *, directional: bool, belt: str = "none", load: str = "none",
     force: str = "none",
@@ -213,21 +240,19 @@ def random_drive(
     draw = np.random.default_rng(
         [seed, LAWS.index(law), directional, *(names.index(kind) for kind in (belt, load, force))]
     )
-    mass, frequency = 10.0 ** draw.uniform(-2.0, 3.0), 10.0 ** draw.uniform(-1.0, 3.0)
-    normal, stiffness = 10.0 ** draw.uniform(-2.0, 4.0), mass * frequency**2
-    length = normal / stiffness
-    speed = length * frequency
+    units = random_units(draw)
+    normal, length, speed = units.normal, units.length, units.speed
     friction, forward = random_law(law, draw, speed)
     backward = forward
     if directional:
         reverse, backward = random_law(law, draw, speed)
         friction = Directional(friction, reverse)
     plain = Drive(
-        mass=float(mass),
-        damping=float(draw.uniform(0.02, 0.2) * frequency * mass),
-        stiffness=float(stiffness),
-        normal_force=float(normal),
-        belt_speed=float(draw.choice([0.0, 0.1, 0.2, 0.3, -0.1, -0.2]) * speed),
+        mass=units.mass,
+        damping=float(draw.uniform(0.02, 0.2) * units.rate * units.mass),
+        stiffness=units.stiffness,
+        normal_force=normal,
+        belt_speed=units.belt_speed(draw),
         friction=friction,
     )
     sample = plain.natural_period / SAMPLES

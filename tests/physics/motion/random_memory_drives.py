@@ -15,7 +15,7 @@ from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.motion import Motion
 from tests.physics.motion import memory_reference
 from tests.physics.motion.memory_reference import Array, Curve, MemoryDrive
-from tests.physics.motion.random_drives import random_law
+from tests.physics.motion.random_drives import Random, Units, random_law, random_units
 
 LAWS = ("dahl", "lugre", "elasto_plastic", "maxwell_slip", "rate_state")
 CURVES = ("exponential", "exponent", "stribeck", "coulomb", "table")
@@ -24,10 +24,6 @@ SAMPLES = 4
 """Per natural period."""
 STORED_EVERY = 3
 """Every so many samples are stored: at equal phases of the period they would be much alike."""
-
-Random = np.random.Generator
-Scales = tuple[float, float, float]
-"""Units of length, speed and rate of a drive."""
 
 
 def size_of(curve: Curve, viscous: float, speed: float) -> Curve:
@@ -41,10 +37,10 @@ def size_of(curve: Curve, viscous: float, speed: float) -> Curve:
 
 
 def random_memory_law(
-    name: str, draw: Random, scales: Scales, shared: dict[str, float], curve_name: str
+    name: str, draw: Random, units: Units, shared: dict[str, float], curve_name: str
 ) -> tuple[Any, Any]:
     """Return a law, and one direction of the reference; `shared` is equal in both directions."""
-    length, speed, rate = scales
+    length, speed, rate = units.length, units.speed, units.rate
     if name == "rate_state":
         direct = float(draw.uniform(0.01, 0.05))
         numbers = {
@@ -128,10 +124,7 @@ class RandomMemoryDrive:
 def random_memory_drive(law: str, seed: int) -> RandomMemoryDrive:
     """Return a drive; every other one has friction by direction."""
     draw = np.random.default_rng([seed, LAWS.index(law), 23])
-    mass, rate = 10.0 ** draw.uniform(-2.0, 3.0), 10.0 ** draw.uniform(-1.0, 3.0)
-    normal, stiffness = 10.0 ** draw.uniform(-2.0, 4.0), mass * rate**2
-    length = float(normal / stiffness)
-    scales = length, float(length * rate), float(rate)
+    units = random_units(draw)
     shared = {
         "stiffness": float(10.0 ** draw.uniform(1.3, 2.7)),
         "damping": float(draw.uniform(0.0, 1.0)),
@@ -141,20 +134,20 @@ def random_memory_drive(law: str, seed: int) -> RandomMemoryDrive:
         "speed": float(10.0 ** draw.uniform(-6.0, -4.0)),
     }
     curve = CURVES[seed % len(CURVES)]
-    made, forward = random_memory_law(law, draw, scales, shared, curve)
+    made, forward = random_memory_law(law, draw, units, shared, curve)
     backward = forward
     if seed % 2:
-        reverse, backward = random_memory_law(law, draw, scales, shared, curve)
+        reverse, backward = random_memory_law(law, draw, units, shared, curve)
         made = friction.Directional(made, reverse)
-    belt = float(draw.choice([0.0, 0.1, 0.2, 0.3, -0.1, -0.2]) * scales[1])
+    belt = units.belt_speed(draw)
     drive = Drive(
-        mass=float(mass),
-        damping=float(draw.uniform(0.0, 0.1) * rate * mass),
-        stiffness=float(stiffness),
-        normal_force=float(normal),
+        mass=units.mass,
+        damping=float(draw.uniform(0.0, 0.1) * units.rate * units.mass),
+        stiffness=units.stiffness,
+        normal_force=units.normal,
         belt_speed=belt,
         friction=made,
     )
-    velocity = [0.0, belt, draw.uniform(-0.5, 0.5) * scales[1]][draw.integers(3)]
-    position = draw.choice([0.0 if belt else 1.0, draw.uniform(-1.0, 1.0)]) * length
+    velocity = [0.0, belt, draw.uniform(-0.5, 0.5) * units.speed][draw.integers(3)]
+    position = draw.choice([0.0 if belt else 1.0, draw.uniform(-1.0, 1.0)]) * units.length
     return RandomMemoryDrive(drive, forward, backward, float(position), float(velocity))

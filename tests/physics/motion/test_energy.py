@@ -126,7 +126,7 @@ def changing_drives(draw: st.DrawFn) -> RandomDrive:
 @example(random_drive(0, "stribeck", directional=True, belt="sine", load="sine", force="sine"))
 @example(random_drive(1, "exponent", directional=True, belt="trapezoid", load="ramp", force="step"))
 @example(random_drive(2, "table", directional=True, belt="table", load="step", force="impulse"))
-@examples(quick=5, thorough=200)
+@examples(quick=5, thorough=100)
 def test_the_energy_gained_is_that_of_belt_and_disturbance_without_what_is_dissipated(
     drive: RandomDrive,
 ) -> None:

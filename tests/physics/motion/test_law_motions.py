@@ -27,7 +27,7 @@ from tests.physics.motion.random_drives import (
 
 LONG_CASES = [
     pytest.param(seed, directional, marks=pytest.mark.long)
-    for seed in range(2, 5)
+    for seed in range(2, 4)
     for directional in (False, True)
 ]
 
