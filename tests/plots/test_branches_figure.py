@@ -23,7 +23,7 @@ def supercritical() -> BifurcationBranches:
 @pytest.fixture(scope="module")
 def subcritical() -> BifurcationBranches:
     drive = replace(PAPER, friction=Exponential(0.4, 0.25, 0.1, 0.0))
-    return BifurcationBranches.around(drive, points=6)
+    return BifurcationBranches.around(drive, points=12)
 
 
 def check_regions(figure: Figure, names: list[str]) -> None:
