@@ -81,13 +81,6 @@ def test_on_a_belt_that_moves_backward_the_slide_slips_forward() -> None:
     assert found.drive.belt_speed == float(back.belt_velocity[-1])
 
 
-@pytest.mark.long
-def test_several_records_tell_more_than_one() -> None:
-    records = [study.record("exponential", "ramp", seed, duration=2.0) for seed in (1, 2)]
-    one, both = identify(records[:1], "exponential"), identify(records, "exponential")
-    assert both.fitted["mass"].standard_error < one.fitted["mass"].standard_error
-
-
 def test_the_model_predicts_a_record_that_it_was_not_fitted_to(stick: Findings) -> None:
     error = stick.check(study.record("stribeck", "stick", 2, 2.5))["free_run_error"]
     assert error is not None
@@ -151,13 +144,6 @@ def test_what_is_refused() -> None:
     ):
         with pytest.raises(InvalidInputError, match=message):
             identify([record], law, fixed)
-
-
-@pytest.mark.long
-def test_a_constant_that_is_fixed_is_not_fitted() -> None:
-    own = study.record("exponential", "stick", 1, 2.0)
-    found = identify([own], "exponential", {"mass": 100.0, "friction.kinetic": 250.0})
-    assert "friction.kinetic" not in found.fitted
 
 
 @pytest.mark.long

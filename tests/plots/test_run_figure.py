@@ -138,13 +138,6 @@ def test_axes_of_the_unit_drive_are_dimensionless(limit_cycle: Drawn) -> None:
     assert not any("switched on" in title for title in titles(limit_cycle.figure))
 
 
-@pytest.mark.long
-def test_without_title_and_units_no_text_in_print_overlaps(limit_cycle: Drawn) -> None:
-    history, measures, drive, *_ = limit_cycle
-    style = replace(STYLES["paper"], titled=False)
-    assert faults(run_figure(history, measures, drive, title="it", style=style)) == []
-
-
 def test_lines_have_every_extreme_of_the_bag(reference: Drawn) -> None:
     with Recording(REFERENCE) as recording:
         states, forces = recording.joint_states, recording.control_forces
@@ -479,7 +472,8 @@ def test_the_instant_of_switching_on_is_enlarged(style: str) -> None:
     see(history, time, np.sin(40.0 * time), 40.0 * np.cos(40.0 * time), belt, 0.1 * belt)
     history.take_control(time, np.where(time < 2.0, 0.0, 3.0), all_acted(time))
     measures = CycleMeter(20).measures()
-    figure = run_figure(history, measures, FEED_DRIVE, title="it", style=STYLES[style])
+    drawn_style = replace(STYLES[style], titled=style != "paper")
+    figure = run_figure(history, measures, FEED_DRIVE, title="it", style=drawn_style)
     assert faults(figure) == []
     (axes,) = (each for each in figure.axes if "control switched on" in each.get_title())
     low, high = axes.get_xlim()

@@ -22,6 +22,7 @@ from stickslip_ros.studies.runner import WorkersDiedError, dask_executor, run
 from stickslip_ros.studies.settling import SettlingOptions
 from stickslip_ros.studies.study import Study
 from stickslip_ros.studies.sweep import sweep_study
+from tests.studies.studies import points_of
 
 PATIENCE = 60.0
 LOCAL = "127.0.0.1"
@@ -101,9 +102,7 @@ def test_a_worker_killed_on_the_way_changes_nothing(cluster: Cluster) -> None:
         found = list(journal.points())
     assert killed.is_set()
     assert doomed.wait(PATIENCE) == -signal.SIGKILL
-    with Journal(asked) as journal:
-        run(journal)
-        assert found == list(journal.points())
+    assert found == points_of(asked)
     assert len(found) == asked.plan.size
 
 

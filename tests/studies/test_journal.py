@@ -19,7 +19,7 @@ from stickslip_ros.studies.journal import Journal
 from stickslip_ros.studies.plan import Axis, Continuation, Grid
 from stickslip_ros.studies.settling import MotionState, SettlingOptions
 from stickslip_ros.studies.study import Piece, Point, Study
-from tests.studies.studies import SHORT, free, speeds, stop_at
+from tests.studies.studies import SHORT, free, points_of, speeds, stop_at
 
 MINIMUM = Axis("plant.friction.minimum", 0.2, 0.5, 4)
 SPEED = Axis("plant.belt_speed", 0.2, 0.5, 5)
@@ -37,12 +37,6 @@ STUDIES = {
 @pytest.fixture
 def path(tmp_path: Path) -> Path:
     return tmp_path / "study.part"
-
-
-def undisturbed(study: Study) -> list[Point]:
-    with Journal(study) as journal:
-        runner.run(journal)
-        return list(journal.points())
 
 
 def interrupted(study: Study, path: Path, count: int) -> int:
@@ -70,7 +64,7 @@ def pieces_of(monkeypatch: pytest.MonkeyPatch, size: int) -> None:
 def test_resumed_in_other_pieces_it_is_as_undisturbed(
     study: Study, path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    expected = undisturbed(study)
+    expected = points_of(study)
     assert [point.number for point in expected] == list(range(study.plan.size))
     assert any(point.reason is not None for point in expected)
     for size, until in ((2, 3), (1, 5)):
@@ -315,7 +309,7 @@ def test_what_cannot_be_written_is_refused(tmp_path: Path) -> None:
 
 def test_points_come_in_order_whatever_the_order_of_the_pieces() -> None:
     study = speeds(7)
-    expected = undisturbed(study)
+    expected = points_of(study)
     with Journal(study) as journal:
         for numbers in ([4, 5], [6], [0, 1], [3, 2]):
             journal.add(Piece([expected[number] for number in numbers], None))
