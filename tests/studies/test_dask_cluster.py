@@ -22,7 +22,7 @@ from stickslip_ros.studies.runner import WorkersDiedError, dask_executor, run
 from stickslip_ros.studies.settling import SettlingOptions
 from stickslip_ros.studies.study import Study
 from stickslip_ros.studies.sweep import sweep_study
-from tests.studies.studies import points_of
+from tests.studies.studies import points_of, speeds
 
 PATIENCE = 60.0
 LOCAL = "127.0.0.1"
@@ -82,6 +82,21 @@ def study(carry: Continuation | None = None) -> Study:
     scenario = load_scenario("paper", ["plant.expects_control=false"])
     axes = [Axis("plant.damping", 0.0, 0.05, 8), Axis("plant.belt_speed", 0.1, 0.6, 40)]
     return sweep_study(scenario, axes, continuation=carry, course=SettlingOptions(transient=100.0))
+
+
+@pytest.mark.process  # distributed starts uname
+def test_on_a_cluster_the_points_are_the_same() -> None:
+    asked = speeds(6)
+    with (
+        distributed.LocalCluster(
+            1, 1, processes=False, host=LOCAL, protocol="tcp://", dashboard_address=None
+        ) as cluster,
+        Journal(asked) as journal,
+        dask_executor(cluster.scheduler_address) as (executor, in_flight),
+    ):
+        run(journal, executor, in_flight=in_flight)
+        found = list(journal.points())
+    assert found == points_of(asked)
 
 
 @pytest.mark.long
