@@ -46,17 +46,10 @@ def check_constants(found: Findings, true: Mapping[str, float]) -> None:
     assert found.notes == []
 
 
-@pytest.mark.parametrize(
-    "law",
-    [
-        "coulomb",
-        *(pytest.param(law, marks=pytest.mark.long) for law in ("stribeck", "exponential")),
-    ],
-)
-def test_constants_are_within_their_errors(law: str) -> None:
-    own = study.record(law, "ramp", seed=7, duration=2.5)
-    found = identify([own], law, {"normal_force": study.NORMAL_FORCE})
-    check_constants(found, study.truth(law, "ramp"))
+def test_constants_are_within_their_errors() -> None:
+    own = study.record("coulomb", "ramp", seed=7, duration=2.5)
+    found = identify([own], "coulomb", {"normal_force": study.NORMAL_FORCE})
+    check_constants(found, study.truth("coulomb", "ramp"))
 
 
 def test_what_stick_slip_at_one_belt_speed_tells(stick: Findings) -> None:
@@ -88,24 +81,16 @@ def test_on_a_belt_that_moves_backward_the_slide_slips_forward() -> None:
     assert found.drive.belt_speed == float(back.belt_velocity[-1])
 
 
-@pytest.mark.long
-def test_several_records_tell_more_than_one() -> None:
-    records = [study.record("exponential", "ramp", seed, duration=2.0) for seed in (1, 2)]
-    one, both = identify(records[:1], "exponential"), identify(records, "exponential")
-    assert both.fitted["mass"].standard_error < one.fitted["mass"].standard_error
-
-
 def test_the_model_predicts_a_record_that_it_was_not_fitted_to(stick: Findings) -> None:
     error = stick.check(study.record("stribeck", "stick", 2, 2.5))["free_run_error"]
     assert error is not None
     assert error < 2e-6
 
 
-@pytest.mark.parametrize("belt", [0.0, pytest.param(1.0, marks=pytest.mark.long)])
-def test_records_that_no_drive_has_made_are_noted(belt: float) -> None:
-    """Positions in mm beside a belt in m/s, or a belt whose velocity is missing."""
+def test_records_that_no_drive_has_made_are_noted() -> None:
+    """Positions in mm, and a belt whose velocity is missing."""
     own = study.record("stribeck", "stick", 1, 2.0)
-    wrong = replace(own, position=1e3 * own.position, belt_velocity=belt * own.belt_velocity)
+    wrong = replace(own, position=1e3 * own.position, belt_velocity=0.0 * own.belt_velocity)
     found = identify([wrong], "coulomb", fixed={"mass": 100.0, "stiffness": 1e6})
     assert "does not describe the recordings" in found.notes[0]
     assert "check the units of time" in found.notes[-1]
@@ -162,13 +147,6 @@ def test_what_is_refused() -> None:
 
 
 @pytest.mark.long
-def test_a_constant_that_is_fixed_is_not_fitted() -> None:
-    own = study.record("exponential", "stick", 1, 2.0)
-    found = identify([own], "exponential", {"mass": 100.0, "friction.kinetic": 250.0})
-    assert "friction.kinetic" not in found.fitted
-
-
-@pytest.mark.long
 def test_friction_without_a_law() -> None:
     own = study.record("stribeck", "ramp", 3)
     found = identify([own], "table", {"normal_force": study.NORMAL_FORCE})
@@ -211,11 +189,11 @@ def test_friction_that_is_alike_in_both_directions_has_one_law() -> None:
 def reversing(law: FrictionLaw) -> Record:
     """Return a run on a belt that moves to and fro, with taps."""
     random = np.random.default_rng(5)
-    times = np.arange(0.0, 3.01, 0.5)
+    times = np.arange(0.0, 1.51, 0.25)
     speeds = 0.03 * (-1.0) ** np.arange(len(times))
     belt = table(list(zip(times.tolist(), speeds.tolist(), strict=True)))
     motion = Motion(Drive(100.0, 0.0, 1e6, 1000.0, 0.0, law, belt=belt), 1e-4, 0.0)
-    count = 3000
+    count = 1500
     force, position = np.zeros(count), np.empty(count)
     for number in range(0, count, 150):
         force[number : number + 20] = random.uniform(-150.0, 150.0)
@@ -328,12 +306,11 @@ def test_the_study_of_100_seeds() -> None:
 
 @pytest.mark.long
 @pytest.mark.timeout(3600)
-@pytest.mark.parametrize(("law", "kind"), study.CASES)
+@pytest.mark.parametrize(
+    ("law", "kind"), [("stribeck", "ramp"), ("exponential", "stick"), ("lugre", "taps")]
+)
 def test_the_first_seeds_of_the_study(law: str, kind: str) -> None:
-    (case,) = study.study(2 if law == "lugre" else 5, workers=2, cases=[(law, kind)])["cases"]
-    if kind == "narrow":
-        assert case["told"] < 0.5
-        return
+    (case,) = study.study(2, workers=2, cases=[(law, kind)])["cases"]
     assert case["right"] == 1.0
     for name, each in case["constants"].items():
         assert abs(each["bias"]) < 3.0 * each["standard_error"], name

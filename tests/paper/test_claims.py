@@ -282,6 +282,7 @@ def test_a_slide_that_overruns_the_belt_sticks_less_with_a_larger_gap() -> None:
     assert [len(arrivals(drive)) for drive in drives] == [1, 1, 2, 2]
 
 
+@pytest.mark.long
 def test_under_the_printed_slope_the_stick_fraction_rises_with_the_damping_and_falls() -> None:
     law = Linear(STRIBECK.static, PRINTED_SLOPE)
     betas = (0.12, 0.15, 0.17, 0.18, 0.2, 0.3)
@@ -299,6 +300,7 @@ def _diagram(number: int, values: Sequence[float]) -> BifurcationFigure:
     return BifurcationFigure(number, "", "", np.array(values), bifurcation_diagram(drives))
 
 
+@pytest.mark.long
 def test_verdicts_survive_ten_times_the_range() -> None:
     speeds = _diagram(2, [0.02, 0.05, 0.2, 0.34, 0.6, 1.0, 3.0, 10.0])
     assert verdict("rest-at-high-speed", speeds).verdict is HOLDS

@@ -15,7 +15,7 @@ from stickslip_ros.physics.model.friction import Linear
 from stickslip_ros.plots.style import BLUE, GREEN, ORANGE, STYLES
 from tests.paper.test_figures import over_belt_speed
 from tests.physics.drives import PAPER
-from tests.plots.texts import faults, legend_texts
+from tests.plots.texts import faults, in_styles, legend_texts
 
 STICKS = PortraitCase("it sticks", replace(PAPER, belt_speed=0.2), duration=100.0)
 RESTS = PortraitCase("it rests", replace(PAPER, belt_speed=0.7), duration=200.0)
@@ -39,7 +39,7 @@ def channels(colour: str) -> npt.NDArray[np.int64]:
     return np.array([int(colour[start : start + 2], 16) for start in (1, 3, 5)])
 
 
-@pytest.mark.parametrize("style", STYLES)
+@in_styles
 def test_portraits_say_what_they_show(
     tmp_path: Path, small_figure: PortraitFigure, style: str
 ) -> None:
@@ -72,7 +72,7 @@ def test_only_what_sticks_has_sticking_in_its_legend() -> None:
     assert "sticking" not in legend_texts(paper_figure(figure_of([RESTS])))
 
 
-@pytest.mark.parametrize("style", STYLES)
+@in_styles
 def test_a_bifurcation_diagram_names_regimes_and_marks(style: str) -> None:
     computed = over_belt_speed()
     marks = {"Hopf point": 0.48876, "limit of sticking": 0.4396}
@@ -88,6 +88,7 @@ def test_a_bifurcation_diagram_names_regimes_and_marks(style: str) -> None:
     ]  # fmt: skip
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("number", [3, 4, 5])
 def test_the_title_of_every_diagram_fits(number: int) -> None:
     assert faults(paper_figure(compute_figure(number, points=3))) == []

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from stickslip_ros.paper.figures import (
-    NUMBERS,
     PRINTED_SLOPE,
     STRIBECK,
     TANGENT_SLOPE,
@@ -53,10 +52,6 @@ def stick_fractions(panel: list[Portrait]) -> list[float]:
 
 def falls(values: list[float]) -> bool:
     return bool(np.all(np.diff(values) < 0.0))
-
-
-def test_there_are_figures_2_to_13() -> None:
-    assert list(range(2, 14)) == list(NUMBERS)
 
 
 def test_si_numbers_of_a_unit_drive_are_the_paper_s() -> None:

@@ -14,7 +14,7 @@ from stickslip_ros.plots.basin_figure import basin_figure
 from stickslip_ros.plots.regimes import REGIMES as LOOKS
 from stickslip_ros.plots.style import GREEN, ORANGE, STYLES
 from stickslip_ros.plots.units import Units
-from tests.plots.texts import faults, legend_texts
+from tests.plots.texts import faults, in_styles, legend_texts
 
 LABELS = ["stick-slip, amplitude 0.318 m: 68.8 % +- 0.7 %", "equilibrium: 31.2 %"]
 MANY = [Regime.STICK_SLIP, Regime.PURE_SLIP, Regime.EQUILIBRIUM] * 7
@@ -57,7 +57,7 @@ def filled(axes: Axes) -> dict[str, Cells]:
     return found
 
 
-@pytest.mark.parametrize("style", STYLES)
+@in_styles
 def test_of_a_grid_each_basin_has_its_cells(style: str) -> None:
     figure = basin_figure(**starts(grid_shape=(30, 40)), style=STYLES[style])
     assert faults(figure) == []

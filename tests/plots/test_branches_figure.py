@@ -12,12 +12,12 @@ from stickslip_ros.physics.theory.bifurcation_branches import BifurcationBranche
 from stickslip_ros.plots.branches_figure import branches_figure
 from stickslip_ros.plots.style import STYLES
 from tests.physics.drives import FEED_DRIVE, PAPER
-from tests.plots.texts import faults, legend_texts
+from tests.plots.texts import faults, in_styles, legend_texts
 
 
 @pytest.fixture(scope="module")
 def supercritical() -> BifurcationBranches:
-    return BifurcationBranches.around(FEED_DRIVE, points=12)
+    return BifurcationBranches.around(FEED_DRIVE, points=6)
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +40,7 @@ def check_regions(figure: Figure, names: list[str]) -> None:
         assert one.x1 < other.x0
 
 
-@pytest.mark.parametrize("style", STYLES)
+@in_styles
 def test_a_supercritical_diagram(supercritical: BifurcationBranches, style: str) -> None:
     figure = branches_figure(supercritical, title="Bifurcation diagram", style=STYLES[style])
     assert faults(figure) == []
@@ -65,7 +65,7 @@ def test_a_supercritical_diagram(supercritical: BifurcationBranches, style: str)
         assert np.logical_or.reduce(covered).all()
 
 
-@pytest.mark.parametrize("style", STYLES)
+@in_styles
 def test_of_a_subcritical_diagram_the_unstable_is_dashed(
     subcritical: BifurcationBranches, style: str
 ) -> None:

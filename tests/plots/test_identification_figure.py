@@ -20,7 +20,7 @@ def _axes(figure: Figure) -> dict[str, Axes]:
 
 
 def test_a_band_that_is_huge_does_not_hide_the_curve() -> None:
-    found = identify([record("coulomb")], "coulomb")
+    found = identify([record("coulomb", 5.0)], "coulomb", {"force_delay": 0.0})
     own = found.friction
 
     def vague(self: Findings, direction: int = 0) -> Friction:

@@ -13,7 +13,7 @@ from stickslip_ros.plots.run_history import RunHistory
 from stickslip_ros.plots.runs_figure import DrawnRun, runs_figure
 from stickslip_ros.plots.style import STYLES
 from tests.physics.drives import FEED_DRIVE, PAPER
-from tests.plots.texts import faults, legend_texts
+from tests.plots.texts import faults, in_styles, legend_texts
 
 # Old versions of matplotlib call names that its parser of formulas has deprecated since.
 # What other tests left open is collected at any time.
@@ -31,7 +31,7 @@ def drawn(name: str, end: float, drive: Drive = FEED_DRIVE) -> DrawnRun:
     return DrawnRun(name, history, measures_of(report), drive)
 
 
-@pytest.mark.parametrize("style", STYLES)
+@in_styles
 def test_each_run_has_a_column_and_a_line_in_each_common_panel(style: str) -> None:
     # The units are SI, since not all drives are without units.
     runs = [drawn("long", 2.0), drawn("short", 1.0), drawn("shortest", 0.02, PAPER)]

@@ -16,7 +16,7 @@ from stickslip_ros.plots.style import STYLES
 from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.studies.design import Design, Task, design
 from tests.physics.drives import FEED_DRIVE, PAPER
-from tests.plots.texts import faults, legend_texts
+from tests.plots.texts import faults, in_styles, legend_texts
 
 GAINS = WashoutGains(20.0, -3000.0, 0.0)
 
@@ -80,7 +80,7 @@ def critical_gains() -> CriticalGainCurves:
     return CriticalGainCurves.over(FEED_DRIVE, 20.0, rates, delays)
 
 
-@pytest.mark.parametrize("style", STYLES)
+@in_styles
 def test_the_map_of_a_loop_and_its_critical_gains(style: str) -> None:
     found = map_of(force_delay=0.003)
     title = "Stability of the sampled loop, feed_drive, washout control"
@@ -126,7 +126,7 @@ def designed(force_limit: float) -> Design:
     return design(Task.from_scenario(load_scenario("feed_drive", [limit]), (0.04, 0.04)))
 
 
-@pytest.mark.parametrize("style", STYLES)
+@in_styles
 def test_a_design_shows_the_force_limit_as_a_contour(style: str) -> None:
     figure = design_figure(designed(200.0), style=STYLES[style])
     assert faults(figure) == []

@@ -3,9 +3,18 @@
 from collections.abc import Iterator
 from itertools import combinations
 
+import pytest
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 from matplotlib.transforms import Bbox
+
+from stickslip_ros.plots.style import STYLES
+
+in_styles = pytest.mark.parametrize(
+    "style",
+    [pytest.param(name, marks=() if name == "paper" else pytest.mark.long) for name in STYLES],
+)
+"""The narrowest style at once, the others where there is time."""
 
 _TOUCHING = 0.5
 """Overlap of two boxes that is no fault, pixels."""

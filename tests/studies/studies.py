@@ -2,9 +2,11 @@
 
 from stickslip_ros.progress import Progress
 from stickslip_ros.scenarios.files import Scenario, load_scenario
+from stickslip_ros.studies.journal import Journal
 from stickslip_ros.studies.plan import Axis, Continuation, Grid
+from stickslip_ros.studies.runner import run
 from stickslip_ros.studies.settling import SettlingOptions
-from stickslip_ros.studies.study import Study
+from stickslip_ros.studies.study import Point, Study
 
 SHORT = SettlingOptions(transient=5.0, cycles=2)
 """Long enough to tell one motion from another."""
@@ -42,6 +44,13 @@ def speeds(
 ) -> Study:
     """Return a study of the free drive over so many belt speeds."""
     return Study(free(), Grid((Axis("plant.belt_speed", first, last, count),), carry), SHORT)
+
+
+def points_of(study: Study) -> list[Point]:
+    """Return the points of a study that nothing disturbs, computed in this process."""
+    with Journal(study) as journal:
+        run(journal)
+        return list(journal.points())
 
 
 def stop_at(count: int) -> Progress:

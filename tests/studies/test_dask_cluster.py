@@ -22,6 +22,7 @@ from stickslip_ros.studies.runner import WorkersDiedError, dask_executor, run
 from stickslip_ros.studies.settling import SettlingOptions
 from stickslip_ros.studies.study import Study
 from stickslip_ros.studies.sweep import sweep_study
+from tests.studies.studies import points_of, speeds
 
 PATIENCE = 60.0
 LOCAL = "127.0.0.1"
@@ -77,27 +78,33 @@ def cluster(tmp_path: Path) -> Iterator[Cluster]:
     cluster.end()
 
 
-def study(speeds: int = 100, carry: Continuation | None = None) -> Study:
+def study(carry: Continuation | None = None) -> Study:
     scenario = load_scenario("paper", ["plant.expects_control=false"])
-    axes = [Axis("plant.damping", 0.0, 0.05, 8), Axis("plant.belt_speed", 0.1, 0.6, speeds)]
+    axes = [Axis("plant.damping", 0.0, 0.05, 8), Axis("plant.belt_speed", 0.1, 0.6, 40)]
     return sweep_study(scenario, axes, continuation=carry, course=SettlingOptions(transient=100.0))
 
 
-@pytest.mark.parametrize(
-    ("speeds", "carry"),
-    [
-        (20, None),
-        pytest.param(100, None, marks=pytest.mark.long),
-        pytest.param(100, Continuation.DOWN, marks=pytest.mark.long),
-    ],
-)
-def test_a_worker_killed_on_the_way_changes_nothing(
-    cluster: Cluster, speeds: int, carry: Continuation | None
-) -> None:
+@pytest.mark.process  # distributed starts uname
+def test_on_a_cluster_the_points_are_the_same() -> None:
+    asked = speeds(6)
+    with (
+        distributed.LocalCluster(
+            1, 1, processes=False, host=LOCAL, protocol="tcp://", dashboard_address=None
+        ) as cluster,
+        Journal(asked) as journal,
+        dask_executor(cluster.scheduler_address) as (executor, in_flight),
+    ):
+        run(journal, executor, in_flight=in_flight)
+        found = list(journal.points())
+    assert found == points_of(asked)
+
+
+@pytest.mark.long
+def test_a_worker_killed_on_the_way_changes_nothing(cluster: Cluster) -> None:
     doomed = cluster.add_worker()
     cluster.add_worker()
     cluster.wait_for_workers(2)
-    asked = study(speeds, carry)
+    asked = study(Continuation.DOWN)
     killed = threading.Event()
 
     def kill_after_the_first_task(done: float) -> None:
@@ -110,9 +117,7 @@ def test_a_worker_killed_on_the_way_changes_nothing(
         found = list(journal.points())
     assert killed.is_set()
     assert doomed.wait(PATIENCE) == -signal.SIGKILL
-    with Journal(asked) as journal:
-        run(journal)
-        assert found == list(journal.points())
+    assert found == points_of(asked)
     assert len(found) == asked.plan.size
 
 

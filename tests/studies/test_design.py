@@ -73,41 +73,25 @@ def check_from_its_own_limit_cycle(task: Task) -> None:
         assert 0.0 < peak <= task.force_limit
 
 
-@pytest.mark.parametrize(
-    ("force_limit", "shortest", "longest"),
-    [
-        # A large vibration dies out as nonlinearly as the friction is: here faster than a small one
-        (100.0, 0.3, 1.0),
-        # and here, where it is gone after one period, by a part of that later.
-        pytest.param(inf, 1.2, 1.45, marks=pytest.mark.long),
-    ],
-)
-def test_a_proposal_brings_the_drive_to_rest_about_as_predicted(
-    force_limit: float, shortest: float, longest: float
-) -> None:
-    task = replace(FEED, force_limit=force_limit)
+def test_a_proposal_brings_the_drive_to_rest_about_as_predicted() -> None:
+    task = replace(FEED, force_limit=100.0)
     found = designed(task)
     check_from_its_own_limit_cycle(task)
     for check in found.checks:
         assert check.vibrates
         assert check.settling_time is not None
-        assert shortest < check.settling_time / check.predicted_settling_time < longest
+        # A large vibration dies out as nonlinearly as the friction is: here faster.
+        assert 0.3 < check.settling_time / check.predicted_settling_time < 1.0
         assert check.peak_force == pytest.approx(check.predicted_peak_force, rel=0.02)
-        assert check.predicted_peak_force <= force_limit
+        assert check.predicted_peak_force <= 100.0
     assert len({check.belt_speed for check in found.checks}) == len(found.checks) > 3
     assert "margin" not in (found.remark or "")
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(
-    "task",
-    [
-        replace(FEED, force_delay=0.005, force_limit=150.0),
-        replace(FEED, belt_speeds=(0.008, 0.04), force_limit=300.0),
-    ],
-)
-def test_late_and_over_a_wide_range_too_it_brings_the_drive_to_rest(task: Task) -> None:
-    check_from_its_own_limit_cycle(task)
+def test_late_and_over_a_wide_range_too_it_brings_the_drive_to_rest() -> None:
+    check_from_its_own_limit_cycle(replace(FEED, force_delay=0.005, force_limit=150.0))
+    check_from_its_own_limit_cycle(replace(FEED, belt_speeds=(0.008, 0.04), force_limit=300.0))
 
 
 def test_nothing_near_a_proposal_is_much_faster() -> None:

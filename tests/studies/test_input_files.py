@@ -14,7 +14,7 @@ from stickslip_ros.studies.columns import compute_columns
 from stickslip_ros.studies.journal import Journal
 from stickslip_ros.studies.plan import Axis, Continuation, Grid
 from stickslip_ros.studies.study import Point, Study, compute
-from tests.studies.studies import SHORT, free, stop_at
+from tests.studies.studies import SHORT, free, points_of, stop_at
 
 FRICTION = "0,0.4\n0.1,0.35\n0.5,0.3\n", "0,0.45\n0.1,0.4\n0.5,0.35\n"
 COURSE = "0,0\n3,0.1\n9,0\n", "0,0\n3,-0.1\n9,0.05\n"
@@ -44,12 +44,6 @@ def study_with(name: str, path: Path) -> Study:
         forward.write_text(FRICTION[0])
         given.append(f"plant.friction.file={forward}")
     return Study(free(*given), Grid((axis,), carry), SHORT)
-
-
-def points_of(study: Study) -> list[Point]:
-    with Journal(study) as journal:
-        runner.run(journal)
-        return list(journal.points())
 
 
 @pytest.fixture

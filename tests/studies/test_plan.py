@@ -122,9 +122,6 @@ def test_values_of_a_whole_number_are_whole() -> None:
     assert [axis.value(number) for number in range(4)] == [0, 3, 7, 10]
     assert all(isinstance(axis.value(number), int) for number in range(4))
     assert axis.values().tolist() == [0.0, 3.0, 7.0, 10.0]
-
-
-def test_random_values_of_a_whole_number_are_whole() -> None:
     sample = RandomSample((Axis("plant.force_jitter_seed", 1, 6, 2),), 50)
     values = {sample.values(index)[0] for index in range(50)}
     assert values == {1, 2, 3, 4, 5, 6}

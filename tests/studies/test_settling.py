@@ -50,8 +50,7 @@ def in_units(mass: float, length: float, time: float) -> Drive:
 
 
 @pytest.mark.parametrize(
-    ("mass", "length", "time"),
-    [(1.0, 1.0, 1.0), (100.0, 1e-3, 1e-2), (1e-6, 1e4, 1e-5), (3e5, 7e-7, 20.0)],
+    ("mass", "length", "time"), [(1.0, 1.0, 1.0), (1e-6, 1e4, 1e-5), (3e5, 7e-7, 20.0)]
 )
 def test_in_any_units_it_is_the_reference_limit_cycle(
     mass: float, length: float, time: float

@@ -1,8 +1,7 @@
 """Studies: every point is a row, even a failed one, and does not depend on other points."""
 
 import json
-from dataclasses import asdict, replace
-from math import inf, nan, ulp
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -136,9 +135,9 @@ def test_the_filter_is_carried_on_and_the_control_does_not_restart() -> None:
     assert point.measures.amplitude > 0.1
 
 
-@pytest.mark.parametrize("count", [18, pytest.param(86, marks=pytest.mark.long)])
-def test_up_the_cycle_is_kept_until_it_is_lost_and_down_rest_to_the_hopf_point(count: int) -> None:
+def test_up_the_cycle_is_kept_until_it_is_lost_and_down_rest_to_the_hopf_point() -> None:
     """Belt speeds across the range in which rest and cycle coexist, up and then down."""
+    count = 18
     axis = Axis("plant.belt_speed", 1.05, 1.9, count)
     found = compute_columns(sweep_study(free(*EXPONENTIAL), [axis], continuation=Continuation.BOTH))
     step = 0.85 / (count - 1)
@@ -223,14 +222,6 @@ def test_a_point_is_the_same_read_back(
     read = Point.from_json(json.loads(json.dumps(point.as_json())))
     assert read == point
     assert type(read.measures.regime) is type(measures.regime)
-
-
-@pytest.mark.parametrize("value", [0.1 + 0.2, ulp(0.0), inf, -0.0, 1e22])
-def test_a_number_keeps_its_last_bit(value: float) -> None:
-    point = Point(0, Measures(value, nan, None, None, None, None, 0, None), True, (value,), None)
-    read = Point.from_json(json.loads(json.dumps(point.as_json())))
-    assert repr(asdict(read.measures)) == repr(asdict(point.measures))
-    assert repr(read.turning_points) == repr(point.turning_points)
 
 
 def test_a_study_without_a_point_that_can_be_is_refused() -> None:

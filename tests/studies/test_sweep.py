@@ -10,7 +10,7 @@ from stickslip_ros.physics.measures.cycle_measures import Regime
 from stickslip_ros.physics.model.friction import Linear
 from stickslip_ros.physics.theory.critical_gains import critical_gains
 from stickslip_ros.studies.columns import compute_columns
-from stickslip_ros.studies.plan import Axis, Continuation, Grid
+from stickslip_ros.studies.plan import Axis
 from stickslip_ros.studies.settling import SettlingOptions
 from stickslip_ros.studies.sweep import bifurcation_diagram, sweep_study
 from tests.physics.drives import FEED_DRIVE, LIMIT_CYCLES, PAPER
@@ -45,13 +45,6 @@ def test_over_the_gain_the_vibration_ends_where_theory_has_it() -> None:
     assert set(found.regime[~rests]) == {Regime.PURE_SLIP, Regime.STICK_SLIP}
     without = compute_columns(sweep_study(free(), [SPEED]))
     assert found.amplitude[-1] == pytest.approx(without.amplitude[-1], rel=1e-9)
-
-
-def test_it_carries_along_the_last_axis() -> None:
-    plan = sweep_study(free(), [DAMPING, SPEED], continuation=Continuation.UP).plan
-    assert plan == Grid((DAMPING, SPEED), Continuation.UP)
-    for chain in plan.chains():
-        assert len({plan.values(index)[0] for index in chain}) == 1
 
 
 def test_what_is_no_sweep_is_refused() -> None:

@@ -35,7 +35,7 @@ FREE = "plant.expects_control=false"
 @pytest.fixture
 def small_maps(monkeypatch: pytest.MonkeyPatch) -> None:
     """Compute the transitions of a map at few places."""
-    monkeypatch.setattr("stickslip_ros.studies.transitions._MAPPED", 8)
+    monkeypatch.setattr("stickslip_ros.studies.transitions._MAPPED", 5)
 
 
 def found(over: str, *overrides: str, continuous: bool = False) -> dict[str, list[float]]:
@@ -73,7 +73,6 @@ def test_the_ends_of_every_range_that_sticks_are_found() -> None:
     ("parameter", "ends", "speed"),
     [
         ("damping", "0.01:0.4:5", 0.4),
-        ("stiffness", "0.01:100:5:log", 0.45),
         pytest.param("mass", "100:0.01:5:log", 0.45, marks=pytest.mark.long),
         pytest.param("normal_force", "0.01:100:5:log", 0.3, marks=pytest.mark.long),
     ],
