@@ -12,7 +12,7 @@ def model(tmp_path_factory: pytest.TempPathFactory) -> ss.Model:
     """Model of a simulated drive, from a table."""
     path = tmp_path_factory.mktemp("logs") / "log.csv"
     drive = ss.scenario("feed_drive", expects_control=False, belt_speed=0.02)
-    ss.simulate(drive, duration=2.5).to_pandas().reset_index().to_csv(path, index=False)
+    ss.simulate(drive, duration=1.2).to_pandas().reset_index().to_csv(path, index=False)
     known = {"plant.mass": 100.0, "plant.damping": 200.0, "plant.normal_force": 1000.0}
     return ss.identify(path, law="stribeck", fixed=known)
 

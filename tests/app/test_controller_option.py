@@ -58,7 +58,7 @@ def test_list_has_every_control_law(stickslip: Run) -> None:
 
 
 @pytest.mark.process
-@pytest.mark.parametrize("how", [["--composed"], []], ids=["composed", "processes"])
+@pytest.mark.parametrize("how", [["--composed"], pytest.param([], marks=pytest.mark.long)])
 def test_the_law_runs_as_a_node(stickslip: Run, two: str, how: list[str]) -> None:
     found = stickslip.json("run", two, "--base", "paper", *VELOCITY, "--duration", "5", *how)
     assert found["controller"] == "/feed_drive/velocity_feedback_controller"

@@ -60,6 +60,7 @@ def scenario(**others: Any) -> ss.Scenario:
     )
 
 
+@pytest.mark.long
 def test_a_sweep_shows_the_hysteresis_of_a_subcritical_hopf_point() -> None:
     """Above the Hopf speed of 72.49 mm/s rest and stick-slip are both stable."""
     found = ss.sweep(scenario(), belt_speed=(0.07, 0.078, 5), carry="both").to_pandas()

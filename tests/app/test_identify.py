@@ -19,7 +19,7 @@ _BY_NAME = dict(each.split("=") for each in _COLUMNS.split(","))
 @pytest.fixture
 def log(tmp_path: Path) -> Path:
     """A log of an axis without a spring."""
-    own = record("saturating", duration=6.0)
+    own = record("saturating", duration=4.0)
     assert own.force is not None
     assert own.reference is not None
     time = own.period * np.arange(len(own.position))
@@ -56,6 +56,7 @@ def test_a_log_becomes_a_model_a_scenario_and_a_figure(
     assert stickslip("simulate", "found.yaml", "--duration", "1").returncode == 0
 
 
+@pytest.mark.long
 def test_recordings_that_are_checked(stickslip: Run, log: Path) -> None:
     """With gaps, in parts, and with a column that the log lacks; as JSON and as tables."""
     rows = np.loadtxt(log, delimiter=",", skiprows=1)
@@ -64,7 +65,7 @@ def test_recordings_that_are_checked(stickslip: Run, log: Path) -> None:
     late[:300, 3] = np.nan
     written(log.parent / "often.csv", often)
     written(log.parent / "late.csv", late)
-    written(log.parent / "parts.csv", np.delete(rows, range(3000, 3100), 0))
+    written(log.parent / "parts.csv", np.delete(rows, range(2000, 2100), 0))
     taps = np.column_stack([rows, np.zeros(len(rows))])
     written(log.parent / "taps.csv", taps, "t,x,u,r,taps")
     given = ("--columns", f"{_COLUMNS},disturbance=taps", "--law", "coulomb")
@@ -85,15 +86,13 @@ def test_recordings_that_are_checked(stickslip: Run, log: Path) -> None:
         assert words in done.stdout
     assert "nan" not in done.stdout.replace("plant.", "")
     assert "late.csv has no" not in done.stdout
-    done = stickslip("identify", "axis.csv", *given)
-    assert done.returncode == 2
-    assert "has no column 'taps'" in done.stderr
 
 
 def test_a_bag_of_a_loop_is_identified(stickslip: Run) -> None:
     known = ("--fix", "plant.mass=100", "--fix", "plant.damping=200")
     known += ("--fix", "plant.normal_force=1000")
-    found = stickslip.json("identify", REFERENCE, "--law", "stribeck", *known)["parameters"]
+    given = ("--to", "1", "--law", "stribeck", *known)
+    found = stickslip.json("identify", REFERENCE, *given)["parameters"]
     assert found["plant.stiffness"]["value"] == pytest.approx(1e6, rel=1e-3)
     assert found["plant.friction.static"]["value"] == pytest.approx(0.4, rel=1e-2)
     assert found["plant.friction.minimum"]["value"] == pytest.approx(0.25, rel=1e-2)
@@ -139,17 +138,17 @@ def test_a_memory_in_both_directions_becomes_a_scenario(stickslip: Run, log: Pat
     assert friction.forward.curve != friction.reverse.curve
 
 
+@pytest.mark.long
 def test_a_model_in_python_is_saved_and_checked(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, log: Path
 ) -> None:
     """What cannot be written leaves no files; of a recording in parts one must be chosen."""
-    model = ss.identify(log, columns=_BY_NAME, law="coulomb")
+    model = ss.identify(log, columns=_BY_NAME, law="table")
     rows = np.loadtxt(log, delimiter=",", skiprows=1)
-    parts = written(tmp_path / "parts.csv", np.delete(rows, range(3000, 3100), 0))
+    parts = written(tmp_path / "parts.csv", np.delete(rows, range(2000, 2100), 0))
     with pytest.raises(InvalidInputError, match="has 2 parts between long gaps"):
         model.check(parts, _BY_NAME)
-    assert model.check(parts, _BY_NAME, start=3.05)["force_error"] > 0.0
-    model = ss.identify(log, columns=_BY_NAME, law="table")
+    assert model.check(parts, _BY_NAME, start=2.05)["force_error"] > 0.0
 
     def refused(*_: object) -> None:
         raise InvalidInputError("it is refused")
@@ -171,11 +170,12 @@ def test_all_constants_are_given(stickslip: Run) -> None:
     known = {"mass": 100, "damping": 200, "stiffness": 1e6, "normal_force": 1000}
     known |= {"bias_force": 0.0, "friction.static": 0.4, "friction.viscous": 0.1}
     given = [f"--fix=plant.{name}={value}" for name, value in known.items()]
-    found = stickslip.json("identify", REFERENCE, "--law", "coulomb", *given)
+    found = stickslip.json("identify", REFERENCE, "--to", "0.6", "--law", "coulomb", *given)
     assert found["parameters"] == {}
     assert set(found["curves"][0]["standard_error"]) == {0.0}
 
 
+@pytest.mark.long
 def test_units_that_are_wrong_are_noted(stickslip: Run, log: Path) -> None:
     columns = "time=t,position=x*1e3,force=u*2,reference=r*1e3"
     done = stickslip("identify", "axis.csv", "--columns", columns, "--law", "coulomb")

@@ -66,6 +66,7 @@ def test_the_examples_can_be_installed(process_environment: dict[str, str], tmp_
         ),
     ],
 )
+@pytest.mark.long
 def test_a_law_of_another_package_is_simulated_like_one_of_this(
     with_packages: Run, stickslip: Run, own: str, foreign: str
 ) -> None:
@@ -117,6 +118,7 @@ def test_a_control_law_of_another_package_runs_as_a_node(
     assert found["report"]["peak_force"] > 0.0
 
 
+@pytest.mark.long
 def test_the_relay_brake_suppresses_the_vibration(with_packages: Run) -> None:
     force = "relay_brake_controller.braking_force"
     braked = with_packages.json("simulate", *RELAY, "--duration", "5")
@@ -160,6 +162,7 @@ def test_a_lubricated_drive_moves_as_its_law_says(with_packages: Run, tmp_path: 
         assert np.abs(found - expected).max() < 1e-9 * np.ptp(expected)
 
 
+@pytest.mark.long
 def test_its_theory_is_that_of_the_law(with_packages: Run) -> None:
     same = [f"-p=plant.friction.reverse.{name}=nan" for name in ("static", "decay_speed")]
     one = with_packages.json("stability", LUBRICATED, "--no-control", *same)
@@ -171,6 +174,7 @@ def test_its_theory_is_that_of_the_law(with_packages: Run) -> None:
     assert both["open_loop"]["hopf_speeds"] != pytest.approx(speeds, rel=1e-3)
 
 
+@pytest.mark.long
 def test_its_constants_are_checked(with_packages: Run, stickslip: Run) -> None:
     for override, refusal in (
         ("reverse.static=0.05", "kinetic = 0.1 must not exceed friction.reverse.static = 0.05"),

@@ -21,11 +21,11 @@ from tests.physics.drives import LIMIT_CYCLES
 
 def test_figures_from_samples_are_those_of_the_limit_cycle(stickslip: Run) -> None:
     known = LIMIT_CYCLES[0]
-    speed = ("-p", f"plant.belt_speed={known.belt_speed}", "--duration", "300")
+    speed = ("-p", f"plant.belt_speed={known.belt_speed}", "--duration", "150")
     figures = stickslip.json("run", "paper", "--no-control", "--composed", *speed)
     assert figures["report"]["amplitude"] == pytest.approx(known.amplitude, rel=1e-4)
     assert figures["report"]["stick_fraction"] == pytest.approx(known.stick_fraction, abs=2e-3)
-    assert figures["samples"] == 30_001
+    assert figures["samples"] == 15_001
     assert figures["lost_samples"] == figures["late_forces"] == figures["missed_deadlines"] == 0
     assert figures["scenario"]["plant"]["belt_speed"] == known.belt_speed
     assert figures["report"]["complete"]
@@ -38,6 +38,7 @@ def test_ctrl_c_closes_the_bag(start_stickslip: Start, tmp_path: Path) -> None:
     assert json.loads(output)["report"]["complete"]
 
 
+@pytest.mark.long
 def test_samples_that_the_analyzer_has_not_taken_in_at_the_end_are_waited_for(
     start_stickslip: Start,
     domain: int,
@@ -61,7 +62,11 @@ def test_samples_that_the_analyzer_has_not_taken_in_at_the_end_are_waited_for(
 
 
 @pytest.mark.parametrize(
-    ("pace", "duration", "flags"), [("realtime", 10, ()), ("lockstep", None, ("--composed",))]
+    ("pace", "duration", "flags"),
+    [
+        pytest.param("realtime", 10, (), marks=pytest.mark.long),
+        ("lockstep", None, ("--composed",)),
+    ],
 )
 def test_a_plant_that_is_deactivated_pauses_the_run(
     start_stickslip: Start,

@@ -168,7 +168,10 @@ FURTHER = ("--", "--ros-args", "-p", "gain:=2.0")  # the scenario says otherwise
 
 @pytest.mark.parametrize(
     ("node", "flags", "gain"),
-    [("Damper", (), 0.5), ("ManagedDamper", ("--composed", *FURTHER), 2.0)],
+    [
+        pytest.param("Damper", (), 0.5, marks=pytest.mark.long),
+        ("ManagedDamper", ("--composed", *FURTHER), 2.0),
+    ],
 )
 def test_a_controller_of_a_user(
     stickslip: Run, install: Install, tmp_path: Path, node: str, flags: tuple[str, ...], gain: float

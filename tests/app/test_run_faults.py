@@ -63,8 +63,7 @@ def test_a_plant_that_gives_up_is_reported_and_its_bag_is_closed(
     ("node", "number", "pace"),
     [
         ("washout_controller", signal.SIGKILL, "realtime"),
-        pytest.param("plant", signal.SIGKILL, "lockstep", marks=pytest.mark.long),
-        pytest.param("washout_controller", signal.SIGTERM, "lockstep", marks=pytest.mark.long),
+        pytest.param("plant", signal.SIGTERM, "lockstep", marks=pytest.mark.long),
     ],
 )
 def test_a_bag_is_closed_when_another_node_dies(
@@ -107,6 +106,7 @@ def test_nodes_that_are_stopped_are_killed_at_the_second_signal(
         assert not is_running(number)
 
 
+@pytest.mark.long
 def test_a_run_that_is_stopped_says_that_its_nodes_go_on(
     start_stickslip: Start, tmp_path: Path
 ) -> None:
@@ -121,7 +121,7 @@ def test_a_run_that_is_stopped_says_that_its_nodes_go_on(
     assert "interrupted: the bag bag is closed; the nodes have ended" in errors
 
 
-@pytest.mark.parametrize("flags", [("--composed",), ()])
+@pytest.mark.parametrize("flags", [("--composed",), pytest.param((), marks=pytest.mark.long)])
 def test_a_run_that_is_interrupted_early_says_that_nothing_was_recorded(
     start_stickslip: Start, tmp_path: Path, flags: tuple[str, ...]
 ) -> None:
@@ -192,7 +192,7 @@ def test_a_reader_that_closes_the_pipe_is_no_failure() -> None:
 
 
 @pytest.mark.process
-@pytest.mark.parametrize("closed", ["2>&-", "<&- >&- 2>&-"])
+@pytest.mark.parametrize("closed", ["<&- >&- 2>&-", pytest.param("2>&-", marks=pytest.mark.long)])
 def test_a_run_does_without_standard_streams(
     process_environment: dict[str, str], tmp_path: Path, closed: str
 ) -> None:

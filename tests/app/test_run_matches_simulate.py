@@ -33,10 +33,13 @@ RUNS: Mapping[str, tuple[str, str]] = {
     "sensor and actuator, composed": (f"feed_drive {ENCODER} {DRIVE} {LATE}", "--composed"),
 }
 """Drive, and how it is run."""
+QUICK = {"moving belt", "sensor and actuator, composed"}
 
 
 @pytest.mark.process
-@pytest.mark.parametrize("name", RUNS)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.long] * (name not in QUICK)) for name in RUNS]
+)
 def test_nodes_in_lockstep_give_what_simulate_does(
     stickslip: Run, tmp_path: Path, name: str
 ) -> None:

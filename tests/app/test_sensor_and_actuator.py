@@ -40,6 +40,7 @@ def test_a_study_measures_the_motion() -> None:
     assert found[0]["amplitude"].tolist() == found[1]["amplitude"].tolist()
 
 
+@pytest.mark.long
 def test_the_washout_holds_the_drive_with_an_encoder_and_not_with_a_slow_actuator() -> None:
     given = {"sensor_position_resolution": 1e-6, "sensor_velocity": "difference"}
     held = {**given, "actuator_time_constant": 1e-3}
@@ -67,6 +68,7 @@ def test_stability_has_lag_and_difference_and_says_what_it_omits() -> None:
     assert slow.notes["closed_loop"].startswith("sensor and actuator are omitted")
 
 
+@pytest.mark.long
 def test_a_design_is_tried_with_them_and_tells_what_they_leave() -> None:
     """It stays within the limit of the actuator, even if the controller has none."""
     encoder = {"sensor_position_resolution": 1e-6, "sensor_velocity": "difference"}

@@ -17,7 +17,7 @@ RUNNING_AWAY = "-p plant.friction.law=linear -p plant.friction.slope=0.9 -p plan
 def test_a_reference_limit_cycle(stickslip: Run) -> None:
     known = LIMIT_CYCLES[0]
     speed = ("-p", f"plant.belt_speed={-known.belt_speed}", "-p", "plant.rate=10")
-    found = stickslip.json("simulate", "paper", "--no-control", *speed, "--duration", "300")
+    found = stickslip.json("simulate", "paper", "--no-control", *speed, "--duration", "150")
     assert found["regime"] == "stick_slip"
     assert found["stick_fraction"] == pytest.approx(known.stick_fraction, abs=1e-6)
     assert found["midpoint"] == pytest.approx(-known.midpoint, abs=1e-7)
@@ -25,7 +25,9 @@ def test_a_reference_limit_cycle(stickslip: Run) -> None:
         assert found[name] == pytest.approx(getattr(known, name), abs=1e-7)
 
 
-@pytest.mark.parametrize("control", ["--no-control", "--continuous-control"])
+@pytest.mark.parametrize(
+    "control", ["--no-control", pytest.param("--continuous-control", marks=pytest.mark.long)]
+)
 def test_a_figure_is_of_the_motion_that_is_measured(
     stickslip: Run, tmp_path: Path, control: str
 ) -> None:
@@ -43,6 +45,7 @@ def test_a_figure_is_of_the_motion_that_is_measured(
         assert text in figure
 
 
+@pytest.mark.long
 def test_a_figure_of_a_disturbed_run_says_so(stickslip: Run, tmp_path: Path) -> None:
     disturbed = ("-p", "plant.disturbance.kind=step", "-p", "plant.disturbance.amplitude=0.1")
     late = ("-p", "plant.force_delay=0.015", "--duration", "100")
@@ -75,7 +78,9 @@ def rows_of(path: Path) -> list[dict[str, float]]:
         ]
 
 
-@pytest.mark.parametrize("flags", [(), ("--continuous-control",)])
+@pytest.mark.parametrize(
+    "flags", [(), pytest.param(("--continuous-control",), marks=pytest.mark.long)]
+)
 def test_the_file_has_the_trajectory_to_the_last_digit(
     stickslip: Run, tmp_path: Path, flags: tuple[str, ...]
 ) -> None:

@@ -104,6 +104,7 @@ def test_the_table_says_why(stickslip: Run) -> None:
     assert "nan" not in done.stdout
 
 
+@pytest.mark.long
 def test_coexisting_cycles_are_told_apart(stickslip: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     overrides = ("plant.friction.law=exponential", "plant.friction.decay_speed=0.05")
     law = [text for override in overrides for text in ("-p", override)]

@@ -139,7 +139,7 @@ def test_a_table_that_came_meanwhile_is_left_alone_and_the_points_are_kept(
 
 
 @pytest.mark.parametrize(
-    ("workers", "count"), [("1", 300), pytest.param("2", 1200, marks=pytest.mark.long)]
+    ("workers", "count"), [("1", 200), pytest.param("2", 800, marks=pytest.mark.long)]
 )
 def test_interrupted_it_keeps_what_is_done_and_goes_on_from_there(
     start_stickslip: Start, stickslip: Run, tmp_path: Path, workers: str, count: int

@@ -20,7 +20,7 @@ SCRIPTS = sorted(
 )
 NOTEBOOKS = sorted(path.stem for path in EXAMPLES.glob("notebooks/*.ipynb"))
 # Those that read a bag or only simulate a little; the others take several seconds each.
-QUICK = {"position_servo", "read_a_bag", "replay_into_a_controller", "simulate_and_plot"}
+QUICK = {"replay_into_a_controller", "simulate_and_plot"}
 ELSEWHERE = {"compare_controllers"}  # test_controllers.py
 
 

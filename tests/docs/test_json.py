@@ -119,7 +119,7 @@ RIG = ("feed_drive", "--belt-speed")
 KNOWN = ("--fix", "plant.mass=100", "--fix", "plant.damping=200")
 ENCODER = ("-p", "plant.sensor.position_resolution=1e-6")
 CALLS = [
-    ("simulate", ("simulate", "paper", "--duration", "100")),
+    ("simulate", ("simulate", "paper", "--duration", "30")),
     ("simulate", ("simulate", "paper", "--duration", "0.1", "--no-control")),
     ("simulate", ("simulate", "feed_drive", "--duration", "1", *ENCODER)),
     ("report", ("report", REFERENCE)),
@@ -130,14 +130,12 @@ CALLS = [
     ("basin", ("basin", "paper", "--no-control", *GRID, *SHORT)),
     ("basin", ("basin", "paper", "--no-control", "--sample", "3", *SHORT)),
     ("stability", ("stability", "paper")),
-    ("stability", ("stability", "feed_drive", "--no-control")),
     ("stability", ("stability", "feed_drive", "-p", "plant.friction.law=coulomb")),
     ("stability", ("stability", "paper", "-p", "plant.belt_speed=0")),
     ("design", ("design", *RIG, "0.06")),
     ("design", ("design", *RIG, "0.02:0.04", "-p", "plant.force_delay=0.02")),
-    pytest.param("design", ("design", *RIG, "0.03"), marks=pytest.mark.long),
-    ("design", ("design", *RIG, "0.03", *ENCODER)),
-    ("identify", ("identify", REFERENCE, "--law", "stribeck", *KNOWN)),
+    pytest.param("design", ("design", *RIG, "0.03", *ENCODER), marks=pytest.mark.long),
+    ("identify", ("identify", REFERENCE, "--to", "0.6", "--law", "stribeck", *KNOWN)),
     ("repair", ("repair", REFERENCE, "sound")),
     ("list", ("list",)),
     ("show", ("show", "feed_drive", "-p", "plant.mass=2")),
@@ -156,7 +154,7 @@ def test_the_page_has_what_is_printed(
 
 
 @pytest.mark.process
-@pytest.mark.parametrize("control", [(), ("--no-control",)])
+@pytest.mark.parametrize("control", [(), pytest.param(("--no-control",), marks=pytest.mark.long)])
 def test_the_page_has_what_a_run_prints(
     stickslip: Run,  # noqa: F811
     control: tuple[str, ...],
