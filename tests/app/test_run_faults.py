@@ -63,7 +63,7 @@ def test_a_plant_that_gives_up_is_reported_and_its_bag_is_closed(
     ("node", "number", "pace"),
     [
         ("washout_controller", signal.SIGKILL, "realtime"),
-        pytest.param("plant", signal.SIGTERM, "lockstep", marks=pytest.mark.long),
+        pytest.param("plant", signal.SIGKILL, "lockstep", marks=pytest.mark.long),
     ],
 )
 def test_a_bag_is_closed_when_another_node_dies(

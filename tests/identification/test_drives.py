@@ -315,3 +315,17 @@ def test_the_first_seeds_of_the_study(law: str, kind: str) -> None:
     for name, each in case["constants"].items():
         assert abs(each["bias"]) < 3.0 * each["standard_error"], name
         assert each["covered"] >= 0.5, name
+
+
+@pytest.mark.long
+def test_several_records_tell_more_than_one() -> None:
+    records = [study.record("exponential", "ramp", seed, duration=2.0) for seed in (1, 2)]
+    one, both = identify(records[:1], "exponential"), identify(records, "exponential")
+    assert both.fitted["mass"].standard_error < one.fitted["mass"].standard_error
+
+
+@pytest.mark.long
+def test_a_constant_that_is_fixed_is_not_fitted() -> None:
+    own = study.record("exponential", "stick", 1, 2.0)
+    found = identify([own], "exponential", {"mass": 100.0, "friction.kinetic": 250.0})
+    assert "friction.kinetic" not in found.fitted

@@ -1,7 +1,8 @@
 """Studies: every point is a row, even a failed one, and does not depend on other points."""
 
 import json
-from dataclasses import replace
+from dataclasses import asdict, replace
+from math import inf, nan, ulp
 
 import numpy as np
 import pytest
@@ -249,3 +250,11 @@ def test_what_continuous_control_does_not_have_is_refused_or_a_row_with_the_reas
     one, other = points(sweep_study(paper(), [delay], course=SHORT, continuous=True))
     assert one.reason is None
     assert "plant.force_delay = 0.1 is refused" in (other.reason or "")
+
+
+@pytest.mark.parametrize("value", [0.1 + 0.2, ulp(0.0), inf, -0.0, 1e22])
+def test_a_number_keeps_its_last_bit(value: float) -> None:
+    point = Point(0, Measures(value, nan, None, None, None, None, 0, None), True, (value,), None)
+    read = Point.from_json(json.loads(json.dumps(point.as_json())))
+    assert repr(asdict(read.measures)) == repr(asdict(point.measures))
+    assert repr(read.turning_points) == repr(point.turning_points)
