@@ -74,11 +74,23 @@ class Signal:
         return max(rates, default=0.0)
 
     def at(self, time: float) -> float:
-        """Return the value at a time, s; where a piece ends that of the next one."""
+        """Return the value at a time; where a piece ends that of the next one.
+
+        Parameters
+        ----------
+        time : float
+            Time, s.
+        """
         return float(self.value(time, self.switches_at(time)))
 
     def reference(self, time: float) -> Reference:
-        """Return position, velocity and acceleration at a time, s; a jump has no velocity."""
+        """Return position, velocity and acceleration at a time; a jump has no velocity.
+
+        Parameters
+        ----------
+        time : float
+            Time, s.
+        """
         if not self.pieces:
             return NO_REFERENCE
         origin, _, slope, swing, rate, _ = piece = self.switches_at(time)
@@ -90,7 +102,13 @@ class Signal:
         )
 
     def integral(self, start: float, end: float) -> float:
-        """Return the exact integral over an interval, s, in the unit of the value times s."""
+        """Return the exact integral over an interval, in the unit of the value times s.
+
+        Parameters
+        ----------
+        start, end : float
+            Ends of the interval, s.
+        """
         total = 0.0
         while self.pieces:
             origin, offset, slope, swing, rate, last = self.switches_at(start)
@@ -106,7 +124,15 @@ class Signal:
         return total
 
     def value(self, time: Any, switches: Sequence[Any]) -> Any:
-        """Return the value at a time within a piece, of floats, complex numbers or expressions."""
+        """Return the value at a time within a piece.
+
+        Parameters
+        ----------
+        time : float, complex or expression
+            Time, s.
+        switches : sequence of float or expression
+            Values of `switches`.
+        """
         if not switches:
             return 0.0
         origin, offset, slope, swing, rate, _ = switches
@@ -115,15 +141,35 @@ class Signal:
         return line + swing * sin(rate * since) if self.has_sine else line
 
     def switches_at(self, time: float) -> Sequence[float]:
-        """Return the switches of the piece that starts at a time, s, or in which it lies."""
+        """Return the switches of the piece that starts at a time, or in which it lies.
+
+        Parameters
+        ----------
+        time : float
+            Time, s.
+        """
         return self.pieces[bisect_right(self._ends, time)] if self.pieces else ()
 
     def next_switch_time(self, switches: Sequence[float]) -> float:
-        """Return the time, s, at which the piece with these switches ends."""
+        """Return the time, s, at which a piece ends.
+
+        Parameters
+        ----------
+        switches : sequence of float
+            Values of `switches`.
+        """
         return switches[-1] if switches else inf
 
     def scaled(self, scales: Scales, unit: str) -> "Signal":
-        """Return the signal in units of `scales`; `unit` is that of its values."""
+        """Return the signal in other units.
+
+        Parameters
+        ----------
+        scales : Scales
+            The units.
+        unit : str
+            Unit of the values, such as "m/s".
+        """
         time, value, rate = map(scales.factor, ("s", unit, "Hz"))
         return Signal(
             tuple(
@@ -189,6 +235,15 @@ NO_SIGNAL = Signal()
 def step(amplitude: float, start: float = 0.0, duration: float = inf) -> Signal:
     """Return a signal that has an amplitude while it lasts, and is zero before and after.
 
+    Parameters
+    ----------
+    amplitude : float
+        Value while it lasts.
+    start : float
+        Time at which it starts, s.
+    duration : float
+        Time that it lasts, s.
+
     Examples
     --------
     >>> from stickslip_ros.physics.model.signals import step
@@ -200,14 +255,36 @@ def step(amplitude: float, start: float = 0.0, duration: float = inf) -> Signal:
 
 
 def impulse(amplitude: float, period: float, start: float = 0.0) -> Signal:
-    """Return a step that lasts for one sample, of a `period` in s."""
+    """Return a step that lasts for one sample.
+
+    Parameters
+    ----------
+    amplitude : float
+        Value while it lasts.
+    period : float
+        Sample period, s.
+    start : float
+        Time at which it starts, s.
+    """
     return step(amplitude, start, period)
 
 
 def ramp(amplitude: float, start: float = 0.0, duration: float = 1.0) -> Signal:
-    """Return a signal that rises to its amplitude during `duration`, s, and then stays.
+    """Return a signal that rises to its amplitude in a straight line, and then stays.
 
-    Raises InvalidInputError for a duration that is not positive and finite.
+    Parameters
+    ----------
+    amplitude : float
+        Value at the end.
+    start : float
+        Time at which it starts, s.
+    duration : float
+        Time of the rise, s.
+
+    Raises
+    ------
+    InvalidInputError
+        If the duration is not positive and finite.
     """
     _check_duration("ramp", duration)
     end = start + duration
@@ -218,6 +295,17 @@ def sine(
     amplitude: float, start: float = 0.0, duration: float = inf, frequency: float = 1.0
 ) -> Signal:
     """Return a sine that starts at zero, and is zero before and after it lasts.
+
+    Parameters
+    ----------
+    amplitude : float
+        Amplitude.
+    start : float
+        Time at which it starts, s.
+    duration : float
+        Time that it lasts, s.
+    frequency : float
+        Frequency, Hz.
 
     Examples
     --------
@@ -233,9 +321,23 @@ def sine(
 def trapezoid(
     amplitude: float, start: float = 0.0, duration: float = 2.0, frequency: float = 1.0
 ) -> Signal:
-    """Return a signal that rises over 1/`frequency`, holds, and falls over 1/`frequency` to zero.
+    """Return a signal that rises in a straight line, holds, and falls to zero.
 
-    It lasts for `duration`, s. Raises InvalidInputError if that is not finite, or too short.
+    Parameters
+    ----------
+    amplitude : float
+        Value between rise and fall.
+    start : float
+        Time at which it starts, s.
+    duration : float
+        Time from the start of the rise to the end of the fall, s.
+    frequency : float
+        One over the time of the rise, and of the fall, Hz.
+
+    Raises
+    ------
+    InvalidInputError
+        If the duration is not finite, or too short.
 
     Examples
     --------
@@ -262,9 +364,17 @@ def trapezoid(
 
 
 def table(points: Sequence[tuple[float, float]]) -> Signal:
-    """Return straight lines between points of time, s, and value; both ends are held outside.
+    """Return straight lines between points; the first and the last value are held outside.
 
-    Raises InvalidInputError for points that are not finite, or whose times do not increase.
+    Parameters
+    ----------
+    points : sequence of (float, float)
+        Time, s, and value of each point.
+
+    Raises
+    ------
+    InvalidInputError
+        If there are no points, they are not finite, or their times do not increase.
 
     Examples
     --------
