@@ -12,7 +12,6 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from stickslip_ros.physics.loop.controller import Controller
-from stickslip_ros.physics.loop.reference import ReferenceCourse, ReferenceKind
 from stickslip_ros.physics.loop.sampled_loop import SampledLoop
 from stickslip_ros.physics.loop.simulation import simulate_sampled
 from stickslip_ros.physics.loop.trajectory import TrajectoryRecorder
@@ -21,6 +20,7 @@ from stickslip_ros.physics.model.constants import constant
 from stickslip_ros.physics.model.control import ControlLaw
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import Coulomb
+from stickslip_ros.physics.model.signals import trapezoid
 from stickslip_ros.physics.motion import RecordedMotion
 
 RATE, FORCE_LIMIT = 1000.0, 351.5065  # Hz, N
@@ -49,17 +49,17 @@ class PositionServo(ControlLaw):
 
 # Their fit: 95.1 kg, 203.5 N s/m, 20.4 N; no spring holds the axis.
 AXIS = Drive(95.1, 203.5, 0.0, 1000.0, belt_speed=0.0, friction=Coulomb(static=0.0204))
-COURSE = ReferenceCourse(ReferenceKind.TRAPEZOID, amplitude=0.1, start=0.1, duration=3.0)
+MOTION = trapezoid(amplitude=0.1, start=0.1, duration=3.0)
 
 
 def simulate(law, duration=3.5):
     """Return the trajectory of the axis, and the reference at its samples (m)."""
     motion = RecordedMotion(AXIS, position=0.0, velocity=0.0)
     recorder = TrajectoryRecorder(RATE)
-    loop, controller = SampledLoop(motion, RATE, start=0), Controller(law, COURSE)
+    loop, controller = SampledLoop(motion, RATE, start=0), Controller(law, MOTION.reference)
     simulate_sampled(loop, motion, controller, duration, CycleMeter(20), recorder=recorder)
     moved = recorder.trajectory()
-    return moved, np.array([COURSE(time).position for time in moved.time])
+    return moved, np.array([MOTION.at(time) for time in moved.time])
 
 
 if __name__ == "__main__":

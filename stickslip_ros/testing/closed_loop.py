@@ -225,8 +225,11 @@ class ClosedLoop:
                     node.trigger_deactivate()
         window, reading = self.scenario.analyzer.window, self.scenario.reading
         result = result_of(self._bag_of_run, window, reading, diagnostics)
-        if result.lost_samples and self.scenario.plant.pace == "lockstep":
-            raise RunError(f"the recording of the run failed: {result.lost_samples} samples lost")
+        taken = diagnostics["plant"].figures["samples"]
+        if self.scenario.plant.pace == "lockstep" and len(result.states) < taken:
+            raise RunError(
+                f"the recording of the run failed: it has {len(result.states)} of {taken} samples"
+            )
         return result
 
     def set(self, *overrides: str) -> None:

@@ -202,6 +202,19 @@ def test_a_run_that_cannot_be_recorded_fails(monkeypatch: pytest.MonkeyPatch, wr
         loop.run(2.0)
 
 
+def test_a_run_without_its_last_samples_fails(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No gap shows that they are missing; the plant knows how many there were."""
+    write = Recorder.write
+
+    def write_first(self: Recorder, channel: int, data: bytes, stamp: int) -> None:
+        if stamp < 1_500_000_000:
+            write(self, channel, data, stamp)
+
+    monkeypatch.setattr(Recorder, "write", write_first)
+    with ClosedLoop("paper") as loop, pytest.raises(RunError, match="it has 50 of 201 samples"):
+        loop.run(2.0)
+
+
 def test_a_bad_change_changes_nothing() -> None:
     with pytest.raises(InvalidInputError, match=r"analyzer\.bag=elsewhere is refused.*`bag`"):
         ClosedLoop("paper", "analyzer.bag=elsewhere")
