@@ -29,12 +29,12 @@ _ATTEMPTS = 6
 """To get an answer from a service within that time."""
 
 
-def wait_for(condition: Callable[[], object], what: str) -> None:
+def wait_for(condition: Callable[[], object], what: str, patience: float = PATIENCE) -> None:
     """Wait until the condition, which other processes bring about, holds; fail if it never does."""
     nothing = Event()
-    deadline = time.monotonic() + PATIENCE
+    deadline = time.monotonic() + patience
     while not condition():
-        assert time.monotonic() < deadline, f"waited {PATIENCE} s in vain: {what}"
+        assert time.monotonic() < deadline, f"waited {patience} s in vain: {what}"
         nothing.wait(0.02)
 
 

@@ -34,7 +34,7 @@ from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.scenarios.keywords import described
 from stickslip_ros.scenarios.parameters import CONTROLLER_PARAMETERS
 from stickslip_ros.studies.stability import stability
-from tests.nodes.graph import wait_for
+from tests.nodes.graph import PATIENCE, wait_for
 
 SCENARIO = load_scenario("feed_drive")
 PLANT, GAINS = SCENARIO.plant.flat(), SCENARIO.controller.flat()
@@ -79,7 +79,7 @@ def settle(theory: Theory) -> None:
         theory.follow()
         return not theory.busy
 
-    wait_for(done, "all is computed")
+    wait_for(done, "all is computed", 5.0 * PATIENCE)  # it leaves the processor to others
 
 
 def series(options: dict[str, Any], name: str) -> np.ndarray:
@@ -154,6 +154,7 @@ def test_the_friction_curve_has_the_operating_point() -> None:
 
 
 @pytest.mark.process
+@pytest.mark.timeout(600)
 def test_only_what_a_parameter_changes_is_computed_again(listener: Any, theory: Theory) -> None:
     settle(theory)
     versions = {each: theory.result(each).version for each in (bifurcation, stability_map, decay)}
