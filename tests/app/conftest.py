@@ -1,11 +1,10 @@
 import json
 import os
-import resource
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Generator, Iterator
-from contextlib import chdir, contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import chdir
 from pathlib import Path
 from typing import Any
 from unittest import mock
@@ -113,14 +112,3 @@ def ended(process: subprocess.Popen[str], status: int, number: int = 0) -> tuple
     output, errors = process.communicate(timeout=PATIENCE)
     assert process.returncode == status, errors
     return output, errors
-
-
-@contextmanager
-def room_for(size: int) -> Generator[None]:
-    """Limit the bytes of each file: what fails is what fails on a full disk."""
-    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))

@@ -4,7 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.app.conftest import Run, room_for
+from tests.app.conftest import Run
+from tests.bags.runs import full_disk
 
 _OLD = b"a figure of before"
 
@@ -24,7 +25,7 @@ def test_the_old_file_stays_and_the_next_call_works(
         if word.startswith("old."):
             (tmp_path / word).write_bytes(_OLD)
     before = _files(tmp_path)
-    with room_for(4096):
+    with full_disk(4096):
         failed = stickslip(*words)
     assert failed.returncode == 2
     (line,) = failed.stderr.splitlines()

@@ -9,7 +9,8 @@ import pytest
 import stickslip_ros as ss
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.identification import scenario
-from tests.app.conftest import REFERENCE, Run, room_for
+from tests.app.conftest import REFERENCE, Run
+from tests.bags.runs import full_disk
 from tests.identification.axis_record import record
 
 _COLUMNS = "time=t,position=x,force=u*2,reference=r"
@@ -160,7 +161,7 @@ def test_a_model_in_python_is_saved_and_checked(
     assert {*tmp_path.iterdir()} == before
     monkeypatch.undo()
     # There is room for the curves, but not for the scenario.
-    with room_for(4096), pytest.raises(OSError, match="File too large"):
+    with full_disk(4096), pytest.raises(OSError, match="File too large"):
         model.save(tmp_path / "found.yaml")
     assert {*tmp_path.iterdir()} == before
     model.save(tmp_path / "found.yaml")
