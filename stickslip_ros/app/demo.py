@@ -5,7 +5,6 @@ import sys
 from stickslip_ros.app.optional_dependencies import load_matplotlib, loading_ros
 from stickslip_ros.app.output import print_values
 from stickslip_ros.app.run import default_bag, record
-from stickslip_ros.bags import Recording
 from stickslip_ros.bags.report import report_of_bag
 from stickslip_ros.errors import StickslipError
 from stickslip_ros.scenarios.files import load_scenario
@@ -40,7 +39,8 @@ def _demonstrate() -> None:
     controller = scenario.controller.node.replace("_", " ")
     bag = default_bag(_SCENARIO)
     load_matplotlib()
-    from stickslip_ros.plots.controller_comparison import control_switched_on_figure
+    from stickslip_ros.plots.run_figure import recorded_run_figure
+    from stickslip_ros.plots.run_history import RunHistory
     from stickslip_ros.plots.style import save
 
     with loading_ros():
@@ -64,9 +64,10 @@ def _demonstrate() -> None:
         {title: {name: part[name] for name in _VALUES} for title, part in parts.items()},
     )
     figure = bag.with_suffix(".png")
-    with Recording(bag) as recording:
-        states, forces = recording.joint_states, recording.control_forces
-    save(control_switched_on_figure(states, forces, switched_on, around=(0.5, 1.0)), figure)
+    history = RunHistory()
+    report = report_of_bag(bag, observer=history)
+    drive = scenario.plant.as_drive()
+    save(recorded_run_figure(bag, drive, history, report), figure)
     print(f"bag:    {bag}\nfigure: {figure}")
 
 
