@@ -21,9 +21,9 @@ from stickslip_ros.paper.claims import (
     Finding,
     Verdict,
 )
-from stickslip_ros.paper.claims.claim import Formula, Number, Observation, agrees
 from stickslip_ros.paper.claims.coefficients import Nonlinearity, samples
 from stickslip_ros.paper.claims.paper_values import FILTER, arrivals, expansion, hopf_point
+from stickslip_ros.paper.claims.verdict import Formula, Number, Observation, Result, agrees
 from stickslip_ros.paper.figures import (
     NUMBERS,
     PRINTED_SLOPE,
@@ -177,13 +177,21 @@ def test_a_number_agrees_with_what_it_rounds_to(units: int, digits: int, rest: f
     assert not agrees(printed, printed + (rest + 1.0) * unit)
 
 
+def judged(result: Result, printed: float | str | None = None, words: str = "") -> Finding:
+    """Return the finding for a claim with this result, whose row has these words."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setitem(COMPUTATIONS, "some", lambda _: result)
+        claim = Claim("some", "eq. 1", "It is so", printed, words, words)
+        return claim.check(Evidence(no_figure))
+
+
 def test_verdict_on_a_number() -> None:
     for value, corrected, verdict in (
         (0.4944, 0.1, HOLDS),
         (0.48876, 0.49441, CORRECTED),
         (0.48876, 0.4943, FAILS),
     ):
-        finding = Number(value, {"With x": corrected}, "So it is.").finding(0.4944)
+        finding = judged(Number(value, {"With x": corrected}), 0.4944, "So it is.")
         assert (finding.verdict, finding.computed) == (verdict, value)
         assert finding.remark.startswith("With x: 0.49441.") == (verdict is CORRECTED)
         assert finding.remark.endswith("So it is.")
@@ -197,7 +205,7 @@ def test_verdict_on_a_formula() -> None:
         ([1.0, 2.5], [1.0, 2.1], FAILS, 0.5),
         (None, [1.0, 2.1], FAILS, None),
     ):
-        finding = Formula(printed, [1.0, 2.0], {"With x": corrected}).finding("a = b")
+        finding = judged(Formula(printed, [1.0, 2.0], {"With x": corrected}), "a = b")
         assert [finding.verdict, finding.difference] == expected
 
 
@@ -208,7 +216,15 @@ def test_verdict_on_a_statement() -> None:
         (False, True, CORRECTED),
         (False, False, FAILS),
     ):
-        assert Observation("", holds, corrected).finding(None).verdict is verdict
+        assert judged(Observation(holds, corrected)).verdict is verdict
+
+
+def test_words_of_a_row_contain_the_values_of_its_function() -> None:
+    result = Observation(True, some=[0.123456, 2.0], z=1.0 - 2.0j, point=hopf_point(), n=3)
+    words = "{some} or {some:.1f}, {z}, {point.angular_frequency:.2f}, {n}, {STUDIED_SPEED:g}"
+    finding = judged(result, None, words)
+    assert finding.computed == "0.1235, 2 or 0.1, 2.0, 1.0000 - 2.0000 i, 1.00, 3, 0.49"
+    assert finding.remark == finding.computed
 
 
 def sigma_of_coefficients(q: Nonlinearity) -> float:

@@ -7,7 +7,6 @@ from math import sqrt
 
 import numpy as np
 
-from stickslip_ros.paper.claims.claim import Computations, Evidence, Formula, Number, Observation
 from stickslip_ros.paper.claims.paper_values import (
     DAMPING,
     PRINTED_HOPF_SPEED,
@@ -19,11 +18,11 @@ from stickslip_ros.paper.claims.paper_values import (
     cycles,
     expansion,
     hopf_point,
-    listed,
     rates,
     slip_friction,
     trace_of,
 )
+from stickslip_ros.paper.claims.verdict import Computations, Evidence, Formula, Number, Observation
 from stickslip_ros.paper.figures import STRIBECK, BifurcationFigure, unit_drive
 from stickslip_ros.physics.measures.cycle_measures import Regime
 from stickslip_ros.physics.model.functions import zero_between
@@ -54,13 +53,7 @@ def _periodicity(figure: BifurcationFigure, end: float) -> Observation:
     """Observe whether the vibrations up to the value `end` are not periodic."""
     rows = _rows(figure, lambda value, regime: regime in VIBRATING and value < end)
     counts = {_turning_points(figure, row) for row in rows}
-    return Observation(
-        f"{listed(sorted(counts))} turning points",
-        min(counts) > 2,
-        remark=f"Each of the {len(rows)} motions up to {end:.4g} repeats the same maximum and "
-        "minimum: they are periodic. A planar autonomous system has no quasi-periodic motion "
-        "(Poincare and Bendixson).",
-    )
+    return Observation(min(counts) > 2, counts=sorted(counts), motions=len(rows), end=end)
 
 
 @computes("hopf-notion")
@@ -68,9 +61,9 @@ def _(_: Evidence) -> Observation:
     speed = hopf_point().belt_speed
     inside, outside = (expansion(speed + step).eigenvalues[0] for step in (-0.01, 0.01))
     return Observation(
-        f"real part {inside.real:.5f} below, {outside.real:.5f} above",
         inside.real > 0.0 > outside.real and min(inside.imag, outside.imag) > 0.0,
-        remark=f"0.01 on both sides of v_b1; imaginary part {inside.imag:.5f}.",
+        inside=inside,
+        outside=outside,
     )
 
 
@@ -88,7 +81,6 @@ def _(_: Evidence) -> Formula:
             - DAMPING * speed
             - gamma * position
         },
-        "In eq. 2 the scales make the stiffness one.",
     )
 
 
@@ -103,8 +95,7 @@ def _(evidence: Evidence) -> Number:
     return Number(
         sqrt(float(quadratic[-1])),
         {TAKEN_FOR_DAMPING: hopf_point(TAKEN_DAMPING).belt_speed},
-        "From Fig. 2: the speed amplitudes of pure slip extrapolate to zero there. Theory with the "
-        f"same damping gives {hopf_point().belt_speed:.4f}.",
+        hopf=hopf_point(),
     )
 
 
@@ -114,11 +105,10 @@ def _(_: Evidence) -> Observation:
     below, above = (bool(expansion(speed + off).stable) for off in (-0.01, 0.01))
     vanishes = len(cycles(speed - 2e-3)) == 1 and not cycles(speed + 2e-3)
     return Observation(
-        f"{'stable' if below else 'unstable'} below, {'stable' if above else 'unstable'} above",
         below and not above and vanishes,
         above and not below and vanishes,
-        "The opposite is true: stability is lost as the speed falls, and the cycle vanishes as the "
-        "speed rises.",
+        below="stable" if below else "unstable",
+        above="stable" if above else "unstable",
     )
 
 
@@ -133,9 +123,7 @@ def _(evidence: Evidence) -> Observation:
     rows = _rows(figure, lambda value, _: value > PRINTED_HOPF_SPEED)
     counts = [_turning_points(figure, row) for row in rows]
     return Observation(
-        f"{counts.count(1)} of {len(rows)} belt speeds",
-        set(counts) == {1},
-        remark=f"With beta = 0.01 in eq. 5 it is single from {hopf_point().belt_speed:.4f} on.",
+        set(counts) == {1}, single=counts.count(1), total=len(rows), hopf=hopf_point()
     )
 
 
@@ -148,10 +136,7 @@ def _(evidence: Evidence) -> Observation:
     agree = [measures[row].regime in VIBRATING for row in below]
     agree += [measures[row].regime is Regime.EQUILIBRIUM for row in above]
     return Observation(
-        f"{sum(agree)} of {len(agree)} belt speeds",
-        all(agree),
-        remark=f"Vibrating up to {_CLEAR_OF_HOPF:g} v_b1, at rest from v_b1/{_CLEAR_OF_HOPF:g} on, "
-        f"with v_b1 = {speed:.5f} for the damping of the motion.",
+        all(agree), agreeing=sum(agree), total=len(agree), clear_of_hopf=_CLEAR_OF_HOPF, speed=speed
     )
 
 
@@ -162,10 +147,10 @@ def _(evidence: Evidence) -> Observation:
     vibrating = [measure.regime in VIBRATING for measure in figure.diagram.measures]
     edges = sum(a != b for a, b in pairwise(vibrating))
     return Observation(
-        f"from beta = {critical:.4f} on at rest",
         vibrating[0] and not vibrating[-1] and edges == 1,
-        remark=f"At v0 = {figure.diagram.drives[0].belt_speed:g}, by p = 0; the last vibration in "
-        f"the diagram, still decaying, is at {figure.values[vibrating].max():.4f}.",
+        critical=critical,
+        figure=figure,
+        last=figure.values[vibrating].max(),
     )
 
 
@@ -177,8 +162,7 @@ def _(evidence: Evidence) -> Number:
     return Number(
         critical_beta(0.4),
         {f"With the belt speed {belt_speed:g} in place of 0.4": critical_beta(belt_speed)},
-        "The belt speed of the figure is not printed; 0.4 is used, as in other figures. "
-        f"The printed beta belongs to v0 = {fitting:.4f}.",
+        fitting=fitting,
     )
 
 
@@ -201,13 +185,13 @@ def _(evidence: Evidence) -> Observation:
         cycles(0.2, stiffness=stiffness)[0].measures.velocity_amplitude or 0.0 for stiffness in far
     )
     return Observation(
-        f"amplitude changes by a factor of {ratios[0]:.3g}",
         max(ratios) < 1.5,
         softest / stiffest < 2.5,
-        f"On the speed amplitude: over a stiffness of {figure.values[0]:g} to "
-        f"{figure.values[-1]:g} it changes by a factor of {ratios[1]:.3g}, and over one of "
-        f"{far[0]:g} to {far[1]:g} by {softest / stiffest:.3g}. The stick fraction changes by "
-        f"{ratios[2]:.3g}, and falls to zero (see Fig. 10).",
+        ratios=ratios,
+        figure=figure,
+        end=figure.values[-1],
+        far=far,
+        change=softest / stiffest,
     )
 
 
@@ -215,11 +199,7 @@ def _(evidence: Evidence) -> Observation:
 def _(evidence: Evidence) -> Observation:
     figure = evidence.bifurcation(4)
     vibrating = [measure.regime in VIBRATING for measure in figure.diagram.measures]
-    return Observation(
-        f"{sum(vibrating)} of {len(vibrating)} stiffnesses vibrate",
-        all(vibrating),
-        remark="The sign of the trace p decides, and p does not contain the stiffness.",
-    )
+    return Observation(all(vibrating), count=sum(vibrating), total=len(vibrating))
 
 
 @computes("fig-5-ratio")
@@ -235,10 +215,9 @@ def _(evidence: Evidence) -> Observation:
     critical = zero_between(p, float(figure.values[0]), float(figure.values[-1]))
     slippery = unit_drive(0.4, friction=replace(STRIBECK, minimum=STRIBECK.static / 1000.0))
     return Observation(
-        f"from mu_s/mu_m = {critical:.4f} on",
         vibrating[-1] and not vibrating[0] and edges == 1,
-        remark=f"By p = 0, at v0 = {figure.diagram.drives[0].belt_speed:g}; in the diagram from "
-        f"{figure.values[vibrating].min():.4f} on, where a vibration still decays slowly. A "
-        f"ratio of 1000 too makes it vibrate below v0 = {hopf_points(slippery)[0].belt_speed:.4f} "
-        "only.",
+        critical=critical,
+        figure=figure,
+        first=figure.values[vibrating].min(),
+        speed=hopf_points(slippery)[0].belt_speed,
     )

@@ -16,22 +16,20 @@ import numpy as np
 import numpy.typing as npt
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.paper.claims.claim import Computations, Evidence, Formula, Number, Observation
 from stickslip_ros.paper.claims.paper_values import (
     DAMPING,
     FILTER,
     PRINTED_HOPF_SPEED,
     STUDIED_SPEED,
     TAKEN_DAMPING,
-    complex_number,
     critical,
     expansion,
     for_both,
     hopf_point,
     known,
-    listed,
     number_for_both,
 )
+from stickslip_ros.paper.claims.verdict import Computations, Evidence, Formula, Number, Observation
 from stickslip_ros.physics.model.drive_system import SPEED
 from stickslip_ros.physics.theory.hopf import first_lyapunov_coefficient
 from stickslip_ros.physics.theory.linear import Expansion
@@ -173,7 +171,7 @@ def _on_samples(
     printed: Callable[[Nonlinearity], complex] | None,
     true: Callable[[Nonlinearity], complex],
     corrections: Mapping[str, Callable[[Nonlinearity], complex]],
-    remark: str = "Tried on arbitrary nonlinearities.",
+    **values: Any,
 ) -> Formula:
     """Return a formula of a coefficient, by its values for arbitrary nonlinearities."""
     tried = samples(order)
@@ -181,7 +179,7 @@ def _on_samples(
         None if printed is None else [printed(q) for q in tried],
         [true(q) for q in tried],
         {what: [corrected(q) for q in tried] for what, corrected in corrections.items()},
-        remark,
+        **values,
     )
 
 
@@ -196,8 +194,7 @@ def _(_: Evidence, coefficient: Callable[[Nonlinearity], complex]) -> Number:
     """Return four times the imaginary part of g20 or g11, which are imaginary at v_b1."""
     return number_for_both(
         lambda damping: 4.0 * coefficient(_at_hopf_point(damping)).imag,
-        "{taken:.5f} with the damping of eq. 8; a misprint, since eq. 11 prints the same "
-        f"product 3.6 v_b1 with the digits {3.6 * PRINTED_HOPF_SPEED:.4f}.",
+        product=3.6 * PRINTED_HOPF_SPEED,
     )
 
 
@@ -211,7 +208,6 @@ computes["eq-12-formula"] = computes["eq-23-formula"] = lambda _: _on_samples(
     lambda q: _printed_g20(q, 1),
     lambda q: q.g20,
     {"With Q2 in place of Q1 in the real part's last term": lambda q: _printed_g20(q, 2)},
-    "Tried on arbitrary nonlinearities; that derivative is zero for the drive.",
 )
 computes["eq-13-formula"] = computes["eq-24-formula"] = lambda _: _on_samples(
     2,
@@ -234,11 +230,8 @@ computes["eq-14-imaginary"] = lambda _: _on_samples(
             (q.by(2, 1, 1, 1) + q.by(2, 1, 2, 2) - q.by(1, 1, 1, 2) - q.by(1, 2, 2, 2)) / 8.0
         )
     },
-    "This does not affect sigma, which contains the real part only.",
 )
-computes["eq-14-value"] = lambda _: Number(
-    _at_hopf_point(DAMPING).cubic.real, remark="For any damping."
-)
+computes["eq-14-value"] = lambda _: Number(_at_hopf_point(DAMPING).cubic.real)
 
 
 @computes("eq-15-formula")
@@ -255,18 +248,15 @@ def _(_: Evidence) -> Formula:
                 (1j * _beat(q) + q.cubic / 2.0).real
             ),
         },
-        f"Compared with the projection method. Without i the sum would be {without:.4g} at v_b1.",
+        without=without,
     )
 
 
 computes["eq-15-value"] = lambda _: Number(
-    known(first_lyapunov_coefficient(expansion(hopf_point().belt_speed))),
-    remark="By the projection method, from heyoka's derivatives.",
+    known(first_lyapunov_coefficient(expansion(hopf_point().belt_speed)))
 )
 computes["eq-15-imaginary"] = lambda _: number_for_both(
-    lambda damping: ((q := _at_hopf_point(damping)).g20 * q.g11).real / 2.0,
-    "Of i g20 g11 / 2; even with the damping of eq. 8 it is 3.6^2 v_b1^2 / 32 = {taken:.4f}. "
-    "This does not affect sigma.",
+    lambda damping: ((q := _at_hopf_point(damping)).g20 * q.g11).real / 2.0
 )
 
 
@@ -276,10 +266,7 @@ def _(_: Evidence, coefficient: Callable[[Nonlinearity], complex]) -> Number:
     """Return four times the magnitude of g20 or g11 in the closed loop."""
     taken = 4.0 * coefficient(_at_critical_gain(TAKEN_DAMPING))
     return number_for_both(
-        lambda damping: 4.0 * abs(coefficient(_at_critical_gain(damping))),
-        f"{complex_number(taken)} with the damping of eq. 8: the printed value is that of the loop "
-        "without filter, with -+ i. The formula needs coordinates in which the linear part has "
-        "Jordan form; these contain the filter.",
+        lambda damping: 4.0 * abs(coefficient(_at_critical_gain(damping))), coefficient=taken
     )
 
 
@@ -304,13 +291,7 @@ def _(_: Evidence, true: Callable[[Nonlinearity], complex], sign: float) -> Form
 @computes("eq-28-value", attrgetter("w11"))
 def _(_: Evidence, coefficient: Callable[[Nonlinearity], complex]) -> Observation:
     here, taken = for_both(lambda damping: coefficient(_at_critical_gain(damping)))
-    return Observation(
-        complex_number(taken),
-        max(abs(here), abs(taken)) < 1e-9,
-        remark="In Jordan coordinates, y3 scaled to the slide's speed, with the damping of eq. 8; "
-        f"{complex_number(here)} with that of eq. 5. The quadratic friction acts on all three "
-        "coordinates, since each of them moves the slide.",
-    )
+    return Observation(max(abs(here), abs(taken)) < 1e-9, taken=taken, here=here)
 
 
 computes["eq-27-formula"] = lambda _: _on_samples(
@@ -323,7 +304,6 @@ computes["eq-27-formula"] = lambda _: _on_samples(
             / (4.0 * (2j * q.frequency - q.third_eigenvalue))
         )
     },
-    "The printed formula subtracts an eigenvalue from a parameter value mu_0.",
 )
 
 
@@ -335,8 +315,7 @@ computes["eq-28-formula"] = lambda _: _on_samples(
     3, _printed_w11, lambda q: q.w11, {"With the opposite sign": lambda q: -_printed_w11(q)}
 )
 computes["eq-29-constant"] = lambda _: number_for_both(
-    lambda damping: _at_critical_gain(damping).cubic.real,
-    "Real part, in Jordan coordinates; {taken:.5f} with the damping of eq. 8.",
+    lambda damping: _at_critical_gain(damping).cubic.real
 )
 
 
@@ -346,12 +325,7 @@ def _(_: Evidence) -> Number:
         return (_at_critical_gain(damping, 1.0).cubic - _at_critical_gain(damping, 0.0).cubic).real
 
     passed = 1j / (1j + FILTER.corner_frequency)
-    return number_for_both(
-        slope,
-        "The printed value is for a gain on the speed itself; the gain acts on the filter output, "
-        f"which is {abs(passed):.3f} of the speed at the frequency one and "
-        f"{np.angle(passed, deg=True):.0f} degrees ahead. The gain called k3 is the k2 of eq. 18.",
-    )
+    return number_for_both(slope, share=abs(passed), phase=np.angle(passed, deg=True))
 
 
 computes["eq-30-formula"] = lambda _: _on_samples(
@@ -363,23 +337,18 @@ computes["eq-30-formula"] = lambda _: _on_samples(
             (1j * _beat(q) + (q.cubic + 2.0 * q.g110 * q.w11 + q.g101 * q.w20) / 2.0).real
         )
     },
-    "Compared with the projection method, on arbitrary nonlinearities.",
 )
 computes["eq-30-value"] = lambda _: number_for_both(
-    lambda damping: critical(STUDIED_SPEED, damping).first_lyapunov_coefficient,
-    "By the projection method; {taken:.5f} with the damping of eq. 8. Half of G21 belongs in "
-    "sigma, as in eq. 15 but not in eq. 30.",
+    lambda damping: critical(STUDIED_SPEED, damping).first_lyapunov_coefficient
 )
 
 
 @computes("eq-30-sign")
 def _(_: Evidence) -> Observation:
     found = for_both(lambda damping: critical(STUDIED_SPEED, damping).first_lyapunov_coefficient)
-    return Observation(listed(found), max(found) < 0.0, remark="For both dampings.")
+    return Observation(max(found) < 0.0, found=found)
 
 
 computes["eq-30-imaginary"] = lambda _: number_for_both(
-    lambda damping: _beat(_at_critical_gain(damping)).real,
-    "Of i g20 g11 / (2 omega_0); {taken:.4f} with the damping of eq. 8. The factor v0^2 is "
-    "missing, and 16 should be 32. This does not affect sigma.",
+    lambda damping: _beat(_at_critical_gain(damping)).real
 )

@@ -1,9 +1,10 @@
-"""Section 4: the effect of the control, Fig. 12 and 13."""
+"""Sections 4 and 5 and the abstract: the effect of the control, Fig. 12 and 13, and all in all."""
 
 from dataclasses import replace
 from math import log
 
-from stickslip_ros.paper.claims.claim import Computations, Evidence, Number, Observation
+import numpy as np
+
 from stickslip_ros.paper.claims.paper_values import (
     DAMPING,
     FASTER,
@@ -27,8 +28,10 @@ from stickslip_ros.paper.claims.paper_values import (
     known,
     listed,
     trace,
+    trace_of,
 )
-from stickslip_ros.paper.figures import unit_drive
+from stickslip_ros.paper.claims.verdict import Computations, Evidence, Number, Observation
+from stickslip_ros.paper.figures import STRIBECK, unit_drive
 from stickslip_ros.physics.measures.cycle_measures import Regime
 from stickslip_ros.physics.model.control import WashoutGains
 from stickslip_ros.physics.motion import Motion
@@ -40,9 +43,7 @@ _FIG_12_SPEEDS = (0.48, 0.49, 0.492)
 
 
 computes["fig-12-place"] = lambda _: Number(
-    hopf_point().belt_speed,
-    remark="The Hopf speed for beta = 0.01 in eq. 5: the change there is the supercritical "
-    f"Hopf point itself, which eq. 8 places at {hopf_point(TAKEN_DAMPING).belt_speed:.4f}.",
+    hopf_point().belt_speed, taken=hopf_point(TAKEN_DAMPING)
 )
 
 
@@ -59,12 +60,13 @@ def _(_: Evidence) -> Observation:
         lambda damping: [(amplitudes(v, damping) or [0.0])[0] for v in _FIG_12_SPEEDS]
     )
     return Observation(
-        listed(here),
         exponent < 0.1,
-        remark="They fall to zero without a jump: amplitude squared over the distance to v_b1 is "
-        f"{listed(squares)} at distances {listed(distances)}, and at the smallest the amplitude "
-        f"varies with power {exponent:.3f} of it. Amplitudes of the limit cycles at v0 = "
-        f"{listed(_FIG_12_SPEEDS)}; with the damping of eq. 8 {listed(taken)}.",
+        here=here,
+        squares=squares,
+        distances=distances,
+        exponent=exponent,
+        fig_12_speeds=_FIG_12_SPEEDS,
+        taken=taken,
     )
 
 
@@ -81,13 +83,13 @@ def _(evidence: Evidence) -> Observation:
     left = [p.measures.amplitude or 0.0 for p in portraits]
     ends = [float(p.trajectory.time[-1]) for p in portraits]
     return Observation(
-        f"p = {listed([trace(speed) for speed in speeds])}",
         here,
         taken,
-        f"{TAKEN_FOR_DAMPING} p = {listed([trace(v, TAKEN_DAMPING) for v in speeds])}, up to v0 = "
-        f"{hopf_point(TAKEN_DAMPING).belt_speed:.4f}. With that "
-        f"of eq. 5 the motion at 0.49 decays slowly: amplitude {listed(left)} "
-        f"after {listed(ends)}.",
+        here=[trace(speed) for speed in speeds],
+        taken=[trace(v, TAKEN_DAMPING) for v in speeds],
+        critical=hopf_point(TAKEN_DAMPING),
+        left=left,
+        ends=ends,
     )
 
 
@@ -99,11 +101,11 @@ def _(_: Evidence) -> Observation:
     multipliers = [abs(cycle.multipliers[0]) for here in found for cycle in here]
     above = expansion(hopf_point(TAKEN_DAMPING).belt_speed + 1e-3, TAKEN_DAMPING).stable
     return Observation(
-        f"multipliers {listed(multipliers)}",
         multipliers[-1] > 1.0 and resting[-1],
-        remark=f"At v0 = {listed(falling_speeds)} with the damping of eq. 8: the cycle is stable "
-        f"and becomes more stable; {resting.count(False)} of the equilibria are unstable, while "
-        f"above v_b1 it is {'stable' if above else 'unstable'}.",
+        multipliers=multipliers,
+        falling_speeds=falling_speeds,
+        vibrating=resting.count(False),
+        above="stable" if above else "unstable",
     )
 
 
@@ -116,10 +118,11 @@ def _(_: Evidence) -> Observation:
     found = [cycle for speed in speeds for cycle in cycles(speed)]
     unstable = [cycle for cycle in found if not cycle.stable]
     return Observation(
-        f"sigma = {listed(sigmas)}",
         max(sigmas) > 0.0 or bool(unstable),
-        remark="For both dampings: supercritical, as in section 2. "
-        f"{len(unstable)} of the {len(found)} limit cycles at v0 = {listed(speeds)} are unstable.",
+        sigmas=sigmas,
+        total=len(unstable),
+        count=len(found),
+        speeds=speeds,
     )
 
 
@@ -140,13 +143,14 @@ def _(evidence: Evidence) -> Observation:
         for (v, d), found in left.items()
     )
     return Observation(
-        listed(sizes),
         falling(sizes) and all(map(falling, left.values())),
         falling(sizes) and falling(left[0.4, 2.0]),
-        "Only if the filter passes the vibration and sticking does not fix its amplitude. At "
-        f"v0 = 0.4, d = 2, k1 = 0, k2 = {listed(gains)}: k2 = {gains[-1]:g} reduces the "
-        f"amplitude by {1.0 - sizes[-1] / sizes[0]:.0%}. With k2 = {listed(strong[1:])} the "
-        f"remaining shares are {'; '.join(shares)}.",
+        sizes=sizes,
+        gains=gains,
+        strongest=gains[-1],
+        reduction=1.0 - sizes[-1] / sizes[0],
+        stronger=strong[1:],
+        shares="; ".join(shares),
     )
 
 
@@ -165,13 +169,13 @@ def _(_: Evidence) -> Number:
     return Number(
         here,
         {TAKEN_FOR_DAMPING: taken},
-        f"{taken:.4g} with the damping of eq. 8: the filter passes little of the speed and shifts "
-        f"its phase. At v0 = {listed(speeds)} it is {'; '.join(others)}: the printed bound is that "
-        "of a filter with d near zero, which passes the speed unchanged. "
-        "For large vibrations this bound, the cubic coefficient of the friction, applies to any "
-        "filter: above k2 = "
-        f"{min(slow):.3f} to {max(slow):.3f} the motion diverges from X' = -30, above "
-        f"{min(fast):.3f} to {max(fast):.3f} from X' = -900 (these v0, d = 0.2 to 20, k1 = 0).",
+        taken=taken,
+        speeds=speeds,
+        others="; ".join(others),
+        slow_least=min(slow),
+        slow_most=max(slow),
+        fast_least=min(fast),
+        fast_most=max(fast),
     )
 
 
@@ -196,18 +200,15 @@ def _(_: Evidence) -> Observation:
     )
     directed = [p.supercritical and p.crossing_speed < 0.0 for p in (here, taken)]
     return Observation(
-        f"v = {here.belt_speed:.5f}",
         directed[0] and abs(here.belt_speed - STUDIED_SPEED) < 1e-3,
         directed[1] and abs(taken.belt_speed - STUDIED_SPEED) < 1e-3,
-        f"{TAKEN_FOR_DAMPING} v = {taken.belt_speed:.5f}; sigma = "
-        f"{taken.first_lyapunov_coefficient:.4f}, so stable cycles start below it.",
+        here=here,
+        taken=taken,
     )
 
 
 computes["before-control"] = lambda _: Observation(
-    f"sigma = {hopf_point().first_lyapunov_coefficient:.6g}",
-    hopf_point().first_lyapunov_coefficient < 0.0,
-    remark="As in section 2; the same section 4.2 then calls it subcritical.",
+    hopf_point().first_lyapunov_coefficient < 0.0, hopf=hopf_point()
 )
 
 
@@ -219,10 +220,11 @@ def _(_: Evidence) -> Observation:
         for d in (FILTER.corner_frequency, 0.2)
     )
     return Observation(
-        f"sigma = {listed(found)}",
         max(*found, *slow) < 0.0,
-        remark=f"At v0 = {listed(speeds)} and their critical gains, d = 2, k2 = 0; "
-        f"{min(slow):.4f} to {max(slow):.4f} with d = 0.2.",
+        found=found,
+        speeds=speeds,
+        slow_least=min(slow),
+        slow_most=max(slow),
     )
 
 
@@ -233,11 +235,12 @@ def _(_: Evidence) -> Observation:
     left = controlled_amplitude(STUDIED_SPEED, gains, TAKEN_DAMPING)
     resting = expansion(STUDIED_SPEED, TAKEN_DAMPING, replace(FILTER, linear=-0.05)).stable
     return Observation(
-        f"{listed(here)} without filter" if here else "no vibration without filter",
         bool(here) and left < here[0],
         bool(taken) and left < taken[0],
-        f"{TAKEN_FOR_DAMPING} the amplitude falls from {listed(taken)} to {left:.4g} with half the "
-        f"critical gain; with k1 = -0.05 the slide {'rests' if resting else 'vibrates'}.",
+        outcome=f"{listed(here)} without filter" if here else "no vibration without filter",
+        taken=taken,
+        left=left,
+        ending="rests" if resting else "vibrates",
     )
 
 
@@ -246,11 +249,10 @@ def _(_: Evidence) -> Observation:
     before = hopf_point().first_lyapunov_coefficient
     after = critical(STUDIED_SPEED, DAMPING).first_lyapunov_coefficient
     return Observation(
-        f"sigma = {before:.4g} without, {after:.4g} with it",
         before > 0.0 > after,
-        remark="There is none to remove; the filter only brings sigma nearer to zero."
-        if abs(after) < abs(before)
-        else "There is none to remove.",
+        before=before,
+        after=after,
+        effect="; the filter only brings sigma nearer to zero" if abs(after) < abs(before) else "",
     )
 
 
@@ -261,12 +263,7 @@ def _(evidence: Evidence) -> Observation:
         for panel in evidence.portraits(13).panels
     )
     ratios = [max(sizes) / min(filter(None, sizes)) for sizes in (linear, cubic, slow)]
-    return Observation(
-        f"by factors of {listed(ratios)}",
-        min(ratios) > 1.1,
-        remark=f"For the vibrating motions. Over k1 with d = 2: {listed(linear)}; over k2: "
-        f"{listed(cubic)}; over k1 with d = 0.2: {listed(slow)}.",
-    )
+    return Observation(min(ratios) > 1.1, ratios=ratios, linear=linear, cubic=cubic, slow=slow)
 
 
 @computes("fig-13-vanish")
@@ -278,13 +275,16 @@ def _(evidence: Evidence) -> Observation:
     starts = ((3.0, 0.0), (-3.0, 0.0), (0.0, 3.0), (0.0, -3.0))
     resting = [_comes_to_rest(k1, x, y) for k1 in (-1.0, -10.0) for x, y in starts]
     return Observation(
-        f"{ends} at {linear.portraits[-1].case.label}",
         ends is Regime.EQUILIBRIUM and all(resting),
-        remark=f"k1 does, below {critical(0.4, DAMPING).linear:.4f}: with k1 = -1 and -10 the "
-        f"slide settles at rest from {sum(resting)} of {len(resting)} starts up to 3 away. k2 "
-        "alone cannot, because it does "
-        f"not change the eigenvalues: {vibrates} of {len(cubic.portraits)} motions vibrate, with "
-        f"k2 = {known(strongest.case.gains).cubic:g} at the amplitude {amplitude(strongest):.4f}.",
+        ends=ends,
+        last=linear.portraits[-1],
+        critical=critical(0.4, DAMPING),
+        resting=sum(resting),
+        total=len(resting),
+        vibrates=vibrates,
+        portraits=len(cubic.portraits),
+        strongest=strongest,
+        left=amplitude(strongest),
     )
 
 
@@ -303,10 +303,145 @@ def _(_: Evidence) -> Observation:
     here, taken = for_both(lambda damping: bool(expansion(0.4, damping, gains).stable))
     without, left = controlled_amplitude(0.4, FILTER), controlled_amplitude(0.4, gains)
     return Observation(
-        f"k1 = {needed:.4f} is needed at v0 = 0.4",
         here,
         taken,
-        f"That is {needed / PRINTED_GAIN:.0f} times the {PRINTED_GAIN:g} found for v0 = 0.49, "
-        f"which leaves the amplitude {left:.4f} of {without:.4f}; with the "
-        f"cutoff frequency d = 0.2 in place of 2, {slow:.4f} is sufficient.",
+        needed=needed,
+        times=needed / PRINTED_GAIN,
+        left=left,
+        without=without,
+        slow=slow,
+    )
+
+
+_STILL_ON_ITS_WAY = 0.02
+"""Trace below which the motions of a bifurcation diagram have not settled yet."""
+
+
+@computes("critical-speed-confirmed")
+def _(evidence: Evidence) -> Observation:
+    figures = [evidence.bifurcation(number) for number in (2, 3, 4, 5)]
+    agree = [
+        (measures.regime in VIBRATING) == (p > 0.0)
+        for figure in figures
+        for measures, drive in zip(figure.diagram.measures, figure.diagram.drives, strict=True)
+        if drive.belt_speed > 0.0 and abs(p := trace_of(drive)) > _STILL_ON_ITS_WAY
+    ]
+    return Observation(
+        all(agree), agreeing=sum(agree), total=len(agree), still_on_its_way=_STILL_ON_ITS_WAY
+    )
+
+
+@computes("curvature-confirmed")
+def _(_: Evidence) -> Observation:
+    sigma = hopf_point().first_lyapunov_coefficient
+    distances = (2e-2, 2e-3, 2e-4)
+    found, expected = zip(*map(_multipliers, distances), strict=True)
+    # The share by which a deviation falls in one cycle.
+    ratios = [(1.0 - a) / (1.0 - b) for a, b in zip(found, expected, strict=True)]
+    return Observation(
+        (sigma < 0.0) == (max(found) < 1.0)
+        and falling([abs(ratio - 1.0) for ratio in ratios])
+        and abs(ratios[-1] - 1.0) < 1e-2,
+        sigma=sigma,
+        found=found,
+        distances=distances,
+        expected=expected,
+    )
+
+
+def _multipliers(distance: float) -> tuple[float, float]:
+    """Return the Floquet multiplier of the cycle at this distance below v_b1, and that of sigma."""
+    speed = hopf_point().belt_speed - distance
+    (cycle,) = cycles(speed)
+    # Near the cycle of r' = alpha r + sigma r^3 a deviation grows by exp(-2 alpha T).
+    alpha = float(expansion(speed).eigenvalues[0].real)
+    return abs(cycle.multipliers[0]), float(np.exp(-2.0 * alpha * cycle.period))
+
+
+@computes("main-factors")
+def _(_: Evidence) -> Observation:
+    base = unit_drive(0.4)
+    changed = {
+        "feed speed 0.6": replace(base, belt_speed=0.6),
+        "beta 0.1": replace(base, damping=0.2),
+        "mu_m 0.39": replace(base, friction=replace(STRIBECK, minimum=0.39)),
+        "stiffness 50": replace(base, stiffness=50.0),
+    }
+    traces = {name: trace_of(drive) for name, drive in changed.items()}
+    stable = [p < 0.0 for p in traces.values()]
+    return Observation(
+        trace(0.4) > 0.0 and stable == [True, True, True, False],
+        p=trace(0.4),
+        changed=", ".join(f"{p:.4g} by {name}" for name, p in traces.items()),
+    )
+
+
+@computes("what-inhibits")
+def _(evidence: Evidence) -> Observation:
+    ends = [evidence.bifurcation(number).diagram for number in (2, 3, 5)]
+    slow = int(np.searchsorted(evidence.bifurcation(2).values, 1.0 / 3.0))
+    quiet = [ends[0].measures[-1], ends[1].measures[-1], ends[2].measures[0]]
+    loud = [ends[0].measures[slow], ends[1].measures[0], ends[2].measures[-1]]
+    return Observation(
+        all(measures.regime in VIBRATING for measures in loud)
+        and not any(measures.regime in VIBRATING for measures in quiet),
+        outcome=", ".join(str(measures.regime) for measures in quiet),
+        speed=ends[0].drives[slow].belt_speed,
+        loud=", ".join(str(measures.regime) for measures in loud),
+    )
+
+
+@computes("amplitude-reduced")
+def _(evidence: Evidence) -> Observation:
+    sizes = [[amplitude(p) for p in panel.portraits] for panel in evidence.portraits(13).panels]
+    without = sizes[0][0]
+    largest = max(sizes[0][1:])
+    slower, high = (
+        controlled_amplitude(speed, gains) / controlled_amplitude(speed, FILTER) - 1.0
+        for speed, gains in (
+            (0.1, replace(FILTER, linear=0.9 * critical(0.1, DAMPING).linear)),
+            (0.4, replace(FILTER, corner_frequency=20.0, linear=-10.0)),
+        )
+    )
+    return Observation(
+        all(falling([without, *values]) for values in (sizes[0][1:], sizes[1], sizes[2])),
+        sizes[0][-1] < without and falling([without, *sizes[1]]),
+        without=without,
+        controlled=sizes[0][1:],
+        change=largest / without - 1.0,
+        sizes=sizes,
+        slower=slower,
+        high=high,
+    )
+
+
+@computes("topology")
+def _(evidence: Evidence) -> Observation:
+    linear, cubic, slow = evidence.portraits(13).panels
+    portraits = [*linear.portraits[1:], *cubic.portraits, *slow.portraits]
+    vibrating = [portrait.measures.regime in VIBRATING for portrait in portraits]
+    return Observation(
+        not any(vibrating),
+        not all(vibrating),
+        resting=vibrating.count(False),
+        total=len(vibrating),
+        critical=critical(0.4, DAMPING),
+        slower=critical(0.4, DAMPING, 0.2),
+        count=vibrating.count(True),
+    )
+
+
+@computes("more-effective")
+def _(_: Evidence) -> Observation:
+    # A force k1 y on the speed itself adds to p and keeps the equilibrium too, since y = 0 there.
+    plain = -trace(0.4)
+    corners = (FILTER.corner_frequency, 0.2, 0.02)
+    washout = [critical(0.4, DAMPING, d).linear for d in corners]
+    return Observation(
+        min(map(abs, washout)) < abs(plain),
+        washout=washout,
+        plain=plain,
+        usual=washout[0] / plain,
+        slower=washout[1] / plain,
+        slowest=washout[2] / plain,
     )

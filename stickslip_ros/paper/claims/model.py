@@ -4,7 +4,6 @@ from math import isclose, sqrt
 
 import numpy as np
 
-from stickslip_ros.paper.claims.claim import Computations, Evidence, Formula, Number, Observation
 from stickslip_ros.paper.claims.paper_values import (
     DAMPING,
     FASTER,
@@ -12,13 +11,13 @@ from stickslip_ros.paper.claims.paper_values import (
     cycles,
     exact_onset,
     hopf_point,
-    listed,
     only_rest_at,
     rates,
     slip_friction,
     time_dependent,
     trace,
 )
+from stickslip_ros.paper.claims.verdict import Computations, Evidence, Formula, Number, Observation
 from stickslip_ros.paper.figures import STRIBECK, unit_drive
 from stickslip_ros.physics.measures.cycle_measures import Regime
 from stickslip_ros.physics.model.drive import Drive
@@ -53,10 +52,7 @@ def _smallest_kinetic() -> tuple[float, float]:
 
 
 computes["normal-vibration"] = lambda _: Observation(
-    "depends on time" if time_dependent() else "constant normal force",
-    time_dependent(),
-    remark="In eq. 1 to 5 only the state changes with time, and it contains no normal motion. "
-    "N is a constant that only sets the scales.",
+    time_dependent(), outcome="depends on time" if time_dependent() else "constant normal force"
 )
 
 
@@ -67,11 +63,7 @@ def _(_: Evidence) -> Formula:
     friction = drive.normal_force * slip_friction(drive.friction, speed - drive.belt_speed)
     acceleration = (friction - drive.damping * speed - drive.stiffness * position) / drive.mass
     scale = drive.angular_frequency * drive.speed_scale
-    return Formula(
-        acceleration / scale,
-        rates(drive, STATES[:2])[1],
-        remark="Compared with the integrated dimensionless equations, scaled to SI units.",
-    )
+    return Formula(acceleration / scale, rates(drive, STATES[:2])[1])
 
 
 @computes("eq-2")
@@ -89,11 +81,7 @@ def _(_: Evidence) -> Formula:
     time = 1.0 / sqrt(_SLIDE.stiffness / _SLIDE.mass)
     length = _SLIDE.normal_force / _SLIDE.stiffness
     inertia, spring = _SLIDE.mass * length / time**2, _SLIDE.stiffness * length
-    return Formula(
-        np.array([inertia, spring]) / _SLIDE.normal_force,
-        [1.0, 1.0],
-        remark="The coefficients of X'' and X, for a drive without a scale of one.",
-    )
+    return Formula(np.array([inertia, spring]) / _SLIDE.normal_force, [1.0, 1.0])
 
 
 @computes("scaled-damping")
@@ -103,8 +91,7 @@ def _(_: Evidence) -> Formula:
         None,
         _SLIDE.damping_coefficient,
         {"With omega, which is not defined, read as omega_0": read},
-        f"The coefficient of X' is c / sqrt(k m) = {_SLIDE.damping_coefficient:.4g} for the tested "
-        "drive.",
+        slide=_SLIDE.damping_coefficient,
     )
 
 
@@ -113,17 +100,12 @@ def _(_: Evidence) -> Formula:
     length = _SLIDE.normal_force / _SLIDE.stiffness
     read = _SLIDE.belt_speed / (sqrt(_SLIDE.stiffness / _SLIDE.mass) * length)
     return Formula(
-        None,
-        _SLIDE.dimensionless.belt_speed,
-        {"With L, which is not defined, read as N/k": read},
-        "One symbol is used for the speed in m/s and for the dimensionless one.",
+        None, _SLIDE.dimensionless.belt_speed, {"With L, which is not defined, read as N/k": read}
     )
 
 
 computes["excitation-frequency"] = lambda _: Observation(
-    "time-dependent" if time_dependent() else "autonomous",
-    time_dependent(),
-    remark="Omega is scaled but not used: the equations do not contain time.",
+    time_dependent(), outcome="time-dependent" if time_dependent() else "autonomous"
 )
 
 
@@ -135,35 +117,24 @@ def _(_: Evidence) -> Formula:
     printed = -static * np.sign(v) + 3.0 * drop * v / (2.0 * speed) - drop * v**3 / (2.0 * speed**3)
     # a v - b v^3 with a - 3 b v_m^2 = 0 and a v_m - b v_m^3 = mu_s - mu_m
     a, b = np.linalg.solve([[1.0, -3.0 * speed**2], [speed, -(speed**3)]], [0.0, drop])
-    return Formula(
-        printed,
-        -static * np.sign(v) + a * v - b * v**3,
-        remark="The odd cubic that starts at mu_s and has its smallest magnitude mu_m at v_m has "
-        f"a = {a:.4g}, b = {b:.4g}.",
-    )
+    return Formula(printed, -static * np.sign(v) + a * v - b * v**3, a=a, b=b)
 
 
-computes["static-coefficient"] = lambda _: Number(
-    _kinetic(0.0), remark="The magnitude of the law as the relative speed approaches zero."
-)
-computes["smallest-coefficient"] = lambda _: Number(
-    _smallest_kinetic()[0], remark="Where heyoka's derivative of the law is zero."
-)
-computes["smallest-at"] = lambda _: Number(
-    _smallest_kinetic()[1], remark="Where heyoka's derivative of the law is zero."
-)
+computes["static-coefficient"] = lambda _: Number(_kinetic(0.0))
+computes["smallest-coefficient"] = lambda _: Number(_smallest_kinetic()[0])
+computes["smallest-at"] = lambda _: Number(_smallest_kinetic()[1])
 
 
 @computes("names-of-coefficients")
 def _(_: Evidence) -> Observation:
     break_away, (smallest, _speed) = _kinetic(0.0), _smallest_kinetic()
     return Observation(
-        f"static {break_away:.4g}, smallest kinetic {smallest:.4g}",
         isclose(STRIBECK.static, smallest, rel_tol=1e-6),
         isclose(STRIBECK.static, break_away, rel_tol=1e-6)
         and isclose(STRIBECK.minimum, smallest, rel_tol=1e-6),
-        f"The opposite is true: the slide breaks away at mu_s = {STRIBECK.static:g}, and "
-        f"mu_m = {STRIBECK.minimum:g} is the smallest coefficient while it slips.",
+        break_away=break_away,
+        smallest=smallest,
+        law=STRIBECK,
     )
 
 
@@ -175,12 +146,12 @@ def _(evidence: Evidence) -> Observation:
     fastest = 2.0 * (cycles(exact_onset() * (1.0 - 1e-6))[0].measures.velocity_amplitude or 0.0)
     highest = float(evidence.bifurcation(2).values.max())
     return Observation(
-        f"up to a relative speed of {end:.4g}",
         end >= max(fastest, highest),
         end > smallest_at,
-        f"Only below {end:.4g}, where it exceeds the static coefficient; at twice v_m it is "
-        f"{_kinetic(2.0 * smallest_at):.4g} already. The belt of Fig. 2 reaches {highest:.4g}, "
-        f"and the vibrations at the onset of sticking {fastest:.4g}.",
+        end=end,
+        at_twice=_kinetic(2.0 * smallest_at),
+        highest=highest,
+        fastest=fastest,
     )
 
 
@@ -216,12 +187,12 @@ def _(evidence: Evidence) -> Observation:
     least, most = float(reaction.min()), float(reaction.max())
     limit = STRIBECK.static
     return Observation(
-        f"{least:.4g} to {most:.4g} instead of 0",
         max(abs(least), abs(most)) < 1e-9,
         max(abs(least), abs(most)) <= limit * (1.0 + 1e-9),
-        f"At v0 = {portrait.drive.belt_speed:g} a slide that sticks needs a friction of "
-        f"{least:.4g} to {most:.4g}; with sgn(0) = 0 the system gives none. The missing "
-        f"rule: the slide sticks while X + 2 beta v0 is within mu_s = {limit:g}.",
+        least=least,
+        most=most,
+        portrait=portrait,
+        limit=limit,
     )
 
 
@@ -236,9 +207,9 @@ def _(evidence: Evidence) -> Observation:
     resting = [measures.regime is Regime.EQUILIBRIUM for measures, _ in fast]
     off = max(abs((m.midpoint or 0.0) / drive.equilibrium_position - 1.0) for m, drive in fast)
     return Observation(
-        f"at {sum(resting)} of {len(fast)} belt speeds",
         all(resting) and off < 1e-4 and only_rest_at(FASTER),
-        remark=f"All speeds of Fig. 2 that are 5 percent or more above the Hopf speed of "
-        f"{hopf_point().belt_speed:.5g}; X deviates from mu(-v0) by {off:.4%} at most. At "
-        f"v0 = {listed(FASTER)} too the equilibrium is stable and shooting finds no limit cycle.",
+        resting=sum(resting),
+        total=len(fast),
+        hopf=hopf_point(),
+        off=off,
     )

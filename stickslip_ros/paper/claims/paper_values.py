@@ -7,13 +7,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cache
 from itertools import pairwise
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.paper.claims.claim import Formula, Number
+from stickslip_ros.paper.claims.verdict import Formula, Number
 from stickslip_ros.paper.figures import unit_drive
 from stickslip_ros.paper.portraits import Portrait
 from stickslip_ros.physics.measures.cycle_measures import Regime
@@ -120,21 +120,21 @@ def for_both(compute: Callable[[float], _T]) -> tuple[_T, _T]:
     return compute(DAMPING), compute(TAKEN_DAMPING)
 
 
-def number_for_both(compute: Callable[[float], float], remark: str = "") -> Number:
+def number_for_both(compute: Callable[[float], float], **values: Any) -> Number:
     """Return the number for the damping of eq. 5, corrected to that of eq. 8.
 
-    "{taken}" in the remark is replaced by the latter.
+    The words of the row may contain the latter, `{taken}`.
     """
     here, taken = for_both(compute)
-    return Number(here, {TAKEN_FOR_DAMPING: taken}, remark.format(taken=taken))
+    return Number(here, {TAKEN_FOR_DAMPING: taken}, taken=taken, **values)
 
 
 def formula_for_both(
-    printed: FloatArray, true: Callable[[float], npt.ArrayLike], remark: str = ""
+    printed: FloatArray, true: Callable[[float], npt.ArrayLike], **values: Any
 ) -> Formula:
     """Return the formula for the damping of eq. 5, corrected to that of eq. 8."""
     here, taken = for_both(lambda damping: printed - np.asarray(true(damping)))
-    return Formula(here, 0.0, {TAKEN_FOR_DAMPING: taken}, remark)
+    return Formula(here, 0.0, {TAKEN_FOR_DAMPING: taken}, **values)
 
 
 def overdamped_from() -> float:

@@ -5,7 +5,6 @@ from math import log
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.paper.claims.claim import Computations, Evidence, Formula, Number, Observation
 from stickslip_ros.paper.claims.paper_values import (
     BELT_SPEEDS,
     DAMPING,
@@ -26,6 +25,7 @@ from stickslip_ros.paper.claims.paper_values import (
     rates,
     trace,
 )
+from stickslip_ros.paper.claims.verdict import Computations, Evidence, Formula, Number, Observation
 from stickslip_ros.paper.figures import STRIBECK, unit_drive
 from stickslip_ros.physics.measures.cycle_measures import Regime
 from stickslip_ros.physics.motion import RecordedMotion
@@ -49,12 +49,8 @@ def _jacobians(damping: float) -> FloatArray:
     return np.array([expansion(speed, damping).jacobian for speed in BELT_SPEEDS])
 
 
-computes["linear-coefficient"] = lambda _: Number(
-    _growth(0.0)[0], remark="From heyoka's derivatives of the equations."
-)
-computes["cubic-coefficient"] = lambda _: Number(
-    -_third_order(), remark="From heyoka's derivatives of the equations."
-)
+computes["linear-coefficient"] = lambda _: Number(_growth(0.0)[0])
+computes["cubic-coefficient"] = lambda _: Number(-_third_order())
 computes["eq-6-speed"] = lambda _: Formula(
     0.0, [expansion(speed).equilibrium[1] for speed in BELT_SPEEDS]
 )
@@ -68,9 +64,7 @@ def _(_: Evidence) -> Formula:
         for speed, x in zip(BELT_SPEEDS.tolist(), positions, strict=True)
     ]
     return Formula(
-        0.4 - 0.45 * BELT_SPEEDS + 0.6 * BELT_SPEEDS**3,
-        positions,
-        remark=f"The acceleration there is {max(accelerations):.6f}.",
+        0.4 - 0.45 * BELT_SPEEDS + 0.6 * BELT_SPEEDS**3, positions, acceleration=max(accelerations)
     )
 
 
@@ -87,9 +81,6 @@ def _(_: Evidence) -> Formula:
         printed(3.0),
         at_rest - friction,
         {"With the factor v0 in the last term": printed(3.0 * belt_speed)},
-        "F2 is minus the change of the friction, so eq. 16 contains -F; v_r is its value -v0 at "
-        "rest. This holds while the slide is slower than the belt: at higher speed friction "
-        "changes sign.",
     )
 
 
@@ -111,10 +102,7 @@ def _(_: Evidence) -> Observation:
     )
     expected = float(expansion(0.45).eigenvalues[0].real)
     return Observation(
-        f"{growth:.5f} and {expected:.5f}",
-        abs(growth / expected - 1.0) < 1e-3,
-        remark="Growth rate of a small vibration at v0 = 0.45, from the motion over "
-        f"{len(turns) - 1} cycles, and the real part of the eigenvalues.",
+        abs(growth / expected - 1.0) < 1e-3, growth=growth, expected=expected, cycles=len(turns) - 1
     )
 
 
@@ -142,18 +130,12 @@ def _(_: Evidence) -> Formula:
         return (ahead - behind) / (2.0 * step)
 
     return Formula(
-        np.round(jacobian(0.0), 6),
-        np.round(jacobian(float(expansion(0.4).equilibrium[0])), 6),
-        remark="Only X2 matters, since X1 enters linearly; central differences, to 6 decimals.",
+        np.round(jacobian(0.0), 6), np.round(jacobian(float(expansion(0.4).equilibrium[0])), 6)
     )
 
 
-computes["eq-8-constant"] = lambda _: number_for_both(
-    lambda damping: _growth(damping)[0], "Eq. 5 has 2 beta, but eq. 8 has beta."
-)
-computes["eq-8-square"] = lambda _: Number(
-    _growth()[1], remark="Three times the cubic coefficient of the law."
-)
+computes["eq-8-constant"] = lambda _: number_for_both(lambda damping: _growth(damping)[0])
+computes["eq-8-square"] = lambda _: Number(_growth()[1])
 
 
 @computes("eq-8-matrix")
@@ -163,14 +145,12 @@ def _(_: Evidence) -> Formula:
         [[eigenvalue, 1.0], [-1.0, eigenvalue - p]],
         eigenvalue * np.eye(2) - expansion(0.4).jacobian,
         {"With the signs of 1 and -1 exchanged": [[eigenvalue, -1.0], [1.0, eigenvalue - p]]},
-        "The determinant is the same either way.",
     )
 
 
 computes["eq-8-polynomial"] = lambda _: Formula(
     [[1.0, -trace(speed), 1.0] for speed in BELT_SPEEDS],
     [np.poly(expansion(speed).jacobian) for speed in BELT_SPEEDS],
-    remark="For any damping in p.",
 )
 
 
@@ -179,17 +159,11 @@ def _(_: Evidence) -> Observation:
     speed = hopf_point().belt_speed
     below, above = (bool(expansion(speed * factor).stable) for factor in (0.999, 1.001))
     p = trace(speed)
-    return Observation(
-        f"p = {abs(p):.6f}",
-        abs(p) < 1e-12 and above and not below,
-        remark=f"At the Hopf speed {speed:.6f}; unstable below, stable above it.",
-    )
+    return Observation(abs(p) < 1e-12 and above and not below, p=abs(p), speed=speed)
 
 
 computes["vb1"] = lambda _: number_for_both(
-    lambda damping: hopf_point(damping).belt_speed,
-    "The error is in eq. 8: with the damping of eq. 5 the loop is already stable above "
-    f"{hopf_point().belt_speed:.5f}.",
+    lambda damping: hopf_point(damping).belt_speed, hopf=hopf_point()
 )
 
 
@@ -198,22 +172,20 @@ def _(_: Evidence) -> Observation:
     sigma = hopf_point().first_lyapunov_coefficient
     just_below = cycles(hopf_point().belt_speed - 2e-3)
     return Observation(
-        f"sigma = {sigma:.6g}",
         sigma < 0.0
         and [cycle.stable for cycle in just_below] == [True]
         and not cycles(hopf_point().belt_speed + 2e-3),
-        remark=f"0.002 below v_b1 shooting finds {len(just_below)} limit cycle, of multiplier "
-        f"{abs(just_below[0].multipliers[0]):.5f}; 0.002 above none.",
+        sigma=sigma,
+        count=len(just_below),
+        multiplier=abs(just_below[0].multipliers[0]),
     )
 
 
 computes["eq-9-matrix"] = lambda _: formula_for_both(
     np.array([[[0.0, 1.0], [-1.0, p]] for p in printed_trace(BELT_SPEEDS)]), _jacobians
 )
-computes["eq-9-square"] = lambda _: Number(
-    float(expansion(1.0).quadratic[1, 1, 1]) / 2.0, remark="Half the second derivative at v0 = 1."
-)
-computes["eq-9-cube"] = lambda _: Number(_third_order(), remark="A sixth of the third derivative.")
+computes["eq-9-square"] = lambda _: Number(float(expansion(1.0).quadratic[1, 1, 1]) / 2.0)
+computes["eq-9-cube"] = lambda _: Number(_third_order())
 
 
 @computes("eq-9-jordan")
@@ -224,11 +196,7 @@ def _(_: Evidence) -> Observation:
 
     at_hopf, elsewhere = defect(hopf_point().belt_speed), defect(0.4)
     return Observation(
-        f"off by {elsewhere:.4g} at v0 = 0.4",
-        max(at_hopf, elsewhere) < 1e-9,
-        at_hopf < 1e-9,
-        f"Only at v_b1 (off by {at_hopf:.6f}), where the untransformed matrix is [[0, 1], [-1, 0]] "
-        "and eq. 12 to 15 use it. No transformation is made.",
+        max(at_hopf, elsewhere) < 1e-9, at_hopf < 1e-9, elsewhere=elsewhere, at_hopf=at_hopf
     )
 
 
@@ -240,14 +208,13 @@ def _(_: Evidence) -> Formula:
         printed,
         np.array([expansion(speed).equilibrium for speed in BELT_SPEEDS]).T,
         {"With the two exchanged": printed[::-1]},
-        "It is displaced and at rest; in the coordinates of eq. 9 it is the origin.",
     )
 
 
 computes["eq-10-real"] = lambda _: formula_for_both(
     printed_trace(BELT_SPEEDS) / 2.0,
     lambda damping: [expansion(v, damping).eigenvalues.real.mean() for v in BELT_SPEEDS],
-    f"From v0 = {overdamped_from():.4f} on, where both eigenvalues are real, it is their mean.",
+    overdamped=overdamped_from(),
 )
 
 
@@ -266,9 +233,9 @@ def _(_: Evidence) -> Formula:
             )
             / 2.0
         },
-        f"Up to v0 = {overdamped_from():.4f} p^2 - 4 is negative, {radicands.min():.4g} at the "
-        "least, so the printed root is that of a negative number; above it is not, and the "
-        f"two eigenvalues are real, as printed (tested up to v0 = {max(speeds):g}).",
+        overdamped=overdamped_from(),
+        least=radicands.min(),
+        fastest=max(speeds),
     )
 
 
@@ -283,14 +250,11 @@ def _(_: Evidence) -> Number:
             TAKEN_FOR_DAMPING: hopf_point(TAKEN_DAMPING).crossing_speed,
             "With p' in place of p'/2, at v0 = 0.4944": doubled,
         },
-        "The factor 1/2 of alpha = p/2 is missing, and the 0 in alpha'(0) means v_b1: the "
-        f"eigenvalues cross at {hopf_point(TAKEN_DAMPING).crossing_speed:.5f} there.",
+        taken=hopf_point(TAKEN_DAMPING),
     )
 
 
-computes["eq-11-sign"] = lambda _: Observation(
-    f"{hopf_point().crossing_speed:.5f}", hopf_point().crossing_speed < 0.0
-)
+computes["eq-11-sign"] = lambda _: Observation(hopf_point().crossing_speed < 0.0, hopf=hopf_point())
 
 
 @computes("stable-below")
@@ -302,13 +266,13 @@ def _(_: Evidence) -> Observation:
         for speed, here in zip(speeds, found, strict=True)
     )
     return Observation(
-        f"one stable cycle at each of {len(speeds)} belt speeds" if below else "other cycles",
         below and not expansion(STUDIED_SPEED).stable,
         below,
-        "With v_b1 computed from beta = 0.01 in eq. 5: at "
-        f"v0 = {STUDIED_SPEED:g} < {PRINTED_HOPF_SPEED:g} the equilibrium is stable and there are "
-        f"{len(cycles(STUDIED_SPEED))} cycles. Largest multiplier below: "
-        f"{max(abs(here[0].multipliers[0]) for here in found):.4f}.",
+        outcome=f"one stable cycle at each of {len(speeds)} belt speeds"
+        if below
+        else "other cycles",
+        cycles=len(cycles(STUDIED_SPEED)),
+        multiplier=max(abs(here[0].multipliers[0]) for here in found),
     )
 
 
@@ -318,17 +282,13 @@ def _(_: Evidence, belt_speed: float, sign: float) -> Observation:
     matrix = expansion(belt_speed).jacobian
     p, q = float(np.trace(matrix)), float(np.linalg.det(matrix))
     discriminant = p**2 - 4.0 * q
-    return Observation(
-        f"p = {p:.5f}, p^2 - 4 q = {discriminant:.4f}",
-        p * sign > 0.0 and discriminant < 0.0,
-        remark=f"q, which is not defined, is the determinant {q:.4g}.",
-    )
+    return Observation(p * sign > 0.0 and discriminant < 0.0, p=p, discriminant=discriminant, q=q)
 
 
 @computes("low-focus")
 def _(_: Evidence) -> Observation:
     upper = expansion(0.45).eigenvalues[0]
-    return Observation(_complex(upper), upper.real > 0.0 and upper.imag > 0.0)
+    return Observation(upper.real > 0.0 and upper.imag > 0.0, upper=upper)
 
 
 @computes("low-cycle")
@@ -337,10 +297,10 @@ def _(evidence: Evidence) -> Observation:
     (cycle,) = cycles(0.45)
     run, shot = portrait.measures.amplitude or 0.0, cycle.measures.amplitude or 0.0
     return Observation(
-        f"amplitude {run:.6f}",
         cycle.stable and abs(run - shot) < 1e-6,
-        remark=f"The run from rest ends on the cycle found by shooting, amplitude {shot:.6f}, "
-        f"multiplier {abs(cycle.multipliers[0]):.4f}.",
+        run=run,
+        shot=shot,
+        multiplier=abs(cycle.multipliers[0]),
     )
 
 
@@ -354,10 +314,11 @@ def _(evidence: Evidence) -> Observation:
     }
     others = {m.regime for m in measures} - {*kinds, Regime.EQUILIBRIUM, Regime.STUCK}
     return Observation(
-        ", ".join(f"{regime} at {len(found)} belt speeds" for regime, found in kinds.items()),
         all(kinds.values()) and not others,
-        remark="Of Fig. 2: stick-slip up to "
-        f"{max(kinds[Regime.STICK_SLIP], default=0.0):.4f}, pure slip above; otherwise at rest.",
+        outcome=", ".join(
+            f"{regime} at {len(found)} belt speeds" for regime, found in kinds.items()
+        ),
+        fastest=max(kinds[Regime.STICK_SLIP], default=0.0),
     )
 
 
@@ -366,11 +327,10 @@ def _(_: Evidence) -> Observation:
     upper = expansion(0.495).eigenvalues[0]
     taken = expansion(0.495, TAKEN_DAMPING).eigenvalues[0]
     return Observation(
-        _complex(upper),
         upper.real < 0.0 < upper.imag,
-        remark="The 1 % settling time of a deviation is "
-        f"{log(100.0) / -upper.real:.0f}; with the damping of eq. 8 it would be "
-        f"{log(100.0) / -taken.real:.0f}.",
+        upper=upper,
+        settling=log(100.0) / -upper.real,
+        settling_taken=log(100.0) / -taken.real,
     )
 
 
@@ -380,12 +340,8 @@ def _(evidence: Evidence) -> Observation:
     midpoint, amplitude = portrait.measures.midpoint or 0.0, portrait.measures.amplitude or 0.0
     equilibrium = portrait.drive.equilibrium_position
     return Observation(
-        f"X = {midpoint:.4f}",
         amplitude < 1e-4 and abs(midpoint) < 1e-4,
         amplitude < 1e-4 and abs(midpoint - equilibrium) < 1e-4,
-        f"Its deviation does: X ends at the equilibrium {equilibrium:.4f} of eq. 6.",
+        midpoint=midpoint,
+        equilibrium=equilibrium,
     )
-
-
-def _complex(value: complex) -> str:
-    return f"{value.real:.5f} +- {value.imag:.5f} i"

@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.paper.claims.claim import Computations, Evidence, Formula, Number, Observation
 from stickslip_ros.paper.claims.paper_values import (
     BELT_SPEEDS,
     DAMPING,
@@ -17,19 +16,18 @@ from stickslip_ros.paper.claims.paper_values import (
     STUDIED_SPEED,
     TAKEN_DAMPING,
     TAKEN_FOR_DAMPING,
-    complex_number,
     critical,
     expansion,
     falling,
     for_both,
     formula_for_both,
     known,
-    listed,
     number_for_both,
     printed_trace,
     rates,
     trace,
 )
+from stickslip_ros.paper.claims.verdict import Computations, Evidence, Formula, Number, Observation
 from stickslip_ros.paper.figures import unit_drive
 from stickslip_ros.physics.model.control import WashoutGains
 from stickslip_ros.physics.model.functions import zero_between
@@ -45,12 +43,7 @@ _SOME_GAINS = replace(FILTER, linear=-0.3, cubic=-2.0)
 def _(_: Evidence) -> Observation:
     found = expansion(STUDIED_SPEED)
     square, cube = found.quadratic[1, 1, 1] / 2.0, found.cubic[1, 1, 1, 1] / 6.0
-    return Observation(
-        f"{square:.4g} y^2, {cube:.4g} y^3",
-        max(abs(square), abs(cube)) < 1e-9,
-        remark=f"F contains square and cube of the Stribeck law, at v0 = {STUDIED_SPEED:g}; "
-        "with a linear law there would be no limit cycle to study.",
-    )
+    return Observation(max(abs(square), abs(cube)) < 1e-9, square=square, cube=cube)
 
 
 def _slow_states() -> FloatArray:
@@ -82,11 +75,7 @@ def _(_: Evidence) -> Formula:
         -_friction(y, last) - DAMPING * y - x for last in (3.0, 3.0 * STUDIED_SPEED)
     )
     return Formula(
-        printed,
-        _loop_rates(None)[1],
-        {"With the factor v0 in the last term of F": corrected},
-        "C and K, which are not defined, are 2 beta and 1. F is as in eq. 6, with the slide "
-        "slower than the belt.",
+        printed, _loop_rates(None)[1], {"With the factor v0 in the last term of F": corrected}
     )
 
 
@@ -96,9 +85,7 @@ def _(_: Evidence) -> Formula:
     moved = expansion(STUDIED_SPEED, gains=_SOME_GAINS).equilibrium[0]
     moved -= expansion(STUDIED_SPEED).equilibrium[0]
     return Formula(
-        y - _SOME_GAINS.corner_frequency * w,
-        _loop_rates(_SOME_GAINS)[2],
-        remark=f"It moves the equilibrium by {abs(moved):.6f}.",
+        y - _SOME_GAINS.corner_frequency * w, _loop_rates(_SOME_GAINS)[2], moved=abs(moved)
     )
 
 
@@ -126,9 +113,9 @@ def _(_: Evidence) -> Observation:
 
     without, with_cubic = speeds(0.0), speeds(-5.0)
     return Observation(
-        f"v_b1 = {listed(without)}",
         falling(without) and bool(np.allclose(without, with_cubic, rtol=1e-12)),
-        remark=f"For k1 = {listed(gains)} with d = 2 and any k2.",
+        without=without,
+        gains=gains,
     )
 
 
@@ -138,12 +125,7 @@ def _(_: Evidence) -> Formula:
     v = y - _SOME_GAINS.corner_frequency * w
     force = _SOME_GAINS.linear * v + _SOME_GAINS.cubic * v**3
     friction = _friction(y, 3.0 * STUDIED_SPEED)
-    return Formula(
-        [y, -friction - DAMPING * y - x + force, v],
-        _loop_rates(_SOME_GAINS),
-        remark="With F corrected as in eq. 16, with the slide slower than the belt. Eq. 18 "
-        "is inserted into eq. 17, not the reverse.",
-    )
+    return Formula([y, -friction - DAMPING * y - x + force, v], _loop_rates(_SOME_GAINS))
 
 
 def _printed_jacobian(p: float, linear: float) -> FloatArray:
@@ -153,12 +135,8 @@ def _printed_jacobian(p: float, linear: float) -> FloatArray:
 computes["eq-20"] = lambda _: Formula(
     _printed_jacobian(trace(STUDIED_SPEED), _SOME_GAINS.linear),
     expansion(STUDIED_SPEED, gains=_SOME_GAINS).jacobian,
-    remark="The matrix implies d = 2; the text does not give it.",
 )
-computes["eq-20-trace"] = lambda _: number_for_both(
-    lambda damping: trace(STUDIED_SPEED, damping),
-    "With the damping of eq. 5 there is nothing to control at v0 = 0.49: p is negative.",
-)
+computes["eq-20-trace"] = lambda _: number_for_both(lambda damping: trace(STUDIED_SPEED, damping))
 
 
 _EQ_21: dict[int, Callable[[FloatArray, float], FloatArray]] = {
@@ -179,19 +157,15 @@ def _(_: Evidence, order: int) -> Formula:
         expansions = (expansion(speed, damping, _SOME_GAINS) for speed in BELT_SPEEDS.tolist())
         return [np.poly(found.jacobian)[order] for found in expansions]
 
-    values = _EQ_21[order](printed_trace(BELT_SPEEDS), _SOME_GAINS.linear)
-    return formula_for_both(values, coefficients, _of_printed_c2() if order == 2 else "")
-
-
-def _of_printed_c2() -> str:
     p = trace(STUDIED_SPEED, TAKEN_DAMPING)
     # c1 c2 - c3 = 0 with c1 = 2 - p - k1, c2 = 2 k1 - p - 1, c3 = 2, a square in k1
     discriminant = (5.0 - p) ** 2 - 8.0 * (2.0 + (2.0 - p) * (p + 1.0))
-    true = np.poly(_printed_jacobian(p, _SOME_GAINS.linear))[2]
-    return (
-        f"The matrix of eq. 20 has c2 = 1 - 2 p = {true:.4f} at v0 = {STUDIED_SPEED:g}, "
-        "without k1. With the printed c2 the condition c1 c2 = c3 has "
-        f"{'no' if discriminant < 0.0 else 'a'} real root (discriminant {discriminant:.3g})."
+    return formula_for_both(
+        _EQ_21[order](printed_trace(BELT_SPEEDS), _SOME_GAINS.linear),
+        coefficients,
+        c2=np.poly(_printed_jacobian(p, _SOME_GAINS.linear))[2],
+        root="no" if discriminant < 0.0 else "a",
+        discriminant=discriminant,
     )
 
 
@@ -201,10 +175,11 @@ def _(_: Evidence) -> Observation:
     c1, c2, c3 = np.poly(_printed_jacobian(trace(STUDIED_SPEED, TAKEN_DAMPING), gain))[1:]
     found = expansion(STUDIED_SPEED, TAKEN_DAMPING, replace(FILTER, linear=gain)).eigenvalues
     return Observation(
-        f"c1 c2 - c3 = {abs(c1 * c2 - c3):.6f}",
         abs(c1 * c2 - c3) < 1e-9 and abs(found[0].real) < 1e-9,
-        remark=f"With the coefficients of eq. 20 at the critical gain {gain:.6f}; the pair there "
-        f"has real part {abs(found[0].real):.6f} and the frequency {found[0].imag:.5f}.",
+        defect=abs(c1 * c2 - c3),
+        gain=gain,
+        real=abs(found[0].real),
+        found=found,
     )
 
 
@@ -221,7 +196,7 @@ def _(_: Evidence) -> Number:
             TAKEN_FOR_DAMPING: exact,
             f"{TAKEN_FOR_DAMPING}, and p rounded to {p:g}": rounded,
         },
-        f"Without that rounding it is {exact:.6f}. The printed c2 does not give this value.",
+        exact=exact,
     )
 
 
@@ -229,11 +204,7 @@ def _(_: Evidence) -> Number:
 def _(_: Evidence) -> Observation:
     gains = replace(FILTER, linear=PRINTED_GAIN)
     pair, _conjugate, real = expansion(STUDIED_SPEED, TAKEN_DAMPING, gains).eigenvalues
-    return Observation(
-        f"{complex_number(pair)} and its conjugate, {real.real:.4f}",
-        pair.imag > 0.0 and real.imag == 0.0,
-        remark="With the damping of eq. 8 and k1 = -0.0395.",
-    )
+    return Observation(pair.imag > 0.0 and real.imag == 0.0, pair=pair, real=real)
 
 
 @computes("eq-22-alpha")
@@ -243,20 +214,10 @@ def _(_: Evidence) -> Formula:
     printed = -(1.5995 + 1.8 * BELT_SPEEDS**2)
     off = np.abs(printed - [values.sum().real for values in found]).max()
     at_studied = expansion(STUDIED_SPEED, TAKEN_DAMPING, gains).eigenvalues[0].real
-    return Formula(
-        printed,
-        [values[0].real for values in found],
-        remark="It deviates from the sum of all three eigenvalues, the trace of eq. 20, by "
-        f"{off:.6f}. The pair's real part at v0 = {STUDIED_SPEED:g} is {at_studied:.6f}, near "
-        "zero as a Hopf point requires.",
-    )
+    return Formula(printed, [values[0].real for values in found], off=off, at_studied=at_studied)
 
 
-computes["eq-22-value"] = lambda _: number_for_both(
-    _crossing,
-    "At the critical gain, by projection onto the eigenvectors; the printed value is the "
-    "derivative of the trace of eq. 20. With the damping of eq. 8 it is {taken:.5f}.",
-)
+computes["eq-22-value"] = lambda _: number_for_both(_crossing)
 
 
 def _crossing(damping: float) -> float:
@@ -267,10 +228,10 @@ def _crossing(damping: float) -> float:
 @computes("eq-11-product", PRINTED_HOPF_SPEED)
 @computes("eq-22-product", STUDIED_SPEED)
 def _(_: Evidence, speed: float) -> Number:
-    return Number(-3.6 * speed, remark="Only the multiplication.")
+    return Number(-3.6 * speed)
 
 
 @computes("eq-22-sign")
 def _(_: Evidence) -> Observation:
     found = for_both(_crossing)
-    return Observation(listed(found), max(found) < 0.0, remark="For both dampings.")
+    return Observation(max(found) < 0.0, found=found)
