@@ -14,7 +14,7 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.paper.portraits import Portrait, PortraitCase, portraits
-from stickslip_ros.physics.model.control import WashoutGains
+from stickslip_ros.physics.model.control import Washout
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import Coulomb, FrictionLaw, Linear, Stribeck
 from stickslip_ros.progress import Progress
@@ -202,7 +202,7 @@ def _gains(corner_frequency: float, gains: Sequence[tuple[float, float]]) -> lis
         PortraitCase(
             f"k1 = {k1:g}, k2 = {k2:g}",
             unit_drive(0.4),
-            WashoutGains(corner_frequency, k1, k2),
+            Washout(corner_frequency, k1, k2),
             duration=_LONG,
         )
         for k1, k2 in gains

@@ -8,7 +8,7 @@ import numpy as np
 
 from stickslip_ros.physics.measures.breakpoints import Breakpoints
 from stickslip_ros.physics.measures.cycle_measures import Cycle, CycleMeter, Measures, Regime
-from stickslip_ros.physics.model.control import WashoutGains
+from stickslip_ros.physics.model.control import Washout
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.motion import RecordedMotion
 
@@ -31,7 +31,7 @@ class PortraitCase(NamedTuple):
     label: str
     """The parameters that distinguish it from the other cases of its panel."""
     drive: Drive
-    gains: WashoutGains | None = None
+    gains: Washout | None = None
     """Gains of a washout controller, active from the start without sampling (eq. 19); SI units."""
     duration: float | None = None
     """Duration, s; None for `PERIODS` natural periods."""

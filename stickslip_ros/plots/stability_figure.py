@@ -137,7 +137,7 @@ def _draw_map(figure: Figure, axes: Axes, found: StabilityMap) -> list[Artist]:
         figure.colorbar(filled, ax=axes, label=units.label("decay rate", "1/s"), ticks=levels)
         axes.contour(corners, gains, rates, levels=[0.0], colors=[ORANGE], linewidths=2.0)
     axes.plot(corners, found.continuous, **_CONTINUOUS)
-    axes.plot(found.gains.corner_frequency, found.gains.linear, **_GAINS, ms=14)
+    axes.plot(found.gains.corner_frequency, found.gains.linear_gain, **_GAINS, ms=14)
     axes.axhline(0.0, color=GREY, lw=0.8)
     axes.set_xscale("log")
     axes.set_xlim(corners[0], corners[-1])
@@ -170,7 +170,7 @@ def _roomiest(shown: BoolArray, found: StabilityMap) -> tuple[float, float] | No
     columns, rows = len(found.corner_frequencies), len(found.linear_gains)
     free = shown.copy()
     column = int(np.abs(np.log(found.corner_frequencies / found.gains.corner_frequency)).argmin())
-    row = int(np.abs(found.linear_gains - found.gains.linear).argmin())
+    row = int(np.abs(found.linear_gains - found.gains.linear_gain).argmin())
     width, height = columns // 12, rows // 16
     free[max(row - height, 0) : row + height + 1, max(column - width, 0) : column + width + 1] = 0
     # A text is three times as wide as high.
@@ -233,7 +233,9 @@ def _draw_critical_gains(axes: Axes, critical: CriticalGainCurves, found: Stabil
         width, label = (2.8, f"{label}, this loop") if rate == found.loop.rate else (1.2, label)
         axes.plot(delays / late, np.insert(gains, jumps, np.nan), **look, lw=width, label=label)
     axes.axhline(0.0, color=GREY, lw=0.8)
-    axes.plot(found.loop.force_delay / late, found.gains.linear, **_GAINS, ms=14, clip_on=False)
+    axes.plot(
+        found.loop.force_delay / late, found.gains.linear_gain, **_GAINS, ms=14, clip_on=False
+    )
     axes.set_ylabel(units.label(units.named("critical linear gain"), "N s/m"))
     corner = found.gains.corner_frequency
     axes.set_title(f"cutoff frequency {corner:.3g}{'' if units.dimensionless else ' rad/s'}")

@@ -13,7 +13,7 @@ from stickslip_ros.arrays import FloatArray
 from stickslip_ros.physics.loop.controller import Controller, answer
 from stickslip_ros.physics.loop.sampled_loop import LOCKSTEP_START, SampledLoop
 from stickslip_ros.physics.measures.cycle_measures import CycleMeter, Measures, Regime
-from stickslip_ros.physics.model.control import Washout, WashoutGains
+from stickslip_ros.physics.model.control import Washout
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.sensor import EXACT_SENSOR, Measure, Sensor
 from stickslip_ros.physics.motion import Motion, RecordedMotion
@@ -63,15 +63,15 @@ class Vibration:
         """Return the largest output, m/s, of the filter with a cutoff frequency in rad/s."""
         return float(np.abs(self._filtered(corner_frequency)).max(initial=0.0))
 
-    def peak_force(self, gains: WashoutGains) -> float:
+    def peak_force(self, gains: Washout) -> float:
         """Return the largest force, N, of a controller activated at the worst phase."""
         return float(np.abs(self._force(gains)).max(initial=0.0))
 
-    def worst_sample(self, gains: WashoutGains) -> int:
+    def worst_sample(self, gains: Washout) -> int:
         """Return the row of the sample at which that force is largest."""
         return int(np.argmax(np.abs(self._force(gains))))
 
-    def _force(self, gains: WashoutGains) -> FloatArray:
+    def _force(self, gains: Washout) -> FloatArray:
         return gains.force(self._filtered(gains.corner_frequency))
 
     def _filtered(self, corner_frequency: float) -> FloatArray:
@@ -177,7 +177,7 @@ class Bench:
         settled = ceil(FILTER_SETTLED / law.corner_frequency * self.rate / count) * count
         cycle = vibration.period * self.rate
         rows = {int(phase * cycle / _PHASES) for phase in range(_PHASES)}
-        due = {settled + row for row in rows | {vibration.worst_sample(law.gains)}}
+        due = {settled + row for row in rows | {vibration.worst_sample(law)}}
         columns = zip(vibration.position.tolist(), vibration.velocity.tolist(), strict=True)
         states, measure = list(columns), self._measure([])
         peak = slowest = 0.0

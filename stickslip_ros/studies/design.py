@@ -12,7 +12,7 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.physics.measures.cycle_measures import Regime
-from stickslip_ros.physics.model.control import Washout, WashoutGains
+from stickslip_ros.physics.model.control import Washout
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.theory.linear_sampled_loop import (
     LinearSampledLoop,
@@ -124,7 +124,7 @@ class Design:
         """Return the stability map of the slowest loop around the proposal; None without one."""
         if self.slowest is None or self.controller is None:
             return None
-        return StabilityMap.around(self.slowest, self.controller.gains)
+        return StabilityMap.around(self.slowest, self.controller)
 
     def peak_forces(self, around: StabilityMap) -> FloatArray:
         """Return the largest force over the gains of a map.
@@ -147,7 +147,7 @@ class Design:
         for row, corner_frequency in enumerate(around.corner_frequencies.tolist()):
             for vibration in self.vibrations:
                 speeds = np.linspace(0.0, vibration.peak_speed(corner_frequency), 50)
-                gains = WashoutGains(corner_frequency, linear, around.gains.cubic)
+                gains = Washout(corner_frequency, linear, around.gains.cubic_gain)
                 force = np.abs(gains.force(speeds)).max(axis=1)
                 forces[row] = np.maximum(forces[row], force)
         return forces
@@ -223,11 +223,9 @@ def _propose(bench: Bench, candidates: Candidates, progress: Progress) -> Design
         gains = candidates.best(strength, shares)
         if gains is None:
             return Design(task, remark=failure or candidates.why_none())
-        waits = FILTER_SETTLED / gains.corner_frequency if gains.linear != 0.0 else 0.0
-        controller = Washout(
-            corner_frequency=gains.corner_frequency,
-            linear_gain=gains.linear,
-            cubic_gain=gains.cubic,
+        waits = FILTER_SETTLED / gains.corner_frequency if gains.linear_gain != 0.0 else 0.0
+        controller = replace(
+            gains,
             force_limit=task.force_limit,
             start_after=rounded(waits, digits=2, up=True),
         )
@@ -241,7 +239,7 @@ def _propose(bench: Bench, candidates: Candidates, progress: Progress) -> Design
                 break
         slowest = candidates.slowest(gains)
         remark, found, little = candidates.why_zero(), None, None
-        if failure is None and gains.linear != 0.0:
+        if failure is None and gains.linear_gain != 0.0:
             found = margins(loops, gains)
             little = little_margin(task, found)
             ends = [loop.drive for loop in loops if loop in (loops[0], loops[-1], slowest)]
@@ -254,7 +252,7 @@ def _propose(bench: Bench, candidates: Candidates, progress: Progress) -> Design
         peak = max((check.peak_force or 0.0 for check in checks), default=0.0)
         if peak > task.force_limit:
             strength *= 0.97 * task.force_limit / peak
-        elif gains.cubic != 0.0:
+        elif gains.cubic_gain != 0.0:
             shares = CUBIC_SHARES[:1]
         else:
             strength *= 0.8
@@ -269,8 +267,7 @@ def _check(
     task: Task, bench: Bench, loop: LinearSampledLoop, vibration: Vibration, controller: Washout
 ) -> Check:
     """Return the check of the controller at one belt speed."""
-    drive, gains = loop.drive, controller.gains
-    decay_rate = loop.decay_rate(gains)
+    drive, decay_rate = loop.drive, loop.decay_rate(controller)
     predicted = settling_time(decay_rate)
     assert predicted is not None
     caught: Outcome | None = None
@@ -287,7 +284,7 @@ def _check(
         decay_rate=decay_rate,
         predicted_settling_time=predicted,
         settling_time=None if caught is None else caught.settling_time,
-        predicted_peak_force=vibration.peak_force(gains),
+        predicted_peak_force=vibration.peak_force(controller),
         peak_force=None if caught is None else caught.peak_force,
         rest=rest,
     )

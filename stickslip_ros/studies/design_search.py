@@ -11,7 +11,7 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.model.control import Washout, WashoutGains
+from stickslip_ros.physics.model.control import Washout
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.drive_system import SPEED
 from stickslip_ros.physics.model.functions import zero_between
@@ -157,17 +157,17 @@ class Candidates:
             return 0.0
         return max(vibration.peak_force(gains) for vibration in self.vibrations)
 
-    def slowest(self, gains: WashoutGains) -> LinearSampledLoop:
+    def slowest(self, gains: Washout) -> LinearSampledLoop:
         """Return the loop in which a small deviation decays most slowly."""
         return min(self.loops, key=lambda loop: loop.decay_rate(gains))
 
-    def best(self, strength: float, cubic_shares: Sequence[float]) -> WashoutGains | None:
+    def best(self, strength: float, cubic_shares: Sequence[float]) -> Washout | None:
         """Return the gains that damp fastest, with the share `strength` of what is allowed.
 
         They have three digits, and are zero if nothing vibrates. None if no gains are stable.
         """
         if not self._vibrates:
-            none = WashoutGains(rounded(self.task.drive.angular_frequency), 0.0, 0.0)
+            none = Washout(rounded(self.task.drive.angular_frequency), 0.0, 0.0)
             if self.slowest(none).decay_rate(none) > 0.0:
                 return none
         best, fastest = None, 0.0
@@ -221,14 +221,14 @@ class Candidates:
     def _vibrates(self) -> bool:
         return any(vibration.vibrates for vibration in self.vibrations)
 
-    def _fastest(self, strength: float, cubic: float) -> WashoutGains:
+    def _fastest(self, strength: float, cubic: float) -> Washout:
         """Return the fastest gains: from five grids, each refined around the best point so far."""
         # A positive cubic gain softens the control with a negative linear gain only.
         limits = np.array(
             [np.log(self._corner_frequencies(2)), [-1.0, 0.0 if cubic > 0.0 else 1.0]]
         )
         window, counts = limits, (25, 41)
-        best = WashoutGains(0.0, 0.0, 0.0)
+        best = Washout(0.0, 0.0, 0.0)
         for _ in range(5):
             logarithms, shares = (
                 np.linspace(low, high, count)
@@ -239,7 +239,7 @@ class Candidates:
             gains = np.outer(largest, shares)
             rates = np.min([loop.decay_rates(corners, gains) for loop in self._extremes], axis=0)
             row, column = np.unravel_index(int(np.argmax(rates)), rates.shape)
-            best = WashoutGains(*map(rounded, (corners[row], gains[row, column], cubic)))
+            best = Washout(*map(rounded, (corners[row], gains[row, column], cubic)))
             centre = np.array([[logarithms[row]], [shares[column]]])
             reach = 0.3 / 2.0 * (window[:, 1:] - window[:, :1])
             window = np.clip(centre + reach * [-1.0, 1.0], limits[:, :1], limits[:, 1:])
@@ -298,13 +298,13 @@ class Margins:
     such within half a natural period, or within the range of the theory."""
 
 
-def margins(loops: Sequence[LinearSampledLoop], gains: WashoutGains) -> Margins:
+def margins(loops: Sequence[LinearSampledLoop], gains: Washout) -> Margins:
     """Return the margins of loops that are stable with these gains (SI units)."""
     factors = [
-        end / gains.linear
+        end / gains.linear_gain
         for loop in loops
         for interval in loop.stable_linear_gains(gains.corner_frequency)
-        if interval.low < gains.linear < interval.high
+        if interval.low < gains.linear_gain < interval.high
         for end in interval
     ]
     delays = [delay for loop in loops if (delay := _delay_margin(loop, gains)) is not None]
@@ -315,7 +315,7 @@ def margins(loops: Sequence[LinearSampledLoop], gains: WashoutGains) -> Margins:
     )
 
 
-def _delay_margin(loop: LinearSampledLoop, gains: WashoutGains) -> float | None:
+def _delay_margin(loop: LinearSampledLoop, gains: Washout) -> float | None:
     def decay_rate(further: float) -> float:
         return replace(loop, force_delay=loop.force_delay + further).decay_rate(gains)
 

@@ -346,7 +346,7 @@ def _closed_forms(drive: Drive, law: ControlLaw | None) -> Section | None:
         forms |= {
             "critical_linear_gain": _scaled(linear, force / speed),
             "critical_lyapunov_coefficient": cubic.critical_lyapunov_coefficient(
-                corner, dimensionless.cubic
+                corner, dimensionless.cubic_gain
             ),
             "critical_cubic_gain": _scaled(cubic_gain, force / speed**3),
         }

@@ -15,7 +15,7 @@ import pytest
 import stickslip_ros as ss
 from stickslip_ros.errors import RunError
 from stickslip_ros.physics.model.constants import constant
-from stickslip_ros.physics.model.control import CONTROL_LAWS, ControlLaw, StateFeedback
+from stickslip_ros.physics.model.control import CONTROL_LAWS, ControlLaw, VelocityFeedback
 from stickslip_ros.physics.model.control.base import LinearFeedback
 from stickslip_ros.scenarios.parameters import (
     CONTROLLER_PARAMETERS,
@@ -175,7 +175,7 @@ def zeros(*shape: int) -> Any:
 
 
 @dataclass(frozen=True)
-class _Absolute(StateFeedback):
+class _Absolute(VelocityFeedback):
     def control_force(self, position: Any, speed: Any, states: Any) -> Any:
         return [] if isinstance(speed, float) else speed
 
@@ -212,7 +212,7 @@ FORMS: dict[str, tuple[dict[str, Any], str]] = {
         "TypeError: float() argument must be a string or a real number, not 'list'",
     ),
     "continuous is nan": (
-        {"continuous": StateFeedback(nan, 1.0)},
+        {"continuous": VelocityFeedback(1.0, nan)},
         "its continuous form: [nan], which must be finite numbers",
     ),
     "refusal raises": ({"refusal": _raising(KeyError("gains"))}, "KeyError: 'gains'"),

@@ -251,7 +251,7 @@ def test_the_nonlinearity_of_the_open_loop() -> None:
 @pytest.mark.parametrize("cubic", [0.0, -3.0])
 def test_the_nonlinearity_of_the_closed_loop(cubic: float) -> None:
     d, p = 2.0, 0.43 - 1.8 * 0.4**2
-    gains = replace(FILTER, linear=d - p - d / (1.0 - p * d), cubic=cubic)
+    gains = replace(FILTER, linear_gain=d - p - d / (1.0 - p * d), cubic_gain=cubic)
     at_critical_gain = expansion(0.4, gains=gains)
     q = Nonlinearity.at(at_critical_gain)
     assert q.frequency == pytest.approx(np.sqrt(1.0 - p * d), rel=1e-9)

@@ -8,7 +8,7 @@ import pytest
 
 from stickslip_ros.paper.portraits import SETTLED, Portrait, PortraitCase, portraits
 from stickslip_ros.physics.measures.cycle_measures import Regime
-from stickslip_ros.physics.model.control import WashoutGains
+from stickslip_ros.physics.model.control import Washout
 from stickslip_ros.physics.model.friction import Coulomb, Linear
 from stickslip_ros.physics.motion.motion import Motion
 from tests.physics.drives import LIMIT_CYCLES, PAPER, LimitCycle
@@ -97,15 +97,15 @@ def test_a_diverging_motion_ends_and_does_not_affect_the_others() -> None:
 def test_the_critical_gain_separates_vibration_from_rest(
     corner_frequency: float, gain: float, rests: bool
 ) -> None:
-    gains = WashoutGains(corner_frequency, gain, 0.0)
+    gains = Washout(corner_frequency, gain, 0.0)
     found = portrait(PortraitCase("", PAPER, gains, duration=3000.0))
     assert (found.measures.regime is Regime.EQUILIBRIUM) == rests
 
 
 def test_a_controlled_case_may_follow_one_without_control() -> None:
     free = PortraitCase("", PAPER, duration=100.0)
-    idle = PortraitCase("", PAPER, WashoutGains(2.0, 0.0, 0.0), duration=100.0)
-    strong = PortraitCase("", PAPER, WashoutGains(2.0, -1.5, 0.0), duration=100.0)
+    idle = PortraitCase("", PAPER, Washout(2.0, 0.0, 0.0), duration=100.0)
+    strong = PortraitCase("", PAPER, Washout(2.0, -1.5, 0.0), duration=100.0)
     first, controlled, second, third = portraits([free, strong, idle, free])
     amplitudes = [other.measures.amplitude for other in (second, third)]
     assert amplitudes == pytest.approx([first.measures.amplitude] * 2, rel=1e-9)

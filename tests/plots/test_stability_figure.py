@@ -7,7 +7,7 @@ from math import inf
 import numpy as np
 import pytest
 
-from stickslip_ros.physics.model.control import WashoutGains
+from stickslip_ros.physics.model.control import Washout
 from stickslip_ros.physics.theory.closed_forms import CubicLoop
 from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop
 from stickslip_ros.physics.theory.stability_map import CriticalGainCurves, StabilityMap
@@ -18,10 +18,10 @@ from stickslip_ros.studies.design import Design, Task, design
 from tests.physics.drives import FEED_DRIVE, PAPER
 from tests.plots.texts import faults, in_styles, legend_texts
 
-GAINS = WashoutGains(20.0, -3000.0, 0.0)
+GAINS = Washout(20.0, -3000.0, 0.0)
 
 
-def map_of(force_delay: float = 0.0025, gains: WashoutGains = GAINS) -> StabilityMap:
+def map_of(force_delay: float = 0.0025, gains: Washout = GAINS) -> StabilityMap:
     loop = LinearSampledLoop.from_drive(FEED_DRIVE, 1000.0, force_delay)
     assert loop is not None
     return StabilityMap.around(loop, gains, points=21)
@@ -56,7 +56,7 @@ def test_the_continuous_loop_has_its_closed_form() -> None:
 
 
 def test_without_gains_it_is_around_the_critical_one() -> None:
-    found = map_of(gains=WashoutGains(20.0, 0.0, 0.0))
+    found = map_of(gains=Washout(20.0, 0.0, 0.0))
     critical = found.loop.critical_linear_gain(20.0)
     assert critical is not None
     assert found.linear_gains[0] == pytest.approx(2.0 * critical)
@@ -96,7 +96,7 @@ def test_the_map_of_a_loop_and_its_critical_gains(style: str) -> None:
     names = {text.get_text(): text.get_position() for text in axes.texts}
     assert names.keys() == {"stable", "unstable"}
     for name, (corner_frequency, gain) in names.items():
-        rate = found.loop.decay_rate(WashoutGains(corner_frequency, gain, 0.0))
+        rate = found.loop.decay_rate(Washout(corner_frequency, gain, 0.0))
         assert (rate > 0.0) == (name == "stable")
     # The colour bar has round numbers.
     ticks = bar.get_yticks()
@@ -115,8 +115,8 @@ def test_the_map_of_a_loop_and_its_critical_gains(style: str) -> None:
     (region,) = curves.collections
     assert region.get_label() == "stable, this loop"
     (path,) = region.get_paths()
-    for gain in (GAINS.linear, -1000.0, 1000.0):
-        stable = found.loop.decay_rate(replace(GAINS, linear=gain)) > 0.0
+    for gain in (GAINS.linear_gain, -1000.0, 1000.0):
+        stable = found.loop.decay_rate(replace(GAINS, linear_gain=gain)) > 0.0
         assert path.contains_point((3.0, gain)) == stable
 
 
@@ -156,7 +156,7 @@ def test_a_design_without_a_limit_shows_contours_of_the_force() -> None:
 def test_for_the_unit_drive_it_is_dimensionless() -> None:
     loop = LinearSampledLoop.from_drive(PAPER, 100.0, 0.0)
     assert loop is not None
-    found = StabilityMap.around(loop, WashoutGains(2.0, -1.0, -1.0), points=11)
+    found = StabilityMap.around(loop, Washout(2.0, -1.0, -1.0), points=11)
     figure = stability_figure(found, None)
     axes, bar = figure.axes
     assert axes.get_xlabel() == "cutoff frequency $d$ (dimensionless)"
@@ -167,7 +167,7 @@ def test_for_the_unit_drive_it_is_dimensionless() -> None:
 def test_where_nothing_is_stable_there_is_a_figure_all_the_same() -> None:
     loop = LinearSampledLoop.from_drive(replace(FEED_DRIVE, belt_speed=0.02), 1000.0, 0.015)
     assert loop is not None
-    found = StabilityMap.around(loop, replace(GAINS, linear=0.0), points=11)
+    found = StabilityMap.around(loop, replace(GAINS, linear_gain=0.0), points=11)
     assert -inf < found.decay_rates.max() < 0.0
     figure = stability_figure(found, None, style=replace(STYLES["paper"], titled=False))
     (axes,) = figure.axes

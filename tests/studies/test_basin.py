@@ -93,7 +93,7 @@ def test_beyond_the_critical_cubic_gain_rest_cycle_and_running_away_coexist() ->
     corner = "washout_controller.corner_frequency=0.5"
     drive = paper().plant.as_drive()
     washout = paper(corner).washout_controller.as_law()
-    critical = critical_gains(drive, washout.gains)
+    critical = critical_gains(drive, washout)
     assert critical is not None
     assert critical.cubic is not None
     linear, cubic = 1.1 * critical.linear, critical.cubic + 1.0

@@ -14,7 +14,7 @@ from stickslip_ros.physics.loop.controller import Controller
 from stickslip_ros.physics.loop.sampled_loop import LOCKSTEP_START, SampledLoop
 from stickslip_ros.physics.loop.simulation import simulate_sampled
 from stickslip_ros.physics.measures.cycle_measures import CycleMeter, Measures, Regime
-from stickslip_ros.physics.model.control import Washout, WashoutGains
+from stickslip_ros.physics.model.control import Washout
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import Coulomb, Exponential, FrictionLaw, Linear
 from stickslip_ros.physics.motion import RecordedMotion
@@ -96,22 +96,22 @@ def test_late_and_over_a_wide_range_too_it_brings_the_drive_to_rest() -> None:
 
 def test_nothing_near_a_proposal_is_much_faster() -> None:
     task = replace(FEED, belt_speeds=(0.04, 0.04))
-    gains = proposal(designed(task)).gains
+    gains = proposal(designed(task))
     loop = LinearSampledLoop.from_drive(FEED_DRIVE, 1000.0)
     assert loop is not None
     corners = gains.corner_frequency * np.linspace(0.5, 2.0, 31)
-    linear = gains.linear * np.linspace(0.5, 2.0, 31)
+    linear = gains.linear_gain * np.linspace(0.5, 2.0, 31)
     assert loop.decay_rate(gains) > 0.95 * loop.decay_rates(corners, linear).max()
 
 
 def test_margins_lead_to_the_edge_of_stability() -> None:
     loop = LinearSampledLoop.from_drive(FEED_DRIVE, 1000.0, 0.0025)
     assert loop is not None
-    gains = WashoutGains(20.0, -3000.0, 0.0)
+    gains = Washout(20.0, -3000.0, 0.0)
     found = margins([loop], gains)
     for factor in (found.gain_down, found.gain_up):
         assert factor is not None
-        at_edge = replace(gains, linear=factor * gains.linear)
+        at_edge = replace(gains, linear_gain=factor * gains.linear_gain)
         assert loop.spectral_radius(at_edge) == pytest.approx(1.0, abs=1e-9)
     assert found.delay is not None
     late = replace(loop, force_delay=0.0025 + found.delay)
@@ -129,7 +129,7 @@ def test_margins_are_the_tightest_of_the_range() -> None:
     for speed in np.linspace(*task.belt_speeds, 9).tolist():
         loop = LinearSampledLoop.from_drive(replace(FEED_DRIVE, belt_speed=speed), FEED.rate)
         assert loop is not None
-        one = margins([loop], proposal(found).gains)
+        one = margins([loop], proposal(found))
         assert (one.gain_down or 0.0) <= tightest.gain_down < 1.0
         assert (one.gain_up or inf) >= (tightest.gain_up or inf) > 1.0
         assert (one.delay or inf) >= (tightest.delay or inf) > 0.0
@@ -140,7 +140,7 @@ def test_without_damping_no_share_of_the_gain_is_unstable() -> None:
         replace(FEED_DRIVE, friction=Coulomb(0.4), damping=0.0), 1000.0
     )
     assert loop is not None
-    assert margins([loop], WashoutGains(20.0, -3000.0, 0.0)).gain_down is None
+    assert margins([loop], Washout(20.0, -3000.0, 0.0)).gain_down is None
 
 
 @pytest.mark.long

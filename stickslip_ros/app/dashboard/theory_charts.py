@@ -9,7 +9,7 @@ from contourpy import contour_generator
 from stickslip_ros.app.dashboard.charts import AXIS, CENTRED, TOOLBOX, line
 from stickslip_ros.app.dashboard.theory import Decay, FrictionCurve
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.physics.model.control import WashoutGains
+from stickslip_ros.physics.model.control import Washout
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.theory.bifurcation_branches import BifurcationBranches, Branch
 from stickslip_ros.physics.theory.stability_map import StabilityMap
@@ -53,7 +53,7 @@ def bifurcation_chart(found: BifurcationBranches, drive: Drive) -> Options:
     return _options(speed_label, reach_label, series, legend=list(names))
 
 
-def stability_chart(found: StabilityMap, drive: Drive, gains: WashoutGains | None) -> Options:
+def stability_chart(found: StabilityMap, drive: Drive, gains: Washout | None) -> Options:
     """Return the limit of stability over the gains, and the present gains, if any, as a point."""
     units = Units.for_drive(drive)
     gain, label = units.axis(units.plain("linear gain"), "N s/m", found.linear_gains)
@@ -69,7 +69,7 @@ def stability_chart(found: StabilityMap, drive: Drive, gains: WashoutGains | Non
     shown = np.where(inside, continuous, np.nan)
     series.append(_line("limit, not sampled", corners, shown, GREY, "dashed"))
     if gains is not None:
-        series.append(_point("gains in use", gains.corner_frequency, gains.linear / gain))
+        series.append(_point("gains in use", gains.corner_frequency, gains.linear_gain / gain))
     for share, style in ((0.25, "dotted"), (0.5, "dashed"), (0.75, "solid")):
         if fastest > 0.0:
             level = float(f"{share * fastest:.1g}")

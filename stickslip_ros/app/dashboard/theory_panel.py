@@ -21,7 +21,7 @@ from stickslip_ros.app.dashboard.theory_charts import (
     stability_chart,
 )
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.model.control import WashoutGains
+from stickslip_ros.physics.model.control import Washout
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.theory.gain_intervals import gains_of
 from stickslip_ros.physics.theory.linear_sampled_loop import settling_time
@@ -84,7 +84,7 @@ class TheoryPanel:
         if name == "decay":
             self._said[name].set_text(_decay_text(value, units))
 
-    def _gains(self) -> WashoutGains | None:
+    def _gains(self) -> Washout | None:
         """Return the gains of the controller; None while they are not known, or it has others."""
         law = self._listener.law
         values = self._listener.parameters[controller_node(law)]
@@ -94,7 +94,7 @@ class TheoryPanel:
             return None
 
 
-def _options(name: str, found: Any, drive: Drive, gains: WashoutGains | None) -> dict[str, Any]:
+def _options(name: str, found: Any, drive: Drive, gains: Washout | None) -> dict[str, Any]:
     """Return the options of the chart of that name, with a result drawn."""
     match name:
         case "map":

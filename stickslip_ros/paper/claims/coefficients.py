@@ -162,7 +162,7 @@ def _at_hopf_point(damping: float) -> Nonlinearity:
 
 def _at_critical_gain(damping: float, cubic: float = 0.0) -> Nonlinearity:
     """Return the nonlinearity at the belt speed and the critical gain of section 4.1."""
-    gains = replace(FILTER, linear=critical(STUDIED_SPEED, damping).linear, cubic=cubic)
+    gains = replace(FILTER, linear_gain=critical(STUDIED_SPEED, damping).linear, cubic_gain=cubic)
     return Nonlinearity.at(expansion(STUDIED_SPEED, damping, gains))
 
 

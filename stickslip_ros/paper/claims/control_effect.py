@@ -33,7 +33,7 @@ from stickslip_ros.paper.claims.paper_values import (
 from stickslip_ros.paper.claims.verdict import Computations, Evidence, Number, Observation
 from stickslip_ros.paper.figures import STRIBECK, unit_drive
 from stickslip_ros.physics.measures.cycle_measures import Regime
-from stickslip_ros.physics.model.control import WashoutGains
+from stickslip_ros.physics.model.control import Washout
 from stickslip_ros.physics.motion import Motion
 from stickslip_ros.physics.theory.hopf import hopf_points
 
@@ -131,11 +131,11 @@ def _(evidence: Evidence) -> Observation:
     linear, cubic, _ = evidence.portraits(13).panels
     portraits = [linear.portraits[0], *cubic.portraits]
     sizes = [amplitude(portrait) for portrait in portraits]
-    gains = [portrait.case.gains.cubic for portrait in portraits if portrait.case.gains]
+    gains = [portrait.case.gains.cubic_gain for portrait in portraits if portrait.case.gains]
     strong = (0.0, -100.0, -1000.0)
     loops = ((0.4, 2.0), (0.4, 0.2), (0.4, 20.0), (0.45, 2.0), (0.2, 2.0))
     left = {
-        (v, d): [controlled_amplitude(v, replace(FILTER, corner_frequency=d, cubic=k2))
+        (v, d): [controlled_amplitude(v, replace(FILTER, corner_frequency=d, cubic_gain=k2))
         for k2 in strong] for v, d in loops
     }  # fmt: skip
     shares = (
@@ -183,7 +183,7 @@ def _largest_cubic_gain(belt_speed: float, corner_frequency: float, speed: float
     """Return the cubic gain above which the motion with that initial speed diverges."""
 
     def stays(cubic: float) -> bool:
-        gains = WashoutGains(corner_frequency, 0.0, cubic)
+        gains = Washout(corner_frequency, 0.0, cubic)
         motion = Motion(unit_drive(belt_speed), 0.0, speed, gains)
         motion.control_state = (0.0,)
         motion.advance(100.0)
@@ -194,7 +194,7 @@ def _largest_cubic_gain(belt_speed: float, corner_frequency: float, speed: float
 
 @computes("eq-30-hopf")
 def _(_: Evidence) -> Observation:
-    gains = replace(FILTER, linear=PRINTED_GAIN)
+    gains = replace(FILTER, linear_gain=PRINTED_GAIN)
     here, taken = for_both(
         lambda damping: hopf_points(unit_drive(STUDIED_SPEED, damping=damping), gains)[-1]
     )
@@ -231,9 +231,9 @@ def _(_: Evidence) -> Observation:
 @computes("control-at-049")
 def _(_: Evidence) -> Observation:
     here, taken = for_both(lambda damping: amplitudes(STUDIED_SPEED, damping))
-    gains = replace(FILTER, linear=PRINTED_GAIN / 2.0)
+    gains = replace(FILTER, linear_gain=PRINTED_GAIN / 2.0)
     left = controlled_amplitude(STUDIED_SPEED, gains, TAKEN_DAMPING)
-    resting = expansion(STUDIED_SPEED, TAKEN_DAMPING, replace(FILTER, linear=-0.05)).stable
+    resting = expansion(STUDIED_SPEED, TAKEN_DAMPING, replace(FILTER, linear_gain=-0.05)).stable
     return Observation(
         bool(here) and left < here[0],
         bool(taken) and left < taken[0],
@@ -290,7 +290,7 @@ def _(evidence: Evidence) -> Observation:
 
 def _comes_to_rest(linear: float, position: float, speed: float) -> bool:
     drive = unit_drive(0.4)
-    motion = Motion(drive, position, speed, replace(FILTER, linear=linear, cubic=0.0))
+    motion = Motion(drive, position, speed, replace(FILTER, linear_gain=linear, cubic_gain=0.0))
     motion.advance(3000.0)
     off = abs(motion.position - drive.equilibrium_position) + abs(motion.velocity)
     return off < 1e-3 * drive.belt_speed
@@ -299,7 +299,7 @@ def _comes_to_rest(linear: float, position: float, speed: float) -> bool:
 @computes("fig-13-design")
 def _(_: Evidence) -> Observation:
     needed, slow = critical(0.4, DAMPING).linear, critical(0.4, DAMPING, 0.2).linear
-    gains = replace(FILTER, linear=PRINTED_GAIN)
+    gains = replace(FILTER, linear_gain=PRINTED_GAIN)
     here, taken = for_both(lambda damping: bool(expansion(0.4, damping, gains).stable))
     without, left = controlled_amplitude(0.4, FILTER), controlled_amplitude(0.4, gains)
     return Observation(
@@ -399,8 +399,8 @@ def _(evidence: Evidence) -> Observation:
     slower, high = (
         controlled_amplitude(speed, gains) / controlled_amplitude(speed, FILTER) - 1.0
         for speed, gains in (
-            (0.1, replace(FILTER, linear=0.9 * critical(0.1, DAMPING).linear)),
-            (0.4, replace(FILTER, corner_frequency=20.0, linear=-10.0)),
+            (0.1, replace(FILTER, linear_gain=0.9 * critical(0.1, DAMPING).linear)),
+            (0.4, replace(FILTER, corner_frequency=20.0, linear_gain=-10.0)),
         )
     )
     return Observation(

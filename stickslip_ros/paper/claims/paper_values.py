@@ -17,7 +17,7 @@ from stickslip_ros.paper.claims.verdict import Formula, Number
 from stickslip_ros.paper.figures import unit_drive
 from stickslip_ros.paper.portraits import Portrait
 from stickslip_ros.physics.measures.cycle_measures import Regime
-from stickslip_ros.physics.model.control import WashoutGains
+from stickslip_ros.physics.model.control import Washout
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.drive_system import SLIP
 from stickslip_ros.physics.model.friction import FrictionLaw
@@ -53,7 +53,7 @@ PRINTED_GAIN = -0.0395
 STUDIED_SPEED = 0.49
 """The belt speed of section 4.1, which eq. 20 to 30 use."""
 
-FILTER = WashoutGains(corner_frequency=2.0, linear=0.0, cubic=0.0)
+FILTER = Washout(corner_frequency=2.0, linear_gain=0.0, cubic_gain=0.0)
 """A washout filter with the cutoff frequency of eq. 20 and no gain."""
 
 VIBRATING = (Regime.STICK_SLIP, Regime.PURE_SLIP)
@@ -82,7 +82,7 @@ def known(value: _T | None) -> _T:
 
 
 def expansion(
-    belt_speed: float, damping: float = DAMPING, gains: WashoutGains | None = None
+    belt_speed: float, damping: float = DAMPING, gains: Washout | None = None
 ) -> Expansion:
     """Return the derivatives of the right-hand side at the equilibrium."""
     return known(expand(unit_drive(belt_speed, damping=damping), gains))
@@ -178,7 +178,7 @@ def critical(belt_speed: float, damping: float, corner_frequency: float = 2.0) -
     return known(critical_gains(unit_drive(belt_speed, damping=damping), gains))
 
 
-def controlled_amplitude(belt_speed: float, gains: WashoutGains, damping: float = DAMPING) -> float:
+def controlled_amplitude(belt_speed: float, gains: Washout, damping: float = DAMPING) -> float:
     """Return the amplitude of the limit cycle that the motion from rest at X = 0 leads to."""
     cycle = limit_cycle_of_run(unit_drive(belt_speed, damping=damping), 0.0, gains=gains)
     return 0.0 if cycle is None else cycle.measures.amplitude or 0.0
@@ -217,7 +217,7 @@ def slip_friction(law: FrictionLaw, relative_speed: FloatArray) -> FloatArray:
     return law.coefficient(relative_speed, np.sign(relative_speed))
 
 
-def rates(drive: Drive, states: FloatArray, gains: WashoutGains | None = None) -> FloatArray:
+def rates(drive: Drive, states: FloatArray, gains: Washout | None = None) -> FloatArray:
     """Return the derivatives by time of dimensionless states (n, m) of a slipping slide.
 
     n is 2, or 3 with `gains` (SI), for eq. 5 and eq. 19.

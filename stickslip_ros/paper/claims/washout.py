@@ -29,14 +29,14 @@ from stickslip_ros.paper.claims.paper_values import (
 )
 from stickslip_ros.paper.claims.verdict import Computations, Evidence, Formula, Number, Observation
 from stickslip_ros.paper.figures import unit_drive
-from stickslip_ros.physics.model.control import WashoutGains
+from stickslip_ros.physics.model.control import Washout
 from stickslip_ros.physics.model.functions import zero_between
 from stickslip_ros.physics.theory.hopf import crossing_speed, hopf_points
 from stickslip_ros.physics.theory.linear import hurwitz_determinants
 
 computes = Computations()
 
-_SOME_GAINS = replace(FILTER, linear=-0.3, cubic=-2.0)
+_SOME_GAINS = replace(FILTER, linear_gain=-0.3, cubic_gain=-2.0)
 
 
 @computes("eq-16-linear")
@@ -62,7 +62,7 @@ def _friction(speed: FloatArray, last: float) -> FloatArray:
     return -0.45 * speed + 0.6 * cubes
 
 
-def _loop_rates(gains: WashoutGains | None) -> FloatArray:
+def _loop_rates(gains: Washout | None) -> FloatArray:
     states = _slow_states()
     states[0] += expansion(STUDIED_SPEED).equilibrium[0]
     return rates(unit_drive(STUDIED_SPEED), states if gains else states[:2], gains)
@@ -97,8 +97,9 @@ def _(_: Evidence) -> Formula:
         None,
         _loop_rates(_SOME_GAINS)[1] - _loop_rates(None)[1],
         {
-            "With v, which is not defined, read as y - d w as in eq. 19": _SOME_GAINS.linear * v
-            + _SOME_GAINS.cubic * v**3
+            "With v, which is not defined, read as y - d w as in eq. 19": _SOME_GAINS.linear_gain
+            * v
+            + _SOME_GAINS.cubic_gain * v**3
         },
     )
 
@@ -108,7 +109,7 @@ def _(_: Evidence) -> Observation:
     gains = (0.0, -0.1, -0.3)
 
     def speeds(cubic: float) -> list[float]:
-        loops = [replace(FILTER, linear=linear, cubic=cubic) for linear in gains]
+        loops = [replace(FILTER, linear_gain=linear, cubic_gain=cubic) for linear in gains]
         return [hopf_points(unit_drive(0.4), loop)[-1].belt_speed for loop in loops]
 
     without, with_cubic = speeds(0.0), speeds(-5.0)
@@ -123,7 +124,7 @@ def _(_: Evidence) -> Observation:
 def _(_: Evidence) -> Formula:
     x, y, w = _slow_states()
     v = y - _SOME_GAINS.corner_frequency * w
-    force = _SOME_GAINS.linear * v + _SOME_GAINS.cubic * v**3
+    force = _SOME_GAINS.linear_gain * v + _SOME_GAINS.cubic_gain * v**3
     friction = _friction(y, 3.0 * STUDIED_SPEED)
     return Formula([y, -friction - DAMPING * y - x + force, v], _loop_rates(_SOME_GAINS))
 
@@ -133,7 +134,7 @@ def _printed_jacobian(p: float, linear: float) -> FloatArray:
 
 
 computes["eq-20"] = lambda _: Formula(
-    _printed_jacobian(trace(STUDIED_SPEED), _SOME_GAINS.linear),
+    _printed_jacobian(trace(STUDIED_SPEED), _SOME_GAINS.linear_gain),
     expansion(STUDIED_SPEED, gains=_SOME_GAINS).jacobian,
 )
 computes["eq-20-trace"] = lambda _: number_for_both(lambda damping: trace(STUDIED_SPEED, damping))
@@ -161,9 +162,9 @@ def _(_: Evidence, order: int) -> Formula:
     # c1 c2 - c3 = 0 with c1 = 2 - p - k1, c2 = 2 k1 - p - 1, c3 = 2, a square in k1
     discriminant = (5.0 - p) ** 2 - 8.0 * (2.0 + (2.0 - p) * (p + 1.0))
     return formula_for_both(
-        _EQ_21[order](printed_trace(BELT_SPEEDS), _SOME_GAINS.linear),
+        _EQ_21[order](printed_trace(BELT_SPEEDS), _SOME_GAINS.linear_gain),
         coefficients,
-        c2=np.poly(_printed_jacobian(p, _SOME_GAINS.linear))[2],
+        c2=np.poly(_printed_jacobian(p, _SOME_GAINS.linear_gain))[2],
         root="no" if discriminant < 0.0 else "a",
         discriminant=discriminant,
     )
@@ -173,7 +174,7 @@ def _(_: Evidence, order: int) -> Formula:
 def _(_: Evidence) -> Observation:
     gain = critical(STUDIED_SPEED, TAKEN_DAMPING).linear
     c1, c2, c3 = np.poly(_printed_jacobian(trace(STUDIED_SPEED, TAKEN_DAMPING), gain))[1:]
-    found = expansion(STUDIED_SPEED, TAKEN_DAMPING, replace(FILTER, linear=gain)).eigenvalues
+    found = expansion(STUDIED_SPEED, TAKEN_DAMPING, replace(FILTER, linear_gain=gain)).eigenvalues
     return Observation(
         abs(c1 * c2 - c3) < 1e-9 and abs(found[0].real) < 1e-9,
         defect=abs(c1 * c2 - c3),
@@ -202,14 +203,14 @@ def _(_: Evidence) -> Number:
 
 @computes("eq-22-roots")
 def _(_: Evidence) -> Observation:
-    gains = replace(FILTER, linear=PRINTED_GAIN)
+    gains = replace(FILTER, linear_gain=PRINTED_GAIN)
     pair, _conjugate, real = expansion(STUDIED_SPEED, TAKEN_DAMPING, gains).eigenvalues
     return Observation(pair.imag > 0.0 and real.imag == 0.0, pair=pair, real=real)
 
 
 @computes("eq-22-alpha")
 def _(_: Evidence) -> Formula:
-    gains = replace(FILTER, linear=PRINTED_GAIN)
+    gains = replace(FILTER, linear_gain=PRINTED_GAIN)
     found = [expansion(speed, TAKEN_DAMPING, gains).eigenvalues for speed in BELT_SPEEDS.tolist()]
     printed = -(1.5995 + 1.8 * BELT_SPEEDS**2)
     off = np.abs(printed - [values.sum().real for values in found]).max()
@@ -221,7 +222,7 @@ computes["eq-22-value"] = lambda _: number_for_both(_crossing)
 
 
 def _crossing(damping: float) -> float:
-    gains = replace(FILTER, linear=critical(STUDIED_SPEED, damping).linear)
+    gains = replace(FILTER, linear_gain=critical(STUDIED_SPEED, damping).linear)
     return known(crossing_speed(expansion(STUDIED_SPEED, damping, gains)))
 
 

@@ -212,7 +212,7 @@ def simulate_continuous(
     >>> drive = Drive(mass=100.0, damping=200.0, stiffness=1e6, normal_force=1000.0,
     ...               belt_speed=0.04, friction=Stribeck(0.4, 0.25, 0.05))
     >>> washout = Washout(20.0, linear_gain=-3000.0, cubic_gain=0.0)
-    >>> motion = RecordedMotion(drive, 0.0, 0.0, control=washout.gains)
+    >>> motion = RecordedMotion(drive, 0.0, 0.0, control=washout)
     >>> simulate_continuous(motion, washout, 5.0, CycleMeter(20)).regime.value
     'equilibrium'
     """

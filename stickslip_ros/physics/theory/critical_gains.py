@@ -7,7 +7,7 @@ from math import inf, isfinite, isinf, isnan, nan, pi, sqrt
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.physics.model.control import ContinuousControl, WashoutGains
+from stickslip_ros.physics.model.control import ContinuousControl, Washout
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.drive_system import MEMORY, POSITION, SPEED
 from stickslip_ros.physics.model.functions import zero_between
@@ -48,7 +48,7 @@ def critical_gains(drive: Drive, gains: ContinuousControl) -> CriticalGains | No
     drive : Drive
         Drive in SI units.
     gains : ContinuousControl
-        Continuous control in SI units: `WashoutGains`, whose linear gain is not used.
+        Continuous control in SI units: `Washout`, whose linear gain is not used.
 
     Returns
     -------
@@ -66,12 +66,12 @@ def critical_gains(drive: Drive, gains: ContinuousControl) -> CriticalGains | No
     The system of the paper:
 
     >>> from stickslip_ros.physics.model.drive import Drive
-    >>> from stickslip_ros.physics.model.control import WashoutGains
+    >>> from stickslip_ros.physics.model.control import Washout
     >>> from stickslip_ros.physics.model.friction import Stribeck
     >>> from stickslip_ros.physics.theory.critical_gains import critical_gains
     >>> drive = Drive(mass=1.0, damping=0.02, stiffness=1.0, normal_force=1.0,
     ...               belt_speed=0.4, friction=Stribeck(0.4, 0.25, 0.5))
-    >>> critical = critical_gains(drive, WashoutGains(2.0, linear=0.0, cubic=-1.0))
+    >>> critical = critical_gains(drive, Washout(2.0, linear_gain=0.0, cubic_gain=-1.0))
     >>> round(critical.linear, 6), round(critical.cubic, 4)
     (-0.935296, 31.468)
     """
@@ -82,20 +82,22 @@ def critical_gains(drive: Drive, gains: ContinuousControl) -> CriticalGains | No
     linear = None if own is None else find(drive, own)
     if own is None or linear is None:
         return None
-    critical = replace(own, linear=linear)
+    critical = replace(own, linear_gain=linear)
     if SMOOTH.lack(drive) is not None:
         return CriticalGains(linear, nan, None)
     sigma = _sigma(drive, critical)
     # sigma is affine in the cubic gain: only the third derivatives contain it, linearly. With a
     # large one the rounding of the other terms does not matter.
     large = 1e9 * drive.normal_force / drive.speed_scale**3
-    without, with_large = (_sigma(drive, replace(critical, cubic=cubic)) for cubic in (0.0, large))
+    without, with_large = (
+        _sigma(drive, replace(critical, cubic_gain=cubic)) for cubic in (0.0, large)
+    )
     slope = with_large - without
     cubic = 0.0 - without / slope * large if slope != 0.0 else None
     return CriticalGains(linear, sigma, cubic)
 
 
-def why_no_linear_gain(drive: Drive, gains: WashoutGains) -> str | None:
+def why_no_linear_gain(drive: Drive, gains: Washout) -> str | None:
     """Return why no linear gain stabilises the equilibrium on a moving belt; None on one at rest.
 
     The sentence is for a drive without critical gains.
@@ -113,7 +115,7 @@ def why_no_linear_gain(drive: Drive, gains: WashoutGains) -> str | None:
     )
 
 
-def _critical_linear_gain(drive: Drive, gains: WashoutGains) -> float | None:
+def _critical_linear_gain(drive: Drive, gains: Washout) -> float | None:
     """Return the linear gain at which the last determinant of Routh and Hurwitz changes sign.
 
     A static friction law enters the Jacobian of eq. 20 by its slope at the belt speed only. The
@@ -122,7 +124,7 @@ def _critical_linear_gain(drive: Drive, gains: WashoutGains) -> float | None:
     unit = drive.normal_force / drive.speed_scale
     margins: list[float] = []
     for linear in (0.0, unit):
-        expansion = expand(drive, replace(gains, linear=linear))
+        expansion = expand(drive, replace(gains, linear_gain=linear))
         if expansion is None:
             return None
         margins.append(float(hurwitz_determinants(expansion.jacobian)[-1]))
@@ -131,14 +133,14 @@ def _critical_linear_gain(drive: Drive, gains: WashoutGains) -> float | None:
     return None if slope > -least else -margins[0] / slope * unit
 
 
-def _critical_gain_of_any_order(drive: Drive, gains: WashoutGains) -> float | None:
+def _critical_gain_of_any_order(drive: Drive, gains: Washout) -> float | None:
     """Return the end nearest to zero of the gains with which the equilibrium is stable.
 
     The characteristic polynomial is p(s) + k q(s): where s = j w is an eigenvalue, p conj(q) is
     real there, which is a polynomial equation for w^2, and k = -p/q.
     """
     unit = drive.normal_force / drive.speed_scale
-    expansions = [expand(drive, replace(gains, linear=linear)) for linear in (0.0, unit)]
+    expansions = [expand(drive, replace(gains, linear_gain=linear)) for linear in (0.0, unit)]
     if expansions[0] is None or expansions[1] is None:
         return None
     without, with_unit = (each.jacobian for each in expansions if each is not None)
@@ -183,7 +185,7 @@ def _between(low: float, high: float) -> float:
     return low + 1.0 + abs(low) if isinf(high) else 0.5 * (low + high)
 
 
-def _sigma(drive: Drive, gains: WashoutGains) -> float:
+def _sigma(drive: Drive, gains: Washout) -> float:
     expansion = expand(drive, gains)
     assert expansion is not None
     sigma = first_lyapunov_coefficient(expansion)
@@ -204,7 +206,7 @@ def limit_cycle_from_hopf(drive: Drive, gains: ContinuousControl) -> LimitCycle 
     drive : Drive
         Drive in SI units.
     gains : ContinuousControl
-        Continuous control in SI units: `WashoutGains`, at whose linear gain the cycle is requested.
+        Continuous control in SI units: `Washout`, at whose linear gain the cycle is requested.
 
     Returns
     -------
@@ -218,12 +220,12 @@ def limit_cycle_from_hopf(drive: Drive, gains: ContinuousControl) -> LimitCycle 
     The system of the paper, at a linear gain just above the critical one of -0.9353:
 
     >>> from stickslip_ros.physics.model.drive import Drive
-    >>> from stickslip_ros.physics.model.control import WashoutGains
+    >>> from stickslip_ros.physics.model.control import Washout
     >>> from stickslip_ros.physics.model.friction import Stribeck
     >>> from stickslip_ros.physics.theory.critical_gains import limit_cycle_from_hopf
     >>> drive = Drive(mass=1.0, damping=0.02, stiffness=1.0, normal_force=1.0,
     ...               belt_speed=0.4, friction=Stribeck(0.4, 0.25, 0.5))
-    >>> cycle = limit_cycle_from_hopf(drive, WashoutGains(2.0, linear=-0.9, cubic=-1.0))
+    >>> cycle = limit_cycle_from_hopf(drive, Washout(2.0, linear_gain=-0.9, cubic_gain=-1.0))
     >>> round(cycle.measures.amplitude, 4), cycle.stable
     (0.1154, True)
     """
@@ -234,8 +236,8 @@ def limit_cycle_from_hopf(drive: Drive, gains: ContinuousControl) -> LimitCycle 
     cycle = None
     for step in range(1, _STEPS + 1):
         part = (step / _STEPS) ** 2  # the amplitude grows with the root of the distance
-        linear = critical.linear + part * (own.linear - critical.linear)
-        at_gain = replace(own, linear=linear)
+        linear = critical.linear + part * (own.linear_gain - critical.linear)
+        at_gain = replace(own, linear_gain=linear)
         guess = (
             2.0 * found[-1] - found[-2]
             if len(found) > 1
@@ -253,7 +255,7 @@ def limit_cycle_from_hopf(drive: Drive, gains: ContinuousControl) -> LimitCycle 
     return cycle
 
 
-def _by_normal_form(drive: Drive, gains: WashoutGains, sigma: float) -> FloatArray | None:
+def _by_normal_form(drive: Drive, gains: Washout, sigma: float) -> FloatArray | None:
     """Return what a cycle has at the upward turning point.
 
     That are displacement (m), filter state (m), period (s), and the memory of the law (SI).

@@ -13,7 +13,6 @@ from stickslip_ros.physics.model.control import (
     ControlLaw,
     LinearFeedback,
     Washout,
-    WashoutGains,
 )
 from stickslip_ros.physics.model.drive_system import POSITION, SPEED
 
@@ -37,14 +36,14 @@ class GainInterval(NamedTuple):
         return self.low if self.low >= 0.0 else self.high
 
 
-def gains_of(law: ControlLaw | None) -> WashoutGains | None:
+def gains_of(law: ControlLaw | None) -> Washout | None:
     """Return the gains of a law that the theory of gains covers; None for any other law."""
     return None if law is None else covered_gains(law.continuous)
 
 
-def covered_gains(control: ContinuousControl | None) -> WashoutGains | None:
+def covered_gains(control: ContinuousControl | None) -> Washout | None:
     """Return a continuous control if the theory of gains covers it, else None."""
-    return control if isinstance(control, WashoutGains) else None
+    return control if isinstance(control, Washout) else None
 
 
 def why_no_gains(law: ControlLaw) -> str | None:
@@ -62,7 +61,7 @@ def feedback_family(
     The cutoff frequency is in rad/s, the gains are in N s/m, shape (m,), and the sample period is
     in s.
     """
-    unit = WashoutGains(corner_frequency, 1.0, 0.0).linear_feedback(period)
+    unit = Washout(corner_frequency, 1.0, 0.0).linear_feedback(period)
     gains = linear_gains[:, np.newaxis]
     return LinearFeedback(unit.state, unit.input, gains * unit.output, gains * unit.direct)
 

@@ -9,7 +9,7 @@ rounding and limits are not, and are left out.
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import frexp, inf, log
-from typing import Any, Protocol, Self
+from typing import Any, Self
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.loop.sampled_loop import whole_and_rest
 from stickslip_ros.physics.model.constants import scaled
-from stickslip_ros.physics.model.control import LinearFeedback
+from stickslip_ros.physics.model.control import ControlLaw, LinearFeedback
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.drive_system import POSITION, SPEED
 from stickslip_ros.physics.model.sensor import EXACT_SENSOR, Sensor
@@ -43,14 +43,6 @@ SETTLED = 0.01
 ROUNDING_LEFT_OUT = (
     "rounding, noise and limits of sensor and actuator are left out: the loop is linear"
 )
-
-
-class SampledControl(Protocol):
-    """A sampled control law that may be linear near the equilibrium, such as a `ControlLaw`."""
-
-    def linear_feedback(self, period: float) -> LinearFeedback | None:
-        """Return the law near the equilibrium for a sample period (s), or None if not linear."""
-        ...
 
 
 def why_no_linear_loop(drive: Drive, rate: float, force_delay: float) -> str | None:
@@ -80,7 +72,7 @@ class LinearSampledLoop:
     The slide of a machine tool, sampled at 1 kHz without delay:
 
     >>> from stickslip_ros.physics.model.drive import Drive
-    >>> from stickslip_ros.physics.model.control import WashoutGains
+    >>> from stickslip_ros.physics.model.control import Washout
     >>> from stickslip_ros.physics.model.friction import Stribeck
     >>> from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop
     >>> drive = Drive(mass=100.0, damping=200.0, stiffness=1e6, normal_force=1000.0,
@@ -88,7 +80,7 @@ class LinearSampledLoop:
     >>> loop = LinearSampledLoop.from_drive(drive, rate=1000.0)
     >>> round(loop.critical_linear_gain(corner_frequency=20.0), 1)
     -1451.2
-    >>> round(loop.settling_time(WashoutGains(20.0, linear=-3000.0, cubic=0.0)), 3)
+    >>> round(loop.settling_time(Washout(20.0, linear_gain=-3000.0, cubic_gain=0.0)), 3)
     0.601
     """
 
@@ -136,12 +128,12 @@ class LinearSampledLoop:
             return None
         return cls(drive, rate, force_delay, expansion.jacobian, sensor.spans)
 
-    def transition_matrix(self, gains: SampledControl) -> FloatArray:
+    def transition_matrix(self, gains: ControlLaw) -> FloatArray:
         """Return the matrix from the state at one sample to the state at the next.
 
         Parameters
         ----------
-        gains : ControlLaw or WashoutGains
+        gains : ControlLaw
             Control law in SI units, of which only the linear part is used.
 
         Returns
@@ -158,16 +150,15 @@ class LinearSampledLoop:
         """
         feedback = gains.linear_feedback(1.0 / self.rate)
         if feedback is None:
-            name = getattr(gains, "name", type(gains).__name__)
-            raise InvalidInputError(f"the theory of the sampled loop: {not_linear(name)}")
+            raise InvalidInputError(f"the theory of the sampled loop: {not_linear(gains.name)}")
         return self._transitions(feedback)
 
-    def spectral_radius(self, gains: SampledControl) -> float:
+    def spectral_radius(self, gains: ControlLaw) -> float:
         """Return the factor by which a small deviation grows per sample, in the long run.
 
         Parameters
         ----------
-        gains : ControlLaw or WashoutGains
+        gains : ControlLaw
             Control law in SI units, linear near the equilibrium.
 
         Returns
@@ -177,12 +168,12 @@ class LinearSampledLoop:
         """
         return float(_spectral_radius(self.transition_matrix(gains)))
 
-    def decay_rate(self, gains: SampledControl) -> float:
+    def decay_rate(self, gains: ControlLaw) -> float:
         """Return the rate at which a small deviation decays.
 
         Parameters
         ----------
-        gains : ControlLaw or WashoutGains
+        gains : ControlLaw
             Control law in SI units, linear near the equilibrium.
 
         Returns
@@ -214,12 +205,12 @@ class LinearSampledLoop:
         with np.errstate(divide="ignore"):
             return -np.log(radii) * self.rate
 
-    def settling_time(self, gains: SampledControl) -> float | None:
+    def settling_time(self, gains: ControlLaw) -> float | None:
         """Return the 1 % settling time of a small deviation.
 
         Parameters
         ----------
-        gains : ControlLaw or WashoutGains
+        gains : ControlLaw
             Control law in SI units, linear near the equilibrium.
 
         Returns

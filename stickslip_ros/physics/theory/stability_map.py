@@ -6,7 +6,7 @@ from typing import Self
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.physics.model.control import WashoutGains
+from stickslip_ros.physics.model.control import Washout
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.sensor import EXACT_SENSOR, Sensor
 from stickslip_ros.physics.theory.critical_gains import critical_gains
@@ -19,7 +19,7 @@ class StabilityMap:
     """Decay rates of a loop over cutoff frequency and linear gain, around given gains; SI units."""
 
     loop: LinearSampledLoop
-    gains: WashoutGains
+    gains: Washout
     """Gains at the centre of the map."""
     corner_frequencies: FloatArray
     """rad/s, shape (m,)."""
@@ -31,16 +31,18 @@ class StabilityMap:
     """Critical linear gain without sampling and delay, shape (m,); NaN if there is none."""
 
     @classmethod
-    def around(cls, loop: LinearSampledLoop, gains: WashoutGains, points: int = 81) -> Self:
+    def around(cls, loop: LinearSampledLoop, gains: Washout, points: int = 81) -> Self:
         """Return the map around `gains` (SI units) with this number of points along each axis."""
         corners = np.geomspace(0.1 * gains.corner_frequency, 10.0 * gains.corner_frequency, points)
         continuous = np.full(points, np.nan)
         for row, corner_frequency in enumerate(corners):
-            critical = critical_gains(loop.drive, WashoutGains(float(corner_frequency), 0.0, 0.0))
+            critical = critical_gains(loop.drive, Washout(float(corner_frequency), 0.0, 0.0))
             if critical is not None:
                 continuous[row] = critical.linear
         needed = loop.critical_linear_gain(gains.corner_frequency) or 0.0
-        far = 2.0 * (gains.linear or needed or -loop.drive.normal_force / loop.drive.speed_scale)
+        far = 2.0 * (
+            gains.linear_gain or needed or -loop.drive.normal_force / loop.drive.speed_scale
+        )
         linear = np.sort(np.linspace(far, -0.25 * far, points))
         decay_rates = loop.coarsened().decay_rates(corners, linear)
         return cls(loop, gains, corners, linear, decay_rates, continuous)

@@ -29,7 +29,7 @@ from stickslip_ros.app.dashboard.theory_charts import (
     stability_chart,
 )
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.model.control import WashoutGains
+from stickslip_ros.physics.model.control import Washout
 from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.scenarios.keywords import described
 from stickslip_ros.scenarios.parameters import CONTROLLER_PARAMETERS
@@ -104,7 +104,7 @@ def test_decay_is_that_of_the_sampled_loop(reference: dict[str, Any]) -> None:
 
 def test_the_limit_in_the_map_is_the_critical_gain(reference: dict[str, Any]) -> None:
     found = stability_map(PLANT, "washout", GAINS)
-    gains = WashoutGains(GAINS["corner_frequency"], GAINS["linear_gain"], 0.0)
+    gains = Washout(GAINS["corner_frequency"], GAINS["linear_gain"], 0.0)
     options = stability_chart(found, DRIVE, gains)
     assert options["yAxis"]["name"] == "linear gain k1 (kN s/m)"
     limit = series(options, "limit of stability")

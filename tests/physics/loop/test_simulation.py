@@ -40,8 +40,7 @@ def continuous(
     drive: Drive = PAPER,
     position: float = 0.0,
 ) -> tuple[Measures, Motion]:
-    control = None if washout is None else washout.gains
-    motion = RecordedMotion(drive, position, 0.0, control)
+    motion = RecordedMotion(drive, position, 0.0, washout)
     return simulate_continuous(motion, washout, duration, CycleMeter(20)), motion
 
 
@@ -112,7 +111,7 @@ def test_a_motion_that_runs_away_ends_early_as_unbounded(simulate: Simulate) -> 
 @pytest.mark.parametrize("simulate", [sampled, continuous])
 def test_progress_rises_to_one(simulate: Simulate) -> None:
     shares: list[float] = []
-    control = PAPER_GAINS.gains if simulate is continuous else None
+    control = PAPER_GAINS if simulate is continuous else None
     motion = RecordedMotion(PAPER, 0.0, 0.0, control)
     if simulate is sampled:
         loop = SampledLoop(motion, 100.0, SECOND)

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.physics.model.constants import Scales
-from stickslip_ros.physics.model.control import WashoutGains
+from stickslip_ros.physics.model.control import Washout
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.drive_system import SLIP, DriveSystem
 from stickslip_ros.physics.model.friction import (
@@ -51,7 +51,7 @@ SIGNALS: list[tuple[Signal, Signal]] = [
     (NO_SIGNAL, sine(0.3, frequency=0.1)),
     (ramp(0.1, 1.0, 2.0), ramp(0.4, 1.0, 2.0)),
 ]
-GAINS = WashoutGains(0.5, -0.1, -0.05)
+GAINS = Washout(0.5, -0.1, -0.05)
 
 
 def above_denormal(number: float) -> float:
@@ -65,7 +65,7 @@ class Case(NamedTuple):
     drive: Drive
     position: float
     velocity: float
-    control: WashoutGains | None
+    control: Washout | None
 
     def motion(self, kind: type[Motion] = Motion) -> Motion:
         return kind(self.drive, self.position, self.velocity, self.control)
@@ -98,13 +98,13 @@ def drive_of(
     )
 
 
-def in_units_of(drive: Drive, control: WashoutGains) -> WashoutGains:
+def in_units_of(drive: Drive, control: Washout) -> Washout:
     """Return the gains in SI units that are these ones, dimensionless."""
     back = drive.normal_force / drive.speed_scale
-    return WashoutGains(
+    return Washout(
         control.corner_frequency * drive.angular_frequency,
-        control.linear * back,
-        control.cubic * back / drive.speed_scale**2,
+        control.linear_gain * back,
+        control.cubic_gain * back / drive.speed_scale**2,
     )
 
 

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from stickslip_ros.physics.model.control import WashoutGains
+from stickslip_ros.physics.model.control import Washout
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import Coulomb, Exponential
 from stickslip_ros.physics.motion.motion import Motion
@@ -76,7 +76,7 @@ def test_restart_puts_the_slide_somewhere_else_and_keeps_the_force() -> None:
 
 
 def test_restart_puts_the_filter_of_the_continuous_controller_to_rest() -> None:
-    motion = Motion(FEED_DRIVE, 0.0, 0.0, WashoutGains(20.0, -3000.0, 0.0))
+    motion = Motion(FEED_DRIVE, 0.0, 0.0, Washout(20.0, -3000.0, 0.0))
     motion.advance(0.3)
     assert abs(control_force(motion)) > 1.0
     motion.restart(1e-4, -0.08)
@@ -86,7 +86,7 @@ def test_restart_puts_the_filter_of_the_continuous_controller_to_rest() -> None:
 
 @changes
 def test_a_new_drive_takes_over_the_filter_of_the_continuous_controller(changed: Drive) -> None:
-    motion = Motion(FEED_DRIVE, 3e-4, -0.05, WashoutGains(20.0, -3000.0, -1e4))
+    motion = Motion(FEED_DRIVE, 3e-4, -0.05, Washout(20.0, -3000.0, -1e4))
     motion.advance(0.01)
     before = control_force(motion)
     motion.drive = changed
@@ -95,10 +95,10 @@ def test_a_new_drive_takes_over_the_filter_of_the_continuous_controller(changed:
 
 
 def test_the_filter_goes_on_without_a_jump_when_its_corner_frequency_changes() -> None:
-    motion = Motion(FEED_DRIVE, 3e-4, -0.05, WashoutGains(20.0, -3000.0, -1e4))
+    motion = Motion(FEED_DRIVE, 3e-4, -0.05, Washout(20.0, -3000.0, -1e4))
     motion.advance(0.01)
     before = control_force(motion)
-    motion.control = WashoutGains(50.0, -3000.0, -1e4)
+    motion.control = Washout(50.0, -3000.0, -1e4)
     assert abs(before) > 10.0
     assert control_force(motion) == pytest.approx(before, rel=1e-3)
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from stickslip_ros.physics.model.control import StateFeedback
+from stickslip_ros.physics.model.control import VelocityFeedback
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.motion.variational import SensitiveMotion
 from stickslip_ros.physics.theory.critical_gains import critical_gains, limit_cycle_from_hopf
@@ -21,18 +21,18 @@ from tests.physics.drives import FEED_DRIVE, PAPER
 from tests.physics.parts import TwoLags
 
 GAINS = [
-    (PAPER, StateFeedback(0.0, -0.1)),
-    (PAPER, StateFeedback(0.0, -0.5)),
-    (PAPER, StateFeedback(0.0, 0.3)),
-    (PAPER, StateFeedback(-0.7, -0.1)),
-    (PAPER, StateFeedback(0.97, 0.002)),
-    (FEED_DRIVE, StateFeedback(-3e5, -1000.0)),
-    (replace(FEED_DRIVE, belt_speed=-0.02), StateFeedback(4e5, -500.0)),
+    (PAPER, VelocityFeedback(-0.1, 0.0)),
+    (PAPER, VelocityFeedback(-0.5, 0.0)),
+    (PAPER, VelocityFeedback(0.3, 0.0)),
+    (PAPER, VelocityFeedback(-0.1, -0.7)),
+    (PAPER, VelocityFeedback(0.002, 0.97)),
+    (FEED_DRIVE, VelocityFeedback(-1000.0, -3e5)),
+    (replace(FEED_DRIVE, belt_speed=-0.02), VelocityFeedback(-500.0, 4e5)),
 ]
 feedback = pytest.mark.parametrize(("drive", "gains"), GAINS)
 
 
-def altered(drive: Drive, gains: StateFeedback) -> Drive:
+def altered(drive: Drive, gains: VelocityFeedback) -> Drive:
     """The drive whose spring and damper do what the feedback does."""
     return replace(
         drive,
@@ -56,7 +56,9 @@ def in_si(drive: Drive, points: list[HopfPoint]) -> np.ndarray:
 
 
 @feedback
-def test_feedback_of_the_state_is_a_spring_and_a_damper(drive: Drive, gains: StateFeedback) -> None:
+def test_feedback_of_the_state_is_a_spring_and_a_damper(
+    drive: Drive, gains: VelocityFeedback
+) -> None:
     other = altered(drive, gains)
     found, expected = expand(drive, gains), expand(other)
     assert found is not None
@@ -77,14 +79,14 @@ def test_feedback_of_the_state_is_a_spring_and_a_damper(drive: Drive, gains: Sta
 
 
 @feedback
-def test_its_hopf_points_are_those_of_that_drive(drive: Drive, gains: StateFeedback) -> None:
+def test_its_hopf_points_are_those_of_that_drive(drive: Drive, gains: VelocityFeedback) -> None:
     other = altered(drive, gains)
     found, expected = in_si(drive, hopf_points(drive, gains)), in_si(other, hopf_points(other))
     assert found == pytest.approx(expected, rel=1e-8)
 
 
 @feedback
-def test_its_limit_cycle_is_that_of_that_drive(drive: Drive, gains: StateFeedback) -> None:
+def test_its_limit_cycle_is_that_of_that_drive(drive: Drive, gains: VelocityFeedback) -> None:
     other = altered(drive, gains)
     found = limit_cycle_of_run(drive, 0.0, gains=gains)
     expected = next((cycle for cycle in limit_cycles(other) if cycle.stable), None)
@@ -101,15 +103,15 @@ def test_its_limit_cycle_is_that_of_that_drive(drive: Drive, gains: StateFeedbac
 
 
 def test_enough_velocity_feedback_leaves_no_cycle() -> None:
-    assert least_cycle(PAPER, StateFeedback(0.0, -0.1)) == least_cycle(
-        altered(PAPER, StateFeedback(0.0, -0.1))
+    assert least_cycle(PAPER, VelocityFeedback(-0.1, 0.0)) == least_cycle(
+        altered(PAPER, VelocityFeedback(-0.1, 0.0))
     )
-    assert least_cycle(PAPER, StateFeedback(0.0, -3.0)) is None
+    assert least_cycle(PAPER, VelocityFeedback(-3.0, 0.0)) is None
 
 
 def test_the_theory_of_gains_is_of_no_other_control() -> None:
-    assert critical_gains(PAPER, StateFeedback(0.0, -0.1)) is None
-    assert limit_cycle_from_hopf(PAPER, StateFeedback(0.0, -0.1)) is None
+    assert critical_gains(PAPER, VelocityFeedback(-0.1, 0.0)) is None
+    assert limit_cycle_from_hopf(PAPER, VelocityFeedback(-0.1, 0.0)) is None
 
 
 LAGS = TwoLags(1.5, -0.1, -0.05)

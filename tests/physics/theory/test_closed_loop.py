@@ -6,7 +6,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from stickslip_ros.physics.model.control import WashoutGains
+from stickslip_ros.physics.model.control import Washout
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import Exponential, Linear
 from stickslip_ros.physics.theory.closed_forms import CubicLoop
@@ -24,7 +24,7 @@ def test_critical_linear_gains_of_the_paper(
     belt_speed: float, damping: float, corner_frequency: float, gain: float
 ) -> None:
     drive = replace(PAPER, belt_speed=belt_speed, damping=damping)
-    critical = critical_gains(drive, WashoutGains(corner_frequency, 0.0, 0.0))
+    critical = critical_gains(drive, Washout(corner_frequency, 0.0, 0.0))
     assert critical is not None
     assert critical.linear == pytest.approx(gain, rel=3e-3)
 
@@ -34,7 +34,7 @@ def test_the_general_theory_agrees_with_the_closed_forms(
     drive: Drive, corner_frequency: float, cubic: float
 ) -> None:
     force, speed = drive.normal_force, drive.speed_scale
-    gains = WashoutGains(corner_frequency * drive.angular_frequency, 0.0, cubic * force / speed**3)
+    gains = Washout(corner_frequency * drive.angular_frequency, 0.0, cubic * force / speed**3)
     forms = CubicLoop.from_drive(drive)
     assert forms is not None
     expected = forms.critical_linear_gain(corner_frequency)
@@ -60,19 +60,19 @@ def test_the_general_theory_agrees_with_the_closed_forms(
 @pytest.mark.parametrize("law", [PAPER.friction, Exponential(0.4, 0.25, 0.2, 0.01)])
 def test_the_pair_is_on_the_axis_at_the_critical_gain(law: Exponential) -> None:
     drive = replace(PAPER, friction=law)
-    gains = WashoutGains(0.5, 0.0, 0.0)
+    gains = Washout(0.5, 0.0, 0.0)
     critical = critical_gains(drive, gains)
     assert critical is not None
     for offset, stable in ((-1e-3, True), (1e-3, False)):
-        expansion = expand(drive, replace(gains, linear=critical.linear + offset))
+        expansion = expand(drive, replace(gains, linear_gain=critical.linear + offset))
         assert expansion is not None
         assert expansion.stable is stable
         assert bool(expansion.eigenvalues[0].real < 0.0) is stable
-    at_gain = expand(drive, replace(gains, linear=critical.linear))
+    at_gain = expand(drive, replace(gains, linear_gain=critical.linear))
     assert at_gain is not None
     assert abs(at_gain.eigenvalues[0].real) < 1e-14
     assert critical.cubic is not None
-    neutral = critical_gains(drive, replace(gains, cubic=critical.cubic))
+    neutral = critical_gains(drive, replace(gains, cubic_gain=critical.cubic))
     assert neutral is not None
     assert abs(neutral.first_lyapunov_coefficient) < 1e-13
 
@@ -80,15 +80,15 @@ def test_the_pair_is_on_the_axis_at_the_critical_gain(law: Exponential) -> None:
 @pytest.mark.parametrize(("slope", "corner_frequency"), [(0.82, 1.25), (0.32, 1.0 / 0.3)])
 def test_no_gain_stabilises_at_the_very_end(slope: float, corner_frequency: float) -> None:
     drive = replace(PAPER, friction=Linear(0.4, slope))  # p d = 1 but for rounding
-    assert critical_gains(drive, WashoutGains(corner_frequency, 0.0, -1.0)) is None
+    assert critical_gains(drive, Washout(corner_frequency, 0.0, -1.0)) is None
 
 
 def test_no_gain_stabilises_where_the_filter_passes_too_little() -> None:
     drive = replace(PAPER, belt_speed=0.2)  # p = 0.358
-    too_fast = WashoutGains(3.0, 0.0, 0.0)
+    too_fast = Washout(3.0, 0.0, 0.0)
     assert critical_gains(drive, too_fast) is None
     for linear in (-1e3, -10.0, -1.0, 0.0, 1.0, 1e3):
-        expansion = expand(drive, replace(too_fast, linear=linear))
+        expansion = expand(drive, replace(too_fast, linear_gain=linear))
         assert expansion is not None
         assert not expansion.stable
     assert critical_gains(replace(PAPER, belt_speed=0.0), too_fast) is None

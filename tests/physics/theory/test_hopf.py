@@ -9,7 +9,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from stickslip_ros.physics.measures.cycle_measures import CycleMeter
-from stickslip_ros.physics.model.control import WashoutGains
+from stickslip_ros.physics.model.control import Washout
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import Coulomb, Exponential, Linear, Stribeck
 from stickslip_ros.physics.motion import RecordedMotion
@@ -88,7 +88,7 @@ def test_the_exponential_law_is_subcritical() -> None:
 
 
 def test_real_eigenvalues_of_opposite_sign_are_no_hopf_point() -> None:
-    gains = WashoutGains(10.0, 15.0, 0.0)
+    gains = Washout(10.0, 15.0, 0.0)
     speeds = np.geomspace(1e-3, 10.0, 2001)
     margins = hurwitz_determinants(jacobians(PAPER, gains, speeds))[:, -1]
     assert np.count_nonzero(np.diff(np.sign(margins))) == 2
@@ -99,7 +99,7 @@ def test_real_eigenvalues_of_opposite_sign_are_no_hopf_point() -> None:
     assert [abs(value.real) < 1e-10 for value in pair] == [True]
 
 
-def speed_amplitude(drive: Drive, gains: WashoutGains | None, periods: int) -> float:
+def speed_amplitude(drive: Drive, gains: Washout | None, periods: int) -> float:
     motion = RecordedMotion(drive, 0.0, 0.0, control=gains)
     expansion = expand(drive)
     assert expansion is not None
@@ -131,10 +131,10 @@ def test_the_coefficient_is_that_of_the_motion_in_the_open_loop() -> None:
 def test_the_coefficient_is_that_of_the_motion_in_the_closed_loop(
     corner_frequency: float, cubic: float, excess: float
 ) -> None:
-    gains = WashoutGains(corner_frequency, 0.0, cubic)
+    gains = Washout(corner_frequency, 0.0, cubic)
     critical = critical_gains(PAPER, gains)
     assert critical is not None
-    above = replace(gains, linear=critical.linear + excess)
+    above = replace(gains, linear_gain=critical.linear + excess)
     expansion = expand(PAPER, above)
     assert expansion is not None
     alpha = float(expansion.eigenvalues[0].real)

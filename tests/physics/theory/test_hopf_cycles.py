@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 
 from stickslip_ros.physics.measures.cycle_measures import CycleMeter, Measures, Regime
-from stickslip_ros.physics.model.control import WashoutGains
+from stickslip_ros.physics.model.control import Washout
 from stickslip_ros.physics.motion.variational import SensitiveMotion
 from stickslip_ros.physics.theory.critical_gains import critical_gains, limit_cycle_from_hopf
 from stickslip_ros.physics.theory.limit_cycles import limit_cycle_of_run
 from tests.physics.drives import PAPER
 
-SUBCRITICAL = WashoutGains(0.2, -0.16, 2.0)
+SUBCRITICAL = Washout(0.2, -0.16, 2.0)
 """Beyond the critical gain (-0.148), with more cubic gain than the critical one (0.649)."""
 
 
-def settled(gains: WashoutGains, position: float, filter_state: float) -> Measures:
+def settled(gains: Washout, position: float, filter_state: float) -> Measures:
     """What the loop does from there in the end; the slide rests at the start."""
     motion = SensitiveMotion(PAPER, gains)
     motion.start(np.array([position, 0.0, filter_state]))
@@ -50,9 +50,9 @@ def test_an_unstable_cycle_separates_rest_from_vibration() -> None:
 
 @pytest.mark.parametrize("corner_frequency", [0.2, 2.0])
 def test_a_stable_cycle_is_the_one_that_a_run_leads_to(corner_frequency: float) -> None:
-    critical = critical_gains(PAPER, WashoutGains(corner_frequency, 0.0, -1.0))
+    critical = critical_gains(PAPER, Washout(corner_frequency, 0.0, -1.0))
     assert critical is not None
-    gains = WashoutGains(corner_frequency, 0.8 * critical.linear, -1.0)
+    gains = Washout(corner_frequency, 0.8 * critical.linear, -1.0)
     cycle, by_run = (
         limit_cycle_from_hopf(PAPER, gains),
         limit_cycle_of_run(PAPER, 0.0, gains=gains),
@@ -65,8 +65,8 @@ def test_a_stable_cycle_is_the_one_that_a_run_leads_to(corner_frequency: float) 
 
 
 def test_none_on_the_other_side_of_the_critical_gain() -> None:
-    assert limit_cycle_from_hopf(PAPER, WashoutGains(2.0, -1.0, 0.0)) is None
-    assert limit_cycle_from_hopf(PAPER, replace(SUBCRITICAL, linear=-0.13)) is None
-    assert limit_cycle_from_hopf(PAPER, WashoutGains(10.0, -1.0, 0.0)) is None
+    assert limit_cycle_from_hopf(PAPER, Washout(2.0, -1.0, 0.0)) is None
+    assert limit_cycle_from_hopf(PAPER, replace(SUBCRITICAL, linear_gain=-0.13)) is None
+    assert limit_cycle_from_hopf(PAPER, Washout(10.0, -1.0, 0.0)) is None
     resting = replace(PAPER, belt_speed=0.0)
     assert limit_cycle_from_hopf(resting, SUBCRITICAL) is None

@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 
 from stickslip_ros.physics.loop.simulation import simulate_continuous
 from stickslip_ros.physics.measures.cycle_measures import CycleMeter, Regime
-from stickslip_ros.physics.model.control import Washout, WashoutGains
+from stickslip_ros.physics.model.control import Washout
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import Coulomb, Exponential, FrictionLaw, Linear, Stribeck
 from stickslip_ros.physics.motion import Motion, RecordedMotion
@@ -32,7 +32,7 @@ from tests.physics.drives import FEED_DRIVE, LIMIT_CYCLES, PAPER
 SUDDEN = replace(PAPER, friction=Exponential(0.4, 0.25, 0.05, 0.0))
 # Friction falls faster than the damping rises: far out everything runs away.
 FALLING = replace(PAPER, belt_speed=0.2, damping=0.2, friction=Linear(0.4, 0.45))
-GAINS = WashoutGains(2.0, -0.5, 0.0)
+GAINS = Washout(2.0, -0.5, 0.0)
 
 
 def returns(drive: Drive, cycle: LimitCycle, offset: float = 0.0) -> float:
@@ -198,9 +198,9 @@ def test_cycles_close_and_are_stable_in_turns(
 
 
 @pytest.mark.parametrize("drive", [PAPER, FALLING, SUDDEN], ids=["paper", "overtakes", "sudden"])
-@pytest.mark.parametrize("gains", [None, WashoutGains(0.7, -0.3, -0.2)], ids=["open", "controlled"])
+@pytest.mark.parametrize("gains", [None, Washout(0.7, -0.3, -0.2)], ids=["open", "controlled"])
 def test_the_transition_matrix_is_the_derivative_by_the_start(
-    drive: Drive, gains: WashoutGains | None
+    drive: Drive, gains: Washout | None
 ) -> None:
     motion = SensitiveMotion(drive, gains)
     # Fast enough to overtake the belt, and to stick in the end.
@@ -243,7 +243,7 @@ def test_shooting_from_a_rough_guess_under_control_in_si_units() -> None:
         FEED_DRIVE,
         cycle.position * 0.97e-3,
         cycle.period * 1.02e-2,
-        gains=WashoutGains(200.0, -0.5e4, 0.0),
+        gains=Washout(200.0, -0.5e4, 0.0),
         filter_state=cycle.filter_state * 1.05e-3,
     )
     assert found is not None
@@ -261,8 +261,8 @@ def test_a_guess_of_two_periods_is_no_cycle() -> None:
 
 
 def test_a_run_that_control_stills_or_that_runs_away_has_no_cycle() -> None:
-    assert limit_cycle_of_run(PAPER, 0.0, gains=WashoutGains(2.0, -1.5, 0.0)) is None
-    assert limit_cycle_of_run(PAPER, 0.0, 5.0, gains=WashoutGains(2.0, 0.0, 5.0)) is None
+    assert limit_cycle_of_run(PAPER, 0.0, gains=Washout(2.0, -1.5, 0.0)) is None
+    assert limit_cycle_of_run(PAPER, 0.0, 5.0, gains=Washout(2.0, 0.0, 5.0)) is None
     assert limit_cycle_of_run(FALLING, 4.0) is None
 
 
@@ -291,10 +291,8 @@ def test_the_cycle_of_a_slow_belt_is_where_a_run_ends(drive: Drive) -> None:
     ],
     ids=["damped", "far up the rising branch", "neutral"],
 )
-@pytest.mark.parametrize("gains", [None, WashoutGains(2.0, -1.0, -1.0)], ids=["open", "controlled"])
-def test_where_no_energy_is_gained_there_is_no_cycle(
-    drive: Drive, gains: WashoutGains | None
-) -> None:
+@pytest.mark.parametrize("gains", [None, Washout(2.0, -1.0, -1.0)], ids=["open", "controlled"])
+def test_where_no_energy_is_gained_there_is_no_cycle(drive: Drive, gains: Washout | None) -> None:
     assert least_cycle(drive) is None
     assert limit_cycles(drive) == []
     assert limit_cycle_of_run(drive, 0.0, gains=gains) is None
@@ -318,7 +316,7 @@ def test_cycles_keep_within_the_bounds_that_energy_sets(drive: Drive) -> None:
 
 @pytest.mark.long
 def test_a_cycle_too_stiff_to_follow_is_not_claimed() -> None:
-    gains = WashoutGains(2.0, -1e6, 0.0)
+    gains = Washout(2.0, -1e6, 0.0)
     assert limit_cycle_of_run(replace(PAPER, belt_speed=0.1), 0.0, gains=gains) is None
 
 
@@ -326,7 +324,7 @@ def test_a_controller_without_gain_leaves_the_cycle_and_adds_its_own_decay() -> 
     for belt_speed in (0.3, 0.46):
         drive = replace(PAPER, belt_speed=belt_speed)
         (free,) = limit_cycles(drive)
-        cycle = limit_cycle_of_run(drive, 0.0, gains=WashoutGains(0.2, 0.0, 0.0))
+        cycle = limit_cycle_of_run(drive, 0.0, gains=Washout(0.2, 0.0, 0.0))
         assert cycle is not None
         assert cycle.position == pytest.approx(free.position, rel=1e-10)
         assert cycle.period == pytest.approx(free.period, rel=1e-11)

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from stickslip_ros.physics.model.control import WashoutGains
+from stickslip_ros.physics.model.control import Washout
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import Coulomb, Exponential, FrictionLaw, Linear, Stribeck
 from stickslip_ros.physics.theory.linear import expand, hurwitz_determinants, jacobians
@@ -61,7 +61,7 @@ def test_nothing_smooth_surrounds_a_slide_on_a_belt_at_rest() -> None:
 
 def test_many_belt_speeds_at_once_are_those_one_by_one() -> None:
     speeds = np.array([0.1, 0.4, 0.9])
-    gains = WashoutGains(2.0, -0.5, -1.0)
+    gains = Washout(2.0, -0.5, -1.0)
     for found, speed in zip(jacobians(PAPER, gains, speeds), speeds, strict=True):
         single = expand(replace(PAPER, belt_speed=float(speed)), gains)
         assert single is not None
@@ -78,7 +78,7 @@ def test_routh_and_hurwitz_agree_with_the_eigenvalues(order: int, entries: list[
 
 def test_continuous_control_is_the_jacobian_of_the_paper() -> None:
     drive = Drive(1.0, 0.01, 1.0, 1.0, 0.49, Stribeck(0.4, 0.25, 0.5))
-    expansion = expand(drive, WashoutGains(2.0, -0.3, 7.0))
+    expansion = expand(drive, Washout(2.0, -0.3, 7.0))
     assert expansion is not None
     rows = [[0.0, 1.0, 0.0], [-1.0, 0.44 - 1.8 * 0.49**2 - 0.3, 0.6], [0.0, 1.0, -2.0]]
     assert expansion.jacobian == pytest.approx(np.array(rows), abs=1e-15)

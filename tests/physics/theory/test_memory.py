@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from stickslip_ros.physics.measures import CycleMeter
-from stickslip_ros.physics.model.control import WashoutGains
+from stickslip_ros.physics.model.control import Washout
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.drive_system import POSITION, SLIP, SPEED
 from stickslip_ros.physics.model.friction import (
@@ -35,7 +35,7 @@ FEED = Drive(100.0, 200.0, 1e6, 1000.0, 0.04, LuGre(CURVE, 1e5, 100.0))
 MAXWELL_SLIP = replace(FEED, friction=MaxwellSlip(CURVE, 1e5, 3, 1000.0))
 ELASTO_PLASTIC = replace(FEED, friction=ElastoPlastic(CURVE, 1e5, 100.0))
 CREEPING = Drive(1.0, 0.05, 1.0, 1.0, 0.03, RateState(0.3, 0.005, 0.02, 1e-4, 1e-6))
-GAINS = WashoutGains(20.0, linear=-3000.0, cubic=0.0)
+GAINS = Washout(20.0, linear_gain=-3000.0, cubic_gain=0.0)
 
 LAWS = [
     FEED.friction,
@@ -117,7 +117,7 @@ def test_the_critical_gain_divides_stable_from_unstable(law: FrictionLaw) -> Non
     found = critical_gains(drive, GAINS)
     assert found is not None
     for ratio, stable in ((1.0 + 1e-7, True), (1.0 - 1e-7, False)):
-        expansion = expand(drive, replace(GAINS, linear=ratio * found.linear))
+        expansion = expand(drive, replace(GAINS, linear_gain=ratio * found.linear))
         assert expansion is not None
         assert bool(np.all(expansion.eigenvalues.real < 0.0)) is stable
 
@@ -132,10 +132,10 @@ def test_the_stable_gains_of_the_sampled_loop(law: FrictionLaw, delay: float) ->
     ends = sorted(end for interval in intervals for end in interval)
     for gain in [*(end * (1.0 + part) for end in ends for part in (-1e-6, 1e-6))]:
         inside = any(low < gain < high for low, high in intervals)
-        assert (loop.spectral_radius(WashoutGains(20.0, gain, 0.0)) < 1.0) is inside
+        assert (loop.spectral_radius(Washout(20.0, gain, 0.0)) < 1.0) is inside
     for gain in np.linspace(1.47 * ends[0], abs(ends[0]), 40).tolist():
         inside = any(low < gain < high for low, high in intervals)
-        assert (loop.spectral_radius(WashoutGains(20.0, gain, 0.0)) < 1.0) is inside
+        assert (loop.spectral_radius(Washout(20.0, gain, 0.0)) < 1.0) is inside
 
 
 def cycle_by_simulation(drive: Drive, duration: float) -> tuple[float, float, float]:
@@ -221,7 +221,7 @@ def test_a_cycle_from_the_hopf_point_of_the_gain() -> None:
     critical = critical_gains(FEED, GAINS)
     assert critical is not None
     assert critical.first_lyapunov_coefficient > 0.0
-    gains = replace(GAINS, linear=1.01 * critical.linear)
+    gains = replace(GAINS, linear_gain=1.01 * critical.linear)
     cycle = limit_cycle_from_hopf(FEED, gains)
     assert cycle is not None
     assert not cycle.stable

@@ -8,7 +8,7 @@ import pytest
 
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.model.actuator import Actuator
-from stickslip_ros.physics.model.control import WashoutGains
+from stickslip_ros.physics.model.control import Washout
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import Dahl
 from stickslip_ros.physics.model.signals import sine
@@ -30,7 +30,7 @@ from stickslip_ros.physics.theory.sticking import sticking_onset
 from tests.physics.drives import PAPER
 from tests.physics.parts import OneSided
 
-GAINS = WashoutGains(2.0, -1.0, -1.0)
+GAINS = Washout(2.0, -1.0, -1.0)
 
 
 SWING = sine(0.05)
@@ -98,7 +98,7 @@ def test_a_drive_that_is_not_covered_is_refused_by_name(
 
 
 @pytest.mark.parametrize("gains", [None, GAINS])
-def test_the_equilibrium_of_a_law_with_a_memory(gains: WashoutGains | None) -> None:
+def test_the_equilibrium_of_a_law_with_a_memory(gains: Washout | None) -> None:
     expansion = expand(REMEMBERS, gains)
     assert expansion is not None
     # Friction is that of steady slip, and the bristles are bent accordingly.

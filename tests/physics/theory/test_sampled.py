@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.loop.controller import Controller, answer
 from stickslip_ros.physics.loop.sampled_loop import LOCKSTEP_START, SampledLoop
-from stickslip_ros.physics.model.control import ControlLaw, VelocityFeedback, Washout, WashoutGains
+from stickslip_ros.physics.model.control import ControlLaw, VelocityFeedback, Washout
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import Coulomb, Exponential, Linear
 from stickslip_ros.physics.motion.motion import Motion
@@ -35,7 +35,7 @@ def loop_of(drive: Drive, rate: float, force_delay: float = 0.0) -> LinearSample
 
 def simulated(
     loop: LinearSampledLoop,
-    gains: WashoutGains | ControlLaw,
+    gains: ControlLaw,
     samples: int,
     start: float = 1e-7,
     rest: float | None = None,
@@ -51,8 +51,6 @@ def simulated(
     rest = expansion.equilibrium[0] * drive.length_scale if rest is None else rest
     motion = Motion(drive, rest + start * drive.length_scale, 0.0)
     running = SampledLoop(motion, rate, LOCKSTEP_START, force_delay=force_delay)
-    if isinstance(gains, WashoutGains):
-        gains = Washout(gains.corner_frequency, gains.linear, gains.cubic)
     controller = Controller(gains, state=state)
     rows = []
     for _ in range(samples):
@@ -65,15 +63,15 @@ def simulated(
 
 
 LOOPS = [
-    (PAPER, 10.0, 0.0, WashoutGains(0.5, -0.5, -1.0)),
-    (PAPER, 10.0, 0.03, WashoutGains(0.5, -0.5, 0.0)),
-    (PAPER, 10.0, 0.1, WashoutGains(0.5, -0.5, 0.0)),
-    (PAPER, 10.0, 0.25, WashoutGains(0.5, -0.1, 0.0)),
-    (PAPER, 1.0, 2.3, WashoutGains(0.2, 0.4, 0.0)),
-    (FEED_DRIVE, 1000.0, 0.0035, WashoutGains(20.0, -3000.0, 0.0)),
-    (replace(FEED_DRIVE, belt_speed=-0.04), 700.0, 0.01, WashoutGains(20.0, -3000.0, 0.0)),
-    (replace(PAPER, friction=Exponential(0.4, 0.25, 0.2, 0.1)), 5.0, 0.5, WashoutGains(1, -0.4, 0)),
-    (replace(PAPER, friction=Coulomb(0.4)), 5.0, 0.7, WashoutGains(1.0, 0.1, 0.0)),
+    (PAPER, 10.0, 0.0, Washout(0.5, -0.5, -1.0)),
+    (PAPER, 10.0, 0.03, Washout(0.5, -0.5, 0.0)),
+    (PAPER, 10.0, 0.1, Washout(0.5, -0.5, 0.0)),
+    (PAPER, 10.0, 0.25, Washout(0.5, -0.1, 0.0)),
+    (PAPER, 1.0, 2.3, Washout(0.2, 0.4, 0.0)),
+    (FEED_DRIVE, 1000.0, 0.0035, Washout(20.0, -3000.0, 0.0)),
+    (replace(FEED_DRIVE, belt_speed=-0.04), 700.0, 0.01, Washout(20.0, -3000.0, 0.0)),
+    (replace(PAPER, friction=Exponential(0.4, 0.25, 0.2, 0.1)), 5.0, 0.5, Washout(1, -0.4, 0)),
+    (replace(PAPER, friction=Coulomb(0.4)), 5.0, 0.7, Washout(1.0, 0.1, 0.0)),
 ]
 
 
@@ -90,7 +88,7 @@ def test_between_samples_an_undamped_drive_turns(rate: float) -> None:
 
 @pytest.mark.parametrize(("drive", "rate", "force_delay", "gains"), LOOPS)
 def test_it_is_the_loop_that_runs(
-    drive: Drive, rate: float, force_delay: float, gains: WashoutGains
+    drive: Drive, rate: float, force_delay: float, gains: Washout
 ) -> None:
     loop = loop_of(drive, rate, force_delay)
     found = simulated(loop, gains, 200)
@@ -158,7 +156,7 @@ def test_at_an_end_a_multiplier_is_on_the_unit_circle(
     for interval in loop.stable_linear_gains(corner_frequency):
         for end in interval:
             if end != 0.0 and abs(end) < 1e3:
-                gains = WashoutGains(corner_frequency, end, 0.0)
+                gains = Washout(corner_frequency, end, 0.0)
                 assert loop.spectral_radius(gains) == pytest.approx(1.0, abs=1e-9)
 
 
@@ -197,12 +195,12 @@ def test_units_do_not_matter() -> None:
     """The feed drive is the paper's drive at 100 rad/s, with 1e4 N s/m for a gain of one."""
     paper, feed = loop_of(PAPER, 10.0, 0.13), loop_of(FEED_DRIVE, 1000.0, 0.0013)
     assert feed.critical_linear_gain(20.0) == pytest.approx(1e4 * paper.critical_linear_gain(0.2))
-    one, other = WashoutGains(0.2, -0.3, 0.0), WashoutGains(20.0, -3000.0, 0.0)
+    one, other = Washout(0.2, -0.3, 0.0), Washout(20.0, -3000.0, 0.0)
     assert feed.spectral_radius(other) == pytest.approx(paper.spectral_radius(one), rel=1e-12)
     assert feed.decay_rate(other) == pytest.approx(100.0 * paper.decay_rate(one))
     assert feed.settling_time(other) == pytest.approx(paper.settling_time(one) / 100.0)
     assert paper.settling_time(one) == pytest.approx(log(100.0) / paper.decay_rate(one))
-    assert paper.settling_time(WashoutGains(0.2, -0.1, 0.0)) is None
+    assert paper.settling_time(Washout(0.2, -0.1, 0.0)) is None
 
 
 def test_a_map_has_the_decay_rate_of_each_pair() -> None:
@@ -211,7 +209,7 @@ def test_a_map_has_the_decay_rate_of_each_pair() -> None:
     rates = loop.decay_rates(corners, gains)
     for row, corner in enumerate(corners):
         for column, gain in enumerate(gains):
-            expected = loop.decay_rate(WashoutGains(corner, gain, 0.0))
+            expected = loop.decay_rate(Washout(corner, gain, 0.0))
             assert rates[row, column] == pytest.approx(expected, rel=1e-12)
 
 
@@ -221,7 +219,7 @@ def test_a_coarser_loop_decays_nearly_alike(force_delay: float) -> None:
     coarse = loop.coarsened()
     assert coarse.under_way < 27 < loop.under_way
     for linear in (-0.5, -0.2, 0.2):
-        gains = WashoutGains(0.3, linear, 0.0)
+        gains = Washout(0.3, linear, 0.0)
         assert coarse.decay_rate(gains) == pytest.approx(loop.decay_rate(gains), abs=0.02)
 
 

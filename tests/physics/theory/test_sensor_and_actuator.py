@@ -10,7 +10,7 @@ from scipy.linalg import expm
 from stickslip_ros.physics.loop.controller import Controller, answer
 from stickslip_ros.physics.loop.sampled_loop import SampledLoop
 from stickslip_ros.physics.model.actuator import Actuator
-from stickslip_ros.physics.model.control import VelocityFeedback, Washout, WashoutGains
+from stickslip_ros.physics.model.control import VelocityFeedback, Washout
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import Exponential, LuGre
 from stickslip_ros.physics.model.sensor import MeasuredVelocity, Sensor
@@ -98,9 +98,7 @@ def test_the_stable_gains(drive: Drive, delay: float, lag: float, spans: int) ->
     inside = np.any([(low < gains) & (gains < high) for low, high in intervals], axis=0)
     assert np.array_equal(rates > 0.0, np.broadcast_to(inside, rates.shape))
     for end in (end for interval in intervals for end in interval):
-        around = [
-            loop.spectral_radius(WashoutGains(20.0, end * g, 0.0)) for g in (0.999999, 1.000001)
-        ]
+        around = [loop.spectral_radius(Washout(20.0, end * g, 0.0)) for g in (0.999999, 1.000001)]
         assert min(around) < 1.0 < max(around)
 
 

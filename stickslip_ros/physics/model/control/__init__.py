@@ -1,8 +1,8 @@
 """The control laws: one file each, and one entry each in `CONTROL_LAWS`."""
 
 from stickslip_ros.physics.model.control.base import ContinuousControl, ControlLaw, LinearFeedback
-from stickslip_ros.physics.model.control.velocity_feedback import StateFeedback, VelocityFeedback
-from stickslip_ros.physics.model.control.washout import Washout, WashoutGains
+from stickslip_ros.physics.model.control.velocity_feedback import VelocityFeedback
+from stickslip_ros.physics.model.control.washout import Washout
 from stickslip_ros.samples import NO_REFERENCE, Reference
 
 CONTROL_LAWS: dict[str, type[ControlLaw]] = {law.name: law for law in (Washout, VelocityFeedback)}
@@ -18,8 +18,6 @@ __all__ = [
     "ControlLaw",
     "LinearFeedback",
     "Reference",
-    "StateFeedback",
     "VelocityFeedback",
     "Washout",
-    "WashoutGains",
 ]

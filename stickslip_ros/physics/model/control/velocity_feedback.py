@@ -19,16 +19,49 @@ from stickslip_ros.samples import Reference, Sample
 
 
 @dataclass(frozen=True)
-class StateFeedback(ContinuousControl):
-    """Force u = k0 x + k1 y, without a state of its own."""
+class VelocityFeedback(ControlLaw, ContinuousControl):
+    """Force proportional to velocity and displacement, u = k0 x + k1 x'.
 
+    A negative velocity gain is a damper between the slide and the frame. A position gain moves the
+    equilibrium.
+
+    Examples
+    --------
+    >>> from stickslip_ros.physics.loop.controller import Controller
+    >>> from stickslip_ros.physics.model.control import VelocityFeedback
+    >>> from stickslip_ros.samples import Reference, Sample
+    >>> controller = Controller(VelocityFeedback(velocity_gain=-500.0))
+    >>> controller.answer(Sample(0, 1e-4, 0.04, 0.0, 0.0, 0.04))
+    -20.0
+    """
+
+    name: ClassVar[str] = "velocity_feedback"
     states: ClassVar[Sequence[str]] = ()
-    """Names of the states: none."""
 
-    position_gain: Any
-    """Gain k0 of the displacement, N/m."""
-    velocity_gain: Any
+    velocity_gain: Any = constant(
+        -1.0, "Gain k1 of the velocity; a negative gain removes energy.", "N s/m"
+    )
     """Gain k1 of the velocity, N s/m."""
+    position_gain: Any = constant(
+        0.0, "Gain k0 of the displacement; it moves the equilibrium.", "N/m"
+    )
+    """Gain k0 of the displacement, N/m."""
+
+    @override
+    def respond(
+        self, state: State, elapsed: float, sample: Sample, reference: Reference
+    ) -> tuple[float, State]:
+        return self.control_force(sample.position, sample.velocity, ()), state
+
+    @override
+    def linear_feedback(self, period: float) -> LinearFeedback:
+        direct = np.array([self.position_gain, self.velocity_gain])
+        return LinearFeedback(np.empty((0, 0)), np.empty((0, 2)), np.empty(0), direct)
+
+    @property
+    @override
+    def continuous(self) -> Self:
+        return self
 
     @override
     def scaled(self, drive: Drive) -> Self:
@@ -61,48 +94,3 @@ class StateFeedback(ContinuousControl):
     def bound(self, speed: Any) -> Any:
         """Return k1 y: the spring stores what it takes; see `ContinuousControl.bound`."""
         return self.velocity_gain * speed
-
-
-@dataclass(frozen=True)
-class VelocityFeedback(ControlLaw):
-    """Force proportional to velocity and displacement, u = k0 x + k1 x'.
-
-    A negative velocity gain is a damper between the slide and the frame. A position gain moves the
-    equilibrium.
-
-    Examples
-    --------
-    >>> from stickslip_ros.physics.loop.controller import Controller
-    >>> from stickslip_ros.physics.model.control import VelocityFeedback
-    >>> from stickslip_ros.samples import Reference, Sample
-    >>> controller = Controller(VelocityFeedback(velocity_gain=-500.0))
-    >>> controller.answer(Sample(0, 1e-4, 0.04, 0.0, 0.0, 0.04))
-    -20.0
-    """
-
-    name: ClassVar[str] = "velocity_feedback"
-
-    velocity_gain: float = constant(
-        -1.0, "Gain k1 of the velocity; a negative gain removes energy.", "N s/m"
-    )
-    """Gain k1 of the velocity, N s/m."""
-    position_gain: float = constant(
-        0.0, "Gain k0 of the displacement; it moves the equilibrium.", "N/m"
-    )
-    """Gain k0 of the displacement, N/m."""
-
-    @property
-    @override
-    def continuous(self) -> StateFeedback:
-        return StateFeedback(self.position_gain, self.velocity_gain)
-
-    @override
-    def respond(
-        self, state: State, elapsed: float, sample: Sample, reference: Reference
-    ) -> tuple[float, State]:
-        return self.position_gain * sample.position + self.velocity_gain * sample.velocity, state
-
-    @override
-    def linear_feedback(self, period: float) -> LinearFeedback:
-        direct = np.array([self.position_gain, self.velocity_gain])
-        return LinearFeedback(np.empty((0, 0)), np.empty((0, 2)), np.empty(0), direct)

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from math import expm1
 from typing import Any, ClassVar, Self
 
@@ -21,59 +20,42 @@ from stickslip_ros.samples import Reference, Sample
 
 
 @dataclass(frozen=True)
-class WashoutGains(ContinuousControl):
-    """Cutoff frequency and gains of a washout controller, eq. 17 and 18.
+class Washout(ControlLaw, ContinuousControl):
+    """Washout filter with linear and cubic velocity feedback, eq. 17 and 18.
 
-    The equations are written once, for floats, arrays and heyoka expressions, in SI units or
-    dimensionless (see `scaled`).
+    The filter is w' = y - d w with the output v = y - d w. As `continuous` control its state is w,
+    m. For held samples it is discretised exactly; the state is then kept as z = d w, the low-passed
+    speed, z' = d (y - z), so that the output does not jump when the cutoff frequency changes. The
+    filter starts at rest.
 
     Examples
     --------
-    >>> from stickslip_ros.physics.model.control import WashoutGains
-    >>> gains = WashoutGains(corner_frequency=20.0, linear=-3000.0, cubic=0.0)
-    >>> gains.force(0.01)
+    >>> from stickslip_ros.physics.loop.controller import Controller
+    >>> from stickslip_ros.physics.model.control import Washout
+    >>> from stickslip_ros.samples import Reference, Sample
+    >>> law = Washout(corner_frequency=20.0, linear_gain=-3000.0, cubic_gain=0.0)
+    >>> law.force(0.01)
+    -30.0
+    >>> washout = Controller(law)
+    >>> sample = Sample(0, 0.0, 0.04, 0.0, 0.0, 0.04)
+    >>> washout.answer(sample)
+    0.0
+    >>> round(washout.answer(sample._replace(stamp=1_000_000, velocity=0.05)), 3)
     -30.0
     """
 
+    name: ClassVar[str] = "washout"
     states: ClassVar[Sequence[str]] = ("w",)
-    """Names of the states: W of the filter, m."""
+    state_units: ClassVar[Mapping[str, str | None]] = {"low_passed": "m/s", "velocity": "m/s"}
 
-    corner_frequency: Any
+    corner_frequency: Any = constant(
+        2.0, "Cutoff frequency d of the filter.", "rad/s", positive=True
+    )
     """Cutoff frequency d of the filter, rad/s."""
-    linear: Any
+    linear_gain: Any = constant(-1.0, "Linear gain k1; a negative gain removes energy.", "N s/m")
     """Linear gain k1, N s/m."""
-    cubic: Any
+    cubic_gain: Any = constant(-1.0, "Cubic gain k2.", "N s^3/m^3")
     """Cubic gain k2, N s^3/m^3."""
-
-    @override
-    def scaled(self, drive: Drive) -> Self:
-        return replace(
-            self,
-            corner_frequency=self.corner_frequency / drive.angular_frequency,
-            linear=self.linear * drive.speed_scale / drive.normal_force,
-            cubic=self.cubic * drive.speed_scale**3 / drive.normal_force,
-        )
-
-    def silenced(self) -> Self:
-        """Return the filter alone, which gives no force."""
-        return replace(self, linear=0.0, cubic=0.0)
-
-    def filtered(self, speed: Any, state: Any) -> Any:
-        """Return the output of the washout filter, v = y - d w, eq. 17.
-
-        Parameters
-        ----------
-        speed : float, array or expression
-            Speed y of the slide.
-        state : float, array or expression
-            State w of the filter.
-
-        Returns
-        -------
-        float, array or expression
-            Filter output v, in the unit of `speed`.
-        """
-        return speed - self.corner_frequency * state
 
     def force(self, filtered: Any) -> Any:
         """Return the control force, u = k1 v + k2 v^3, eq. 18.
@@ -88,100 +70,7 @@ class WashoutGains(ContinuousControl):
         float, array or expression
             Force u, N for gains and speed in SI units.
         """
-        return self.linear * filtered + self.cubic * filtered * filtered * filtered
-
-    def rest(self, position: Any, speed: Any) -> Sequence[Any]:
-        """Return w = y/d: the filter has no output; see `ContinuousControl.rest`."""
-        return (speed / self.corner_frequency,)
-
-    def state_rates(self, position: Any, speed: Any, states: Sequence[Any]) -> Sequence[Any]:
-        """Return w' = v, eq. 17; see `ContinuousControl.state_rates`."""
-        return (self.filtered(speed, states[0]),)
-
-    def control_force(self, position: Any, speed: Any, states: Sequence[Any]) -> Any:
-        """Return u, eq. 17 and 18; see `ContinuousControl.control_force`."""
-        return self.force(self.filtered(speed, states[0]))
-
-    def state_scales(self, drive: Drive) -> Sequence[float]:
-        """Return that from W to z = d w, m/s; see `ContinuousControl.state_scales`."""
-        return (self.corner_frequency / drive.angular_frequency * drive.speed_scale,)
-
-    def linear_feedback(self, period: float) -> LinearFeedback:
-        """Return the sampled controller near the equilibrium: z' = z + q (y - z), u = k1 (y - z).
-
-        Parameters
-        ----------
-        period : float
-            Sample period T, s; q = 1 - exp(-d T).
-
-        Returns
-        -------
-        LinearFeedback
-            Controller with the one state z.
-        """
-        step, gain = -expm1(-self.corner_frequency * period), self.linear
-        return LinearFeedback(
-            np.array([[1.0 - step]]),
-            np.array([[0.0, step]]),
-            np.array([-gain]),
-            np.array([0.0, gain]),
-        )
-
-    def bound(self, speed: Any) -> Any:
-        """Return forces that give at least the energy; see `ContinuousControl.bound`.
-
-        With v = w' and d w the parts of y that pass the filter and do not, both periodic,
-        int v w = 0: int v y = int v^2 <= int y^2. Where k2 < 0, by Young's inequality
-        -int v^3 y = -int (v^4 + v^3 d w) <= (27/256) int (d w)^4 <= (27/256) int y^4.
-        Otherwise, by Hoelder's, int v^3 y <= 8 int y^4, since v is at most twice as large as y in
-        L^4.
-        """
-        cubic = -27.0 / 256.0 * self.cubic if self.cubic < 0.0 else 8.0 * self.cubic
-        return max(self.linear, 0.0) * speed + cubic * speed**3
-
-
-@dataclass(frozen=True)
-class Washout(ControlLaw):
-    """Washout filter with linear and cubic velocity feedback, eq. 17 and 18.
-
-    For held samples the filter w' = y - d w, v = y - d w is discretised exactly. Its state is kept
-    as z = d w, the low-passed speed, z' = d (y - z), so that its output does not jump when the
-    cutoff frequency changes. The filter starts at rest.
-
-    Examples
-    --------
-    >>> from stickslip_ros.physics.loop.controller import Controller
-    >>> from stickslip_ros.physics.model.control import Washout
-    >>> from stickslip_ros.samples import Reference, Sample
-    >>> washout = Controller(Washout(corner_frequency=20.0, linear_gain=-3000.0, cubic_gain=0.0))
-    >>> sample = Sample(0, 0.0, 0.04, 0.0, 0.0, 0.04)
-    >>> washout.answer(sample)
-    0.0
-    >>> round(washout.answer(sample._replace(stamp=1_000_000, velocity=0.05)), 3)
-    -30.0
-    """
-
-    name: ClassVar[str] = "washout"
-    state_units: ClassVar[Mapping[str, str | None]] = {"low_passed": "m/s", "velocity": "m/s"}
-
-    corner_frequency: float = constant(
-        2.0, "Cutoff frequency d of the filter.", "rad/s", positive=True
-    )
-    """Cutoff frequency d of the filter, rad/s."""
-    linear_gain: float = constant(-1.0, "Linear gain k1; a negative gain removes energy.", "N s/m")
-    """Linear gain k1, N s/m."""
-    cubic_gain: float = constant(-1.0, "Cubic gain k2.", "N s^3/m^3")
-    """Cubic gain k2, N s^3/m^3."""
-
-    @cached_property
-    def gains(self) -> WashoutGains:
-        """Cutoff frequency and gains."""
-        return WashoutGains(self.corner_frequency, self.linear_gain, self.cubic_gain)
-
-    @property
-    @override
-    def continuous(self) -> WashoutGains:
-        return self.gains
+        return self.linear_gain * filtered + self.cubic_gain * filtered * filtered * filtered
 
     def initial_state(self, sample: Sample, reference: Reference) -> State:
         """Return a filter at rest: z = y, and y, m/s; see `ControlLaw.initial_state`."""
@@ -195,8 +84,60 @@ class Washout(ControlLaw):
         velocity = sample.velocity
         if elapsed > 0.0:
             low_passed -= expm1(-self.corner_frequency * elapsed) * (held - low_passed)
-        return self.gains.force(velocity - low_passed), (low_passed, velocity)
+        return self.force(velocity - low_passed), (low_passed, velocity)
+
+    def linear_feedback(self, period: float) -> LinearFeedback:
+        """Return z' = z + q (y - z), u = k1 (y - z), q = 1 - exp(-d T); see `ControlLaw`."""
+        step, gain = -expm1(-self.corner_frequency * period), self.linear_gain
+        return LinearFeedback(
+            np.array([[1.0 - step]]),
+            np.array([[0.0, step]]),
+            np.array([-gain]),
+            np.array([0.0, gain]),
+        )
+
+    @property
+    @override
+    def continuous(self) -> Self:
+        return self
 
     @override
-    def linear_feedback(self, period: float) -> LinearFeedback:
-        return self.gains.linear_feedback(period)
+    def scaled(self, drive: Drive) -> Self:
+        return replace(
+            self,
+            corner_frequency=self.corner_frequency / drive.angular_frequency,
+            linear_gain=self.linear_gain * drive.speed_scale / drive.normal_force,
+            cubic_gain=self.cubic_gain * drive.speed_scale**3 / drive.normal_force,
+        )
+
+    def silenced(self) -> Self:
+        """Return the filter alone, which gives no force."""
+        return replace(self, linear_gain=0.0, cubic_gain=0.0)
+
+    def rest(self, position: Any, speed: Any) -> Sequence[Any]:
+        """Return w = y/d: the filter has no output; see `ContinuousControl.rest`."""
+        return (speed / self.corner_frequency,)
+
+    def state_rates(self, position: Any, speed: Any, states: Sequence[Any]) -> Sequence[Any]:
+        """Return w' = v = y - d w, eq. 17; see `ContinuousControl.state_rates`."""
+        return (speed - self.corner_frequency * states[0],)
+
+    def control_force(self, position: Any, speed: Any, states: Sequence[Any]) -> Any:
+        """Return u, eq. 17 and 18; see `ContinuousControl.control_force`."""
+        return self.force(speed - self.corner_frequency * states[0])
+
+    def state_scales(self, drive: Drive) -> Sequence[float]:
+        """Return that from W to z = d w, m/s; see `ContinuousControl.state_scales`."""
+        return (self.corner_frequency / drive.angular_frequency * drive.speed_scale,)
+
+    def bound(self, speed: Any) -> Any:
+        """Return forces that give at least the energy; see `ContinuousControl.bound`.
+
+        With v = w' and d w the parts of y that pass the filter and do not, both periodic,
+        int v w = 0: int v y = int v^2 <= int y^2. Where k2 < 0, by Young's inequality
+        -int v^3 y = -int (v^4 + v^3 d w) <= (27/256) int (d w)^4 <= (27/256) int y^4.
+        Otherwise, by Hoelder's, int v^3 y <= 8 int y^4, since v is at most twice as large as y in
+        L^4.
+        """
+        cubic = -27.0 / 256.0 * self.cubic_gain if self.cubic_gain < 0.0 else 8.0 * self.cubic_gain
+        return max(self.linear_gain, 0.0) * speed + cubic * speed**3

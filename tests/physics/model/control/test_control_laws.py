@@ -20,7 +20,6 @@ from stickslip_ros.physics.model.control import (
     ControlLaw,
     VelocityFeedback,
     Washout,
-    WashoutGains,
 )
 from stickslip_ros.physics.motion import Motion, RecordedMotion
 from stickslip_ros.samples import Sample
@@ -181,5 +180,5 @@ def test_a_change_of_drive_or_constants_keeps_its_state(law: ControlLaw) -> None
     assert motion.control_state == pytest.approx(state, rel=1e-14)
     assert (motion.position, motion.velocity) == pytest.approx(place, rel=1e-14)
     assert motion.applied_force == 0.0
-    motion.control = WashoutGains(50.0, -1.0, 0.0) if motion.control_state else control
+    motion.control = Washout(50.0, -1.0, 0.0) if motion.control_state else control
     assert motion.control_state == pytest.approx(state, rel=1e-14)
