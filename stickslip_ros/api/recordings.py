@@ -82,14 +82,11 @@ class RecordedRun(Shown):
         InvalidInputError
             If `style` is unknown.
         """
-        from stickslip_ros.plots.run_figure import recorded_run_figure
+        from stickslip_ros.plots.run_figure import DrawnRun, run_figure
         from stickslip_ros.plots.style import style_named
 
-        return shown_in_notebooks(
-            recorded_run_figure(
-                self.path, self.drive, self._history, self.report, style=style_named(style)
-            )
-        )
+        drawn = DrawnRun.recorded(self.path, self._history, self.report, self.drive)
+        return shown_in_notebooks(run_figure(drawn, style=style_named(style)))
 
     def to_pandas(self) -> "DataFrame":
         """Return the samples as a table.

@@ -68,13 +68,11 @@ class Run(Shown):
         InvalidInputError
             If `style` is unknown.
         """
-        from stickslip_ros.plots.run_figure import simulated_run_figure
+        from stickslip_ros.plots.run_figure import DrawnRun, run_figure
         from stickslip_ros.plots.style import style_named
 
-        measures = self.truth or self.measures
-        return shown_in_notebooks(
-            simulated_run_figure(self.scenario, self._history, measures, style=style_named(style))
-        )
+        drawn = DrawnRun.simulated(self.scenario, self._history, self.truth or self.measures)
+        return shown_in_notebooks(run_figure(drawn, style=style_named(style)))
 
     def to_pandas(self) -> "DataFrame":
         """Return the trajectory as a table.

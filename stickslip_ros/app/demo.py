@@ -39,7 +39,7 @@ def _demonstrate() -> None:
     controller = scenario.controller.node.replace("_", " ")
     bag = default_bag(_SCENARIO)
     load_matplotlib()
-    from stickslip_ros.plots.run_figure import recorded_run_figure
+    from stickslip_ros.plots.run_figure import DrawnRun, run_figure
     from stickslip_ros.plots.run_history import RunHistory
     from stickslip_ros.plots.style import save
 
@@ -67,7 +67,7 @@ def _demonstrate() -> None:
     history = RunHistory()
     report = report_of_bag(bag, observer=history)
     drive = scenario.plant.as_drive()
-    save(recorded_run_figure(bag, drive, history, report), figure)
+    save(run_figure(DrawnRun.recorded(bag, history, report, drive)), figure)
     print(f"bag:    {bag}\nfigure: {figure}")
 
 

@@ -136,25 +136,13 @@ def _draw(
     histories: Mapping[str, "RunHistory"],
     reports: Mapping[str, Mapping[str, Any]],
 ) -> None:
-    from stickslip_ros.physics.measures.cycle_measures import measures_of
-    from stickslip_ros.plots.run_figure import recorded_run_figure
-    from stickslip_ros.plots.runs_figure import DrawnRun, runs_figure
+    from stickslip_ros.plots.run_figure import DrawnRun, run_figure
     from stickslip_ros.studies.recorded_drive import recorded_drive
 
-    runs: list[DrawnRun] = []
-    for bag, report in reports.items():
-        drive = recorded_drive(Path(bag), arguments.namespace)
-        runs.append(DrawnRun(bag, histories[bag], measures_of(report), drive))
-    if len(runs) > 1:
-        notes = [
-            f"{bag}: {sentence}"
-            for bag, report in reports.items()
-            for sentence in [*report["missing"], *report["notes"]]
-        ]
-        write_figure(arguments, lambda style: runs_figure(runs, notes=notes, style=style))
-        return
-    (bag, history, _, drive), report = runs[0], reports[runs[0].name]
-    write_figure(
-        arguments,
-        lambda style: recorded_run_figure(Path(bag), drive, history, report, style=style),
-    )
+    runs = [
+        DrawnRun.recorded(
+            Path(bag), histories[bag], report, recorded_drive(Path(bag), arguments.namespace)
+        )
+        for bag, report in reports.items()
+    ]
+    write_figure(arguments, lambda style: run_figure(*runs, style=style))

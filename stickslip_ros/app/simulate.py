@@ -100,12 +100,10 @@ def run(arguments: argparse.Namespace) -> None:
             told=told,
         )
         if history is not None:
-            from stickslip_ros.plots.run_figure import simulated_run_figure
+            from stickslip_ros.plots.run_figure import DrawnRun, run_figure
 
-            write_figure(
-                arguments,
-                lambda style: simulated_run_figure(scenario, history, true, style=style),
-            )
+            drawn = DrawnRun.simulated(scenario, history, true)
+            write_figure(arguments, lambda style: run_figure(drawn, style=style))
     measures = true if told is None else told.measures()
     if arguments.json:
         truth = None if told is None else true.as_dict()

@@ -1,9 +1,9 @@
-"""Figure of a run: motion, force, phase portrait, cycles and friction law."""
+"""The figure of a run, and that of several runs side by side."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -16,15 +16,18 @@ from matplotlib.patches import Patch
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.physics.measures.cycle_measures import Measures, measures_of
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.plots.panes import (
-    LEAST_SPAN,
+from stickslip_ros.plots.panels import (
+    BELT,
+    LEAST_PART,
+    MOTION,
     PIXELS,
+    POINT,
     Pane,
     broken,
-    cycle_rows,
     draw_conclusions,
+    draw_cycles,
+    draw_law,
     draw_line,
-    end_duration,
     label_time,
     measures_text,
     say,
@@ -33,26 +36,29 @@ from stickslip_ros.plots.panes import (
 )
 from stickslip_ros.plots.run_history import DrawnMotion, RunHistory
 from stickslip_ros.plots.style import (
+    AMBER,
     BLUE,
     GREEN,
     GREY,
     LIGHT_GREY,
     MANY,
     ORANGE,
+    PURPLE,
     SCREEN,
     SKY_BLUE,
     FigureStyle,
     finish,
     styled,
     title_of,
+    wrapped,
 )
-from stickslip_ros.plots.units import Units
+from stickslip_ros.plots.units import SI, Units
 from stickslip_ros.scenarios.files import Scenario
 
-_MOTION: Any = {"color": BLUE, "lw": 1.0}
-_BELT: Any = {"color": "black", "lw": 1.0, "ls": "--", "zorder": 2.5}
+LAST_CYCLES = 5
+"""Number of cycles that are enlarged, and in the phase portrait."""
+
 _REST: Any = {"color": GREEN, "lw": 1.2, "ls": ":", "zorder": 2.5}
-_POINT: Any = {"color": GREEN, "marker": "o", "ms": 6.0, "ls": "", "mec": "white"}
 _CONTROL: Any = {"color": ORANGE, "lw": 1.6, "drawstyle": "steps-post"}
 _HELD: Any = {"color": ORANGE, "lw": 1.2, "ls": ":", "drawstyle": "steps-post"}
 _DROPPED: Any = {"color": ORANGE, "alpha": 0.5, "marker": ".", "ms": 2.0, "ls": ""}
@@ -60,54 +66,93 @@ _FRICTION: Any = {"color": SKY_BLUE, "lw": 0.7}
 _EARLIER: Any = {"color": LIGHT_GREY, "lw": 0.7}
 _STICKS: Any = {"color": GREY, "lw": 5.0, "solid_capstyle": "butt", "zorder": 1.9}
 
+_COLOURS = (BLUE, ORANGE, GREEN, PURPLE, AMBER, SKY_BLUE)
+_DASHES = ("-", "--", "-.", ":", (0, (6, 1)), (0, (3, 1, 1, 1)))
+_LOOKS: list[dict[str, Any]] = [
+    {"color": colour, "ls": dashes, "marker": marker, "ms": 4.0}
+    for colour, dashes, marker in zip(_COLOURS, _DASHES, "os^Dv*", strict=True)
+]
+"""Looks of runs side by side."""
+
 _ENLARGED = ", enlarged"
-_SWITCHED_ON = f"control switched on{_ENLARGED}"
-_FIRST_FORCE = f"first force{_ENLARGED}"
-_CONTROL_ONLY = "control force"
 _LEAST_ROWS = 20
 """Rows of a motion that is worth being enlarged."""
 
 
-@styled
-def run_figure(
-    history: RunHistory,
-    measures: Measures,
-    drive: Drive | None,
-    *,
-    title: str,
-    notes: Sequence[str] = (),
-    force: str = _CONTROL_ONLY,
-    style: FigureStyle = SCREEN,
-) -> Figure:
-    """Return the figure of a run.
+class DrawnRun(NamedTuple):
+    """A run to draw."""
 
-    It shows the whole run, the instant at which the controller is switched on, if there is one,
-    and its last `LAST_CYCLES` cycles over time, shaded by the share of time
-    in which the slide sticks; the phase portrait of these cycles and of the start; amplitude and
-    stick fraction of each cycle; and the friction law with the range of relative speeds. The
-    equilibrium and the friction law need a `drive`, the equilibrium also a moving belt. The belt
-    speed is that at the end of the run. `notes` are shown below the title, and `force` is the label
-    of the force.
+    name: str
+    """What it is called beside other runs."""
+    history: RunHistory
+    measures: Measures
+    drive: Drive | None
+    """None if it is unknown."""
+    notes: Sequence[str] = ()
+    """Sentences on the run, shown below the title."""
+    title: str = ""
+    disturbed: bool = False
+    """Whether a disturbance is added to the control force."""
+
+    @classmethod
+    def simulated(cls, scenario: Scenario, history: RunHistory, measures: Measures) -> Self:
+        """Return a simulated run of a scenario."""
+        title, drive = title_of("Simulated run", scenario), scenario.plant.as_drive()
+        disturbed = scenario.plant.disturbance.kind != "none"
+        return cls(scenario.name, history, measures, drive, (), title, disturbed)
+
+    @classmethod
+    def recorded(
+        cls, bag: Path, history: RunHistory, report: Mapping[str, Any], drive: Drive | None
+    ) -> Self:
+        """Return a recorded run with the `report` of its bag, and the drive that it holds."""
+        notes = [*report["missing"], *report["notes"]]
+        return cls(str(bag), history, measures_of(report), drive, notes, f"Recorded run, {bag}")
+
+    @property
+    def last_cycles(self) -> DrawnMotion:
+        """The last `LAST_CYCLES` cycles; without a period a fixed share of the run."""
+        time = self.history.motion.time
+        span = float(time[-1] - time[0]) if len(time) else 0.0
+        natural = self.drive.natural_period if self.drive and self.drive.has_spring else 0.0
+        duration = LAST_CYCLES * (self.measures.period or natural)
+        return self.history.end(min(duration, span) or 0.05 * span)
+
+
+@styled
+def run_figure(*runs: DrawnRun, style: FigureStyle = SCREEN) -> Figure:
+    """Return the figure of a run, or of up to six runs, each in its own colour.
+
+    Of one run it shows the whole run, the instant at which the controller is switched on, if there
+    is one, and its last cycles over time, shaded by the share of time in which the slide sticks;
+    the phase portrait of these cycles and of the start; amplitude and stick fraction of each cycle;
+    and the friction law with the range of relative speeds. The equilibrium and the friction law
+    need a drive, the equilibrium also a moving belt. The belt speed is that at the end of the run.
+
+    Of several runs there is a column each: displacement and force over time, with the same axes.
+    Below are all runs together: the phase portrait of the last cycles, and amplitude and stick
+    fraction of each cycle. The units are SI unless all drives are dimensionless.
     """
-    motion = history.motion
-    if drive is not None and len(motion.time):
-        drive = replace(drive, belt_speed=float(motion.belt_velocity[-1]))
-    last = history.end(end_duration(motion, measures, drive))
+    figure = _single(runs[0], style) if len(runs) == 1 else _compared(runs, style)
+    finish(figure)
+    return figure
+
+
+def _single(run: DrawnRun, style: FigureStyle) -> Figure:
+    history, drive, notes = run.history, run.drive, [*run.notes]
+    if drive is None:
+        notes.append("it is not recorded what drive it was: no equilibrium, no friction law")
+    elif len(history.motion.time):
+        drive = replace(drive, belt_speed=float(history.motion.belt_velocity[-1]))
+        run = run._replace(drive=drive)
+    if history.left_out:
+        notes.append(f"not drawn: {history.left_out} samples without an increasing time")
     concluded = history.conclusions
     rows = 3 if concluded.mean_cycle is not None or concluded.slips is not None else 2
     size = (12.0, 10.0 if rows == 2 else 12.5)
-    panels = _Panels(
-        history,
-        drive,
-        last if len(last.time) > 1 else history.end(float("inf")),
-        narrow=style.narrow,
-        short=style.crowded(*size),
-        first_force=_SWITCHED_ON if force == _CONTROL_ONLY else _FIRST_FORCE,
-    )
+    panels = _OneRun([run], narrow=style.narrow, short=style.crowded(*size))
     figure = style.figure(*size, wide=1.1 if rows == 2 else 1.4, narrow=3.0 if rows == 2 else 4.0)
-    if history.left_out:
-        notes = [*notes, f"not drawn: {history.left_out} samples without an increasing time"]
-    style.set_title(figure, title, measures_text(measures, panels.units), *notes)
+    style.set_title(figure, run.title, measures_text(run.measures, panels.units), *notes)
     ratios = (2.8, 2.4, 1.5) if panels.short else (3.0, 1.9, 1.2)
     if style.narrow:
         ratios = (5.2, 4.2, 4.0)
@@ -127,87 +172,71 @@ def run_figure(
     panels.portrait(figure.add_subplot(left))
     first, second = (figure.add_subplot(part) for part in cycles)
     panels.cycles(first, second)
-    panels.law(figure.add_subplot(right))
+    of_law = panels.law(figure.add_subplot(right))
+    force = "control force and disturbance" if run.disturbed else "control force"
     sticks = "sticks" if panels.short else "sticks (paler: part of the time)"
     handles: list[Any] = [
-        Line2D([], [], **_MOTION, label="slide"),
-        Line2D([], [], **_BELT, label="belt speed"),
+        Line2D([], [], **MOTION, label="slide"),
+        Line2D([], [], **BELT, label="belt speed"),
         Patch(color=GREY, alpha=0.6, lw=0.0, label=sticks),
         Line2D([], [], **_CONTROL, label=force),
         Line2D([], [], **_FRICTION, label="friction force"),
         Line2D([], [], **_EARLIER | {"lw": 4.0}, label="start of the run"),
     ]
     if drive is not None and drive.has_spring:
-        handles.insert(2, Line2D([], [], **_POINT | _REST, label="equilibrium"))
+        handles.insert(2, Line2D([], [], **POINT | _REST, label="equilibrium"))
     if panels.holds:
         handles.append(Line2D([], [], **_HELD, label="no new force: last one"))
-    if panels.drops:
+    if len(history.dropped.columns()[0]):
         handles.append(Line2D([], [], **_DROPPED | {"ms": 6.0}, label="sent, did not act"))
-    if panels.short:
-        handles += panels.of_law
-    style.legend_below(figure, handles)
-    finish(figure)
+    style.legend_below(figure, [*handles, *of_law])
     return figure
 
 
-def simulated_run_figure(
-    scenario: Scenario, history: RunHistory, measures: Measures, *, style: FigureStyle = SCREEN
-) -> Figure:
-    """Return the figure of a simulated run of a scenario."""
-    disturbed = scenario.plant.disturbance.kind != "none"
-    title = title_of("Simulated run", scenario)
-    force = f"{_CONTROL_ONLY} and disturbance" if disturbed else _CONTROL_ONLY
-    drive = scenario.plant.as_drive()
-    return run_figure(history, measures, drive, title=title, force=force, style=style)
-
-
-def recorded_run_figure(
-    bag: Path,
-    drive: Drive | None,
-    history: RunHistory,
-    report: Mapping[str, Any],
-    *,
-    style: FigureStyle = SCREEN,
-) -> Figure:
-    """Return the figure of a recorded run, with what the `report` of its bag notes.
-
-    `drive` is None if the bag does not hold its parameters.
-    """
-    notes = [*report["missing"], *report["notes"]]
-    if drive is None:
-        notes.append("it is not recorded what drive it was: no equilibrium, no friction law")
-    title = f"Recorded run, {bag}"
-    return run_figure(history, measures_of(report), drive, title=title, notes=notes, style=style)
+def _compared(runs: Sequence[DrawnRun], style: FigureStyle) -> Figure:
+    count = len(runs)
+    figure = style.figure(12.0, 9.0, wide=0.95, narrow=0.9 * count + 1.4)
+    notes = [f"{run.name}: {note}" for run in runs for note in run.notes]
+    style.set_title(figure, "Runs compared, " + "; ".join(run.name for run in runs), *notes)
+    panels = _SeveralRuns(runs, narrow=style.narrow, short=style.crowded(12.0, 9.0))
+    ratios = (0.9 * count, 1.3) if style.narrow else (1.3, 1.0)
+    above, below = figure.add_gridspec(2, 1, height_ratios=ratios)
+    panels.over_time(figure, above)
+    left, middle, right = below.subgridspec(*((3, 1) if style.narrow else (1, 3)))
+    panels.portrait(figure.add_subplot(left))
+    amplitude = figure.add_subplot(middle)
+    panels.cycles(amplitude, figure.add_subplot(right, sharex=amplitude))
+    looks = zip(runs, _LOOKS, strict=False)
+    style.legend_below(figure, [Line2D([], [], label=run.name, **look) for run, look in looks])
+    return figure
 
 
 class _Panels:
-    """The panels of the figure, with their common units and data."""
+    """What the panels of a figure have in common: runs and axes."""
 
-    def __init__(
-        self,
-        history: RunHistory,
-        drive: Drive | None,
-        last: DrawnMotion,
-        *,
-        narrow: bool,
-        short: bool,
-        first_force: str,
-    ) -> None:
-        self.units = units = Units.for_drive(drive).shortened()
-        self._history, self._drive, self._last = history, drive, last
-        self._narrow, self.short, self._first_force = narrow, short, first_force
-        motion = history.motion
-        self._run = Pane.covering("whole run", motion, *self._force_times)
-        self._length = units.axis(units.named("displacement", short=short), "m", motion.position)
-        self._speed = units.axis(
-            units.named("velocity", short=short), "m/s", motion.velocity, motion.belt_velocity
-        )
+    def __init__(self, runs: Sequence[DrawnRun], *, narrow: bool, short: bool) -> None:
+        own = {Units.for_drive(run.drive).shortened() for run in runs}
+        self.units = units = own.pop() if len(own) == 1 else SI
+        self.short, self._narrow, self._runs = short, narrow, runs
+        self._motions = motions = [run.history.motion for run in runs]
+        positions = [motion.position for motion in motions]
+        speeds = [each for motion in motions for each in (motion.velocity, motion.belt_velocity)]
+        self._length = units.axis(units.named("displacement", short=short), "m", *positions)
+        self._speed = units.axis(units.named("velocity", short=short), "m/s", *speeds)
+
+
+class _OneRun(_Panels):
+    """The panels of one run."""
+
+    def __init__(self, runs: Sequence[DrawnRun], *, narrow: bool, short: bool) -> None:
+        super().__init__(runs, narrow=narrow, short=short)
+        (run,) = runs
+        self._history, self._drive, self._disturbed = run.history, run.drive, run.disturbed
+        last = run.last_cycles
+        self._last = last if len(last.time) > 1 else run.history.end(float("inf"))
+        self._whole = Pane.covering("whole run", self._motions[0], *self._force_times)
         self.holds = False
         """Whether forces are missing for a while, so that the last one is drawn on."""
-        self.drops = len(history.dropped.columns()[0]) > 0
-        """Whether forces were sent that did not act."""
-        self.of_law: list[Artist] = []
-        """Entries of the legend for the friction law."""
 
     @property
     def _force_times(self) -> list[FloatArray]:
@@ -220,7 +249,7 @@ class _Panels:
         end = Pane.covering(f"end of the run{_ENLARGED}", self._last, *others)
         traces = history.friction, history.control, history.dropped
         whole = [trace.columns() for trace in traces]
-        panes = [self._run, *self._switch_on(end), end]
+        panes = [self._whole, *self._switch_on(end), end]
         drawn = [whole] * (len(panes) - 1) + [[trace.since(end.start) for trace in traces]]
         newton, label = self.units.axis("force", "N", *(columns[1] for columns in whole))
         panels = _panels_over_time(figure, part, len(panes), narrow=self._narrow)
@@ -251,12 +280,13 @@ class _Panels:
         if at is None or not len(end.rows.time):
             return []
         before, after = 0.5 * length, 1.5 * length
-        if at - before < self._run.start or at + after > end.start:
+        if at - before < self._whole.start or at + after > end.start:
             return []
         rows = self._history.around_switch_on(before, after)
         if len(rows.time) < _LEAST_ROWS:
             return []
-        return [Pane(self._first_force, rows, at - before, at + after)]
+        title = "first force" if self._disturbed else "control switched on"
+        return [Pane(f"{title}{_ENLARGED}", rows, at - before, at + after)]
 
     def _label_time(self, axes: Axes, pane: Pane) -> None:
         label_time(axes, self.units.axis("time", "s", pane.start, pane.end))
@@ -271,132 +301,137 @@ class _Panels:
             by_friction = self._drive.friction.at_rest(belt) * self._drive.length_scale
             rest = by_friction + self._drive.bias_force / self._drive.stiffness
             draw_line(position, pane, (rows.time, rest), length, gap, **_REST)
-        draw_line(position, pane, (rows.time, rows.position), length, gap, **_MOTION)
-        draw_line(velocity, pane, (rows.time, rows.belt_velocity), speed, gap, **_BELT)
-        draw_line(velocity, pane, (rows.time, rows.velocity), speed, gap, **_MOTION)
+        draw_line(position, pane, (rows.time, rows.position), length, gap, **MOTION)
+        draw_line(velocity, pane, (rows.time, rows.belt_velocity), speed, gap, **BELT)
+        draw_line(velocity, pane, (rows.time, rows.velocity), speed, gap, **MOTION)
 
     def portrait(self, axes: Axes) -> None:
         """Draw the phase portrait of the last cycles, above that of the start."""
         (length, label), (speed, speed_label) = self._length, self._speed
-        axes.set_title("phase portrait")
-        axes.set_xlabel(label)
-        axes.set_ylabel(speed_label)
+        axes.set(title="phase portrait", xlabel=label, ylabel=speed_label)
         if not len(self._last.time):
             say(axes, "no motion recorded")
             return
-        for rows, look in ((self._history.beginning, _EARLIER), (self._last, _MOTION)):
-            time, position, velocity, belt, stick_time = broken(
-                self._history.gap, rows.time, *rows[1:]
-            )
+        for rows, look in ((self._history.beginning, _EARLIER), (self._last, MOTION)):
+            time, position, velocity, belt, stick_time = broken(self._history.gap, *rows)
             many = len(time) > MANY
             axes.plot(position / length, velocity / speed, rasterized=many, **look)
             stuck = np.diff(stick_time, prepend=np.nan) > 0.5 * np.diff(time, prepend=np.nan)
             stuck |= np.append(stuck[1:], False)
             axes.plot(np.where(stuck, position, np.nan) / length, belt / speed, **_STICKS)
         belt_speed = float(self._last.belt_velocity[-1])
-        axes.axhline(belt_speed / speed, **_BELT)
+        axes.axhline(belt_speed / speed, **BELT)
         if self._drive is not None and self._drive.has_spring and belt_speed != 0.0:
-            axes.plot(self._drive.equilibrium_position / length, 0.0, zorder=3.0, **_POINT)
+            axes.plot(self._drive.equilibrium_position / length, 0.0, zorder=3.0, **POINT)
         axes.set_xlim(widened(*axes.get_xlim()))
         axes.set_ylim(widened(*axes.get_ylim()))
 
     def cycles(self, amplitude: Axes, stick_fraction: Axes) -> None:
         """Draw amplitude and stick fraction of each cycle over time."""
-        time, *columns = self._history.cycles
+        count = len(self._history.cycles[0])
+        look = MOTION | {"marker": "." if count < PIXELS else "", "ms": 3.0, "lw": 0.5}
+        panels = amplitude, stick_fraction
+        draw_cycles(panels, [self._history], [look], self.units, most=PIXELS)
         amplitude.set_title("each cycle")
-        scale, label = self.units.axis("amplitude", "m", columns[0])
-        if not len(time):
-            say(amplitude, "no cycle was completed")
-        rows = cycle_rows(time, *columns)
-        farthest = float(np.abs(self._history.motion.position).max(initial=0.0)) / scale
-        for axes, values, least in (
-            (amplitude, columns[0] / scale, LEAST_SPAN * farthest),
-            (stick_fraction, columns[1], 0.0),
-        ):
-            marker = "." if len(time) < PIXELS else ""
-            axes.plot(time[rows], values[rows], marker=marker, ms=3.0, **_MOTION | {"lw": 0.5})
-            axes.set_ylim(0.0, max(1.1 * float(values.max(initial=0.0)), least) or 1.0)
-        amplitude.set_ylabel(label)
-        stick_fraction.set_ylabel("stick fraction")
         if self._narrow:  # beside each other
             stick_fraction.set_title("each cycle")
-            self._label_time(amplitude, self._run)
+            self._label_time(amplitude, self._whole)
         else:
             amplitude.sharex(stick_fraction)
             amplitude.tick_params(labelbottom=False)
-        self._label_time(stick_fraction, self._run)
+        self._label_time(stick_fraction, self._whole)
 
-    def law(self, axes: Axes) -> None:
-        """Draw the friction law, and the range of relative speeds.
-
-        Friction with a memory leaves the curve of steady slip: its loop is drawn.
-        """
-        axes.set_title("friction law" if self.short else "friction law, with the range of this run")
-        drive, reached = self._drive, self._history.relative_speeds
-        if drive is None:
+    def law(self, axes: Axes) -> list[Artist]:
+        """Draw the friction law; return entries for the legend below, if they have no room here."""
+        short = self.short
+        axes.set_title("friction law" if short else "friction law, with the range of this run")
+        if self._drive is None:
             say(axes, "the drive is not known")
             axes.set(xticks=[], yticks=[])
-            return
-        at_rest = -drive.belt_speed
-        least, largest = reached or (min(at_rest, 0.0), max(at_rest, 0.0))
-        ends = min(least, at_rest, 0.0), max(largest, at_rest, 0.0)
-        room = 0.1 * (ends[1] - ends[0]) or drive.speed_scale
-        ends = ends[0] - room, ends[1] + room
-        relative_speed = self.units.named("velocity relative to the belt", short=self.short)
-        scale, label = self.units.axis(relative_speed, "m/s", ends)
-        axes.set_xlabel(label)
-        axes.set_ylabel(self.units.named("friction coefficient", short=self.short))
-        self._law_between(axes, *ends, scale, color="black", lw=0.8, ls="-.")
-        if reached is not None:
-            axes.axvspan(least / scale, largest / scale, color=LIGHT_GREY, alpha=0.4, lw=0.0)
-        curve, followed = "friction law", Line2D([], [], **_MOTION | {"lw": 3.0})
-        followed.set_label("range of the last cycles")
-        relative = self._last.velocity - self._last.belt_velocity
-        if drive.friction.states:
-            curve, followed = "in steady slip", Line2D([], [], **_MOTION, label="last cycles")
-            self._loop(axes, relative / scale)
-        elif len(relative):
-            span = float(relative.min()), float(relative.max())
-            self._law_between(axes, *span, scale, **_MOTION | {"lw": 3.0})
-        if at_rest != 0.0:
-            rest = float(drive.friction.at_rest(drive.belt_speed))
-            axes.plot(at_rest / scale, rest, zorder=3.0, **_POINT)
-        axes.axvline(at_rest / scale, **_BELT)
-        axes.set_xlim(ends[0] / scale, ends[1] / scale)
-        self.of_law = [
-            Line2D([], [], color="black", lw=0.8, ls="-.", label=curve),
-            followed,
-            Patch(color=LIGHT_GREY, alpha=0.4, lw=0.0, label="range of the whole run"),
+            return []
+        handles = draw_law(axes, self._drive, self._history, self._last, self.units, short=short)
+        if short:
+            return handles
+        rest = Line2D([], [], **BELT, label="slide at rest")
+        axes.legend(handles=[*handles, rest], loc="best")
+        return []
+
+
+class _SeveralRuns(_Panels):
+    """The panels of several runs."""
+
+    def over_time(self, figure: Figure, part: SubplotSpec) -> None:
+        """Draw displacement and force of each run in its own column."""
+        count = len(self._runs)
+        if self._narrow:
+            stacked: Any = part.subgridspec(2 * count, 1).subplots(sharex=True, squeeze=False)
+            panels = stacked.reshape(count, 2).T
+            for first, *others in panels:
+                for axes in others:
+                    axes.sharey(first)
+        else:
+            grid = part.subgridspec(2, count)
+            panels = grid.subplots(sharex=True, sharey="row", squeeze=False)
+        forces = [run.history.control.columns() for run in self._runs]
+        newton, force_label = self.units.axis(
+            self.units.named("control force", short=self.short), "N", *(f[1] for f in forces)
+        )
+        panes = [
+            Pane.covering(run.name, motion, force[0])
+            for run, motion, force in zip(self._runs, self._motions, forces, strict=True)
         ]
-        if not self.short:  # otherwise there is no room for a legend within the panel
-            rest = Line2D([], [], **_BELT, label="slide at rest")
-            axes.legend(handles=[*self.of_law, rest], loc="best")
+        time = self.units.axis("time", "s", *(pane.end for pane in panes))
+        width = 0.9 * figure.get_figwidth() / (1 if self._narrow else count)
+        for (position, force), run, look, pane, trace in zip(
+            panels.T, self._runs, _LOOKS[:count], panes, forces, strict=True
+        ):
+            solid: Any = {"color": look["color"], "ls": "-", "lw": 1.0}
+            motion, history = (pane.rows.time, pane.rows.position), run.history
+            draw_line(position, pane, motion, self._length[0], history.gap, **solid)
+            solid["drawstyle"] = "steps-post"
+            draw_line(force, pane, trace, newton, history.control_gap, **solid)
+            lines = pane.title, measures_text(run.measures, self.units)
+            title = wrapped(lines, width, "small")
+            position.set_title(title, fontsize="small", parse_math=False)
+            label_time(force, time)
+            if not len(pane.rows.time):
+                say(position, "no motion recorded")
+        for row, label in zip(panels, (self._length[1], force_label), strict=True):
+            row[0].set_ylabel(label)
+            row[0].set_ylim(widened(*row[0].get_ylim()))
+        start, end = min(pane.start for pane in panes), max(pane.end for pane in panes)
+        for axes, pane in zip(panels[0], panes, strict=True):
+            shade(axes, pane)
+            axes.set_xlim(start, end)
 
-    def _loop(self, axes: Axes, relative: FloatArray) -> None:
-        """Draw the friction of the last cycles over their relative speed."""
-        assert self._drive is not None
-        if len(relative):
-            time, force = self._history.friction.since(float(self._last.time[0]))
-            coefficient = force / self._drive.normal_force
-            speed = np.interp(time, self._last.time, relative)
-            axes.plot(speed, coefficient, label="loop", **_MOTION)
+    def portrait(self, axes: Axes) -> None:
+        """Draw the phase portraits of the last cycles."""
+        (length, label), (speed, speed_label) = self._length, self._speed
+        axes.set(title="phase portrait of the last cycles", xlabel=label, ylabel=speed_label)
+        for run, motion, look in zip(self._runs, self._motions, _LOOKS, strict=False):
+            if not len(motion.time):
+                continue
+            time, position, velocity, *_ = broken(run.history.gap, *run.last_cycles)
+            # The marker is where it ends, which is all there is of a slide at rest.
+            ends: Any = {"markevery": [len(time) - 1], "rasterized": len(time) > MANY}
+            axes.plot(position / length, velocity / speed, **look, **ends)
+        spans = [
+            (float(np.ptp(m.position)), float(np.ptp(m.velocity)))
+            for m in self._motions
+            if len(m.time)
+        ]
+        across, along = np.max(spans or [(0.0, 0.0)], axis=0)
+        axes.set_xlim(widened(*axes.get_xlim(), LEAST_PART * across / length))
+        axes.set_ylim(widened(*axes.get_ylim(), LEAST_PART * along / speed))
 
-    def _law_between(
-        self, axes: Axes, least: float, largest: float, scale: float, **look: Any
-    ) -> None:
-        assert self._drive is not None
-        law = self._drive.friction
-        for sign, start, end in ((-1.0, least, min(largest, 0.0)), (1.0, max(least, 0.0), largest)):
-            if start < end:
-                # Closely spaced where the law may be steep.
-                steps = np.r_[0.0, np.geomspace(1e-6, 1.0, 400)]
-                speeds = start + (end - start) * steps
-                if sign < 0.0:
-                    speeds = end - (end - start) * steps
-                axes.plot(speeds / scale, law.coefficient(speeds, sign), **look)
-        if least <= 0.0 <= largest:
-            forward, backward = map(float, law.limits)
-            axes.plot([0.0, 0.0], [-forward, backward], **look)
+    def cycles(self, amplitude: Axes, stick_fraction: Axes) -> None:
+        """Draw amplitude and stick fraction of each cycle over time."""
+        panels = amplitude, stick_fraction
+        draw_cycles(panels, [run.history for run in self._runs], _LOOKS, self.units, most=12)
+        axis = self.units.axis("time", "s", *(motion.time for motion in self._motions))
+        for axes, name in zip(panels, ("amplitude", "stick fraction"), strict=True):
+            axes.set_title(f"{name} of each cycle")
+            label_time(axes, axis)
 
 
 def _panels_over_time(figure: Figure, part: SubplotSpec, panes: int, *, narrow: bool) -> Any:

@@ -1,7 +1,8 @@
-"""The figure of a run, and the history kept for it."""
+"""The figures of a run and of several, and the history kept for them."""
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
@@ -15,16 +16,15 @@ import stickslip_ros as ss
 from benchmarks.measures_under_noise import motion
 from stickslip_ros.bags import Recording
 from stickslip_ros.bags.report import report_of_bag
-from stickslip_ros.physics.measures.cycle_measures import Cycle, CycleMeter, Measures
+from stickslip_ros.physics.measures.cycle_measures import Cycle, CycleMeter, Measures, measures_of
 from stickslip_ros.physics.measures.reading import SampleAssumptions
 from stickslip_ros.physics.measures.run_meter import RunAnalysis
 from stickslip_ros.physics.measures.sample_meter import MeasuredMotion, SampleMeter
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.motion import RecordedMotion
-from stickslip_ros.plots.panes import LAST_CYCLES
-from stickslip_ros.plots.run_figure import run_figure
+from stickslip_ros.plots.run_figure import LAST_CYCLES, DrawnRun, run_figure
 from stickslip_ros.plots.run_history import RunHistory
-from stickslip_ros.plots.style import STYLES, FigureStyle, save
+from stickslip_ros.plots.style import SCREEN, STYLES, FigureStyle, save
 from stickslip_ros.samples import SampleColumns
 from tests.physics.drives import FEED_DRIVE, PAPER
 from tests.plots.texts import faults, in_styles, legend_texts
@@ -38,7 +38,6 @@ pytestmark = pytest.mark.filterwarnings(
 FloatArray = npt.NDArray[np.float64]
 
 REFERENCE = Path(__file__).parents[2] / "bags" / "reference"
-MEASURES = Measures.__dataclass_fields__
 
 POSITION, POSITION_END, VELOCITY, VELOCITY_END, FORCE, FORCE_END = range(6)
 PORTRAIT, AMPLITUDE, STICK_FRACTION, LAW = range(6, 10)
@@ -58,6 +57,17 @@ class Drawn(NamedTuple):
     def line(self, panel: int, number: int) -> FloatArray:
         """Return x and y of a line as drawn."""
         return np.asarray(self.panel(panel).lines[number].get_xydata(), dtype=float).T
+
+
+def figure_of(
+    history: RunHistory,
+    measures: Measures,
+    drive: Drive | None,
+    *,
+    notes: Sequence[str] = (),
+    style: FigureStyle = SCREEN,
+) -> Figure:
+    return run_figure(DrawnRun("run", history, measures, drive, notes, "it"), style=style)
 
 
 def see(
@@ -94,7 +104,7 @@ def moving(drive: Drive, duration: float) -> Drawn:
         history.take_motion(MeasuredMotion(breakpoints, belt, done, meter.ends))
         cycles += done
     measures = meter.measures()
-    return Drawn(history, measures, drive, run_figure(history, measures, drive, title="it"), cycles)
+    return Drawn(history, measures, drive, figure_of(history, measures, drive), cycles)
 
 
 @pytest.fixture(scope="module")
@@ -106,8 +116,8 @@ def limit_cycle() -> Drawn:
 def reference() -> Drawn:
     history = RunHistory()
     report = report_of_bag(REFERENCE, observer=history)
-    measures = Measures(**{name: report[name] for name in MEASURES})
-    figure = run_figure(history, measures, FEED_DRIVE, title="it")
+    measures = measures_of(report)
+    figure = figure_of(history, measures, FEED_DRIVE)
     return Drawn(history, measures, FEED_DRIVE, figure, [])
 
 
@@ -214,7 +224,7 @@ def test_a_belt_that_changes_its_speed_moves_the_equilibrium() -> None:
     none = np.full(len(time), np.nan)
     see(history, time, np.sin(time), 0.1 * np.cos(time), belt, none)
     history.take_control(time, np.where(time < 9.9, 0.0, 3.0), all_acted(time))
-    figure = run_figure(history, CycleMeter(20).measures(), PAPER, title="it")
+    figure = figure_of(history, CycleMeter(20).measures(), PAPER)
     # What happens at the very end has no panel of its own.
     assert not any("switched on" in title for title in titles(figure))
     slow = replace(PAPER, belt_speed=0.2)
@@ -248,11 +258,12 @@ def test_without_a_drive_and_with_stamps_that_go_back_it_says_so() -> None:
         history.take_control(time, ones, all_acted(ones))
     assert np.all(np.diff(history.motion.time) > 0.0)
     assert np.all(np.diff(history.control.columns()[0]) > 0.0)
-    figure = run_figure(history, CycleMeter(20).measures(), None, title="it", notes=["a $note"])
+    figure = figure_of(history, CycleMeter(20).measures(), None, notes=["a $note"])
     assert [text.get_text() for text in figure.axes[LAW].texts] == ["the drive is not known"]
     assert len(figure.axes[PORTRAIT].lines) == 5
-    title, measures, note, left_out = figure.get_suptitle().split("\n")
+    title, measures, note, unknown, left_out = figure.get_suptitle().split("\n")
     assert (title, measures, note) == ("it", "no whole cycle", "a $note")
+    assert unknown.startswith("it is not recorded what drive it was")
     assert left_out.startswith("not drawn: 1000 samples")
     assert "equilibrium" not in legend_texts(figure)
     # The control acts from the first sample on.
@@ -268,7 +279,7 @@ def test_gaps_of_samples_and_forces_are_not_drawn_over() -> None:
     came = (time <= 1.0) | (time >= 1.5)
     acted = (time <= 2.0) | (time >= 2.5)
     history.take_control(time[came], 7.0 * time[came], acted[came])
-    figure = run_figure(history, CycleMeter(20).measures(), PAPER, title="it")
+    figure = figure_of(history, CycleMeter(20).measures(), PAPER)
 
     def gaps(panel: int, number: int) -> list[tuple[float, float]]:
         x, y = np.array(figure.axes[panel].lines[number].get_xydata()).T
@@ -300,7 +311,7 @@ def test_rounding_is_no_wave() -> None:
     wave = np.sin(time)
     belt = np.full(len(time), 0.4)
     see(history, time, 0.25 + 1e-16 * wave, 1e-16 * wave, belt, 0.25 + 1e-16 * wave)
-    figure = run_figure(history, CycleMeter(20).measures(), PAPER, title="it")
+    figure = figure_of(history, CycleMeter(20).measures(), PAPER)
     for panel in (POSITION, VELOCITY, FORCE, PORTRAIT):
         bottom, top = figure.axes[panel].get_ylim()
         assert top - bottom >= 0.9e-6 * max(abs(bottom), abs(top))
@@ -320,7 +331,7 @@ def test_very_little_makes_a_figure_too(samples: int, forces: int, drive: Drive 
     column = np.arange(float(samples))
     see(history, column, column, column, column, column)
     history.take_control(np.arange(float(forces)), np.zeros(forces), np.ones(forces, dtype=bool))
-    run_figure(history, CycleMeter(20).measures(), drive, title="it").draw_without_rendering()
+    figure_of(history, CycleMeter(20).measures(), drive).draw_without_rendering()
 
 
 def test_implausible_values_are_omitted() -> None:
@@ -358,7 +369,7 @@ def hour_of(blocks: Sequence[int]) -> RunHistory:
 @pytest.mark.long
 def test_an_hour_is_few_points_with_its_peak_and_its_shade(tmp_path: Path) -> None:
     history = hour_of([20_000] * 180)
-    figure = run_figure(history, CycleMeter(20).measures(), FEED_DRIVE, title="an hour")
+    figure = figure_of(history, CycleMeter(20).measures(), FEED_DRIVE)
     for axes in figure.axes[:PORTRAIT]:
         assert all(len(line.get_xdata()) < 5_000 for line in axes.lines)
     time, position = np.array(figure.axes[POSITION].lines[1].get_xydata()).T
@@ -383,7 +394,7 @@ def test_a_motion_that_runs_away_on_a_belt_at_rest_has_no_equilibrium() -> None:
     meter = CycleMeter(20)
     meter.report_run_away()
     drive = replace(PAPER, belt_speed=0.0)
-    figure = run_figure(history, meter.measures(), drive, title="it")
+    figure = figure_of(history, meter.measures(), drive)
     assert figure.get_suptitle() == "it\nunbounded"
     marked = [line.get_marker() for panel in (PORTRAIT, LAW) for line in figure.axes[panel].lines]
     assert "o" not in marked
@@ -425,7 +436,7 @@ def test_the_mean_cycle_of_a_noisy_record_is_shown(
     """Raw samples, the fit, and the edges of the stick with their intervals."""
     history, meter = noisy_record
     history.take_conclusions(RunAnalysis(meter.mean_cycle, None))
-    figure = run_figure(history, meter.measures(), None, title="it", style=STYLES["paper"])
+    figure = figure_of(history, meter.measures(), None, style=STYLES["paper"])
     assert faults(figure) == []
     (axes,) = (each for each in figure.axes if "mean cycle" in each.get_title())
     labels = [text.get_text() for text in axes.texts]
@@ -444,7 +455,7 @@ def test_the_slips_of_a_noisy_record_are_shown_instead(
     slips = {"each": {**each, "slip_time": [4e-3, 4e-3 + 1e-18, 4e-3]}}
     history.take_conclusions(RunAnalysis(meter.mean_cycle, slips))
     style = FigureStyle(size=(8.0, 7.0))
-    figure = run_figure(history, meter.measures(), None, title="it", style=style)
+    figure = figure_of(history, meter.measures(), None, style=style)
     assert faults(figure) == []
     assert "drop of a slip, 3 slips" in titles(figure)
     assert not any("mean cycle" in title for title in titles(figure))
@@ -473,7 +484,7 @@ def test_the_instant_of_switching_on_is_enlarged(style: str) -> None:
     history.take_control(time, np.where(time < 2.0, 0.0, 3.0), all_acted(time))
     measures = CycleMeter(20).measures()
     drawn_style = replace(STYLES[style], titled=style != "paper")
-    figure = run_figure(history, measures, FEED_DRIVE, title="it", style=drawn_style)
+    figure = figure_of(history, measures, FEED_DRIVE, style=drawn_style)
     assert faults(figure) == []
     (axes,) = (each for each in figure.axes if "control switched on" in each.get_title())
     low, high = axes.get_xlim()
@@ -482,3 +493,37 @@ def test_the_instant_of_switching_on_is_enlarged(style: str) -> None:
     x = np.asarray(axes.lines[-1].get_xdata(), dtype=float)
     assert len(x) > 20
     assert low - 0.02 <= x.min() < x.max() <= high + 0.02
+
+
+@cache
+def drawn(name: str, end: float, drive: Drive = FEED_DRIVE) -> DrawnRun:
+    history = RunHistory()
+    report = report_of_bag(REFERENCE, end=end, observer=history)
+    return DrawnRun(name, history, measures_of(report), drive)
+
+
+@in_styles
+def test_each_run_has_a_column_and_a_line_in_each_common_panel(style: str) -> None:
+    # The units are SI, since not all drives are without units.
+    runs = [drawn("long", 2.0), drawn("short", 1.0), drawn("shortest", 0.02, PAPER)]
+    figure = run_figure(*runs, style=STYLES[style])
+    assert faults(figure) == []
+    assert legend_texts(figure) == ["long", "short", "shortest"]
+    upper, (portrait, amplitude, stick_fraction) = figure.axes[:6], figure.axes[6:]
+    shown = [axes for axes in upper if axes.get_title()]
+    assert [axes.get_title().split("\n")[0] for axes in shown] == ["long", "short", "shortest"]
+    assert len({axes.get_xlim() for axes in upper}) == 1
+    assert len({axes.get_ylim() for axes in shown}) == 1
+    colours = {axes.lines[0].get_color() for axes in shown}
+    assert len(colours) == 3
+    for axes in (portrait, amplitude, stick_fraction):
+        assert {line.get_color() for line in axes.lines} == colours
+    for number, run in enumerate(runs):
+        drawn_amplitude = np.asarray(amplitude.lines[number].get_ydata(), dtype=float)
+        assert drawn_amplitude == pytest.approx(1e6 * run.history.cycles[1])
+    assert amplitude.get_ylabel().replace("\n", " ") == "amplitude (µm)"
+
+
+def test_there_are_no_units_where_all_drives_have_none() -> None:
+    figure = run_figure(*[drawn("a", 1.0, PAPER)] * 2)
+    assert figure.axes[0].get_ylabel() == "displacement $X$"

@@ -1,13 +1,16 @@
-"""Panels of a run: a part of it over time, and conclusions from a noisy record of it."""
+"""The panels of a figure of runs: parts over time, cycles, friction law, and conclusions."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple, Self
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap, to_rgba
 from matplotlib.figure import Figure
 from matplotlib.gridspec import GridSpec, GridSpecFromSubplotSpec
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 
 from stickslip_ros.arrays import FloatArray, IntArray
 from stickslip_ros.physics.measures.cycle_fit import MeanCycle
@@ -16,12 +19,14 @@ from stickslip_ros.physics.measures.run_meter import RunAnalysis
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.plots.decimation import intervals, peaks
 from stickslip_ros.plots.regimes import REGIMES
-from stickslip_ros.plots.run_history import DrawnMotion
-from stickslip_ros.plots.style import BLUE, GREY, ORANGE
+from stickslip_ros.plots.run_history import DrawnMotion, RunHistory
+from stickslip_ros.plots.style import BLUE, GREEN, GREY, LIGHT_GREY, ORANGE
 from stickslip_ros.plots.units import Units
 
-LAST_CYCLES = 5
-"""Number of cycles that are enlarged, and in the phase portrait."""
+MOTION: Any = {"color": BLUE, "lw": 1.0}
+BELT: Any = {"color": "black", "lw": 1.0, "ls": "--", "zorder": 2.5}
+POINT: Any = {"color": GREEN, "marker": "o", "ms": 6.0, "ls": "", "mec": "white"}
+"""Looks of the slide, the belt and an equilibrium."""
 
 PIXELS = 1000
 """Intervals of time across a panel, of about one pixel each."""
@@ -34,6 +39,8 @@ LEAST_PART = 1e-3
 
 _SHADE = LinearSegmentedColormap.from_list("stick", [to_rgba(GREY, 0.0), to_rgba(GREY, 0.6)])
 
+_LAW: Any = {"color": "black", "lw": 0.8, "ls": "-."}
+_REACHED: Any = {"color": LIGHT_GREY, "alpha": 0.4, "lw": 0.0}
 _RAW: Any = {"color": BLUE, "marker": ".", "ms": 2.0, "ls": "", "alpha": 0.5, "mew": 0.0}
 _FITTED: Any = {"color": ORANGE, "lw": 1.2}
 _CONFIDENCE = 1.96
@@ -75,14 +82,6 @@ def measures_text(measures: Measures, units: Units) -> str:
     return ", ".join(found)
 
 
-def end_duration(motion: DrawnMotion, measures: Measures, drive: Drive | None) -> float:
-    """Return the duration of the enlarged end, s; a fixed share of the run without a period."""
-    span = float(motion.time[-1] - motion.time[0]) if len(motion.time) else 0.0
-    natural = drive.natural_period if drive is not None and drive.has_spring else 0.0
-    period = measures.period or natural
-    return min(LAST_CYCLES * period, span) or 0.05 * span
-
-
 def draw_line(
     axes: Axes, pane: Pane, trace: Sequence[FloatArray], scale: float, gap: float, **look: Any
 ) -> None:
@@ -111,7 +110,37 @@ def broken(gap: float, time: FloatArray, *columns: FloatArray) -> list[FloatArra
     return [np.insert(column, behind, np.nan) for column in (time, *columns)]
 
 
-def cycle_rows(time: FloatArray, *columns: FloatArray) -> IntArray:
+def draw_cycles(
+    panels: Sequence[Axes],
+    histories: Sequence[RunHistory],
+    looks: Sequence[Mapping[str, Any]],
+    units: Units,
+    most: int,
+) -> None:
+    """Draw amplitude and stick fraction of each cycle over time, in a panel each.
+
+    The markers of `looks` are on at most about `most` cycles of a run.
+    """
+    cycles = [history.cycles for history in histories]
+    scale, label = units.axis("amplitude", "m", *(each[1] for each in cycles))
+    if not any(len(time) for time, *_ in cycles):
+        say(panels[0], "no cycle was completed")
+    positions = [history.motion.position for history in histories]
+    farthest = max(float(np.abs(each).max(initial=0.0)) for each in positions) / scale
+    for axes, column, of_panel, size, least in (
+        (panels[0], 1, label, scale, LEAST_SPAN * farthest),
+        (panels[1], 2, "stick fraction", 1.0, 0.0),
+    ):
+        for each, look in zip(cycles, looks, strict=False):
+            rows = _cycle_rows(*each)
+            every = max(1, len(rows) // most)
+            axes.plot(each[0][rows], each[column][rows] / size, markevery=every, **look)
+        largest = max(float(each[column].max(initial=0.0)) / size for each in cycles)
+        axes.set_ylim(0.0, max(1.1 * largest, least) or 1.0)
+        axes.set_ylabel(of_panel)
+
+
+def _cycle_rows(time: FloatArray, *columns: FloatArray) -> IntArray:
     """Return the rows of the cycles to draw: in each pixel column all peaks."""
     span = float(time[-1] - time[0]) if len(time) else 0.0
     return peaks(intervals(time, span / PIXELS or 1.0), *columns)
@@ -142,6 +171,66 @@ def label_time(axes: Axes, time: tuple[float, str]) -> None:
 def say(axes: Axes, why: str) -> None:
     """Write in a panel why it is empty."""
     axes.text(0.5, 0.5, why, ha="center", va="center", transform=axes.transAxes)
+
+
+def draw_law(
+    axes: Axes, drive: Drive, history: RunHistory, last: DrawnMotion, units: Units, *, short: bool
+) -> list[Artist]:
+    """Draw the friction law with the range of relative speeds; return the entries of its legend.
+
+    Friction with a memory leaves the curve of steady slip: its loop in the `last` cycles is drawn.
+    """
+    at_rest, reached = -drive.belt_speed, history.relative_speeds
+    least, largest = reached or (min(at_rest, 0.0), max(at_rest, 0.0))
+    ends = min(least, at_rest, 0.0), max(largest, at_rest, 0.0)
+    room = 0.1 * (ends[1] - ends[0]) or drive.speed_scale
+    ends = ends[0] - room, ends[1] + room
+    relative_speed = units.named("velocity relative to the belt", short=short)
+    scale, label = units.axis(relative_speed, "m/s", ends)
+    axes.set_xlabel(label)
+    axes.set_ylabel(units.named("friction coefficient", short=short))
+    _law_between(axes, drive, *ends, scale, **_LAW)
+    if reached is not None:
+        axes.axvspan(least / scale, largest / scale, **_REACHED)
+    curve, followed = "friction law", Line2D([], [], **MOTION | {"lw": 3.0})
+    followed.set_label("range of the last cycles")
+    relative = last.velocity - last.belt_velocity
+    if drive.friction.states:
+        curve, followed = "in steady slip", Line2D([], [], **MOTION, label="last cycles")
+        if len(relative):
+            time, force = history.friction.since(float(last.time[0]))
+            speed = np.interp(time, last.time, relative / scale)
+            axes.plot(speed, force / drive.normal_force, label="loop", **MOTION)
+    elif len(relative):
+        span = float(relative.min()), float(relative.max())
+        _law_between(axes, drive, *span, scale, **MOTION | {"lw": 3.0})
+    if at_rest != 0.0:
+        rest = float(drive.friction.at_rest(drive.belt_speed))
+        axes.plot(at_rest / scale, rest, zorder=3.0, **POINT)
+    axes.axvline(at_rest / scale, **BELT)
+    axes.set_xlim(ends[0] / scale, ends[1] / scale)
+    return [
+        Line2D([], [], **_LAW, label=curve),
+        followed,
+        Patch(**_REACHED, label="range of the whole run"),
+    ]
+
+
+def _law_between(
+    axes: Axes, drive: Drive, least: float, largest: float, scale: float, **look: Any
+) -> None:
+    law = drive.friction
+    for sign, start, end in ((-1.0, least, min(largest, 0.0)), (1.0, max(least, 0.0), largest)):
+        if start < end:
+            # Closely spaced where the law may be steep.
+            steps = np.r_[0.0, np.geomspace(1e-6, 1.0, 400)]
+            speeds = start + (end - start) * steps
+            if sign < 0.0:
+                speeds = end - (end - start) * steps
+            axes.plot(speeds / scale, law.coefficient(speeds, sign), **look)
+    if least <= 0.0 <= largest:
+        forward, backward = map(float, law.limits)
+        axes.plot([0.0, 0.0], [-forward, backward], **look)
 
 
 def draw_conclusions(
