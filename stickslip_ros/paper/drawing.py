@@ -15,8 +15,14 @@ from matplotlib.figure import Figure, SubFigure
 from matplotlib.lines import Line2D
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.paper.figures import BifurcationFigure, Panel, PaperFigure, PortraitFigure
-from stickslip_ros.paper.portraits import LAST_CYCLES, Portrait
+from stickslip_ros.paper.figures import (
+    LAST_CYCLES,
+    BifurcationFigure,
+    Panel,
+    PaperFigure,
+    Portrait,
+    PortraitFigure,
+)
 from stickslip_ros.physics.measures.breakpoints import Breakpoints
 from stickslip_ros.plots.regimes import REGIMES
 from stickslip_ros.plots.style import (

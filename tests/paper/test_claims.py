@@ -31,11 +31,12 @@ from stickslip_ros.paper.figures import (
     BifurcationFigure,
     Panel,
     PaperFigure,
+    PortraitCase,
     PortraitFigure,
     bifurcation_drive,
+    portrait_of,
     unit_drive,
 )
-from stickslip_ros.paper.portraits import PortraitCase, portraits
 from stickslip_ros.physics.measures.cycle_measures import Regime
 from stickslip_ros.physics.model.friction import Linear
 from stickslip_ros.physics.theory.hopf import first_lyapunov_coefficient
@@ -273,7 +274,7 @@ def test_enough_stiffness_ends_the_sticking(without_figures: dict[str, Finding])
     assert finding.computed == f"from stiffness {never:g} on"
     # From rest, without shooting: what the slide does on either side of these stiffnesses.
     stiffnesses = (overruns - 0.1, overruns + 0.1, never - 1.0, never + 1.0)
-    ends = list(portraits(PortraitCase("", unit_drive(0.2, stiffness=k)) for k in stiffnesses))
+    ends = [portrait_of(PortraitCase("", unit_drive(0.2, stiffness=k))) for k in stiffnesses]
     fastest = [float(end.last_cycles.velocity.max()) for end in ends]
     assert fastest[0] == pytest.approx(0.2, rel=1e-12)
     assert all(speed > 0.2 * (1.0 + 1e-9) for speed in fastest[1:])
@@ -281,9 +282,7 @@ def test_enough_stiffness_ends_the_sticking(without_figures: dict[str, Finding])
 
 
 def test_the_friction_of_a_stick_is_that_from_the_landing_on() -> None:
-    only = PortraitFigure(
-        6, "", (Panel("", tuple(portraits([PortraitCase("", unit_drive(0.2))]))),)
-    )
+    only = PortraitFigure(6, "", (Panel("", (portrait_of(PortraitCase("", unit_drive(0.2))),)),))
     finding = verdict("eq-5-stick", only)
     # A stick ends at mu_s = 0.4. It takes 0.285506954 of a period of 7.06772953, at the speed 0.2.
     landing = 0.4 - 0.2 * 0.285506954 * 7.06772953
@@ -303,10 +302,7 @@ def test_under_the_printed_slope_the_stick_fraction_rises_with_the_damping_and_f
     law = Linear(STRIBECK.static, PRINTED_SLOPE)
     betas = (0.12, 0.15, 0.17, 0.18, 0.2, 0.3)
     drives = [unit_drive(0.2, damping=2.0 * beta, friction=law) for beta in betas]
-    ends = [
-        portrait.measures.stick_fraction
-        for portrait in portraits(PortraitCase("", d) for d in drives)
-    ]
+    ends = [portrait_of(PortraitCase("", d)).measures.stick_fraction for d in drives]
     assert ends == sorted(ends[:4]) + sorted(ends[4:], reverse=True)
     assert [len(arrivals(drive)) for drive in drives] == [2, 2, 2, 1, 1, 1]
 
@@ -325,7 +321,7 @@ def test_verdicts_survive_ten_times_the_range() -> None:
     assert verdict("fig-4-influence", stiffnesses).verdict is CORRECTED
     minima = (0.001, 0.01, 0.1, 0.25, 0.37, 0.39, 0.399)
     drives = [unit_drive(0.4, friction=replace(STRIBECK, minimum=m)) for m in minima]
-    gaps = tuple(portraits(PortraitCase("", drive) for drive in drives))
+    gaps = tuple(portrait_of(PortraitCase("", drive)) for drive in drives)
     figure = PortraitFigure(11, "", (Panel("", gaps),))
     assert verdict("fig-11-amplitude", figure).verdict is HOLDS
     wide = {

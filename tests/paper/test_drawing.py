@@ -9,8 +9,13 @@ import pytest
 from PIL import Image
 
 from stickslip_ros.paper.drawing import paper_figure, save_paper_figure
-from stickslip_ros.paper.figures import Panel, PortraitFigure, compute_figure
-from stickslip_ros.paper.portraits import PortraitCase, portraits
+from stickslip_ros.paper.figures import (
+    Panel,
+    PortraitCase,
+    PortraitFigure,
+    compute_figure,
+    portrait_of,
+)
 from stickslip_ros.physics.model.friction import Linear
 from stickslip_ros.plots.style import BLUE, GREEN, ORANGE, STYLES
 from tests.paper.test_figures import over_belt_speed
@@ -26,7 +31,7 @@ WIDTHS = {"screen": None, "paper": 85.0 / 25.4, "paper-double": 180.0 / 25.4}
 
 
 def figure_of(*panels: list[PortraitCase]) -> PortraitFigure:
-    drawn = tuple(Panel("panel", tuple(portraits(cases))) for cases in panels)
+    drawn = tuple(Panel("panel", tuple(map(portrait_of, cases))) for cases in panels)
     return PortraitFigure(99, "a title", drawn)
 
 

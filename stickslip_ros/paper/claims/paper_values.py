@@ -14,8 +14,7 @@ import numpy.typing as npt
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.paper.claims.verdict import Formula, Number
-from stickslip_ros.paper.figures import unit_drive
-from stickslip_ros.paper.portraits import Portrait
+from stickslip_ros.paper.figures import Portrait, unit_drive
 from stickslip_ros.physics.measures.cycle_measures import Regime
 from stickslip_ros.physics.model.control import Washout
 from stickslip_ros.physics.model.drive import Drive

@@ -32,8 +32,7 @@ from stickslip_ros.paper.claims.paper_values import (
     trace_of,
 )
 from stickslip_ros.paper.claims.verdict import Computations, Evidence, Number, Observation
-from stickslip_ros.paper.figures import PRINTED_SLOPE, STRIBECK, TANGENT_SLOPE, unit_drive
-from stickslip_ros.paper.portraits import Portrait
+from stickslip_ros.paper.figures import PRINTED_SLOPE, STRIBECK, TANGENT_SLOPE, Portrait, unit_drive
 from stickslip_ros.physics.measures.cycle_measures import Regime
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import Coulomb, Linear, Stribeck
