@@ -38,7 +38,7 @@ from benchmarks.parties import (
     wait_until_connected,
 )
 from benchmarks.slices import Row, by_turns, compare_rates, show
-from stickslip_ros.nodes.base.process import spin
+from stickslip_ros.nodes.base.spinner import spin
 
 ROUNDS = 11
 SLICE_TIME = 0.7

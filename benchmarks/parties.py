@@ -25,13 +25,13 @@ from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 
-from stickslip_ros.bags.report import report_of_bag
+from stickslip_ros.bags.report import report_of_recording
 from stickslip_ros.nodes.analyzer import AnalyzerNode
 from stickslip_ros.nodes.base.child_process import start_child
 from stickslip_ros.nodes.base.machine import own_domain
 from stickslip_ros.nodes.base.managed import ManagedNode
 from stickslip_ros.nodes.base.network import domain_variables
-from stickslip_ros.nodes.base.process import spin
+from stickslip_ros.nodes.base.spinner import spin
 from stickslip_ros.nodes.plant import PlantNode
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
 from stickslip_ros.scenarios.files import DEFAULT_NAMESPACE, load_scenario, parameter_file
@@ -180,7 +180,7 @@ class OurLoop(Generic[PlantT]):
             process.terminate()
         for process in self.processes:
             process.wait()
-        report = report_of_bag(self._bag)
+        report = report_of_recording(self._bag)
         if report["samples"] != self._samples or not report["complete"]:
             raise SystemExit(f"the bag does not hold {self._samples} samples: {report}")
 

@@ -29,7 +29,7 @@ from stickslip_ros.messages.topics import CONTROL_FORCE, DEEP, JOINT_STATES
 from stickslip_ros.nodes.base.child_process import start_child
 from stickslip_ros.nodes.base.machine import own_domain
 from stickslip_ros.nodes.base.network import domain_variables
-from stickslip_ros.nodes.base.process import spin
+from stickslip_ros.nodes.base.spinner import spin
 from stickslip_ros.nodes.replay import ReplayNode
 from stickslip_ros.nodes.replaying.player import Message
 from stickslip_ros.scenarios import DEFAULT_NAMESPACE

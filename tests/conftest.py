@@ -32,7 +32,7 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 
 STARTING_FIXTURES = {"cluster", "processes", "recorded", "start", "start_stickslip"}
 
-MIDDLEWARE = {Path(__file__).parent / floor for floor in ("nodes", "running", "bags")}
+MIDDLEWARE = {Path(__file__).parent / floor for floor in ("nodes", "bags")}
 
 _STARTS = {"os.fork", "os.forkpty", "os.posix_spawn", "os.system", "subprocess.Popen"}
 _FOUND_BY_LIBRARIES = {"fc-list", "ldconfig", "/sbin/ldconfig"}

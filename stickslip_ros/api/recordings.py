@@ -1,8 +1,7 @@
 """Recorded runs: the samples in a bag or a table, and their measures."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +10,7 @@ import numpy as np
 from stickslip_ros.api.display import Parts, Shown, shown_in_notebooks
 from stickslip_ros.api.frames import Quantity, data_frame, data_set
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.bags.report import report_of_bag, report_of_table
+from stickslip_ros.bags.report import report_of_recording
 from stickslip_ros.physics.loop.trajectory import QUANTITIES
 from stickslip_ros.physics.measures.cycle_measures import Measures, measures_of
 from stickslip_ros.physics.measures.slips import SlipThreshold
@@ -188,16 +187,16 @@ def read_bag(
     >>> recorded.measures.regime.value, f"{recorded.measures.amplitude:.2e}"
     ('stick_slip', '3.26e-04')
     """
-    report = partial(
-        report_of_bag,
+    return _recorded_run(
         Path(path),
+        recorded_drive(Path(path), namespace),
+        table=False,
         start=start,
         end=end,
         namespace=namespace,
         belt_speed=belt_speed,
         slips=slips,
     )
-    return _recorded_run(Path(path), report, recorded_drive(Path(path), namespace))
 
 
 def read_table(
@@ -254,23 +253,21 @@ def read_table(
     >>> run.measures.regime.value, round(1e6 * run.measures.amplitude)
     ('stick_slip', 434)
     """
-    report = partial(
-        report_of_table,
+    return _recorded_run(
         Path(path),
-        columns,
+        None,
+        table=True,
+        columns=columns,
         start=start,
         end=end,
         stick_speed=stick_speed,
         belt_speed=belt_speed,
         slips=slips,
     )
-    return _recorded_run(Path(path), report, None)
 
 
-def _recorded_run(
-    path: Path, report: Callable[..., dict[str, Any]], drive: Drive | None
-) -> RecordedRun:
-    """Return the run that a report is made of."""
+def _recorded_run(path: Path, drive: Drive | None, **options: Any) -> RecordedRun:
+    """Return the run that a report with these options is made of."""
     history = RunHistory()
     samples: list[SampleColumns] = []
     forces: list[ForceColumns] = []
@@ -281,7 +278,7 @@ def _recorded_run(
         else:
             forces.append(part)
 
-    made = report(observer=history, take=take)
+    made = report_of_recording(path, observer=history, take=take, **options)
     nothing = np.empty(0)
     stamps = np.empty(0, dtype=np.int64)
     return RecordedRun(

@@ -5,7 +5,7 @@ import sys
 from stickslip_ros.app.optional_dependencies import load_matplotlib, loading_ros
 from stickslip_ros.app.output import print_values
 from stickslip_ros.app.run import default_bag, record
-from stickslip_ros.bags.report import report_of_bag
+from stickslip_ros.bags.report import report_of_recording
 from stickslip_ros.errors import StickslipError
 from stickslip_ros.scenarios.files import load_scenario
 
@@ -55,8 +55,8 @@ def _demonstrate() -> None:
     if interrupted:
         raise KeyboardInterrupt
     parts = {
-        f"before ({switched_on:g} s)": report_of_bag(bag, end=switched_on),
-        f"after ({_DURATION - switched_on:g} s)": report_of_bag(bag, start=switched_on),
+        f"before ({switched_on:g} s)": report_of_recording(bag, end=switched_on),
+        f"after ({_DURATION - switched_on:g} s)": report_of_recording(bag, start=switched_on),
     }
     print_values(
         f"{results['samples']} samples, {results['lost_samples']} lost, "
@@ -65,7 +65,7 @@ def _demonstrate() -> None:
     )
     figure = bag.with_suffix(".png")
     history = RunHistory()
-    report = report_of_bag(bag, observer=history)
+    report = report_of_recording(bag, observer=history)
     drive = scenario.plant.as_drive()
     save(run_figure(DrawnRun.recorded(bag, history, report, drive)), figure)
     print(f"bag:    {bag}\nfigure: {figure}")

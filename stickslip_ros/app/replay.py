@@ -74,7 +74,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Run the command; return the exit status."""
     with loading_ros():
         from stickslip_ros.nodes.base.network import keep_on_this_machine
-        from stickslip_ros.running.bag_replay import replay_bag
+        from stickslip_ros.nodes.replay import replay_bag
 
         reach = keep_on_this_machine(arguments.network)
 

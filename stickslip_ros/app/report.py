@@ -71,7 +71,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> None:
     """Run the command."""
-    from stickslip_ros.bags.report import report_of_bag, report_of_table
+    from stickslip_ros.bags.report import report_of_recording
     from stickslip_ros.bags.table_file import is_table
     from stickslip_ros.physics.measures.slips import SlipThreshold
     from stickslip_ros.plots.measure_table import slip_table, why_no_cycle
@@ -93,18 +93,16 @@ def run(arguments: argparse.Namespace) -> None:
     slips = None if arguments.slips is None else SlipThreshold(arguments.slips, arguments.slip_time)
     reports: dict[str, dict[str, Any]] = {}
     for bag in dict.fromkeys(bags):
-        options: dict[str, Any] = {
-            "start": arguments.start,
-            "end": arguments.end,
-            "stick_speed": arguments.stick_speed,
-            "belt_speed": arguments.belt_speed,
-            "slips": slips,
-            "observer": histories.get(str(bag)),
-        }
-        reports[str(bag)] = (
-            report_of_table(bag, columns, **options)
-            if is_table(bag)
-            else report_of_bag(bag, namespace=arguments.namespace, **options)
+        reports[str(bag)] = report_of_recording(
+            bag,
+            columns,
+            start=arguments.start,
+            end=arguments.end,
+            namespace=arguments.namespace,
+            stick_speed=arguments.stick_speed,
+            belt_speed=arguments.belt_speed,
+            slips=slips,
+            observer=histories.get(str(bag)),
         )
     if plot is not None:
         _draw(arguments, histories, reports)

@@ -261,9 +261,9 @@ def _other_controller(arguments: argparse.Namespace) -> list[str] | None:
 
 
 def _values(bag: Path, controller: str | None, plant: Mapping[str, str]) -> dict[str, Any]:
-    from stickslip_ros.bags.report import report_of_bag
+    from stickslip_ros.bags.report import report_of_recording
 
-    report = report_of_bag(bag)
+    report = report_of_recording(bag)
     return {
         "bag": str(bag),
         "controller": controller,

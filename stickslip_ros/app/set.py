@@ -43,8 +43,8 @@ def run(arguments: argparse.Namespace) -> None:
             raise InvalidInputError(f"{node}.{error}") from None
         given.setdefault(node, {})[name] = value
     with loading_ros():
+        from stickslip_ros.nodes.base.clients import NodeNotFoundError, set_parameters
         from stickslip_ros.nodes.base.network import keep_on_this_machine
-        from stickslip_ros.running.node_clients import NodeNotFoundError, set_parameters
 
         keep_on_this_machine(arguments.network)
     try:

@@ -129,6 +129,9 @@ class Recording:
         }
         """Types by name, such as `sensor_msgs/msg/JointState` by `/feed_drive/joint_states`."""
 
+    notes = ()
+    """Sentences on what other recordings, such as tables, do not have."""
+
     @property
     def complete(self) -> bool:
         """Whether `missing` is empty."""
@@ -154,14 +157,10 @@ class Recording:
     @cached_property
     def joint_states(self) -> SampleColumns:
         """All joint states; raises BagError as `blocks` does."""
-        name = self._topic(JOINT_STATES)
-        if self._belt_speed is None or not name:
+        if self._belt_speed is None:
             return self._whole(JOINT_STATES, joint_states_in)
         self._single = _SingleJoint(self._belt_speed)
-        blocks = [self._states(name, block, ids) for block, ids in self._blocks(name)]
-        if not blocks:
-            return self._whole(JOINT_STATES, joint_states_in)
-        return blocks[0].followed_by(*blocks[1:])
+        return self._single.completed(self._whole(JOINT_STATES, single_joint_states_in))
 
     @cached_property
     def true_joint_states(self) -> SampleColumns:

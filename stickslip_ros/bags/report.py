@@ -1,8 +1,8 @@
-"""Report the measures and counts of a recorded run."""
+"""Report the measures and counts of a recorded run, from a bag or a table."""
 
 import json
 from collections.abc import Callable, Mapping
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from math import inf
 from pathlib import Path
 from typing import Any
@@ -11,7 +11,7 @@ import numpy as np
 
 from stickslip_ros.arrays import BoolArray, IntArray
 from stickslip_ros.bags.reader import Recording
-from stickslip_ros.bags.table_file import LONGEST, read_table
+from stickslip_ros.bags.table_file import LONGEST, TableRecording, is_table, read_table
 from stickslip_ros.errors import BagError, InvalidInputError
 from stickslip_ros.messages.topics import CONTROL_FORCE, JOINT_STATES
 from stickslip_ros.physics.measures.reading import SampleAssumptions, reading_of
@@ -22,14 +22,16 @@ from stickslip_ros.stamps import NANOSECONDS
 from stickslip_ros.text import quantity
 
 _DEFAULT_WINDOW = 20
-"""Cycles to average over for a bag of another recorder."""
+"""Cycles to average over for a recording of others."""
 _NOISES = 6.0
 """Least drop of a slip, in standard deviations of the noise, that is not noise."""
 
 
-def report_of_bag(
+def report_of_recording(
     path: Path,
+    columns: Mapping[str, str] | None = None,
     *,
+    table: bool | None = None,
     start: float = 0.0,
     end: float = float("inf"),
     window: int | None = None,
@@ -47,7 +49,11 @@ def report_of_bag(
     Parameters
     ----------
     path : Path
-        A bag directory, or one MCAP file.
+        A bag directory, one MCAP file, or a CSV or MAT file.
+    columns : mapping or None
+        Where a table has its quantities, as for `read_table`.
+    table : bool or None
+        Whether the file is a table; None: whether its name ends as that of one.
     start : float
         Start of the part that is measured, s; 0 includes everything from the beginning.
     end : float
@@ -56,11 +62,12 @@ def report_of_bag(
         Number of whole cycles at the end of the part over which the measures are averaged; None:
         as many as the analyzer used.
     namespace : str or None
-        ROS namespace of the drive; None if the bag holds only one drive.
+        ROS namespace of the drive; None if the bag holds only one drive, or for a table.
     stick_speed : float or None
         Largest relative speed of a slide that sticks, m/s; None: as the analyzer used.
     belt_speed : float or None
-        Belt speed, m/s, of a bag whose joint states have a single joint.
+        Belt speed, m/s, of a bag whose joint states have a single joint, or in place of a column
+        of a table.
     slips : SlipThreshold or None
         What counts as a slip; None: slips are not looked for.
     observer : RunObserver or None
@@ -73,25 +80,32 @@ def report_of_bag(
     -------
     dict
         Measures (SI units) and counts by name. `complete` is True if `missing`, sentences on what
-        the bag lacks, is empty. `notes` are sentences on what makes the measures doubtful.
+        the bag lacks, is empty. `notes` are sentences on what a table lacks, and on what makes the
+        measures doubtful.
 
     Raises
     ------
     BagError
-        If `path` is not a bag, or holds neither joint states nor control forces.
+        If `path` is not a bag or table, or holds neither joint states nor control forces.
     InvalidInputError
-        If the part is empty.
+        If the part is empty, or a table does not have a column.
 
     Examples
     --------
     >>> from pathlib import Path
-    >>> from stickslip_ros.bags.report import report_of_bag
-    >>> report = report_of_bag(Path("bags/reference"), start=1.0)
+    >>> from stickslip_ros.bags.report import report_of_recording
+    >>> report = report_of_recording(Path("bags/reference"), start=1.0)
     >>> report["complete"], report["samples"]
     (True, 2001)
     """
-    _check_part(start, end)
-    with Recording(path, namespace, belt_speed=belt_speed) as recording:
+    if not start < end:
+        raise InvalidInputError(f"the part from {start} s to {end} s is empty")
+    with ExitStack() as opened:
+        recording = (
+            read_table(path, columns, belt_speed)
+            if (is_table(path) if table is None else table)
+            else opened.enter_context(Recording(path, namespace, belt_speed=belt_speed))
+        )
         meter = RunMeter(
             window or _window_at_recording(recording),
             dropped_known=recording.dropped_known,
@@ -117,44 +131,10 @@ def report_of_bag(
                 + "".join(f"; {sentence}" for sentence in missing)
             )
     report = run.report(path)
+    notes = [*recording.notes, *report["notes"]]
     if not run.has_states:
         missing.append("the bag holds no joint states: the motion is unknown")
-    return {**report, "complete": not missing, "missing": missing}
-
-
-def report_of_table(
-    path: Path,
-    columns: Mapping[str, str] | None = None,
-    *,
-    start: float = 0.0,
-    end: float = float("inf"),
-    window: int = _DEFAULT_WINDOW,
-    stick_speed: float | None = None,
-    belt_speed: float | None = None,
-    slips: SlipThreshold | None = None,
-    observer: RunObserver | None = None,
-    take: Callable[[SampleColumns | ForceColumns], None] = lambda _: None,
-) -> dict[str, Any]:
-    """Return measures and counts of a CSV or MAT file, as `report_of_bag` does.
-
-    Without `stick_speed`, m/s, the noise is found from the samples. For `columns` and `belt_speed`
-    see `read_table`. `take` receives samples and forces. The notes also say what the table lacks.
-    """
-    _check_part(start, end)
-    table = read_table(path, columns, belt_speed)
-    reading = table.reading if stick_speed is None else SampleAssumptions(stick_speed)
-    meter = RunMeter(window, observer=observer, reading=reading)
-    run = _RunReader(meter, start, end, observer, take, slips)
-    run.feed(table.samples, table.forces, table.forces[:0])
-    run.finish()
-    report = run.report(path)
-    notes = [*table.notes, *report["notes"]]
-    return {**report, "notes": notes, "complete": True, "missing": []}
-
-
-def _check_part(start: float, end: float) -> None:
-    if not start < end:
-        raise InvalidInputError(f"the part from {start} s to {end} s is empty")
+    return {**report, "notes": notes, "complete": not missing, "missing": missing}
 
 
 class _RunReader:
@@ -265,7 +245,9 @@ class _RunReader:
         return (since >= self._start) & (since < self._end)
 
 
-def reading_at_recording(recording: Recording, given: float | None = None) -> SampleAssumptions:
+def reading_at_recording(
+    recording: Recording | TableRecording, given: float | None = None
+) -> SampleAssumptions:
     """Return how the samples of a recording are to be read, with a stick speed that is `given`."""
     if given is not None:
         return SampleAssumptions(given)
@@ -282,7 +264,7 @@ def reading_at_recording(recording: Recording, given: float | None = None) -> Sa
     return reading_of(known)
 
 
-def _window_at_recording(recording: Recording) -> int:
+def _window_at_recording(recording: Recording | TableRecording) -> int:
     kept = recording.metadata("stickslip_ros/analyzer") or {}
     try:
         window = int(kept["window"])

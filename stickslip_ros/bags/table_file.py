@@ -16,9 +16,9 @@ import numpy as np
 from stickslip_ros.arrays import FloatArray, IntArray
 from stickslip_ros.bags.compression import LARGEST as LARGEST_FILE
 from stickslip_ros.bags.mat_file import vectors_of
+from stickslip_ros.bags.reader import RunBlock
 from stickslip_ros.errors import BagError, InvalidInputError
 from stickslip_ros.files import open_regular
-from stickslip_ros.physics.measures.reading import UNKNOWN, SampleAssumptions
 from stickslip_ros.samples import LARGEST, ForceColumns, SampleColumns
 from stickslip_ros.stamps import NANOSECONDS
 from stickslip_ros.text import did_you_mean, must_be_one_of, shown
@@ -60,16 +60,36 @@ _LONGEST_LIST = 1000
 
 @dataclass(frozen=True)
 class TableRecording:
-    """A recording from a table, in SI units."""
+    """A recording from a table, in SI units; it is read as a `Recording` is, in one block."""
 
     samples: SampleColumns
     """The motion; time zero is the stamp 0."""
     forces: ForceColumns
     """Control force at each sample; empty if the table has none."""
-    reading: SampleAssumptions
-    """How the samples are to be read, as far as the table tells."""
+    velocity_estimated: bool
+    """Whether the velocities are estimated from the positions."""
     notes: tuple[str, ...]
     """Sentences on what the table does not have."""
+    dropped_known = False
+    """A table does not tell which forces did not act."""
+
+    @property
+    def topics(self) -> dict[str, str]:
+        """A table has none."""
+        return {}
+
+    @property
+    def missing(self) -> list[str]:
+        """A table that can be read is complete."""
+        return []
+
+    def blocks(self, least: int = 1) -> Iterator[RunBlock]:
+        """Yield the samples, the forces and no dropped forces."""
+        yield RunBlock(self.samples, self.forces, self.forces[:0])
+
+    def metadata(self, name: str) -> dict[str, str] | None:
+        """Return None: a table has no metadata."""
+        return None
 
 
 def is_table(path: Path) -> bool:
@@ -204,9 +224,7 @@ def _recording(path: Path, found: Mapping[str, FloatArray]) -> TableRecording:
     forces = ForceColumns(stamp[:0], rest[:0])
     if "force" in found:
         forces = ForceColumns(stamp, found["force"])
-    # Differences of positions never have exactly the speed of the belt.
-    reading = UNKNOWN if velocity is not None else SampleAssumptions(noisy=True)
-    return TableRecording(samples, forces, reading, tuple(notes))
+    return TableRecording(samples, forces, velocity is None, tuple(notes))
 
 
 def _differences(time: FloatArray, position: FloatArray) -> FloatArray:

@@ -38,10 +38,10 @@ from stickslip_ros.messages.topics import (
     STICK_FRACTION,
     Topic,
 )
+from stickslip_ros.nodes.base.clients import ServiceCall, parameters_call
 from stickslip_ros.nodes.base.managed import ERROR, OK, Diagnosis, ManagedNode, diagnosis
 from stickslip_ros.nodes.base.process import run_node
 from stickslip_ros.nodes.base.ros_topics import qos_profile, waiting_messages
-from stickslip_ros.nodes.base.service_call import ServiceCall, parameters_call
 from stickslip_ros.physics.measures.cycle_measures import trend_text
 from stickslip_ros.physics.measures.run_meter import RunMeter
 from stickslip_ros.scenarios.curve_file import CURVES, Pairs, read_pairs

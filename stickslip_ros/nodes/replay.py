@@ -6,19 +6,22 @@ wait_for it starts when the nodes named there read its topics.
 
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
 
+import rclpy
 from rclpy.duration import Duration
+from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 from rclpy.publisher import Publisher
 from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 
+from stickslip_ros.errors import RunError
 from stickslip_ros.messages.topics import CLOCK, JOINT_STATES, RECORDED
 from stickslip_ros.nodes.base.managed import ERROR, OK, WARN, Diagnosis, ManagedNode
-from stickslip_ros.nodes.base.process import run_node
+from stickslip_ros.nodes.base.process import initialise, run_node, run_until_stopped
 from stickslip_ros.nodes.base.ros_topics import message_class
 from stickslip_ros.nodes.pacing import FlowWindow
 from stickslip_ros.nodes.replaying.player import Message, Player
@@ -181,6 +184,62 @@ class ReplayNode(ManagedNode[ReplayParameters]):
             state = "paused" if player.paused else "playing"
             response.message = f"{state} at {self._position:.3f} s of the bag"
         return response
+
+
+def replay_bag(
+    parameters: Mapping[str, Any],
+    offering: Callable[[Sequence[str]], None],
+    progress: Callable[[float], None],
+) -> bool:
+    """Replay a bag in this process; return whether a signal ended the replay before the bag did.
+
+    `parameters` are those of the node, by name. `offering` receives the topics when the node
+    publishes them, and `progress` receives the share of the recorded time that is done. Raises
+    InvalidInputError for refused parameters, BagError if the bag cannot be read further, and
+    RunError for other failures.
+    """
+    initialise()
+    try:
+        node = _OneReplay(offering, progress, overrides=parameters)
+        run_until_stopped(node)
+        return not node.ended
+    finally:
+        rclpy.try_shutdown()
+
+
+class _OneReplay(ReplayNode):
+    """A replay that runs until the bag or a signal ends it, and reports its progress."""
+
+    def __init__(
+        self,
+        offering: Callable[[Sequence[str]], None],
+        progress: Callable[[float], None],
+        **options: Any,
+    ) -> None:
+        super().__init__(**options)
+        self._offering = offering
+        self._progress = progress
+        self.ended = False
+        """Whether the replay reached the end of the bag."""
+        self.every(0.1, self._tell_progress)
+
+    def connect(self) -> None:
+        super().connect()
+        self._offering(sorted(self._writers))
+
+    def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
+        self.end_process(RunError("the replay failed for the reason above"))
+        return super().on_error(state)
+
+    def _end(self) -> None:
+        super()._end()
+        self.ended = True
+        self.end_process(self._player.failure if self._player is not None else None)
+
+    def _tell_progress(self) -> None:
+        if self._position > 0.0:
+            done = self._position - self.parameters.start
+            self._progress(done / max(self._selection.length, 1e-9))
 
 
 def main() -> None:

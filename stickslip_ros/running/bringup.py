@@ -14,20 +14,22 @@ from typing import Any
 
 import rclpy
 from lifecycle_msgs.msg import Transition
-from rcl_interfaces.srv import SetParameters
 from rclpy.node import Node
-from rclpy.parameter import Parameter
 from rclpy.task import Future
 
 from stickslip_ros.errors import RunError
 from stickslip_ros.nodes.base.child_process import GUARD_TIMEOUT, how_it_ended, start_child
+from stickslip_ros.nodes.base.clients import (
+    ACTIVE,
+    NEXT_TRANSITION,
+    LifecycleClient,
+    setting_call,
+)
 from stickslip_ros.nodes.base.machine import lock_namespace
-from stickslip_ros.nodes.base.process import ROS_ARGUMENTS, initialise, stop_on_signals
-from stickslip_ros.nodes.base.service_call import ServiceCall
+from stickslip_ros.nodes.base.process import ROS_ARGUMENTS, initialise
+from stickslip_ros.nodes.base.spinner import Spinner, stop_on_signals
 from stickslip_ros.running.controller_search import ControllerSearch
-from stickslip_ros.running.node_clients import ACTIVE, NEXT_TRANSITION, LifecycleClient
 from stickslip_ros.running.run_monitor import Notify, OnSimulatedTime, RunMonitor
-from stickslip_ros.running.spinner import Spinner
 from stickslip_ros.scenarios.files import Scenario, parameter_file
 from stickslip_ros.scenarios.sections import section_matches
 
@@ -252,8 +254,8 @@ class _Supervisor:
         if command:
             self._processes[controller] = self._processes.pop(command[0])
         name = controller.rpartition("/")[2]
-        self._set_wait_for("analyzer", [name])
-        self._set_wait_for("plant", ["analyzer", name])
+        for node, others in (("analyzer", [name]), ("plant", ["analyzer", name])):
+            self._spinner.spin_until(setting_call(self._node, node, {"wait_for": others}).pursue)
         nodes = self._node.get_node_names_and_namespaces()
         for section in self._scenario.other_sections:
             if not any(section_matches(section, f"{ns.rstrip('/')}/{name}") for name, ns in nodes):
@@ -307,12 +309,6 @@ class _Supervisor:
             if self._user_controller and state in NEXT_TRANSITION:
                 self._change_state(node, NEXT_TRANSITION[state])
         return None, problems
-
-    def _set_wait_for(self, node: str, others: list[str]) -> None:
-        call = ServiceCall(self._node, SetParameters, f"{node}/set_parameters")
-        parameter = Parameter("wait_for", value=others).to_parameter_msg()
-        call.start(SetParameters.Request(parameters=[parameter]))
-        self._spinner.spin_until(call.pursue)
 
     def _bring_down(self) -> None:
         """Deactivate the active nodes, the analyzer last, and end the processes.

@@ -14,9 +14,9 @@ from rclpy.parameter import Parameter
 from stickslip_ros.errors import InvalidInputError, RunError
 from stickslip_ros.nodes.analyzer import AnalyzerNode
 from stickslip_ros.nodes.base.managed import ManagedNode
+from stickslip_ros.nodes.base.spinner import Spinner
 from stickslip_ros.nodes.controller import ControllerNode
 from stickslip_ros.nodes.plant import PlantNode
-from stickslip_ros.running.spinner import Spinner
 from stickslip_ros.scenarios.parameters import CONTROLLER_PARAMETERS, controller_node
 
 NODE_CLASSES: dict[str, Callable[..., ManagedNode[Any]]] = {

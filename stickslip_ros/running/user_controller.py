@@ -13,7 +13,7 @@ from rclpy.task import Future
 
 from stickslip_ros.errors import InvalidInputError, RunError
 from stickslip_ros.nodes.base.child_process import how_it_ended, start_child
-from stickslip_ros.running.spinner import destroy
+from stickslip_ros.nodes.base.spinner import destroy
 
 _END_TIMEOUT = 5.0
 

@@ -17,15 +17,14 @@ from rclpy.validate_namespace import validate_namespace
 from stickslip_ros.bags.recorder import check_new_bag
 from stickslip_ros.errors import InvalidInputError, RunError
 from stickslip_ros.nodes.analyzer import VERDICT_TIME
+from stickslip_ros.nodes.base.clients import LifecycleClient, parameters_call
 from stickslip_ros.nodes.base.machine import own_domain
 from stickslip_ros.nodes.base.managed import ERROR
 from stickslip_ros.nodes.base.network import domain_variables
 from stickslip_ros.nodes.base.process import ros_context
-from stickslip_ros.nodes.base.service_call import parameters_call
 from stickslip_ros.running.bringup import node_parameters
 from stickslip_ros.running.composition import Composition
 from stickslip_ros.running.controller_search import ControllerSearch
-from stickslip_ros.running.node_clients import LifecycleClient
 from stickslip_ros.running.user_controller import ControllerProcess, ControllerThread
 from stickslip_ros.scenarios import DEFAULT_NAMESPACE, LONGEST_NAMESPACE
 from stickslip_ros.scenarios.files import Scenario, load_scenario

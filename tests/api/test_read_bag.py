@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 import stickslip_ros as ss
 from stickslip_ros.bags.reader import Recording
-from stickslip_ros.bags.report import report_of_bag
+from stickslip_ros.bags.report import report_of_recording
 from stickslip_ros.errors import BagError, InvalidInputError
 
 REFERENCE = Path(__file__).parents[2] / "bags" / "reference"
@@ -21,7 +21,7 @@ def found() -> ss.RecordedRun:
 
 
 def test_it_has_what_the_bag_has(found: ss.RecordedRun) -> None:
-    report = report_of_bag(REFERENCE)
+    report = report_of_recording(REFERENCE)
     with Recording(REFERENCE) as recording:
         states, forces = recording.joint_states, recording.control_forces
     assert found.report == report
@@ -51,7 +51,7 @@ def test_its_table_has_the_columns_of_a_simulated_run(found: ss.RecordedRun) -> 
 
 def test_a_part_is_that_of_the_report() -> None:
     found = ss.read_bag(REFERENCE, start=1.0, end=2.0)
-    assert found.report == report_of_bag(REFERENCE, start=1.0, end=2.0)
+    assert found.report == report_of_recording(REFERENCE, start=1.0, end=2.0)
     assert len(found.samples) == 1000
     assert len(found.forces) == 1000
     with pytest.raises(InvalidInputError, match="is empty"):

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from stickslip_ros.bags.report import report_of_bag
+from stickslip_ros.bags.report import report_of_recording
 from tests.nodes.graph import PATIENCE
 
 pytestmark = pytest.mark.process
@@ -30,7 +30,7 @@ def test_before_and_after_a_bag_and_a_picture(
     (picture,) = (tmp_path / "bags").glob("*.png")
     assert str(bag.relative_to(tmp_path)) in done.stdout
     assert str(picture.relative_to(tmp_path)) in done.stdout
-    report = report_of_bag(bag)
+    report = report_of_recording(bag)
     assert report["samples"] == 10_001
     assert report["lost_samples"] == 0
     assert report["complete"]

@@ -14,7 +14,7 @@ from mcap.opcode import Opcode
 
 from stickslip_ros.bags import Recording
 from stickslip_ros.bags.recorder import QosProfile, Recorder
-from stickslip_ros.bags.report import report_of_bag
+from stickslip_ros.bags.report import report_of_recording
 from stickslip_ros.errors import StickslipError
 from stickslip_ros.messages.codec import pack_joint_state, pack_wrench
 from tests.bags.runs import FORCES, STATES
@@ -170,7 +170,7 @@ def check(content, file, path):
                 recording.metadata(name)
             recording.attachment("note")
             assert recording.missing or len(read) == len(MESSAGES)
-        report_of_bag(path)
+        report_of_recording(path)
     except StickslipError as error:
         refusal = str(error)
     assert most_memory() - memory < MUCH_MEMORY

@@ -18,7 +18,7 @@ from zstandard import ZstdCompressor
 from stickslip_ros.bags import Recording
 from stickslip_ros.bags.compression import unpack_file
 from stickslip_ros.bags.repair import repair
-from stickslip_ros.bags.report import report_of_bag
+from stickslip_ros.bags.report import report_of_recording
 from stickslip_ros.errors import BagError
 from stickslip_ros.messages.codec import pack_joint_state
 
@@ -36,7 +36,7 @@ READER = """
 import json, os, resource, sys
 from pathlib import Path
 from stickslip_ros.bags.repair import repair
-from stickslip_ros.bags.report import report_of_bag
+from stickslip_ros.bags.report import report_of_recording
 from stickslip_ros.errors import StickslipError
 
 def outcome_of(action):
@@ -48,7 +48,7 @@ def outcome_of(action):
         return f"CRASH {type(error).__name__}: {error}"
 
 bag, out = map(Path, sys.argv[1:])
-for action in (lambda: report_of_bag(bag)["missing"], lambda: repair(bag, out).missing):
+for action in (lambda: report_of_recording(bag)["missing"], lambda: repair(bag, out).missing):
     ours, theirs = os.pipe()
     if (child := os.fork()) == 0:
         taken = int(open("/proc/self/statm").read().split()[0]) * resource.getpagesize()
@@ -271,7 +271,7 @@ def test_a_description_leads_nowhere_else(tmp_path: Path) -> None:
         ),
     ):
         (bag / "metadata.yaml").write_text(description, encoding="utf-8")
-        report = report_of_bag(bag)
+        report = report_of_recording(bag)
         assert report["samples"] == 499
         assert report["missing"][0].startswith(missing)
 
@@ -288,7 +288,7 @@ def test_what_shrinks_much_is_sound(tmp_path: Path) -> None:
 
 def test_an_unreadable_table_is_reported(tmp_path: Path) -> None:
     damaged = record(Opcode.METADATA, text("stickslip_ros/analyzer") + text(bytes([9, 0, 0, 0, 1])))
-    report = report_of_bag(bag_of(tmp_path / "bag", SOUND, damaged))
+    report = report_of_recording(bag_of(tmp_path / "bag", SOUND, damaged))
     assert report["samples"] == 499
     (missing,) = report["missing"]
     assert missing.startswith("bag_0.mcap: bytes")
@@ -312,7 +312,7 @@ def test_names_cannot_steer_a_terminal(tmp_path: Path) -> None:
     bag = bag_of(tmp_path / "bag", odd)
     shown = r"/\x1b]0;owned\x07/joint_states"
     with pytest.raises(BagError) as raised:
-        report_of_bag(bag)
+        report_of_recording(bag)
     assert shown in str(raised.value)
     assert str(raised.value).isprintable()
     with Recording(bag) as recording:

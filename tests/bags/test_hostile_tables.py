@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from scipy.io import savemat
 
 from stickslip_ros.bags.compression import unpack_file
-from stickslip_ros.bags.report import report_of_table
+from stickslip_ros.bags.report import report_of_recording
 from stickslip_ros.bags.table_file import read_table, table_of
 from stickslip_ros.errors import BagError, InvalidInputError
 from stickslip_ros.physics.measures.slips import SlipThreshold
@@ -199,5 +199,5 @@ def measure_or_refuse(tmp_path_factory: pytest.TempPathFactory, kind: str, seed:
     path = tmp_path_factory.getbasetemp() / f"changed.{kind}"
     path.write_bytes(changed(kind, random.Random(seed)))
     with suppress(InvalidInputError):
-        report = report_of_table(path, COLUMNS, slips=SlipThreshold(1e-5, within=1e7))
+        report = report_of_recording(path, COLUMNS, slips=SlipThreshold(1e-5, within=1e7))
         assert report["samples"] <= len(TIME)

@@ -5,7 +5,7 @@ from rosbags.rosbag2 import Reader
 
 from stickslip_ros.bags import Recording
 from stickslip_ros.bags.repair import repair
-from stickslip_ros.bags.report import report_of_bag
+from stickslip_ros.bags.report import report_of_recording
 from stickslip_ros.errors import BagError
 from tests.bags.runs import FORCES, STAMPS, STATES, foreign_file, record, state
 
@@ -61,7 +61,7 @@ def test_what_is_left_of_a_damaged_bag_is_sound(tmp_path):
     repaired = repair(tmp_path / "bag", tmp_path / "sound")
     assert repaired.messages == {STATES: len(STAMPS), FORCES: len(STAMPS)}
     assert repaired.missing
-    report = report_of_bag(tmp_path / "sound")
+    report = report_of_recording(tmp_path / "sound")
     assert (report["complete"], report["samples"]) == (True, len(STAMPS))
     with Reader(tmp_path / "sound") as reader:
         assert {c.topic: c.msgcount for c in reader.connections} == repaired.messages

@@ -4,7 +4,7 @@ from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 
 from stickslip_ros.bags.recorder import QosProfile, Recorder
-from stickslip_ros.bags.report import report_of_bag
+from stickslip_ros.bags.report import report_of_recording
 from stickslip_ros.errors import BagError, InvalidInputError
 from tests.bags.runs import (
     PERIOD,
@@ -34,48 +34,48 @@ def foreign_state(stamp):
 
 def test_a_run_and_its_parts_are_measured(tmp_path):
     record(tmp_path / "bag")
-    report = report_of_bag(tmp_path / "bag")
+    report = report_of_recording(tmp_path / "bag")
     assert report["amplitude"] == pytest.approx(3.0, rel=1e-6)
     assert report["frequency"] == pytest.approx(1.0 / PERIOD, rel=1e-6)
     assert (report["samples"], report["lost_samples"]) == (1000, 0)
     assert (report["complete"], report["missing"]) == (True, [])
-    part = report_of_bag(tmp_path / "bag", start=2.0, end=7.5)
+    part = report_of_recording(tmp_path / "bag", start=2.0, end=7.5)
     assert (part["samples"], part["duration"]) == (550, pytest.approx(5.49))
     assert part["peak_force"] == pytest.approx(5.0 + 7.49)
     for empty in ({"start": 20.0}, {"start": 3.0, "end": 3.0}):
         with pytest.raises(InvalidInputError, match=r"holds no samples from|is empty"):
-            report_of_bag(tmp_path / "bag", **empty)
+            report_of_recording(tmp_path / "bag", **empty)
 
 
 def test_forces_ahead_of_the_first_joint_state_are_measured(tmp_path):
     record(tmp_path / "bag", states=STAMPS[500:])
-    assert report_of_bag(tmp_path / "bag")["samples"] == 500
-    resting = report_of_bag(tmp_path / "bag", end=1.0)
+    assert report_of_recording(tmp_path / "bag")["samples"] == 500
+    resting = report_of_recording(tmp_path / "bag", end=1.0)
     assert resting["peak_force"] == pytest.approx(5.0 + 5.99)
 
 
 def test_what_is_lost_is_counted_by_the_stamps(tmp_path):
     record(tmp_path / "bag", states=STAMPS[:300] + STAMPS[307:])
-    report = report_of_bag(tmp_path / "bag")
+    report = report_of_recording(tmp_path / "bag")
     assert (report["samples"], report["lost_samples"]) == (993, 7)
 
 
 def test_a_restarted_plant_is_measured_from_its_first_stamp(tmp_path):
     stamps = [*STAMPS, *(stamp - 4 * SECOND for stamp in STAMPS)]
     write_bag(tmp_path / "bag", [(STATES, stamp, state(stamp)) for stamp in stamps])
-    report = report_of_bag(tmp_path / "bag")
+    report = report_of_recording(tmp_path / "bag")
     assert (report["samples"], report["lost_samples"]) == (2000, 0)
     assert len(report["notes"]) == 1
 
 
 def test_what_a_bag_does_not_hold_is_not_measured_and_it_is_said(tmp_path):
     record(tmp_path / "forces", states=[])
-    report = report_of_bag(tmp_path / "forces")
+    report = report_of_recording(tmp_path / "forces")
     assert report["peak_force"] == pytest.approx(14.99)
     assert (report["amplitude"], report["samples"], report["complete"]) == (None, 0, False)
     assert report["missing"] == ["the bag holds no joint states: the motion is unknown"]
     record(tmp_path / "states", forces=[])
-    report = report_of_bag(tmp_path / "states")
+    report = report_of_recording(tmp_path / "states")
     assert report["amplitude"] == pytest.approx(3.0, rel=1e-6)
     assert (report["peak_force"], report["complete"]) == (None, True)
 
@@ -83,16 +83,16 @@ def test_what_a_bag_does_not_hold_is_not_measured_and_it_is_said(tmp_path):
 def test_a_bag_of_nothing_of_ours_is_refused_with_its_topics(tmp_path):
     write_bag(tmp_path / "bag", [("/a/temperature", 1, bytes(12))])
     with pytest.raises(BagError, match=r"no joint_states and no control_force .*/a/temperature"):
-        report_of_bag(tmp_path / "bag")
+        report_of_recording(tmp_path / "bag")
     with pytest.raises(BagError, match="in /b that can be read"):
-        report_of_bag(tmp_path / "bag", namespace="/b")
+        report_of_recording(tmp_path / "bag", namespace="/b")
 
 
 def test_joint_states_of_a_robot_without_slide_are_refused_with_the_reason(tmp_path):
     elbow = serialize_message(JointState(name=["elbow"], position=[1.0], velocity=[0.0]))
     write_bag(tmp_path / "bag", [(STATES, stamp, elbow) for stamp in range(5)])
     with pytest.raises(BagError, match=r"5 messages .*joints \['elbow'\]; slide and belt must be"):
-        report_of_bag(tmp_path / "bag")
+        report_of_recording(tmp_path / "bag")
 
 
 def test_other_recorders_layouts_and_messages_give_the_same_report(tmp_path):
@@ -109,7 +109,7 @@ def test_other_recorders_layouts_and_messages_give_the_same_report(tmp_path):
             message = foreign_state(stamp) if stamp % 3 else state(stamp)
             writer.add_message(channel, late, message, late)
             writer.add_message(noise, late, bytes(12), late)
-    assert report_of_bag(path) == report_of_bag(tmp_path / "bag")
+    assert report_of_recording(path) == report_of_recording(tmp_path / "bag")
 
 
 def test_a_growing_bag_is_measured_as_far_as_it_goes(tmp_path):
@@ -119,8 +119,8 @@ def test_a_growing_bag_is_measured_as_far_as_it_goes(tmp_path):
             recorder.write(channel, state(stamp), stamp)
             if count in (400, 800):
                 recorder.flush()
-                report = report_of_bag(tmp_path / "bag")
+                report = report_of_recording(tmp_path / "bag")
                 assert report["samples"] == count
                 assert not report["complete"]
                 assert any("still running" in sentence for sentence in report["missing"])
-    assert report_of_bag(tmp_path / "bag")["complete"]
+    assert report_of_recording(tmp_path / "bag")["complete"]

@@ -10,7 +10,7 @@ from sensor_msgs.msg import JointState
 import stickslip_ros as ss
 from benchmarks.measures_under_noise import motion
 from stickslip_ros.bags import Recording
-from stickslip_ros.bags.report import report_of_bag
+from stickslip_ros.bags.report import report_of_recording
 from stickslip_ros.errors import BagError
 from stickslip_ros.physics.measures.slips import SlipThreshold
 from tests.bags.runs import write_bag
@@ -56,9 +56,9 @@ def test_a_single_joint_is_the_slide(tmp_path: Path, noise: float, velocities: b
 def test_without_a_belt_speed_the_reason_is_told(tmp_path: Path) -> None:
     bag = record(tmp_path / "bag", 0.0, velocities=True)
     with pytest.raises(BagError, match="or the belt speed must be given for a single joint"):
-        report_of_bag(bag)
+        report_of_recording(bag)
 
 
 def test_the_joint_of_our_plant_needs_no_option() -> None:
     reference = Path(__file__).parents[2] / "bags" / "reference"
-    assert report_of_bag(reference, belt_speed=1.0) == report_of_bag(reference)
+    assert report_of_recording(reference, belt_speed=1.0) == report_of_recording(reference)

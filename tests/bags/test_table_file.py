@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
-from stickslip_ros.bags.report import report_of_table
+from stickslip_ros.bags.report import report_of_recording
 from stickslip_ros.bags.table_file import is_table, read_table
 from stickslip_ros.errors import BagError, InvalidInputError
 
@@ -61,15 +61,15 @@ def test_a_mat_file_gives_the_same_up_to_a_limit(
 def test_a_report_of_a_table_has_the_measures(tmp_path: Path) -> None:
     table = lists(t=TIME, x=POSITION, v=VELOCITY, u=np.ones(2001))
     path = csv_of(tmp_path / "log.csv", **table)
-    report = report_of_table(path, COLUMNS)
+    report = report_of_recording(path, COLUMNS)
     assert report["amplitude"] == pytest.approx(1e-4, rel=1e-9)
     assert report["period"] == pytest.approx(0.1, rel=1e-9)
     assert report["regime"] == "pure_slip"
     assert report["peak_force"] == 2.5
     assert (report["complete"], report["missing"], report["notes"]) == (True, [], [])
-    part = report_of_table(path, COLUMNS, start=0.5, end=1.0)
+    part = report_of_recording(path, COLUMNS, start=0.5, end=1.0)
     assert (part["samples"], part["duration"]) == (500, pytest.approx(0.499))
-    slow = report_of_table(path, {**COLUMNS, "belt_velocity": "0.0"}, stick_speed=1e-3)
+    slow = report_of_recording(path, {**COLUMNS, "belt_velocity": "0.0"}, stick_speed=1e-3)
     assert slow["stick_fraction"] > 0.05
 
 
@@ -81,7 +81,7 @@ def test_a_velocity_that_is_missing_is_a_difference(tmp_path: Path) -> None:
         "the velocity",
         "the belt velocity",
     ]
-    report = report_of_table(path, {"time": "t", "position": "x"})
+    report = report_of_recording(path, {"time": "t", "position": "x"})
     assert report["amplitude"] == pytest.approx(1e-4, rel=1e-3)
     assert report["notes"] == list(recording.notes)
 

@@ -18,9 +18,8 @@ from rclpy.subscription import Subscription
 from rclpy.task import Future
 
 from stickslip_ros.nodes.base.managed import ManagedNode
-from stickslip_ros.nodes.base.process import spin
 from stickslip_ros.nodes.base.ros_topics import message_class, qos_profile
-from stickslip_ros.running.spinner import destroy
+from stickslip_ros.nodes.base.spinner import destroy, spin
 
 PATIENCE = 60.0
 """How long a test waits, s, for what should happen at once on an idle machine."""

@@ -11,7 +11,7 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from stickslip_ros.bags.reader import Recording
 from stickslip_ros.bags.recorder import Recorder
-from stickslip_ros.bags.report import report_of_bag
+from stickslip_ros.bags.report import report_of_recording
 from stickslip_ros.messages.codec import joint_state_columns, pack_joint_state, pack_wrench
 from stickslip_ros.messages.topics import (
     AMPLITUDE,
@@ -57,7 +57,7 @@ def test_it_records_the_bytes_it_hears_measures_them_and_logs_each_figure_once(
         assert recording.complete
     assert recorded == [bytes(message) for message in heard]
     assert joint_state_columns(recorded)[0].stamp[-1] == 101_000_000_000
-    report = report_of_bag(tmp_path / "bag")
+    report = report_of_recording(tmp_path / "bag")
     assert (report["samples"], report["lost_samples"]) == (10_001, 0)
     assert stored is not None
     assert json.loads(stored["amplitude"]) == pytest.approx(report["amplitude"], rel=1e-12)
@@ -251,6 +251,6 @@ def test_on_a_full_disk_it_says_so_and_goes_on_measuring(graph: Graph, tmp_path:
     analyzer.trigger_activate()
     run()
     graph.deactivate("analyzer")
-    report = report_of_bag(tmp_path / "bag_2")
+    report = report_of_recording(tmp_path / "bag_2")
     assert report["complete"]
     assert report["samples"] == 6001

@@ -14,7 +14,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 
-from stickslip_ros.bags.report import report_of_bag
+from stickslip_ros.bags.report import report_of_recording
 from stickslip_ros.errors import BagError
 from stickslip_ros.messages.codec import (
     pack_header,
@@ -215,7 +215,7 @@ def test_messages_of_every_kind_harm_no_node(graph: Graph, tmp_path: Path, pace:
     for node in (controller, analyzer):
         assert node.active
     graph.deactivate("analyzer")
-    report = report_of_bag(tmp_path / "bag")
+    report = report_of_recording(tmp_path / "bag")
     assert report["notes"]
     assert all(isfinite(figure) for figure in plant._loop.sample)
 
@@ -271,4 +271,4 @@ def test_a_flood_of_garbage_leaves_no_trace_but_a_count(
     for process in list(started.values())[::-1]:
         process.send_signal(signal.SIGINT)
         assert process.wait(PATIENCE) == 0
-    assert report_of_bag(tmp_path / "bag")["notes"]
+    assert report_of_recording(tmp_path / "bag")["notes"]

@@ -13,7 +13,7 @@ import pytest
 
 from stickslip_ros.arrays import IntArray
 from stickslip_ros.bags.reader import Recording
-from stickslip_ros.bags.report import report_of_bag
+from stickslip_ros.bags.report import report_of_recording
 from stickslip_ros.errors import BagError
 from stickslip_ros.messages.codec import unpack_header
 from stickslip_ros.messages.topics import CONTROL_FORCE, JOINT_STATES, RECORDED, Topic
@@ -144,11 +144,11 @@ def test_a_killed_node_is_replaced(trio: Trio, processes: Processes) -> None:
     trio.wait_for_closed_loop()
     trio.end()
 
-    assert report_of_bag(trio.bags[1])["complete"]
+    assert report_of_recording(trio.bags[1])["complete"]
     for bag, segments in zip(trio.bags, (2, 1), strict=True):
         stamp = stamps(bag)
         assert np.count_nonzero(np.diff(stamp) < 0) == segments - 1
-        assert gaps(stamp) == report_of_bag(bag)["lost_samples"]
+        assert gaps(stamp) == report_of_recording(bag)["lost_samples"]
 
 
 @pytest.mark.long
@@ -191,7 +191,7 @@ def test_in_real_time_what_a_stop_costs_is_counted(trio: Trio) -> None:
     steps = np.diff(stamp)
     assert (steps > 0).all()
     assert (steps % PERIOD == 0).all()
-    assert report_of_bag(trio.bags[0])["lost_samples"] == gaps(stamp)
+    assert report_of_recording(trio.bags[0])["lost_samples"] == gaps(stamp)
 
 
 @pytest.mark.long
@@ -213,7 +213,7 @@ def test_a_monkey_among_them(trio: Trio, pace: str) -> None:
             trio.start(node)
     trio.wait_for_closed_loop()
     trio.end()
-    assert report_of_bag(trio.bags[-1])["complete"]
+    assert report_of_recording(trio.bags[-1])["complete"]
     for bag in trio.bags:
         if len(stamp := stamps(bag)) > 0:
-            assert report_of_bag(bag)["lost_samples"] == gaps(stamp)
+            assert report_of_recording(bag)["lost_samples"] == gaps(stamp)

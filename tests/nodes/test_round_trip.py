@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from stickslip_ros.bags.report import report_of_bag
+from stickslip_ros.bags.report import report_of_recording
 from stickslip_ros.nodes.analyzer import AnalyzerNode
 from stickslip_ros.nodes.replay import ReplayNode
 from tests.nodes.graph import Graph
@@ -40,7 +40,7 @@ def test_what_is_replayed_and_recorded_again_is_the_same(graph: Graph, tmp_path:
     assert messages["/test/true_joint_states"] != messages["/test/joint_states"]
     assert len(messages["/test/applied_disturbance"]) > 0
     assert messages_of(second) == messages
-    assert report_of_bag(second) == report_of_bag(first)
+    assert report_of_recording(second) == report_of_recording(first)
 
 
 def check_against_the_reference(report: dict[str, Any]) -> None:
@@ -60,11 +60,11 @@ def check_against_the_reference(report: dict[str, Any]) -> None:
 def test_the_reference_bag_is_reported_as_ever_also_when_it_is_replayed(
     graph: Graph, tmp_path: Path
 ) -> None:
-    check_against_the_reference(report_of_bag(REFERENCE))
+    check_against_the_reference(report_of_recording(REFERENCE))
     options = {"namespace": "/feed_drive", "overrides": {"bag": str(tmp_path / "again")}}
     analyzer = AnalyzerNode(context=graph.context, **options)
     graph.adopt(analyzer)
     play(graph, REFERENCE)
     analyzer.trigger_deactivate()
     assert messages_of(tmp_path / "again") == messages_of(REFERENCE)
-    check_against_the_reference(report_of_bag(tmp_path / "again"))
+    check_against_the_reference(report_of_recording(tmp_path / "again"))

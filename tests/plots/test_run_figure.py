@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 import stickslip_ros as ss
 from benchmarks.measures_under_noise import motion
 from stickslip_ros.bags import Recording
-from stickslip_ros.bags.report import report_of_bag
+from stickslip_ros.bags.report import report_of_recording
 from stickslip_ros.physics.measures.cycle_measures import Cycle, CycleMeter, Measures, measures_of
 from stickslip_ros.physics.measures.reading import SampleAssumptions
 from stickslip_ros.physics.measures.run_meter import RunAnalysis
@@ -115,7 +115,7 @@ def limit_cycle() -> Drawn:
 @pytest.fixture(scope="module")
 def reference() -> Drawn:
     history = RunHistory()
-    report = report_of_bag(REFERENCE, observer=history)
+    report = report_of_recording(REFERENCE, observer=history)
     measures = measures_of(report)
     figure = figure_of(history, measures, FEED_DRIVE)
     return Drawn(history, measures, FEED_DRIVE, figure, [])
@@ -180,7 +180,7 @@ def test_the_shade_is_the_share_of_time_that_it_sticks(limit_cycle: Drawn) -> No
 def test_the_shade_of_whole_cycles_is_the_stick_fraction_of_the_report() -> None:
     for end in (1.5, 1.9):
         history = RunHistory()
-        report = report_of_bag(REFERENCE, end=end, observer=history)
+        report = report_of_recording(REFERENCE, end=end, observer=history)
         motion, count = history.motion, report["cycles"]
         ends = history.cycles[0][-count:]
         starts = np.append(ends[0] - report["period"], ends[:-1])
@@ -498,7 +498,7 @@ def test_the_instant_of_switching_on_is_enlarged(style: str) -> None:
 @cache
 def drawn(name: str, end: float, drive: Drive = FEED_DRIVE) -> DrawnRun:
     history = RunHistory()
-    report = report_of_bag(REFERENCE, end=end, observer=history)
+    report = report_of_recording(REFERENCE, end=end, observer=history)
     return DrawnRun(name, history, measures_of(report), drive)
 
 

@@ -9,7 +9,7 @@ from nicegui import ui
 
 from stickslip_ros.app.dashboard.elements import heading, show_commands
 from stickslip_ros.app.dashboard.listener import ListenerNode
-from stickslip_ros.bags.report import report_of_bag
+from stickslip_ros.bags.report import report_of_recording
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.files import open_regular
 from stickslip_ros.plots.measure_table import LABELS, measure_table
@@ -58,7 +58,7 @@ class EndedRun:
             self._open = [open_regular(file, links=False) for file in bag.glob("*.mcap")]
             if len(self._open) == 1:
                 source = Path(f"/proc/self/fd/{self._open[0].fileno()}")
-            self._report = report_of_bag(source)
+            self._report = report_of_recording(source)
             if source != bag and source.stat().st_size <= _LARGEST:
                 self.file = source
         except OSError as error:

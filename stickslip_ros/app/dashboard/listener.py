@@ -38,10 +38,10 @@ from stickslip_ros.messages.topics import (
     STICK_FRACTION,
     Topic,
 )
+from stickslip_ros.nodes.base.clients import ANSWER_TIME, ServiceCall, parameters_call
 from stickslip_ros.nodes.base.managed import STATE
 from stickslip_ros.nodes.base.ros_topics import PollingNode, qos_profile, waiting_messages
-from stickslip_ros.nodes.base.service_call import ANSWER_TIME, ServiceCall, parameters_call
-from stickslip_ros.nodes.base.steady_clock import steady_clock
+from stickslip_ros.nodes.base.spinner import steady_clock
 from stickslip_ros.running.controller_search import DASHBOARD
 from stickslip_ros.samples import ForceColumns, SampleColumns
 from stickslip_ros.scenarios.parameter_field import known_parameters

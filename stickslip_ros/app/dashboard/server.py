@@ -24,7 +24,8 @@ from stickslip_ros.app.dashboard.frames import Frames
 from stickslip_ros.app.dashboard.listener import ListenerNode
 from stickslip_ros.app.dashboard.page import Pages
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.nodes.base.process import initialise, spin
+from stickslip_ros.nodes.base.process import initialise
+from stickslip_ros.nodes.base.spinner import spin
 
 _HOST = "127.0.0.1"
 

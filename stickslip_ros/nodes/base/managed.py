@@ -28,7 +28,7 @@ from stickslip_ros.nodes.base.ros_topics import (
     message_class,
     qos_profile,
 )
-from stickslip_ros.nodes.base.steady_clock import steady_clock
+from stickslip_ros.nodes.base.spinner import steady_clock
 
 MessageT = TypeVar("MessageT")
 ThingT = TypeVar("ThingT")

@@ -1,7 +1,6 @@
-"""Initialise ROS, run one node as a process, and spin the executors of this package."""
+"""Initialise ROS, and run one node as a process."""
 
 import argparse
-import signal
 import sys
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager
@@ -11,12 +10,9 @@ from typing import Any
 
 import rclpy
 from rclpy.context import Context
-from rclpy.executors import Executor
 from rclpy.experimental import EventsExecutor
-from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
-from rclpy.task import Future
 from rclpy.utilities import remove_ros_args
 
 from stickslip_ros.errors import InvalidInputError, StickslipError
@@ -38,6 +34,7 @@ from stickslip_ros.nodes.base.network import (
     this_machine_only,
 )
 from stickslip_ros.nodes.base.parameters import first_line
+from stickslip_ros.nodes.base.spinner import spin, stop_on_signals
 from stickslip_ros.scenarios.parameter_field import parameters_of
 from stickslip_ros.scenarios.parameters import NodeParameters
 from stickslip_ros.standard_streams import open_closed_streams
@@ -141,33 +138,6 @@ def run_until_stopped(node: ManagedNode[Any]) -> None:
     executor.shutdown()
     if reason is not None:
         raise reason
-
-
-def stop_on_signals(executor: Executor, *stopped: Future) -> dict[signal.Signals, Any]:
-    """Let each SIGINT, SIGTERM or SIGHUP complete the next of `stopped` with None.
-
-    SIGHUP stays ignored if it is, as under nohup. Return the previous handlers.
-    """
-
-    def stop(*_: object) -> None:
-        due = next((future for future in stopped if not future.done()), None)
-        if due is not None:
-            due.set_result(None)
-            executor.wake()
-
-    numbers = [signal.SIGINT, signal.SIGTERM]
-    if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:
-        numbers.append(signal.SIGHUP)
-    return {number: signal.signal(number, stop) for number in numbers}
-
-
-def spin(executor: Executor, until: Future) -> None:
-    """Run callbacks until the future is done; log exceptions of callbacks and continue."""
-    while not until.done():
-        try:
-            executor.spin_until_future_complete(until, timeout_sec=0.2)
-        except Exception as error:  # an invalid request from outside ends here, too
-            get_logger("stickslip_ros").error(f"{type(error).__name__}: {error}")
 
 
 @cache

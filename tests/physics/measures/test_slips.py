@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from stickslip_ros.bags.report import report_of_table
+from stickslip_ros.bags.report import report_of_recording
 from stickslip_ros.bags.table_file import read_table
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.measures import Regime
@@ -117,7 +117,7 @@ def test_the_slips_of_paper_on_paper_are_those_that_are_seen() -> None:
 @pytest.mark.parametrize(("speed", "regime"), [(42, "stick_slip"), (4300, "pure_slip")])
 def test_stick_slip_is_told_apart_from_inertial_motion(speed: int, regime: str) -> None:
     path = DATA / f"k168Nm_v{speed}.mat"
-    report = report_of_table(path, columns(168, speed), slips=SlipThreshold(2e-3 / 168))
+    report = report_of_recording(path, columns(168, speed), slips=SlipThreshold(2e-3 / 168))
     assert report["slips"]["regime"] == regime
     if speed == 42:
         # The spring's end moves some 9 % faster than is said, or the spring is stiffer.

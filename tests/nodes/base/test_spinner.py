@@ -1,13 +1,18 @@
-"""Waits of nodes while the system's clock is set back."""
+"""Waiting for conditions while nodes run, also while the system's clock is set back."""
 
 import platform
 import shutil
 import subprocess
 import sys
+import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from rclpy.node import Node
 
+from stickslip_ros.nodes.base.process import ros_context
+from stickslip_ros.nodes.base.spinner import Spinner
 from tests.nodes.graph import PATIENCE
 
 # What the library waits for by the system's clock takes as much longer as that is set back.
@@ -52,7 +57,7 @@ _WAIT = """
 import ctypes, sys, threading, time
 from rclpy.node import Node
 from stickslip_ros.nodes.base.process import initialise
-from stickslip_ros.running.spinner import Spinner
+from stickslip_ros.nodes.base.spinner import Spinner
 
 initialise()
 spinner = Spinner()
@@ -63,6 +68,36 @@ assert not spinner.spin_until(lambda: False, 0.5)
 assert time.time() < before
 spinner.close()
 """
+
+
+@pytest.fixture
+def spinner(domain: int) -> Iterator[Spinner]:
+    with ros_context(domain, ["--ros-args"]) as context:
+        spinner = Spinner(context)
+        spinner.add(Node("waiting", context=context))
+        yield spinner
+        spinner.close()
+
+
+def test_time_ends_waiting_though_there_is_always_a_callback_to_run(spinner: Spinner) -> None:
+    def call_again() -> None:
+        spinner.executor.create_task(call_again)
+        spinner.executor.create_task(lambda: None)
+
+    call_again()
+    started = time.monotonic()
+    assert not spinner.spin_until(lambda: False, 0.1)
+    assert time.monotonic() - started < 10.0
+
+
+def test_waiting_is_cut_short(spinner: Spinner) -> None:
+    rung: list[None] = []
+    other = Node("ringing", context=spinner.executor.context)
+    spinner.add(other)
+    other.create_timer(0.05, lambda: rung.append(None))
+    spinner.is_cut_short = lambda: bool(rung)
+    assert not spinner.spin_until(lambda: False)
+    assert not spinner.spin_until(lambda: True)
 
 
 @pytest.mark.process

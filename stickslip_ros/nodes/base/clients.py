@@ -1,0 +1,291 @@
+"""Ask nodes that run, in any process: their services, states, transitions and parameters.
+
+An answer arrives even if the middleware is slow or loses messages.
+"""
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import closing, suppress
+from math import inf
+from typing import Any
+
+import rclpy
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState, GetState
+from rcl_interfaces.msg import SetParametersResult
+from rcl_interfaces.srv import GetParameters, SetParametersAtomically
+from rclpy.client import Client
+from rclpy.node import Node
+from rclpy.parameter import Parameter, parameter_value_to_python
+from rclpy.task import Future
+
+from stickslip_ros.errors import RunError
+from stickslip_ros.nodes.base.process import initialise
+from stickslip_ros.nodes.base.spinner import Spinner
+
+ANSWER_TIME = 1.0
+"""Time, s, for a client to match an existing service, and then to get its answer."""
+
+ACTIVE = "active"
+
+NEXT_TRANSITION = {
+    "unconfigured": Transition.TRANSITION_CONFIGURE,
+    "inactive": Transition.TRANSITION_ACTIVATE,
+}
+"""The next transition from a state towards the active one."""
+
+_STATE_AFTER = {
+    Transition.TRANSITION_CONFIGURE: "inactive",
+    Transition.TRANSITION_ACTIVATE: ACTIVE,
+    Transition.TRANSITION_DEACTIVATE: "inactive",
+}
+
+_PARTICIPLE = {"unconfigured": "configured", "inactive": "activated"}
+
+_DISCOVERY_TIME = 5.0
+"""Wall time, s, within which a node that runs is found."""
+
+_ANSWER_TIME = 10.0
+
+
+class ServiceCall:
+    """Calls a service as soon as it exists, until it has answered.
+
+    A client may never match an existing service, and an answer may be lost. Then a new client
+    repeats the request, and has twice the time. So the service may get the request more than once.
+    The earlier clients stay: to answer one that is gone takes a service 0.1 s, and it complains.
+    """
+
+    def __init__(
+        self, node: Node, kind: Any, service: str, *, answer_time: float = ANSWER_TIME
+    ) -> None:
+        """Prepare to call a service through `node`; the first answer may take `answer_time` (s)."""
+        self._node = node
+        self._kind = kind
+        self._service = service
+        self._answer_time = answer_time
+        self._clients = [self._new_client()]
+        self._pending: Future | None = None
+        self._factor = 1.0
+
+    def start(self, request: Any, on_answer: Callable[[Any], None] = lambda _: None) -> None:
+        """Send this request from now on, in place of an earlier one."""
+        self._request = request
+        self._on_answer = on_answer
+        self.answer: Any = None
+        """The answer; None until it arrives."""
+        self._pending = None
+        self._attempt_ends: float | None = None
+
+    @property
+    def exists(self) -> bool:
+        """Whether the service has appeared."""
+        return self._node.count_services(self._service) > 0
+
+    @property
+    def sent(self) -> bool:
+        """Whether the request was sent."""
+        return self._pending is not None
+
+    def pursue(self) -> bool:
+        """Do the next step; call this repeatedly. Return whether the answer has arrived."""
+        if self.answer is not None:
+            return True
+        if not self.exists:
+            return False
+        now = time.monotonic()
+        if self._attempt_ends is not None and now > self._attempt_ends:
+            self._clients.append(self._new_client())
+            self._pending = self._attempt_ends = None
+            self._factor *= 2.0
+        if self._attempt_ends is None:
+            self._attempt_ends = now + ANSWER_TIME * self._factor
+        if self._pending is None and self._clients[-1].service_is_ready():
+            self._attempt_ends = now + self._answer_time * self._factor
+            self._pending = self._clients[-1].call_async(self._request)
+            self._pending.add_done_callback(self._take)
+        return False
+
+    def ask(self, spinner: Spinner, request: Any, timeout: float) -> Any:
+        """Send this request and return the answer, while the spinner runs its nodes.
+
+        Return None if the service does not appear, or does not answer, within `timeout` (s) each.
+        """
+        self.start(request)
+        return self.wait(spinner, timeout)
+
+    def wait(self, spinner: Spinner, timeout: float) -> Any:
+        """Return the answer to the request that was started, as `ask` does."""
+        if spinner.spin_until(lambda: self.pursue() or self.sent, timeout):
+            spinner.spin_until(self.pursue, timeout)
+        return self.answer
+
+    def close(self) -> None:
+        """Stop; ignore an answer that still arrives."""
+        self._pending = None
+        for client in self._clients:
+            self._node.destroy_client(client)
+
+    def _new_client(self) -> Client:
+        return self._node.create_client(self._kind, self._service)
+
+    def _take(self, pending: Future) -> None:
+        response = pending.result()
+        if response is not None and pending is self._pending:
+            self.answer = response
+            self._factor = 1.0
+            self._on_answer(response)
+
+
+def parameters_call(
+    node: Node, other: str, names: Sequence[str], on_answer: Callable[[dict[str, Any]], None]
+) -> ServiceCall:
+    """Return a call that requests the named parameters of the node `other`."""
+
+    def take(response: Any) -> None:
+        values: list[Any] = []
+        with suppress(RuntimeError):  # a type that ROS does not know
+            values += map(parameter_value_to_python, response.values)
+        on_answer(dict(zip(names, values, strict=False)))
+
+    call = ServiceCall(node, GetParameters, f"{other}/get_parameters")
+    call.start(GetParameters.Request(names=names), take)
+    return call
+
+
+class LifecycleClient:
+    """Requests the state of a managed node, and transitions."""
+
+    def __init__(self, spinner: Spinner, node: Node, name: str, answer_timeout: float) -> None:
+        """Prepare requests to the managed node `name`, through `node`, which the spinner runs.
+
+        `answer_timeout` is the wall time (s) for each answer.
+        """
+        self.name = name
+        self._spinner = spinner
+        self._timeout = answer_timeout
+        self._get_state = ServiceCall(node, GetState, f"{name}/get_state")
+        # No second request: it would be invalid while the transition is in progress.
+        self._change_state = ServiceCall(node, ChangeState, f"{name}/change_state", answer_time=inf)
+
+    def state(self) -> str:
+        """Return the name of the node's state, empty if it does not answer."""
+        answer = self._get_state.ask(self._spinner, GetState.Request(), self._timeout)
+        return answer.current_state.label if answer is not None else ""
+
+    def change_state(self, transition: int) -> bool:
+        """Request a transition; return whether the node has made it.
+
+        If the last request was not answered, it is repeated only in a state that shows that it had
+        no effect: the answer may be lost, or the transition still in progress.
+        """
+        if self._change_state.sent and self._change_state.answer is None:
+            state = self.state()
+            if state == _STATE_AFTER[transition] or state not in NEXT_TRANSITION:
+                return state == _STATE_AFTER[transition]
+        self._change_state.ask(self._spinner, _request(transition), self._timeout)
+        return self.changed
+
+    def start_change(self, transition: int) -> None:
+        """Request a transition and do not wait for the answer: see `change_ended`."""
+        self._change_state.start(_request(transition))
+
+    @property
+    def changed(self) -> bool:
+        """Whether the node has made the last transition requested."""
+        answer = self._change_state.answer
+        return answer is not None and answer.success
+
+    def change_ended(self) -> bool:
+        """Send the request if that is due; return whether it was answered."""
+        return self._change_state.pursue()
+
+    def bring_up(self, timeout: float, check: Callable[[], None]) -> None:
+        """Configure and activate the node unless it does so by itself.
+
+        `check` is called repeatedly meanwhile; its exceptions propagate. Raises RunError if the
+        node refuses, or is not active within `timeout` (s, wall time).
+        """
+        deadline = time.monotonic() + timeout
+        asked: list[str] = []
+        while (state := self.state()) != ACTIVE:
+            check()
+            if state in asked or state == "finalized":
+                done = _PARTICIPLE[asked[-1]] if asked else "brought up"
+                raise RunError(f"the controller {self.name} could not be {done}; see its log")
+            if time.monotonic() >= deadline:
+                raise RunError(f"the controller {self.name} was not active within {timeout:g} s")
+            # It may proceed to its next state by itself.
+            if state in NEXT_TRANSITION and not self._spinner.spin_until(
+                lambda before=state: self.state() != before, timeout=1.0
+            ):
+                asked.append(state)
+                self.change_state(NEXT_TRANSITION[state])
+
+
+def _request(transition: int) -> ChangeState.Request:
+    return ChangeState.Request(transition=Transition(id=transition))
+
+
+class NodeNotFoundError(RunError):
+    """No node of that name runs."""
+
+
+def set_parameters(
+    namespace: str, values: Mapping[str, Mapping[str, Any]]
+) -> dict[str, SetParametersResult]:
+    """Set parameters of running nodes; return their answers by node.
+
+    `values` are by node, whose name is relative to the namespace, and by flat name; all those of a
+    node are set together, or none. Nothing is set unless every node is found: otherwise this raises
+    NodeNotFoundError, and RunError for a node that does not answer.
+    """
+    initialise()
+    try:
+        node = Node(
+            "parameter_client",
+            namespace=namespace,
+            enable_rosout=False,
+            start_parameter_services=False,
+        )
+        spinner = Spinner()
+        spinner.add(node)
+        with closing(spinner):
+            calls = {name: setting_call(node, name, new) for name, new in values.items()}
+            for name, call in calls.items():
+                if not spinner.spin_until(lambda call=call: call.exists, _DISCOVERY_TIME):
+                    raise NodeNotFoundError(_not_found(node, name))
+            for name, call in calls.items():
+                if call.wait(spinner, _ANSWER_TIME) is None:
+                    raise RunError(f"the node {_full_name(node, name)} does not answer")
+            return {name: call.answer.result for name, call in calls.items()}
+    finally:
+        rclpy.try_shutdown()
+
+
+def _full_name(node: Node, name: str) -> str:
+    return f"{node.get_namespace().rstrip('/')}/{name}"
+
+
+def _not_found(node: Node, name: str) -> str:
+    elsewhere = sorted(
+        f"{namespace.rstrip('/')}/{found}"
+        for found, namespace in node.get_node_names_and_namespaces()
+        if found == name
+    )
+    what = f"no node {_full_name(node, name)} is running"
+    return f"{what}; running: {', '.join(elsewhere)}" if elsewhere else what
+
+
+def setting_call(node: Node, other: str, values: Mapping[str, Any]) -> ServiceCall:
+    """Return a call that sets parameters of the node `other`, all of them or none."""
+    call = ServiceCall(node, SetParametersAtomically, f"{other}/set_parameters_atomically")
+    given = [_parameter(name, value).to_parameter_msg() for name, value in values.items()]
+    call.start(SetParametersAtomically.Request(parameters=given))
+    return call
+
+
+def _parameter(name: str, value: Any) -> Parameter:
+    if isinstance(value, list):  # of an empty one ROS cannot know the type
+        return Parameter(name, Parameter.Type.STRING_ARRAY, value)
+    return Parameter(name, value=value)

@@ -1,0 +1,145 @@
+"""Asking other nodes, while the middleware responds late: services, states, parameters."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from lifecycle_msgs.msg import Transition
+from rclpy.client import Client
+from rclpy.node import Node
+from std_srvs.srv import Trigger
+
+from stickslip_ros.nodes.base.clients import LifecycleClient, ServiceCall, parameters_call
+from stickslip_ros.nodes.base.process import ros_context
+from stickslip_ros.nodes.base.spinner import Spinner
+from stickslip_ros.nodes.plant import PlantNode
+from stickslip_ros.nodes.washout_controller import WashoutControllerNode
+from tests.nodes.graph import Graph
+
+CONFIGURE = Transition.TRANSITION_CONFIGURE
+ACTIVATE = Transition.TRANSITION_ACTIVATE
+
+
+@pytest.fixture
+def client(domain: int) -> Iterator[LifecycleClient]:
+    with ros_context(domain, ["--ros-args"]) as context:
+        spinner, asking = Spinner(context), Node("asking", context=context)
+        spinner.add(asking)
+        spinner.add(WashoutControllerNode(context=context, overrides={"autostart": False}))
+        yield LifecycleClient(spinner, asking, "washout_controller", 1.0)
+        spinner.close()
+
+
+def test_each_transition_is_made_once(client: LifecycleClient) -> None:
+    assert client.state() == "unconfigured"
+    assert not client.change_state(ACTIVATE)
+    assert client.change_state(CONFIGURE)
+    assert client.state() == "inactive"
+    assert client.change_state(ACTIVATE)
+    assert client.state() == "active"
+
+
+def test_the_state_replaces_an_answer_that_is_lost(
+    client: LifecycleClient, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    take = ServiceCall._take
+    lost: list[Any] = []
+
+    def lose_the_first(call: ServiceCall, pending: Any) -> None:
+        if call is client._change_state and not lost:
+            lost.append(pending.result())
+        else:
+            take(call, pending)
+
+    monkeypatch.setattr(ServiceCall, "_take", lose_the_first)
+    assert not client.change_state(CONFIGURE)
+    assert [answer.success for answer in lost] == [True]
+    assert client.change_state(CONFIGURE)
+    assert client.change_state(ACTIVATE)
+    assert client.state() == "active"
+
+
+def answer_once(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+    response.message = "here"
+    return response
+
+
+def test_a_service_is_asked_again_and_again_by_one_call(domain: int) -> None:
+    with ros_context(domain, ["--ros-args"]) as context:
+        node, spinner = Node("asking", context=context), Spinner(context)
+        spinner.add(node)
+        call = ServiceCall(node, Trigger, "ring")
+        assert call.ask(spinner, Trigger.Request(), 0.1) is None
+        assert not call.sent
+        service = node.create_service(Trigger, "ring", answer_once)
+        answers: list[Any] = [call.ask(spinner, Trigger.Request(), 10.0) for _ in range(2)]
+        assert [answer.message for answer in answers] == ["here", "here"]
+        assert answers[0] is not answers[1]
+        node.destroy_service(service)
+        assert call.ask(spinner, Trigger.Request(), 0.2) is None
+        spinner.close()
+
+
+class _Unlucky(Node):
+    """A node whose first client never matches, although the service is there."""
+
+    def __init__(self, graph: Graph) -> None:
+        super().__init__("unlucky", context=graph.context, namespace="/test")
+        self.clients_made = 0
+
+    def create_client(self, srv_type: Any, srv_name: str, **options: Any) -> Client:
+        self.clients_made += 1
+        name = srv_name if self.clients_made > 1 else "nowhere/to_be_found"
+        return super().create_client(srv_type, name, **options)
+
+
+@pytest.fixture
+def unlucky(graph: Graph) -> _Unlucky:
+    node = _Unlucky(graph)
+    graph.adopt(node)
+    return node
+
+
+@pytest.mark.parametrize(
+    ("names", "known"),
+    [(["mass", "rate"], {"mass": 3.0, "rate": 10.0}), (["no_such_parameter"], {})],
+)
+def test_another_client_asks_where_one_does_not_match(
+    graph: Graph, unlucky: _Unlucky, names: list[str], known: dict[str, Any]
+) -> None:
+    graph.add(PlantNode, autostart=False, mass=3.0, rate=10.0)
+    answers: list[dict[str, Any]] = []
+    call = parameters_call(unlucky, "plant", names, answers.append)
+    graph.wait_until(lambda: call.pursue() or answers, "the plant answers")
+    assert answers == [known]
+    assert unlucky.clients_made > 1
+    call.close()
+
+
+def test_for_a_node_that_is_not_there_one_client_is_enough(graph: Graph, unlucky: _Unlucky) -> None:
+    call = parameters_call(unlucky, "plant", ["mass"], lambda _: None)
+    rounds = iter(range(30))
+    graph.wait_until(lambda: call.pursue() or next(rounds, None) is None, "many rounds")
+    assert unlucky.clients_made == 1
+    call.close()
+
+
+def test_a_service_that_runs_late_still_finds_the_clients_that_asked_before(
+    graph: Graph, unlucky: _Unlucky, recwarn: pytest.WarningsRecorder
+) -> None:
+    asked: list[None] = []
+
+    def answer(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        asked.append(None)
+        return response
+
+    late = Node("late", context=graph.context, namespace="/test")
+    late.create_service(Trigger, "late", answer)
+    call = ServiceCall(unlucky, Trigger, "late", answer_time=0.05)
+    call.start(Trigger.Request())
+    graph.wait_until(lambda: call.pursue() or unlucky.clients_made == 4, "it repeats")
+    graph.adopt(late)
+    graph.wait_until(lambda: call.pursue() and len(asked) >= 2, "each request is answered")
+    call.close()
+    assert not [each for each in recwarn if "failed to send response" in str(each.message)]
+    assert not list(unlucky.clients)
