@@ -11,7 +11,7 @@ import time
 from benchmarks.bare import BareMotion
 from benchmarks.slices import Row, by_turns, compare_times, show
 from stickslip_ros.paper.figures import bifurcation_drives
-from stickslip_ros.studies.sweep import DIAGRAM_OPTIONS, bifurcation_diagram
+from stickslip_ros.studies.settling import DIAGRAM_OPTIONS, bifurcation_diagram
 
 POINTS, ROUNDS = 1000, 3
 PERIODS = DIAGRAM_OPTIONS.transient + DIAGRAM_OPTIONS.cycles + 2

@@ -26,12 +26,10 @@ from benchmarks.slices import Row, by_turns, compare_times, show
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.studies.columns import write_csv
-from stickslip_ros.studies.journal import Journal
 from stickslip_ros.studies.plan import Axis
-from stickslip_ros.studies.runner import run_here
+from stickslip_ros.studies.runner import compute_columns
 from stickslip_ros.studies.settling import SettlingOptions
-from stickslip_ros.studies.study import Study
-from stickslip_ros.studies.sweep import sweep_study
+from stickslip_ros.studies.study import Study, sweep_study
 
 POINTS, SAMPLED_POINTS, ROUNDS = 1000, 3, 5
 MANY_POINTS, MANY_ROUNDS = 20_000, 3
@@ -60,9 +58,7 @@ def end(drive: Drive) -> float:
 def ours(asked: Study, workers: int = 1) -> Callable[[], float]:
     def run() -> float:
         start = time.perf_counter()
-        with Journal(asked) as journal:
-            run_here(journal, workers)
-            write_csv(StringIO(), journal, {})
+        write_csv(StringIO(), compute_columns(asked, workers=workers), {})
         return time.perf_counter() - start
 
     return run

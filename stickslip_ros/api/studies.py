@@ -36,13 +36,12 @@ from stickslip_ros.studies.basin import (
     basin_study,
     default_axes,
 )
-from stickslip_ros.studies.columns import COLUMNS, Columns, compute_columns
+from stickslip_ros.studies.columns import Columns
 from stickslip_ros.studies.options import BASIN_COUNT, BASIN_OPTIONS
 from stickslip_ros.studies.plan import Axis, Continuation, Grid, ListedAxis, RandomSample
-from stickslip_ros.studies.runner import CountPoints
+from stickslip_ros.studies.runner import CountPoints, compute_columns
 from stickslip_ros.studies.settling import SettlingOptions
-from stickslip_ros.studies.study import MEASURES, Study
-from stickslip_ros.studies.sweep import sweep_study
+from stickslip_ros.studies.study import COLUMNS, MEASURES, Study, sweep_study
 from stickslip_ros.text import shown
 
 if TYPE_CHECKING:
@@ -85,7 +84,7 @@ class _Result(Shown):
             If pandas is not installed.
         """
         values = self._values()
-        values |= {"turning_points": list(self.columns.turning_points)}
+        values |= {"turning_points": self.columns.turning_points}
         quantities = self._quantities()
         return data_frame(
             {name: values[name] for name in quantities}, quantities, units_of(self.study)
@@ -205,7 +204,7 @@ class Sweep(_Result):
         )
 
     def _parts(self) -> Parts:
-        yield sweep_table(self.study, self.columns.points)
+        yield sweep_table(self.study, self.columns)
 
 
 class Basin(_Result):
@@ -214,7 +213,7 @@ class Basin(_Result):
     @cached_property
     def basins(self) -> Basins:
         """The motions, with the number and the share of the starts that lead to each."""
-        return Basins.from_points(self.columns.points())
+        return Basins.from_columns(self.columns)
 
     @property
     def attractors(self) -> tuple[Attractor, ...]:
@@ -247,8 +246,7 @@ class Basin(_Result):
         )
 
     def _values(self) -> dict[str, Any]:
-        places = [self.basins.place(point) for point in self.columns.points()]
-        return super()._values() | {"attractor": np.array(places, dtype=np.intp)}
+        return super()._values() | {"attractor": self.basins.places}
 
     def _quantities(self) -> dict[str, Quantity]:
         return super()._quantities() | {"attractor": Quantity("place in the attractors, from 0")}
@@ -448,7 +446,7 @@ def _texts(values: Any) -> Any:
     return np.array([value or "" for value in values], dtype=str)
 
 
-def _padded(rows: tuple[tuple[float, ...], ...]) -> Any:
+def _padded(rows: list[tuple[float, ...]]) -> Any:
     """Return rows of unequal length as an array, filled up with NaN."""
     found = np.full((len(rows), max(map(len, rows), default=0)), np.nan)
     for number, row in enumerate(rows):

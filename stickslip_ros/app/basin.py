@@ -69,15 +69,14 @@ def run(arguments: argparse.Namespace) -> None:
     check_figure(arguments)
     label = f"basins of {scenario.name}, {study.plan.size} starts"
     with computed(arguments, study, label) as journal:
-        basins = Basins.from_points(journal.points())
+        columns = journal.columns
+        basins = Basins.from_columns(columns)
         made = {"attractors": [asdict(attractor) for attractor in basins.attractors]}
         if arguments.plot is not None:
             from stickslip_ros.plots.basin_figure import study_figure
-            from stickslip_ros.studies.columns import Columns
 
-            columns = Columns.from_journal(journal)
             write_figure(arguments, lambda style: study_figure(columns, basins, study, style=style))
-        write_results(arguments, journal, {"attractor": basins.place}, made)
+        write_results(arguments, journal, {"attractor": basins.places.tolist()}, made)
         if not arguments.json:
             print_table(*basin_table(study, basins))
 

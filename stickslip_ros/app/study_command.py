@@ -16,7 +16,7 @@ from stickslip_ros.files import written
 from stickslip_ros.studies.options import SettlingOptions
 
 if TYPE_CHECKING:
-    from stickslip_ros.studies.columns import ExtraColumns
+    from stickslip_ros.studies.columns import Further
     from stickslip_ros.studies.journal import Journal
     from stickslip_ros.studies.study import Study
 
@@ -107,7 +107,7 @@ def computed(arguments: argparse.Namespace, study: "Study", label: str) -> "Gene
             tell(f"stickslip {arguments.command}: {done}")
             raise
         except OSError as error:
-            raise RunError(f"{part or 'temporary file'}: {error.strerror}{kept}") from None
+            raise RunError(f"{part or study.scenario.name}: {error.strerror}{kept}") from None
         except DaskError as error:
             raise RunError(f"--dask {error}{kept}") from None
         except RunError as error:
@@ -131,7 +131,7 @@ def _advice(study: "Study") -> str:
 def write_results(
     arguments: argparse.Namespace,
     journal: "Journal",
-    further: "ExtraColumns",
+    further: "Further",
     made: Mapping[str, Any],
 ) -> None:
     """Write the table of a complete journal to where it was asked for, a file or as JSON.
@@ -141,13 +141,14 @@ def write_results(
     """
     from stickslip_ros.studies.columns import write_csv, write_json
 
-    head, out = finite({**provenance(journal.study.scenario), **made}), arguments.out
+    study, columns, out = journal.study, journal.columns, arguments.out
+    head = finite({**provenance(study.scenario), **made})
     if out is not None:
         with writing("--out", out), written(out) as stream:
             if out.suffix.lower() == ".csv":
-                write_csv(stream, journal, further)
+                write_csv(stream, columns, further)
             else:
-                write_json(stream, journal, further, head)
+                write_json(stream, study, columns, further, head)
     if arguments.json:
-        write_json(sys.stdout, journal, further, head)
+        write_json(sys.stdout, study, columns, further, head)
     journal.discard()

@@ -19,8 +19,7 @@ from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.studies.options import Continuation, SettlingOptions
 
 if TYPE_CHECKING:
-    from stickslip_ros.studies.columns import ExtraColumns
-    from stickslip_ros.studies.journal import Journal
+    from stickslip_ros.studies.columns import Further
 
 _DESCRIPTION = """Measure the settled motion of a scenario over the values of one parameter or two:
 amplitude, regime, stick fraction and turning points, for a bifurcation diagram (one parameter) or a
@@ -62,7 +61,7 @@ def run(arguments: argparse.Namespace) -> None:
     """Run the command."""
     from stickslip_ros.plots.study_tables import sweep_table, units_of
     from stickslip_ros.studies.plan import Axis, Grid
-    from stickslip_ros.studies.sweep import sweep_study
+    from stickslip_ros.studies.study import sweep_study
     from stickslip_ros.studies.transitions import transitions
 
     with naming("--over"):
@@ -83,26 +82,20 @@ def run(arguments: argparse.Namespace) -> None:
     plan = study.plan
     assert isinstance(plan, Grid)
     label = f"sweep of {study.scenario.name}, {plan.size} points"
-    further: ExtraColumns = {}
+    further: Further = {}
     if plan.continuation:
-        further = {"direction": lambda point: plan.direction(point.number)}
+        further = {"direction": [plan.direction(number) for number in range(plan.size)]}
     with computed(arguments, study, label) as journal:
+        columns, colour = journal.columns, arguments.colour
         if arguments.plot is not None:
-            _draw(arguments, journal)
+            from stickslip_ros.plots.sweep_figure import sweep_figure
+
+            write_figure(arguments, lambda style: sweep_figure(columns, study, colour, style=style))
         theory = transitions(study, plan.axes[0]) if len(plan.axes) == 1 else {}
         made = {"transitions": {name.lower().replace(" ", "_"): theory[name] for name in theory}}
         write_results(arguments, journal, further, made)
         if not arguments.json:
-            print_table(*sweep_table(study, journal.points))
+            print_table(*sweep_table(study, columns))
             units = units_of(study)
             for name, values in theory.items():
                 print(f"{name}: {', '.join(units.texts(values, plan.axes[0].unit))}")
-
-
-def _draw(arguments: argparse.Namespace, journal: "Journal") -> None:
-    from stickslip_ros.plots.sweep_figure import sweep_figure
-    from stickslip_ros.studies.columns import Columns
-
-    columns = Columns.from_journal(journal)
-    study, colour = journal.study, arguments.colour
-    write_figure(arguments, lambda style: sweep_figure(columns, study, colour, style=style))

@@ -20,8 +20,11 @@ from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import Coulomb, FrictionLaw, Linear, Stribeck
 from stickslip_ros.physics.motion import RecordedMotion
 from stickslip_ros.progress import Progress
-from stickslip_ros.studies.settling import ControlledDrive
-from stickslip_ros.studies.sweep import BifurcationDiagram, bifurcation_diagram
+from stickslip_ros.studies.settling import (
+    BifurcationDiagram,
+    ControlledDrive,
+    bifurcation_diagram,
+)
 from stickslip_ros.studies.transitions import (
     HOPF_POINT,
     STICKING_LIMIT,

@@ -9,7 +9,7 @@ from typing import Any
 
 from stickslip_ros.paper.claims import CHAPTERS, Finding, Verdict
 from stickslip_ros.paper.figures import BifurcationFigure, PaperFigure
-from stickslip_ros.studies.sweep import DIAGRAM_OPTIONS
+from stickslip_ros.studies.settling import DIAGRAM_OPTIONS
 
 Report = Mapping[str, Any]
 """The report as in JSON: `claims` and `figures`, each a list of objects."""

@@ -44,7 +44,7 @@ def study_figure(
     return basin_figure(
         position=columns.values[POSITION],
         velocity=columns.values[VELOCITY],
-        attractor=np.array([basins.place(point) for point in columns.points()], dtype=np.intp),
+        attractor=basins.places,
         regimes=[attractor.regime for attractor in basins.attractors],
         labels=[_label(attractor, units) for attractor in basins.attractors],
         grid_shape=plan.shape if isinstance(plan, Grid) else None,

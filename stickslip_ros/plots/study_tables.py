@@ -1,7 +1,7 @@
 """The tables of studies: sweeps, basins of attraction, designs, and what theory says."""
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict
 from itertools import groupby, islice
 from typing import Any, cast
@@ -11,6 +11,7 @@ from stickslip_ros.plots.measure_table import measure_table
 from stickslip_ros.plots.units import Units
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.studies.basin import Attractor, Basins
+from stickslip_ros.studies.columns import Columns
 from stickslip_ros.studies.design import Design
 from stickslip_ros.studies.plan import Grid
 from stickslip_ros.studies.stability import Notes, Section
@@ -88,28 +89,25 @@ _SECTIONS: dict[str, dict[str, tuple[str, str]]] = {
 
 def _direction_and_regime(point: Point, plan: Grid) -> str:
     """Return what the points of a row of the table on the screen have in common."""
-    regime = Regime.label(point.measures.regime)
-    if point.measures.regime in (None, Regime.UNBOUNDED):
+    regime = Regime.label(point.regime)
+    if point.regime in (None, Regime.UNBOUNDED):
         regime = point.reason or regime
     elif not point.steady:
         regime += ", not steady" + (f": {Trend.DRIFTING}" if point.reason else "")
     return f"{plan.direction(point.number) or ''} {regime}".lstrip()
 
 
-def sweep_table(study: Study, points: Callable[[], Iterable[Point]]) -> TextTable:
-    """Return in which ranges of the parameter there is which regime; of a map, how often.
-
-    `points` yields the points of the study in their order, each time that it is called.
-    """
+def sweep_table(study: Study, columns: Columns) -> TextTable:
+    """Return in which ranges of the parameter there is which regime; of a map, how often."""
     plan = study.plan
     assert isinstance(plan, Grid)
     title = f"{study.scenario.name}, {plan.size} points"
     if len(plan.axes) == 1:
-        rows = list(islice(_ranges(points, plan, units_of(study)), _MOST_RANGES + 1))
+        rows = list(islice(_ranges(columns, plan, units_of(study)), _MOST_RANGES + 1))
         if len(rows) <= _MOST_RANGES:
             headings = ["regime", plan.parameters[0], "points", "amplitude", "stick fraction"]
             return TextTable(title, headings, rows)
-    counts = Counter(_direction_and_regime(point, plan) for point in points())
+    counts = Counter(_direction_and_regime(point, plan) for point in columns.points())
     return TextTable(title, ["regime", "points"], [[each, str(n)] for each, n in counts.items()])
 
 
@@ -118,13 +116,10 @@ def units_of(study: Study) -> Units:
     return Units.for_drive(study.scenario.plant.as_drive(), study.plan.parameters)
 
 
-def _ranges(points: Callable[[], Iterable[Point]], plan: Grid, units: Units) -> Iterator[list[str]]:
-    largest = max((point.measures.amplitude or 0.0 for point in points()), default=0.0)
-    for kind, group in groupby(points(), lambda point: _direction_and_regime(point, plan)):
-        measured = [
-            (point.measures.amplitude, point.measures.stick_fraction, point.number)
-            for point in group
-        ]
+def _ranges(columns: Columns, plan: Grid, units: Units) -> Iterator[list[str]]:
+    largest = max((amplitude or 0.0 for amplitude in columns.cells("amplitude")), default=0.0)
+    for kind, group in groupby(columns.points(), lambda point: _direction_and_regime(point, plan)):
+        measured = [(point.amplitude, point.stick_fraction, point.number) for point in group]
         amplitudes, stick_fractions, numbers = zip(*measured, strict=True)
         yield [
             kind,

@@ -1,17 +1,20 @@
 """Basins of attraction: the motion that each start leads to, and the share of starts of each."""
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import sqrt
 from typing import Self
+
+import numpy as np
+import numpy.typing as npt
 
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.measures.cycle_measures import Regime
 from stickslip_ros.scenarios.files import Scenario
+from stickslip_ros.studies.columns import Columns
 from stickslip_ros.studies.options import BASIN_OPTIONS, SettlingOptions
 from stickslip_ros.studies.plan import Axis, Plan
 from stickslip_ros.studies.settling import CYCLES
-from stickslip_ros.studies.study import Point, Study
+from stickslip_ros.studies.study import Study
 
 POSITION, VELOCITY = "plant.initial.position", "plant.initial.velocity"
 """Parameters that define a start; the control law starts in its initial state."""
@@ -36,45 +39,6 @@ class Attractor:
     standard_error: float = 0.0
     """Of the share S of n random starts, sqrt(S (1 - S) / n); usually smaller on a grid."""
 
-    @classmethod
-    def from_point(cls, point: Point) -> Self:
-        """Return the attractor that a motion has reached, as far as known.
-
-        Parameters
-        ----------
-        point : Point
-            A computed point of a study.
-
-        Returns
-        -------
-        Attractor
-            The attractor; its count and share are 0.
-        """
-        measures, steady = point.measures, point.steady
-        if steady and measures.regime in CYCLES:
-            return cls(measures.regime, steady, measures.amplitude, measures.midpoint)
-        return cls(measures.regime, steady, None, None)
-
-    def is_like(self, other: "Attractor") -> bool:
-        """Return whether two attractors are the same, up to rounding and a remaining transient.
-
-        Parameters
-        ----------
-        other : Attractor
-            The attractor to compare with.
-
-        Returns
-        -------
-        bool
-            Whether `regime` and `steady` are equal, and amplitude and midpoint differ by 2 % of
-            the amplitude at most.
-        """
-        if (self.regime, self.steady) != (other.regime, other.steady):
-            return False
-        allowed = 0.02 * (self.amplitude or 0.0)
-        pairs = (self.amplitude, other.amplitude), (self.midpoint, other.midpoint)
-        return all(abs((one or 0.0) - (two or 0.0)) <= allowed for one, two in pairs)
-
 
 @dataclass(frozen=True)
 class Basins:
@@ -82,58 +46,55 @@ class Basins:
 
     attractors: tuple[Attractor, ...]
     """The attractors; the one with the most starts comes first."""
-    order: tuple[int, ...]
-    """Index in `attractors` of each attractor in `found`."""
-    found: tuple[Attractor, ...]
-    """The attractors in the order in which they were found."""
+    places: npt.NDArray[np.intp]
+    """Index in `attractors` of the attractor that each start leads to, shape (n,)."""
 
     @classmethod
-    def from_points(cls, points: Iterable[Point]) -> Self:
+    def from_columns(cls, columns: Columns) -> Self:
         """Return the attractors that the points of a study have reached.
+
+        Motions are the same, up to rounding and a remaining transient, if `regime` and `steady`
+        are equal, and amplitude and midpoint differ by 2 % of the amplitude at most from those of
+        the first one; these count for settled cycles only.
 
         Parameters
         ----------
-        points : Iterable[Point]
-            The points, as from `Journal.points`. They are read once, one at a time.
+        columns : Columns
+            The results of the study.
 
         Returns
         -------
         Basins
             The attractors with their shares of the points.
         """
-        found: list[Attractor] = []
-        counts: list[int] = []
-        for point in points:
-            attractor = Attractor.from_point(point)
-            place = _place(attractor, found)
-            if place == len(found):
-                found.append(attractor)
-                counts.append(0)
-            counts[place] += 1
-        ranked = sorted(range(len(found)), key=lambda place: -counts[place])
+        regime, steady = columns.regime, columns.steady
+        cycle = steady & np.isin(regime, CYCLES)
+        amplitude, midpoint = (
+            np.where(cycle, each, 0.0) for each in (columns.amplitude, columns.midpoint)
+        )
+        found = np.full(len(regime), -1)
         attractors: list[Attractor] = []
-        for place in ranked:
-            share = counts[place] / sum(counts)
-            error = sqrt(share * (1.0 - share) / sum(counts))
-            one = replace(found[place], count=counts[place], share=share, standard_error=error)
-            attractors.append(one)
-        order = tuple(ranked.index(place) for place in range(len(found)))
-        return cls(tuple(attractors), order, tuple(found))
-
-    def place(self, point: Point) -> int:
-        """Return which of the attractors a point has reached.
-
-        Parameters
-        ----------
-        point : Point
-            One of the points that the basins were made from.
-
-        Returns
-        -------
-        int
-            Index in `attractors`.
-        """
-        return self.order[_place(Attractor.from_point(point), self.found)]
+        while len(left := np.flatnonzero(found < 0)):
+            first = left[0]
+            allowed = 0.02 * amplitude[first]
+            alike = (regime[left] == regime[first]) & (steady[left] == steady[first])
+            for each in (amplitude, midpoint):
+                alike &= np.abs(each[left] - each[first]) <= allowed
+            found[left[alike]] = len(attractors)
+            share = (count := int(alike.sum())) / len(regime)
+            attractor = Attractor(
+                regime=regime[first],
+                steady=bool(steady[first]),
+                amplitude=float(amplitude[first]) if cycle[first] else None,
+                midpoint=float(midpoint[first]) if cycle[first] else None,
+                count=count,
+                share=share,
+                standard_error=sqrt(share * (1.0 - share) / len(regime)),
+            )
+            attractors.append(attractor)
+        order = sorted(range(len(attractors)), key=lambda place: -attractors[place].count)
+        ranked = tuple(attractors[place] for place in order)
+        return cls(ranked, np.argsort(order)[found] if order else found)
 
 
 def basin_study(
@@ -145,7 +106,7 @@ def basin_study(
 ) -> Study:
     """Return the study of the starts in a plan.
 
-    Compute it with `run` or `compute_columns`; `Basins` groups the results by attractor.
+    Compute it with `compute_columns`; `Basins` groups the results by attractor.
 
     Parameters
     ----------
@@ -172,14 +133,11 @@ def basin_study(
     Examples
     --------
     >>> from stickslip_ros.scenarios.files import load_scenario
-    >>> from stickslip_ros.studies.journal import Journal
     >>> from stickslip_ros.studies.plan import Grid
-    >>> from stickslip_ros.studies.runner import run
+    >>> from stickslip_ros.studies.runner import compute_columns
     >>> scenario = load_scenario("paper", ["plant.expects_control=false"])
     >>> study = basin_study(scenario, Grid(default_axes(scenario, 2)))
-    >>> with Journal(study) as journal:
-    ...     run(journal)
-    ...     basins = Basins.from_points(journal.points())
+    >>> basins = Basins.from_columns(compute_columns(study))
     >>> [(str(each.regime), each.share) for each in basins.attractors]
     [('stick_slip', 1.0)]
     """
@@ -235,9 +193,3 @@ def default_axes(scenario: Scenario, count: int) -> tuple[Axis, Axis]:
         Axis(POSITION, middle - reach, middle + reach, count),
         Axis(VELOCITY, -speed, speed, count),
     )
-
-
-def _place(attractor: Attractor, found: Sequence[Attractor]) -> int:
-    """Return the index of the first attractor found that is like it, or else their number."""
-    places = (place for place, other in enumerate(found) if other.is_like(attractor))
-    return next(places, len(found))

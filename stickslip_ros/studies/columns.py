@@ -2,42 +2,31 @@
 
 import csv
 import json
-from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import Executor
-from contextlib import ExitStack
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from math import isnan
-from pathlib import Path
-from shutil import copyfileobj
-from tempfile import TemporaryFile
+from functools import cached_property
 from typing import Any, Self, TextIO
 
 import numpy as np
 import numpy.typing as npt
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.physics.measures.cycle_measures import Measures
-from stickslip_ros.studies.journal import Journal
 from stickslip_ros.studies.plan import Grid, Plan
-from stickslip_ros.studies.runner import IN_FLIGHT, CountPoints, run, run_here
-from stickslip_ros.studies.study import MEASURES, Point, Study
-
-COLUMNS = (*MEASURES, "steady", "turning_points", "reason")
-"""Columns of a table, in addition to the values of the parameters."""
+from stickslip_ros.studies.study import COLUMNS, Point, Study
 
 
 @dataclass(frozen=True)
 class Columns:
     """The results of the n points of a study, in the order of its plan; SI units.
 
-    All arrays have shape (n,). NaN or None marks a value that does not exist, such as the period of
-    a motion at rest, and a point that is not computed yet.
+    All arrays have shape (n,); the turning points are a list. NaN or None marks a value that does
+    not exist, such as the period of a motion at rest, and a point that is not computed yet.
     """
 
     plan: Plan
     """The points of the study."""
-    values: Mapping[str, FloatArray]
-    """Values of each varied parameter, by NODE.PARAMETER."""
+    done: npt.NDArray[np.bool_]
+    """Whether the point is computed."""
     amplitude: FloatArray
     """Amplitude of the displacement, m."""
     velocity_amplitude: FloatArray
@@ -56,187 +45,112 @@ class Columns:
     """The `Regime`, or None."""
     steady: npt.NDArray[np.bool_]
     """Whether the motion has settled."""
-    turning_points: tuple[tuple[float, ...], ...]
+    turning_points: list[tuple[float, ...]]
     """Poincare section x' = 0 of each point, m."""
     reason: npt.NDArray[np.object_]
     """Why a point has no cycle to measure, or how it drifts, in words, or None."""
 
     @classmethod
-    def from_journal(cls, journal: Journal) -> Self:
-        """Return the points of a journal as columns.
+    def of(cls, plan: Plan) -> Self:
+        """Return the columns of a plan of which no point is computed.
 
         Parameters
         ----------
-        journal : Journal
-            The journal; it need not be complete.
+        plan : Grid or RandomSample
+            The points of the study.
 
         Returns
         -------
         Columns
-            One row for each point of the study's plan.
+            One row for each point.
         """
-        plan = journal.study.plan
-        count = plan.size
-        numbers: dict[str, Any] = {name: np.full(count, np.nan) for name in MEASURES}
-        numbers["cycles"] = np.zeros(count, dtype=np.intp)
-        numbers["regime"] = np.full(count, None, dtype=object)
-        reason = np.full(count, None, dtype=object)
-        steady = np.zeros(count, dtype=bool)
-        turning_points: list[tuple[float, ...]] = [()] * count
-        for point in journal.points():
-            row = point.number
-            for name, column in numbers.items():
-                column[row] = getattr(point.measures, name)
-            steady[row], reason[row] = point.steady, point.reason
-            turning_points[row] = point.turning_points
-        values = np.array([plan.values(row) for row in range(count)], dtype=float).T
+        size = plan.size
         return cls(
-            plan=plan,
-            values=dict(zip(plan.parameters, values, strict=True)),
-            **numbers,
-            steady=steady,
-            turning_points=tuple(turning_points),
-            reason=reason,
+            plan,
+            np.zeros(size, dtype=bool),
+            *(np.full(size, np.nan) for _ in range(6)),
+            cycles=np.zeros(size, dtype=np.intp),
+            regime=np.full(size, None, dtype=object),
+            steady=np.zeros(size, dtype=bool),
+            turning_points=[()] * size,
+            reason=np.full(size, None, dtype=object),
         )
 
+    @cached_property
+    def values(self) -> Mapping[str, FloatArray]:
+        """Values of each varied parameter, by NODE.PARAMETER."""
+        rows = np.array([self.plan.values(row) for row in range(self.plan.size)], dtype=float)
+        return dict(zip(self.plan.parameters, rows.T, strict=True))
+
+    def enter(self, points: Iterable[Point]) -> None:
+        """Enter points that are computed.
+
+        Parameters
+        ----------
+        points : Iterable[Point]
+            The points.
+        """
+        columns = [getattr(self, name) for name in COLUMNS]
+        for number, *cells in points:
+            for column, cell in zip(columns, cells, strict=True):
+                column[number] = cell
+            self.done[number] = True
+
+    def cells(self, name: str) -> Iterator[Any]:
+        """Yield the values of a column, None for those that do not exist.
+
+        Parameters
+        ----------
+        name : str
+            Name of the column.
+        """
+        column = getattr(self, name)
+        for value in column if isinstance(column, list) else column.tolist():
+            yield None if value != value else value
+
     def points(self) -> Iterator[Point]:
-        """Yield the points, in their order."""
-        columns = [getattr(self, name).tolist() for name in MEASURES]
-        for number, values in enumerate(zip(*columns, strict=True)):
-            measures: dict[str, Any] = {
-                name: None if isinstance(value, float) and isnan(value) else value
-                for name, value in zip(MEASURES, values, strict=True)
-            }
-            yield Point(
-                number,
-                Measures(**measures),
-                bool(self.steady[number]),
-                self.turning_points[number],
-                self.reason[number],
-            )
+        """Yield the points that are computed, in their order."""
+        rows = zip(self.done, *map(self.cells, COLUMNS), strict=True)
+        return (Point(number, *cells) for number, (done, *cells) in enumerate(rows) if done)
 
 
-def compute_columns(
-    study: Study,
-    *,
-    workers: int = 1,
-    executor: Executor | None = None,
-    in_flight: int = IN_FLIGHT,
-    path: Path | None = None,
-    progress: CountPoints = lambda _: None,
-) -> Columns:
-    """Compute a study and return its points as columns.
-
-    The result does not depend on how the work is shared.
-
-    Parameters
-    ----------
-    study : Study
-        The study, as from `sweep_study` or `basin_study`.
-    workers : int
-        Number of processes on this machine; 1 computes in this process.
-    executor : concurrent.futures.Executor, optional
-        Executor to use instead of `workers`.
-    in_flight : int
-        Number of tasks that the executor holds at a time.
-    path : Path, optional
-        Journal file. An interrupted study continues from it, and it is kept at the end. Without a
-        path the journal is a temporary file.
-    progress : Callable[[int], None]
-        Receives the number of points that are done.
-
-    Returns
-    -------
-    Columns
-        The results, one row for each point.
-
-    Raises
-    ------
-    InvalidInputError
-        If `path` is not a journal of this study, or cannot be written.
-    RunError
-        If the worker processes keep dying, or the executor gives up.
-
-    Examples
-    --------
-    >>> from stickslip_ros.physics.measures.cycle_measures import Regime
-    >>> from stickslip_ros.scenarios.files import load_scenario
-    >>> from stickslip_ros.studies.plan import Axis
-    >>> from stickslip_ros.studies.sweep import sweep_study
-    >>> scenario = load_scenario("paper", ["plant.expects_control=false"])
-    >>> study = sweep_study(scenario, [Axis("plant.belt_speed", 0.1, 0.6, 6)])
-    >>> found = compute_columns(study)
-    >>> sticks = found.regime == Regime.STICK_SLIP
-    >>> print(f"{found.values['plant.belt_speed'][sticks].max():.1f}")
-    0.4
-    """
-    with Journal(study, path) as journal:
-        if executor is not None:
-            run(journal, executor, in_flight=in_flight, progress=progress)
-        else:
-            run_here(journal, workers, progress)
-        return Columns.from_journal(journal)
+Further = Mapping[str, Sequence[Any]]
+"""Extra columns of a table, before the measures, by name."""
 
 
-ExtraColumns = Mapping[str, Callable[[Point], Any]]
-"""Extra columns of a table, before the measures: their names, and a function of a point each."""
-
-
-def write_csv(stream: TextIO, journal: Journal, further: ExtraColumns) -> None:
-    """Write a row for each point that is done, with turning points separated by spaces."""
-    plan = journal.study.plan
+def write_csv(stream: TextIO, columns: Columns, further: Further) -> None:
+    """Write a row for each point, with turning points separated by spaces."""
+    plan = columns.plan
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow([*plan.parameters, *further, *COLUMNS])
-    for point in journal.points():
-        cells = [*plan.values(point.number), *(make(point) for make in further.values())]
-        *measures, turning_points, reason = point.as_json()[1:]
-        writer.writerow([*cells, *measures, " ".join(map(repr, turning_points)), reason])
+    rows = zip(*further.values(), *map(columns.cells, COLUMNS), strict=True)
+    for number, (*cells, turning_points, reason) in enumerate(rows):
+        section = " ".join(map(repr, turning_points))
+        writer.writerow([*plan.values(number), *cells, section, reason])
 
 
 def write_json(
-    stream: TextIO, journal: Journal, further: ExtraColumns, provenance: Mapping[str, Any]
+    stream: TextIO, study: Study, columns: Columns, further: Further, provenance: Mapping[str, Any]
 ) -> None:
     """Write one object: the parameters, their values, and an array for each column.
 
     For a grid, `values` has a list for each axis, and the arrays are row-major over the axes; if
     it has a continuation, the direction is the slowest index. Otherwise `values` has the
-    parameters' values of each point. The entries of `provenance`, ready for JSON, are added. The
-    arrays pass through temporary files, so that memory holds one piece of the study only.
+    parameters' values of each point. The entries of `provenance`, ready for JSON, are added.
     """
-    study = journal.study
     plan = study.plan
     how = {name: found for name, found in study.as_dict().items() if name != "scenario"}
-    stream.write("{\n")
+    separator = "{\n"
     for name, value in {**provenance, **how, "parameters": plan.parameters}.items():
-        stream.write(f' "{name}": {json.dumps(value, allow_nan=False)},\n')
-    makers: dict[str, Callable[[Point], Any]] = dict(further)
+        stream.write(f'{separator} "{name}": {json.dumps(value, allow_nan=False)}')
+        separator = ",\n"
+    values: Iterable[Any] = map(plan.values, range(plan.size))
     if isinstance(plan, Grid):
-        _write_values(stream, plan)
-    else:
-        makers = {"values": lambda point: plan.values(point.number), **further}
-    names = [*makers, *COLUMNS]
-    with ExitStack() as stack:
-        files = {name: stack.enter_context(TemporaryFile("w+")) for name in names}
-        separator = ""
-        for point in journal.points():
-            cells = [*(make(point) for make in makers.values()), *point.as_json()[1:]]
-            for file, cell in zip(files.values(), cells, strict=True):
-                file.write(f"{separator}{json.dumps(cell)}")
-            separator = ", "
-        for name, file in files.items():
-            file.seek(0)
-            stream.write(f' "{name}": [')
-            copyfileobj(file, stream)
-            stream.write("],\n" if name != names[-1] else "]\n")
-    stream.write("}\n")
-
-
-def _write_values(stream: TextIO, grid: Grid) -> None:
-    """Write the values of each axis, one at a time."""
-    stream.write(' "values": [')
-    for place, axis in enumerate(grid.axes):
-        stream.write(", [" if place else "[")
-        for number in range(axis.count):
-            stream.write(f"{', ' if number else ''}{json.dumps(axis.value(number))}")
+        values = ([*map(axis.value, range(axis.count))] for axis in plan.axes)
+    arrays = {"values": values, **further} | {name: columns.cells(name) for name in COLUMNS}
+    for name, cells in arrays.items():
+        stream.write(f'{separator} "{name}": [')
+        for number, cell in enumerate(cells):  # one at a time: a long text takes much memory
+            stream.write(f"{', ' if number else ''}{json.dumps(cell)}")
         stream.write("]")
-    stream.write("],\n")
+    stream.write("\n}\n")

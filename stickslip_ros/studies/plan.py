@@ -16,8 +16,8 @@ from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
 from stickslip_ros.studies.options import Continuation
 from stickslip_ros.text import by_group, did_you_mean, shown
 
-MOST_POINTS = 1_000_000_000
-"""Largest number of points of a study, since its results must fit into a file."""
+MOST_POINTS = 10_000_000
+"""Largest number of points of a study, since memory holds its results."""
 
 _NODES = tuple(node for node in NODE_PARAMETERS if node != "analyzer")
 

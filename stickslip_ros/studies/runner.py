@@ -16,22 +16,23 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from multiprocessing import active_children, get_context, parent_process
 from os import _exit
+from pathlib import Path
 from threading import Thread
 from typing import Any, cast
 
+import numpy as np
+
 from stickslip_ros.errors import InvalidInputError, RunError
+from stickslip_ros.studies.columns import Columns
 from stickslip_ros.studies.journal import Journal
 from stickslip_ros.studies.settling import MotionState
-from stickslip_ros.studies.study import Piece, compute, pieces_of
+from stickslip_ros.studies.study import Piece, Study, compute, pieces_of
 
 IN_FLIGHT = 64
 """Default number of tasks that an executor holds at a time, which limits the memory."""
 
 _LARGEST_TASK = 1000
 """Largest number of points of a task."""
-
-_SCANNED = 100_000
-"""Largest number of points to scan before the missing ones among them are started."""
 
 _DASK_TIMEOUT = "10s"
 
@@ -59,34 +60,9 @@ def run(
     If the run is interrupted, the journal holds the points that are done. The result does not
     depend on the executor, to the last bit on one kind of processor.
 
-    Parameters
-    ----------
-    journal : Journal
-        The journal of the study.
-    executor : concurrent.futures.Executor, optional
-        Executor of the tasks, of some points each; without one this process computes them.
-    in_flight : int
-        Number of tasks that the executor holds at a time.
-    progress : Callable[[int], None]
-        Receives the number of points that are done.
-
-    Raises
-    ------
-    InvalidInputError
-        If `in_flight` is below 1.
-    WorkersDiedError
-        If the executor gives up.
-
-    Examples
-    --------
-    >>> from stickslip_ros.scenarios.files import load_scenario
-    >>> from stickslip_ros.studies.plan import Axis
-    >>> from stickslip_ros.studies.sweep import sweep_study
-    >>> scenario = load_scenario("paper", ["plant.expects_control=false"])
-    >>> with Journal(sweep_study(scenario, [Axis("plant.belt_speed", 0.2, 0.6, 3)])) as journal:
-    ...     run(journal)
-    ...     journal.count
-    3
+    An executor holds `in_flight` tasks of some points each at a time; without one this process
+    computes them. `progress` receives the number of points that are done. Raises InvalidInputError
+    if `in_flight` is below 1, and WorkersDiedError if the executor gives up.
     """
     if in_flight < 1:
         raise InvalidInputError(f"{in_flight} tasks in flight: must be 1 or more")
@@ -159,6 +135,67 @@ def run_here(journal: Journal, workers: int, progress: CountPoints = lambda _: N
                 ) from None
         else:
             return
+
+
+def compute_columns(
+    study: Study,
+    *,
+    workers: int = 1,
+    executor: Executor | None = None,
+    in_flight: int = IN_FLIGHT,
+    path: Path | None = None,
+    progress: CountPoints = lambda _: None,
+) -> Columns:
+    """Compute a study and return its points as columns.
+
+    The result does not depend on how the work is shared.
+
+    Parameters
+    ----------
+    study : Study
+        The study, as from `sweep_study` or `basin_study`.
+    workers : int
+        Number of processes on this machine; 1 computes in this process.
+    executor : concurrent.futures.Executor, optional
+        Executor to use instead of `workers`.
+    in_flight : int
+        Number of tasks that the executor holds at a time.
+    path : Path, optional
+        Journal file. An interrupted study continues from it, and it is kept at the end.
+    progress : Callable[[int], None]
+        Receives the number of points that are done.
+
+    Returns
+    -------
+    Columns
+        The results, one row for each point.
+
+    Raises
+    ------
+    InvalidInputError
+        If `path` is not a journal of this study, or cannot be written.
+    RunError
+        If the worker processes keep dying, or the executor gives up.
+
+    Examples
+    --------
+    >>> from stickslip_ros.physics.measures.cycle_measures import Regime
+    >>> from stickslip_ros.scenarios.files import load_scenario
+    >>> from stickslip_ros.studies.plan import Axis
+    >>> from stickslip_ros.studies.study import sweep_study
+    >>> scenario = load_scenario("paper", ["plant.expects_control=false"])
+    >>> study = sweep_study(scenario, [Axis("plant.belt_speed", 0.1, 0.6, 6)])
+    >>> found = compute_columns(study)
+    >>> sticks = found.regime == Regime.STICK_SLIP
+    >>> print(f"{found.values['plant.belt_speed'][sticks].max():.1f}")
+    0.4
+    """
+    with Journal(study, path) as journal:
+        if executor is not None:
+            run(journal, executor, in_flight=in_flight, progress=progress)
+        else:
+            run_here(journal, workers, progress)
+        return journal.columns
 
 
 @contextmanager
@@ -243,19 +280,15 @@ class _Chain:
 
 def _missing(journal: Journal) -> Iterator[tuple[range, MotionState | None]]:
     """Yield runs of missing points, and the state in which the first point of each starts."""
-    continuation = journal.study.plan.continuation
-    chains = journal.study.plan.chains()
-    if not continuation:
-        chains = (part for points in chains for part in pieces_of(points, _SCANNED))
-    for points in chains:
-        first = 0
-        for place in range(len(points) + 1):
-            if place < len(points) and not journal.is_done(points[place]):
-                continue
-            if first < place:
-                start = journal.state_after(points[first - 1]) if continuation and first else None
-                yield points[first:place], start
-            first = place + 1
+    plan, done = journal.study.plan, journal.columns.done
+    for points in plan.chains():
+        places = np.flatnonzero(~done[points])
+        for each in np.split(places, np.flatnonzero(np.diff(places) > 1) + 1):
+            if len(each):
+                first, last = int(each[0]), int(each[-1])
+                carried = plan.continuation and first
+                start = journal.state_after(points[first - 1]) if carried else None
+                yield points[first : last + 1], start
 
 
 def _record(journal: Journal, piece: Piece, progress: CountPoints) -> MotionState | None:

@@ -2,19 +2,14 @@
 
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
-from dataclasses import asdict, dataclass, field, fields, replace
+from dataclasses import asdict, dataclass, field, replace
 from hashlib import sha256
 from typing import Any, NamedTuple, Self
 
 from stickslip_ros.errors import InvalidInputError, StickslipError
-from stickslip_ros.physics.measures.cycle_measures import (
-    EQUILIBRIUM_SPEED,
-    Measures,
-    Regime,
-    trend_text,
-)
+from stickslip_ros.physics.measures.cycle_measures import EQUILIBRIUM_SPEED, Regime, trend_text
 from stickslip_ros.scenarios.files import Scenario
-from stickslip_ros.studies.plan import Plan
+from stickslip_ros.studies.plan import Axis, Continuation, Grid, Plan
 from stickslip_ros.studies.settling import (
     ControlledDrive,
     MotionState,
@@ -22,43 +17,42 @@ from stickslip_ros.studies.settling import (
     settle,
 )
 
-MEASURES = tuple(
-    measure.name
-    for measure in fields(Measures)
-    if measure.name not in ("steady", "trend", "errors", "drift")
-)
-"""Names of the measures of a point, which has `steady` as an attribute of its own."""
-
 _NUDGE = EQUILIBRIUM_SPEED / 2.0
 """Share of the belt speed by which a slide at rest is pushed before the next point: rounding alone
 would leave an unstable equilibrium very late or never."""
 
 
 class Point(NamedTuple):
-    """The result of one point."""
+    """The result of one point: a row of the columns (see `Columns`), and of a journal in JSON."""
 
     number: int
     """Index in the plan, from 0."""
-    measures: Measures
-    steady: bool
-    """Whether it has settled (see `Settled`)."""
-    turning_points: tuple[float, ...]
-    """Poincare section x' = 0, m (see `Settled`)."""
-    reason: str | None
-    """Why it has no cycle to measure, or how it drifts; None otherwise."""
-
-    def as_json(self) -> list[Any]:
-        """Return values from which `from_json` makes the same point, to the last bit."""
-        measures = [getattr(self.measures, name) for name in MEASURES]
-        return [self.number, *measures, self.steady, list(self.turning_points), self.reason]
+    amplitude: float | None = None
+    velocity_amplitude: float | None = None
+    midpoint: float | None = None
+    period: float | None = None
+    frequency: float | None = None
+    stick_fraction: float | None = None
+    cycles: int = 0
+    regime: Regime | None = None
+    steady: bool = False
+    turning_points: tuple[float, ...] = ()
+    reason: str | None = None
 
     @classmethod
     def from_json(cls, values: Sequence[Any]) -> Self:
-        """Return the point of the values that `as_json` returned."""
-        number, *measures, steady, turning_points, reason = values
-        named: dict[str, Any] = dict(zip(MEASURES, measures, strict=True))
-        named["regime"] = None if named["regime"] is None else Regime(named["regime"])
-        return cls(number, Measures(**named), steady, tuple(turning_points), reason)
+        """Return the point of a list that went through JSON, the same to the last bit."""
+        number, *measures, regime, steady, turning_points, reason = values
+        regime = None if regime is None else Regime(regime)
+        cells = [number, *measures, regime, steady, tuple(turning_points), reason]
+        return cls._make(cells)
+
+
+COLUMNS = Point._fields[1:]
+"""Columns of a table, in addition to the values of the parameters."""
+
+MEASURES = COLUMNS[: COLUMNS.index("steady")]
+"""Those columns that are measures of the motion."""
 
 
 class Piece(NamedTuple):
@@ -161,6 +155,64 @@ class Study:
         }
 
 
+def sweep_study(
+    scenario: Scenario,
+    axes: Sequence[Axis],
+    *,
+    continuation: Continuation | None = None,
+    course: SettlingOptions | None = None,
+    continuous: bool = False,
+) -> Study:
+    """Return the study of a scenario over the values of one or two parameters.
+
+    Compute it with `compute_columns`. For a sweep without control, set
+    `plant.expects_control` to false in the scenario.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario; it supplies all other parameters.
+    axes : Sequence[Axis]
+        One or two axes; the study has every combination of their values.
+    continuation : Continuation, optional
+        Direction along the last axis in which each point starts from the end of its neighbour. By
+        default every point starts in the scenario's initial state.
+    course : SettlingOptions, optional
+        How long each motion is simulated; by default a transient of 200 natural periods, then 4
+        cycles.
+    continuous : bool
+        Whether the control acts without sampling (eq. 19).
+
+    Returns
+    -------
+    Study
+        The study, ready to be computed.
+
+    Raises
+    ------
+    InvalidInputError
+        If there are not one or two axes, an axis is of a controller that the scenario does not
+        have, or no point is valid.
+
+    Examples
+    --------
+    >>> from stickslip_ros.scenarios.files import load_scenario
+    >>> study = sweep_study(load_scenario("paper"), [Axis("plant.belt_speed", 0.1, 0.5, 5)])
+    >>> study.plan.size
+    5
+    """
+    if not 1 <= len(axes) <= 2:
+        raise InvalidInputError(f"{len(axes)} parameters: a sweep is over one or two")
+    without = [axis for axis in axes if not axis.parameter.startswith("plant.")]
+    if without and not scenario.plant.expects_control:
+        raise InvalidInputError(f"{without[0]}: without control there is no controller")
+    study = Study(
+        scenario, Grid(tuple(axes), continuation), course or SettlingOptions(), continuous
+    )
+    study.check()
+    return study
+
+
 def compute(study: Study, points: Sequence[int], start: MotionState | None) -> Piece:
     """Compute some points in their order; a pure function, for any process.
 
@@ -185,12 +237,9 @@ def _compute_point(
             case = replace(case, law=replace(case.law, start_after=0.0))
         settled = settle(case, start or initial, study.course)
     except (StickslipError, ArithmeticError) as error:
-        nothing = Measures(None, None, None, None, None, None, 0, None)
-        return Point(index, nothing, False, (), " ".join(str(error).split())), None
-    measures = replace(settled.measures, steady=None, trend=None, drift=None)
-    end, reason = settled.end, None
-    if settled.measures.drift:
-        reason = trend_text(vars(settled.measures))
+        return Point(index, reason=" ".join(str(error).split())), None
+    measures, end = settled.measures, settled.end
+    reason = trend_text(vars(measures)) if measures.drift else None
     match measures.regime:
         case Regime.UNBOUNDED:
             end, reason = None, "the motion diverges"
@@ -200,8 +249,9 @@ def _compute_point(
             reason = "no whole cycle in the measured time"
         case _:
             pass
+    values = [getattr(measures, name) for name in MEASURES]
     turning_points = tuple(settled.turning_points.tolist())
-    return Point(index, measures, settled.steady, turning_points, reason), end
+    return Point._make([index, *values, settled.steady, turning_points, reason]), end
 
 
 def pieces_of(points: range, size: int) -> Iterator[range]:

@@ -11,7 +11,7 @@ from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.scenarios.keywords import keyword_of, overrides_of, parameter_of
 from stickslip_ros.scenarios.parameter_field import known_parameters
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
-from stickslip_ros.studies.columns import COLUMNS
+from stickslip_ros.studies.study import COLUMNS
 
 EVERY = [
     f"{node}.{name}" for node, model in NODE_PARAMETERS.items() for name in known_parameters(model)

@@ -12,11 +12,10 @@ from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.measures.cycle_measures import Regime
 from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.studies.basin import Basins
-from stickslip_ros.studies.columns import COLUMNS, compute_columns
 from stickslip_ros.studies.plan import Axis
+from stickslip_ros.studies.runner import compute_columns
 from stickslip_ros.studies.settling import SettlingOptions
-from stickslip_ros.studies.study import MEASURES
-from stickslip_ros.studies.sweep import sweep_study
+from stickslip_ros.studies.study import COLUMNS, MEASURES, sweep_study
 
 FREE = ss.scenario("paper", expects_control=False)
 SHORT: dict[str, Any] = {"transient": 20.0, "cycles": 2}
@@ -194,7 +193,7 @@ def test_a_basin_of_a_grid() -> None:
     one = ss.basin(FREE, position=(-1.0, 1.0, 3), velocity=(-1.0, 1.0, 2), **SHORT)
     (attractor,) = one.attractors
     assert attractor.regime is Regime.STICK_SLIP
-    assert one.basins == Basins.from_points(one.columns.points())
+    assert one.basins.attractors == Basins.from_columns(one.columns).attractors
     assert repr(one).splitlines()[0] == "paper, 6 starts"
     assert isinstance(one.plot(), Figure)
     frame, data = one.to_pandas(), one.to_xarray()

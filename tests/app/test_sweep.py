@@ -10,10 +10,10 @@ import pytest
 
 from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.studies import runner
-from stickslip_ros.studies.columns import compute_columns
 from stickslip_ros.studies.plan import Axis
+from stickslip_ros.studies.runner import compute_columns
 from stickslip_ros.studies.settling import SettlingOptions
-from stickslip_ros.studies.sweep import sweep_study
+from stickslip_ros.studies.study import sweep_study
 from tests.app.conftest import Run, Start, ended
 from tests.nodes.graph import wait_for
 

@@ -41,7 +41,7 @@ from stickslip_ros.physics.measures.cycle_measures import Regime
 from stickslip_ros.physics.model.friction import Linear
 from stickslip_ros.physics.theory.hopf import first_lyapunov_coefficient
 from stickslip_ros.physics.theory.limit_cycles import limit_cycles
-from stickslip_ros.studies.sweep import bifurcation_diagram
+from stickslip_ros.studies.settling import bifurcation_diagram
 
 HOLDS, CORRECTED, FAILS = Verdict.HOLDS, Verdict.CORRECTED, Verdict.FAILS
 

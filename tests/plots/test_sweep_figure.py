@@ -11,9 +11,8 @@ from stickslip_ros.plots.style import BLUE, GREEN, LIGHT_GREY, ORANGE, STYLES
 from stickslip_ros.plots.sweep_figure import diagram_figure, map_figure
 from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.studies.columns import Columns
-from stickslip_ros.studies.journal import Journal
 from stickslip_ros.studies.plan import Axis, Continuation, Grid
-from stickslip_ros.studies.runner import run
+from stickslip_ros.studies.runner import compute_columns
 from stickslip_ros.studies.settling import SettlingOptions
 from stickslip_ros.studies.study import Study
 from tests.plots.texts import faults, in_styles, legend_texts
@@ -45,9 +44,7 @@ def swept(
 ) -> Swept:
     axes = tuple(Axis.parse(text) for text in over)
     study = Study(load_scenario("paper", overrides), Grid(axes, carry), SettlingOptions(60.0, 3))
-    with Journal(study) as journal:
-        run(journal)
-        return Columns.from_journal(journal), study
+    return compute_columns(study), study
 
 
 @pytest.fixture(scope="module")

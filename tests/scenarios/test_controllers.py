@@ -11,7 +11,7 @@ from stickslip_ros.physics.model.control import VelocityFeedback
 from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.scenarios.parameters import CONTROLLER_PARAMETERS
 from stickslip_ros.studies.plan import Axis
-from stickslip_ros.studies.sweep import sweep_study
+from stickslip_ros.studies.study import sweep_study
 from tests.scenarios.files import refusal, scenario_file, section
 
 BASE = section("/**/scenario", "{base: feed_drive}")

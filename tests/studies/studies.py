@@ -2,9 +2,8 @@
 
 from stickslip_ros.progress import Progress
 from stickslip_ros.scenarios.files import Scenario, load_scenario
-from stickslip_ros.studies.journal import Journal
 from stickslip_ros.studies.plan import Axis, Continuation, Grid
-from stickslip_ros.studies.runner import run
+from stickslip_ros.studies.runner import compute_columns
 from stickslip_ros.studies.settling import SettlingOptions
 from stickslip_ros.studies.study import Point, Study
 
@@ -48,9 +47,7 @@ def speeds(
 
 def points_of(study: Study) -> list[Point]:
     """Return the points of a study that nothing disturbs, computed in this process."""
-    with Journal(study) as journal:
-        run(journal)
-        return list(journal.points())
+    return list(compute_columns(study).points())
 
 
 def stop_at(count: int) -> Progress:

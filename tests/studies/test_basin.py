@@ -1,16 +1,16 @@
 """Basins against published shares, and the counting of attractors."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 from math import sqrt
 from random import Random
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.measures.cycle_measures import Measures, Regime
+from stickslip_ros.physics.measures.cycle_measures import Regime
 from stickslip_ros.physics.theory.critical_gains import critical_gains
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.studies.basin import (
@@ -20,9 +20,9 @@ from stickslip_ros.studies.basin import (
     basin_study,
     default_axes,
 )
-from stickslip_ros.studies.journal import Journal
+from stickslip_ros.studies.columns import Columns
 from stickslip_ros.studies.plan import Axis, Continuation, Grid, Plan, RandomSample
-from stickslip_ros.studies.runner import run
+from stickslip_ros.studies.runner import compute_columns
 from stickslip_ros.studies.settling import SettlingOptions
 from stickslip_ros.studies.study import Point
 from tests.studies.studies import EXPONENTIAL, free, paper
@@ -50,9 +50,13 @@ STARTS = (Axis(POSITION, -2.0, 2.0, 2), Axis(VELOCITY, 0.0, 2.0, 2))
 
 
 def basins_of(scenario: Scenario, plan: Plan, *, continuous: bool = False) -> Basins:
-    with Journal(basin_study(scenario, plan, continuous=continuous)) as journal:
-        run(journal)
-        return Basins.from_points(journal.points())
+    return Basins.from_columns(compute_columns(basin_study(scenario, plan, continuous=continuous)))
+
+
+def basins_from(points: Sequence[Point]) -> Basins:
+    columns = Columns.of(RandomSample(STARTS, max(len(points), 1)))
+    columns.enter(point._replace(number=number) for number, point in enumerate(points))
+    return Basins.from_columns(columns)
 
 
 def share(basins: Basins, *regimes: Regime) -> float:
@@ -122,8 +126,7 @@ def point(
     midpoint: float | None = 0.5,
     steady: bool = True,
 ) -> Point:
-    measures = Measures(amplitude, amplitude, midpoint, 1.0, 1.0, 0.0, 6, regime)
-    return Point(0, measures, steady, (), None)
+    return Point(0, amplitude, amplitude, midpoint, 1.0, 1.0, 0.0, 6, regime, steady)
 
 
 SMALL = point(Regime.PURE_SLIP, amplitude=0.3)
@@ -139,15 +142,10 @@ KINDS = [SMALL, LARGE, SHIFTED, REST, AWAY, RUNNING_DOWN, GROWING, FAILED]
 
 def blurred(kind: Point, share: float) -> Point:
     """Return the point with amplitude and midpoint off by a share of the amplitude."""
-    measures = kind.measures
-    if measures.amplitude is None or measures.midpoint is None:
+    if kind.amplitude is None or kind.midpoint is None:
         return kind
-    off = share * measures.amplitude
-    return kind._replace(
-        measures=replace(
-            measures, amplitude=measures.amplitude + off, midpoint=measures.midpoint - off
-        )
-    )
+    off = share * kind.amplitude
+    return kind._replace(amplitude=kind.amplitude + off, midpoint=kind.midpoint - off)
 
 
 @given(
@@ -162,7 +160,7 @@ def test_the_order_of_the_points_changes_no_count(counts: list[int], random: Ran
     ]
     places = list(range(len(points)))
     random.shuffle(places)
-    basins = Basins.from_points(points[place] for place in places)
+    basins = basins_from([points[place] for place in places])
     total = sum(counts)
     assert [attractor.count for attractor in basins.attractors] == sorted(counts, reverse=True)
     for attractor in basins.attractors:
@@ -170,24 +168,23 @@ def test_the_order_of_the_points_changes_no_count(counts: list[int], random: Ran
         assert attractor.standard_error == pytest.approx(
             sqrt(attractor.share * (1.0 - attractor.share) / total), rel=1e-12
         )
-    by_kind = iter(points)
+    by_kind = iter(basins.places[np.argsort(places)].tolist())
     for kind, count in zip(KINDS, counts, strict=True):
-        (place,) = {basins.place(next(by_kind)) for _ in range(count)}
+        (place,) = {next(by_kind) for _ in range(count)}
         attractor = basins.attractors[place]
-        assert (attractor.count, attractor.regime) == (count, kind.measures.regime)
+        assert (attractor.count, attractor.regime) == (count, kind.regime)
 
 
 def test_what_is_not_known_and_what_is_not_steady_stand_apart() -> None:
     later = point(Regime.PURE_SLIP, amplitude=0.1, steady=False)
     stopped = point(None, amplitude=0.2, steady=False)
-    basins = Basins.from_points([GROWING, later, FAILED, stopped, SMALL, SMALL, SMALL])
+    basins = basins_from([GROWING, later, FAILED, stopped, SMALL, SMALL, SMALL])
     assert [(a.regime, a.steady, a.count) for a in basins.attractors] == [
         (Regime.PURE_SLIP, True, 3),
         (Regime.PURE_SLIP, False, 2),
         (None, False, 2),
     ]
     assert [attractor.amplitude for attractor in basins.attractors] == [0.3, None, None]
-    assert Basins.from_points([]).attractors == ()
 
 
 def test_a_basin_over_anything_else_is_refused() -> None:
@@ -210,10 +207,7 @@ def test_by_default_starts_reach_beyond_the_vibration(overrides: Sequence[str]) 
     scenario = free(*overrides)
     position, velocity = default_axes(scenario, 3)
     study = basin_study(scenario, Grid((position, velocity)), course=SettlingOptions(100.0))
-    with Journal(study) as journal:
-        run(journal)
-        found = [point.measures for point in journal.points()]
-    for measures in found:
+    for measures in compute_columns(study).points():
         assert measures.amplitude is not None
         assert measures.midpoint is not None
         assert position.first < measures.midpoint - measures.amplitude

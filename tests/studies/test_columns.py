@@ -2,8 +2,6 @@
 
 import csv
 import json
-import tracemalloc
-from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from io import StringIO
@@ -14,20 +12,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from stickslip_ros.physics.measures.cycle_measures import Measures, Regime
-from stickslip_ros.studies.columns import (
-    COLUMNS,
-    Columns,
-    ExtraColumns,
-    compute_columns,
-    write_csv,
-    write_json,
-)
-from stickslip_ros.studies.journal import Journal
+from stickslip_ros.physics.measures.cycle_measures import Regime
+from stickslip_ros.studies.columns import Columns, Further, write_csv, write_json
 from stickslip_ros.studies.plan import Axis, Continuation, Grid, RandomSample
-from stickslip_ros.studies.runner import run
+from stickslip_ros.studies.runner import compute_columns
 from stickslip_ros.studies.settling import SettlingOptions
-from stickslip_ros.studies.study import MEASURES, Piece, Point, Study
+from stickslip_ros.studies.study import COLUMNS, MEASURES, Point, Study, compute
 from tests.studies.studies import SHORT, free, speeds
 
 MINIMUM = Axis("plant.friction.minimum", 0.1, 0.6, 4)
@@ -50,14 +40,16 @@ STUDIES = {
 
 
 @pytest.fixture(params=STUDIES, scope="module")
-def journal(request: pytest.FixtureRequest) -> Iterator[Journal]:
-    with Journal(STUDIES[request.param]) as journal:
-        run(journal)
-        yield journal
+def study(request: pytest.FixtureRequest) -> Study:
+    return STUDIES[request.param]
 
 
-one_of = partial(pytest.mark.parametrize, "journal", indirect=True)
+@pytest.fixture(scope="module")
+def columns(study: Study) -> Columns:
+    return compute_columns(study)
 
+
+one_of = partial(pytest.mark.parametrize, "study", indirect=True)
 
 NUMBERS = [name for name in MEASURES if name not in ("cycles", "regime")]
 
@@ -67,38 +59,35 @@ def bits(values: Any) -> list[bytes]:
     return [np.float64(nan if value in (None, "") else value).tobytes() for value in values]
 
 
-def test_columns_are_the_points_in_their_order(journal: Journal) -> None:
-    columns, points = Columns.from_journal(journal), list(journal.points())
-    assert len(points) == journal.study.plan.size
+def test_columns_are_the_points_in_their_order(study: Study, columns: Columns) -> None:
+    chains = study.plan.chains()
+    points = sorted(point for chain in chains for point in compute(study, chain, None).points)
+    assert len(points) == study.plan.size
     for name in NUMBERS:
-        expected = [getattr(point.measures, name) for point in points]
+        expected = [getattr(point, name) for point in points]
         assert bits(getattr(columns, name)) == bits(expected), name
-    assert columns.cycles.tolist() == [point.measures.cycles for point in points]
-    assert columns.regime.tolist() == [point.measures.regime for point in points]
+    assert columns.cycles.tolist() == [point.cycles for point in points]
+    assert columns.regime.tolist() == [point.regime for point in points]
     assert columns.steady.tolist() == [point.steady for point in points]
     assert columns.reason.tolist() == [point.reason for point in points]
-    assert columns.turning_points == tuple(point.turning_points for point in points)
-    rows = [journal.study.plan.values(number) for number in range(len(points))]
-    for place, parameter in enumerate(journal.study.plan.parameters):
+    assert columns.turning_points == [point.turning_points for point in points]
+    rows = [study.plan.values(number) for number in range(len(points))]
+    for place, parameter in enumerate(study.plan.parameters):
         assert columns.values[parameter].tolist() == [row[place] for row in rows]
     assert list(columns.points()) == points
 
 
 def test_a_point_that_is_not_done_has_nothing() -> None:
-    study = speeds(3)
-    done = Measures(0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 2, Regime.PURE_SLIP)
-    with Journal(study) as journal:
-        journal.add(Piece([Point(1, done, True, (0.5,), None)], None))
-        columns = Columns.from_journal(journal)
+    columns = Columns.of(speeds(3).plan)
+    point = Point(1, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 2, Regime.PURE_SLIP, True, (0.5,))
+    columns.enter([point])
     assert bits(columns.amplitude) == bits([None, 0.1, None])
     assert columns.regime.tolist() == [None, Regime.PURE_SLIP, None]
     assert columns.steady.tolist() == [False, True, False]
     assert columns.cycles.tolist() == [0, 2, 0]
-    assert columns.turning_points == ((), (0.5,), ())
+    assert columns.turning_points == [(), (0.5,), ()]
     assert columns.reason.tolist() == [None] * 3
-
-
-FURTHER: ExtraColumns = {"twice": lambda point: 2 * point.number}
+    assert list(columns.points()) == [point]
 
 
 def refuse(constant: str) -> None:
@@ -106,20 +95,21 @@ def refuse(constant: str) -> None:
 
 
 def as_json(
-    journal: Journal, further: ExtraColumns | None = None, **provenance: Any
+    study: Study, columns: Columns, further: Further | None = None, **provenance: Any
 ) -> dict[str, Any]:
     stream = StringIO()
-    write_json(stream, journal, further or {}, provenance)
+    write_json(stream, study, columns, further or {}, provenance)
     read = json.loads(stream.getvalue(), parse_constant=refuse)
     assert isinstance(read, dict)
     return read
 
 
-def test_a_table_read_back_is_the_columns_to_the_last_bit(journal: Journal) -> None:
-    write_csv(stream := StringIO(), journal, FURTHER)
-    columns, plan = Columns.from_journal(journal), journal.study.plan
+def test_a_table_read_back_is_the_columns_to_the_last_bit(study: Study, columns: Columns) -> None:
+    plan = study.plan
+    further = {"twice": range(0, 2 * plan.size, 2)}
+    write_csv(stream := StringIO(), columns, further)
     lines = csv.DictReader(StringIO(stream.getvalue()))
-    rows, read = list(lines), as_json(journal, FURTHER)
+    rows, read = list(lines), as_json(study, columns, further)
     assert lines.fieldnames == [*plan.parameters, "twice", *COLUMNS]
     assert len(rows) == plan.size
     for name in (*NUMBERS, "cycles"):
@@ -130,7 +120,7 @@ def test_a_table_read_back_is_the_columns_to_the_last_bit(journal: Journal) -> N
     assert [row["regime"] or None for row in rows] == read["regime"] == columns.regime.tolist()
     assert [row["steady"] == "True" for row in rows] == read["steady"] == columns.steady.tolist()
     assert [row["reason"] or None for row in rows] == read["reason"] == columns.reason.tolist()
-    assert [int(row["twice"]) for row in rows] == read["twice"] == [*range(0, 2 * plan.size, 2)]
+    assert [int(row["twice"]) for row in rows] == read["twice"] == [*further["twice"]]
     for row, section, points in zip(
         rows, read["turning_points"], columns.turning_points, strict=True
     ):
@@ -138,9 +128,10 @@ def test_a_table_read_back_is_the_columns_to_the_last_bit(journal: Journal) -> N
 
 
 @one_of(["both ways"])
-def test_the_arrays_of_a_grid_are_row_major_over_the_values_of_its_axes(journal: Journal) -> None:
-    read = as_json(journal, scenario={"plant.mass": 1.0})
-    columns = Columns.from_journal(journal)
+def test_the_arrays_of_a_grid_are_row_major_over_the_values_of_its_axes(
+    study: Study, columns: Columns
+) -> None:
+    read = as_json(study, columns, scenario={"plant.mass": 1.0})
     assert read["parameters"] == ["plant.friction.minimum", "plant.belt_speed"]
     assert read["values"] == [MINIMUM.values().tolist(), SPEED.values().tolist()]
     amplitude = np.array(read["amplitude"], dtype=float).reshape(2, 4, 5)
@@ -157,8 +148,8 @@ def test_the_arrays_of_a_grid_are_row_major_over_the_values_of_its_axes(journal:
 
 
 @one_of(["sample"])
-def test_of_a_sample_there_are_the_values_of_each_point(journal: Journal) -> None:
-    read, plan = as_json(journal), journal.study.plan
+def test_of_a_sample_there_are_the_values_of_each_point(study: Study, columns: Columns) -> None:
+    read, plan = as_json(study, columns), study.plan
     assert read["parameters"] == ["plant.initial.position", "plant.initial.velocity"]
     assert [tuple(values) for values in read["values"]] == [plan.values(row) for row in range(9)]
     assert read["plan"]["kind"] == "sample"
@@ -167,56 +158,30 @@ def test_of_a_sample_there_are_the_values_of_each_point(journal: Journal) -> Non
 
 def test_whole_numbers_stay_whole_in_a_table() -> None:
     seeds = Axis("plant.force_jitter_seed", 0.0, 10.0, 3)
-    with Journal(Study(free(), Grid((seeds,)), SHORT)) as journal:
-        run(journal)
-        assert [repr(value) for value in as_json(journal)["values"][0]] == ["0", "5", "10"]
-        write_csv(stream := StringIO(), journal, {})
+    study = Study(free(), Grid((seeds,)), SHORT)
+    columns = compute_columns(study)
+    assert [repr(value) for value in as_json(study, columns)["values"][0]] == ["0", "5", "10"]
+    write_csv(stream := StringIO(), columns, {})
     rows = csv.reader(StringIO(stream.getvalue()))
     assert [row[0] for row in rows] == ["plant.force_jitter_seed", "0", "5", "10"]
 
 
 def test_any_reason_is_read_back() -> None:
-    nothing = Measures(None, None, None, None, None, None, 0, None)
     reason = 'a, "b"\n c; \u00e4'
-    with Journal(speeds(2)) as journal:
-        journal.add(Piece([Point(n, nothing, False, (), reason) for n in (0, 1)], None))
-        read = as_json(journal)
-        write_csv(stream := StringIO(), journal, {})
+    study = speeds(2)
+    columns = Columns.of(study.plan)
+    columns.enter(Point(number, reason=reason) for number in (0, 1))
+    read = as_json(study, columns)
+    write_csv(stream := StringIO(), columns, {})
     rows = list(csv.DictReader(StringIO(stream.getvalue(), newline="")))
     assert read["reason"] == [row["reason"] for row in rows] == [reason] * 2
 
 
-def _peak(count: int, tmp_path: Path) -> tuple[int, int]:
-    """Return the peaks of memory, bytes, of writing a table of so many points as CSV and JSON."""
-    measures = Measures(0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 6, Regime.PURE_SLIP)
-    with Journal(speeds(count)) as journal:
-        for first in range(0, count, 500):
-            numbers = range(first, first + 500)
-            points = [Point(number, measures, True, (0.1,), None) for number in numbers]
-            journal.add(Piece(points, None))
-        peaks: list[int] = []
-        for write in (write_csv, partial(write_json, provenance={})):
-            with (tmp_path / "table").open("w") as stream:
-                tracemalloc.start()
-                try:
-                    write(stream, journal, {})
-                    peaks.append(tracemalloc.get_traced_memory()[1])
-                finally:
-                    tracemalloc.stop()
-    return peaks[0], peaks[1]
-
-
-@pytest.mark.long
-def test_the_memory_of_writing_a_table_is_for_one_piece_of_it(tmp_path: Path) -> None:
-    # Buffers of files fill up; a column of numbers would be a megabyte.
-    few, many = _peak(1_000, tmp_path), _peak(16_000, tmp_path)
-    for one, other in zip(few, many, strict=True):
-        assert other < one + 700_000
-
-
 @one_of(["both ways"])
-def test_computing_columns_in_another_way_changes_no_bit(journal: Journal, tmp_path: Path) -> None:
-    study, path = journal.study, tmp_path / "study.part"
+def test_computing_columns_in_another_way_changes_no_bit(
+    study: Study, columns: Columns, tmp_path: Path
+) -> None:
+    path = tmp_path / "study.part"
     counts: list[float] = []
     with ThreadPoolExecutor(2) as threads:
         others = [
@@ -225,7 +190,7 @@ def test_computing_columns_in_another_way_changes_no_bit(journal: Journal, tmp_p
             compute_columns(study, path=path, progress=counts.append),
         ]
     assert counts[-2:] == [study.plan.size] * 2
-    points = list(journal.points())
+    points = list(columns.points())
     for other in others:
         assert list(other.points()) == points
     assert path.exists()

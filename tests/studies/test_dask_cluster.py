@@ -20,8 +20,7 @@ from stickslip_ros.studies.journal import Journal
 from stickslip_ros.studies.plan import Axis, Continuation
 from stickslip_ros.studies.runner import WorkersDiedError, dask_executor, run
 from stickslip_ros.studies.settling import SettlingOptions
-from stickslip_ros.studies.study import Study
-from stickslip_ros.studies.sweep import sweep_study
+from stickslip_ros.studies.study import Study, sweep_study
 from tests.studies.studies import points_of, speeds
 
 PATIENCE = 60.0
@@ -95,7 +94,7 @@ def test_on_a_cluster_the_points_are_the_same() -> None:
         dask_executor(cluster.scheduler_address) as (executor, in_flight),
     ):
         run(journal, executor, in_flight=in_flight)
-        found = list(journal.points())
+        found = list(journal.columns.points())
     assert found == points_of(asked)
 
 
@@ -114,7 +113,7 @@ def test_a_worker_killed_on_the_way_changes_nothing(cluster: Cluster) -> None:
 
     with Journal(asked) as journal, dask_executor(cluster.address) as (executor, in_flight):
         run(journal, executor, in_flight=in_flight, progress=kill_after_the_first_task)
-        found = list(journal.points())
+        found = list(journal.columns.points())
     assert killed.is_set()
     assert doomed.wait(PATIENCE) == -signal.SIGKILL
     assert found == points_of(asked)

@@ -10,9 +10,9 @@ from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.scenarios.parameter_field import known_parameters
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
 from stickslip_ros.studies import runner
-from stickslip_ros.studies.columns import compute_columns
 from stickslip_ros.studies.journal import Journal
 from stickslip_ros.studies.plan import Axis, Continuation, Grid
+from stickslip_ros.studies.runner import compute_columns
 from stickslip_ros.studies.study import Point, Study, compute
 from tests.studies.studies import SHORT, free, points_of, stop_at
 
@@ -99,7 +99,7 @@ def test_a_study_has_the_content_that_it_began_with(name: str, curve: Path, part
     with Journal(study_with(name, curve), part) as journal:
         assert 3 <= journal.count < 8
         runner.run(journal)
-        assert list(journal.points()) == expected
+        assert list(journal.columns.points()) == expected
 
 
 @pytest.mark.parametrize("trials", [4, pytest.param(100, marks=pytest.mark.long)])
@@ -139,7 +139,7 @@ def interrupted_at_random(
     try:
         with Journal(study, part) as journal:
             runner.run(journal, progress=progress)
-            return list(journal.points())
+            return list(journal.columns.points())
     except KeyboardInterrupt:
         content = bytearray(part.read_bytes()[: random.randint(0, 2 * part.stat().st_size)])
         if random.random() < 0.3:

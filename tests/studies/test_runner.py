@@ -21,7 +21,7 @@ from stickslip_ros.errors import InvalidInputError, RunError
 from stickslip_ros.studies import runner
 from stickslip_ros.studies.journal import Journal
 from stickslip_ros.studies.plan import Axis, Continuation, Grid
-from stickslip_ros.studies.runner import local_processes, run, run_here
+from stickslip_ros.studies.runner import compute_columns, local_processes, run, run_here
 from stickslip_ros.studies.settling import SettlingOptions
 from stickslip_ros.studies.study import Piece, Point, Study, compute
 from tests.studies.studies import SHORT, free, paper, speeds, stop_at
@@ -96,10 +96,9 @@ def _small_tasks(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def computed(study: Study, executor: Executor | None = None, in_flight: int = 5) -> list[Point]:
-    with Journal(study) as journal:
-        run(journal, executor, in_flight=in_flight)
-        assert journal.count == study.plan.size
-        return list(journal.points())
+    found = compute_columns(study, executor=executor, in_flight=in_flight)
+    assert found.done.all()
+    return list(found.points())
 
 
 def at_once(study: Study) -> list[Point]:
@@ -173,7 +172,7 @@ class _Forgetful(Journal):
     """Only counts what it is given."""
 
     def add(self, piece: Piece) -> None:
-        self.count += len(piece.points)
+        self.columns.done[[*piece.points]] = True
 
 
 def test_a_million_points_are_a_few_thousand_tasks(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -188,23 +187,6 @@ def test_a_million_points_are_a_few_thousand_tasks(monkeypatch: pytest.MonkeyPat
     with _Forgetful(speeds(200)) as journal:
         run(journal, few, in_flight=4)
     assert few.tasks >= 4 * 8
-
-
-def test_points_are_begun_before_all_are_looked_at(monkeypatch: pytest.MonkeyPatch) -> None:
-    looked_at: list[int] = []
-
-    class Seen(Journal):
-        def is_done(self, index: int) -> bool:
-            looked_at.append(index)
-            return super().is_done(index)
-
-    monkeypatch.setattr(runner, "_SCANNED", 10)
-    with Seen(speeds(40)) as journal:
-        with pytest.raises(KeyboardInterrupt):
-            run(journal, progress=stop_at(1))
-        assert len(looked_at) <= 10
-        run(journal)
-        assert list(journal.points()) == at_once(journal.study)
 
 
 def test_progress_is_told_how_many_points_are_done(tmp_path: Path) -> None:
@@ -230,7 +212,7 @@ def test_interrupted_threads_keep_what_is_done(tmp_path: Path) -> None:
         with Journal(study, path) as journal:
             assert journal.count == done
             run(journal, threads)
-            assert list(journal.points()) == at_once(study)
+            assert list(journal.columns.points()) == at_once(study)
 
 
 class _Held(Executor):
@@ -253,7 +235,7 @@ def test_what_was_finished_when_it_is_interrupted_is_kept() -> None:
         with pytest.raises(KeyboardInterrupt):
             run(journal, _Held(), in_flight=4, progress=stop_at(1))
         assert journal.count == 2  # of one point each
-        assert [point.number for point in journal.points()] == [1, 2]
+        assert [point.number for point in journal.columns.points()] == [1, 2]
 
 
 @pytest.mark.process
@@ -270,7 +252,7 @@ def test_interrupted_processes_end_and_what_is_done_is_kept(tmp_path: Path) -> N
     with Journal(study, path) as journal:
         assert journal.count == done
         run(journal)
-        assert list(journal.points()) == at_once(study)
+        assert list(journal.columns.points()) == at_once(study)
 
 
 @pytest.mark.process
@@ -302,7 +284,7 @@ def test_a_worker_that_is_killed_costs_no_point() -> None:
     with Journal(study) as journal:
         run_here(journal, 2, kill_one)
         assert killed
-        assert list(journal.points()) == at_once(study)
+        assert list(journal.columns.points()) == at_once(study)
 
 
 @dataclass(frozen=True)
@@ -334,9 +316,9 @@ def test_workers_that_keep_dying_end_the_run_and_what_is_done_is_kept(
         with pytest.raises(RunError, match=r"were killed 3 times without progress, with . of 6"):
             run_here(journal, 2)
         assert 3 <= len(pools) <= 8
-        found = list(journal.points())
-        assert found == [point for point in at_once(study) if journal.is_done(point.number)]
-        assert not journal.is_done(5)
+        found = list(journal.columns.points())
+        assert found == [point for point in at_once(study) if journal.columns.done[point.number]]
+        assert not journal.columns.done[5]
 
 
 _BEGIN = """

@@ -9,10 +9,10 @@ from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.measures.cycle_measures import Regime
 from stickslip_ros.physics.model.friction import Linear
 from stickslip_ros.physics.theory.critical_gains import critical_gains
-from stickslip_ros.studies.columns import compute_columns
 from stickslip_ros.studies.plan import Axis
-from stickslip_ros.studies.settling import SettlingOptions
-from stickslip_ros.studies.sweep import bifurcation_diagram, sweep_study
+from stickslip_ros.studies.runner import compute_columns
+from stickslip_ros.studies.settling import SettlingOptions, bifurcation_diagram
+from stickslip_ros.studies.study import sweep_study
 from tests.physics.drives import FEED_DRIVE, LIMIT_CYCLES, PAPER
 from tests.studies.studies import free, paper
 
