@@ -6,9 +6,9 @@ g(y) = mu(y - v0) - mu(-v0) - 2 beta y, and the energy (x^2 + x'^2) / 2 changes 
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import sqrt
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from stickslip_ros.physics.model.control import ContinuousControl
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.drive_system import UNBOUNDED_SPEED
 from stickslip_ros.physics.model.equations import acceleration, reaction
-from stickslip_ros.physics.model.friction import FrictionLaw
+from stickslip_ros.physics.model.friction import SteadyPart
 from stickslip_ros.physics.motion.recorded_motion import RecordedMotion
 from stickslip_ros.physics.theory.requirements import (
     AUTONOMOUS,
@@ -129,34 +129,13 @@ def largest_cycle(drive: Drive) -> float | None:
     return 2.0 * n + max(low, p) + belt_speed * sqrt(max(2.0, (u + p) / (u - n)))
 
 
-@dataclass(frozen=True)
-class _Steady(FrictionLaw):
-    """The friction of a law in steady slip, as a static law."""
-
-    law: Any = None
-
-    def coefficient(self, relative_speed: Any, sign: Any) -> Any:
-        return self.law.coefficient(relative_speed, sign)
-
-    @property
-    def limits(self) -> tuple[Any, Any]:
-        return self.law.limits
-
-    @property
-    def characteristic_speed(self) -> float:
-        return self.law.characteristic_speed
-
-    def scaled(self, speed: float, length: float = 1.0) -> Self:
-        return replace(self, law=self.law.scaled(speed, length))
-
-
 def without_memory(drive: Drive) -> Drive:
     """Return a drive with the friction that its law has in steady slip.
 
     Bounds on its cycles are no bounds on those of the drive, but a guide for a search.
     """
     law = drive.friction
-    return replace(drive, friction=_Steady(law.static, law)) if law.states else drive
+    return replace(drive, friction=SteadyPart(law)) if law.states else drive
 
 
 def _net_force(drive: Drive) -> tuple[FloatArray, FloatArray]:

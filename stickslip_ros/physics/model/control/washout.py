@@ -87,7 +87,7 @@ class Washout(ControlLaw, ContinuousControl):
         return self.force(velocity - low_passed), (low_passed, velocity)
 
     def linear_feedback(self, period: float) -> LinearFeedback:
-        """Return z' = z + q (y - z), u = k1 (y - z), q = 1 - exp(-d T); see `ControlLaw`."""
+        """Return z' = z + q (y - z), u = k1 (y - z); see `ControlLaw.linear_feedback`."""
         step, gain = -expm1(-self.corner_frequency * period), self.linear_gain
         return LinearFeedback(
             np.array([[1.0 - step]]),

@@ -1,18 +1,20 @@
-"""The friction laws: one file each, and one entry each in `LAWS`."""
+"""The friction laws, each with an entry in `LAWS`."""
 
-from stickslip_ros.physics.model.friction.base import FrictionLaw
-from stickslip_ros.physics.model.friction.coulomb import Coulomb
-from stickslip_ros.physics.model.friction.curve_follower import CurveFollower
+from stickslip_ros.physics.model.friction.base import (
+    FrictionCreep,
+    FrictionLaw,
+    FrictionMemory,
+    SteadyFriction,
+)
 from stickslip_ros.physics.model.friction.dahl import Dahl
 from stickslip_ros.physics.model.friction.directional import Directional
 from stickslip_ros.physics.model.friction.elasto_plastic import ElastoPlastic
 from stickslip_ros.physics.model.friction.exponential import Exponential
-from stickslip_ros.physics.model.friction.linear import Linear
-from stickslip_ros.physics.model.friction.lugre import LuGre
+from stickslip_ros.physics.model.friction.lugre import CurveFollower, LuGre, SteadyPart
 from stickslip_ros.physics.model.friction.maxwell_slip import MaxwellSlip
 from stickslip_ros.physics.model.friction.observer import FrictionObserver
+from stickslip_ros.physics.model.friction.polynomials import Coulomb, Linear, Stribeck
 from stickslip_ros.physics.model.friction.rate_state import RateState
-from stickslip_ros.physics.model.friction.stribeck import Stribeck
 from stickslip_ros.physics.model.friction.table import Table
 
 LAWS: dict[str, type[FrictionLaw]] = {
@@ -43,12 +45,16 @@ __all__ = [
     "Directional",
     "ElastoPlastic",
     "Exponential",
+    "FrictionCreep",
     "FrictionLaw",
+    "FrictionMemory",
     "FrictionObserver",
     "Linear",
     "LuGre",
     "MaxwellSlip",
     "RateState",
+    "SteadyFriction",
+    "SteadyPart",
     "Stribeck",
     "Table",
 ]

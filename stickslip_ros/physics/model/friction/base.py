@@ -1,4 +1,4 @@
-"""The base class of the friction laws."""
+"""The base of the friction laws: friction in steady slip, its memory and its creep."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
@@ -15,53 +15,21 @@ _SPEEDS = np.concatenate([[0.0], np.geomspace(1e-6, 1e6, 4001)])
 """Speeds, in the characteristic one, at which the size of a law is asked for."""
 
 
-@dataclass(frozen=True)
-class FrictionLaw(ABC):
-    """Friction law: the friction coefficient as a function of the relative speed.
+class SteadyFriction(ABC):
+    """Friction in steady slip: all that a law without a memory gives.
 
-    A law is a frozen dataclass of its constants, each described by `constant`. Its equations are
-    written once; they accept floats, numpy arrays and heyoka expressions, and so do the constants.
-
-    Coefficients have the sign of the force on the slide: below zero while v_r > 0. A static law
-    defines `coefficient`. A law with a memory also has `states` with their rates, and no stick: the
-    slide always slips, however slowly. A law in pieces, or whose elements stick and slip, has
-    `switches`: values that are constant in each of its modes, such as the polynomial coefficients
-    of a piece. All modes then share one compiled flow. A mode ends where one of `margins` falls to
-    zero; `switches_after` then gives the next one.
-
-    Examples
-    --------
-    A law of your own:
-
-    >>> from dataclasses import dataclass
-    >>> from typing import Any
-    >>> from stickslip_ros.physics.model.constants import constant
-    >>> from stickslip_ros.physics.model.friction import FrictionLaw
-    >>> @dataclass(frozen=True)
-    ... class Viscous(FrictionLaw):
-    ...     name = "viscous"
-    ...     rise: Any = constant(0.1, "Increase of the coefficient with speed.", "s/m")
-    ...
-    ...     def coefficient(self, relative_speed, sign):
-    ...         return -self.static * sign - self.rise * relative_speed
-    >>> Viscous.constants()
-    ('static', 'rise')
-    >>> float(Viscous(static=0.3, rise=0.5).at_rest(0.1))
-    0.35
+    `name` and `coefficient` are needed, and `characteristic_speed` unless the law is a polynomial.
     """
 
     name: ClassVar[str]
     """Name of the law in the parameters."""
-    states: ClassVar[Mapping[str, str | None]] = {}
-    """Unit of each state of the memory by name; empty for a static law."""
-    switches: ClassVar[Sequence[str]] = ()
-    """Names of the values that are constant in each mode of the law."""
     nonsmooth: ClassVar[bool] = False
     """Whether friction has no second derivative in steady slip: no Lyapunov coefficient exists."""
     direction_independent: ClassVar[Sequence[str]] = ()
     """Constants that must be the same in both directions of slip: otherwise friction would jump."""
 
-    static: Any = constant(0.4, "Static (break-away) coefficient mu_s.", at_least=0.0)
+    static: Any
+    """Static (break-away) coefficient mu_s."""
 
     @abstractmethod
     def coefficient(self, relative_speed: Any, sign: Any) -> Any:
@@ -92,44 +60,77 @@ class FrictionLaw(ABC):
         """
         return self.static, self.static
 
+    @property
+    def characteristic_speed(self) -> float:
+        """Speed that may change the coefficient by a factor, m/s; infinite for polynomials."""
+        return inf
+
+    def refusal(self) -> str | None:
+        """Return a sentence that says which constants do not fit together, or None.
+
+        Returns
+        -------
+        str or None
+            Sentence with names, values and what is allowed; bounds of one constant are not its
+            subject.
+        """
+        return None
+
+    def warning(self) -> str | None:
+        """Return a sentence that says what a user of the law should know, or None."""
+        return None
+
+
+class FrictionMemory(SteadyFriction):
+    """The memory of a law, and its modes; by default friction is that of steady slip.
+
+    A law with a memory gives `states`, `friction`, `memory_rates` and `memory_at`, and for a
+    sampled controller `memory_after`. It has no stick: the slide always slips, however slowly.
+
+    A law in pieces, or whose elements stick and slip, has `switches`: values that are constant in
+    each of its modes, such as the polynomial coefficients of a piece. All modes then share one
+    compiled flow. A mode ends where one of `margins` falls to zero; `switches_after` then gives the
+    next one, and `switches_at` the first.
+    """
+
+    states: ClassVar[Mapping[str, str | None]] = {}
+    """Unit of each state of the memory by name; empty for a static law."""
+    switches: ClassVar[Sequence[str]] = ()
+    """Names of the values that are constant in each mode of the law."""
+
+    @property
+    def sticks(self) -> bool:
+        """Whether the slide can stick to the belt: only without a memory."""
+        return not self.states
+
     def friction(
         self, relative_speed: Any, sign: Any, memory: Sequence[Any], switches: Sequence[Any]
     ) -> Any:
-        """Return the friction coefficient during slip, steady or not.
+        """Return the friction coefficient during slip, steady or not; by default `coefficient`.
 
         Parameters
         ----------
-        relative_speed : float, array or expression
-            Speed v_r of the slide relative to the belt, m/s.
-        sign : float, array or expression
-            sgn(v_r), -1 or 1.
-        memory : sequence of float or expression
-            Values of `states`.
-        switches : sequence of float or expression
-            Values of `switches`.
+        relative_speed, sign : float, array or expression
+            As in `coefficient`.
+        memory, switches : sequence of float or expression
+            Values of `states` and of `switches`.
 
         Returns
         -------
         float, array or expression
-            Coefficient with the sign of the force on the slide; by default `coefficient`.
+            Coefficient with the sign of the force on the slide.
         """
         return self.coefficient(relative_speed, sign)
 
     def memory_rates(
         self, relative_speed: Any, sign: Any, memory: Sequence[Any], switches: Sequence[Any]
     ) -> Sequence[Any]:
-        """Return the derivatives of the memory by time; arguments as in `friction`.
+        """Return the derivatives of the memory by time.
 
         Parameters
         ----------
-        relative_speed : float or expression
-            Speed v_r of the slide relative to the belt, m/s.
-        sign : float or expression
-            sgn(v_r), -1 or 1.
-        memory : sequence of float or expression
-            Values of `states`.
-        switches : sequence of float or expression
-            Values of `switches`.
+        relative_speed, sign, memory, switches
+            As in `friction`.
 
         Returns
         -------
@@ -138,93 +139,26 @@ class FrictionLaw(ABC):
         """
         return ()
 
-    def margins(
-        self, relative_speed: Any, sign: Any, memory: Sequence[Any], switches: Sequence[Any]
-    ) -> Sequence[Any]:
-        """Return what is above zero in a mode; where one falls to zero the mode ends.
-
-        The sign of v_r need not be among them: the drive follows it.
-
-        Parameters
-        ----------
-        relative_speed : float or expression
-            Speed v_r of the slide relative to the belt, m/s.
-        sign : float or expression
-            sgn(v_r), -1 or 1.
-        memory : sequence of float or expression
-            Values of `states`.
-        switches : sequence of float or expression
-            Values of `switches`.
-
-        Returns
-        -------
-        sequence of float or expression
-            Margins of the order of one; as many in every mode. Where a mode lacks one it must be a
-            constant above zero, made from the switches, for example slips + (1 - slips) * margin.
-        """
-        return ()
-
-    def switches_at(
-        self, relative_speed: float, sign: float, memory: Sequence[float]
-    ) -> Sequence[float]:
-        """Return the switches of the mode that starts in a state.
-
-        It is called at the start of a motion, and when the relative speed changes its sign.
+    def initial_memory(self, relative_speed: float) -> Sequence[float]:
+        """Return the memory at the start of a motion; by default 0.
 
         Parameters
         ----------
         relative_speed : float
             Speed v_r of the slide relative to the belt, m/s.
-        sign : float
-            sgn(v_r) from now on, -1 or 1.
-        memory : sequence of float
-            Values of `states`.
-
-        Returns
-        -------
-        sequence of float
-            Values of `switches`.
         """
-        return ()
-
-    def switches_after(
-        self, margin: int, sign: float, switches: Sequence[float]
-    ) -> Sequence[float]:
-        """Return the switches of the mode that follows where a margin has fallen to zero.
-
-        Parameters
-        ----------
-        margin : int
-            Index of the margin.
-        sign : float
-            sgn(v_r), -1 or 1.
-        switches : sequence of float
-            Values of `switches` so far.
-
-        Returns
-        -------
-        sequence of float
-            Values of `switches` from then on.
-        """
-        return switches
+        return (0.0,) * len(self.states)
 
     def memory_at(self, relative_speed: float, sign: float) -> Sequence[float]:
         """Return the memory in steady slip: the start of the search for an equilibrium.
 
-        A law whose elements stick and slip must define it, so that `switches_at` gives the mode of
-        steady slip there.
+        By default it is 0. A law whose elements stick and slip must define it, so that
+        `switches_at` gives the mode of steady slip there.
 
         Parameters
         ----------
-        relative_speed : float
-            Speed v_r of the slide relative to the belt, m/s.
-        sign : float
-            sgn(v_r), -1 or 1.
-
-        Returns
-        -------
-        sequence of float
-            Values of `states`; by default 0.
+        relative_speed, sign : float
+            As in `coefficient`.
         """
         return (0.0,) * len(self.states)
 
@@ -243,17 +177,10 @@ class FrictionLaw(ABC):
         ----------
         relative_speed : float
             Speed v_r of the slide relative to the belt, m/s.
-        memory : sequence of float
-            Values of `states`.
-        switches : sequence of float
-            Values of `switches` at the start.
+        memory, switches : sequence of float
+            Values of `states` and of `switches` at the start.
         duration : float
             Duration, s.
-
-        Returns
-        -------
-        sequence of float
-            Values of `states`.
 
         Raises
         ------
@@ -267,6 +194,54 @@ class FrictionLaw(ABC):
             )
         return ()
 
+    def margins(
+        self, relative_speed: Any, sign: Any, memory: Sequence[Any], switches: Sequence[Any]
+    ) -> Sequence[Any]:
+        """Return what is above zero in a mode; where one falls to zero the mode ends.
+
+        The sign of v_r need not be among them: the drive follows it.
+
+        Parameters
+        ----------
+        relative_speed, sign, memory, switches
+            As in `friction`.
+
+        Returns
+        -------
+        sequence of float or expression
+            Margins of the order of one; as many in every mode. Where a mode lacks one it must be a
+            constant above zero, made from the switches, for example slips + (1 - slips) * margin.
+        """
+        return ()
+
+    def switches_at(
+        self, relative_speed: float, sign: float, memory: Sequence[float]
+    ) -> Sequence[float]:
+        """Return the switches of the mode that starts in a state.
+
+        It is called at the start of a motion, and when the relative speed changes its sign.
+
+        Parameters
+        ----------
+        relative_speed, sign, memory
+            As in `friction`; the sign is that from now on.
+        """
+        return ()
+
+    def switches_after(
+        self, margin: int, sign: float, switches: Sequence[float]
+    ) -> Sequence[float]:
+        """Return the switches of the mode that follows where a margin has fallen to zero.
+
+        Parameters
+        ----------
+        margin : int
+            Index of the margin.
+        sign, switches
+            As in `friction`; the switches are those so far.
+        """
+        return switches
+
     def switches_following(
         self,
         switches: Sequence[float],
@@ -276,59 +251,98 @@ class FrictionLaw(ABC):
     ) -> Sequence[float]:
         """Return the switches of a state that follows others, in the same direction of slip.
 
+        By default they are those of the state, as `switches_at` gives them.
+
         Parameters
         ----------
         switches : sequence of float
             Values of `switches` before.
-        relative_speed : float
-            Speed v_r of the slide relative to the belt, m/s.
-        sign : float
-            sgn(v_r), -1 or 1.
-        memory : sequence of float
-            Values of `states`.
-
-        Returns
-        -------
-        sequence of float
-            Values of `switches`; by default those of the state, as `switches_at` gives them.
+        relative_speed, sign, memory
+            As in `friction`.
         """
         return self.switches_at(relative_speed, sign, memory)
 
-    def initial_memory(self, relative_speed: float) -> Sequence[float]:
-        """Return the memory at the start of a motion.
+
+class FrictionCreep(FrictionMemory):
+    """The creep of a law whose viscosity grows without bound as the slide slows down.
+
+    Such a law gives all three; by default there is no creep.
+    """
+
+    @property
+    def rate_sensitivity(self) -> Any:
+        """Increase of |mu| where the speed grows e-fold at constant memory, in creep.
+
+        Zero for a law without creep.
+        """
+        return 0.0
+
+    def creep_speed(self, coefficient: Any, sign: Any, memory: Sequence[Any]) -> Any:
+        """Return the relative speed at which friction has a coefficient: the inverse of `friction`.
 
         Parameters
         ----------
-        relative_speed : float
+        coefficient : float or expression
+            Coefficient with the sign of the force on the slide, dimensionless.
+        sign, memory
+            As in `friction`.
+
+        Returns
+        -------
+        float or expression
             Speed v_r of the slide relative to the belt, m/s.
+        """
+        raise NotImplementedError
+
+    def creep_limit(self, relative_speed: Any, sign: Any, memory: Sequence[Any]) -> Any:
+        """Return `rate_sensitivity` divided by the viscosity -d mu/d v_r.
+
+        Parameters
+        ----------
+        relative_speed, sign, memory
+            As in `friction`.
 
         Returns
         -------
-        sequence of float
-            Values of `states`; by default 0.
+        float or expression
+            Speed, m/s, above zero; |v_r| where the coefficient is logarithmic.
         """
-        return (0.0,) * len(self.states)
+        raise NotImplementedError
 
-    def refusal(self) -> str | None:
-        """Return a sentence that says which constants do not fit together, or None.
 
-        Returns
-        -------
-        str or None
-            Sentence with names, values and what is allowed; bounds of one constant are not its
-            subject.
-        """
-        return None
+@dataclass(frozen=True)
+class FrictionLaw(FrictionCreep):
+    """Friction law: the friction coefficient as a function of the relative speed.
 
-    def warning(self) -> str | None:
-        """Return a sentence that says what a user of the law should know, or None.
+    A law is a frozen dataclass of its constants, each described by `constant`. Its equations are
+    written once; they accept floats, numpy arrays and heyoka expressions, and so do the constants.
+    Coefficients have the sign of the force on the slide: below zero while v_r > 0.
 
-        Returns
-        -------
-        str or None
-            Sentence with names and values of constants.
-        """
-        return None
+    What a law gives is said by `SteadyFriction`, for one with a memory or in pieces also by
+    `FrictionMemory`, and for one that creeps by `FrictionCreep`.
+
+    Examples
+    --------
+    A law of your own:
+
+    >>> from dataclasses import dataclass
+    >>> from typing import Any
+    >>> from stickslip_ros.physics.model.constants import constant
+    >>> from stickslip_ros.physics.model.friction import FrictionLaw
+    >>> @dataclass(frozen=True)
+    ... class Viscous(FrictionLaw):
+    ...     name = "viscous"
+    ...     rise: Any = constant(0.1, "Increase of the coefficient with speed.", "s/m")
+    ...
+    ...     def coefficient(self, relative_speed, sign):
+    ...         return -self.static * sign - self.rise * relative_speed
+    >>> Viscous.constants()
+    ('static', 'rise')
+    >>> float(Viscous(static=0.3, rise=0.5).at_rest(0.1))
+    0.35
+    """
+
+    static: Any = constant(0.4, "Static (break-away) coefficient mu_s.", at_least=0.0)
 
     def above_static(self, name: str) -> str | None:
         """Return the refusal of a constant above the static coefficient, or None.
@@ -377,63 +391,6 @@ class FrictionLaw(ABC):
             -sign * self.coefficient(sign * speeds, sign * signs) for sign in (1.0, -1.0)
         ]  # fmt: skip
         return float(np.min(sizes)), float(np.max(sizes))
-
-    @property
-    def rate_sensitivity(self) -> Any:
-        """Increase of |mu| where the speed grows e-fold at constant memory, in creep.
-
-        Zero for a law without creep. Any other law has a viscosity that grows without bound as the
-        slide slows down; it must define `creep_speed` and `creep_limit`.
-        """
-        return 0.0
-
-    def creep_speed(self, coefficient: Any, sign: Any, memory: Sequence[Any]) -> Any:
-        """Return the relative speed at which friction has a coefficient: the inverse of `friction`.
-
-        Parameters
-        ----------
-        coefficient : float or expression
-            Coefficient with the sign of the force on the slide, dimensionless.
-        sign : float or expression
-            sgn(v_r), -1 or 1.
-        memory : sequence of float or expression
-            Values of `states`.
-
-        Returns
-        -------
-        float or expression
-            Speed v_r of the slide relative to the belt, m/s.
-        """
-        raise NotImplementedError
-
-    def creep_limit(self, relative_speed: Any, sign: Any, memory: Sequence[Any]) -> Any:
-        """Return `rate_sensitivity` divided by the viscosity -d mu/d v_r.
-
-        Parameters
-        ----------
-        relative_speed : float or expression
-            Speed v_r of the slide relative to the belt, m/s.
-        sign : float or expression
-            sgn(v_r), -1 or 1.
-        memory : sequence of float or expression
-            Values of `states`.
-
-        Returns
-        -------
-        float or expression
-            Speed, m/s, above zero; |v_r| where the coefficient is logarithmic.
-        """
-        raise NotImplementedError
-
-    @property
-    def characteristic_speed(self) -> float:
-        """Speed that may change the coefficient by a factor, m/s; infinite for polynomials."""
-        return inf
-
-    @property
-    def sticks(self) -> bool:
-        """Whether the slide can stick to the belt: only without a memory."""
-        return not self.states
 
     def scaled(self, speed: float, length: float = 1.0) -> Self:
         """Return the same law in other units of speed and length.

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from stickslip_ros.physics.model.friction.base import FrictionLaw
-from stickslip_ros.physics.model.friction.curve_follower import (
+from stickslip_ros.physics.model.friction.lugre import (
     LEAST_SIZE,
     approached,
     bristle_stiffness,
@@ -38,7 +38,7 @@ class Dahl(FrictionLaw):
     bristle_stiffness: Any = bristle_stiffness()
 
     def coefficient(self, relative_speed: Any, sign: Any) -> Any:
-        """Return mu(v_r) = -mu_s s in steady slip; see `FrictionLaw.coefficient`."""
+        """Return mu(v_r) = -mu_s s in steady slip; see `SteadyFriction.coefficient`."""
         return -self.static * sign + 0.0 * relative_speed
 
     @property
@@ -49,18 +49,18 @@ class Dahl(FrictionLaw):
     def friction(
         self, relative_speed: Any, sign: Any, memory: Sequence[Any], switches: Sequence[Any]
     ) -> Any:
-        """Return -S z; see `FrictionLaw.friction`."""
+        """Return -S z; see `FrictionMemory.friction`."""
         return -self.bristle_stiffness * memory[0]
 
     def memory_rates(
         self, relative_speed: Any, sign: Any, memory: Sequence[Any], switches: Sequence[Any]
     ) -> Sequence[Any]:
-        """Return z'; see `FrictionLaw.memory_rates`."""
+        """Return z'; see `FrictionMemory.memory_rates`."""
         share = self.bristle_stiffness * memory[0] / self.static
         return (relative_speed - sign * relative_speed * share,)
 
     def memory_at(self, relative_speed: float, sign: float) -> Sequence[float]:
-        """Return s mu_s / S; see `FrictionLaw.memory_at`."""
+        """Return s mu_s / S; see `FrictionMemory.memory_at`."""
         return (sign * self.static / self.bristle_stiffness,)
 
     def memory_after(
@@ -70,12 +70,12 @@ class Dahl(FrictionLaw):
         switches: Sequence[float],
         duration: float,
     ) -> Sequence[float]:
-        """Return z, which approaches that of steady slip; see `FrictionLaw.memory_after`."""
+        """Return z, which approaches that of steady slip; see `FrictionMemory.memory_after`."""
         (steady,) = self.memory_at(relative_speed, 1.0 if relative_speed > 0.0 else -1.0)
         return (approached(memory[0], steady, abs(relative_speed) * duration),)
 
     def refusal(self) -> str | None:
-        """Refuse a coefficient of zero; see `FrictionLaw.refusal`."""
+        """Refuse a coefficient of zero; see `SteadyFriction.refusal`."""
         if self.static >= LEAST_SIZE:
             return None
         return f"static = {self.static} must be at least {LEAST_SIZE:g} for law {self.name}"

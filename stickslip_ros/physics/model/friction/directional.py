@@ -3,11 +3,41 @@
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import wraps
+from inspect import signature
 from typing import Any, ClassVar, Self
 
 from typing_extensions import override
 
 from stickslip_ros.physics.model.friction.base import FrictionLaw
+
+
+def _of_direction(method: Callable[..., Any]) -> Any:
+    """Return a method that asks the law of the direction of slip.
+
+    Where the sign is an array or an expression it asks both laws.
+    """
+    name, parameters = method.__name__, list(signature(method).parameters)[1:]
+    place = parameters.index("sign" if "sign" in parameters else "relative_speed")
+
+    @wraps(method, updated=())
+    def ask(self: "Directional", *arguments: Any, **named: Any) -> Any:
+        arguments = (*arguments, *(named[each] for each in parameters[len(arguments) :]))
+        sign = arguments[place]
+        if isinstance(sign, int | float):
+            law = self.forward if sign > 0.0 else self.reverse
+            return getattr(law, name)(*arguments)
+        ahead, back = (getattr(law, name)(*arguments) for law in (self.forward, self.reverse))
+        return _blended(sign, ahead, back)
+
+    return ask
+
+
+def _blended(sign: Any, ahead: Any, back: Any) -> Any:
+    """Return the value of forward slip where the sign is 1, and of backward slip where it is -1."""
+    if isinstance(ahead, Sequence):
+        return [_blended(sign, *each) for each in zip(ahead, back, strict=True)]
+    return 0.5 * ((1.0 + sign) * ahead + (1.0 - sign) * back)
 
 
 @dataclass(frozen=True)
@@ -33,6 +63,19 @@ class Directional(FrictionLaw):
     reverse: Any
     """Law of backward slip."""
 
+    coefficient = _of_direction(FrictionLaw.coefficient)
+    friction = _of_direction(FrictionLaw.friction)
+    memory_rates = _of_direction(FrictionLaw.memory_rates)
+    initial_memory = _of_direction(FrictionLaw.initial_memory)
+    memory_at = _of_direction(FrictionLaw.memory_at)
+    memory_after = _of_direction(FrictionLaw.memory_after)
+    margins = _of_direction(FrictionLaw.margins)
+    switches_at = _of_direction(FrictionLaw.switches_at)
+    switches_after = _of_direction(FrictionLaw.switches_after)
+    switches_following = _of_direction(FrictionLaw.switches_following)
+    creep_speed = _of_direction(FrictionLaw.creep_speed)
+    creep_limit = _of_direction(FrictionLaw.creep_limit)
+
     def __post_init__(self) -> None:
         if type(self.forward) is not type(self.reverse):
             raise TypeError("a directional law needs two laws of one class")
@@ -46,7 +89,7 @@ class Directional(FrictionLaw):
 
     @property
     def limits(self) -> tuple[Any, Any]:
-        """The limit of each law in its direction; see `FrictionLaw.limits`."""
+        """The limit of each law in its direction; see `SteadyFriction.limits`."""
         return self.forward.limits[0], self.reverse.limits[1]
 
     @property
@@ -54,94 +97,17 @@ class Directional(FrictionLaw):
         """The smaller one of both laws, m/s."""
         return min(self.forward.characteristic_speed, self.reverse.characteristic_speed)
 
-    @override
-    def coefficient(self, relative_speed: Any, sign: Any) -> Any:
-        return self._of(sign, lambda law: law.coefficient(relative_speed, sign))
-
-    @override
-    def friction(
-        self, relative_speed: Any, sign: Any, memory: Sequence[Any], switches: Sequence[Any]
-    ) -> Any:
-        return self._of(sign, lambda law: law.friction(relative_speed, sign, memory, switches))
-
-    @override
-    def memory_rates(
-        self, relative_speed: Any, sign: Any, memory: Sequence[Any], switches: Sequence[Any]
-    ) -> Sequence[Any]:
-        return self._each(
-            sign, lambda law: law.memory_rates(relative_speed, sign, memory, switches)
-        )
-
-    @override
-    def margins(
-        self, relative_speed: Any, sign: Any, memory: Sequence[Any], switches: Sequence[Any]
-    ) -> Sequence[Any]:
-        return self._each(sign, lambda law: law.margins(relative_speed, sign, memory, switches))
-
-    @override
-    def switches_at(
-        self, relative_speed: float, sign: float, memory: Sequence[float]
-    ) -> Sequence[float]:
-        return self._of(sign, lambda law: law.switches_at(relative_speed, sign, memory))
-
-    @override
-    def switches_after(
-        self, margin: int, sign: float, switches: Sequence[float]
-    ) -> Sequence[float]:
-        return self._of(sign, lambda law: law.switches_after(margin, sign, switches))
-
-    @override
-    def memory_at(self, relative_speed: float, sign: float) -> Sequence[float]:
-        return self._of(sign, lambda law: law.memory_at(relative_speed, sign))
-
-    @override
-    def initial_memory(self, relative_speed: float) -> Sequence[float]:
-        return self._of(relative_speed, lambda law: law.initial_memory(relative_speed))
-
-    @override
-    def switches_following(
-        self,
-        switches: Sequence[float],
-        relative_speed: float,
-        sign: float,
-        memory: Sequence[float],
-    ) -> Sequence[float]:
-        return self._of(
-            sign, lambda law: law.switches_following(switches, relative_speed, sign, memory)
-        )
-
-    @override
-    def memory_after(
-        self,
-        relative_speed: float,
-        memory: Sequence[float],
-        switches: Sequence[float],
-        duration: float,
-    ) -> Sequence[float]:
-        return self._of(
-            relative_speed,
-            lambda law: law.memory_after(relative_speed, memory, switches, duration),
-        )
-
     @property
     def rate_sensitivity(self) -> Any:
         """The smaller one of both laws."""
         return min(self.forward.rate_sensitivity, self.reverse.rate_sensitivity)
 
-    @override
-    def creep_speed(self, coefficient: Any, sign: Any, memory: Sequence[Any]) -> Any:
-        return self._of(sign, lambda law: law.creep_speed(coefficient, sign, memory))
-
-    @override
-    def creep_limit(self, relative_speed: Any, sign: Any, memory: Sequence[Any]) -> Any:
-        return self._of(sign, lambda law: law.creep_limit(relative_speed, sign, memory))
-
     def warning(self) -> str | None:
-        """Return the warning of either law; see `FrictionLaw.warning`."""
+        """Return the warning of either law; see `SteadyFriction.warning`."""
         return self.forward.warning() or self.reverse.warning()
 
     def refusal(self) -> str | None:
-        """Return the refusal of either law; see `FrictionLaw.refusal`."""
+        """Return the refusal of either law; see `SteadyFriction.refusal`."""
         refusal = self.forward.refusal()
         if refusal is not None:
             return refusal
@@ -160,14 +126,3 @@ class Directional(FrictionLaw):
             forward=self.forward.scaled(speed, length),
             reverse=self.reverse.scaled(speed, length),
         )
-
-    def _of(self, sign: Any, value: Callable[[FrictionLaw], Any]) -> Any:
-        """Return a value of the law of a direction; for an array or an expression of both laws."""
-        if isinstance(sign, int | float):
-            return value(self.forward if sign > 0.0 else self.reverse)
-        ahead, back = value(self.forward), value(self.reverse)
-        return 0.5 * ((1.0 + sign) * ahead + (1.0 - sign) * back)
-
-    def _each(self, sign: Any, values: Callable[[FrictionLaw], Sequence[Any]]) -> Sequence[Any]:
-        count = len(values(self.forward))
-        return [self._of(sign, lambda law, i=i: values(law)[i]) for i in range(count)]

@@ -49,7 +49,7 @@ class ElastoPlastic(LuGre):
     def memory_rates(
         self, relative_speed: Any, sign: Any, memory: Sequence[Any], switches: Sequence[Any]
     ) -> Sequence[Any]:
-        """Return z'; see `FrictionLaw.memory_rates`."""
+        """Return z'; see `FrictionMemory.memory_rates`."""
         elastic, plastic, limit, *_ = switches
         size = self.size(relative_speed, sign, switches)
         force = sign * self.bristle_stiffness * memory[0]
@@ -57,30 +57,37 @@ class ElastoPlastic(LuGre):
         yields = plastic + (1.0 - elastic - plastic) * (0.5 + 0.5 * sin(angle))
         return (relative_speed * (1.0 - yields * force / size),)
 
-    def _own_margins(
+    def margins(
         self, relative_speed: Any, sign: Any, memory: Sequence[Any], switches: Sequence[Any]
     ) -> Sequence[Any]:
-        """Return the distances to the two ends of the range in which alpha changes."""
+        """Return the distances to the ends of a changing alpha; see `FrictionMemory.margins`."""
         elastic, plastic, limit, *_ = switches
         size = self.size(relative_speed, sign, switches)
         force = sign * self.bristle_stiffness * memory[0]
         return (
             plastic + (1.0 - plastic) * (1.0 - 2.0 * elastic) * (force - limit),
             elastic + (1.0 - elastic) * (1.0 - 2.0 * plastic) * (size - force),
+            *super().margins(relative_speed, sign, memory, switches),
         )
 
-    def _own_switches_at(
-        self, sign: float, memory: Sequence[float], size: float
+    def switches_at(
+        self, relative_speed: float, sign: float, memory: Sequence[float]
     ) -> Sequence[float]:
-        """Return whether the contact is elastic, or fully plastic, and S z_b."""
+        """Return if it is elastic, if plastic, and S z_b; see `FrictionMemory.switches_at`."""
+        of_curve = super().switches_at(relative_speed, sign, memory)
+        size = float(self.size(relative_speed, sign, (0.0, 0.0, 0.0, *of_curve)))
         limit = self.break_away * self._dry.size_range[0]
         force = sign * self.bristle_stiffness * memory[0]
-        return (float(force <= limit), float(force >= size), limit)
+        return (float(force <= limit), float(force >= size), limit, *of_curve)
 
-    def _own_switches_after(self, margin: int, switches: Sequence[float]) -> Sequence[float]:
-        """Return the switches on the other side of an end."""
-        elastic, plastic, limit = switches
-        return (1.0 - elastic, 0.0, limit) if margin == 0 else (0.0, 1.0 - plastic, limit)
+    def switches_after(
+        self, margin: int, sign: float, switches: Sequence[float]
+    ) -> Sequence[float]:
+        """Return the switches on the other side of an end; see `FrictionMemory.switches_after`."""
+        elastic, plastic, *others = switches
+        if margin > 1:
+            return super().switches_after(margin - 2, sign, switches)
+        return (1.0 - elastic, 0.0, *others) if margin == 0 else (0.0, 1.0 - plastic, *others)
 
     def memory_after(
         self,
@@ -89,7 +96,7 @@ class ElastoPlastic(LuGre):
         switches: Sequence[float],
         duration: float,
     ) -> Sequence[float]:
-        """Return z by Runge-Kutta steps along the path; see `FrictionLaw.memory_after`."""
+        """Return z by Runge-Kutta steps along the path; see `FrictionMemory.memory_after`."""
         if relative_speed == 0.0 or duration == 0.0:
             return memory
         sign = 1.0 if relative_speed > 0.0 else -1.0
@@ -122,7 +129,7 @@ class ElastoPlastic(LuGre):
         return None
 
     def refusal(self) -> str | None:
-        """Refuse a break-away of one or more; see `FrictionLaw.refusal`."""
+        """Refuse a break-away of one or more; see `SteadyFriction.refusal`."""
         if self.break_away >= 1.0:
             return f"break_away = {self.break_away} must be below 1"
         return super().refusal()

@@ -1,11 +1,146 @@
-"""The LuGre law."""
+"""The LuGre law, and the base of all laws whose contact follows a static law."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, ClassVar
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from math import exp
+from typing import Any, ClassVar, Self
 
 from stickslip_ros.physics.model.constants import constant
-from stickslip_ros.physics.model.friction.curve_follower import CurveFollower, approached
+from stickslip_ros.physics.model.friction.base import FrictionLaw
+from stickslip_ros.physics.model.friction.exponential import Exponential
+
+LEAST_SIZE = 1e-12
+"""Least coefficient at which bristles yield."""
+
+
+def bristle_stiffness() -> Any:
+    """Describe the constant of this name."""
+    return constant(
+        1000.0, "Stiffness S of the contact, per unit of normal force.", "1/m", positive=True
+    )
+
+
+def approached(deflection: float, steady: float, path: float) -> float:
+    """Return the deflection after a path (m), with z' = v_r (1 - s z / |steady|)."""
+    return steady + (deflection - steady) * exp(-path / abs(steady))
+
+
+@dataclass(frozen=True)
+class SteadyPart(FrictionLaw):
+    """The friction of another law in steady slip, its curve, as a law without a memory."""
+
+    static: ClassVar[Any]  # type: ignore[misc]
+
+    curve: FrictionLaw = field(default_factory=Exponential)
+    """Law that gives the friction in steady slip."""
+
+    @property
+    def static(self) -> Any:  # pyright: ignore[reportIncompatibleVariableOverride]
+        """The static coefficient of the curve."""
+        return self.curve.static
+
+    @property
+    def limits(self) -> tuple[Any, Any]:
+        """The limits of the curve."""
+        return self.curve.limits
+
+    @property
+    def characteristic_speed(self) -> float:
+        """That of the curve, m/s."""
+        return self.curve.characteristic_speed
+
+    def coefficient(self, relative_speed: Any, sign: Any) -> Any:
+        """Return that of the curve; see `SteadyFriction.coefficient`."""
+        return self.curve.coefficient(relative_speed, sign)
+
+    def scaled(self, speed: float, length: float = 1.0) -> Self:
+        """Return the same law, and its curve, in other units; see `FrictionLaw.scaled`."""
+        return replace(super().scaled(speed, length), curve=self.curve.scaled(speed, length))
+
+
+@dataclass(frozen=True)
+class CurveFollower(SteadyPart):
+    """Law with a memory that has the friction of a static law in steady slip: its curve.
+
+    The size of the curve without its viscous part, g(v_r), limits the memory. The viscous part acts
+    immediately. Switches and margins of the curve, such as those of the pieces of a table, follow
+    the law's own.
+    """
+
+    direction_independent: ClassVar[Sequence[str]] = ("bristle_stiffness",)
+    own_switches: ClassVar[Sequence[str]] = ()
+    """Switches of the law itself."""
+
+    bristle_stiffness: Any = bristle_stiffness()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "switches", (*self.own_switches, *self.curve.switches))
+
+    def size(self, relative_speed: Any, sign: Any, switches: Sequence[Any]) -> Any:
+        """Return g(v_r), dimensionless.
+
+        Parameters
+        ----------
+        relative_speed : float or expression
+            Speed v_r of the slide relative to the belt, m/s.
+        sign : float or expression
+            sgn(v_r), -1 or 1.
+        switches : sequence of float or expression
+            Values of `switches`.
+
+        Returns
+        -------
+        float or expression
+            Size of the curve without its viscous part.
+        """
+        own = switches[len(self.own_switches) :]
+        return -sign * self._dry.friction(relative_speed, sign, (), own)
+
+    @property
+    def viscous_part(self) -> Any:
+        """Increase of the coefficient with speed that acts immediately, s/m."""
+        return getattr(self.curve, "viscous", 0.0)
+
+    def margins(
+        self, relative_speed: Any, sign: Any, memory: Sequence[Any], switches: Sequence[Any]
+    ) -> Sequence[Any]:
+        """Return those of the curve, with the switches of all; see `FrictionMemory.margins`."""
+        own = len(self.own_switches)
+        return self._dry.margins(relative_speed, sign, (), switches[own:])
+
+    def switches_at(
+        self, relative_speed: float, sign: float, memory: Sequence[float]
+    ) -> Sequence[float]:
+        """Return those of the curve only; see `FrictionMemory.switches_at`."""
+        return self.curve.switches_at(relative_speed, sign, ())
+
+    def switches_after(
+        self, margin: int, sign: float, switches: Sequence[float]
+    ) -> Sequence[float]:
+        """Return all switches after a margin of the curve; see `FrictionMemory.switches_after`."""
+        own = len(self.own_switches)
+        return (*switches[:own], *self.curve.switches_after(margin, sign, switches[own:]))
+
+    def refusal(self) -> str | None:
+        """Refuse a curve with a memory, or one that is not above 0 everywhere."""
+        name = self.curve.name
+        if self.curve.states:
+            return f"curve = {name} must be a static law: it has a memory"
+        refusal = self.curve.refusal()
+        if refusal is not None:
+            return refusal
+        least, _ = self._dry.size_range
+        if least >= LEAST_SIZE:
+            return None
+        return (
+            f"curve = {name} must be at least {LEAST_SIZE:g} at every speed: without its viscous "
+            f"part it falls to {least}"
+        )
+
+    @cached_property
+    def _dry(self) -> FrictionLaw:
+        return self.curve.dry
 
 
 @dataclass(frozen=True)
@@ -39,7 +174,7 @@ class LuGre(CurveFollower):
     def friction(
         self, relative_speed: Any, sign: Any, memory: Sequence[Any], switches: Sequence[Any]
     ) -> Any:
-        """Return -(S z + D z' + mu_v v_r); see `FrictionLaw.friction`."""
+        """Return -(S z + D z' + mu_v v_r); see `FrictionMemory.friction`."""
         (rate,) = self.memory_rates(relative_speed, sign, memory, switches)
         elastic = self.bristle_stiffness * memory[0] + self.bristle_damping * rate
         return -(elastic + self.viscous_part * relative_speed)
@@ -47,13 +182,13 @@ class LuGre(CurveFollower):
     def memory_rates(
         self, relative_speed: Any, sign: Any, memory: Sequence[Any], switches: Sequence[Any]
     ) -> Sequence[Any]:
-        """Return z'; see `FrictionLaw.memory_rates`."""
+        """Return z'; see `FrictionMemory.memory_rates`."""
         size = self.size(relative_speed, sign, switches)
         share = self.bristle_stiffness * memory[0] / size
         return (relative_speed - sign * relative_speed * share,)
 
     def memory_at(self, relative_speed: float, sign: float) -> Sequence[float]:
-        """Return s g / S; see `FrictionLaw.memory_at`."""
+        """Return s g / S; see `FrictionMemory.memory_at`."""
         steady = self._dry.coefficient(relative_speed, sign)
         return (-float(steady) / self.bristle_stiffness,)
 
@@ -64,12 +199,12 @@ class LuGre(CurveFollower):
         switches: Sequence[float],
         duration: float,
     ) -> Sequence[float]:
-        """Return z, which approaches that of steady slip; see `FrictionLaw.memory_after`."""
+        """Return z, which approaches that of steady slip; see `FrictionMemory.memory_after`."""
         (steady,) = self.memory_at(relative_speed, 1.0 if relative_speed > 0.0 else -1.0)
         return (approached(memory[0], steady, abs(relative_speed) * duration),)
 
     def warning(self) -> str | None:
-        """Say that the law is not passive, if so; see `FrictionLaw.warning`."""
+        """Say that the law is not passive, if so; see `SteadyFriction.warning`."""
         margin = self.passivity_margin
         if margin > 0.0 or self.bristle_damping == 0.0:
             return None

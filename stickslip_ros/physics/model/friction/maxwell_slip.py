@@ -6,7 +6,7 @@ from math import exp
 from typing import Any, ClassVar
 
 from stickslip_ros.physics.model.constants import constant
-from stickslip_ros.physics.model.friction.curve_follower import CurveFollower
+from stickslip_ros.physics.model.friction.lugre import CurveFollower
 
 _MOST_ELEMENTS = 20
 _AT_LIMIT = 1.0 - 2.0**-40
@@ -58,14 +58,14 @@ class MaxwellSlip(CurveFollower):
     def friction(
         self, relative_speed: Any, sign: Any, memory: Sequence[Any], switches: Sequence[Any]
     ) -> Any:
-        """Return -(sum S_i z_i + mu_v v_r); see `FrictionLaw.friction`."""
+        """Return -(sum S_i z_i + mu_v v_r); see `FrictionMemory.friction`."""
         forces = [s * z for s, z in zip(self.stiffnesses, memory, strict=True)]
         return -(sum(forces[1:], forces[0]) + self.viscous_part * relative_speed)
 
     def memory_rates(
         self, relative_speed: Any, sign: Any, memory: Sequence[Any], switches: Sequence[Any]
     ) -> Sequence[Any]:
-        """Return z_i'; see `FrictionLaw.memory_rates`."""
+        """Return z_i'; see `FrictionMemory.memory_rates`."""
         size, weight = self.size(relative_speed, sign, switches), 1.0 / self.elements
         return [
             (1.0 - slips) * relative_speed
@@ -73,28 +73,36 @@ class MaxwellSlip(CurveFollower):
             for stiffness, z, slips in zip(self.stiffnesses, memory, switches, strict=False)
         ]
 
-    def _own_margins(
+    def margins(
         self, relative_speed: Any, sign: Any, memory: Sequence[Any], switches: Sequence[Any]
     ) -> Sequence[Any]:
-        """Return the distance of each element that sticks to its limit."""
+        """Return those of the elements from their limits; see `FrictionMemory.margins`."""
         size = self.size(relative_speed, sign, switches)
-        return [
+        own = [
             slips + (1.0 - slips) * (size - sign * force)
             for force, slips in zip(self._forces(memory), switches, strict=False)
         ]
+        return (*own, *super().margins(relative_speed, sign, memory, switches))
 
-    def _own_switches_at(
-        self, sign: float, memory: Sequence[float], size: float
+    def switches_at(
+        self, relative_speed: float, sign: float, memory: Sequence[float]
     ) -> Sequence[float]:
-        """Return which elements slip: those at their limit in the direction of the slip."""
-        return [float(sign * force >= _AT_LIMIT * size) for force in self._forces(memory)]
+        """Return which elements are at their limit; see `FrictionMemory.switches_at`."""
+        of_curve = super().switches_at(relative_speed, sign, memory)
+        size = float(self.size(relative_speed, sign, (*[0.0] * self.elements, *of_curve)))
+        own = [float(sign * force >= _AT_LIMIT * size) for force in self._forces(memory)]
+        return (*own, *of_curve)
 
-    def _own_switches_after(self, margin: int, switches: Sequence[float]) -> Sequence[float]:
-        """Return the switches with one more element that slips."""
+    def switches_after(
+        self, margin: int, sign: float, switches: Sequence[float]
+    ) -> Sequence[float]:
+        """Return those with one more element that slips; see `FrictionMemory.switches_after`."""
+        if margin >= self.elements:
+            return super().switches_after(margin - self.elements, sign, switches)
         return (*switches[:margin], 1.0, *switches[margin + 1 :])
 
     def memory_at(self, relative_speed: float, sign: float) -> Sequence[float]:
-        """Return s g / (n S_i); see `FrictionLaw.memory_at`."""
+        """Return s g / (n S_i); see `FrictionMemory.memory_at`."""
         steady = -float(self._dry.coefficient(relative_speed, sign)) / self.elements
         return [steady / stiffness for stiffness in self.stiffnesses]
 
@@ -105,7 +113,7 @@ class MaxwellSlip(CurveFollower):
         sign: float,
         memory: Sequence[float],
     ) -> Sequence[float]:
-        """Keep the elements that slip; see `FrictionLaw.switches_following`."""
+        """Keep the elements that slip; see `FrictionMemory.switches_following`."""
         reached, count = self.switches_at(relative_speed, sign, memory), self.elements
         return (*map(max, switches[:count], reached[:count]), *reached[count:])
 
@@ -116,7 +124,7 @@ class MaxwellSlip(CurveFollower):
         switches: Sequence[float],
         duration: float,
     ) -> Sequence[float]:
-        """Return z_i, each as it sticks and then slips; see `FrictionLaw.memory_after`."""
+        """Return z_i, each as it sticks and then slips; see `FrictionMemory.memory_after`."""
         sign = 1.0 if relative_speed > 0.0 else -1.0
         size = abs(float(self._dry.coefficient(relative_speed, sign)))
         after: list[float] = []
@@ -132,7 +140,7 @@ class MaxwellSlip(CurveFollower):
         return after
 
     def refusal(self) -> str | None:
-        """Refuse too many elements; see `FrictionLaw.refusal`."""
+        """Refuse too many elements; see `SteadyFriction.refusal`."""
         if self.elements > _MOST_ELEMENTS:
             return f"elements = {self.elements} must not exceed {_MOST_ELEMENTS}"
         return super().refusal()

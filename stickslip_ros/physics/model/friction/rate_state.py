@@ -71,14 +71,14 @@ class RateState(FrictionLaw):
         return self.direct_effect
 
     def coefficient(self, relative_speed: Any, sign: Any) -> Any:
-        """Return mu(v_r) in steady slip, th = L/|v_r|; see `FrictionLaw.coefficient`."""
+        """Return mu(v_r) in steady slip, th = L/|v_r|; see `SteadyFriction.coefficient`."""
         speed = np.maximum(relative_speed * sign / self.reference_speed, _SLOWEST)
         return self.friction(relative_speed, sign, (-log(speed),), ())
 
     def friction(
         self, relative_speed: Any, sign: Any, memory: Sequence[Any], switches: Sequence[Any]
     ) -> Any:
-        """Return mu; see `FrictionLaw.friction`."""
+        """Return mu; see `FrictionMemory.friction`."""
         strength, limit = self._strength(memory), self.creep_limit(relative_speed, sign, memory)
         speed = (sign * relative_speed + limit) / (2.0 * self.reference_speed)
         return -sign * self.direct_effect * (strength + log(speed))
@@ -86,17 +86,17 @@ class RateState(FrictionLaw):
     def memory_rates(
         self, relative_speed: Any, sign: Any, memory: Sequence[Any], switches: Sequence[Any]
     ) -> Sequence[Any]:
-        """Return the rate of ln(v_0 th/L); see `FrictionLaw.memory_rates`."""
+        """Return the rate of ln(v_0 th/L); see `FrictionMemory.memory_rates`."""
         ageing = self.reference_speed * exp(-memory[0])
         return ((ageing - sign * relative_speed) / self.slip_distance,)
 
     def memory_at(self, relative_speed: float, sign: float) -> Sequence[float]:
-        """Return ln(v_0/|v_r|); see `FrictionLaw.memory_at`."""
+        """Return ln(v_0/|v_r|); see `FrictionMemory.memory_at`."""
         speed = max(abs(relative_speed) / self.reference_speed, _SLOWEST)
         return (-float_log(speed),)
 
     def initial_memory(self, relative_speed: float) -> Sequence[float]:
-        """Return the memory of the age L/max(|v_r|, v_0); see `FrictionLaw.initial_memory`."""
+        """Return the memory of the age L/max(|v_r|, v_0); see `FrictionMemory.initial_memory`."""
         return (-float_log(max(abs(relative_speed) / self.reference_speed, 1.0)),)
 
     def memory_after(
@@ -106,24 +106,24 @@ class RateState(FrictionLaw):
         switches: Sequence[float],
         duration: float,
     ) -> Sequence[float]:
-        """Return the memory of the age then; see `FrictionLaw.memory_after`."""
+        """Return the memory of the age then; see `FrictionMemory.memory_after`."""
         path = abs(relative_speed) * duration / self.slip_distance
         grown = -expm1(-path) / path if path > 0.0 else 1.0
         age = exp(memory[0] - path) + self.reference_speed * duration / self.slip_distance * grown
         return (float_log(age),)
 
     def creep_speed(self, coefficient: Any, sign: Any, memory: Sequence[Any]) -> Any:
-        """Return v_r = -2 v_0 sinh(mu/a) exp(-strength); see `FrictionLaw.creep_speed`."""
+        """Return v_r = -2 v_0 sinh(mu/a) exp(-strength); see `FrictionCreep.creep_speed`."""
         strength, load = self._strength(memory), coefficient / self.direct_effect
         return self.reference_speed * (exp(-load - strength) - exp(load - strength))
 
     def creep_limit(self, relative_speed: Any, sign: Any, memory: Sequence[Any]) -> Any:
-        """Return a divided by the viscosity; see `FrictionLaw.creep_limit`."""
+        """Return a divided by the viscosity; see `FrictionCreep.creep_limit`."""
         least = 2.0 * self.reference_speed * exp(-self._strength(memory))
         return sqrt(relative_speed * relative_speed + least * least)
 
     def refusal(self) -> str | None:
-        """Refuse a direct effect that is too small for numbers; see `FrictionLaw.refusal`."""
+        """Refuse a direct effect that is too small for numbers; see `SteadyFriction.refusal`."""
         for name, ratio in _LARGEST_RATIOS.items():
             value = getattr(self, name)
             if value > ratio * self.direct_effect:

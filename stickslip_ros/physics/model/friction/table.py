@@ -55,7 +55,7 @@ class Table(FrictionLaw):
     def friction(
         self, relative_speed: Any, sign: Any, memory: Sequence[Any], switches: Sequence[Any]
     ) -> Any:
-        """Return the coefficient in a piece; see `FrictionLaw.friction`."""
+        """Return the coefficient in a piece; see `FrictionMemory.friction`."""
         lower, _, _, _, c0, c1, c2, c3 = switches
         speed = relative_speed * sign - lower
         return -sign * (c0 + speed * (c1 + speed * (c2 + speed * c3)))
@@ -63,7 +63,7 @@ class Table(FrictionLaw):
     def margins(
         self, relative_speed: Any, sign: Any, memory: Sequence[Any], switches: Sequence[Any]
     ) -> Sequence[Any]:
-        """Return the distances to the ends of a piece, 1 for no end; see `FrictionLaw.margins`."""
+        """Return the distances to the ends, 1 for no end; see `FrictionMemory.margins`."""
         lower, upper, first, last, *_ = switches
         speed = relative_speed * sign
         return (
@@ -74,13 +74,13 @@ class Table(FrictionLaw):
     def switches_at(
         self, relative_speed: float, sign: float, memory: Sequence[float]
     ) -> Sequence[float]:
-        """Return the piece at a speed; see `FrictionLaw.switches_at`."""
+        """Return the piece at a speed; see `FrictionMemory.switches_at`."""
         return self._piece(relative_speed * sign)
 
     def switches_after(
         self, margin: int, sign: float, switches: Sequence[float]
     ) -> Sequence[float]:
-        """Return the piece below (margin 0) or above (1); see `FrictionLaw.switches_after`."""
+        """Return the piece below (margin 0) or above (1); see `FrictionMemory.switches_after`."""
         lower, upper, *_ = switches
         return self._piece(upper) if margin else self._piece(nextafter(lower, 0.0))
 
