@@ -21,7 +21,7 @@ def test_before_and_after_a_bag_and_a_picture(
         env=process_environment,
         capture_output=True,
         text=True,
-        timeout=PATIENCE,
+        timeout=4 * PATIENCE,
     )
     assert done.returncode == 0, done.stderr
     for shown in ("before", "after", "434.1 µm", "stick-slip", "equilibrium", "119.8 N"):
