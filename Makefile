@@ -19,7 +19,7 @@ PYTEST := $(BIN)/python -m pytest $(TESTS) --timeout=300 --numprocesses=3 --dist
 # What Python compiles is kept, even if the environment says not to: the tests start hundreds.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: setup demo check test-quick test test-all lint site gallery bench screenshot clean
+.PHONY: setup demo check test-quick slow test test-all lint site gallery bench screenshot clean
 
 setup: $(READY)
 
@@ -57,7 +57,11 @@ check: setup
 	@$(MAKE) --no-print-directory --jobs=2 --output-sync=target lint test-quick
 
 test-quick: setup
-	$(PYTEST) -m 'not process and not long' $(PYTEST_OPTIONS)
+	$(PYTEST) -m 'not process and not long and not slow' $(PYTEST_OPTIONS)
+
+# Which tests are slow, by the processor time that they take: tests/slow.txt.
+slow: setup
+	$(PYTEST) -m 'not process and not long' -p tests.slow $(PYTEST_OPTIONS)
 
 # What a fresh machine should pass.
 test: setup

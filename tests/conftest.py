@@ -14,6 +14,8 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
+from tests.slow import LIST, function_of
+
 # How long an example takes says more of the machine than of the code. Where nobody looks on,
 # the examples are the same every time, so that what fails is the change at hand.
 THOROUGH = "thorough"
@@ -50,13 +52,16 @@ sys.addaudithook(_note_start)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark the tests whose fixtures start processes, and deal them to the workers."""
+    """Mark the tests whose fixtures start processes and the slow ones; deal them to the workers."""
     items[:] = dealt(items, int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1")))
+    slow = set(LIST.read_text(encoding="utf-8").splitlines())
     for item in items:
         if STARTING_FIXTURES.intersection(getattr(item, "fixturenames", ())):
             item.add_marker("process")
         if MIDDLEWARE.intersection(item.path.parents):
             item.add_marker("middleware")
+        if function_of(item.nodeid) in slow:
+            item.add_marker("slow")
 
 
 def dealt(items: list[pytest.Item], workers: int) -> list[pytest.Item]:
