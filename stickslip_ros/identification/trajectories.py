@@ -13,10 +13,9 @@ from stickslip_ros.errors import InvalidInputError, RunError
 from stickslip_ros.identification.friction_models import DELAY, REVERSE, Model
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.trajectory import Predictor, Segment, steady_memory
-from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.model.drive import Drive, in_units_of
 from stickslip_ros.physics.model.drive_system import MEMORY
 from stickslip_ros.physics.model.plain_drive import drive_system
-from stickslip_ros.physics.model.scaled_drive import in_units_of
 
 _STEP = 1e-4
 """Step, as a share of the value, of constants that are linear in the coordinates."""

@@ -9,11 +9,11 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.identification.record import Record
-from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.drive_system import SPEED
+from stickslip_ros.physics.model.drive import Drive, in_units_of
+from stickslip_ros.physics.model.drive_system import POSITION, SPEED
 from stickslip_ros.physics.model.signals import table
 from stickslip_ros.physics.motion.motion import Motion
-from stickslip_ros.physics.motion.parametric_motion import ParametricMotion
+from stickslip_ros.physics.motion.variational import VariationalMotion
 
 _FIRST = 20
 """Samples from which the velocity at the start is found."""
@@ -112,17 +112,18 @@ class Predictor:
         """Return the outputs of segments, as `followed`, and their derivatives.
 
         The latter have shape (rows, arguments): the state at the start of the segment, then the
-        free constants of the drive, all dimensionless as in `ParametricMotion`; the outputs are in
+        free constants of the drive, all dimensionless as in `VariationalMotion`; the outputs are in
         SI units.
         """
         found: list[tuple[FloatArray, FloatArray]] = []
-        for segment, motion in self._motions(ParametricMotion, drive, segments, starts):
+        scaled = in_units_of(drive, drive)
+        for segment, motion in self._motions(VariationalMotion, scaled, segments, starts):
             own = np.full((self.outputs, segment.count), np.nan)
             by = np.zeros((self.outputs, segment.count, motion.derivatives.shape[1]))
             own[:, 0] = (motion.position, motion.velocity)[: self.outputs]
             by[:, 0] = motion.derivatives[: self.outputs]
             for number in self._samples(motion, segment.start, segment.count, delay):
-                own[0, number], by[0, number] = motion.position, motion.position_derivatives
+                own[0, number], by[0, number] = motion.position, motion.derivatives[POSITION]
                 if self.outputs > 1:
                     own[1, number], by[1, number] = motion.velocity, motion.derivatives[SPEED]
             units = np.array([drive.length_scale, drive.speed_scale])[: self.outputs]

@@ -1,9 +1,11 @@
 """The drive: a mass on a spring and a damper, pressed onto a moving belt."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import inf, pi, sqrt
 from typing import Self
+
+from typing_extensions import override
 
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.model.actuator import IDEAL_ACTUATOR, Actuator
@@ -146,3 +148,54 @@ class Drive:
         if not self.has_spring:
             return self.damping / self.normal_force
         return self.damping / sqrt(self.stiffness * self.mass)
+
+
+@dataclass(frozen=True)
+class ScaledDrive(Drive):
+    """Drive whose units are those of another drive: its mass and stiffness need not be 1 in them.
+
+    Durations, lengths and speeds then do not depend on its constants, so that a motion has
+    derivatives by all of them.
+    """
+
+    unit: Drive = field(kw_only=True)
+    """The drive that gives the units; with a spring."""
+
+    @cached_property
+    @override
+    def angular_frequency(self) -> float:
+        return self.unit.angular_frequency
+
+    @cached_property
+    @override
+    def length_scale(self) -> float:
+        return self.unit.length_scale
+
+    @cached_property
+    @override
+    def speed_scale(self) -> float:
+        return self.unit.speed_scale
+
+    @cached_property
+    @override
+    def dimensionless(self) -> Self:
+        scales = self.unit.scales
+        return replace(
+            self,
+            mass=self.mass / self.unit.mass,
+            damping=self.damping * scales.speed / scales.force,
+            stiffness=self.stiffness / self.unit.stiffness,
+            normal_force=self.normal_force / scales.force,
+            belt_speed=self.belt_speed / scales.speed,
+            friction=self.friction.scaled(scales.speed, scales.length),
+            belt=self.belt.scaled(scales, "m/s"),
+            load=self.load.scaled(scales, "N"),
+            actuator=scaled(self.actuator, scales),
+            bias_force=self.bias_force / scales.force,
+        )
+
+
+def in_units_of(unit: Drive, drive: Drive) -> ScaledDrive:
+    """Return a drive in the units of another one, of the same normal force."""
+    own = {name: getattr(drive, name) for name in Drive.__dataclass_fields__}
+    return ScaledDrive(**own, unit=unit)

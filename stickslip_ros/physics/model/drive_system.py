@@ -13,7 +13,7 @@ from stickslip_ros.errors import RunError
 from stickslip_ros.physics.model import equations
 from stickslip_ros.physics.model.constants import numbers, structure, with_symbols
 from stickslip_ros.physics.model.control import ContinuousControl
-from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.model.drive import Drive, ScaledDrive
 from stickslip_ros.physics.model.friction import FrictionLaw
 from stickslip_ros.physics.model.hybrid import (
     Flow,
@@ -114,7 +114,8 @@ class DriveSystem(HybridSystem):
 
     Drive and control are in SI units. Continuous control, eq. 19, acts without the actuator;
     without it the force is the input `force`. An actuator with states receives that input, and the
-    input `disturbance` is added to its force.
+    input `disturbance` is added to its force. Of a `ScaledDrive` also mass, stiffness and bias are
+    constants.
     """
 
     def __init__(self, drive: Drive, control: ContinuousControl | None = None) -> None:
@@ -154,17 +155,10 @@ class DriveSystem(HybridSystem):
         # Whether the normal force may fall below zero: then a guard ends the motion.
         self._may_lift = 1.0 + self.drive.load.bounds[0] < -_LIFT_ROUNDING
         has_bias = self.drive.bias_force != 0.0
-        self.structure = structure_number(
-            (
-                *(type(self), self.states, self._may_lift, drive.has_spring, has_bias),
-                *((each.switches, each.has_sine) for each in signals),
-                *map(structure, (law, self.drive.actuator, self.control)),
-            )
-        )
         self._steady = not self.drive.belt.pieces
         self._limits_by_series = law.characteristic_speed != inf and not law.sticks
         self._frequency, self._stiffness = drive.angular_frequency, self.drive.stiffness
-        self.constants = {
+        constants: dict[str, float] = {
             "damping": self.drive.damping,
             "belt_speed": self.drive.belt_speed,
             **({"bias_force": self.drive.bias_force} if has_bias else {}),
@@ -179,6 +173,20 @@ class DriveSystem(HybridSystem):
                 else {"step_limiter": 1.0 / (_CHANGE_IN_A_STEP * law.characteristic_speed)}
             ),
         }
+        if isinstance(drive, ScaledDrive):
+            free = ("mass", "stiffness", "bias_force")
+            constants |= {name: getattr(self.drive, name) for name in free}
+            of_law = (name for name in constants if name.startswith("friction."))
+            self.free_constants = ("mass", "damping", "stiffness", "bias_force", *of_law)
+        self.constants = constants
+        self.structure = structure_number(
+            (
+                *(type(self), self.states, self._may_lift, drive.has_spring, has_bias),
+                *((each.switches, each.has_sine) for each in signals),
+                *map(structure, (law, self.drive.actuator, self.control)),
+                self.free_constants,
+            )
+        )
         self._friction = law.friction
         self.sticks = law.sticks
         self.many_steps = not law.sticks or self.has_actuator
@@ -538,6 +546,8 @@ class DriveSystem(HybridSystem):
         drive, constants = self.drive, self.symbols.constants
         symbolic = replace(
             drive,
+            mass=constants.get("mass", drive.mass),
+            stiffness=constants.get("stiffness", drive.stiffness),
             damping=constants["damping"],
             belt_speed=constants["belt_speed"],
             bias_force=constants.get("bias_force", 0.0),

@@ -9,9 +9,11 @@ from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import inf
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import heyoka as hy
+
+_Shared = TypeVar("_Shared")
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,12 +116,16 @@ class HybridSystem(ABC):
     def flow(self, name: str) -> Flow:
         """Return a flow by its name, in `symbols`."""
 
+    def shared(self, key: Hashable, make: Callable[[], _Shared]) -> _Shared:
+        """Return what all systems of this structure share under a key; it is made once."""
+        found = _shared.setdefault(self.structure, {})
+        if key not in found:
+            found[key] = make()
+        return found[key]
+
     def shared_flow(self, name: str) -> Flow:
         """Return a flow by its name; systems of one structure share it."""
-        key = (self.structure, name)
-        if key not in _flows:
-            _flows[key] = self.flow(name)
-        return _flows[key]
+        return self.shared(("flow", name), lambda: self.flow(name))
 
     @abstractmethod
     def settled(self, mode: Mode | None, instant: Instant) -> Mode:
@@ -197,10 +203,11 @@ class HybridSystem(ABC):
     @property
     def index(self) -> Mapping[str, int]:
         """Index of constants, inputs, switches and of the time at the start, by name."""
-        if self.structure not in _indices:
-            names = (*self.constants, *self.inputs, *self.switches, "epoch")
-            _indices[self.structure] = {name: number for number, name in enumerate(names)}
-        return _indices[self.structure]
+        return self.shared("index", self._numbered)
+
+    def _numbered(self) -> Mapping[str, int]:
+        names = (*self.constants, *self.inputs, *self.switches, "epoch")
+        return {name: number for number, name in enumerate(names)}
 
     @cached_property
     def symbols(self) -> Symbols:
@@ -215,8 +222,7 @@ class HybridSystem(ABC):
         )
 
 
-_flows: dict[tuple[int, str], Flow] = {}
-_indices: dict[int, Mapping[str, int]] = {}
+_shared: dict[int, dict[Hashable, Any]] = {}
 _structures: dict[Hashable, int] = {}
 
 

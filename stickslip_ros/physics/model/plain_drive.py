@@ -6,7 +6,7 @@ from math import copysign, ulp
 from stickslip_ros.physics.model import equations
 from stickslip_ros.physics.model.control import ContinuousControl
 from stickslip_ros.physics.model.creeping_drive import CreepingDrive
-from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.model.drive import Drive, ScaledDrive
 from stickslip_ros.physics.model.drive_system import (
     POSITION,
     SLIP,
@@ -15,7 +15,6 @@ from stickslip_ros.physics.model.drive_system import (
     DriveSystem,
 )
 from stickslip_ros.physics.model.hybrid import Instant, Mode
-from stickslip_ros.physics.model.scaled_drive import FreeDriveSystem, ScaledDrive
 
 _STUCK, _FORWARD, _BACKWARD = Mode(STICK, (0.0,)), Mode(SLIP, (1.0,)), Mode(SLIP, (-1.0,))
 """All modes of such a drive."""
@@ -145,7 +144,7 @@ class PlainDriveSystem(DriveSystem):
 def drive_system(drive: Drive, control: ContinuousControl | None = None) -> DriveSystem:
     """Return the dimensionless system of a drive and its continuous control, both in SI units."""
     if isinstance(drive, ScaledDrive):
-        return FreeDriveSystem(drive, control)
+        return DriveSystem(drive, control)
     law, moves = drive.friction, drive.belt.pieces or drive.load.pieces
     plain = not moves and not law.states and not law.switches and not drive.actuator.states
     if plain:

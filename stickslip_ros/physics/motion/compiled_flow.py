@@ -9,8 +9,8 @@ from array import array
 from collections import defaultdict
 from collections.abc import Sequence
 from copy import copy
-from enum import Enum
-from itertools import permutations
+from enum import Flag, auto
+from functools import partial
 from typing import Any
 
 import heyoka as hy
@@ -27,22 +27,18 @@ Marks = list[tuple[float, float, float]]
 """Time, and the first two states, at the zeros of a flow's marks."""
 
 
-class Detail(Enum):
-    """Values that are integrated and found along with the states."""
+class Detail(Flag):
+    """Values that are integrated and found along with the states; they may be combined."""
 
-    STATES = "states"
-    """Nothing."""
-    MARKS = "marks"
+    STATES = 0
+    """Nothing else."""
+    MARKS = auto()
     """Zeros of the flow's marks."""
-    DERIVATIVES = "derivatives"
-    """The marks, and the derivatives of the states by those at the start."""
-    SENSITIVITIES = "sensitivities"
-    """The derivatives of the states by those at the start, and by the free constants."""
+    DERIVATIVES = auto()
+    """Derivatives of the states by those at the start and by the free constants.
 
-    @property
-    def integrates_derivatives(self) -> bool:
-        """Whether the integrator has derivatives: then no mode has a closed form."""
-        return self in (Detail.DERIVATIVES, Detail.SENSITIVITIES)
+    No mode has a closed form then.
+    """
 
 
 class CompiledFlow:
@@ -104,7 +100,6 @@ class CompiledFlow:
 
 _Key = tuple[int, str, Detail]
 
-_originals: dict[_Key, CompiledFlow] = {}
 _shelves: dict[_Key, list[CompiledFlow]] = defaultdict(list)
 
 
@@ -118,13 +113,14 @@ class IntegratorPool:
         """Return the integrator of a flow, compiled if there is none of this structure yet."""
         key = (system.structure, name, detail)
         if key not in self._borrowed:
-            if detail is Detail.MARKS and not system.shared_flow(name).marks:
+            if detail == Detail.MARKS and not system.shared_flow(name).marks:
                 return self.flow(system, name, Detail.STATES)
             shelf = _shelves[key]
             try:
                 flow = shelf.pop()
             except IndexError:
-                flow = _original(system, name, detail).another(system)
+                original = system.shared(key, partial(_compile, system, name, detail))
+                flow = original.another(system)
             self._borrowed[key] = flow, shelf
         return self._borrowed[key][0]
 
@@ -133,22 +129,13 @@ class IntegratorPool:
             shelf.append(flow)
 
 
-def _original(system: HybridSystem, name: str, detail: Detail) -> CompiledFlow:
-    key = (system.structure, name, detail)
-    if key not in _originals:
-        _originals[key] = _compile(system, name, detail)
-    return _originals[key]
-
-
 def _compile(system: HybridSystem, name: str, detail: Detail) -> CompiledFlow:
     flow = system.shared_flow(name)
     equations = list(zip(system.variables, flow.rates, strict=True))
-    if detail is Detail.DERIVATIVES:
-        equations = hy.var_ode_sys(equations, hy.var_args.vars, order=1)
-    elif detail is Detail.SENSITIVITIES:
-        equations = hy.var_ode_sys(equations, sensitivity_arguments(system), order=1)
+    if Detail.DERIVATIVES in detail:
+        equations = hy.var_ode_sys(equations, _variations(system), order=1)
     downward = hy.event_direction.negative
-    watched = detail in (Detail.MARKS, Detail.DERIVATIVES)
+    watched = Detail.MARKS in detail
     # The compiler rounds by all that it compiles together.
     marks = flow.marks if watched or system.many_steps else ()
     taylor = hy.taylor_adaptive(
@@ -164,8 +151,8 @@ def _compile(system: HybridSystem, name: str, detail: Detail) -> CompiledFlow:
     return CompiledFlow(taylor, system)
 
 
-def sensitivity_arguments(system: HybridSystem) -> list[Any]:
-    """Return what `Detail.SENSITIVITIES` has derivatives by: the states, the free constants."""
+def _variations(system: HybridSystem) -> list[Any]:
+    """Return what `Detail.DERIVATIVES` has derivatives by: the states, the free constants."""
     constants = [hy.par[system.index[name]] for name in system.free_constants]
     return [*system.variables, *constants]
 
@@ -186,95 +173,43 @@ class _Finder:
 
 
 class FlowRates:
-    """Rates of a flow, their Jacobian, and the gradients of its guards, at a state."""
+    """Rates of a flow, and the gradients of them, of its margins and of its slaved states."""
 
     def __init__(self, system: HybridSystem, name: str) -> None:
-        """Compile them; the flow must not depend on the time."""
-        flow, variables = system.shared_flow(name), system.variables
-        margins = [guard.margin for guard in flow.guards]
-        rows = [*flow.rates, *margins, *flow.slaved.values()]
+        """Compile them for an instant at which an integration starts."""
+        flow, still = system.shared_flow(name), {hy.time: hy.expression(0.0)}
         self.slaved = tuple(flow.slaved)
         """Indices of the slaved states; their gradients come after those of the margins."""
-        gradients = [hy.diff(row, variable) for row in rows for variable in variables]
-        self._order = len(variables)
-        self._compiled = hy.cfunc([*flow.rates, *gradients], list(variables))
+        by = [*_variations(system), hy.par[system.index["epoch"]]]  # added to the time everywhere
+        rows = [*flow.rates, *(guard.margin for guard in flow.guards), *flow.slaved.values()]
+        found = [*flow.rates, *(hy.diff(row, each) for row in rows for each in by)]
+        self._order, self._count = len(system.states), len(by)
+        self._compiled = hy.cfunc([hy.subs(each, still) for each in found], list(system.variables))
 
     def at(self, state: FloatArray, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the rates, as the state (n, ...), and their gradients and those of the margins.
+        """Return the rates, as the state (n, ...), and the gradients.
 
-        The gradients have the shape (rates and margins, n, ...).
+        A row of the gradients has the derivatives by the states, the free constants and the time;
+        the shape is (rates, margins and slaved states; derivatives; ...).
         """
-        found = _evaluated(self._compiled, state, parameters)
+        found = evaluated(self._compiled, state, parameters)
         order = self._order
-        return found[:order], found[order:].reshape(-1, order, *state.shape[1:])
-
-
-_rates: dict[tuple[int, str], FlowRates] = {}
+        return found[:order], found[order:].reshape(-1, self._count, *state.shape[1:])
 
 
 def flow_rates(system: HybridSystem, name: str) -> FlowRates:
     """Return the compiled rates of a flow."""
-    key = (system.structure, name)
-    if key not in _rates:
-        _rates[key] = FlowRates(system, name)
-    return _rates[key]
+    return system.shared(("rates", name), lambda: FlowRates(system, name))
 
 
-class FlowTensors:
-    """Derivatives of a flow's rates of orders 1 to 3, by the states and by one constant."""
-
-    HIGHEST_ORDER = 3
-
-    def __init__(self, system: HybridSystem, name: str, constant: str) -> None:
-        """Compile the derivatives by the states and then by the `constant`."""
-        self.order = len(system.states)
-        by = [*system.variables, hy.par[system.index[constant]]]
-        rates = list(system.shared_flow(name).rates)
-        tensors = hy.diff_tensors(rates, diff_args=by, diff_order=self.HIGHEST_ORDER)
-        self._places: list[tuple[int, ...]] = []
-        expressions: list[Any] = []
-        for order in range(1, self.HIGHEST_ORDER + 1):
-            for (component, *powers), expression in tensors.get_derivatives(order):
-                axes = [axis for axis, power in enumerate(powers) for _ in range(power)]
-                self._places.append((component, *axes))
-                expressions.append(expression)
-        self._compiled = hy.cfunc(expressions, list(system.variables))
-
-    def at(self, states: FloatArray, parameters: FloatArray) -> list[FloatArray]:
-        """Return the derivatives of each order at m states.
-
-        The states have the shape (n, m), the parameters (number of parameters, m). The first axis
-        of a result is the component, and the last one has length m. The axes between are the states
-        and then the constant.
-        """
-        found = _evaluated(self._compiled, states, parameters)
-        points = states.shape[1]
-        tensors = [
-            np.zeros((self.order, *[self.order + 1] * order, points))
-            for order in range(1, self.HIGHEST_ORDER + 1)
-        ]
-        for (component, *axes), value in zip(self._places, found, strict=True):
-            for order in set(permutations(axes)):
-                tensors[len(axes) - 1][component, *order] = value
-        return tensors
-
-
-_tensors: dict[tuple[int, str, str], FlowTensors] = {}
-
-
-def flow_tensors(system: HybridSystem, name: str, constant: str) -> FlowTensors:
-    """Return the compiled derivatives of a flow by the states and a constant."""
-    key = (system.structure, name, constant)
-    if key not in _tensors:
-        _tensors[key] = FlowTensors(system, name, constant)
-    return _tensors[key]
-
-
-def parameter_values(system: HybridSystem, mode: Mode, inputs: Sequence[float]) -> FloatArray:
+def parameter_values(
+    system: HybridSystem, mode: Mode, inputs: Sequence[float], time: float = 0.0
+) -> FloatArray:
     """Return the values of a system's parameters in a mode, in the order of its expressions."""
-    return np.array([*system.constants.values(), *inputs, *mode.switches, 0.0])
+    return np.array([*system.constants.values(), *inputs, *mode.switches, time])
 
 
-def _evaluated(compiled: Any, state: FloatArray, parameters: FloatArray) -> FloatArray:
+def evaluated(compiled: Any, state: FloatArray, parameters: FloatArray) -> FloatArray:
+    """Return the values of a compiled function of states and of as many parameters as it uses."""
     used = parameters[: compiled.nparams]
     return compiled(np.ascontiguousarray(state), pars=np.ascontiguousarray(used))

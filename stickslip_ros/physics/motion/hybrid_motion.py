@@ -50,7 +50,7 @@ class HybridMotion:
         self.unbounded = False
         """Whether the motion is unbounded; then it does not advance any further."""
         self._steps_left = _SPARE_STEPS
-        self._detail, self._watched = detail, detail is not Detail.STATES
+        self._detail, self._watched = detail, bool(detail)
         self._integrators = IntegratorPool()
         self._flow: CompiledFlow | None = None
         self._instant = Instant(memoryview(array("d")), [0.0] * len(system.inputs))
@@ -78,7 +78,7 @@ class HybridMotion:
 
     def _set_detail(self, detail: Detail) -> None:
         """Continue with another detail."""
-        self._detail, self._watched = detail, detail is not Detail.STATES
+        self._detail, self._watched = detail, bool(detail)
         self._prepared = self._prepared_by_detail.setdefault(detail, {})
         self._enter(self._mode)
 
@@ -114,7 +114,7 @@ class HybridMotion:
     def _prepare(self, mode: Mode) -> _Prepared:
         """Load the constants into the integrator of a mode's flow, unless it has a closed form."""
         name, system, flow = mode.flow, self._system, None
-        if self._detail.integrates_derivatives or not system.has_closed_form(mode):
+        if Detail.DERIVATIVES in self._detail or not system.has_closed_form(mode):
             flow = self._integrators.flow(system, name, self._detail)
             flow.load(self._constants)
         prepared = self._prepared[name] = flow, system.shared_flow(name).transitions

@@ -76,7 +76,7 @@ class RecordedMotion(Motion):
     @property
     def recording(self) -> bool:
         """Whether breakpoints are recorded now: this costs more than the motion itself."""
-        return self._detail is not Detail.STATES
+        return Detail.MARKS in self._detail
 
     @recording.setter
     def recording(self, recording: bool) -> None:
@@ -106,7 +106,7 @@ class RecordedMotion(Motion):
 
     def advance(self, duration: float) -> None:
         """Integrate over a duration; see `Motion.advance`."""
-        if not self._system.sticks:
+        if not self._system.sticks and self.recording:
             self._set_stick_speed()
         super().advance(duration)
 
@@ -124,6 +124,8 @@ class RecordedMotion(Motion):
         self._set_constant("stick_speed", self._slow)
 
     def _pass(self, mode: Mode, guard: int | None, following: Mode | None, now: float) -> None:
+        if not self.recording:
+            return
         state, sticks = self._instant.state, self._system.sticks
         found = [] if self._flow is None else self._flow.take_marks()
         found.append((now, state[POSITION], state[SPEED]))

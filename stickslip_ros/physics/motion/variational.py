@@ -1,4 +1,4 @@
-"""The motion and its derivatives by the state at its start."""
+"""The motion and its derivatives by the state at its start and by constants of the drive."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -11,10 +11,18 @@ from stickslip_ros.errors import RunError
 from stickslip_ros.physics.model.actuator import IDEAL_ACTUATOR
 from stickslip_ros.physics.model.control import ContinuousControl
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.drive_system import MEMORY, SLIP, SPEED
+from stickslip_ros.physics.model.drive_system import MEMORY, SLIP, SPEED, STICK
 from stickslip_ros.physics.model.hybrid import Mode
-from stickslip_ros.physics.motion.compiled_flow import Detail, flow_rates, parameter_values
+from stickslip_ros.physics.motion.compiled_flow import (
+    CompiledFlow,
+    Detail,
+    flow_rates,
+    parameter_values,
+)
 from stickslip_ros.physics.motion.recorded_motion import RecordedMotion
+
+_GRAZING = 1e-12
+"""Rate of a margin below which a motion grazes a guard: the instant has no derivative there."""
 
 _GREATEST_EFFORT = 8e6
 """Limit of slip time times stiffness, dimensionless, for a motion: some seconds of work."""
@@ -30,32 +38,44 @@ class TooStiffError(Exception):
     """Raised when a motion takes too many steps; it does not depend on the speed of the machine."""
 
 
-class SensitiveMotion(RecordedMotion):
-    """Motion with the derivatives of its state by the state at its start.
+class VariationalMotion(RecordedMotion):
+    """Motion with the derivatives of its state by the state at the start and by constants.
 
-    The state is dimensionless, that of the `DriveSystem`. heyoka integrates the variational
-    equations along with the motion. At a guard the derivatives jump by the saltation matrix (Leine
-    and Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems, 2004, ch. 7).
-    Breakpoints are recorded. `advance` raises TooStiffError when the integration becomes too
-    costly, summed over all starts.
+    The constants are those of a `ScaledDrive`; another drive has none. All derivatives are
+    dimensionless. heyoka integrates the variational equations along with the motion. At a guard
+    the derivatives jump by the saltation matrix (Leine and Nijmeijer, Dynamics and Bifurcations of
+    Non-Smooth Mechanical Systems, 2004, ch. 7), which has here a part for guards that depend on
+    the constants. What a law computes from its constants apart from its equations, as the elastic
+    limit of `ElastoPlastic`, is held. Breakpoints are not recorded.
     """
 
     _first_detail = Detail.DERIVATIVES
 
-    def __init__(self, drive: Drive, gains: ContinuousControl | None = None) -> None:
-        """Start at rest at X = 0, with continuous control if `gains` (SI) are given.
-
-        The actuator has no part in it.
-        """
-        self.transition: FloatArray = np.empty((0, 0))
-        """Derivatives of the state (rows) by the state at the start (columns)."""
-        self.landed = False
-        """Whether the slide has stuck since the start."""
+    def __init__(
+        self,
+        drive: Drive,
+        position: float,
+        velocity: float,
+        control: ContinuousControl | None = None,
+    ) -> None:
+        self._found: FloatArray = np.empty((0, 0))
+        self._holder: CompiledFlow | None = None
         self._at_guard: FloatArray = np.empty(0)
-        self._effort = self._begun = 0.0
-        self._steps_before = 0
-        super().__init__(replace(drive, actuator=IDEAL_ACTUATOR), 0.0, 0.0, gains)
-        self.start(np.zeros(self.order))
+        super().__init__(drive, position, velocity, control)
+        self._begin_again()
+
+    def restart(
+        self, position: float, velocity: float, memory: Sequence[float] | None = None
+    ) -> None:
+        """Set the state of the slide; derivatives are by this state from now on."""
+        super().restart(position, velocity, memory)
+        self._begin_again()
+
+    def _begin_again(self) -> None:
+        order, count = self.order, len(self._system.free_constants)
+        self._found, self._holder = np.eye(order, order + count), None
+        if self._mode.flow == STICK:  # it has the speed of the belt
+            self._found[SPEED] = 0.0
 
     @property
     def order(self) -> int:
@@ -64,8 +84,94 @@ class SensitiveMotion(RecordedMotion):
 
     @property
     def state(self) -> FloatArray:
-        """X, Y, the memory of the law and, with continuous control, its states."""
+        """The state of the `DriveSystem`, dimensionless."""
         return np.array(self._instant.state)
+
+    @property
+    def derivatives(self) -> FloatArray:
+        """Derivatives of the states (rows) by those at the start, then by the free constants.
+
+        They may be a view that the next step overwrites.
+        """
+        return self._found if self._holder is None else self._integrated(self._holder)
+
+    def _integrated(self, flow: CompiledFlow | None) -> FloatArray:
+        """Return the derivatives in an integrator."""
+        assert flow is not None
+        order = len(self._system.states)
+        return flow.state[order:].reshape(order, -1)
+
+    def _begin(self, now: float, end: float) -> float:
+        if self._flow is not self._holder:
+            found = self.derivatives
+            self._integrated(self._flow)[:] = found
+            self._holder = self._flow
+        return end
+
+    def _reach_guard(self) -> None:
+        # What follows may set a part of the state.
+        self._at_guard = self.state
+
+    def _pass(self, mode: Mode, guard: int | None, following: Mode | None, now: float) -> None:
+        super()._pass(mode, guard, following, now)
+        if guard is not None and following is not None:
+            self._jump(mode, guard, following, self.derivatives.copy())
+
+    def _jump(self, mode: Mode, guard: int, following: Mode, found: FloatArray) -> None:
+        """Let derivatives jump at a guard."""
+        before, gradients = self._rates(mode, self._at_guard)
+        order = self.order
+        own = gradients[order + guard]
+        normal = own[:order] @ found
+        normal[order:] += own[order:-1]
+        rate = float(own[:order] @ before + own[-1])
+        reset = self._enslaving(following)
+        self._found, self._holder = reset @ found, None
+        if abs(rate) > _GRAZING:
+            after, _ = self._rates(following)
+            self._found += np.outer((after - reset @ before) / rate, normal)
+
+    def _rates(self, mode: Mode, state: FloatArray | None = None) -> tuple[FloatArray, FloatArray]:
+        """Return the rates in a mode, and the gradients, see `FlowRates`.
+
+        They are those at a `state`, by default the present one.
+        """
+        state, instant = self.state if state is None else state, self._instant
+        parameters = parameter_values(self._system, mode, instant.inputs, instant.time)
+        rates, gradients = flow_rates(self._system, mode.flow).at(state, parameters)
+        return self._enslaving(mode, gradients) @ rates, gradients
+
+    def _enslaving(self, mode: Mode, gradients: FloatArray | None = None) -> FloatArray:
+        """Return the derivatives of the state by itself where a mode sets its slaved states."""
+        found = np.eye(self.order)
+        flow = flow_rates(self._system, mode.flow)
+        if flow.slaved:
+            if gradients is None:
+                _, gradients = self._rates(mode)
+            found[list(flow.slaved)] = gradients[-len(flow.slaved) :, : self.order]
+        return found
+
+
+class ShootingMotion(VariationalMotion):
+    """Motion with the derivatives of its state by that at its start, for searches of cycles.
+
+    Breakpoints are recorded. `advance` raises TooStiffError when the integration becomes too
+    costly, summed over all starts.
+    """
+
+    _first_detail = Detail.MARKS | Detail.DERIVATIVES
+
+    def __init__(self, drive: Drive, gains: ContinuousControl | None = None) -> None:
+        """Start at rest at X = 0, with continuous control if `gains` (SI) are given.
+
+        The actuator has no part in it.
+        """
+        self.landed = False
+        """Whether the slide has stuck since the start."""
+        self._effort = self._begun = 0.0
+        self._steps_before = 0
+        super().__init__(replace(drive, actuator=IDEAL_ACTUATOR), 0.0, 0.0, gains)
+        self.start(np.zeros(self.order))
 
     @property
     def rate(self) -> FloatArray:
@@ -117,7 +223,7 @@ class SensitiveMotion(RecordedMotion):
         if mode is not None and mode.flow == self._mode.flow:
             self._enter(mode)
         self._append_present()
-        self.transition = np.eye(self.order)
+        self._begin_again()
         self.landed = False
 
     def advance(self, duration: float) -> None:
@@ -129,56 +235,20 @@ class SensitiveMotion(RecordedMotion):
 
     def _begin(self, now: float, end: float) -> float:
         # Start from the identity: heyoka's error is relative to the largest of the variables.
-        self._derivatives[:] = np.eye(self.order)
+        self._integrated(self._flow)[:] = np.eye(self.order)
         self._begun, self._steps_before = now, self._steps_left
         return min(end, now + _LONGEST_SLIP) if self._mode.flow == SLIP else end
 
-    def _reach_guard(self) -> None:
-        self._at_guard = self.state
-
     def _pass(self, mode: Mode, guard: int | None, following: Mode | None, now: float) -> None:
+        self._found = self._enslaving(mode) @ self._integrated(self._flow) @ self._found
         super()._pass(mode, guard, following, now)
-        # A slide that begins to creep is put at the speed of creep, maybe beyond that of the belt.
-        at_guard = self.state if guard is None else self._at_guard
-        before, gradients = self._rates(mode, at_guard)
-        self.transition = self._enslaving(mode) @ self._derivatives @ self.transition
         if not self._system.sticks:
             self._effort += _EFFORT_OF_A_STEP * (self._steps_before - self._steps_left)
         elif mode.flow == SLIP:
+            # A slide that begins to creep is put at the speed of creep, maybe beyond the belt's.
+            state = self.state if guard is None else self._at_guard
+            _, gradients = self._rates(mode, state)
             self._effort += (now - self._begun) * (1.0 + abs(float(gradients[SPEED, SPEED])))
         if self._effort > _GREATEST_EFFORT:
             raise TooStiffError
-        if guard is None or following is None:
-            return
-        normal = gradients[self.order + guard]
-        reset = self._enslaving(following)
-        jump = self._rates(following)[0] - reset @ before
-        change = np.outer(jump / (normal @ before), normal @ self.transition)
-        self.transition = reset @ self.transition + change
-        self.landed |= following.flow != SLIP
-
-    @property
-    def _derivatives(self) -> FloatArray:
-        """Derivatives of the state by that at the start of the phase, in the integrator."""
-        assert self._flow is not None
-        return self._flow.state[self.order :].reshape(self.order, self.order)
-
-    def _rates(self, mode: Mode, state: FloatArray | None = None) -> tuple[FloatArray, FloatArray]:
-        """Return the rates in a mode, and the gradients, see `FlowRates`.
-
-        They are those at a `state`, by default the present one.
-        """
-        state = self.state if state is None else state
-        parameters = parameter_values(self._system, mode, self._instant.inputs)
-        rates, gradients = flow_rates(self._system, mode.flow).at(state, parameters)
-        return self._enslaving(mode, gradients) @ rates, gradients
-
-    def _enslaving(self, mode: Mode, gradients: FloatArray | None = None) -> FloatArray:
-        """Return the derivatives of the state by itself where a mode sets its slaved states."""
-        found = np.eye(self.order)
-        flow = flow_rates(self._system, mode.flow)
-        if flow.slaved:
-            if gradients is None:
-                _, gradients = self._rates(mode)
-            found[list(flow.slaved)] = gradients[-len(flow.slaved) :]
-        return found
+        self.landed |= guard is not None and following is not None and following.flow != SLIP

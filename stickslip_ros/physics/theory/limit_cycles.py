@@ -21,7 +21,7 @@ from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.drive_system import POSITION, SPEED, UNBOUNDED_SPEED
 from stickslip_ros.physics.model.functions import zero_between
 from stickslip_ros.physics.model.hybrid import Mode
-from stickslip_ros.physics.motion.variational import SensitiveMotion, TooStiffError
+from stickslip_ros.physics.motion.variational import ShootingMotion, TooStiffError
 from stickslip_ros.physics.theory.cycle_bounds import (
     averaged_growth,
     follow,
@@ -137,7 +137,7 @@ def shoot(
     require("shooting", drive, SPRING, AUTONOMOUS)
     if drive.belt_speed == 0.0:
         return None
-    motion = SensitiveMotion(drive, gains)
+    motion = ShootingMotion(drive, gains)
     state = motion.state_at(position, filter_state, memory)
     try:
         return _solve(motion, state, period)
@@ -187,7 +187,7 @@ def limit_cycle_of_run(
     static = STATIC.lack(drive) is None
     if drive.belt_speed == 0.0 or (static and least_cycle(drive, gains) is None):
         return None
-    motion = SensitiveMotion(drive, gains)
+    motion = ShootingMotion(drive, gains)
     motion.restart(position, velocity)
     try:
         return _cycle_ahead(motion, turns)
@@ -250,7 +250,7 @@ def limit_cycles(drive: Drive) -> list[LimitCycle]:
     return [cycle for cycle in cycles if cycle is not None]
 
 
-def _cycle_ahead(motion: SensitiveMotion, turns: int) -> LimitCycle | None:
+def _cycle_ahead(motion: ShootingMotion, turns: int) -> LimitCycle | None:
     """Return the cycle that the motion reaches within this number of upward turns."""
     drive = motion.drive
     state, duration = motion.state, 0.0
@@ -271,7 +271,7 @@ class _ReturnMap:
     """Map from a distance below the equilibrium, where the slide turns upward, to the next one."""
 
     def __init__(self, drive: Drive) -> None:
-        self._motion = SensitiveMotion(drive)
+        self._motion = ShootingMotion(drive)
         expansion = expand(drive)
         assert expansion is not None
         self._rest = expansion.equilibrium
@@ -380,7 +380,7 @@ class _ReturnMap:
 
         There Y = X' is zero.
         """
-        return float(self._motion.transition[0, 0]) - 1.0
+        return float(self._motion.derivatives[0, 0]) - 1.0
 
     def _state(self, distance: float) -> FloatArray:
         return self._rest - distance * np.eye(len(self._rest))[POSITION]
@@ -402,7 +402,7 @@ def _outermost(drive: Drive) -> float:
     return max(by_friction, 2.0 * float(growing.max(initial=0.0)))
 
 
-def _next_turn(motion: SensitiveMotion, state: FloatArray) -> tuple[FloatArray, float] | None:
+def _next_turn(motion: ShootingMotion, state: FloatArray) -> tuple[FloatArray, float] | None:
     """Return state and time (s) of the next upward turn, or None; the motion is left there."""
     motion.start(state)
     turns = (_first_turn(breakpoints) for breakpoints in follow(motion))
@@ -445,7 +445,7 @@ class _Shot:
     """Mode at the end, in which the next shot starts."""
 
     @classmethod
-    def fire(cls, motion: SensitiveMotion, unknowns: FloatArray, mode: Mode | None) -> Self | None:
+    def fire(cls, motion: ShootingMotion, unknowns: FloatArray, mode: Mode | None) -> Self | None:
         """Return the shot; None if it does not start upward, or does not end."""
         drive = motion.drive
         start, period = unknowns.copy(), float(unknowns[SPEED]) / drive.angular_frequency
@@ -461,7 +461,7 @@ class _Shot:
             return None
         residual = motion.state - start
         miss = float(np.abs(residual).max()) / max(abs(float(start[0])), distance)
-        found = motion.transition, motion.rate, motion.landed, motion.mode
+        found = motion.derivatives, motion.rate, motion.landed, motion.mode
         return cls(unknowns, residual, miss, *found)
 
     def newton_step(self) -> FloatArray:
@@ -483,7 +483,7 @@ class _Shot:
 
 
 def _solve(
-    motion: SensitiveMotion, state: FloatArray, period: float, mode: Mode | None = None
+    motion: ShootingMotion, state: FloatArray, period: float, mode: Mode | None = None
 ) -> LimitCycle | None:
     """Solve for the cycle by Newton's method; each step is halved until the residual decreases.
 
@@ -505,7 +505,7 @@ def _solve(
     return _cycle(motion, shot)
 
 
-def _nearer(motion: SensitiveMotion, shot: _Shot) -> _Shot | None:
+def _nearer(motion: ShootingMotion, shot: _Shot) -> _Shot | None:
     step = shot.newton_step()
     for halvings in range(10):
         trial = _Shot.fire(motion, shot.unknowns + 2.0**-halvings * step, shot.mode)
@@ -514,7 +514,7 @@ def _nearer(motion: SensitiveMotion, shot: _Shot) -> _Shot | None:
     return None
 
 
-def _cycle(motion: SensitiveMotion, shot: _Shot) -> LimitCycle | None:
+def _cycle(motion: ShootingMotion, shot: _Shot) -> LimitCycle | None:
     """Return the cycle that a shot closes; None if it took several turns."""
     drive = motion.drive
     start = shot.unknowns.copy()

@@ -7,8 +7,11 @@ control, its states, such as W of eq. 17. The actuator has no part in it.
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import permutations
 from math import copysign
+from typing import Any
 
+import heyoka as hy
 import numpy as np
 import numpy.typing as npt
 
@@ -19,8 +22,11 @@ from stickslip_ros.physics.model.control import ContinuousControl
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.drive_system import MEMORY, SLIP, SPEED, DriveSystem
 from stickslip_ros.physics.model.plain_drive import drive_system
-from stickslip_ros.physics.motion.compiled_flow import flow_rates, flow_tensors
+from stickslip_ros.physics.motion.compiled_flow import evaluated, flow_rates
 from stickslip_ros.physics.theory.requirements import AUTONOMOUS, SPRING, require
+
+_ORDERS = (1, 2, 3)
+"""Orders of the derivatives."""
 
 _ITERATIONS = 50
 _CONVERGED_STEP = 1e-14
@@ -184,7 +190,39 @@ def _at_equilibrium(
         for name, value in zip(law.switches, switches, strict=True):
             values[system.index[f"law.{name}"], column] = value
     states = equilibria(system, values)
-    return states, flow_tensors(system, SLIP, "belt_speed").at(states, values)
+    return states, _tensors(system, states, values)
+
+
+def _tensors(system: DriveSystem, states: FloatArray, parameters: FloatArray) -> list[FloatArray]:
+    """Return the derivatives of the rates in slip, of orders 1 to 3, at m states (n, m).
+
+    The first axis of a result is the component, and the last one has length m. The axes between are
+    the states and then the belt speed.
+    """
+    places, compiled = system.shared("tensors", lambda: _compiled_tensors(system))
+    order, points = states.shape
+    found = [np.zeros((order, *[order + 1] * number, points)) for number in _ORDERS]
+    for (component, *axes), value in zip(
+        places, evaluated(compiled, states, parameters), strict=True
+    ):
+        for permuted in set(permutations(axes)):
+            found[len(axes) - 1][component, *permuted] = value
+    return found
+
+
+def _compiled_tensors(system: DriveSystem) -> tuple[list[tuple[int, ...]], Any]:
+    """Return places in the tensors, and a compiled function of the values there."""
+    by = [*system.variables, hy.par[system.index["belt_speed"]]]
+    rates = list(system.shared_flow(SLIP).rates)
+    tensors = hy.diff_tensors(rates, diff_args=by, diff_order=_ORDERS[-1])
+    places: list[tuple[int, ...]] = []
+    expressions: list[Any] = []
+    for order in _ORDERS:
+        for (component, *powers), expression in tensors.get_derivatives(order):
+            axes = [axis for axis, power in enumerate(powers) for _ in range(power)]
+            places.append((component, *axes))
+            expressions.append(expression)
+    return places, hy.cfunc(expressions, list(system.variables))
 
 
 def equilibria(system: DriveSystem, parameters: FloatArray) -> FloatArray:
@@ -205,7 +243,7 @@ def equilibria(system: DriveSystem, parameters: FloatArray) -> FloatArray:
         states[MEMORY : MEMORY + len(law.states)] = np.array(memory).T
     for _ in range(_ITERATIONS):
         rate, gradients = rates.at(states, parameters)
-        jacobians = np.moveaxis(gradients[:order], -1, 0)
+        jacobians = np.moveaxis(gradients[:order, :order], -1, 0)
         try:
             step = np.linalg.solve(jacobians, -rate.T[..., np.newaxis])[..., 0].T
         except np.linalg.LinAlgError:

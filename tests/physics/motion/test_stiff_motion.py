@@ -6,7 +6,7 @@ import pytest
 
 from stickslip_ros.errors import RunError
 from stickslip_ros.physics.motion import Motion, RecordedMotion
-from stickslip_ros.physics.motion.variational import SensitiveMotion, TooStiffError
+from stickslip_ros.physics.motion.variational import ShootingMotion, TooStiffError
 from tests.physics.drives import PAPER
 
 STIFF = replace(PAPER, damping=1e9)
@@ -53,7 +53,7 @@ def test_a_stick_however_long_is_followed_to_its_end() -> None:
 
 
 def test_theory_takes_it_for_too_stiff() -> None:
-    motion = SensitiveMotion(STIFF)
+    motion = ShootingMotion(STIFF)
     with pytest.raises(TooStiffError):
         motion.advance(0.1)
 

@@ -7,7 +7,7 @@ import pytest
 
 from stickslip_ros.physics.model.control import VelocityFeedback
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.motion.variational import SensitiveMotion
+from stickslip_ros.physics.motion.variational import ShootingMotion
 from stickslip_ros.physics.theory.critical_gains import critical_gains, limit_cycle_from_hopf
 from stickslip_ros.physics.theory.cycle_bounds import least_cycle
 from stickslip_ros.physics.theory.hopf import HopfPoint, hopf_points
@@ -128,7 +128,7 @@ def test_a_cycle_with_two_states_closes() -> None:
     assert len(cycle.filter_states) == 2
     assert cycle.filter_state is None
     assert len(cycle.multipliers) == 3
-    motion = SensitiveMotion(PAPER, LAGS)
+    motion = ShootingMotion(PAPER, LAGS)
     start = motion.state_at(cycle.position, cycle.filter_states)
     assert start[2:].tolist() == list(cycle.filter_states)
     motion.start(start)

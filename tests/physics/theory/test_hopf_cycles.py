@@ -7,7 +7,7 @@ import pytest
 
 from stickslip_ros.physics.measures.cycle_measures import CycleMeter, Measures, Regime
 from stickslip_ros.physics.model.control import Washout
-from stickslip_ros.physics.motion.variational import SensitiveMotion
+from stickslip_ros.physics.motion.variational import ShootingMotion
 from stickslip_ros.physics.theory.critical_gains import critical_gains, limit_cycle_from_hopf
 from stickslip_ros.physics.theory.limit_cycles import limit_cycle_of_run
 from tests.physics.drives import PAPER
@@ -18,7 +18,7 @@ SUBCRITICAL = Washout(0.2, -0.16, 2.0)
 
 def settled(gains: Washout, position: float, filter_state: float) -> Measures:
     """What the loop does from there in the end; the slide rests at the start."""
-    motion = SensitiveMotion(PAPER, gains)
+    motion = ShootingMotion(PAPER, gains)
     motion.start(np.array([position, 0.0, filter_state]))
     motion.advance(300.0 * PAPER.natural_period)
     motion.take_breakpoints()

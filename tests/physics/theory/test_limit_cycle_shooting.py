@@ -15,7 +15,7 @@ from stickslip_ros.physics.model.control import Washout
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import Coulomb, Exponential, FrictionLaw, Linear, Stribeck
 from stickslip_ros.physics.motion import Motion, RecordedMotion
-from stickslip_ros.physics.motion.variational import SensitiveMotion
+from stickslip_ros.physics.motion.variational import ShootingMotion
 from stickslip_ros.physics.theory.cycle_bounds import largest_cycle, least_cycle
 from stickslip_ros.physics.theory.limit_cycles import (
     LimitCycle,
@@ -202,14 +202,14 @@ def test_cycles_close_and_are_stable_in_turns(
 def test_the_transition_matrix_is_the_derivative_by_the_start(
     drive: Drive, gains: Washout | None
 ) -> None:
-    motion = SensitiveMotion(drive, gains)
+    motion = ShootingMotion(drive, gains)
     # Fast enough to overtake the belt, and to stick in the end.
     start = np.array([0.1, -1.3, 0.2])[: motion.order]
     landings, step = 0, 1e-6
     for duration in np.arange(0.7, 21.0, 1.4):
         motion.start(start)
         motion.advance(duration)
-        transition = motion.transition
+        transition = motion.derivatives
         landings += motion.sticking
         found = np.zeros_like(transition)
         for column, direction in enumerate(step * np.eye(motion.order)):

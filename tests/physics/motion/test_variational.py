@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.model.drive import Drive, in_units_of
 from stickslip_ros.physics.model.friction import (
     Coulomb,
     Dahl,
@@ -23,10 +23,9 @@ from stickslip_ros.physics.model.friction import (
     Stribeck,
 )
 from stickslip_ros.physics.model.plain_drive import drive_system
-from stickslip_ros.physics.model.scaled_drive import in_units_of
 from stickslip_ros.physics.model.signals import table
 from stickslip_ros.physics.motion import Motion
-from stickslip_ros.physics.motion.parametric_motion import ParametricMotion
+from stickslip_ros.physics.motion.variational import VariationalMotion
 
 CURVE = Exponential(static=0.4, kinetic=0.25, decay_speed=0.02, viscous=0.5)
 LAWS: dict[str, FrictionLaw] = {
@@ -68,9 +67,9 @@ def followed(motion: Any, read: Callable[[Any], Any]) -> FloatArray:
 @pytest.mark.parametrize(("law", "moves"), [(law, i % 2 == 0) for i, law in enumerate(LAWS)])
 def test_derivatives_are_those_of_differences(law: str, moves: bool) -> None:
     drive = drive_of(law, moves=moves)
-    motion = ParametricMotion(drive, *START)
-    rows = followed(motion, lambda own: own.position_derivatives.copy())
-    system = drive_system(in_units_of(drive, drive))
+    scaled = in_units_of(drive, drive)
+    motion, system = VariationalMotion(scaled, *START), drive_system(scaled)
+    rows = followed(motion, lambda own: own.derivatives[0].copy())
     order, names = len(system.states), system.free_constants
     for number, name in enumerate(names):
         size = 1e-6 * max(abs(system.constants[name]), 1e-3)
@@ -113,7 +112,7 @@ def moved_law(drive: Drive, law: Any, path: list[str], change: float) -> Any:
 
 def test_a_slide_that_sticks_keeps_its_distance_and_forgets_its_speed() -> None:
     drive = drive_of("stribeck", moves=False)
-    motion = ParametricMotion(drive, 0.0, 0.02)
+    motion = VariationalMotion(in_units_of(drive, drive), 0.0, 0.02)
     motion.advance(PERIOD)
     assert motion.sticking
     assert motion.derivatives[0].tolist() == [1.0, 0.0] + [0.0] * (motion.derivatives.shape[1] - 2)
@@ -122,5 +121,6 @@ def test_a_slide_that_sticks_keeps_its_distance_and_forgets_its_speed() -> None:
 def test_the_motion_is_that_without_derivatives() -> None:
     for law in ("exponential", "lugre"):
         drive = drive_of(law, moves=True)
-        own = followed(ParametricMotion(drive, *START), lambda motion: motion.position)
+        motion = VariationalMotion(in_units_of(drive, drive), *START)
+        own = followed(motion, lambda motion: motion.position)
         assert np.abs(own - positions(drive)).max() < 1e-12 * np.ptp(own), law
