@@ -40,19 +40,11 @@ class PlainDriveSystem(DriveSystem):
         """Return the speed of the belt."""
         return self._speed
 
-    def normal_force(self, mode: Mode, time: float) -> float:
-        """Return the normal force: one, by its scale."""
-        return 1.0
-
     def reaction(self, instant: Instant) -> float:
         """Return h = X + 2 beta X' - U - bias."""
         state = instant.state
         force = instant.inputs[0] if self.control is None else self.control_force(instant)
         return self._reaction(state[POSITION], state[SPEED], force)
-
-    def held_force(self, mode: Mode, instant: Instant) -> float:
-        """Return the friction force of a slide that sticks: the reaction."""
-        return self.reaction(instant)
 
     def friction_force(self, mode: Mode, instant: Instant) -> float:
         """Return the friction force on the slide."""
@@ -68,35 +60,24 @@ class PlainDriveSystem(DriveSystem):
             return _FORWARD
         if relative_speed < 0.0:
             return _BACKWARD
-        held = self.reaction(instant)
-        if held > self.backward_limit:
-            return _BACKWARD
-        if held < -self.forward_limit:
-            return _FORWARD
-        if mode is _STUCK and self.control is not None:
+        settled = self._resting(mode, instant)
+        if settled is mode is _STUCK and self.control is not None:
             self.nudge_off_guard(_STUCK, instant)
-        return _STUCK
+        return settled
 
     def reach_belt(self, mode: Mode, instant: Instant) -> Mode:
         """Stick, or slip on in either direction, where the slide reaches the belt speed."""
         instant.state[SPEED] = self._speed
+        return self._resting(mode, instant)
+
+    def _resting(self, mode: Mode | None, instant: Instant) -> Mode:
         held = self.reaction(instant)
         if held > self.backward_limit:
             return _BACKWARD
         return _FORWARD if held < -self.forward_limit else _STUCK
 
-    def release_backward(self, mode: Mode, instant: Instant) -> Mode:
-        """Slip backward where the reaction exceeds its limit."""
-        return _BACKWARD
-
-    def release_forward(self, mode: Mode, instant: Instant) -> Mode:
-        """Slip forward where the reaction falls below its limit."""
-        return _FORWARD
-
-    def overflow(self, mode: Mode, instant: Instant) -> Mode:
-        """Set the speed at which a motion counts as unbounded; see `DriveSystem.overflow`."""
-        super().overflow(mode, instant)
-        return _FORWARD if instant.state[SPEED] > 0.0 else _BACKWARD
+    def _slip(self, mode: Mode, sign: float, instant: Instant) -> Mode:
+        return _FORWARD if sign > 0.0 else _BACKWARD
 
     def nudge_off_guard(self, mode: Mode, instant: Instant) -> None:
         """Move a slide that starts to slip, or sticks near its limit, by rounding errors."""

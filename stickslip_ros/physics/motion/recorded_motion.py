@@ -60,6 +60,7 @@ class RecordedMotion(Motion):
         control: ContinuousControl | None = None,
         stick_speed: float | None = None,
     ) -> None:
+        self._recording = Detail.MARKS in self._first_detail
         self._recorded: list[tuple[float, float, float, bool]] = []
         self._breakpoint_time = 0.0
         self._stick_speed, self._peak, self._was_slow = stick_speed, 0.0, False
@@ -76,12 +77,13 @@ class RecordedMotion(Motion):
     @property
     def recording(self) -> bool:
         """Whether breakpoints are recorded now: this costs more than the motion itself."""
-        return Detail.MARKS in self._detail
+        return self._recording
 
     @recording.setter
     def recording(self, recording: bool) -> None:
-        if recording == self.recording:
+        if recording == self._recording:
             return
+        self._recording = recording
         self._set_detail(self._first_detail if recording else Detail.STATES)
         self._append_present()
 
@@ -106,7 +108,7 @@ class RecordedMotion(Motion):
 
     def advance(self, duration: float) -> None:
         """Integrate over a duration; see `Motion.advance`."""
-        if not self._system.sticks and self.recording:
+        if not self._system.sticks and self._recording:
             self._set_stick_speed()
         super().advance(duration)
 
@@ -124,7 +126,7 @@ class RecordedMotion(Motion):
         self._set_constant("stick_speed", self._slow)
 
     def _pass(self, mode: Mode, guard: int | None, following: Mode | None, now: float) -> None:
-        if not self.recording:
+        if not self._recording:
             return
         state, sticks = self._instant.state, self._system.sticks
         found = [] if self._flow is None else self._flow.take_marks()
@@ -145,7 +147,7 @@ class RecordedMotion(Motion):
         return before and self._was_slow
 
     def _append_present(self) -> None:
-        if self.recording:
+        if self._recording:
             state = self._instant.state
             self._append(0.0, state[POSITION], state[SPEED], sticking=False)
 

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from math import copysign
+from typing import Any
 
 import numpy as np
 
@@ -126,10 +127,12 @@ class VariationalMotion(RecordedMotion):
         normal[order:] += own[order:-1]
         rate = float(own[:order] @ before + own[-1])
         reset = self._enslaving(following)
-        self._found, self._holder = reset @ found, None
+        found = reset @ found
         if abs(rate) > _GRAZING:
             after, _ = self._rates(following)
-            self._found += np.outer((after - reset @ before) / rate, normal)
+            change: Any = np.outer((after - reset @ before) / rate, normal)
+            found += change
+        self._found, self._holder = found, None
 
     def _rates(self, mode: Mode, state: FloatArray | None = None) -> tuple[FloatArray, FloatArray]:
         """Return the rates in a mode, and the gradients, see `FlowRates`.

@@ -18,7 +18,7 @@ from stickslip_ros.arrays import FloatArray
 from stickslip_ros.physics.model.constants import Scales
 from stickslip_ros.physics.model.control import Washout
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.drive_system import SLIP, DriveSystem
+from stickslip_ros.physics.model.drive_system import DriveSystem
 from stickslip_ros.physics.model.friction import (
     Coulomb,
     Dahl,
@@ -30,8 +30,7 @@ from stickslip_ros.physics.model.friction import (
 from stickslip_ros.physics.model.hybrid import HybridSystem, Mode
 from stickslip_ros.physics.model.signals import NO_SIGNAL, Signal, ramp, sine
 from stickslip_ros.physics.motion import Motion, RecordedMotion, compiled_flow
-from stickslip_ros.physics.motion.compiled_flow import flow_rates, parameter_values
-from stickslip_ros.physics.motion.variational import ShootingMotion
+from stickslip_ros.physics.motion.compiled_flow import parameter_values
 from tests.examples import examples
 from tests.physics.parts import Iwan, OneSided, Pieces
 
@@ -325,6 +324,8 @@ def test_the_energy_gained_is_the_work_done(case: Case) -> None:
             if motion.sticking and drive.load == NO_SIGNAL:
                 limit = max(drive.friction.limits)
                 assert abs(motion.friction_force) <= limit * drive.normal_force * (1.0 + 1e-12)
+            if not drive.friction.states:  # it dissipates
+                assert motion.friction_force * (speed - motion.belt_speed) <= 0.0
             work += weight * (after - before) * force * speed
     motion.advance(duration - time)
     energies = [
@@ -339,33 +340,6 @@ def test_an_ended_motion_gives_its_integrator_back(monkeypatch: pytest.MonkeyPat
     Motion(drive_of(LAWS[0], 0.3), 0.0, 0.0).advance(5.0)
     monkeypatch.setattr(compiled_flow, "_compile", lambda *_: pytest.fail("compiles again"))
     Motion(drive_of(LAWS[0], 0.2), 0.0, 0.0).advance(5.0)
-
-
-@pytest.mark.parametrize("law", LAWS[1:], ids=lambda law: law.name)
-def test_transition_is_that_of_finite_differences(law: FrictionLaw) -> None:
-    motion = ShootingMotion(drive_of(law, 0.3))
-    start = np.array([0.1, 0.5, *([0.001] * (motion.order - 2))])
-
-    def end(state: FloatArray) -> FloatArray:
-        motion.start(state)
-        motion.advance(2.0)
-        return motion.state
-
-    columns = [(end(start + h) - end(start - h)) / 2e-6 for h in 1e-6 * np.eye(motion.order)]
-    end(start)
-    np.testing.assert_allclose(motion.derivatives, np.transpose(columns), rtol=1e-5, atol=1e-7)
-
-
-def test_gradients_are_those_of_finite_differences() -> None:
-    system = DriveSystem(drive_of(Dahl(0.4, 20.0), 0.3))
-    parameters = parameter_values(system, Mode(SLIP, (-1.0,)), [0.1])
-    flow, state = flow_rates(system, SLIP), np.array([0.2, 0.1, -0.01])
-    _, gradients = flow.at(state, parameters)
-    found = [
-        (flow.at(state + h, parameters)[0] - flow.at(state - h, parameters)[0]) / 2e-6
-        for h in 1e-6 * np.eye(3)
-    ]
-    np.testing.assert_allclose(gradients[:3, :3], np.transpose(found), atol=1e-8)
 
 
 def test_a_breakpoint_of_the_next_step_may_follow_at_once() -> None:

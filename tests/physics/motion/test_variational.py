@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from stickslip_ros.arrays import FloatArray
+from stickslip_ros.physics.model.control import Washout
 from stickslip_ros.physics.model.drive import Drive, in_units_of
 from stickslip_ros.physics.model.friction import (
     Coulomb,
@@ -18,6 +19,7 @@ from stickslip_ros.physics.model.friction import (
     Directional,
     Exponential,
     FrictionLaw,
+    Linear,
     LuGre,
     MaxwellSlip,
     Stribeck,
@@ -25,7 +27,9 @@ from stickslip_ros.physics.model.friction import (
 from stickslip_ros.physics.model.plain_drive import drive_system
 from stickslip_ros.physics.model.signals import table
 from stickslip_ros.physics.motion import Motion
-from stickslip_ros.physics.motion.variational import VariationalMotion
+from stickslip_ros.physics.motion.variational import ShootingMotion, VariationalMotion
+from tests.physics.drives import PAPER
+from tests.physics.parts import Iwan, OneSided, Pieces
 
 CURVE = Exponential(static=0.4, kinetic=0.25, decay_speed=0.02, viscous=0.5)
 LAWS: dict[str, FrictionLaw] = {
@@ -124,3 +128,41 @@ def test_the_motion_is_that_without_derivatives() -> None:
         motion = VariationalMotion(in_units_of(drive, drive), *START)
         own = followed(motion, lambda motion: motion.position)
         assert np.abs(own - positions(drive)).max() < 1e-12 * np.ptp(own), law
+
+
+SLOW = replace(PAPER, belt_speed=0.3)
+STARTED = [
+    PAPER,
+    replace(PAPER, friction=Exponential(0.4, 0.25, 0.05, 0.0)),
+    # It overtakes the belt.
+    replace(PAPER, belt_speed=0.2, damping=0.2, friction=Linear(0.4, 0.45)),
+    *(
+        replace(SLOW, friction=law)
+        for law in (OneSided(static=0.3), Pieces(static=0.4), Dahl(0.4, 20.0), Iwan(static=0.4))
+    ),
+]
+
+
+@pytest.mark.parametrize("drive", STARTED, ids=lambda drive: drive.friction.name)
+@pytest.mark.parametrize("gains", [None, Washout(0.7, -0.3, -0.2)], ids=["open", "controlled"])
+def test_derivatives_by_the_start_alone(drive: Drive, gains: Washout | None) -> None:
+    motion = ShootingMotion(drive, gains)
+    # Fast enough to overtake the belt, and to stick in the end.
+    own = [0.001] * len(drive.friction.states)
+    start = np.array([0.1, -1.3, *own, 0.2])[: motion.order]
+    landings, step = 0, 1e-6
+
+    def end(state: FloatArray, duration: float) -> FloatArray:
+        motion.start(state)
+        motion.advance(duration)
+        return motion.state
+
+    for duration in np.arange(0.7, 21.0 if not own else 3.0, 1.4):
+        steps = step * np.eye(motion.order)
+        found = [end(start + each, duration) - end(start - each, duration) for each in steps]
+        end(start, duration)
+        landings += motion.sticking
+        assert motion.derivatives == pytest.approx(
+            np.transpose(found) / (2.0 * step), rel=1e-5, abs=1e-7
+        )
+    assert landings > 0 or own

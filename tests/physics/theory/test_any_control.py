@@ -61,8 +61,6 @@ def test_feedback_of_the_state_is_a_spring_and_a_damper(
 ) -> None:
     other = altered(drive, gains)
     found, expected = expand(drive, gains), expand(other)
-    assert found is not None
-    assert expected is not None
     position = found.equilibrium[0] * drive.length_scale
     assert position == pytest.approx(other.equilibrium_position, rel=1e-13)
     assert found.eigenvalues * drive.angular_frequency == pytest.approx(

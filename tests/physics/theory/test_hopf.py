@@ -54,9 +54,7 @@ def test_hopf_speed_of_the_paper(damping: float, speed: float) -> None:
 @given(cubic_drives)
 def test_the_general_theory_agrees_with_the_closed_forms(drive: Drive) -> None:
     cubic = CubicLoop.from_drive(drive)
-    assert cubic is not None
     expansion = expand(drive)
-    assert expansion is not None
     assert expansion.equilibrium[0] == pytest.approx(cubic.equilibrium, rel=1e-12, abs=1e-12)
     assert expansion.jacobian[1, 1] == pytest.approx(cubic.trace, rel=1e-12, abs=1e-12)
     assume(cubic.hopf_speed is None or cubic.hopf_speed > 1e-5)  # lower ones are not looked for
@@ -94,7 +92,6 @@ def test_real_eigenvalues_of_opposite_sign_are_no_hopf_point() -> None:
     assert np.count_nonzero(np.diff(np.sign(margins))) == 2
     (point,) = hopf_points(PAPER, gains)
     expansion = expand(replace(PAPER, belt_speed=point.belt_speed), gains)
-    assert expansion is not None
     pair = [value for value in expansion.eigenvalues if value.imag > 0.0]
     assert [abs(value.real) < 1e-10 for value in pair] == [True]
 
@@ -102,7 +99,6 @@ def test_real_eigenvalues_of_opposite_sign_are_no_hopf_point() -> None:
 def speed_amplitude(drive: Drive, gains: Washout | None, periods: int) -> float:
     motion = RecordedMotion(drive, 0.0, 0.0, control=gains)
     expansion = expand(drive)
-    assert expansion is not None
     motion.restart(expansion.equilibrium[0] * drive.length_scale, 0.03 * drive.speed_scale)
     for _ in range(periods // 100):
         motion.take_breakpoints()
@@ -110,7 +106,6 @@ def speed_amplitude(drive: Drive, gains: Washout | None, periods: int) -> float:
     meter = CycleMeter(window=20)
     meter.feed(motion.take_breakpoints(), drive.belt_speed)
     amplitude = meter.measures().velocity_amplitude
-    assert amplitude is not None
     return amplitude / drive.speed_scale
 
 
@@ -133,10 +128,8 @@ def test_the_coefficient_is_that_of_the_motion_in_the_closed_loop(
 ) -> None:
     gains = Washout(corner_frequency, 0.0, cubic)
     critical = critical_gains(PAPER, gains)
-    assert critical is not None
     above = replace(gains, linear_gain=critical.linear + excess)
     expansion = expand(PAPER, above)
-    assert expansion is not None
     alpha = float(expansion.eigenvalues[0].real)
     amplitude = speed_amplitude(PAPER, above, 12000)
     assert amplitude**2 == pytest.approx(-alpha / critical.first_lyapunov_coefficient, rel=0.01)

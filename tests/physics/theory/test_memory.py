@@ -51,7 +51,6 @@ def test_the_jacobian_is_the_derivative_of_the_motion(law: FrictionLaw) -> None:
     """A small deviation from the equilibrium moves as the matrix exponential says."""
     drive = replace(FEED, friction=law)
     expansion = expand(drive)
-    assert expansion is not None
     rest, scales = expansion.equilibrium, drive.scales
     units = np.array(
         [
@@ -96,8 +95,6 @@ def test_the_critical_stiffness_of_rate_and_state(damping: float) -> None:
     assert [each.belt_speed for each in others] == pytest.approx(balance, rel=1e-3)
     slower = expand(replace(drive, belt_speed=0.99 * speed))
     faster = expand(replace(drive, belt_speed=1.01 * speed))
-    assert slower is not None
-    assert faster is not None
     assert (slower.stable, faster.stable) == (True, False)
 
 
@@ -115,10 +112,8 @@ def test_stiff_bristles_have_the_hopf_speed_of_the_curve() -> None:
 def test_the_critical_gain_divides_stable_from_unstable(law: FrictionLaw) -> None:
     drive = replace(FEED, friction=law)
     found = critical_gains(drive, GAINS)
-    assert found is not None
     for ratio, stable in ((1.0 + 1e-7, True), (1.0 - 1e-7, False)):
         expansion = expand(drive, replace(GAINS, linear_gain=ratio * found.linear))
-        assert expansion is not None
         assert bool(np.all(expansion.eigenvalues.real < 0.0)) is stable
 
 
@@ -126,7 +121,6 @@ def test_the_critical_gain_divides_stable_from_unstable(law: FrictionLaw) -> Non
 @pytest.mark.parametrize("delay", [0.0, 0.4e-3, 2.7e-3])
 def test_the_stable_gains_of_the_sampled_loop(law: FrictionLaw, delay: float) -> None:
     loop = LinearSampledLoop.from_drive(replace(FEED, friction=law), 1000.0, delay)
-    assert loop is not None
     intervals = loop.stable_linear_gains(20.0)
     assert intervals
     ends = sorted(end for interval in intervals for end in interval)
@@ -219,11 +213,9 @@ def test_the_equilibrium_of_a_creeping_slide_has_no_speed() -> None:
 
 def test_a_cycle_from_the_hopf_point_of_the_gain() -> None:
     critical = critical_gains(FEED, GAINS)
-    assert critical is not None
     assert critical.first_lyapunov_coefficient > 0.0
     gains = replace(GAINS, linear_gain=1.01 * critical.linear)
     cycle = limit_cycle_from_hopf(FEED, gains)
-    assert cycle is not None
     assert not cycle.stable
     again = shoot(
         FEED,
@@ -233,6 +225,5 @@ def test_a_cycle_from_the_hopf_point_of_the_gain() -> None:
         filter_state=cycle.filter_states,
         memory=cycle.memory,
     )
-    assert again is not None
     assert again.position == pytest.approx(cycle.position, rel=1e-9)
     assert len(cycle.multipliers) == 3

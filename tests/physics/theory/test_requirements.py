@@ -100,7 +100,6 @@ def test_a_drive_that_is_not_covered_is_refused_by_name(
 @pytest.mark.parametrize("gains", [None, GAINS])
 def test_the_equilibrium_of_a_law_with_a_memory(gains: Washout | None) -> None:
     expansion = expand(REMEMBERS, gains)
-    assert expansion is not None
     # Friction is that of steady slip, and the bristles are bent accordingly.
     assert expansion.equilibrium[:3] == pytest.approx([0.4, 0.0, -0.4 / 5.0], rel=1e-14)
     assert expansion.stable  # Dahl's friction does not fall with speed
@@ -117,8 +116,6 @@ def test_what_covers_every_law_takes_them_all(theory: Theory) -> None:
 def test_an_actuator_has_no_part_in_theory_without_sampling() -> None:
     for gains in (None, GAINS):
         lagging, ideal = expand(LAGGING, gains), expand(PAPER, gains)
-        assert lagging is not None
-        assert ideal is not None
         assert lagging.jacobian.tolist() == ideal.jacobian.tolist()
         assert hopf_points(LAGGING, gains) == hopf_points(PAPER, gains)
         assert shoot(LAGGING, -0.1, 6.4, gains=gains) == shoot(PAPER, -0.1, 6.4, gains=gains)
@@ -130,8 +127,6 @@ def test_an_actuator_has_no_part_in_theory_without_sampling() -> None:
 def test_a_bias_force_moves_the_equilibrium_and_nothing_else() -> None:
     gains, biased = GAINS, replace(PAPER, bias_force=0.3)
     moved, unmoved = expand(biased, gains), expand(PAPER, gains)
-    assert moved is not None
-    assert unmoved is not None
     assert moved.equilibrium[0] == pytest.approx(unmoved.equilibrium[0] + 0.3, rel=1e-14)
     assert moved.jacobian.tolist() == unmoved.jacobian.tolist()
     assert hopf_points(biased, gains) == hopf_points(PAPER, gains)

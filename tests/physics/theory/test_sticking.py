@@ -66,7 +66,6 @@ def test_averaged_growth_is_the_work_of_friction_on_a_harmonic(
 @pytest.mark.parametrize("drive", [PAPER, SUDDEN], ids=["cubic", "exponential"])
 def test_the_cycle_sticks_just_below_the_exact_onset_and_not_just_above(drive: Drive) -> None:
     onset = sticking_onset(drive).exact
-    assert onset is not None
     below, above = (replace(drive, belt_speed=onset * (1.0 + part)) for part in (-1e-8, 1e-8))
     assert sticks(below)
     assert not sticks(above)
@@ -76,7 +75,6 @@ def test_the_cycle_sticks_just_below_the_exact_onset_and_not_just_above(drive: D
 
 def test_it_scales_and_does_not_depend_on_the_speed_or_direction_of_the_belt() -> None:
     onset = sticking_onset(PAPER)
-    assert onset.exact is not None
     for belt_speed in (-0.3, 0.0, 7.0):
         assert sticking_onset(replace(PAPER, belt_speed=belt_speed)) == onset
     in_si = sticking_onset(FEED_DRIVE)
@@ -101,7 +99,6 @@ def test_where_there_is_no_onset_a_sentence_says_why(
     assert onset.approximate is None
     assert onset.exact is None
     assert onset.no_approximate is not None
-    assert onset.no_exact is not None
     assert words in onset.no_exact
 
 
@@ -113,7 +110,6 @@ def test_what_neither_grows_nor_dies_out_has_no_onset(law: FrictionLaw, damping:
     onset = sticking_onset(replace(PAPER, friction=law, damping=damping))
     assert onset.approximate is None
     assert onset.exact is None
-    assert onset.no_approximate is not None
     assert "neither grow nor decay" in onset.no_approximate
 
 
@@ -173,7 +169,6 @@ def test_a_stiff_drive_sticks_in_two_ranges_of_belt_speeds() -> None:
 def test_exact_grazing_is_pure_slip() -> None:
     for drive in (PAPER, FEED_DRIVE):
         onset = sticking_onset(drive).exact
-        assert onset is not None
         found = {
             part: {
                 cycle.measures.regime

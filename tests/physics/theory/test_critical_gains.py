@@ -1,16 +1,20 @@
-"""The critical gains of the washout controller: the paper's, closed forms, and eigenvalues."""
+"""The critical gains of the washout controller, and the limit cycle that starts there."""
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
+from stickslip_ros.physics.measures.cycle_measures import CycleMeter, Measures, Regime
 from stickslip_ros.physics.model.control import Washout
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import Exponential, Linear
+from stickslip_ros.physics.motion.variational import ShootingMotion
 from stickslip_ros.physics.theory.closed_forms import CubicLoop
-from stickslip_ros.physics.theory.critical_gains import critical_gains
+from stickslip_ros.physics.theory.critical_gains import critical_gains, limit_cycle_from_hopf
+from stickslip_ros.physics.theory.limit_cycles import limit_cycle_of_run
 from stickslip_ros.physics.theory.linear import expand
 from tests.physics.drives import PAPER
 from tests.physics.theory.test_hopf import cubic_drives
@@ -25,7 +29,6 @@ def test_critical_linear_gains_of_the_paper(
 ) -> None:
     drive = replace(PAPER, belt_speed=belt_speed, damping=damping)
     critical = critical_gains(drive, Washout(corner_frequency, 0.0, 0.0))
-    assert critical is not None
     assert critical.linear == pytest.approx(gain, rel=3e-3)
 
 
@@ -36,7 +39,6 @@ def test_the_general_theory_agrees_with_the_closed_forms(
     force, speed = drive.normal_force, drive.speed_scale
     gains = Washout(corner_frequency * drive.angular_frequency, 0.0, cubic * force / speed**3)
     forms = CubicLoop.from_drive(drive)
-    assert forms is not None
     expected = forms.critical_linear_gain(corner_frequency)
     critical = critical_gains(drive, gains)
     # Next to where no gain stabilises any more, everything is steep.
@@ -44,7 +46,6 @@ def test_the_general_theory_agrees_with_the_closed_forms(
     if expected is None:
         assert critical is None
         return
-    assert critical is not None
     scale = 1.0 + abs(expected)
     assert critical.linear * speed / force == pytest.approx(expected, abs=1e-12 * scale)
     sigma = forms.critical_lyapunov_coefficient(corner_frequency, cubic)
@@ -52,7 +53,6 @@ def test_the_general_theory_agrees_with_the_closed_forms(
     assert sigma is not None
     assert cubic_gain is not None
     assert critical.first_lyapunov_coefficient == pytest.approx(sigma, rel=1e-9, abs=1e-12)
-    assert critical.cubic is not None
     # The cubic gain acts on what the filter lets through, next to nothing at a high corner.
     assert critical.cubic * speed**3 / force == pytest.approx(cubic_gain, rel=1e-9, abs=1e-12)
 
@@ -62,18 +62,14 @@ def test_the_pair_is_on_the_axis_at_the_critical_gain(law: Exponential) -> None:
     drive = replace(PAPER, friction=law)
     gains = Washout(0.5, 0.0, 0.0)
     critical = critical_gains(drive, gains)
-    assert critical is not None
     for offset, stable in ((-1e-3, True), (1e-3, False)):
         expansion = expand(drive, replace(gains, linear_gain=critical.linear + offset))
-        assert expansion is not None
         assert expansion.stable is stable
         assert bool(expansion.eigenvalues[0].real < 0.0) is stable
     at_gain = expand(drive, replace(gains, linear_gain=critical.linear))
-    assert at_gain is not None
     assert abs(at_gain.eigenvalues[0].real) < 1e-14
     assert critical.cubic is not None
     neutral = critical_gains(drive, replace(gains, cubic_gain=critical.cubic))
-    assert neutral is not None
     assert abs(neutral.first_lyapunov_coefficient) < 1e-13
 
 
@@ -89,6 +85,58 @@ def test_no_gain_stabilises_where_the_filter_passes_too_little() -> None:
     assert critical_gains(drive, too_fast) is None
     for linear in (-1e3, -10.0, -1.0, 0.0, 1.0, 1e3):
         expansion = expand(drive, replace(too_fast, linear_gain=linear))
-        assert expansion is not None
         assert not expansion.stable
     assert critical_gains(replace(PAPER, belt_speed=0.0), too_fast) is None
+
+
+SUBCRITICAL = Washout(0.2, -0.16, 2.0)
+"""Beyond the critical gain (-0.148), with more cubic gain than the critical one (0.649)."""
+
+
+def settled(gains: Washout, position: float, filter_state: float) -> Measures:
+    """What the loop does from there in the end; the slide rests at the start."""
+    motion = ShootingMotion(PAPER, gains)
+    motion.start(np.array([position, 0.0, filter_state]))
+    motion.advance(300.0 * PAPER.natural_period)
+    motion.take_breakpoints()
+    motion.advance(20.0 * PAPER.natural_period)
+    meter = CycleMeter(window=10)
+    meter.feed(motion.take_breakpoints(), PAPER.belt_speed)
+    return meter.measures()
+
+
+def test_an_unstable_cycle_separates_rest_from_vibration() -> None:
+    critical = critical_gains(PAPER, SUBCRITICAL)
+    assert critical.first_lyapunov_coefficient > 0.0
+    cycle = limit_cycle_from_hopf(PAPER, SUBCRITICAL)
+    assert cycle.multipliers[0].real > 1.0
+    assert not cycle.stable
+    distance = PAPER.equilibrium_position - cycle.position
+    for factor, regime in ((0.99, Regime.EQUILIBRIUM), (1.01, Regime.STICK_SLIP)):
+        start = PAPER.equilibrium_position - factor * distance
+        found = settled(SUBCRITICAL, start, factor * cycle.filter_state)
+        assert found.regime is regime
+    outer = limit_cycle_of_run(PAPER, 0.0, gains=SUBCRITICAL)
+    assert outer.stable
+    assert outer.position < cycle.position
+
+
+@pytest.mark.parametrize("corner_frequency", [0.2, 2.0])
+def test_a_stable_cycle_is_the_one_that_a_run_leads_to(corner_frequency: float) -> None:
+    critical = critical_gains(PAPER, Washout(corner_frequency, 0.0, -1.0))
+    gains = Washout(corner_frequency, 0.8 * critical.linear, -1.0)
+    cycle, by_run = (
+        limit_cycle_from_hopf(PAPER, gains),
+        limit_cycle_of_run(PAPER, 0.0, gains=gains),
+    )
+    assert cycle.stable
+    assert cycle.position == pytest.approx(by_run.position, rel=1e-9)
+    assert cycle.period == pytest.approx(by_run.period, rel=1e-9)
+
+
+def test_none_on_the_other_side_of_the_critical_gain() -> None:
+    assert limit_cycle_from_hopf(PAPER, Washout(2.0, -1.0, 0.0)) is None
+    assert limit_cycle_from_hopf(PAPER, replace(SUBCRITICAL, linear_gain=-0.13)) is None
+    assert limit_cycle_from_hopf(PAPER, Washout(10.0, -1.0, 0.0)) is None
+    resting = replace(PAPER, belt_speed=0.0)
+    assert limit_cycle_from_hopf(resting, SUBCRITICAL) is None
