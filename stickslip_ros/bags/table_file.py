@@ -36,7 +36,7 @@ QUANTITIES = (
     "disturbance",
     "reference",
 )
-"""What a table may have of a run; time and position it must have."""
+"""Quantities of a run that a table may have; time and position it must have."""
 
 LONGEST = 9e9
 """Longest time, s, that stamps can express."""

@@ -154,13 +154,13 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         counts = {name: report[name] for name in ("regime", "steady", "samples", "lost_samples")}
         counts["trend"] = trend_text(report)
         notes = {"notes": "; ".join(report["notes"])}
-        figures = {**counts, **self.dropped.figures, **notes, **bag}
+        values = {**counts, **self.dropped.values, **notes, **bag}
         if self._bag_failure:
-            return ERROR, self._bag_failure, figures
+            return ERROR, self._bag_failure, values
         complaints = [self.dropped.complaint, *self.duplicate_publishers(*RECORDED_TOPICS)]
         if report["lost_samples"]:
             complaints.append("samples were lost")
-        return diagnosis(complaints, figures)
+        return diagnosis(complaints, values)
 
     def _if_active(self, callback: Callable[[], None]) -> None:
         """Call back unless the node has stopped since the timer was due."""
@@ -240,9 +240,9 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         states = self._columns(JOINT_STATES, joint_state_columns)
         windows = self._cycles // self.parameters.window
         for cycle in self._meter.motion.feed(states):
-            figures = (cycle.amplitude, cycle.stick_fraction, cycle.frequency)
-            for publisher, figure in zip(self._limit_cycle, figures, strict=True):
-                publisher.publish(Float64(data=figure))
+            values = (cycle.amplitude, cycle.stick_fraction, cycle.frequency)
+            for publisher, value in zip(self._limit_cycle, values, strict=True):
+                publisher.publish(Float64(data=value))
             self._cycles += 1
         if self._cycles // self.parameters.window > windows:
             self._log_measures()

@@ -72,7 +72,7 @@ class ControllerNode(ManagedNode[ControllerParameters]):
             return OK, "", {}
         return diagnosis(
             [self.dropped.complaint, *self.duplicate_publishers(JOINT_STATES, REFERENCE)],
-            {"answered": self._answered, **self.dropped.figures},
+            {"answered": self._answered, **self.dropped.values},
         )
 
     def _followed(self) -> ReferenceSource:

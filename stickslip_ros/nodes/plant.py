@@ -149,7 +149,7 @@ class PlantNode(ManagedNode[PlantParameters]):
         if not self._has_started:
             return OK, "", {}
         loop, pacer = self._loop, self._pacer
-        figures = {
+        values = {
             "samples": loop.sample_number + 1,
             NEWEST_STAMP: loop.sample.stamp,
             FINISHED: pacer.finished,
@@ -157,13 +157,13 @@ class PlantNode(ManagedNode[PlantParameters]):
             "missed_deadlines": pacer.missed_deadlines,
             "largest_lateness": round(pacer.largest_lateness, 6),
             "steps_per_second": round(pacer.steps_per_second, 1),
-            **self.dropped.figures,
+            **self.dropped.values,
             **{f"dropped: {reason}": count for reason, count in loop.dropped.items()},
         }
         if loop.unbounded:
-            return ERROR, "the motion diverges (regime unbounded)", figures
+            return ERROR, "the motion diverges (regime unbounded)", values
         if pacer.failure:
-            return ERROR, pacer.failure, {**figures, FAILURE: pacer.failure}
+            return ERROR, pacer.failure, {**values, FAILURE: pacer.failure}
         complaints = [pacer.complaint]
         controlled = self.parameters.expects_control and loop.controller_present
         if self.parameters.expects_control and not controlled:
@@ -178,7 +178,7 @@ class PlantNode(ManagedNode[PlantParameters]):
         )
         complaints.append(self.dropped.complaint)
         complaints += self.duplicate_publishers(CONTROL_FORCE, DISTURBANCE_FORCE)
-        return diagnosis(complaints, figures)
+        return diagnosis(complaints, values)
 
     def _publish(self, sample: Sample) -> None:
         self._state.publish(_packed(sample))

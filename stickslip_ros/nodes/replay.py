@@ -97,15 +97,15 @@ class ReplayNode(ManagedNode[ReplayParameters]):
         player = self._player
         if player is None:
             return OK, self._waiting_for, {}
-        figures = {
+        values = {
             "messages": player.sent,
             "position": self._position,
             "paused": player.paused,
             "worst_lateness": player.worst_lateness,
         }
         if player.failure is not None:
-            return ERROR, str(player.failure), figures
-        return (WARN if player.complaint else OK), player.complaint or self._waiting_for, figures
+            return ERROR, str(player.failure), values
+        return (WARN if player.complaint else OK), player.complaint or self._waiting_for, values
 
     @property
     def _position(self) -> float:

@@ -40,7 +40,7 @@ and starts from rest at X = 0. Figure 1 is a drawing of the model.
 """
 
 _TOLD_BY_THE_VERDICT = ("the same", "something else")
-"""What is computed for a formula."""
+"""Results for a formula."""
 
 _COLUMNS = ("", "claim", "printed", "computed", "verdict")
 

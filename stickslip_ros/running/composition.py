@@ -24,7 +24,7 @@ NODE_CLASSES: dict[str, Callable[..., ManagedNode[Any]]] = {
     "plant": PlantNode,
     **{controller_node(law): partial(ControllerNode, law) for law in CONTROLLER_PARAMETERS},
 }
-"""What makes each node of a loop, by name."""
+"""Makers of the nodes of a loop, by name."""
 
 
 class Composition:

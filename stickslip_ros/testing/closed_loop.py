@@ -212,10 +212,10 @@ class ClosedLoop:
             self._runs += 1
             self._close_the_loop(nodes)
             if not self._wait(nodes, lambda: not nodes.plant.active, timeout):
-                figures = nodes.plant.diagnose()[2]
+                values = nodes.plant.diagnose()[2]
                 raise RunError(
-                    f"the run of {duration} s took more than {timeout} s: {figures['samples']} "
-                    f"samples so far, {figures['late_forces']} without a force"
+                    f"the run of {duration} s took more than {timeout} s: {values['samples']} "
+                    f"samples so far, {values['late_forces']} without a force"
                 )
             diagnostics = self._end_run(nodes)
         finally:

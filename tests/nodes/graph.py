@@ -6,20 +6,19 @@ from threading import Event
 from typing import Any
 
 import rclpy
+from diagnostic_msgs.msg import DiagnosticStatus
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
-from rclpy.clock import Clock, ClockType
 from rclpy.context import Context
-from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.signals import SignalHandlerOptions
 from rclpy.subscription import Subscription
-from rclpy.task import Future
 
+from stickslip_ros.messages.topics import DIAGNOSTICS
 from stickslip_ros.nodes.base.managed import ManagedNode
 from stickslip_ros.nodes.base.ros_topics import message_class, qos_profile
-from stickslip_ros.nodes.base.spinner import destroy, spin
+from stickslip_ros.nodes.base.spinner import Spinner
 
 PATIENCE = 60.0
 """How long a test waits, s, for what should happen at once on an idle machine."""
@@ -48,10 +47,11 @@ class Graph:
             domain_id=domain,
             signal_handler_options=SignalHandlerOptions.NO,
         )
-        self.executor = EventsExecutor(context=self.context)
+        self._spinner = Spinner(self.context)
+        self.executor = self._spinner.executor
+        self._nodes: list[Any] = []
         self.observer = Node("observer", context=self.context, namespace="/test")
-        self.executor.add_node(self.observer)
-        self._nodes: list[Any] = [self.observer]
+        self.adopt(self.observer)
 
     def add(self, node: type[ManagedNode[Any]], **parameters: Any) -> Any:
         """Add one of our nodes in the namespace /test."""
@@ -62,30 +62,16 @@ class Graph:
     def adopt(self, node: Node) -> None:
         """Add a node that exists already."""
         self._nodes.append(node)
-        self.executor.add_node(node)
+        self._spinner.add(node)
 
     def wait_until(self, condition: Callable[[], object], what: str) -> None:
         """Run the nodes until the condition holds; fail with `what` if it does not in time."""
-        self._run_until(condition, PATIENCE)
-        assert condition(), f"waited {PATIENCE} s in vain: {what}"
+        holds = self._spinner.spin_until(lambda: bool(condition()), PATIENCE)
+        assert holds, f"waited {PATIENCE} s in vain: {what}"
 
     def run_for(self, seconds: float) -> None:
         """Run the nodes for so long, of wall time."""
-        self._run_until(lambda: False, seconds)
-
-    def _run_until(self, condition: Callable[[], object], patience: float) -> None:
-        done = Future()
-        clock = Clock(clock_type=ClockType.STEADY_TIME)
-        started = clock.now()
-
-        def check() -> None:
-            waited = (clock.now() - started).nanoseconds * 1e-9
-            if not done.done() and (condition() or waited > patience):
-                done.set_result(None)
-
-        timer = self.observer.create_timer(0.01, check, clock=clock)
-        spin(self.executor, done)
-        self.observer.destroy_timer(timer)
+        self._spinner.spin_for(seconds)
 
     def call(
         self, kind: Any, name: str, request: Any, enough: Callable[[], object] = lambda: False
@@ -97,9 +83,11 @@ class Graph:
         """
         for _ in range(_ATTEMPTS):
             client = self.observer.create_client(kind, name)
-            self._run_until(client.service_is_ready, PATIENCE / _ATTEMPTS)
+            self._spinner.spin_until(client.service_is_ready, PATIENCE / _ATTEMPTS)
             answer = client.call_async(request)
-            self._run_until(lambda a=answer: a.done() or enough(), PATIENCE / _ATTEMPTS)
+            self._spinner.spin_until(
+                lambda a=answer: bool(a.done() or enough()), PATIENCE / _ATTEMPTS
+            )
             self.observer.destroy_client(client)
             if answer.done() or enough():
                 return answer.result()
@@ -116,6 +104,16 @@ class Graph:
         """Return a list to which every message of a topic will be appended."""
         heard: list[Any] = []
         self.subscribe(topic, heard.append, raw=raw)
+        return heard
+
+    def health(self, node: str) -> list[DiagnosticStatus]:
+        """Return a list to which every status will be appended that a node reports."""
+        heard: list[DiagnosticStatus] = []
+
+        def take(array: Any) -> None:
+            heard.extend(status for status in array.status if status.name == f"/test/{node}")
+
+        self.subscribe(DIAGNOSTICS, take, raw=False)
         return heard
 
     def subscribe(
@@ -137,8 +135,5 @@ class Graph:
 
     def close(self) -> None:
         """Take everything down."""
-        for node in reversed(self._nodes):
-            self.executor.remove_node(node)
-            destroy(node)
-        self.executor.shutdown()
+        self._spinner.close()
         rclpy.shutdown(context=self.context)

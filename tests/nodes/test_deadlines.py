@@ -4,10 +4,10 @@ from itertools import count
 from threading import Event, Lock
 
 import pytest
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from diagnostic_msgs.msg import DiagnosticStatus
 
 from stickslip_ros.messages.codec import pack_wrench, unpack_header
-from stickslip_ros.messages.topics import CONTROL_FORCE, DIAGNOSTICS, JOINT_STATES
+from stickslip_ros.messages.topics import CONTROL_FORCE, JOINT_STATES
 from stickslip_ros.nodes import pacing
 from stickslip_ros.nodes.pacing import RealtimePacer, TimingMonitor
 from stickslip_ros.nodes.plant import PlantNode
@@ -95,7 +95,7 @@ def test_only_the_latest_checks_count_and_none_without_a_controller() -> None:
 def test_a_plant_whose_controller_answers_every_third_sample_warns(
     graph: Graph, often_diagnosed: None
 ) -> None:
-    health: list[DiagnosticArray] = graph.listen(DIAGNOSTICS)
+    health = graph.health("plant")
     force = graph.publisher(CONTROL_FORCE)
     counted = count()
 
@@ -108,8 +108,7 @@ def test_a_plant_whose_controller_answers_every_third_sample_warns(
     graph.wait_until(
         lambda: any(
             status.level == DiagnosticStatus.WARN and "forces came late" in status.message
-            for array in health
-            for status in array.status
+            for status in health
         ),
         "a warning",
     )

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from stickslip_ros.messages.codec import unpack_header
-from stickslip_ros.messages.topics import CONTROL_FORCE, DIAGNOSTICS
+from stickslip_ros.messages.topics import CONTROL_FORCE
 from stickslip_ros.nodes.base.managed import WARN
 from stickslip_ros.nodes.plant import PlantNode
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
@@ -27,25 +27,16 @@ class Watch(Samples):
     def __init__(self, graph: Graph, standard_error: Callable[[], str]) -> None:
         super().__init__(graph)
         self.forces: list[int] = []
-        self._diagnostics = graph.listen(DIAGNOSTICS)
+        self._health = graph.health("plant")
         self._standard_error = standard_error
         self._logged = ""
         graph.subscribe(CONTROL_FORCE, lambda message: self.forces.append(unpack_header(message)))
 
     def further_health(self, count: int) -> list[tuple[bytes, str]]:
         """Wait until the plant has reported on its health again; return levels and messages."""
-
-        def reports() -> list[tuple[bytes, str]]:
-            return [
-                (status.level, status.message)
-                for array in self._diagnostics
-                for status in array.status
-                if status.name == "/test/plant"
-            ]
-
-        reached = len(reports())
-        self._graph.wait_until(lambda: len(reports()) >= reached + count, "the plant reports")
-        return reports()[reached:]
+        reached = len(self._health)
+        self._graph.wait_until(lambda: len(self._health) >= reached + count, "the plant reports")
+        return [(status.level, status.message) for status in self._health[reached:]]
 
     def log_lines(self, text: str) -> list[str]:
         """Return the plant's log lines that contain a text."""

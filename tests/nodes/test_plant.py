@@ -19,7 +19,6 @@ from stickslip_ros.messages.topics import (
     APPLIED_FORCE,
     CLOCK,
     CONTROL_FORCE,
-    DIAGNOSTICS,
     DISTURBANCE_FORCE,
     DROPPED_FORCE,
     JOINT_STATES,
@@ -187,7 +186,7 @@ def test_the_truth_is_told_if_asked(graph: Graph) -> None:
 
 
 def test_a_motion_that_runs_away_deactivates_the_plant(graph: Graph) -> None:
-    diagnostics = graph.listen(DIAGNOSTICS)
+    health = graph.health("plant")
     parameters = {
         "friction.law": "linear",
         "friction.slope": 2.0,
@@ -197,9 +196,7 @@ def test_a_motion_that_runs_away_deactivates_the_plant(graph: Graph) -> None:
     }
     plant = graph.add(PlantNode, **parameters)
     graph.wait_until(
-        lambda: any(
-            "unbounded" in status.message for array in diagnostics for status in array.status
-        ),
+        lambda: any("unbounded" in status.message for status in health),
         "the reason is in the diagnostics",
     )
     assert not plant.active

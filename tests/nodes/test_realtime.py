@@ -9,9 +9,8 @@ from pathlib import Path
 from threading import Lock
 
 import pytest
-from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticStatus
 
-from stickslip_ros.messages.topics import DIAGNOSTICS
 from stickslip_ros.nodes.pacing import RealtimePacer
 from stickslip_ros.physics.loop.sampled_loop import SampledLoop
 from stickslip_ros.physics.motion.motion import Motion
@@ -28,16 +27,10 @@ def least_delay(samples: Samples, first: int, last: int | None) -> float:
     return min(arrival - (stamp - start) * 1e-9 for arrival, stamp in pairs)
 
 
-def figure(health: list[DiagnosticArray], name: str) -> int:
-    """Return a figure of the plant's last diagnostics, 0 before it has told."""
-    figures = {
-        entry.key: entry.value
-        for array in health
-        for status in array.status
-        if status.name == "/test/plant"
-        for entry in status.values
-    }
-    return int(figures.get(name, 0))
+def value(health: list[DiagnosticStatus], name: str) -> int:
+    """Return a value of the plant's last diagnostics, 0 before it has told."""
+    values = {entry.key: entry.value for status in health for entry in status.values}
+    return int(values.get(name, 0))
 
 
 def test_after_a_stall_every_sample_follows_at_once_and_the_schedule_stands(
@@ -45,7 +38,7 @@ def test_after_a_stall_every_sample_follows_at_once_and_the_schedule_stands(
 ) -> None:
     rate, duration = 300.0, 3.0
     samples = Samples(graph)
-    health = graph.listen(DIAGNOSTICS)
+    health = graph.health("plant")
     parameters = {"expects_control": False, "wait_for": "[observer]", "duration": duration}
     plant = processes.node("plant", pace="realtime", rate=rate, **parameters)
     samples.wait_for(200)
@@ -58,12 +51,12 @@ def test_after_a_stall_every_sample_follows_at_once_and_the_schedule_stands(
 
     count = round(duration * rate) + 1
     graph.wait_until(lambda: len(samples.stamps) == count, "every sample comes")
-    graph.wait_until(lambda: figure(health, "samples") == count, "the plant tells its figures")
+    graph.wait_until(lambda: value(health, "samples") == count, "the plant tells its values")
     nanoseconds = 1_000_000_000 / rate
     assert [stamp - samples.stamps[0] for stamp in samples.stamps] == [
         round(number * nanoseconds) for number in range(count)
     ]
-    assert count > figure(health, "missed_deadlines") >= stall * rate - 5
+    assert count > value(health, "missed_deadlines") >= stall * rate - 5
     # The second half of the rest: by then the plant has caught up.
     after = (before + round(stall * rate) + count) // 2
     delayed = least_delay(samples, after, None) - least_delay(samples, 0, before)

@@ -1,1 +1,1 @@
-"""What all nodes have in common."""
+"""Base of all nodes."""

@@ -1,4 +1,4 @@
-"""What ROS needs from this machine: memory, the clock, ports, a domain, a namespace of its own.
+"""Conditions of ROS on this machine: memory, the clock, ports, a domain, a namespace of its own.
 
 Importing this module does not load ROS.
 """

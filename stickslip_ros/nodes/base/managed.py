@@ -53,10 +53,10 @@ FINISHED = "finished"
 _DIAGNOSTICS_PERIOD = 1.0
 
 
-def diagnosis(complaints: Iterable[str], figures: dict[str, Any]) -> Diagnosis:
+def diagnosis(complaints: Iterable[str], values: dict[str, Any]) -> Diagnosis:
     """Return the diagnosis of a working node: a warning if there is a complaint, else OK."""
     complaint = "; ".join(filter(None, complaints))
-    return WARN if complaint else OK, complaint, figures
+    return WARN if complaint else OK, complaint, values
 
 
 class DroppedMessages:
@@ -86,7 +86,7 @@ class DroppedMessages:
         return f"{self._number} messages dropped so far, the last: {self._last}"
 
     @property
-    def figures(self) -> dict[str, Any]:
+    def values(self) -> dict[str, Any]:
         """Number and last reason, for the diagnostics."""
         return {"dropped_messages": self._number, "last_dropped": self._last or "none"}
 
@@ -139,7 +139,7 @@ class ManagedNode(PollingNode, ParameterNode[ParametersT], ABC):
         """Return the node's health; by default based on dropped messages."""
         if not self.active:
             return OK, "", {}
-        return diagnosis([self.dropped.complaint], self.dropped.figures)
+        return diagnosis([self.dropped.complaint], self.dropped.values)
 
     def publishing_nodes(self) -> set[str]:
         """Return the names of nodes that publish what this node needs; its readers are known."""
@@ -213,14 +213,14 @@ class ManagedNode(PollingNode, ParameterNode[ParametersT], ABC):
 
     def publish_diagnostics(self) -> None:
         """Publish the node's health."""
-        level, message, figures = self.diagnose()
+        level, message, values = self.diagnose()
         status = DiagnosticStatus(
             level=level,
             name=self.get_fully_qualified_name(),
             message=message or self.lifecycle_state,
             values=[
                 KeyValue(key=key, value=str(value))
-                for key, value in {STATE: self.lifecycle_state, **figures}.items()
+                for key, value in {STATE: self.lifecycle_state, **values}.items()
             ],
         )
         array = DiagnosticArray(status=[status])

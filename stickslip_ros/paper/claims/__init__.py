@@ -64,7 +64,7 @@ class Claim:
     computed: str = ""
     """The result for a statement in words, with the names of values in braces."""
     remark: str = ""
-    """What else the computation tells, likewise."""
+    """Further results, likewise."""
     undecidable: str | None = None
     """Why no computation can decide it."""
 

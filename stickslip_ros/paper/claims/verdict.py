@@ -25,7 +25,7 @@ class Verdict(StrEnum):
 
 
 class Judgement(NamedTuple):
-    """What a result means for a claim, without the words of its row."""
+    """The verdict on a claim, without the words of its row."""
 
     verdict: Verdict
     computed: float | str | None = None
