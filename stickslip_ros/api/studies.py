@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     from pandas import DataFrame
     from xarray import Dataset
 
-    from stickslip_ros.plots.sweep_figure import Colour
+    from stickslip_ros.plots.study_figure import Colour
 
 Values = tuple[float | str, float | str, int] | tuple[float | str, float | str, int, str]
 """First and last value, how many, and optionally "log"."""
@@ -196,8 +196,8 @@ class Sweep(_Result):
         InvalidInputError
             If `colour` is unknown, or given for a sweep over one parameter, or `style` is unknown.
         """
+        from stickslip_ros.plots.study_figure import sweep_figure
         from stickslip_ros.plots.style import style_named
-        from stickslip_ros.plots.sweep_figure import sweep_figure
 
         return shown_in_notebooks(
             sweep_figure(self.columns, self.study, colour, style=style_named(style))
@@ -238,11 +238,11 @@ class Basin(_Result):
         InvalidInputError
             If `style` is unknown.
         """
-        from stickslip_ros.plots.basin_figure import study_figure
+        from stickslip_ros.plots.study_figure import basin_figure
         from stickslip_ros.plots.style import style_named
 
         return shown_in_notebooks(
-            study_figure(self.columns, self.basins, self.study, style=style_named(style))
+            basin_figure(self.columns, self.basins, self.study, style=style_named(style))
         )
 
     def _values(self) -> dict[str, Any]:

@@ -73,9 +73,9 @@ def run(arguments: argparse.Namespace) -> None:
         basins = Basins.from_columns(columns)
         made = {"attractors": [asdict(attractor) for attractor in basins.attractors]}
         if arguments.plot is not None:
-            from stickslip_ros.plots.basin_figure import study_figure
+            from stickslip_ros.plots.study_figure import basin_figure
 
-            write_figure(arguments, lambda style: study_figure(columns, basins, study, style=style))
+            write_figure(arguments, lambda style: basin_figure(columns, basins, study, style=style))
         write_results(arguments, journal, {"attractor": basins.places.tolist()}, made)
         if not arguments.json:
             print_table(*basin_table(study, basins))

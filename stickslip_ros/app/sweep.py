@@ -88,7 +88,7 @@ def run(arguments: argparse.Namespace) -> None:
     with computed(arguments, study, label) as journal:
         columns, colour = journal.columns, arguments.colour
         if arguments.plot is not None:
-            from stickslip_ros.plots.sweep_figure import sweep_figure
+            from stickslip_ros.plots.study_figure import sweep_figure
 
             write_figure(arguments, lambda style: sweep_figure(columns, study, colour, style=style))
         theory = transitions(study, plan.axes[0]) if len(plan.axes) == 1 else {}

@@ -24,12 +24,12 @@ from stickslip_ros.paper.figures import (
     PortraitFigure,
 )
 from stickslip_ros.physics.measures.breakpoints import Breakpoints
-from stickslip_ros.plots.regimes import REGIMES
 from stickslip_ros.plots.style import (
     BLUE,
     DASHES,
     GREEN,
     ORANGE,
+    REGIMES,
     SCREEN,
     FigureStyle,
     finish,

@@ -18,9 +18,8 @@ from stickslip_ros.physics.measures.cycle_measures import Measures, trend_text
 from stickslip_ros.physics.measures.run_meter import RunAnalysis
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.plots.decimation import intervals, peaks
-from stickslip_ros.plots.regimes import REGIMES
 from stickslip_ros.plots.run_history import DrawnMotion, RunHistory
-from stickslip_ros.plots.style import BLUE, GREEN, GREY, LIGHT_GREY, ORANGE
+from stickslip_ros.plots.style import BLUE, GREEN, GREY, LIGHT_GREY, ORANGE, REGIMES
 from stickslip_ros.plots.units import Units
 
 MOTION: Any = {"color": BLUE, "lw": 1.0}

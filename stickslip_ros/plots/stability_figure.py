@@ -1,5 +1,8 @@
 """Figures of stability: the map of a scenario or a design, or a bifurcation diagram by theory."""
 
+from collections.abc import Iterator
+from itertools import pairwise
+from math import isclose
 from typing import Any
 
 import numpy as np
@@ -12,20 +15,24 @@ from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 
 from stickslip_ros.arrays import BoolArray, FloatArray
+from stickslip_ros.physics.measures.cycle_measures import Regime
+from stickslip_ros.physics.theory.bifurcation_branches import BifurcationBranches, Branch
 from stickslip_ros.physics.theory.stability_map import CriticalGainCurves, StabilityMap
-from stickslip_ros.plots.branches_figure import branches_figure
-from stickslip_ros.plots.regimes import INK
 from stickslip_ros.plots.style import (
     BLUE,
+    DASHES,
     GREEN,
     GREY,
+    INK,
     ORANGE,
     PURPLE,
+    REGIMES,
     SCREEN,
     SKY_BLUE,
     FigureStyle,
     finish,
     styled,
+    text_width,
     title_of,
 )
 from stickslip_ros.plots.units import Units
@@ -50,6 +57,20 @@ _LOOKS: tuple[dict[str, Any], ...] = (
     {"color": PURPLE, "ls": (0, (1, 1))},
 )
 """Looks of the curves, one for each rate."""
+
+_DASHED: Any = {"ls": (0, (4.0, 2.0))}
+_WIDTHS = {Regime.EQUILIBRIUM: 1.8, Regime.STICK_SLIP: 2.4, Regime.PURE_SLIP: 1.2}
+"""Widths of branches differ, too, so that colour is not the only distinction."""
+_CYCLES = {Regime.STICK_SLIP: True, Regime.PURE_SLIP: False}
+"""Whether the slide sticks in a limit cycle."""
+_POINT: Any = {"marker": "o", "ms": 5.0, "ls": "", "color": "white", "mec": "black", "zorder": 4.0}
+_FOLD: Any = {**_POINT, "marker": "D", "ms": 4.0}
+_NOW: Any = {"color": GREY, "lw": 3.0, "alpha": 0.6, "zorder": 1.0}
+_ONSET: Any = {"color": "black", "lw": 0.8, "ls": DASHES[2], "zorder": 1.5}
+_BORDER: Any = {"color": "black", "lw": 0.5, "ls": DASHES[1], "zorder": 1.5}
+
+_SAME = 1e-3
+"""Relative distance of two belt speeds below which one mark serves for both."""
 
 
 def scenario_stability_figure(scenario: Scenario, *, style: FigureStyle = SCREEN) -> Figure:
@@ -247,3 +268,131 @@ def _draw_critical_gains(axes: Axes, critical: CriticalGainCurves, found: Stabil
         axes.collections[-1].set_label("stable, this loop")
     axes.set_ylim(limits)
     axes.legend(title="sample rate")
+
+
+@styled
+def branches_figure(
+    found: BifurcationBranches, *, title: str, style: FigureStyle = SCREEN
+) -> Figure:
+    """Return the bifurcation diagram of a drive without control.
+
+    Lines are solid where the motion is stable and dashed where it is not. A limit cycle has two
+    lines, its least and its greatest displacement. Above each range of belt speeds stands the
+    motion that the drive settles to. The drive's own belt speed is marked.
+    """
+    figure = style.figure(8.0, 5.6, narrow=1.15)
+    style.set_title(figure, title)
+    axes = figure.subplots()
+    units = Units.for_drive(found.drive)
+    branches = [*found.equilibria, *found.cycles]
+    every = [each for branch in branches for each in (branch.least, branch.greatest)]
+    length, y_label = units.axis(units.named("displacement"), "m", *every)
+    speed, x_label = units.axis(units.named("belt speed"), "m/s", found.belt_speeds)
+    looks: dict[str, dict[str, Any]] = {}
+    for branch in found.equilibria:
+        name, look = _look(branch, Regime.EQUILIBRIUM)
+        looks[name] = look
+        axes.plot(branch.belt_speeds / speed, branch.least / length, **look)
+    for branch in found.cycles:
+        looks |= (_look(branch, each) for each in _CYCLES if (branch.sticks == _CYCLES[each]).any())
+        for edge in (branch.least, branch.greatest):
+            for regime in reversed(_CYCLES):
+                rows = branch.sticks == _CYCLES[regime]
+                # With the row before them, so that lines in turn leave no gap.
+                shown = np.where(rows | np.append(rows[1:], False), edge, np.nan)
+                _, look = _look(branch, regime)
+                axes.plot(branch.belt_speeds / speed, shown / length, **look)
+    handles: list[Artist] = [Line2D([], [], **look, label=name) for name, look in looks.items()]
+    speeds = np.concatenate([branch.belt_speeds for branch in found.equilibria])
+    rests = np.concatenate([branch.least for branch in found.equilibria])
+    for point in found.hopf_points:
+        rest = np.interp(point.belt_speed, speeds, rests)
+        label = f"Hopf point {units.text(point.belt_speed, 'm/s')}"
+        handles += axes.plot(point.belt_speed / speed, rest / length, **_POINT, label=label)
+    onset, own = found.sticking_onset, found.drive.belt_speed
+    for fold in found.folds:
+        name = "fold"
+        if onset is not None and isclose(fold, onset, rel_tol=_SAME):
+            name, onset = "fold, onset of sticking", None
+        for branch in found.cycles:
+            for end in (0, -1):
+                if branch.belt_speeds[end] == fold:
+                    ends = branch.least[end] / length, branch.greatest[end] / length
+                    axes.plot([fold / speed] * 2, ends, **_FOLD)
+        handles.append(Line2D([], [], **_FOLD, label=f"{name} {units.text(fold, 'm/s')}"))
+    if onset is not None:
+        label = f"onset of sticking {units.text(onset, 'm/s')}"
+        handles.append(axes.axvline(onset / speed, **_ONSET, label=label))
+    if own != 0.0:
+        label = f"belt speed of the drive {units.text(own, 'm/s')}"
+        handles.append(axes.axvline(own / speed, **_NOW, label=label))
+    low, high = found.belt_speeds[[0, -1]].tolist()
+    axes.set_xlim(min(low, own, 0.0) / speed, max(high, own, 0.0) / speed)
+    axes.set_xlabel(x_label)
+    axes.set_ylabel(y_label)
+    finish(figure)
+    style.legend_below(figure, handles, most=3)
+    _name_regions(figure, axes, found, speed)
+    return figure
+
+
+def _look(branch: Branch, regime: Regime) -> tuple[str, dict[str, Any]]:
+    """Return the name of a branch, where it has that regime, and the look of its line."""
+    look: dict[str, Any] = {"color": REGIMES[regime].colour, "lw": _WIDTHS[regime]}
+    name = Regime.label(regime)
+    return (f"{name}, stable", look) if branch.stable else (f"{name}, unstable", look | _DASHED)
+
+
+def _regions(found: BifurcationBranches) -> Iterator[tuple[float, float, str]]:
+    """Yield ranges of belt speeds with the motions that the drive settles to."""
+    low, high = found.belt_speeds[[0, -1]].tolist()
+    onset = [] if found.sticking_onset is None else [found.sticking_onset]
+    edges = [point.belt_speed for point in found.hopf_points] + found.folds + onset
+    start, before = low, ""
+    for left, right in pairwise([low, *sorted(edges), high]):
+        name = _settles(found, (left + right) / 2.0)
+        if left > start and name != before:
+            yield start, left, before
+            start = left
+        before = name
+    yield start, high, before
+
+
+def _settles(found: BifurcationBranches, belt_speed: float) -> str:
+    """Return the stable motions at a belt speed."""
+    motions: dict[str, None] = {}
+    for branches, rests in ((found.cycles, False), (found.equilibria, True)):
+        for branch in branches:
+            speeds = branch.belt_speeds
+            if branch.stable and speeds[0] <= belt_speed <= speeds[-1]:
+                nearest = int(np.abs(speeds - belt_speed).argmin())
+                cycle = Regime.STICK_SLIP if branch.sticks[nearest] else Regime.PURE_SLIP
+                motions["rest" if rests else Regime.label(cycle)] = None
+    return " or ".join(motions)
+
+
+def _name_regions(figure: Figure, axes: Axes, found: BifurcationBranches, speed: float) -> None:
+    """Write above each range of belt speeds what the drive settles to, upright if it is narrow."""
+    points = 8.0
+    figure.draw_without_rendering()
+    box = axes.get_window_extent()
+    width, height = box.width / figure.dpi, box.height / figure.dpi
+    left, right = axes.get_xlim()
+    line, deepest = 1.5 * points / 72.0, 0.0
+    for start, end, name in _regions(found):
+        room = width * (end - start) / speed / (right - left)
+        written = text_width(name, points)
+        upright = written > 0.95 * room
+        if end != found.belt_speeds[-1]:
+            axes.axvline(end / speed, **_BORDER)
+        if not name or (upright and room < line):
+            continue
+        deepest = max(deepest, written if upright else line)
+        axes.annotate(
+            name, ((start + end) / 2.0 / speed, 1.0), (0.0, -3.0),
+            xycoords=("data", "axes fraction"), textcoords="offset points", fontsize=points,
+            ha="center", va="top", rotation=90.0 if upright else 0.0,
+        )  # fmt: skip
+    bottom, top = axes.get_ylim()
+    share = min((deepest + 0.1) / height, 0.6)
+    axes.set_ylim(bottom, bottom + (top - bottom) / (1.0 - share))

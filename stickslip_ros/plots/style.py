@@ -1,14 +1,14 @@
-"""Common style of the figures: lines, fonts and colours, and how figures are saved."""
+"""Common style of the figures: lines, fonts, colours and regimes, and how figures are saved."""
 
 import re
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial, wraps
 from io import BytesIO
 from itertools import accumulate
 from pathlib import Path
 from textwrap import fill
-from typing import Any, ParamSpec, TypeVar, cast
+from typing import Any, NamedTuple, ParamSpec, TypeVar, cast
 
 import matplotlib as mpl
 import numpy as np
@@ -23,6 +23,7 @@ from PIL import Image
 
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.files import written
+from stickslip_ros.physics.measures.cycle_measures import Regime
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.text import printable, shown
 
@@ -34,6 +35,35 @@ YELLOW, PURPLE, AMBER = "#F0E442", "#CC79A7", "#E69F00"
 
 LIGHT_GREY = "#CCCCCC"
 """Colour of elements without information."""
+
+INK = "#333333"
+"""Colour of hatches, visible on every colour except black."""
+
+
+class Look(NamedTuple):
+    """Colour and label of a regime, with marker and hatch to distinguish it without colour."""
+
+    colour: str
+    label: str
+    marker: str
+    hatch: str
+    """Hatch pattern, drawn in `INK`."""
+
+
+REGIMES: Mapping[Regime | None, Look] = {
+    regime: Look(colour, Regime.label(regime), marker, hatch)
+    for regime, colour, marker, hatch in (
+        (Regime.STICK_SLIP, ORANGE, "o", ""),
+        (Regime.PURE_SLIP, BLUE, "^", "..."),
+        (Regime.EQUILIBRIUM, GREEN, "s", "///"),
+        (Regime.HELD, SKY_BLUE, "v", "---"),
+        (Regime.STUCK, GREY, "D", "xxx"),
+        (Regime.UNBOUNDED, "black", "X", ""),
+        (Regime.UNDERSAMPLED, YELLOW, "p", "+++"),
+        (None, LIGHT_GREY, "P", "\\\\\\"),
+    )
+}
+"""Look by regime; None is for a motion without one."""
 
 DASHES = ("--", ":", "-.")
 """Line styles of markers, in turn, so that colour is not the only distinction."""

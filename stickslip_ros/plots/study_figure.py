@@ -1,4 +1,4 @@
-"""Figures of a sweep: a bifurcation diagram over one parameter, a map over two."""
+"""Figures of studies: the bifurcation diagram or map of a sweep, and basins of attraction."""
 
 from collections.abc import Iterator, Sequence
 from itertools import chain, cycle
@@ -9,27 +9,36 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.colors import to_rgb
+from matplotlib.colors import ListedColormap, to_rgb
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
+from matplotlib.patches import Patch, PathPatch
+from matplotlib.path import Path
 
-from stickslip_ros.arrays import FloatArray
+from stickslip_ros.arrays import BoolArray, FloatArray
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.measures.cycle_measures import Regime
-from stickslip_ros.plots.regimes import REGIMES, Look, draw_cells, patch
+from stickslip_ros.plots.study_tables import attractor_name
 from stickslip_ros.plots.style import (
+    AMBER,
     DASHES,
     GREY,
+    INK,
     LIGHT_GREY,
     MANY,
+    PURPLE,
+    REGIMES,
     SCREEN,
+    SKY_BLUE,
+    YELLOW,
     FigureStyle,
+    Look,
     finish,
     styled,
     title_of,
 )
 from stickslip_ros.plots.units import Units
+from stickslip_ros.studies.basin import POSITION, VELOCITY, Attractor, Basins
 from stickslip_ros.studies.columns import Columns
 from stickslip_ros.studies.plan import Axis, Continuation, Grid
 from stickslip_ros.studies.study import Study
@@ -192,15 +201,62 @@ def map_figure(
     handles: list[Artist] = []
     for regime, look in _present(columns):
         if regime is not None and colour == "regime":
-            handles.append(patch(look, look.label))
+            handles.append(_patch(look, look.label))
         elif regime is Regime.UNBOUNDED:
-            handles.append(patch(_AWAY, look.label))
+            handles.append(_patch(_AWAY, look.label))
     if _are(columns.regime, None).any():
         handles.append(Patch(**_HATCH, label="no result"))
     handles += [
         Line2D([], [], color="black", ls=dashes, label=name) for name, _, dashes in _curves(found)
     ]
     style.legend_below(figure, handles, most=4)
+    finish(figure)
+    return figure
+
+
+@styled
+def basin_figure(
+    columns: Columns, basins: Basins, study: Study, *, style: FigureStyle = SCREEN
+) -> Figure:
+    """Return the figure of which attractor each start of a study leads to.
+
+    A line marks the belt speed and a circle the equilibrium, if there is one.
+    """
+    plan, drive = study.plan, study.scenario.plant.as_drive()
+    units, belt_speed = Units.for_drive(drive), drive.belt_speed
+    position, velocity = columns.values[POSITION], columns.values[VELOCITY]
+    figure = style.figure(7.5, 6.8, narrow=1.25)
+    title = title_of("Basins of attraction", study.scenario)
+    style.set_title(figure, title, f"the motion that each of {plan.size} starts leads to")
+    axes = figure.subplots()
+    axes.grid(visible=False)
+    length, x_label = units.axis(units.named("initial displacement"), "m", position)
+    speed, y_label = units.axis(units.named("initial velocity"), "m/s", velocity, belt_speed)
+    x, y = position / length, velocity / speed
+    handles: list[Any] = []
+    rasterized = plan.size > MANY
+    area = float(np.clip(2e5 / max(plan.size, 1), 4.0, 30.0))
+    looks = _looks([attractor.regime for attractor in basins.attractors])
+    for number, (look, found) in enumerate(zip(looks, basins.attractors, strict=True)):
+        of_it, label = basins.places == number, _label(found, units)
+        if isinstance(plan, Grid):
+            middles = x.reshape(plan.shape), y.reshape(plan.shape)
+            _draw_cells(axes, *middles, of_it.reshape(plan.shape), look, shading="nearest")
+            handles.append(_patch(look, label))
+        else:
+            points: Any = {"color": look.colour, "marker": look.marker, "label": label}
+            axes.scatter(x[of_it], y[of_it], s=area, lw=0.0, rasterized=rasterized, **points)
+            handles.append(Line2D([], [], ls="", **points))
+    if isinstance(plan, Grid):  # white below black is visible on any colour
+        axes.axhline(belt_speed / speed, color="white", lw=3.0)
+    belt: Any = {"color": "black", "lw": 1.2, "ls": "--", "label": "belt speed"}
+    handles.append(axes.axhline(belt_speed / speed, **belt))
+    if drive.has_spring:
+        circle: Any = {"color": "white", "mec": "black", "mew": 1.5, "marker": "o", "ls": ""}
+        axes.plot(drive.equilibrium_position / length, 0.0, ms=8.0, **circle)
+        handles.append(Line2D([], [], label="equilibrium", **circle))
+    axes.set(xlabel=x_label, ylabel=y_label)
+    style.legend_below(figure, handles, most=2)
     finish(figure)
     return figure
 
@@ -286,14 +342,14 @@ def _draw_regimes(axes: Axes, columns: Columns, grid: Grid, rows: slice) -> None
     for regime, look in _present(columns):
         if regime is not None:
             of_it = _are(columns.regime[rows], regime).reshape(grid.shape).T
-            draw_cells(axes, x, y, of_it, look)
+            _draw_cells(axes, x, y, of_it, look)
 
 
 def _draw_values(axes: Axes, columns: Columns, grid: Grid, rows: slice, values: FloatArray) -> Any:
     """Draw the cells of a map by a measure; return the mesh for a colour bar."""
     x, y = (_edges(axis) for axis in grid.axes)
     away = _are(columns.regime[rows], Regime.UNBOUNDED).reshape(grid.shape).T
-    draw_cells(axes, x, y, away, _AWAY)
+    _draw_cells(axes, x, y, away, _AWAY)
     cells = np.ma.masked_invalid(values[rows].reshape(grid.shape).T)
     largest = float(np.nanmax(values, initial=0.0)) or 1.0
     rasterized = cells.size > MANY
@@ -333,3 +389,54 @@ def _scale(axis: Axis) -> dict[str, Any]:
     if axis.first > 0.0:
         return {"value": "log"}
     return {"value": "symlog", "linthresh": min(abs(axis.first), abs(axis.last))}
+
+
+def _looks(regimes: Sequence[Regime | None]) -> Iterator[Look]:
+    """Yield the look of each attractor: that of its regime, or another one if that is in use."""
+    colours = cycle((SKY_BLUE, YELLOW, PURPLE, AMBER))
+    # Together they repeat after twenty.
+    more = zip(colours, cycle("v*P<>"), cycle(("+++", "", "ooo", "|||", "---")), strict=False)
+    for number, regime in enumerate(regimes):
+        look = REGIMES[regime]
+        if regime in regimes[:number]:
+            colour, marker, hatch = next(more)
+            look = look._replace(colour=colour, marker=marker, hatch=hatch)
+        yield look
+
+
+def _label(attractor: Attractor, units: Units) -> str:
+    amplitude = ""
+    if attractor.amplitude is not None:
+        amplitude = f", amplitude {units.text(attractor.amplitude, 'm')}"
+    share, error = 100.0 * attractor.share, 100.0 * attractor.standard_error
+    return (
+        f"{attractor_name(attractor)}{amplitude}: {share:.1f} % \N{PLUS-MINUS SIGN} {error:.1f} %"
+    )
+
+
+def _draw_cells(
+    axes: Axes, x: FloatArray, y: FloatArray, shown: BoolArray, look: Look, **more: Any
+) -> None:
+    """Fill the cells of a grid that are `shown`, in the colour and with the hatch of a look."""
+    if not shown.any():
+        return
+    rasterized = shown.size > MANY
+    filling = ListedColormap([look.colour])
+    cells = np.where(shown, 0.0, np.nan)
+    mesh: Any = axes.pcolormesh(x, y, cells, cmap=filling, rasterized=rasterized, **more)
+    if not look.hatch:
+        return
+    # One outline of all cells: hatching each cell takes a hundred times as long.
+    corners = mesh.get_coordinates()
+    around = corners[:-1, :-1], corners[:-1, 1:], corners[1:, 1:], corners[1:, :-1]
+    outlines = np.stack([corner[shown] for corner in (*around, around[0])], axis=1)
+    codes = [Path.MOVETO, Path.LINETO, Path.LINETO, Path.LINETO, Path.CLOSEPOLY]
+    outline: Any = Path(outlines.reshape(-1, 2), np.tile(codes, len(outlines)))
+    hatched: Any = PathPatch(outline, lw=0.0, rasterized=rasterized, hatch=look.hatch)
+    hatched.set(facecolor="none", edgecolor=INK)
+    axes.add_patch(hatched)
+
+
+def _patch(look: Look, label: str) -> Patch:
+    """Return the legend entry of such cells."""
+    return Patch(facecolor=look.colour, hatch=look.hatch, edgecolor=INK, lw=0.0, label=label)

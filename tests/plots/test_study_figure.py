@@ -1,17 +1,23 @@
-"""The figures of sweeps: diagrams over one parameter, maps over two."""
+"""The figures of studies: diagrams and maps of sweeps, and basins of attraction."""
 
+from collections.abc import Sequence
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 from matplotlib.axes import Axes
 from matplotlib.colors import to_hex
+from matplotlib.figure import Figure
 
-from stickslip_ros.plots.style import BLUE, GREEN, LIGHT_GREY, ORANGE, STYLES
-from stickslip_ros.plots.sweep_figure import diagram_figure, map_figure
+from stickslip_ros.physics.measures.cycle_measures import Regime
+from stickslip_ros.plots.study_figure import basin_figure, diagram_figure, map_figure
+from stickslip_ros.plots.style import BLUE, GREEN, LIGHT_GREY, ORANGE, REGIMES, STYLES
 from stickslip_ros.scenarios.files import load_scenario
+from stickslip_ros.studies.basin import POSITION, VELOCITY, Attractor
 from stickslip_ros.studies.columns import Columns
-from stickslip_ros.studies.plan import Axis, Continuation, Grid
+from stickslip_ros.studies.plan import Axis, Continuation, Grid, Plan, RandomSample
 from stickslip_ros.studies.runner import compute_columns
 from stickslip_ros.studies.settling import SettlingOptions
 from stickslip_ros.studies.study import Study
@@ -193,3 +199,95 @@ def test_beside_a_colour_bar_what_runs_away_is_grey() -> None:
     figure = map_figure(*found, "amplitude")
     assert cells(figure.axes[0])[LIGHT_GREY][2] >= 1
     assert "unbounded" in legend_texts(figure)
+
+
+MANY = [Regime.STICK_SLIP, Regime.PURE_SLIP, Regime.EQUILIBRIUM] * 7
+BASINS = [
+    Attractor(Regime.STICK_SLIP, True, 0.318, 0.1, 825, 0.688, 0.007),
+    Attractor(Regime.EQUILIBRIUM, True, None, None, 375, 0.312, 0.007),
+]
+X, Y = Axis(POSITION, -2.0, 2.0, 40), Axis(VELOCITY, -1.0, 1.0, 30)
+POSITIONS, VELOCITIES = (each.ravel() for each in np.meshgrid(X.values(), Y.values()))
+
+
+def at_rest(position: npt.NDArray[Any], velocity: npt.NDArray[Any]) -> npt.NDArray[np.intp]:
+    """Return which starts are within an ellipse around an equilibrium at rest; others vibrate."""
+    return ((position - 0.25) ** 2 + 4.0 * velocity**2 < 1.0).astype(np.intp)
+
+
+def drawn_basins(
+    plan: Plan,
+    position: npt.NDArray[Any],
+    velocity: npt.NDArray[Any],
+    attractor: npt.NDArray[np.intp],
+    attractors: Sequence[Attractor],
+    *,
+    scenario: str = "paper",
+    style: str = "screen",
+) -> Figure:
+    study: Any = Study(load_scenario(scenario, [FREE]), plan, SettlingOptions())
+    values = {POSITION: position, VELOCITY: velocity}
+    columns: Any = SimpleNamespace(values=values)
+    basins: Any = SimpleNamespace(attractors=attractors, places=attractor)
+    return basin_figure(columns, basins, study, style=STYLES[style])
+
+
+@in_styles
+def test_of_a_grid_each_basin_has_its_cells(style: str) -> None:
+    found = at_rest(POSITIONS, VELOCITIES)
+    figure = drawn_basins(Grid((Y, X)), POSITIONS, VELOCITIES, found, BASINS, style=style)
+    assert faults(figure) == []
+    (axes,) = figure.axes
+    assert axes.get_xlabel() == "initial displacement $X(0)$ (dimensionless)"
+    for number, colour in enumerate((ORANGE, GREEN)):
+        of_it = found == number
+        middle = POSITIONS[of_it].mean(), VELOCITIES[of_it].mean(), of_it.sum()
+        assert cells(axes)[colour] == pytest.approx(middle, abs=1e-9)
+    assert legend_texts(figure) == [
+        "stick-slip, amplitude 0.318: 68.8 % ± 0.7 %", "equilibrium: 31.2 % ± 0.7 %",
+        "belt speed", "equilibrium",
+    ]  # fmt: skip
+    assert "the motion that each of 1200 starts leads to" in figure.get_suptitle().replace(
+        "\n", " "
+    )
+
+
+def test_a_grid_may_have_the_positions_first() -> None:
+    velocity, position = (each.ravel() for each in np.meshgrid(Y.values(), X.values()))
+    # There are as many attractors as look different.
+    attractors = [Attractor(regime, True, None, None) for regime in MANY]
+    attractor = np.arange(1200) % len(MANY)
+    figure = drawn_basins(Grid((X, Y)), position, velocity, attractor, attractors)
+    (axes,) = figure.axes
+    first = attractor == 0
+    middle = position[first].mean(), velocity[first].mean(), first.sum()
+    assert cells(axes)[ORANGE] == pytest.approx(middle, abs=1e-9)
+    patches: Any = figure.legends[0].legend_handles[: len(MANY)]
+    assert len({(patch.get_facecolor(), patch.get_hatch()) for patch in patches}) == len(MANY)
+
+
+def test_scattered_starts_are_in_the_units_of_the_drive() -> None:
+    attractors = [Attractor(regime, True, None, None) for regime in MANY]
+    sample = RandomSample((X, Y), 1200, 1)
+    starts = 1e-3 * POSITIONS, 1e-3 * VELOCITIES, np.arange(1200) % len(MANY)
+    figure = drawn_basins(sample, *starts, attractors, scenario="feed_drive")
+    (axes,) = figure.axes
+    assert axes.get_xlabel() == "initial displacement $x(0)$ (mm)"
+    assert axes.get_ylabel() == "initial velocity $x'(0)$ (mm/s)"
+    *_, belt, equilibrium = axes.lines
+    assert belt.get_ydata() == pytest.approx([40.0, 40.0])
+    assert equilibrium.get_xdata() == pytest.approx([0.2584], abs=1e-4)
+    # The line of the belt speed hides no points.
+    assert "white" not in {line.get_color() for line in axes.lines if line.get_marker() == "None"}
+    points: Any = figure.legends[0].legend_handles[: len(MANY)]
+    assert len({(point.get_color(), point.get_marker()) for point in points}) == len(MANY)
+
+
+def test_regimes_differ_in_more_than_colour() -> None:
+    for place in ("marker", "label", "colour"):
+        assert len({getattr(look, place) for look in REGIMES.values()}) == len(REGIMES)
+    # Those that have none are as different as dark and bright.
+    assert [regime for regime, look in REGIMES.items() if not look.hatch] == [
+        Regime.STICK_SLIP,
+        Regime.UNBOUNDED,
+    ]
