@@ -5,23 +5,28 @@ from dataclasses import replace
 
 import numpy as np
 
-from stickslip_ros.arrays import rms
+from stickslip_ros.arrays import FloatArray, rms
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.identification.candidates import Candidate
-from stickslip_ros.identification.curves import (
-    CoulombCurve,
-    Curve,
-    ExponentialCurve,
-    FollowedCurve,
-    SaturatingCurve,
-    SteppedCurve,
-    StribeckCurve,
+from stickslip_ros.identification.fit import Candidate
+from stickslip_ros.identification.laws import (
+    DELAY,
+    STATIC_LAWS,
+    BristledTableAdapter,
+    IdentifiedLaw,
+    SaturatingAdapter,
+    TableAdapter,
 )
-from stickslip_ros.identification.filtered import filtered
-from stickslip_ros.identification.free_runs import adjusted
-from stickslip_ros.identification.friction_models import DELAY
 from stickslip_ros.identification.record import Record
-from stickslip_ros.identification.regression import LINEAR, Regression, Rows, regress
+from stickslip_ros.identification.regression import (
+    DECIMATION,
+    LINEAR,
+    Regression,
+    Rows,
+    filtered,
+    regress,
+    solve,
+)
+from stickslip_ros.identification.trajectory import Predictor, delayed, free_run
 
 _RESOLVED_ERROR_RATIO = 0.9
 """Share of the error to which a delay or a memory must lower it to be believed."""
@@ -31,6 +36,14 @@ _KNOTS = 9
 _DEFLECTIONS = (1e-5, 1e-4, 1e-3)
 """Deflections that are tried first, shares of the range of the positions."""
 
+_UNBOUNDED_ERROR = 1e3
+"""Error of a free run that is not bounded, in units of that of the regression."""
+_FREE_RUN_STEPS = 3
+"""Steps in which forces and free runs are fitted together."""
+_FREE_WEIGHT = 1.4
+"""Weight of the free run beside that of the forces."""
+_STEP = 1e-4
+"""Step of differences, as a share of the value."""
 AXIS_LAWS = ("coulomb", "stribeck", "exponential", "table", "lugre")
 """Laws that can be identified for an axis without a spring."""
 
@@ -53,20 +66,20 @@ class AxisTask:
         self.delay: float | None = fixed.get(DELAY)
         self._filtered = [filtered(each, decimated=True) for each in records]
         self._by_delay: dict[float, Rows] = {}
-        self.rows = Rows.of(self._filtered) if self.delay is None else self._rows(self.delay)
+        self.rows = self._rows(self.delay)
 
     def candidates(self, law: str, progress: Callable[[str], None]) -> list[Candidate]:
         """Return the fits of the laws that compete, or of the one that is asked for."""
-        curves: list[Curve] = [CoulombCurve(), StribeckCurve(), ExponentialCurve()]
-        quantiles = np.quantile(self.rows.speeds, np.linspace(0.0, 1.0, _KNOTS)).tolist()
-        tables = [SaturatingCurve(), SteppedCurve((0.0, *quantiles[1:]))]
         found: list[Candidate] = []
-        for curve in curves:
-            if law in ("auto", curve.name):
-                progress(curve.name)
-                found.append(self._with_delay(curve))
+        for each in STATIC_LAWS:
+            if law in ("auto", each.name):
+                progress(each.name)
+                found.append(self._with_delay(each))
         if law in ("auto", "table", "lugre"):
             progress("table")
+            knots = np.quantile(self.rows.speeds, np.linspace(0.0, 1.0, _KNOTS))
+            knots[0] = 0.0
+            tables = SaturatingAdapter(self.rows.curve_speeds), TableAdapter(knots)
             best = min(map(self._with_delay, tables), key=lambda each: each.error)
             found += [best] if law != "lugre" else []
             if law != "table":
@@ -79,76 +92,202 @@ class AxisTask:
         fit = found.fit
         assert isinstance(fit, Regression)
         fit.require("mass")
-        if fit.curve.name != "table":
-            return found
-        return replace(found, fit=adjusted(fit, self.records, found.delay or 0.0))
+        return replace(found, fit=adjusted(fit, self.records)) if found.law == "table" else found
 
-    def _with_delay(self, curve: Curve) -> Candidate:
+    def _with_delay(self, law: IdentifiedLaw) -> Candidate:
         """Return a fit with a delay if the records ask for one."""
-        plain = self._candidate(self.rows, curve, self.delay)
+        fit = plain = regress(self.rows, law, self.free, self.fixed)
+        found = Candidate(plain, plain.held_out)
         if self.delay is not None:
-            return plain
-        fit, found = plain.fit, plain
+            return found
         period = self.records[0].period
         tried: Sequence[float] = _DELAYS.tolist()
         for step in (0.25, 0.05):
-            assert isinstance(fit, Regression)
-            if found.delay is not None:
-                tried = (found.delay / period + step * np.arange(-5.0, 6.0)).tolist()
-            errors = [_error_with(fit, self._rows(each * period)) for each in tried]
-            delay = tried[int(np.argmin(errors))] * period
-            found = self._candidate(self._rows(delay), curve, delay)
-            fit = found.fit
-        return found if found.error < _RESOLVED_ERROR_RATIO * plain.error else plain
+            if fit.delay is not None:
+                tried = (fit.delay / period + step * np.arange(-5.0, 6.0)).tolist()
+            errors = [
+                _loss(replace(fit, rows=self._rows(each * period)).refitted()) for each in tried
+            ]
+            fit = regress(
+                self._rows(tried[int(np.argmin(errors))] * period), law, self.free, self.fixed
+            )
+        other = Candidate(fit, fit.held_out)
+        return other if other.error < _RESOLVED_ERROR_RATIO * found.error else found
 
     def _with_memory(self, static: Candidate, *, asked: bool) -> Candidate:
-        """Return the fit whose friction follows the curve of another over a path."""
+        """Return the fit whose friction follows the table of another over a path."""
         fit = static.fit
         assert isinstance(fit, Regression)
+        table = fit.curve
+        assert isinstance(table, TableAdapter)
+        if not table.shaped:
+            table = TableAdapter(self.rows.curve_speeds, table.speeds)
         span = max(float(np.ptp(record.position)) for record in self.records)
         tried: dict[float, Regression] = {}
 
         def error(deflection: float) -> float:
-            curve = FollowedCurve(fit.curve, deflection)
-            own = replace(fit, curve=curve).refitted()
-            tried[deflection] = own
-            return float(own.residual @ own.residual)
+            tried[deflection] = replace(
+                fit, curve=BristledTableAdapter(table, deflection)
+            ).refitted()
+            return _loss(tried[deflection])
 
         best = min((share * span for share in _DEFLECTIONS), key=error)
         for factor in (0.2, 0.4, 2.0, 4.0):
             error(factor * best)
-        nearest = min(tried.values(), key=lambda each: float(each.residual @ each.residual))
-        found = self._as_candidate(nearest, static.delay)
+        nearest = min(tried.values(), key=_loss)
+        found = Candidate(nearest, nearest.held_out)
         if asked or found.error < _RESOLVED_ERROR_RATIO * static.error:
             return found
         share = f"{1.0 - _RESOLVED_ERROR_RATIO:.0%}"
         remark = f"predicts better by less than {share}: not resolved by filtered rows"
         return replace(found, remark=remark)
 
-    def _candidate(self, rows: Rows, curve: Curve, delay: float | None) -> Candidate:
-        return self._as_candidate(regress(rows, curve, self.free, self.fixed), delay)
-
-    def _as_candidate(self, fit: Regression, delay: float | None) -> Candidate:
-        scale = rms(fit.rows.force)
-        size = len(fit.values) + len(fit.shapes) + (fit.curve.deflection > 0.0)
-        return Candidate(fit.curve.name, size, fit.held_out, scale, fit, delay)
-
-    def _rows(self, delay: float) -> Rows:
+    def _rows(self, delay: float | None) -> Rows:
+        if delay is None:
+            return Rows.of(self._filtered, None)
         if delay not in self._by_delay:
             pairs = zip(self._filtered, self.records, strict=True)
-            rows = Rows.of([columns.with_delay(record, delay) for columns, record in pairs])
-            if delay not in self._tried_first:
+            rows = Rows.of([columns.with_delay(record, delay) for columns, record in pairs], delay)
+            # Delays that are tried for each curve: their rows are kept.
+            if delay not in [each * self.records[0].period for each in _DELAYS.tolist()]:
                 return rows
             self._by_delay[delay] = rows
         return self._by_delay[delay]
 
-    @property
-    def _tried_first(self) -> Sequence[float]:
-        """Delays that are tried for each curve, s: their rows are kept."""
-        return [each * self.records[0].period for each in _DELAYS.tolist()]
+
+def _loss(fit: Regression) -> float:
+    return float(fit.residual @ fit.residual)
 
 
-def _error_with(fit: Regression, rows: Rows) -> float:
-    """Return the squared error of a curve with its shapes, fitted to rows with another delay."""
-    residual = replace(fit, rows=rows).refitted().residual
-    return float(residual @ residual)
+def adjusted(fit: Regression, records: Sequence[Record]) -> Regression:
+    """Return a regression whose forces fit, and whose free run through each record, too.
+
+    The sum of both mean squares is least, each in units of what the regression leaves. `records`
+    are those that it was fitted to.
+    """
+    from scipy.optimize import least_squares
+
+    task = _FreeRuns(fit, records)
+    start = task.linear()
+    slowest = np.full(len(fit.shapes), fit.rows.least_shape(fit.curve))
+    least = np.array([*fit.least, *slowest, *[-np.inf] * len(records)])
+    solved = least_squares(
+        task.residual,
+        np.maximum(start, least + 1e-9),
+        bounds=(least, np.inf),
+        x_scale=np.maximum(np.abs(start), 1e-3),
+        diff_step=_STEP,
+        max_nfev=_FREE_RUN_STEPS,
+    )
+    return fit.at(solved.x)
+
+
+class _FreeRuns:
+    """The forces of a regression and the free runs of its drive, as one residual.
+
+    A point has the unknowns and the shapes of the regression, then the velocity at the start of
+    each record.
+    """
+
+    def __init__(self, fit: Regression, records: Sequence[Record]) -> None:
+        self._fit = fit
+        records = [delayed(record, fit.delay or 0.0) for record in records]
+        self._predictors = [Predictor(record) for record in records]
+        self._measured = np.concatenate([record.position for record in records])
+        self._records = records
+        left = np.concatenate([run for _, run in self._runs(fit)]) - self._measured
+        count = len(fit.residual)
+        self._weights = (
+            1.0 / (rms(fit.residual) * np.sqrt(count)),
+            _FREE_WEIGHT / (rms(left) * np.sqrt(len(left))),
+        )
+        # The same weight for a run that is sampled as the rows are.
+        self._row_weight = _FREE_WEIGHT / (rms(left) * np.sqrt(count))
+
+    def residual(self, point: FloatArray) -> FloatArray:
+        """Return the errors of the forces and of the simulated free runs, weighted."""
+        own = self._fit.at(point)
+        drive = own.drive(1.0)
+        positions: list[FloatArray] = []
+        for each, speed in zip(
+            self._predictors, point[-len(self._predictors) :].tolist(), strict=True
+        ):
+            measured = each.record.position
+            positions.append(each.positions(drive, 0, len(measured), float(measured[0]), speed))
+        errors = np.concatenate(positions) - self._measured
+        errors = np.nan_to_num(errors, nan=_UNBOUNDED_ERROR / self._weights[1])
+        return np.concatenate([own.residual * self._weights[0], errors * self._weights[1]])
+
+    def linear(self) -> FloatArray:
+        """Return the point at which the residual is least if errors of force move the mass alone.
+
+        The position error of a free run is then the force error through mass and viscous friction,
+        which is linear in the unknowns.
+        """
+        from scipy.optimize import least_squares
+        from scipy.signal import lfilter
+
+        fit, parts = self._fit, self._fit.rows.parts
+        mass = fit.constants["mass"]
+        speed, typical = fit.rows.speeds, rms(fit.rows.speeds)
+        rate = max(_slope(fit, typical, float(speed[-1])) / mass, 1e-3)
+        lengths = [len(part.rows(part.time)) for part in parts]
+        steps = [float(part.time[1] - part.time[0]) * DECIMATION for part in parts]
+        place = np.split(np.arange(sum(lengths)), np.cumsum(lengths)[:-1])
+
+        def positions(columns: FloatArray) -> FloatArray:
+            made: list[FloatArray] = []
+            for rows, step in zip(place, steps, strict=True):
+                speeds = lfilter([step / mass], [1.0, -np.exp(-rate * step)], columns[rows], 0)
+                made.append(np.cumsum(speeds, axis=0) * step)
+            return np.concatenate(made)
+
+        by_speed = np.zeros((len(fit.residual), len(parts)))
+        for number, (rows, step) in enumerate(zip(place, steps, strict=True)):
+            by_speed[rows, number] = -np.expm1(-rate * step * np.arange(len(rows))) / rate
+
+        def solved(shapes: FloatArray) -> tuple[FloatArray, FloatArray]:
+            design, wanted = replace(fit, shapes=shapes).system
+            matrix = np.vstack(
+                [
+                    np.hstack([design * self._weights[0], np.zeros_like(by_speed)]),
+                    np.hstack([positions(design), by_speed]) * self._row_weight,
+                ]
+            )
+            target = np.concatenate(
+                [wanted * self._weights[0], positions(wanted) * self._row_weight]
+            )
+            least = np.array([*fit.least, *[-np.inf] * len(parts)])
+            values = solve(matrix, target, least)
+            return values, target - matrix @ values
+
+        def by_logarithms(logarithms: FloatArray) -> FloatArray:
+            return solved(np.exp(logarithms))[1]
+
+        shapes = fit.shapes
+        if len(shapes):
+            lowest = np.log(fit.rows.least_shape(fit.curve))
+            found = least_squares(
+                by_logarithms,
+                np.maximum(np.log(shapes), lowest),
+                bounds=(lowest, np.inf),
+                diff_step=1e-3,
+                max_nfev=10,
+            )
+            shapes = np.exp(found.x)
+        values, _ = solved(shapes)
+        point = np.concatenate([values[: len(fit.unknowns)], shapes])
+        return np.concatenate([point, [speed for speed, _ in self._runs(self._fit.at(point))]])
+
+    def _runs(self, fit: Regression) -> list[tuple[float, FloatArray]]:
+        drive = fit.drive(1.0)
+        return [free_run(record, drive) for record in self._records]
+
+
+def _slope(fit: Regression, low: float, high: float) -> float:
+    """Return the mean slope of the friction curves between two speeds, N s/m."""
+    slopes: list[float] = []
+    for sign in fit.directions:
+        low_force, high_force = fit.force_at(fit.point, sign, np.array([low, high]))
+        slopes.append(float(high_force - low_force) / (high - low))
+    return float(np.mean(slopes))

@@ -7,26 +7,23 @@ from math import inf, pi, sqrt
 
 import numpy as np
 
-from stickslip_ros.arrays import FloatArray
+from stickslip_ros.arrays import FloatArray, rms
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.identification.candidates import Candidate
-from stickslip_ros.identification.curves import Curve
-from stickslip_ros.identification.filtered import filtered
-from stickslip_ros.identification.friction_models import (
+from stickslip_ros.identification.fit import Candidate
+from stickslip_ros.identification.laws import (
     DAHL,
     DELAY,
     EXPONENTIAL,
     LUGRE,
-    MEMORY_MODELS,
-    STATIC_MODELS,
-    DirectionalModel,
-    FrictionModel,
-    Model,
-    TableModel,
+    MEMORY_LAWS,
+    STATIC_LAWS,
+    DirectionalAdapter,
+    IdentifiedLaw,
+    TableAdapter,
 )
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.refinement import Refinement, refine, restarted
-from stickslip_ros.identification.regression import LINEAR, Regression, Rows, regress
+from stickslip_ros.identification.regression import LINEAR, Regression, Rows, filtered, regress
 from stickslip_ros.identification.trajectories import Trajectories, segments_of
 from stickslip_ros.identification.trajectory import Predictor
 
@@ -63,9 +60,9 @@ _ZERO_ERRORS = 3.0
 AUTO = "auto"
 """Law that stands for the one that predicts held-out parts best."""
 DRIVE_LAWS = (
-    *(model.law for model in STATIC_MODELS),
-    TableModel.law,
-    *(model.law for model in MEMORY_MODELS),
+    *(law.name for law in STATIC_LAWS),
+    TableAdapter.name,
+    *(law.name for law in MEMORY_LAWS),
 )
 """Laws that can be identified for a drive on a spring."""
 _MOST_SAMPLES = 15_000
@@ -74,6 +71,8 @@ _POINTS = 8
 """Number of points of friction without a law."""
 _SPEEDS = ("minimum_speed", "decay_speed")
 """Constants of friction that are speeds and not forces."""
+_LEAST_SHARE = 1e-9
+"""Smallest friction from which a search starts, as a share of the other forces."""
 OPTIONAL = ("damping", "bias_force", DELAY)
 """Constants that are fitted only if the record asks for them."""
 
@@ -99,13 +98,13 @@ class DriveTask:
         parts = [
             filtered(each, decimated=False, delay=self.fixed.get(DELAY, 0.0)) for each in records
         ]
-        self.rows = Rows.of(parts)
+        self.rows = Rows.of(parts, None)
         self.predictors = [Predictor(record) for record in records]
 
     @cached_property
     def constants(self) -> Mapping[str, float]:
         """Mass and stiffness by the regression; InvalidInputError where one is not above zero."""
-        fit = self._regression(EXPONENTIAL.curve)
+        fit = self._regression(EXPONENTIAL)
         fit.require("mass", "stiffness")
         return fit.constants
 
@@ -118,54 +117,62 @@ class DriveTask:
         return max(min(natural, longest), shortest)
 
     def searched(
-        self, friction: FrictionModel, *, thorough: bool = True, like: Refinement | None = None
+        self, law: IdentifiedLaw, *, thorough: bool = True, like: Refinement | None = None
     ) -> Refinement:
         """Return a model fitted to short segments, from several starts, or from a LuGre one."""
-        model = Model(friction)
         if like is not None:
-            return self._nearest(
-                model, [friction.like(like.values)], _GIVEN_UP_LOSS_RATIO * _loss(like)
-            )
-        starts = [model.start(each) for each in self._regressions(friction, thorough)]
-        # A curve that does not suit the friction may leave none to them.
-        unfit = [{name for name in self.free if not each[name] > 0.0} for each in starts]
-        starts = [
-            {**each, **{name: self.constants[name] for name in names}}
-            for each, names in zip(starts, unfit, strict=True)
-        ]
-        if friction.memory:
+            # The static friction of Dahl's law is the kinetic one.
+            values = {**like.values, "static": like.values["kinetic"]}
+            return self._nearest(law, [values], _GIVEN_UP_LOSS_RATIO * _loss(like))
+        own = law.own if isinstance(law, DirectionalAdapter) else law
+        starts = [self._start(law, each) for each in self._regressions(own, thorough)]
+        if law.memory:
             starts = [
                 {**_falling(each), "bristle_stiffness": stiffness}
                 | {"bristle_damping": _DAMPING_RATIO * sqrt(stiffness * each["mass"])}
                 for each in starts
                 for stiffness in (factor * each["stiffness"] for factor in _STIFFNESS_RATIOS)
             ]
-        return self._nearest(model, starts)
+        return self._nearest(law, starts)
+
+    def _start(self, law: IdentifiedLaw, fit: Regression) -> dict[str, float]:
+        """Return the coordinates that a regression gives, within their bounds."""
+        constants, columns = fit.constants, fit.rows.columns
+        others = sum(abs(value) * rms(columns[name]) for name, value in constants.items())
+        smallest = _LEAST_SHARE * (others or 1.0)
+        own = [
+            fit.curve.start(fit.coordinates(number), smallest)
+            for number in range(len(fit.directions))
+        ]
+        # A curve that does not suit the friction may leave no mass or stiffness to them.
+        unfit = [name for name in self.free if not constants[name] > 0.0]
+        both = isinstance(law, DirectionalAdapter)
+        return {
+            **constants,
+            **law.joined(own if both else own[-1:]),
+            **{name: self.constants[name] for name in unfit},
+        }
 
     @cached_property
-    def table(self) -> TableModel:
+    def table(self) -> TableAdapter:
         """Friction without a law, at the speeds that were recorded."""
-        speeds = np.quantile(self.rows.speeds, np.linspace(0.0, 1.0, _POINTS))[1:]
-        return TableModel((0.0, *speeds.tolist()))
+        speeds = np.quantile(self.rows.speeds, np.linspace(0.0, 1.0, _POINTS))
+        speeds[0] = 0.0
+        return TableAdapter(speeds)
 
-    @property
-    def both_directions(self) -> bool:
-        """Whether the slide slips in both directions."""
-        return len(self.rows.directions) > 1
-
-    def _regressions(self, friction: FrictionModel, thorough: bool) -> list[Regression]:
-        fits = [self._regression(friction.curve)]
-        if friction.curve.shaped and thorough:
+    def _regressions(self, law: IdentifiedLaw, thorough: bool) -> list[Regression]:
+        fits = [self._regression(law)]
+        if law.shaped and thorough:
             top = float(self.rows.speeds[-1])
-            fits += [self._regression(friction.curve, shape * top) for shape in _SHAPES]
+            fits += [self._regression(law, shape * top) for shape in _SHAPES]
         return fits
 
     def _nearest(
-        self, model: Model, starts: Sequence[Mapping[str, float]], most: float = inf
+        self, law: IdentifiedLaw, starts: Sequence[Mapping[str, float]], most: float = inf
     ) -> Refinement:
         """Return the best search; errors that are noise, or a larger loss than `most`, end it."""
-        short = self._trajectories(model, _SHORT_SEGMENT * self.period)
-        names = self._names(model)
+        short = self._trajectories(law, _SHORT_SEGMENT * self.period)
+        names = [*self.free, *(name for name in law.coordinates if name not in self.friction)]
         tried: list[Refinement] = []
         for values in starts:
             tried.append(refine(short, names, self._known(values), most=_FIRST_STEPS))
@@ -219,50 +226,33 @@ class DriveTask:
 
     def finished(self, near: Refinement) -> Candidate:
         """Return a fit to long segments, with the constants that the records ask for."""
-        model = near.task.model
-        task = self._trajectories(model, _LONG_SEGMENT * self.period)
+        task = self._trajectories(near.law, _LONG_SEGMENT * self.period)
         # Measured starts are too rough for motions that grow over a segment.
         begun = refine(task, (), near.values)
         fit = self._settled(replace(begun, free=near.free))
         fit = self._with_optional(fit, least_share=0.0)
-        return self._candidate(fit, _held_out(fit))
+        return Candidate(fit, _held_out(fit))
 
     def unfinished(self, near: Refinement) -> Candidate:
         """Return a fit to short segments that is out of the choice."""
-        remark = "much worse in the search: not fitted further"
-        return replace(self._candidate(near, near.losses), remark=remark)
+        return Candidate(near, near.losses, "much worse in the search: not fitted further")
 
-    def _candidate(self, fit: Refinement, held_out: FloatArray) -> Candidate:
-        friction, measured = fit.task.model.friction, fit.task.positions
-        return Candidate(
-            friction.law,
-            len(fit.free),
-            held_out,
-            float(np.std(measured)),
-            fit,
-            fit.values.get(DELAY, 0.0),
-            by_direction=isinstance(friction, DirectionalModel),
-        )
-
-    def _regression(self, curve: Curve, shape: float | None = None) -> Regression:
+    def _regression(self, law: IdentifiedLaw, shape: float | None = None) -> Regression:
         fixed = {name: 0.0 for name in LINEAR if name not in self.free} | {
             name: value for name, value in self.fixed.items() if name != DELAY
         }
-        return regress(self.rows, curve, self.free, fixed, shape)
+        return regress(self.rows, law, self.free, fixed, shape)
 
-    def _trajectories(self, model: Model, length: float) -> Trajectories:
+    def _trajectories(self, law: IdentifiedLaw, length: float) -> Trajectories:
         segments, starts = segments_of(self.records, length)
-        task = Trajectories(model, self.predictors, segments, starts, self.normal_force)
+        directions = self.rows.directions
+        task = Trajectories(law, directions, self.predictors, segments, starts, self.normal_force)
         return task.chosen(np.arange(len(segments)) % self.stride == 0)
 
     @property
     def stride(self) -> int:
         """Of the segments of long records one of so many is used."""
         return -(-sum(len(each.position) for each in self.records) // _MOST_SAMPLES)
-
-    def _names(self, model: Model) -> list[str]:
-        own = model.friction.coordinates
-        return [*self.free, *(name for name in own if name not in self.friction)]
 
     def _known(self, values: Mapping[str, float]) -> dict[str, float]:
         own = {name: value * self.normal_force for name, value in self.friction.items()}
@@ -278,32 +268,32 @@ def drive_candidates(task: DriveTask, law: str, progress: Callable[[str], None])
     in the search is not fitted further.
     """
     found: list[Refinement] = []
-    for friction in STATIC_MODELS:
-        if law in (AUTO, friction.law):
-            progress(friction.law)
-            found.append(task.searched(friction, thorough=not any(map(is_white, found))))
-    if law == task.table.law:
+    for each in STATIC_LAWS:
+        if law in (AUTO, each.name):
+            progress(each.name)
+            found.append(task.searched(each, thorough=not any(map(is_white, found))))
+    if law == task.table.name:
         progress(law)
         found.append(task.searched(task.table))
-    if task.both_directions and found and not any(map(is_white, found)):
-        friction = min(found, key=_loss).task.model.friction
-        progress(f"{friction.law} by direction")
-        found.append(task.searched(DirectionalModel(friction)))
+    if len(task.rows.directions) > 1 and found and not any(map(is_white, found)):
+        best = min(found, key=_loss).law
+        progress(f"{best.name} by direction")
+        found.append(task.searched(DirectionalAdapter(best)))
     # A memory changes the motion near sticking: it does not explain an input that is missing.
     near = not found or (law == AUTO and min(map(_share, found)) < _MISSING_INPUT_ERROR)
     if near and not any(map(is_white, found)):
         bristles: Refinement | None = None
-        for friction in MEMORY_MODELS:
-            if law not in (AUTO, friction.law):
+        for each in MEMORY_LAWS:
+            if law not in (AUTO, each.name):
                 continue
-            progress(friction.law)
-            if friction is not DAHL and any(map(is_white, found)):
+            progress(each.name)
+            if each is not DAHL and any(map(is_white, found)):
                 break
-            found.append(task.searched(friction, like=bristles))
-            if friction is LUGRE:
+            found.append(task.searched(each, like=bristles))
+            if each is LUGRE:
                 bristles = found[-1]
     if law == AUTO and not any(map(is_white, found)):
-        progress(task.table.law)
+        progress(task.table.name)
         found.append(task.searched(task.table))
     least = min(map(_loss, found))
     return [

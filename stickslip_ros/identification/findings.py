@@ -1,29 +1,22 @@
 """The identified model: constants with intervals, the friction curve, and its predictions."""
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from math import inf, isfinite, isinf
 
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray, rms
-from stickslip_ros.identification.axis_drive import axis_drive, law_of
-from stickslip_ros.identification.candidates import Candidate, Estimate, better_by
-from stickslip_ros.identification.curve_bands import Friction, friction_of
 from stickslip_ros.identification.drives import POOR_ERROR
-from stickslip_ros.identification.filtered import START, Filtered, filtered
-from stickslip_ros.identification.friction_models import DELAY, numbers_of
-from stickslip_ros.identification.intervals import propagated
+from stickslip_ros.identification.fit import Candidate, ForceErrors, Friction, Residuals, better_by
+from stickslip_ros.identification.intervals import Estimate
 from stickslip_ros.identification.record import FEWEST, Record
-from stickslip_ros.identification.refinement import Refinement, refine, restarted
-from stickslip_ros.identification.regression import Regression, directions_of
+from stickslip_ros.identification.refinement import Refinement
+from stickslip_ros.identification.regression import START, Filtered, filtered
 from stickslip_ros.identification.servo import Servo, closed_loop
-from stickslip_ros.identification.trajectories import Trajectories, segments_of
-from stickslip_ros.identification.trajectory import Predictor, delayed, free_run
 from stickslip_ros.physics.model.drive import Drive
 
-_RELATIVE_STEP = 1e-5
 _STILL_SPEED = 0.02
 """Share of the fastest speed below which a slide may stick."""
 _VAGUE_ERROR = 0.5
@@ -47,30 +40,6 @@ CHECKED = (
     "closed_loop_force_error",
 )
 """Errors of the prediction of a recording."""
-
-
-@dataclass(frozen=True, eq=False)
-class Residuals:
-    """Errors that a model leaves in its record, arrays of shape (rows,)."""
-
-    time: FloatArray
-    """Time from the first sample, s."""
-    position: FloatArray
-    """Displacement, m."""
-    relative_speed: FloatArray
-    """Velocity less that of the belt, m/s."""
-    error: FloatArray
-    """Measured less modelled force of an axis, N; position of a drive on a spring, m."""
-
-
-@dataclass(frozen=True, eq=False)
-class ForceErrors(Residuals):
-    """Measured and modelled forces on filtered rows; the error is one of forces, N."""
-
-    friction: FloatArray
-    """Size of the measured friction with the sign of the slip: what the other forces leave, N."""
-    force: FloatArray
-    """Known force, N."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,12 +82,12 @@ class Findings:
     @property
     def delay(self) -> float:
         """Time from a sample until its force acts, s."""
-        return 0.0 if self.chosen.delay is None else self.chosen.delay
+        return self.chosen.fit.delay or 0.0
 
     @property
     def has_spring(self) -> bool:
         """Whether the model has a spring."""
-        return isinstance(self.chosen.fit, Refinement)
+        return self.chosen.fit.has_spring
 
     @cached_property
     def fitted(self) -> Mapping[str, Estimate]:
@@ -147,35 +116,7 @@ class Findings:
     @cached_property
     def _constants(self) -> tuple[list[str], FloatArray, FloatArray]:
         """Names, values and covariance of the constants that are parameters of the plant."""
-        fit = self.chosen.fit
-        if isinstance(fit, Refinement):
-            return self._of_trajectory(fit)
-        point = np.concatenate([fit.values, fit.shapes])
-
-        def constants(values: FloatArray) -> dict[str, float]:
-            moved = fit.at(values)
-            found = {name: moved.constants[name] for name in fit.free}
-            # Of LuGre a few deflections are tried: they have no error.
-            directions = 0 if fit.curve.deflection > 0.0 else len(fit.rows.directions)
-            for number in range(directions):
-                group = "friction." if number == 0 else "friction.reverse."
-                own = numbers_of(law_of(moved, number, self.normal_force))
-                found |= {group + name: value for name, value in own.items()}
-            return found
-
-        steps = _RELATIVE_STEP * np.maximum(np.abs(point), 1e-9)
-        return _propagated(constants, point, steps, fit.covariance)
-
-    def _of_trajectory(self, fit: Refinement) -> tuple[list[str], FloatArray, FloatArray]:
-        model, typical = fit.task.model, fit.task.typical(fit.values)
-
-        def constants(values: FloatArray) -> dict[str, float]:
-            moved = {**fit.values, **dict(zip(fit.free, values.tolist(), strict=True))}
-            return {**model.constants(moved, self.normal_force), DELAY: moved.get(DELAY, 0.0)}
-
-        point = np.array([fit.values[name] for name in fit.free])
-        sizes = [max(abs(fit.values[name]), typical.get(name, 0.0)) for name in fit.free]
-        return _propagated(constants, point, _RELATIVE_STEP * np.array(sizes), fit.covariance)
+        return self.chosen.fit.parameters(self.normal_force)
 
     @property
     def notes(self) -> Sequence[str]:
@@ -274,7 +215,7 @@ class Findings:
             if same or not self.as_good.get(each.label) or each.remark:
                 continue
             for number, sign in enumerate(self.directions):
-                own, other = self.friction(number), friction_of(each.fit, sign, self._fastest)
+                own, other = self.friction(number), each.fit.friction(sign, self._fastest)
                 away = np.abs(np.interp(own.speed, other.speed, other.force) - own.force)
                 if float(away.max()) > _FRICTION_DIFFERENCE * float(own.force.max()):
                     found.append(each.label)
@@ -282,7 +223,7 @@ class Findings:
         return found
 
     def _merged_on_an_axis(self) -> dict[str, str]:
-        both = len(self._regression.rows.directions) > 1
+        both = len(self.directions) > 1
         found = {
             "damping": "viscous damping and the viscous part of friction are one where the belt is "
             "at rest: it is in the friction, and taken as 0",
@@ -313,7 +254,7 @@ class Findings:
                     "at one belt speed it merges with a linear part of friction, and is taken as "
                     "0; run at several belt speeds"
                 )
-            elif name == "bias_force" and len(self._slips) == 1:
+            elif name == "bias_force" and len(self.directions) == 1:
                 found[name] = (
                     "in one direction it merges with the static friction, and is taken as 0; run "
                     "in both directions"
@@ -349,69 +290,30 @@ class Findings:
             np.mean(each > _STILL_SPEED * each.max()) < 0.98 for each in (*self._speeds, *raw)
         )
 
-    @cached_property
+    @property
     def directions(self) -> Sequence[float]:
-        """Signs of the relative speed that have a curve of their own."""
-        fit = self.chosen.fit
-        return fit.rows.directions if isinstance(fit, Regression) else self._slips
-
-    @cached_property
-    def _slips(self) -> Sequence[float]:
         """Signs of the relative speed that were recorded: 1, -1 or both."""
-        return directions_of(
-            np.concatenate([each.relative_speed[each.slipping] for each in self._filtered])
-        )
+        return self.chosen.fit.directions
 
     def friction(self, direction: int = 0) -> Friction:
         """Return the friction curve over the recorded speeds, in one of `directions`."""
-        return friction_of(self.chosen.fit, self.directions[direction], self._fastest)
+        return self.chosen.fit.friction(self.directions[direction], self._fastest)
 
     @property
     def _fastest(self) -> float:
         return max(float(each.max()) for each in self._speeds)
 
-    @property
-    def _regression(self) -> Regression:
-        assert isinstance(self.chosen.fit, Regression)
-        return self.chosen.fit
-
     @cached_property
     def drive(self) -> Drive:
         """The drive, with the usual belt speed of the first record: the median where it moves."""
-        fit, belt = self.chosen.fit, _usual(self.records[0].belt_velocity)
-        if isinstance(fit, Refinement):
-            return fit.task.model.drive(fit.values, self.normal_force, belt)
-        return axis_drive(fit, self.normal_force, belt)
+        return self.chosen.fit.drive(self.normal_force, _usual(self.records[0].belt_velocity))
 
     def errors(self, record: Record | None = None) -> ForceErrors:
         """Return measured and modelled forces on the filtered rows of a record, or of the first.
 
         Of a drive on a spring these are the rows where it slips.
         """
-        record = self.records[0] if record is None else record
-        fit, spring = self.chosen.fit, self.has_spring
-        columns = filtered(record, decimated=not spring, delay=self.chosen.delay)
-
-        def rows(values: FloatArray) -> FloatArray:
-            return values[columns.settled] if spring else columns.rows(values)
-
-        force, speed = rows(columns.force), rows(columns.relative_speed)
-        if isinstance(fit, Refinement):
-            values = fit.values
-            law = fit.task.model.drive(values, 1.0).friction
-            friction = np.array(
-                [float(law.coefficient(each, 1.0 if each > 0.0 else -1.0)) for each in speed]
-            )
-            model = values["mass"] * rows(columns.acceleration) - friction - values["bias_force"]
-            model += values["damping"] * rows(columns.velocity)
-            model += values["stiffness"] * rows(columns.position)
-            error = force - model
-        else:
-            terms = replace(type(fit.rows).of([columns]), directions=fit.rows.directions)
-            error = replace(fit, rows=terms).residual
-            friction = -terms.friction_terms(fit.curve, fit.shapes) @ fit.values[len(fit.free) :]
-        time, position = rows(columns.time), rows(columns.position)
-        return ForceErrors(time, position, speed, error, error - friction, force)
+        return self.chosen.fit.errors(self.records[0] if record is None else record)
 
     def force_error(self, record: Record) -> float | None:
         """Return the rms of F - F_model over that of F, on filtered rows; None without a force."""
@@ -427,17 +329,8 @@ class Findings:
         slide is fast relative to the belt, at the position that fits best, too; NaN before.
         """
         if record not in self._runs:
-            self._runs[record] = self._free_run(record)
+            self._runs[record] = self.chosen.fit.free_run(record)
         return self._runs[record]
-
-    def _free_run(self, record: Record) -> FloatArray:
-        fit = self.chosen.fit
-        if isinstance(fit, Regression):
-            return free_run(delayed(record, self.delay), self.drive)[1]
-        task = _divided(fit.task, record, record.duration)
-        count = task.segments[0].count
-        run = task.predicted(fit.values, refine(task, (), fit.values).starts)[:count]
-        return np.concatenate([np.full(len(record.position) - len(run), np.nan), run])
 
     def segment_error(self, record: Record) -> float | None:
         """Return the rms position error in segments like those of the fit, m; None for an axis.
@@ -456,28 +349,10 @@ class Findings:
 
     def _in_segments(self, record: Record) -> Residuals:
         if record not in self._errors_in_segments:
-            self._errors_in_segments[record] = self._found_in_segments(record)
+            fit = self.chosen.fit
+            assert isinstance(fit, Refinement)
+            self._errors_in_segments[record] = fit.in_segments(record)
         return self._errors_in_segments[record]
-
-    def _found_in_segments(self, record: Record) -> Residuals:
-        from scipy.signal import savgol_filter
-
-        fit = self.chosen.fit
-        assert isinstance(fit, Refinement)
-        counts = [segment.count for segment in fit.task.segments]
-        task = _divided(fit.task, record, float(np.median(counts)) * self.records[0].period)
-        task = replace(task, predictors=[Predictor(replace(record, velocity=None))])
-        starts = restarted(refine(task, (), fit.values)).starts
-        away = task.positions - task.predicted(fit.values, starts)
-        rows = np.concatenate([np.arange(s.start, s.start + s.count) for s in task.segments])
-        measured = ~record.lost[rows]
-        away, rows = away[measured], rows[measured]
-        speed: FloatArray = np.asarray(
-            savgol_filter(record.position, 11, 3, deriv=1, delta=record.period)
-        )
-        relative = (speed - record.belt_velocity)[rows]
-        time = record.period * rows.astype(float)
-        return Residuals(time, record.position[rows], relative, away)
 
     def check(self, record: Record) -> dict[str, float | None]:
         """Return what the model predicts of a record, as `CHECKED` names it.
@@ -521,12 +396,6 @@ def _usual(belt: FloatArray) -> float:
     return float(np.median(moving[moving * sign > 0.0]))
 
 
-def _divided(task: Trajectories, record: Record, length: float) -> Trajectories:
-    """Return the task of predicting a record in segments of a length, s."""
-    segments, starts = segments_of([record], length)
-    return replace(task, predictors=[Predictor(record)], segments=segments, starts=starts)
-
-
 def _relative(found: FloatArray, measured: FloatArray) -> float:
     """Return the rms error as a share of what was measured; infinite of an unbounded motion."""
     return rms(found - measured) / rms(measured) if np.isfinite(found).all() else inf
@@ -534,24 +403,3 @@ def _relative(found: FloatArray, measured: FloatArray) -> float:
 
 def _listed(names: Sequence[str]) -> str:
     return f"{', '.join(names[:-1])} and {names[-1]}"
-
-
-def _propagated(
-    constants: Callable[[FloatArray], dict[str, float]],
-    point: FloatArray,
-    steps: FloatArray,
-    covariance: FloatArray,
-) -> tuple[list[str], FloatArray, FloatArray]:
-    """Return names, values and covariance of what depends on a point with a covariance."""
-    if not len(point):
-        return [], np.empty(0), np.empty((0, 0))
-    base = constants(point)
-    columns: list[list[float]] = []
-    for number, step in enumerate(steps.tolist()):
-        moved = constants(point + np.where(np.arange(len(point)) == number, step, 0.0))
-        columns.append([(moved[name] - base[name]) / step for name in base])
-    linear = np.transpose(columns)
-    fitted = np.abs(linear).sum(axis=1) > 0.0
-    names = [name for name, used in zip(base, fitted, strict=True) if used]
-    values = np.array([base[name] for name in names])
-    return names, values, propagated(linear[fitted], covariance)

@@ -5,10 +5,10 @@ from math import inf, isfinite
 
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.identification.axes import AXIS_LAWS, AxisTask
-from stickslip_ros.identification.candidates import choose
 from stickslip_ros.identification.drives import AUTO, DRIVE_LAWS, DriveTask, drive_candidates
 from stickslip_ros.identification.findings import Findings
-from stickslip_ros.identification.friction_models import DELAY, MEMORY_MODELS, STATIC_MODELS
+from stickslip_ros.identification.fit import choose
+from stickslip_ros.identification.laws import DELAY, MEMORY_LAWS, STATIC_LAWS
 from stickslip_ros.identification.reading import ReadRecords
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.regression import LINEAR
@@ -161,9 +161,9 @@ def _check_friction(fixed: Mapping[str, float], law: str, *, spring: bool) -> No
     """Refuse constants of friction that the law in question does not search by themselves."""
     known = {
         f"friction.{name}"
-        for model in (*STATIC_MODELS, *MEMORY_MODELS)
-        if spring and model.law == law
-        for name in model.coordinates
+        for own in (*STATIC_LAWS, *MEMORY_LAWS)
+        if spring and own.name == law
+        for name in own.coordinates
     }
     for name in fixed:
         if name.startswith("friction.") and name not in known:

@@ -1,5 +1,7 @@
 """Covariances of what was fitted, with errors that may be coloured."""
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from stickslip_ros.arrays import BoolArray, FloatArray
@@ -13,6 +15,22 @@ _RANK = 1e-13
 """Share of the largest eigenvalue below which rows do not tell a combination of parameters."""
 _PART = 1e-6
 """Part in such a combination from which a parameter is not told; less is rounding error."""
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A fitted constant."""
+
+    value: float
+    """Value, SI units."""
+    standard_error: float
+    """Standard error, SI units."""
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """The 95 % interval."""
+        half = QUANTILE * self.standard_error
+        return self.value - half, self.value + half
 
 
 def block_covariance(jacobian: FloatArray, residual: FloatArray, lost: int = 0) -> FloatArray:

@@ -20,7 +20,7 @@ from stickslip_ros.bags.table_file import (
     table_of,
 )
 from stickslip_ros.errors import BagError, InvalidInputError
-from stickslip_ros.identification.friction_models import DELAY
+from stickslip_ros.identification.laws import DELAY
 from stickslip_ros.identification.record import FEWEST, Record, evenly_spaced
 from stickslip_ros.physics.model.actuator import Actuator
 from stickslip_ros.samples import ForceColumns

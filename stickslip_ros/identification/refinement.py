@@ -1,15 +1,20 @@
 """Fit of the simulated trajectory, through stick and slip, to what records have measured."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
+from typing_extensions import override
 
 from stickslip_ros.arrays import BoolArray, FloatArray
+from stickslip_ros.identification.fit import CURVE_POINTS, Fit, ForceErrors, Residuals
 from stickslip_ros.identification.intervals import block_covariance
-from stickslip_ros.identification.trajectories import Trajectories
+from stickslip_ros.identification.laws import DELAY, IdentifiedLaw
+from stickslip_ros.identification.record import Record
+from stickslip_ros.identification.regression import filtered
+from stickslip_ros.identification.trajectories import Trajectories, segments_of
+from stickslip_ros.identification.trajectory import Predictor
 
 _OWN_SHARE = 1e-5
 """Least share of a derivative that is not one of the others, for a coordinate that can be told."""
@@ -56,9 +61,10 @@ class _Errors(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Refinement:
+class Refinement(Fit):
     """The constants whose trajectories are nearest to the measured positions."""
 
+    has_spring = True
     task: Trajectories
     free: Sequence[str]
     """Coordinates that are fitted."""
@@ -72,6 +78,104 @@ class Refinement:
     """Derivatives of the residual by the start of the own segment; shape (rows, 2)."""
     derivatives: FloatArray
     """Derivatives of the residual by `free`, at starts that follow them; shape (rows, free)."""
+
+    @property
+    @override
+    def law(self) -> IdentifiedLaw:
+        return self.task.law
+
+    @property
+    @override
+    def directions(self) -> Sequence[float]:
+        return self.task.directions
+
+    @property
+    @override
+    def delay(self) -> float:
+        return self.values.get(DELAY, 0.0)
+
+    @property
+    @override
+    def scale(self) -> float:
+        return float(np.std(self.task.positions))
+
+    @property
+    @override
+    def point(self) -> FloatArray:
+        return np.array([self.values[name] for name in self.free])
+
+    @override
+    def linearized(self) -> tuple[FloatArray, FloatArray, int]:
+        return self.derivatives, self.residual, self._lost
+
+    @override
+    def values_at(self, point: FloatArray) -> Mapping[str, float]:
+        return {**self.values, **dict(zip(self.free, point.tolist(), strict=True))}
+
+    @override
+    def force_at(self, point: FloatArray, sign: float, speed: FloatArray) -> FloatArray:
+        law = self.law.friction(self.values_at(point), 1.0)
+        return np.array([-sign * float(law.coefficient(sign * w, sign)) for w in speed.tolist()])
+
+    @override
+    def curve_speeds(self, fastest: float) -> FloatArray:
+        return np.linspace(0.0, fastest, CURVE_POINTS)
+
+    @override
+    def errors(self, record: Record) -> ForceErrors:
+        columns = filtered(record, decimated=False, delay=self.delay)
+        time, position, velocity, acceleration, speed, force = (
+            each[columns.settled]
+            for each in (
+                columns.time,
+                columns.position,
+                columns.velocity,
+                columns.acceleration,
+                columns.relative_speed,
+                columns.force,
+            )
+        )
+        values, law = self.values, self.law.friction(self.values, 1.0)
+        friction = np.array(
+            [float(law.coefficient(each, 1.0 if each > 0.0 else -1.0)) for each in speed]
+        )
+        model = values["mass"] * acceleration - friction - values["bias_force"]
+        model += values["damping"] * velocity + values["stiffness"] * position
+        return ForceErrors(time, position, speed, force - model, force - model - friction, force)
+
+    @override
+    def free_run(self, record: Record) -> FloatArray:
+        task = self._divided(record, record.duration)
+        count = task.segments[0].count
+        run = task.predicted(self.values, refine(task, (), self.values).starts)[:count]
+        return np.concatenate([np.full(len(record.position) - len(run), np.nan), run])
+
+    def in_segments(self, record: Record) -> Residuals:
+        """Return the position errors of a record in segments like those of the fit.
+
+        Each segment starts from the state that fits best.
+        """
+        from scipy.signal import savgol_filter
+
+        length = float(np.median([segment.count for segment in self.task.segments]))
+        task = self._divided(record, length * self.task.predictors[0].record.period)
+        task = replace(task, predictors=[Predictor(replace(record, velocity=None))])
+        starts = restarted(refine(task, (), self.values)).starts
+        away = task.positions - task.predicted(self.values, starts)
+        rows = np.concatenate([np.arange(s.start, s.start + s.count) for s in task.segments])
+        measured = ~record.lost[rows]
+        away, rows = away[measured], rows[measured]
+        speed: FloatArray = np.asarray(
+            savgol_filter(record.position, 11, 3, deriv=1, delta=record.period)
+        )
+        relative = (speed - record.belt_velocity)[rows]
+        time = record.period * rows.astype(float)
+        return Residuals(time, record.position[rows], relative, away)
+
+    def _divided(self, record: Record, length: float) -> Trajectories:
+        """Return the task of predicting a record in segments of a length, s."""
+        segments, starts = segments_of([record], length)
+        return replace(self.task, predictors=[Predictor(record)], segments=segments, starts=starts)
 
     @property
     def losses(self) -> FloatArray:
@@ -98,11 +202,6 @@ class Refinement:
     def repetition(self) -> int | None:
         """Number of samples after which the errors of position repeat; None if they do not."""
         return repetition_of(self.residual[self.task.of_positions])
-
-    @cached_property
-    def covariance(self) -> FloatArray:
-        """Covariance of `free`."""
-        return block_covariance(self.derivatives, self.residual, self._lost)
 
     @property
     def _lost(self) -> int:
@@ -219,9 +318,8 @@ class _Projection:
         self._best: _Errors | None = None
         self._last: tuple[bytes, _Errors] | None = None
         self._starts = starts
-        self._friction = task.model.friction
-        self._straight = self._friction.straightens(free)
-        to_search = self._friction.to_search(values, task.fastest) if self._straight else values
+        self._straight = task.law.straightened if {*task.law.straightened} <= {*free} else {}
+        to_search = task.law.to_search(values, task.fastest) if self._straight else values
         self.first = np.array([to_search[name] for name in free])
         """The point of the coordinates at the start of the search."""
 
@@ -239,16 +337,18 @@ class _Projection:
 
     def bounds(self) -> FloatArray:
         """Return the smallest and the largest values of a point, shape (2, coordinates)."""
-        task, found = self._task, list[tuple[float, float]]()
-        for name in self._free:
-            other = self._friction.free_bounds(name) if self._straight else None
-            found.append(other or task.model.bounds(name, self._values, task.fastest))
-        return np.transpose(found)
+        law, fastest = self._task.law, self._task.fastest
+        return np.transpose(
+            [
+                self._straight.get(name) or law.bounds(name, self._values, fastest)
+                for name in self._free
+            ]
+        )
 
     def values(self, point: FloatArray) -> dict[str, float]:
         """Return all coordinates at a point."""
         found = {**self._values, **dict(zip(self._free, point.tolist(), strict=True))}
-        return self._friction.from_search(found, self._task.fastest) if self._straight else found
+        return self._task.law.from_search(found, self._task.fastest) if self._straight else found
 
     def _of_search(self, point: FloatArray) -> FloatArray:
         """Return the derivatives of the coordinates by those of the search."""

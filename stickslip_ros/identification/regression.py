@@ -1,23 +1,133 @@
-"""Regression of the equation of motion on filtered records."""
+"""Regression of the equation of motion on records that are filtered, all columns alike."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
+from typing_extensions import override
 
-from stickslip_ros.arrays import FloatArray, IntArray
+from stickslip_ros.arrays import BoolArray, FloatArray, IntArray, rms
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.identification.curves import Curve, followed
-from stickslip_ros.identification.filtered import Filtered
-from stickslip_ros.identification.intervals import BLOCKS, block_covariance
+from stickslip_ros.identification.fit import CURVE_POINTS, Fit, ForceErrors
+from stickslip_ros.identification.intervals import BLOCKS
+from stickslip_ros.identification.laws import DirectionalAdapter, IdentifiedLaw, TableAdapter
+from stickslip_ros.identification.record import Record
+from stickslip_ros.identification.trajectory import delayed, free_run
 
+_CUTOFF = 100.0
+"""Cutoff frequency of the low-pass, Hz; at most a tenth of the sample rate."""
+_ORDER, _PAD = 4, 12
+DECIMATION = 10
+"""Every so many rows one is kept of a record that is decimated."""
+START, END = 49, 50
+"""Samples at both ends that the filter spoils."""
 _DIRECTION_SHARE = 0.05
 """Least share of the rows of a direction that has a curve of its own."""
 _FASTEST_SHAPE = 4.0
 """Largest shape of a curve that is sought, in fastest speeds."""
 LINEAR = ("mass", "damping", "stiffness", "bias_force")
 """Constants of the equation beside those of friction."""
+
+
+@dataclass(frozen=True, eq=False)
+class Filtered:
+    """The filtered columns of a record, arrays of shape (samples,); SI units.
+
+    A. Janot, M. Gautier, M. Brunot, Data set and reference models of EMPS, 2019: a Butterworth
+    low-pass of order 4 forwards and backwards, then central differences. For slow motions every
+    column of the equation is decimated by ten behind a Chebyshev low-pass.
+    """
+
+    time: FloatArray
+    """Time from the first sample, s."""
+    position: FloatArray
+    """Displacement, m."""
+    velocity: FloatArray
+    """Velocity, m/s."""
+    acceleration: FloatArray
+    """Acceleration, m/s^2."""
+    relative_speed: FloatArray
+    """Velocity less that of the belt, m/s."""
+    force: FloatArray
+    """Known forces, N."""
+    decimated: bool
+    """Whether rows are decimated; otherwise they are those where the slide clearly slips."""
+    slipping: BoolArray
+    """Whether the slide clearly slips, in one direction, for half of the length of the filter on
+    both sides: such rows are to start a search."""
+    settled: BoolArray
+    """The same for twice its length: the filter has forgotten where the slide stuck."""
+
+    def rows(self, values: FloatArray) -> FloatArray:
+        """Return the rows of the regression that columns of shape (samples, ...) give."""
+        if not self.decimated:
+            return values[self.slipping]
+        from scipy.signal import cheby1, sosfiltfilt  # takes long to import
+
+        chebyshev = cheby1(8, 0.05, 0.8 / DECIMATION, output="sos")
+        return sosfiltfilt(chebyshev, values, axis=0)[::DECIMATION]
+
+    def with_delay(self, record: Record, delay: float) -> "Filtered":
+        """Return the columns, decimated, of the same record with another delay of its force, s."""
+        return replace(self, force=_shifted(record.held_force, delay / record.period)[START:-END])
+
+
+def filtered(record: Record, *, decimated: bool, delay: float | None = None) -> Filtered:
+    """Return the filtered columns of a record, without both ends.
+
+    Rows are decimated for motions whose friction changes slowly. `delay` is the time from a sample
+    until its force acts, s; by default the force at a sample is the one that answers it.
+    """
+    from scipy.signal import butter, filtfilt  # takes long to import
+
+    rate = 1.0 / record.period
+    cutoff = min(_CUTOFF, 0.1 * rate)
+    low_pass: Any = butter(_ORDER, cutoff / (0.5 * rate))
+
+    def smooth(values: FloatArray) -> FloatArray:
+        return np.asarray(filtfilt(low_pass[0], low_pass[1], values, padlen=_PAD))
+
+    position = smooth(record.position)
+    velocity: FloatArray = np.asarray(np.gradient(position, record.period))
+    acceleration: FloatArray = np.asarray(np.gradient(velocity, record.period))
+    relative = velocity - smooth(record.belt_velocity)
+    held = record.held_force
+    force = held if delay is None else _shifted(held, delay / record.period)
+    if not decimated:
+        force = smooth(force)  # all that enters the equation passes the same filter
+    time: FloatArray = record.period * np.arange(len(position), dtype=float)
+    inside = slice(START, -END)
+    return Filtered(
+        time[inside],
+        position[inside],
+        velocity[inside],
+        acceleration[inside],
+        relative[inside],
+        force[inside],
+        decimated,
+        _slipping(relative[inside], 0.5 * rate / cutoff),
+        _slipping(relative[inside], 2.0 * rate / cutoff),
+    )
+
+
+def _shifted(held: FloatArray, periods: float) -> FloatArray:
+    """Return forces, held from sample to sample, as they are on average around each sample."""
+    at = np.arange(len(held)) - periods
+    edges = np.concatenate([[0.0], np.cumsum(held)])
+    places = np.arange(len(edges))
+    return np.interp(at + 0.5, places, edges) - np.interp(at - 0.5, places, edges)
+
+
+def _slipping(relative: FloatArray, reach: float) -> BoolArray:
+    """Return where the speed stays away from zero for a number of samples on both sides."""
+    from scipy.ndimage import minimum_filter1d
+
+    width = 2 * max(round(reach), 1) + 1
+    least = 0.02 * float(np.abs(relative).max())
+    sides = [minimum_filter1d(sign * relative, width) > least for sign in (1.0, -1.0)]
+    return sides[0] | sides[1]
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,9 +143,11 @@ class Rows:
     """Number of the block of time."""
     directions: Sequence[float]
     """Signs of the relative speed that occur: 1, -1 or both."""
+    delay: float | None
+    """Time from a sample until its force acts, s; None if nothing is known of one."""
 
     @classmethod
-    def of(cls, parts: Sequence[Filtered]) -> "Rows":
+    def of(cls, parts: Sequence[Filtered], delay: float | None) -> "Rows":
         """Return the rows of filtered records."""
 
         def joined(values: Callable[[Filtered], FloatArray]) -> FloatArray:
@@ -48,7 +160,9 @@ class Rows:
                 f"at least {4 * BLOCKS}"
             )
         relative = joined(lambda part: part.relative_speed)
-        directions = directions_of(relative)
+        counts = {sign: np.count_nonzero(relative * sign > 0.0) for sign in (1.0, -1.0)}
+        least = _DIRECTION_SHARE * len(relative)
+        directions = [sign for sign, count in counts.items() if count > least]
         if not directions:
             raise InvalidInputError("the slide never slips in the recordings: they tell nothing")
         return cls(
@@ -62,6 +176,7 @@ class Rows:
             force,
             np.arange(len(force)) * BLOCKS // len(force),
             directions,
+            delay,
         )
 
     @cached_property
@@ -70,11 +185,17 @@ class Rows:
         speeds = np.abs(np.concatenate([part.rows(part.relative_speed) for part in self.parts]))
         return np.sort(speeds[speeds > 0.0])
 
-    def least_shape(self, curve: Curve) -> float:
+    @cached_property
+    def curve_speeds(self) -> FloatArray:
+        """Speeds of the points that stand for a curve, m/s: 0 and those recorded."""
+        low, high = np.quantile(self.speeds, [0.02, 1.0])
+        return np.concatenate([[0.0], np.geomspace(low, high, CURVE_POINTS - 1)])
+
+    def least_shape(self, curve: IdentifiedLaw) -> float:
         """Return the smallest shape of a curve that the rows tell, m/s."""
         return curve.least_shape * float(np.quantile(self.speeds, 0.02))
 
-    def friction_terms(self, curve: Curve, shapes: FloatArray) -> FloatArray:
+    def friction_terms(self, curve: IdentifiedLaw, shapes: FloatArray) -> FloatArray:
         """Return sgn(v_r) times the terms of a curve for each direction, shape (rows, terms)."""
         made: list[FloatArray] = []
         for part in self.parts:
@@ -88,55 +209,120 @@ class Rows:
             terms = np.hstack(columns)
             if curve.deflection > 0.0:
                 path = np.abs(speed) * (part.time[1] - part.time[0]) / curve.deflection
-                terms = followed(terms, path)
+                terms = _followed(terms, path)
             made.append(part.rows(terms))
         return np.vstack(made)
 
 
-def directions_of(relative: FloatArray) -> Sequence[float]:
-    """Return the signs of relative speeds that are not rare: 1, -1 or both; none at rest."""
-    counts = {sign: np.count_nonzero(relative * sign > 0.0) for sign in (1.0, -1.0)}
-    return [sign for sign, count in counts.items() if count > _DIRECTION_SHARE * len(relative)]
+def _followed(terms: FloatArray, path: FloatArray) -> FloatArray:
+    """Return terms, shape (samples, terms), as friction follows them over a path.
+
+    `path` is that from the sample before, in deflections; the terms have the sign of the slip.
+    """
+    found = np.empty_like(terms)
+    state = terms[0]
+    for number, (target, kept) in enumerate(zip(terms, np.exp(-path).tolist(), strict=True)):
+        state = target + (state - target) * kept
+        found[number] = state
+    return found
 
 
 @dataclass(frozen=True, eq=False)
-class Regression:
+class Regression(Fit):
     """The equation of motion with a friction curve in each direction, fitted to rows."""
 
+    has_spring = False
     rows: Rows
-    curve: Curve
+    curve: IdentifiedLaw
+    """Law whose terms are fitted in each direction."""
     free: Sequence[str]
     """Constants of `LINEAR` that are fitted."""
     fixed: Mapping[str, float]
     """Values of the others."""
     shapes: FloatArray
     """Shape of the curve in each direction of the rows, m/s; empty without a shape."""
-    values: FloatArray
+    unknowns: FloatArray
     """Fitted constants: those of `free`, then the forces of the curve for each direction."""
+
+    @property
+    @override
+    def law(self) -> IdentifiedLaw:
+        return DirectionalAdapter(self.curve) if len(self.directions) > 1 else self.curve
+
+    @property
+    @override
+    def directions(self) -> Sequence[float]:
+        return self.rows.directions
+
+    @property
+    @override
+    def delay(self) -> float | None:
+        return self.rows.delay
+
+    @property
+    @override
+    def scale(self) -> float:
+        return rms(self.rows.force)
+
+    @property
+    @override
+    def point(self) -> FloatArray:
+        return np.concatenate([self.unknowns, self.shapes])
 
     @property
     def constants(self) -> dict[str, float]:
         """Value of each of `LINEAR`."""
-        return {**self.fixed, **dict(zip(self.free, self.values.tolist(), strict=False))}
+        return {**self.fixed, **dict(zip(self.free, self.unknowns.tolist(), strict=False))}
 
-    def forces(self, number: int) -> FloatArray:
+    def coordinates(self, number: int) -> dict[str, float]:
+        """Return the coordinates of the curve in a direction of the rows."""
+        return self.curve.coordinates_of(self._forces(number).tolist(), self._shape(number))
+
+    @override
+    def values_at(self, point: FloatArray) -> Mapping[str, float]:
+        own = self.at(point)
+        numbers = range(len(self.directions))
+        return {**own.constants, **self.curve.joined([own.coordinates(each) for each in numbers])}
+
+    @override
+    def force_at(self, point: FloatArray, sign: float, speed: FloatArray) -> FloatArray:
+        own, number = self.at(point), [*self.directions].index(sign)
+        return self.curve.terms(speed, own._shape(number)) @ own._forces(number)
+
+    @override
+    def curve_speeds(self, fastest: float) -> FloatArray:
+        return self.curve.speeds if isinstance(self.curve, TableAdapter) else self.rows.curve_speeds
+
+    @override
+    def errors(self, record: Record) -> ForceErrors:
+        columns = filtered(record, decimated=True, delay=self.delay)
+        rows = replace(Rows.of([columns], self.delay), directions=self.directions)
+        error = replace(self, rows=rows).residual
+        friction = -rows.friction_terms(self.curve, self.shapes) @ self.unknowns[len(self.free) :]
+        time, position, speed, force = (
+            columns.rows(each)
+            for each in (columns.time, columns.position, columns.relative_speed, columns.force)
+        )
+        return ForceErrors(time, position, speed, error, error - friction, force)
+
+    @override
+    def free_run(self, record: Record) -> FloatArray:
+        return free_run(delayed(record, self.delay or 0.0), self.drive(1.0))[1]
+
+    def _forces(self, number: int) -> FloatArray:
         """Return the forces of the curve in a direction of the rows, N."""
-        own = np.array_split(self.values[len(self.free) :], len(self.rows.directions))
+        own = np.array_split(self.unknowns[len(self.free) :], len(self.directions))
         return own[number]
 
-    def shape(self, number: int) -> float:
+    def _shape(self, number: int) -> float:
         """Return the shape of the curve in a direction of the rows, m/s; 1 without one."""
         return float(self.shapes[number]) if len(self.shapes) else 1.0
 
-    def friction(self, number: int, speed: FloatArray) -> FloatArray:
-        """Return the friction force in a direction of the rows, N, at speeds |v_r|, m/s."""
-        return self.curve.terms(speed, self.shape(number)) @ self.forces(number)
-
     def at(self, point: FloatArray) -> "Regression":
-        """Return the same with the values and then the shapes of a point."""
-        count = len(self.values)
+        """Return the same with the unknowns and then the shapes of a point."""
+        count = len(self.unknowns)
         shapes = point[count : count + len(self.shapes)]
-        return replace(self, values=point[:count], shapes=shapes)
+        return replace(self, unknowns=point[:count], shapes=shapes)
 
     def require(self, *names: str) -> None:
         """Raise InvalidInputError if one of these constants is not above zero."""
@@ -147,34 +333,38 @@ class Regression:
                     "sign and unit, and whether one is missing"
                 )
 
-    def refitted(self) -> "Regression":
-        """Return the fit to its rows with the same shapes."""
-        return _solved(self.rows, self.curve, self.free, self.fixed, self.shapes)
+    def refitted(self, shapes: FloatArray | None = None) -> "Regression":
+        """Return the fit to its rows with the same shapes, or with other ones."""
+        own = self if shapes is None else replace(self, shapes=shapes)
+        return replace(own, unknowns=solve(*own.system, own.least))
+
+    @property
+    def system(self) -> tuple[FloatArray, FloatArray]:
+        """The matrix of the unknowns and what it is to give."""
+        rows = self.rows
+        wanted = rows.force - sum(value * rows.columns[name] for name, value in self.fixed.items())
+        linear = [rows.columns[name][:, None] for name in self.free]
+        return np.hstack([*linear, rows.friction_terms(self.curve, self.shapes)]), wanted
 
     @cached_property
     def residual(self) -> FloatArray:
         """Known forces less those of the model, N, by row."""
-        return self._residual_with(self.shapes)
+        design, wanted = self.system
+        return wanted - design @ self.unknowns
 
-    def _residual_with(self, shapes: FloatArray) -> FloatArray:
-        design, wanted = system(self.rows, self.curve, self.free, self.fixed, shapes)
-        return wanted - design @ self.values
-
-    @cached_property
-    def covariance(self) -> FloatArray:
-        """Covariance of `values` and `shapes`, from the scatter over the blocks of time."""
-        columns = [system(self.rows, self.curve, self.free, self.fixed, self.shapes)[0]]
+    @override
+    def linearized(self) -> tuple[FloatArray, FloatArray, int]:
+        columns = [self.system[0]]
         for number, shape in enumerate(self.shapes):
             step = np.where(np.arange(len(self.shapes)) == number, 1e-4 * shape, 0.0)
-            change = self._residual_with(self.shapes - step)
-            change -= self._residual_with(self.shapes + step)
-            columns.append((change / (2e-4 * shape))[:, None])
-        return block_covariance(np.hstack(columns), self.residual)
+            below, above = (replace(self, shapes=self.shapes + sign * step) for sign in (-1, 1))
+            columns.append(((below.residual - above.residual) / (2e-4 * shape))[:, None])
+        return np.hstack(columns), self.residual, 0
 
     @cached_property
     def held_out(self) -> FloatArray:
         """Mean square of the residual in each block, N^2, fitted without it; shape (blocks,)."""
-        design, wanted = system(self.rows, self.curve, self.free, self.fixed, self.shapes)
+        design, wanted = self.system
         losses = np.empty(BLOCKS)
         for block in range(BLOCKS):
             held = self.rows.block == block
@@ -185,13 +375,14 @@ class Regression:
 
     @property
     def least(self) -> FloatArray:
-        """Smallest value of each of `values`."""
-        return _least(self.rows, self.curve, self.free)
+        """Smallest value of each of `unknowns`."""
+        linear = [-np.inf if name == "bias_force" else 0.0 for name in self.free]
+        return np.array([*linear, *[*self.curve.least] * len(self.directions)])
 
 
 def regress(
     rows: Rows,
-    curve: Curve,
+    curve: IdentifiedLaw,
     free: Sequence[str],
     fixed: Mapping[str, float],
     shape: float | None = None,
@@ -202,38 +393,25 @@ def regress(
     `LINEAR` that are fitted, `fixed` has the others. The shape of the curve, m/s, is fitted in each
     direction unless it is given.
     """
+    fit = Regression(rows, curve, free, fixed, np.empty(0), np.empty(0))
+    directions = len(rows.directions)
     if not curve.shaped:
-        return _solved(rows, curve, free, fixed, np.empty(0))
+        return fit.refitted()
     if shape is not None:
-        return _solved(rows, curve, free, fixed, np.full(len(rows.directions), shape))
+        return fit.refitted(np.full(directions, shape))
     from scipy.optimize import least_squares
 
     high = float(np.log(_FASTEST_SHAPE * np.quantile(rows.speeds, 0.98)))
     low = float(np.log(rows.least_shape(curve)))
 
     def residual(logarithms: FloatArray) -> FloatArray:
-        shapes = np.broadcast_to(np.exp(logarithms), len(rows.directions))
-        return _solved(rows, curve, free, fixed, shapes).residual
+        return fit.refitted(np.broadcast_to(np.exp(logarithms), directions)).residual
 
     grid = np.linspace(low, high, 9)[1:-1]
     best = grid[np.argmin([np.sum(residual(np.array([each])) ** 2) for each in grid])]
-    start = np.full(len(rows.directions), best)
+    start = np.full(directions, best)
     found = least_squares(residual, start, bounds=(low, high), diff_step=1e-4, xtol=1e-6)
-    return _solved(rows, curve, free, fixed, np.exp(found.x))
-
-
-def _solved(
-    rows: Rows, curve: Curve, free: Sequence[str], fixed: Mapping[str, float], shapes: FloatArray
-) -> Regression:
-    """Return the fit with given shapes."""
-    values = solve(*system(rows, curve, free, fixed, shapes), _least(rows, curve, free))
-    return Regression(rows, curve, free, fixed, shapes, values)
-
-
-def _least(rows: Rows, curve: Curve, free: Sequence[str]) -> FloatArray:
-    """Return the smallest value of each unknown."""
-    linear = [-np.inf if name == "bias_force" else 0.0 for name in free]
-    return np.array([*linear, *[*curve.least] * len(rows.directions)])
+    return fit.refitted(np.exp(found.x))
 
 
 def solve(design: FloatArray, wanted: FloatArray, least: FloatArray) -> FloatArray:
@@ -246,16 +424,3 @@ def solve(design: FloatArray, wanted: FloatArray, least: FloatArray) -> FloatArr
     if (values < least).any():
         values = lsq_linear(design / scale, wanted, (least, np.inf), method="bvls").x
     return values / scale
-
-
-def system(
-    rows: Rows,
-    curve: Curve,
-    free: Sequence[str],
-    fixed: Mapping[str, float],
-    shapes: FloatArray,
-) -> tuple[FloatArray, FloatArray]:
-    """Return the matrix of the unknowns and what it is to give."""
-    wanted = rows.force - sum(value * rows.columns[name] for name, value in fixed.items())
-    linear = [rows.columns[name][:, None] for name in free]
-    return np.hstack([*linear, rows.friction_terms(curve, shapes)]), wanted

@@ -1,13 +1,13 @@
 """A complete scenario of an identified drive."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from stickslip_ros.files import written
 from stickslip_ros.identification.findings import Findings
-from stickslip_ros.identification.friction_models import numbers_of
-from stickslip_ros.identification.refinement import Refinement
-from stickslip_ros.physics.model.friction import CurveFollower, Directional, FrictionLaw, Table
+from stickslip_ros.identification.laws import by_group, numbers_of
+from stickslip_ros.physics.model.friction import CurveFollower, FrictionLaw, Table
 from stickslip_ros.scenarios.files import Scenario, load_scenario
 from stickslip_ros.scenarios.template import commented_file
 
@@ -28,10 +28,7 @@ def written_scenario(found: Findings, path: Path) -> list[Path]:
     spring has a washout controller without gains, for `stickslip design`. Returns the files that
     were written; raises OSError if one exists or cannot be written.
     """
-    laws = {"friction.": found.drive.friction}
-    if isinstance(found.drive.friction, Directional):
-        both = found.drive.friction
-        laws = {"friction.": both.forward, "friction.reverse.": both.reverse}
+    laws = by_group(found.drive.friction)
     curves: list[Path] = []
     files: dict[str, str] = {}
     try:
@@ -56,7 +53,7 @@ def written_scenario(found: Findings, path: Path) -> list[Path]:
     return [path, *curves]
 
 
-def _scenario(found: Findings, laws: dict[str, FrictionLaw], files: dict[str, str]) -> Scenario:
+def _scenario(found: Findings, laws: Mapping[str, FrictionLaw], files: dict[str, str]) -> Scenario:
     drive, record, servo = found.drive, found.records[0], found.servo
     values: dict[str, Any] = {
         f"plant.{name}": getattr(drive, name)
@@ -73,7 +70,7 @@ def _scenario(found: Findings, laws: dict[str, FrictionLaw], files: dict[str, st
     values["plant.rate"] = float(f"{1.0 / record.period:.9g}")
     values["plant.force_delay"] = max(found.delay, 0.0)
     values["plant.initial.position"] = float(record.position[0])
-    if isinstance(found.chosen.fit, Refinement):
+    if found.has_spring:
         values |= {"washout_controller.linear_gain": 0.0, "washout_controller.start_after": 0.0}
         return load_scenario(_BASE).changed(values)
     values["plant.duration"] = 10.0

@@ -10,7 +10,7 @@ import numpy as np
 
 from stickslip_ros.arrays import BoolArray, FloatArray, IntArray
 from stickslip_ros.errors import InvalidInputError, RunError
-from stickslip_ros.identification.friction_models import DELAY, REVERSE, Model
+from stickslip_ros.identification.laws import DELAY, REVERSE, IdentifiedLaw
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.trajectory import Predictor, Segment, steady_memory
 from stickslip_ros.physics.model.drive import Drive, in_units_of
@@ -38,9 +38,11 @@ class Sensitivities(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Trajectories:
-    """A model with the segments of records that it is to predict."""
+    """A law with the segments of records that it is to predict."""
 
-    model: Model
+    law: IdentifiedLaw
+    directions: Sequence[float]
+    """Signs of the relative speed in the records: 1, -1 or both."""
     predictors: Sequence[Predictor]
     segments: Sequence[Segment]
     starts: FloatArray
@@ -108,7 +110,7 @@ class Trajectories:
         """Return the outputs of all segments; far away where there is no motion."""
         delay = values.get(DELAY, 0.0)
         try:
-            drive = self.model.drive(values, self.normal_force)
+            drive = self._drive(values)
             found = [
                 each
                 for predictor, segments, own in self._by_record(starts)
@@ -132,7 +134,7 @@ class Trajectories:
             found.outputs[:] = np.nan
         found = found._replace(outputs=self._bounded(found.outputs))
         typical = self.typical(values)
-        for name in self.model.by_differences(names):
+        for name in self._by_differences(names):
             step = _MOTION_STEP * max(abs(values[name]), typical.get(name, 0.0))
             moved = self.predicted({**values, name: values[name] + step}, starts)
             found.by_names[:, list(names).index(name)] = (moved - found.outputs) / step
@@ -145,14 +147,14 @@ class Trajectories:
         names: Sequence[str],
         found: Sensitivities,
     ) -> None:
-        drive = self.model.drive(values, self.normal_force)
+        drive = self._drive(values)
         typical, moved = self.typical(values), list[tuple[float, Drive]]()
-        others = self.model.by_differences(names)
+        others = self._by_differences(names)
         columns = [number for number, name in enumerate(names) if name not in others]
         for name in (names[number] for number in columns):
             step = _STEP * max(abs(values[name]), typical.get(name, 0.0))
             other = {**values, name: values[name] + step}
-            moved.append((step, self.model.drive(other, self.normal_force)))
+            moved.append((step, self._drive(other)))
 
         def by_coordinates(function: Callable[[Drive], FloatArray]) -> FloatArray:
             base = function(drive)
@@ -185,6 +187,18 @@ class Trajectories:
                     )
                 found.by_names[part, columns] = derivatives
 
+    def _drive(self, values: Mapping[str, float]) -> Drive:
+        """Return the drive of coordinates; raises InvalidInputError if there is none."""
+        drive = self.law.drive(values, self.normal_force)
+        refusal = drive.friction.refusal()
+        if refusal is not None:
+            raise InvalidInputError(refusal)
+        return drive
+
+    def _by_differences(self, names: Sequence[str]) -> Sequence[str]:
+        """Return those of these coordinates by which a motion has no derivatives of its own."""
+        return [name for name in names if name in (DELAY, *self.law.by_differences)]
+
     def _by_record(
         self, starts: FloatArray
     ) -> Iterator[tuple[Predictor, Sequence[Segment], FloatArray]]:
@@ -212,10 +226,10 @@ class Trajectories:
 
     def typical(self, values: Mapping[str, float]) -> dict[str, float]:
         """Return a size of each coordinate, SI units, from which steps of differences are made."""
-        force, fastest = self.model.friction.static_force(values), self.fastest
+        force, fastest = self.law.static_force(values), self.fastest
         found = {"bias_force": force, "damping": force / fastest}
         found[DELAY] = 100.0 * self.predictors[0].record.period
-        for name in self.model.friction.coordinates:
+        for name in self.law.coordinates:
             kind = name.removeprefix(REVERSE)
             if kind.endswith("_speed"):
                 found[name] = fastest

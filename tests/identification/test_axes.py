@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.identification.curves import SaturatingCurve
 from stickslip_ros.identification.findings import Findings
 from stickslip_ros.identification.identify import identify
+from stickslip_ros.identification.laws import SaturatingAdapter
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.regression import Regression, regress
 from stickslip_ros.identification.servo import closed_loop, servo_of
@@ -161,7 +161,7 @@ def test_a_curve_does_not_rise_far_below_the_slowest_speed() -> None:
     found = identify([record("coulomb")], "table", {"force_delay": 0.0})
     fit = found.chosen.fit
     assert isinstance(fit, Regression)
-    curve = SaturatingCurve()
+    curve = SaturatingAdapter(fit.rows.curve_speeds)
     saturating = regress(fit.rows, curve, fit.free, fit.fixed)
     assert (saturating.shapes >= 0.999 * np.quantile(fit.rows.speeds, 0.02)).all()
     for number, law in enumerate((COULOMB.forward, COULOMB.reverse)):

@@ -7,8 +7,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from benchmarks import identification as study
-from stickslip_ros.identification.curve_bands import Friction
 from stickslip_ros.identification.findings import Findings
+from stickslip_ros.identification.fit import Friction
 from stickslip_ros.identification.identify import identify
 from stickslip_ros.plots.identification_figure import identification_figure
 from tests.identification.axis_record import record
