@@ -78,7 +78,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> None:
     """Run the command."""
     from stickslip_ros.identification.identify import fixed_of, identify_recordings
-    from stickslip_ros.identification.reading import read_all
+    from stickslip_ros.identification.record import read_all
     from stickslip_ros.identification.scenario import curve_files
     from stickslip_ros.plots.identification_table import identification_tables
 

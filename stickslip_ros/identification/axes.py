@@ -212,8 +212,7 @@ class _FreeRuns:
         for each, speed in zip(
             self._predictors, point[-len(self._predictors) :].tolist(), strict=True
         ):
-            measured = each.record.position
-            positions.append(each.positions(drive, 0, len(measured), float(measured[0]), speed))
+            positions.append(each.positions(drive, speed))
         errors = np.concatenate(positions) - self._measured
         errors = np.nan_to_num(errors, nan=_UNBOUNDED_ERROR / self._weights[1])
         return np.concatenate([own.residual * self._weights[0], errors * self._weights[1]])

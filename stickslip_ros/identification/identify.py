@@ -9,8 +9,7 @@ from stickslip_ros.identification.drives import AUTO, DRIVE_LAWS, DriveTask, dri
 from stickslip_ros.identification.findings import Findings
 from stickslip_ros.identification.fit import choose
 from stickslip_ros.identification.laws import DELAY, MEMORY_LAWS, STATIC_LAWS
-from stickslip_ros.identification.reading import ReadRecords
-from stickslip_ros.identification.record import Record
+from stickslip_ros.identification.record import ReadRecords, Record
 from stickslip_ros.identification.regression import LINEAR
 from stickslip_ros.identification.servo import servo_of
 from stickslip_ros.quantities import number_of

@@ -238,8 +238,7 @@ def repetition_of(errors: FloatArray) -> int | None:
     """
     from scipy.signal import correlate
 
-    count = len(errors)
-    found = correlate(errors, errors, method="fft")[count - 1 :][: count // 4]
+    found = correlate(errors, errors, method="fft")[len(errors) - 1 :][: len(errors) // 4]
     if not len(found) or not found[0] > 0.0:
         return None
     shares = found / found[0]

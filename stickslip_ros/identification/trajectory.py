@@ -3,7 +3,6 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from math import copysign, isfinite
-from typing import TypeVar
 
 import numpy as np
 
@@ -24,8 +23,6 @@ _REACHES, _REACH_RATIO, _END_TOLERANCE = 14, 0.25, 0.05
 before; share of the squared error by which both ends of the last one may be worse."""
 _TOLERANCE = 1e-6
 """Largest error of the belt velocity between corners, as a share of its largest value."""
-
-_Motion = TypeVar("_Motion", bound=Motion)
 
 
 @dataclass(frozen=True)
@@ -51,50 +48,14 @@ class Predictor:
         self._force = record.held_force.tolist()
         self._corners = _corners(record.belt_velocity)
 
-    def positions(
-        self,
-        drive: Drive,
-        start: int,
-        count: int,
-        position: float,
-        velocity: float,
-        delay: float = 0.0,
-    ) -> FloatArray:
-        """Return positions, m, at `count` samples from `start` on; NaN once unbounded.
-
-        The motion starts from a position, m, and a velocity, m/s, on the belt of the record.
-        `delay` is the time from a sample until its force acts, s, from minus one to several
-        periods.
-        """
-        motion = Motion(self.with_belt(drive, start, count), position, velocity)
+    def positions(self, drive: Drive, velocity: float) -> FloatArray:
+        """Return positions, m, from the measured one at a velocity, m/s; NaN once unbounded."""
+        count, start = len(self.record.position), float(self.record.position[0])
+        motion = Motion(self.with_belt(drive, 0, count), start, velocity)
         found = np.full(count, np.nan)
-        found[0] = position
-        for number in self._samples(motion, start, count, delay):
+        found[0] = start
+        for number in self._samples(motion, 0, count, 0.0):
             found[number] = motion.position
-        return found
-
-    def followed(
-        self,
-        drive: Drive,
-        segments: Sequence[Segment],
-        starts: FloatArray,
-        delay: float = 0.0,
-    ) -> list[FloatArray]:
-        """Return the outputs of segments, each from a state (position, velocity) of its own.
-
-        Outputs are the positions, m, and then the velocities, m/s, if the record has some with a
-        weight. The memory of the friction law is that of steady slip at the start of a segment.
-        Outputs are NaN from where the motion is unbounded.
-        """
-        found: list[FloatArray] = []
-        for segment, motion in self._motions(Motion, drive, segments, starts):
-            own = np.full((self.outputs, segment.count), np.nan)
-            own[:, 0] = (motion.position, motion.velocity)[: self.outputs]
-            for number in self._samples(motion, segment.start, segment.count, delay):
-                own[0, number] = motion.position
-                if self.outputs > 1:
-                    own[1, number] = motion.velocity
-            found.append(own.ravel())
         return found
 
     @property
@@ -102,40 +63,62 @@ class Predictor:
         """Number of outputs: positions, or positions and velocities."""
         return 1 if self.record.velocity_weight == 0.0 else 2
 
+    def followed(
+        self, drive: Drive, segments: Sequence[Segment], starts: FloatArray, delay: float
+    ) -> list[FloatArray]:
+        """Return the outputs of segments, each from a state (position, velocity) of its own.
+
+        Outputs are the positions, m, and then the velocities, m/s, if the record has some with a
+        weight. The memory of the friction law is that of steady slip at the start of a segment.
+        `delay` is the time from a sample until its force acts, s, from minus one to several
+        periods. Outputs are NaN from where the motion is unbounded.
+        """
+        return [found for found, _ in self._followed(Motion, drive, segments, starts, delay)]
+
     def sensitivities(
-        self,
-        drive: Drive,
-        segments: Sequence[Segment],
-        starts: FloatArray,
-        delay: float = 0.0,
-    ) -> list[tuple[FloatArray, FloatArray]]:
-        """Return the outputs of segments, as `followed`, and their derivatives.
+        self, drive: Drive, segments: Sequence[Segment], starts: FloatArray, delay: float
+    ) -> Iterator[tuple[FloatArray, FloatArray]]:
+        """Yield the outputs of segments, as `followed`, and their derivatives.
 
         The latter have shape (rows, arguments): the state at the start of the segment, then the
         free constants of the drive, all dimensionless as in `VariationalMotion`; the outputs are in
         SI units.
         """
-        found: list[tuple[FloatArray, FloatArray]] = []
-        scaled = in_units_of(drive, drive)
-        for segment, motion in self._motions(VariationalMotion, scaled, segments, starts):
+        kind = VariationalMotion
+        return self._followed(kind, in_units_of(drive, drive), segments, starts, delay)
+
+    def _followed(
+        self,
+        kind: type[Motion],
+        drive: Drive,
+        segments: Sequence[Segment],
+        starts: FloatArray,
+        delay: float,
+    ) -> Iterator[tuple[FloatArray, FloatArray]]:
+        units = np.array([drive.length_scale, drive.speed_scale])[: self.outputs]
+        for segment, motion in self._motions(kind, drive, segments, starts):
+            varied = motion if isinstance(motion, VariationalMotion) else None
             own = np.full((self.outputs, segment.count), np.nan)
-            by = np.zeros((self.outputs, segment.count, motion.derivatives.shape[1]))
+            by = np.zeros((*own.shape, varied.derivatives.shape[1] if varied else 0))
             own[:, 0] = (motion.position, motion.velocity)[: self.outputs]
-            by[:, 0] = motion.derivatives[: self.outputs]
+            if varied:
+                by[:, 0] = varied.derivatives[: self.outputs]
             for number in self._samples(motion, segment.start, segment.count, delay):
-                own[0, number], by[0, number] = motion.position, motion.derivatives[POSITION]
+                own[0, number] = motion.position
                 if self.outputs > 1:
-                    own[1, number], by[1, number] = motion.velocity, motion.derivatives[SPEED]
-            units = np.array([drive.length_scale, drive.speed_scale])[: self.outputs]
+                    own[1, number] = motion.velocity
+                if varied:
+                    by[0, number] = varied.derivatives[POSITION]
+                if varied and self.outputs > 1:
+                    by[1, number] = varied.derivatives[SPEED]
             by *= units[:, np.newaxis, np.newaxis]
-            found.append((own.ravel(), by.reshape(-1, by.shape[2])))
-        return found
+            yield own.ravel(), by.reshape(own.size, -1)
 
     def _motions(
-        self, kind: type[_Motion], drive: Drive, segments: Sequence[Segment], starts: FloatArray
-    ) -> Iterator[tuple[Segment, _Motion]]:
+        self, kind: type[Motion], drive: Drive, segments: Sequence[Segment], starts: FloatArray
+    ) -> Iterator[tuple[Segment, Motion]]:
         """Yield each segment with a motion at its start, which the caller advances to its end."""
-        motion: _Motion | None = None
+        motion: Motion | None = None
         end = -1
         for segment, (position, velocity) in zip(segments, starts.tolist(), strict=True):
             if motion is None or motion.unbounded or segment.start != end:
@@ -193,21 +176,20 @@ def delayed(record: Record, delay: float) -> Record:
     return replace(record, force=np.diff(edges), disturbance=None)
 
 
-def free_run(record: Record, drive: Drive, delay: float = 0.0) -> tuple[float, FloatArray]:
+def free_run(record: Record, drive: Drive) -> tuple[float, FloatArray]:
     """Return the motion of a drive through a whole record, with its force and without feedback.
 
     It starts at the measured position with the velocity that fits best, m/s, which is returned
-    before the positions, m. `delay` is the time from a sample until its force acts, s.
+    before the positions, m.
     """
     predictor = Predictor(record)
-    count, start = len(record.position), float(record.position[0])
     first = record.position[:_FIRST]
     slope = float(np.polyfit(np.arange(len(first)) * record.period, first, 1)[0])
     # The range also makes up for the friction over the first stroke.
     spread = 3.0 * abs(slope) + float(np.std(np.diff(first))) / record.period
 
     def run(velocity: float) -> tuple[float, FloatArray]:
-        found = predictor.positions(drive, 0, count, start, velocity, delay)
+        found = predictor.positions(drive, velocity)
         loss = float(np.mean((found - record.position) ** 2))
         return loss if isfinite(loss) else _UNBOUNDED_LOSS, found
 

@@ -16,7 +16,7 @@ def _moved(velocity: float) -> Record:
     time = 1e-3 * np.arange(4000)
     force = 60.0 * np.sin(9.0 * time) + 40.0 * np.sin(31.0 * time)
     still = Record("axis", 1e-3, np.zeros(len(time)), np.zeros(len(time)), force=force)
-    position = Predictor(still).positions(_DRIVE, 0, len(time), 0.0, velocity)
+    position = Predictor(still).positions(_DRIVE, velocity)
     return Record("axis", 1e-3, np.rint(position / 1e-6) * 1e-6, still.belt_velocity, force=force)
 
 
@@ -26,8 +26,7 @@ def test_no_velocity_at_the_start_near_the_found_one_is_better() -> None:
     found, positions = free_run(record, _DRIVE)
     assert found == pytest.approx(velocity, rel=0.05)
     error = np.std(positions - record.position)
-    start = float(record.position[0])
     for share in (-0.05, -0.01, 0.01, 0.05):
         speed = (1.0 + share) * found
-        other = Predictor(record).positions(_DRIVE, 0, len(record.position), start, speed)
+        other = Predictor(record).positions(_DRIVE, speed)
         assert error < 1.05 * np.std(other - record.position)
