@@ -1,9 +1,10 @@
 """The identified model: constants with intervals, the friction curve, and its predictions."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import inf, isfinite, isinf
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -12,7 +13,6 @@ from stickslip_ros.identification.drives import POOR_ERROR
 from stickslip_ros.identification.fit import Candidate, ForceErrors, Friction, Residuals, better_by
 from stickslip_ros.identification.intervals import Estimate
 from stickslip_ros.identification.record import FEWEST, Record
-from stickslip_ros.identification.refinement import Refinement
 from stickslip_ros.identification.regression import START, Filtered, filtered
 from stickslip_ros.identification.servo import Servo, closed_loop
 from stickslip_ros.physics.model.drive import Drive
@@ -41,6 +41,8 @@ CHECKED = (
 )
 """Errors of the prediction of a recording."""
 
+_T = TypeVar("_T")
+
 
 @dataclass(frozen=True, eq=False)
 class Findings:
@@ -60,14 +62,10 @@ class Findings:
     """Constants that were given."""
     servo: Servo | None
     """The position controller in the first record that has one."""
-    _runs: dict[Record, FloatArray] = field(
-        default_factory=dict[Record, FloatArray], init=False, repr=False
+    _predicted: dict[tuple[Any, Record], Any] = field(
+        default_factory=dict[tuple[Any, Record], Any], init=False, repr=False
     )
-    """Free runs so far."""
-    _errors_in_segments: dict[Record, Residuals] = field(
-        default_factory=dict[Record, Residuals], init=False, repr=False
-    )
-    """Position errors in segments so far."""
+    """What was predicted so far, by method of the fit and record."""
 
     def behind(self, candidate: Candidate) -> float:
         """Return by how many standard errors a law predicts held-out parts worse than the best."""
@@ -130,18 +128,16 @@ class Findings:
             )
         found += self._notes_on_samples
         fit = self.chosen.fit
-        if isinstance(fit, Refinement):
-            samples = sum(segment.count for segment in fit.task.segments)
-            used = samples / sum(len(each.position) for each in self.records)
-            if used < _USED_SHARE:
-                found.append(
-                    f"{used:.0%} of the samples were used, in parts over the whole length: the "
-                    "recordings are long; choose a part by --from and --to"
-                )
-        if isinstance(fit, Refinement) and (repetition := fit.repetition) is not None:
+        if fit.used < _USED_SHARE:
             found.append(
-                f"the errors repeat every {repetition} samples: the motion takes a whole number of "
-                "samples, so that rounding does not average out; the intervals may be too narrow"
+                f"{fit.used:.0%} of the samples were used, in parts over the whole length: the "
+                "recordings are long; choose a part by --from and --to"
+            )
+        if fit.repetition is not None:
+            found.append(
+                f"the errors repeat every {fit.repetition} samples: the motion takes a whole "
+                "number of samples, so that rounding does not average out; the intervals may be "
+                "too narrow"
             )
         return found
 
@@ -242,12 +238,10 @@ class Findings:
 
     def _merged_at_one_belt_speed(self) -> dict[str, str]:
         belts = np.concatenate([record.belt_velocity for record in self.records])
-        fit = self.chosen.fit
-        assert isinstance(fit, Refinement)
         found: dict[str, str] = {}
         single = float(np.ptp(belts)) <= 1e-3 * float(np.abs(belts).max())
         for name in ("damping", "bias_force"):
-            if name in self.fixed or name in fit.free:
+            if name in self.fixed or name in self.fitted:
                 continue
             if single and name == "damping":
                 found[name] = (
@@ -328,31 +322,21 @@ class Findings:
         The velocity at the start is the one that fits best. A drive on a spring starts where the
         slide is fast relative to the belt, at the position that fits best, too; NaN before.
         """
-        if record not in self._runs:
-            self._runs[record] = self.chosen.fit.free_run(record)
-        return self._runs[record]
+        return self._once(self.chosen.fit.free_run, record)
 
-    def segment_error(self, record: Record) -> float | None:
-        """Return the rms position error in segments like those of the fit, m; None for an axis.
+    def residuals(self, record: Record | None = None) -> Residuals:
+        """Return what the model leaves of a record, or of the first one.
 
-        Each segment starts from the state that fits best.
+        Of a drive on a spring these are the position errors in segments like those of the fit, each
+        from the state that fits best. The model of an axis is fitted to the forces.
         """
-        return rms(self._in_segments(record).error) if self.has_spring else None
+        return self._once(self.chosen.fit.residuals, self.records[0] if record is None else record)
 
-    def residuals(self) -> Residuals:
-        """Return what the model leaves of the first record: position errors in segments, or forces.
-
-        The model of an axis is fitted to the forces, and has no segments.
-        """
-        record = self.records[0]
-        return self._in_segments(record) if self.has_spring else self.errors(record)
-
-    def _in_segments(self, record: Record) -> Residuals:
-        if record not in self._errors_in_segments:
-            fit = self.chosen.fit
-            assert isinstance(fit, Refinement)
-            self._errors_in_segments[record] = fit.in_segments(record)
-        return self._errors_in_segments[record]
+    def _once(self, predicted: Callable[[Record], _T], record: Record) -> _T:
+        key = predicted, record
+        if key not in self._predicted:
+            self._predicted[key] = predicted(record)
+        return self._predicted[key]
 
     def check(self, record: Record) -> dict[str, float | None]:
         """Return what the model predicts of a record, as `CHECKED` names it.
@@ -367,7 +351,7 @@ class Findings:
         found |= {
             "force_error": self.force_error(record),
             "free_run_error": error if isfinite(error) else inf,
-            "segment_error": self.segment_error(record),
+            "segment_error": rms(self.residuals(record).error) if self.has_spring else None,
         }
         led = record.led
         if self.servo is not None and led is not None and led.force is not None:

@@ -118,8 +118,22 @@ class Fit(ABC):
         """Return measured and modelled forces on the filtered rows of a record where it slips."""
 
     @abstractmethod
+    def residuals(self, record: Record) -> Residuals:
+        """Return what the fit leaves of a record; see `Findings.residuals`."""
+
+    @abstractmethod
     def free_run(self, record: Record) -> FloatArray:
         """Return the positions in a run through a whole record, m; see `Findings.free_run`."""
+
+    @property
+    def used(self) -> float:
+        """Share of the samples of the records that were used."""
+        return 1.0
+
+    @property
+    def repetition(self) -> int | None:
+        """Number of samples after which the errors of position repeat; None if they do not."""
+        return None
 
     @cached_property
     def covariance(self) -> FloatArray:

@@ -150,11 +150,8 @@ class Refinement(Fit):
         run = task.predicted(self.values, refine(task, (), self.values).starts)[:count]
         return np.concatenate([np.full(len(record.position) - len(run), np.nan), run])
 
-    def in_segments(self, record: Record) -> Residuals:
-        """Return the position errors of a record in segments like those of the fit.
-
-        Each segment starts from the state that fits best.
-        """
+    @override
+    def residuals(self, record: Record) -> Residuals:
         from scipy.signal import savgol_filter
 
         length = float(np.median([segment.count for segment in self.task.segments]))
@@ -199,8 +196,14 @@ class Refinement(Fit):
         return float(first @ second) / power if power > 0.0 else 0.0
 
     @property
+    @override
+    def used(self) -> float:
+        samples = sum(segment.count for segment in self.task.segments)
+        return samples / sum(len(each.record.position) for each in self.task.predictors)
+
+    @property
+    @override
     def repetition(self) -> int | None:
-        """Number of samples after which the errors of position repeat; None if they do not."""
         return repetition_of(self.residual[self.task.of_positions])
 
     @property

@@ -306,6 +306,10 @@ class Regression(Fit):
         return ForceErrors(time, position, speed, error, error - friction, force)
 
     @override
+    def residuals(self, record: Record) -> ForceErrors:
+        return self.errors(record)
+
+    @override
     def free_run(self, record: Record) -> FloatArray:
         return free_run(delayed(record, self.delay or 0.0), self.drive(1.0))[1]
 

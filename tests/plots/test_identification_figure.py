@@ -49,8 +49,7 @@ def test_the_residuals_of_a_drive_on_a_spring_are_those_of_its_position() -> Non
     axes = _axes(identification_figure(found))
     label = axes["residuals over time"].get_ylabel().replace("\n", " ")
     assert label == "position, measured less fitted (nm)"
-    error = found.segment_error(own)
-    assert error is not None
+    error = found.check(own)["segment_error"]
     assert np.sqrt(np.mean(found.residuals().error ** 2)) == error
     assert "difference" in axes
     motion = axes["in-sample: measured, and without feedback (dashed)"]
