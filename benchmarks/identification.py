@@ -25,8 +25,8 @@ from typing import Any
 import numpy as np
 
 from stickslip_ros.identification.findings import Findings
+from stickslip_ros.identification.fit import QUANTILE
 from stickslip_ros.identification.identify import identify
-from stickslip_ros.identification.intervals import QUANTILE
 from stickslip_ros.identification.record import Record
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import (

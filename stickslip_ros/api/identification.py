@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 from stickslip_ros.api.display import Parts, Shown, shown_in_notebooks
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.identification.findings import Findings
+from stickslip_ros.identification.fit import Estimate
 from stickslip_ros.identification.identify import AUTO, identify_recordings
-from stickslip_ros.identification.intervals import Estimate
 from stickslip_ros.identification.record import read_all, read_records
 from stickslip_ros.identification.scenario import written_scenario
 from stickslip_ros.physics.model.drive import Drive

@@ -10,8 +10,14 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray, rms
 from stickslip_ros.identification.drives import POOR_ERROR
-from stickslip_ros.identification.fit import Candidate, ForceErrors, Friction, Residuals, better_by
-from stickslip_ros.identification.intervals import Estimate
+from stickslip_ros.identification.fit import (
+    Candidate,
+    Estimate,
+    ForceErrors,
+    Friction,
+    Residuals,
+    better_by,
+)
 from stickslip_ros.identification.record import FEWEST, Record
 from stickslip_ros.identification.regression import START, Filtered, filtered
 from stickslip_ros.identification.servo import Servo, closed_loop

@@ -8,8 +8,13 @@ import numpy as np
 from typing_extensions import override
 
 from stickslip_ros.arrays import BoolArray, FloatArray
-from stickslip_ros.identification.fit import CURVE_POINTS, Fit, ForceErrors, Residuals
-from stickslip_ros.identification.intervals import block_covariance
+from stickslip_ros.identification.fit import (
+    CURVE_POINTS,
+    Fit,
+    ForceErrors,
+    Residuals,
+    block_covariance,
+)
 from stickslip_ros.identification.laws import DELAY, IdentifiedLaw
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.regression import filtered

@@ -10,8 +10,7 @@ from typing_extensions import override
 
 from stickslip_ros.arrays import BoolArray, FloatArray, IntArray, rms
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.identification.fit import CURVE_POINTS, Fit, ForceErrors
-from stickslip_ros.identification.intervals import BLOCKS
+from stickslip_ros.identification.fit import BLOCKS, CURVE_POINTS, Fit, ForceErrors
 from stickslip_ros.identification.laws import DirectionalAdapter, IdentifiedLaw, TableAdapter
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.trajectory import delayed, free_run

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.identification.findings import Findings
-from stickslip_ros.identification.intervals import QUANTILE
+from stickslip_ros.identification.fit import QUANTILE
 from stickslip_ros.plots.style import BLUE, GREEN, ORANGE, SCREEN, FigureStyle, finish, styled
 from stickslip_ros.plots.units import SI
 

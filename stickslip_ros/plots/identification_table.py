@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 
 from stickslip_ros.identification.findings import Findings
-from stickslip_ros.identification.fit import Candidate
-from stickslip_ros.identification.intervals import QUANTILE, Estimate
+from stickslip_ros.identification.fit import QUANTILE, Candidate, Estimate
 from stickslip_ros.plots.units import SI
 from stickslip_ros.scenarios.parameter_field import parameters_of
 from stickslip_ros.scenarios.parameters import PlantParameters

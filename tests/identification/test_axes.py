@@ -1,4 +1,4 @@
-"""Axes without a spring: constants, curves, the controller, predictions."""
+"""Axes without a spring: constants, curves, the controller, motions, predictions."""
 
 from dataclasses import replace
 
@@ -12,6 +12,8 @@ from stickslip_ros.identification.laws import SaturatingAdapter
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.regression import Regression, regress
 from stickslip_ros.identification.servo import closed_loop, servo_of
+from stickslip_ros.identification.trajectory import Predictor, free_run
+from stickslip_ros.physics.model.friction import Coulomb
 from tests.identification.axis_record import COULOMB, SATURATING, SERVO, axis, record
 
 
@@ -167,3 +169,30 @@ def test_a_curve_does_not_rise_far_below_the_slowest_speed() -> None:
     for number, law in enumerate((COULOMB.forward, COULOMB.reverse)):
         force = found.friction(number)
         assert force.force[1] == pytest.approx(law.static, rel=0.3)
+
+
+def test_the_loop_has_the_belt_of_the_record() -> None:
+    """A belt that starts to move takes the slide with it, against the controller."""
+    still = np.zeros(2000)
+    belt = np.where(np.arange(2000) < 1000, 0.0, 0.02)
+    record = Record("axis", 1e-3, still, belt, reference=still)
+    drive = axis(Coulomb(static=20.0))
+    soft = replace(SERVO, position_gain=1e4, velocity_gain=1e3)
+    _, force = closed_loop(record, drive, soft, 0.0)
+    assert np.abs(force[:990]).max() < 1e-6
+    assert force[-1] == pytest.approx(-20.0, rel=0.01)
+
+
+def test_no_velocity_at_the_start_near_the_found_one_is_better() -> None:
+    drive, velocity = axis(Coulomb(static=20.0, viscous=200.0)), 0.35
+    time, still = 1e-3 * np.arange(4000), np.zeros(4000)
+    force = 60.0 * np.sin(9.0 * time) + 40.0 * np.sin(31.0 * time)
+    start = Record("axis", 1e-3, still, still, force=force)
+    position = np.rint(Predictor(start).positions(drive, velocity) / 1e-6) * 1e-6
+    moved = replace(start, position=position)
+    found, positions = free_run(moved, drive)
+    assert found == pytest.approx(velocity, rel=0.05)
+    error = np.std(positions - position)
+    for share in (-0.05, -0.01, 0.01, 0.05):
+        other = Predictor(moved).positions(drive, (1.0 + share) * found)
+        assert error < 1.05 * np.std(other - position)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from stickslip_ros.identification.intervals import block_covariance, propagated
+from stickslip_ros.identification.fit import block_covariance, propagated
 
 _ROWS = 2400
 
