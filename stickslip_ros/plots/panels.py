@@ -17,8 +17,8 @@ from stickslip_ros.physics.measures.cycle_fit import MeanCycle
 from stickslip_ros.physics.measures.cycle_measures import Measures, trend_text
 from stickslip_ros.physics.measures.run_meter import RunAnalysis
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.plots.decimation import intervals, peaks
-from stickslip_ros.plots.run_history import DrawnMotion, RunHistory
+from stickslip_ros.plots.measure_table import LABELS
+from stickslip_ros.plots.run_history import DrawnMotion, RunHistory, intervals, peaks
 from stickslip_ros.plots.style import BLUE, GREEN, GREY, LIGHT_GREY, ORANGE, REGIMES
 from stickslip_ros.plots.units import Units
 
@@ -71,13 +71,10 @@ def measures_text(measures: Measures, units: Units) -> str:
     """Return regime, amplitude, frequency and stick fraction as a line of text."""
     trend = trend_text(vars(measures), units.text)
     found = [f"{REGIMES[measures.regime].label}{trend and f', not steady: {trend}'}"]
-    for name, value, unit in (
-        ("amplitude", measures.amplitude, "m"),
-        ("frequency", measures.frequency, "Hz"),
-        ("stick fraction", measures.stick_fraction, ""),
-    ):
+    for name in ("amplitude", "frequency", "stick_fraction"):
+        value, (label, unit) = getattr(measures, name), LABELS[name]
         if value is not None and measures.period is not None:
-            found.append(f"{name} {units.text(value, unit)}")
+            found.append(f"{label} {units.text(value, unit)}")
     return ", ".join(found)
 
 

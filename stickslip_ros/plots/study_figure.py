@@ -18,6 +18,7 @@ from matplotlib.path import Path
 from stickslip_ros.arrays import BoolArray, FloatArray
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.measures.cycle_measures import Regime
+from stickslip_ros.plots.measure_table import LABELS
 from stickslip_ros.plots.study_tables import attractor_name
 from stickslip_ros.plots.style import (
     AMBER,
@@ -60,8 +61,8 @@ _HATCH: Any = {"facecolor": "white", "edgecolor": GREY, "hatch": "////"}
 _AWAY = REGIMES[Regime.UNBOUNDED]._replace(colour=LIGHT_GREY, hatch="...")
 """Look of diverging motions next to a colour bar, which starts with a near black."""
 
-_MEASURES = {"amplitude": ("amplitude", "m"), "stick_fraction": ("stick fraction", "")}
-"""Measures that are drawn in addition to the regimes: name and unit."""
+_MEASURES = {name: LABELS[name] for name in ("amplitude", "stick_fraction")}
+"""Measures that are drawn in addition to the regimes: label and unit."""
 
 
 Colour = Literal["regime", "amplitude", "stick_fraction"]

@@ -1,13 +1,13 @@
 """The tables of studies: sweeps, basins of attraction, designs, and what theory says."""
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict
 from itertools import groupby, islice
 from typing import Any, cast
 
 from stickslip_ros.physics.measures.cycle_measures import Regime, Trend
-from stickslip_ros.plots.measure_table import measure_table
+from stickslip_ros.plots.measure_table import LABELS, measure_table
 from stickslip_ros.plots.units import Units
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.studies.basin import Attractor, Basins
@@ -20,6 +20,8 @@ from stickslip_ros.tables import TextTable
 
 _MOST_RANGES = 60
 """Rows of the table of a sweep; where there are more, only their regimes are counted."""
+
+_Labels = Mapping[str, tuple[str, str]]
 
 # Label and unit of each value of a design, by its name in JSON.
 CONTROLLER = {
@@ -42,7 +44,8 @@ WORST = {
 }
 CHECKS = {"belt_speed": ("belt speed", "m/s"), "vibrates": ("vibrates", "")} | WORST
 _REST = {
-    "amplitude": ("amplitude", "m"),
+    "belt_speed": ("belt speed", "m/s"),
+    "amplitude": LABELS["amplitude"],
     "peak_force": ("peak force", "N"),
     "rms_force": ("rms force", "N"),
 }
@@ -59,7 +62,7 @@ _HOPF_POINTS = {
     "first_lyapunov_coefficients": ("first Lyapunov coefficient", ""),
 }
 
-_SECTIONS: dict[str, dict[str, tuple[str, str]]] = {
+_SECTIONS: dict[str, _Labels] = {
     "open_loop": _LOOP
     | {"hopf_angular_frequencies": ("angular frequency there", "rad/s")}
     | _HOPF_POINTS,
@@ -174,38 +177,33 @@ def design_tables(name: str, found: Design) -> Iterator[TextTable | str]:
             name: None if value == float("inf") else value
             for name, value in asdict(found.controller).items()
         }
-        yield TextTable(task, ["proposal", ""], _rows(values, CONTROLLER, units))
+        yield _one_below_another(task, "proposal", CONTROLLER, values, units)
         if found.margins is not None:
-            margins = _rows(asdict(found.margins), MARGINS, units)
-            yield TextTable("margins at the worst of these belt speeds", ["margins", ""], margins)
+            title, margins = "margins at the worst of these belt speeds", asdict(found.margins)
+            yield _one_below_another(title, "margins", MARGINS, margins, units)
         checks = [asdict(check) for check in found.checks]
-        columns = [
-            units.texts([check[key] for check in checks], unit) for key, (_, unit) in CHECKS.items()
-        ]
-        headings = [label for label, _ in CHECKS.values()]
-        rows = list(zip(*columns, strict=True))
-        yield TextTable("verification", headings, rows)
-        yield from _at_rest(found, units)
+        yield _side_by_side("verification", CHECKS, checks, units)
+        at_rest = [each | each["rest"] for each in checks if each["rest"] is not None]
+        if at_rest:
+            yield _side_by_side("at rest, by noise and rounding", _REST, at_rest, units)
     if found.remark is not None:
         yield found.remark
 
 
-def _at_rest(found: Design, units: Units) -> Iterator[TextTable]:
-    """Yield what noise and rounding leave at the equilibrium, if there are any."""
-    left = [(check.belt_speed, check.rest) for check in found.checks if check.rest is not None]
-    if not left:
-        return
-    columns = [units.texts([speed for speed, _ in left], "m/s")]
-    for name, (_, unit) in _REST.items():
-        columns.append(units.texts([getattr(rest, name) for _, rest in left], unit))
-    headings = ["belt speed", *(label for label, _ in _REST.values())]
-    yield TextTable("at rest, by noise and rounding", headings, list(zip(*columns, strict=True)))
+def _side_by_side(
+    title: str, labels: _Labels, rows: Sequence[Mapping[str, Any]], units: Units
+) -> TextTable:
+    """Return a table with a column for each of `labels`, all its values with one prefix."""
+    columns = [units.texts([row[name] for row in rows], unit) for name, (_, unit) in labels.items()]
+    headings = [label for label, _ in labels.values()]
+    return TextTable(title, headings, list(zip(*columns, strict=True)))
 
 
-def _rows(
-    values: Mapping[str, Any], labels: Mapping[str, tuple[str, str]], units: Units
-) -> list[list[str]]:
-    return [[label, units.text(values[key], unit)] for key, (label, unit) in labels.items()]
+def _one_below_another(
+    title: str, heading: str, labels: _Labels, values: Mapping[str, Any], units: Units
+) -> TextTable:
+    rows = [[label, units.text(values[name], unit)] for name, (label, unit) in labels.items()]
+    return TextTable(title, [heading, ""], rows)
 
 
 def stability_tables(scenario: Scenario, found: Section, notes: Notes) -> Iterator[TextTable | str]:

@@ -1,4 +1,4 @@
-"""Decimation without loss of peaks."""
+"""The history of a run: decimation without loss of peaks."""
 
 import numpy as np
 import numpy.typing as npt
@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from stickslip_ros.plots.decimation import Trace, peaks
+from stickslip_ros.plots.run_history import Trace, peaks
 
 FloatArray = npt.NDArray[np.float64]
 
