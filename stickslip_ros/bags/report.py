@@ -14,8 +14,8 @@ from stickslip_ros.bags.reader import Recording
 from stickslip_ros.bags.table_file import LONGEST, TableRecording, is_table, read_table
 from stickslip_ros.errors import BagError, InvalidInputError
 from stickslip_ros.messages.topics import CONTROL_FORCE, JOINT_STATES
-from stickslip_ros.physics.measures.reading import SampleAssumptions, reading_of
 from stickslip_ros.physics.measures.run_meter import RunAnalysis, RunMeter, RunObserver
+from stickslip_ros.physics.measures.sample_meter import SampleAssumptions, reading_of
 from stickslip_ros.physics.measures.slips import SlipMeter, SlipThreshold
 from stickslip_ros.samples import ForceColumns, SampleColumns
 from stickslip_ros.stamps import NANOSECONDS

@@ -210,7 +210,7 @@ def portrait_of(case: PortraitCase) -> Portrait:
     meter = CycleMeter(LAST_CYCLES)
     cycles = meter.feed(trajectory, drive.belt_speed)
     if motion.unbounded:
-        meter.report_run_away()
+        meter.unbounded = True
     measures = meter.measures()
     settling_time = (
         None if motion.unbounded else _settling_time(trajectory, cycles, measures, drive)

@@ -11,7 +11,7 @@ from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.installed_packages import prefixes
 from stickslip_ros.physics.measures.cycle_measures import CycleMeter
 from stickslip_ros.physics.measures.drift import resolved
-from stickslip_ros.physics.measures.reading import SampleAssumptions, varies
+from stickslip_ros.physics.measures.sample_meter import SampleAssumptions, varies
 from stickslip_ros.physics.model.control import ControlLaw
 from stickslip_ros.quantities import QUANTITY, number_of
 from stickslip_ros.scenarios import DEFAULT_NAMESPACE, ros_yaml

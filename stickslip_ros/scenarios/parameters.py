@@ -15,7 +15,7 @@ from typing_extensions import override
 
 from stickslip_ros.physics.loop.controller import Controller
 from stickslip_ros.physics.loop.sampled_loop import LOCKSTEP_START, SampledLoop
-from stickslip_ros.physics.measures.reading import SampleAssumptions, reading_of
+from stickslip_ros.physics.measures.sample_meter import SampleAssumptions, reading_of
 from stickslip_ros.physics.model.actuator import Actuator
 from stickslip_ros.physics.model.constants import constants_of
 from stickslip_ros.physics.model.control import CONTROL_LAWS, ControlLaw

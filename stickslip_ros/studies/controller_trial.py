@@ -285,7 +285,7 @@ def _measured(motion: RecordedMotion, loading: float) -> Measures:
     meter = CycleMeter(10)
     meter.feed(motion.take_breakpoints(), motion.drive.belt_speed)
     if motion.unbounded:
-        meter.report_run_away()
+        meter.unbounded = True
     return meter.measures()
 
 

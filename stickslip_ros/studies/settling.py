@@ -236,7 +236,7 @@ def settle(case: ControlledDrive, start: MotionState, course: SettlingOptions) -
             advance(step, section)
             done, step = done + step, done + step  # cycles on a slow belt are that long
         if motion.unbounded:
-            section.meter.report_run_away()
+            section.meter.unbounded = True
         return section
 
     section = observe()

@@ -8,8 +8,8 @@ from stickslip_ros.arrays import FloatArray
 from stickslip_ros.bags import Recording
 from stickslip_ros.errors import RunError
 from stickslip_ros.physics.measures.cycle_measures import Measures
-from stickslip_ros.physics.measures.reading import SampleAssumptions
 from stickslip_ros.physics.measures.run_meter import RunMeter
+from stickslip_ros.physics.measures.sample_meter import SampleAssumptions
 from stickslip_ros.samples import ForceColumns, SampleColumns
 
 

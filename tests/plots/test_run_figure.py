@@ -17,9 +17,12 @@ from benchmarks.measures_under_noise import motion
 from stickslip_ros.bags import Recording
 from stickslip_ros.bags.report import report_of_recording
 from stickslip_ros.physics.measures.cycle_measures import Cycle, CycleMeter, Measures, measures_of
-from stickslip_ros.physics.measures.reading import SampleAssumptions
 from stickslip_ros.physics.measures.run_meter import RunAnalysis
-from stickslip_ros.physics.measures.sample_meter import MeasuredMotion, SampleMeter
+from stickslip_ros.physics.measures.sample_meter import (
+    MeasuredMotion,
+    SampleAssumptions,
+    SampleMeter,
+)
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.motion import RecordedMotion
 from stickslip_ros.plots.run_figure import LAST_CYCLES, DrawnRun, run_figure
@@ -392,7 +395,7 @@ def test_a_motion_that_runs_away_on_a_belt_at_rest_has_no_equilibrium() -> None:
     growing, at_rest = np.exp(0.5 * time), np.zeros(len(time))
     see(history, time, growing * np.sin(time), growing, at_rest, growing)
     meter = CycleMeter(20)
-    meter.report_run_away()
+    meter.unbounded = True
     drive = replace(PAPER, belt_speed=0.0)
     figure = figure_of(history, meter.measures(), drive)
     assert figure.get_suptitle() == "it\nunbounded"

@@ -151,7 +151,7 @@ def simulate_sampled(
             forces.clear()
             progress(number / samples)
             if motion.unbounded:
-                meter.report_run_away()
+                meter.unbounded = True
                 break
     if recorder is not None:
         recorder.take(loop.true_sample, answer(loop, controller), loop.sample)
@@ -240,5 +240,5 @@ def simulate_continuous(
     if recorder is not None:
         recorder.take_due(motion)
     if motion.unbounded:
-        meter.report_run_away()
+        meter.unbounded = True
     return meter.measures()

@@ -90,10 +90,10 @@ def breakpoints_from_samples(
     # velocity may turn while it sticks.
     sticking = breakpoints.sticking
     straight = sticking if stick_speed == 0.0 else np.zeros_like(sticking)
-    breakpoints = _with_interior_points(breakpoints, _Cubics.turning_points, straight, velocity=0.0)
+    breakpoints = _with_interior_points(breakpoints, _turning_points, straight, velocity=0.0)
     if exact_times:
         sticking = breakpoints.sticking
-        breakpoints = _with_interior_points(breakpoints, _Cubics.velocity_peaks, sticking)
+        breakpoints = _with_interior_points(breakpoints, _velocity_peaks, sticking)
     return breakpoints
 
 
@@ -153,59 +153,53 @@ def _with_stick_edges(
     return _insert(breakpoints, edges + 1, edge_breakpoints)
 
 
-@dataclass(frozen=True)
-class _Cubics:
-    """The cubics of n intervals: velocity start + slope u + curvature u^2 for u from 0 to 1."""
+def _turning_points(
+    start: FloatArray, end: FloatArray, slope: FloatArray, curvature: FloatArray
+) -> FloatArray:
+    """Return where the velocity start + slope u + curvature u^2 is zero, NaN where it is not."""
+    with np.errstate(all="ignore"):
+        root = np.sqrt(slope * slope - 4.0 * curvature * start)
+        # The form of the root without cancellation.
+        u = -2.0 * start / (slope + np.copysign(root, end - start))
+        straight = start / (start - end)
+    u = np.where((u > 0.0) & (u < 1.0), u, straight)
+    return np.where(start * end < 0.0, u, np.nan)
 
-    start: FloatArray
-    end: FloatArray
-    slope: FloatArray
-    curvature: FloatArray
 
-    @classmethod
-    def through(cls, breakpoints: Breakpoints) -> Self:
-        step = np.diff(breakpoints.time)
-        start, end = breakpoints.velocity[:-1], breakpoints.velocity[1:]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            mean = np.diff(breakpoints.position) / step
-        curvature = 3.0 * (start + end - 2.0 * mean)
-        return cls(start, end, 6.0 * mean - 4.0 * start - 2.0 * end, curvature)
-
-    def turning_points(self) -> FloatArray:
-        """Return u where the velocity crosses zero, NaN where it does not."""
-        with np.errstate(all="ignore"):
-            root = np.sqrt(self.slope * self.slope - 4.0 * self.curvature * self.start)
-            # The form of the root without cancellation.
-            u = -2.0 * self.start / (self.slope + np.copysign(root, self.end - self.start))
-            straight = self.start / (self.start - self.end)
-        u = np.where((u > 0.0) & (u < 1.0), u, straight)
-        return np.where(self.start * self.end < 0.0, u, np.nan)
-
-    def velocity_peaks(self) -> FloatArray:
-        """Return u where the velocity has an extreme, NaN where it has none."""
-        with np.errstate(all="ignore"):
-            u = -self.slope / (2.0 * self.curvature)
-        return np.where((u > 0.0) & (u < 1.0), u, np.nan)
+def _velocity_peaks(
+    _start: FloatArray, _end: FloatArray, slope: FloatArray, curvature: FloatArray
+) -> FloatArray:
+    """Return where the velocity start + slope u + curvature u^2 has an extreme, else NaN."""
+    with np.errstate(all="ignore"):
+        u = -slope / (2.0 * curvature)
+    return np.where((u > 0.0) & (u < 1.0), u, np.nan)
 
 
 def _with_interior_points(
     breakpoints: Breakpoints,
-    find: Callable[[_Cubics], FloatArray],
+    find: Callable[[FloatArray, FloatArray, FloatArray, FloatArray], FloatArray],
     straight: BoolArray,
     velocity: float | None = None,
 ) -> Breakpoints:
     """Insert the points that `find` returns, with `velocity` where it is known.
 
-    Before the breakpoints that are `straight` there are none.
+    In each interval the velocity is start + slope u + curvature u^2, for u from 0 to 1. Before the
+    breakpoints that are `straight` there are no points.
     """
-    cubics = _Cubics.through(breakpoints)
-    u = np.where(straight[1:], np.nan, find(cubics))
+    step, start, end = (
+        np.diff(breakpoints.time),
+        breakpoints.velocity[:-1],
+        breakpoints.velocity[1:],
+    )
+    with np.errstate(divide="ignore", invalid="ignore"):
+        mean = np.diff(breakpoints.position) / step
+    slope, curvature = 6.0 * mean - 4.0 * start - 2.0 * end, 3.0 * (start + end - 2.0 * mean)
+    u = np.where(straight[1:], np.nan, find(start, end, slope, curvature))
     # A jump onto the belt takes no time: there are no points within it.
-    at = np.flatnonzero(np.isfinite(u) & (np.diff(breakpoints.time) > 0.0))
+    at = np.flatnonzero(np.isfinite(u) & (step > 0.0))
     if len(at) == 0:
         return breakpoints
-    u, step = u[at], np.diff(breakpoints.time)[at]
-    start, slope, curvature = cubics.start[at], cubics.slope[at], cubics.curvature[at]
+    u, step, start, slope, curvature = (each[at] for each in (u, step, start, slope, curvature))
     reached = start + u * (slope + u * curvature)
     new = Breakpoints(
         breakpoints.time[at] + u * step,

@@ -1,13 +1,15 @@
 """Mean cycle of positions with noise: cycles folded onto each other and fitted together."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf, pi
+from typing import NamedTuple
 
 import numpy as np
+from numpy.polynomial import chebyshev
 
 from stickslip_ros.arrays import FloatArray, IntArray
-from stickslip_ros.physics.measures.cycle_measures import LEAST_CYCLES, Cycle
+from stickslip_ros.physics.measures.cycle_measures import LEAST_CYCLES, Cycle, CycleMeans
 from stickslip_ros.physics.measures.noise import FEW_SAMPLES, LEAST_SAMPLES
 from stickslip_ros.physics.measures.stick_fit import StickFit, fit_stick
 
@@ -37,17 +39,9 @@ _UNLIKE_NOISE, _UNLIKE_AMPLITUDE = 3.0, 0.05
 
 
 @dataclass(frozen=True)
-class MeanCycle:
-    """Mean of cycles that are alike, with standard errors."""
+class MeanCycle(CycleMeans):
+    """Mean of cycles that are alike; they stick if the data show it, at a level of 1 %."""
 
-    cycle: Cycle
-    """Measures of the mean cycle, SI units."""
-    errors: Cycle
-    """Their standard errors, SI units."""
-    sticks: bool
-    """Whether the data show a stick, at a level of 1 %."""
-    amplitudes: FloatArray
-    """Amplitude of each cycle by the mean cycle's shape, m; shape (cycles,)."""
     noise: float
     """Standard deviation of the residuals, m."""
     phase: FloatArray
@@ -64,17 +58,20 @@ class MeanCycle:
 
 @dataclass(frozen=True)
 class _Shape:
-    """A fitted cycle: position and derivatives by phase (s), and how the fit depends on the data.
+    """A fitted cycle: its position, or the derivative by time, as functions of the phase (s).
 
-    `rows` returns the derivatives of the position, or of its time derivative, by the coefficients.
+    It is what is `known` and the `rows` of the derivatives by the coefficients that were `found`.
     """
 
-    value: Callable[[FloatArray], FloatArray]
-    rate: Callable[[FloatArray], FloatArray]
+    known: Callable[[FloatArray, int], FloatArray]
     rows: Callable[[FloatArray, int], FloatArray]
+    found: FloatArray
     covariance: FloatArray
-    fastest: float | None = None
+    fastest: float | None
     """Highest velocity, m/s, where it is known beforehand."""
+
+    def value(self, phase: FloatArray, derivative: int = 0) -> FloatArray:
+        return self.known(phase, derivative) + self.rows(phase, derivative) @ self.found
 
 
 def fit_mean_cycle(
@@ -86,6 +83,10 @@ def fit_mean_cycle(
     step: float = 0.0,
 ) -> MeanCycle | None:
     """Fit the mean of cycles of equal period to samples, s and m, on a belt with a velocity, m/s.
+
+    Folded by the period, they are fitted by a Fourier series, or by a stick and a polynomial slip
+    where a test of the squared residuals shows a stick. The standard errors are those of linear
+    least squares, from the noise or, if larger, from the scatter of the cycles (cluster-robust).
 
     `starts` are the starts of the cycles and the end of the last, s, `noise` is the standard
     deviation of the positions, m, and `step` that to which they are rounded, m. None where there
@@ -106,40 +107,27 @@ def fit_mean_cycle(
         shape = fold.slip(stick.fit, belt_speed)
         fold.adjust(shape)
         shape = fold.slip(stick.fit, belt_speed)
-    residual = fold.position - shape.value(fold.phase)
+    fitted = shape.value(fold.phase)
+    residual = fold.position - fitted
     spread = float(np.sqrt(np.mean(residual**2)))
-    cycle, errors = _measures(shape, fold)
+    cycle, errors = _measures(shape, fold, stick, fold.period_error(shape, residual))
     if spread > _UNLIKE_NOISE * noise + _UNLIKE_AMPLITUDE * cycle.amplitude:
         return None
-    period_error = fold.period_error(shape, residual)
-    fraction = fraction_error = 0.0
-    edges = edge_errors = None
-    if stick is not None:
-        fraction = stick.fit.stick_time / fold.period
-        fraction_error = stick.time_error / fold.period
-        edges, edge_errors = (stick.fit.landing, stick.fit.departure), stick.edge_errors
-    cycle = cycle._replace(stick_fraction=fraction, midpoint=sign * cycle.midpoint)
-    errors = errors._replace(
-        period=period_error,
-        frequency=period_error / fold.period**2,
-        stick_fraction=fraction_error,
-    )
     return MeanCycle(
-        cycle=cycle,
+        cycle=cycle._replace(midpoint=sign * cycle.midpoint),
         errors=errors,
         sticks=stick is not None,
         amplitudes=cycle.amplitude * fold.relative_amplitudes(shape, residual),
         noise=spread,
         phase=fold.phase,
         position=sign * fold.position,
-        fitted=sign * shape.value(fold.phase),
-        edges=edges,
-        edge_errors=edge_errors,
+        fitted=sign * fitted,
+        edges=None if stick is None else (stick.fit.landing, stick.fit.departure),
+        edge_errors=None if stick is None else stick.edge_errors,
     )
 
 
-@dataclass(frozen=True)
-class _Stick:
+class _Stick(NamedTuple):
     fit: StickFit
     time_error: float
     edge_errors: tuple[float, float]
@@ -153,11 +141,10 @@ class _Fold:
     ) -> None:
         self.time, self.position, self.count, self.period = time, position, count, period
         self._step = step
-        self._origin = 0.0
 
     @property
     def _turns(self) -> FloatArray:
-        return (self.time - self._origin) / self.period
+        return self.time / self.period
 
     @property
     def phase(self) -> FloatArray:
@@ -181,12 +168,10 @@ class _Fold:
 
         def rows(phase: FloatArray, derivative: int, harmonics: int) -> FloatArray:
             omega: FloatArray = (2.0 * pi / self.period) * np.arange(1.0, harmonics + 1.0)
-            angle = phase[:, None] * omega
+            angle, one = phase[:, None] * omega, np.ones((len(phase), 1))
             if derivative == 0:
-                return np.hstack([np.ones((len(phase), 1)), np.cos(angle), np.sin(angle)])
-            return np.hstack(
-                [np.zeros((len(phase), 1)), -omega * np.sin(angle), omega * np.cos(angle)]
-            )
+                return np.hstack([one, np.cos(angle), np.sin(angle)])
+            return np.hstack([0.0 * one, -omega * np.sin(angle), omega * np.cos(angle)])
 
         most = max(len(self.time) // (3 * self.count), 1)
         if most < _HARMONICS[0]:  # the cycles have samples at different phases
@@ -230,9 +215,9 @@ class _Fold:
                 break
             squares, width = left, basis.shape[1]
         return _Shape(
-            lambda phase: known(phase, 0) + rows(phase, 0, size) @ found,
-            lambda phase: known(phase, 1) + rows(phase, 1, size) @ found,
+            known,
             lambda phase, derivative: rows(phase, derivative, size),
+            found,
             covariance,
             fastest,
         )
@@ -240,7 +225,7 @@ class _Fold:
     def stick(self, shape: _Shape, belt_speed: float, noise: float) -> _Stick | None:
         """Return the stick of the cycles; None without one."""
         grid = np.linspace(0.0, self.period, _GRID, endpoint=False)
-        velocity = shape.rate(grid)
+        velocity = shape.value(grid, 1)
         if not _STICKING_SHARE * belt_speed < velocity.max() < _PASSING_SHARE * belt_speed:
             return None
         near = velocity > np.minimum(0.93 * belt_speed, 0.98 * velocity.max())
@@ -270,15 +255,10 @@ class _Fold:
             variance = with_stick.squares / max(len(time) - with_stick.jacobian.shape[1], 1)
             if without.squares - with_stick.squares <= STICK_LEVEL * variance:
                 return None
-        fit = with_stick
-        moved = StickFit(
-            fit.centre + centre,
-            fit.stick_time,
-            fit.gap,
-            fit.offset - belt_speed * centre,
-            fit.residual,
-            fit.jacobian,
-            fit.squares,
+        moved = replace(
+            with_stick,
+            centre=with_stick.centre + centre,
+            offset=with_stick.offset - belt_speed * centre,
         )
         return _Stick(moved, time_error, (landing, departure))
 
@@ -305,17 +285,11 @@ class _Fold:
         def rows(phase: FloatArray, derivative: int, degree: int) -> FloatArray:
             u = np.clip(since(phase) / length, 0.0, 1.0)
             shape, slope = (u * (1.0 - u)) ** 2, 2.0 * u * (1.0 - u) * (1.0 - 2.0 * u)
-            basis = np.polynomial.chebyshev.chebvander(2.0 * u - 1.0, degree)
+            basis = chebyshev.chebvander(2.0 * u - 1.0, degree)
             if derivative == 0:
                 return shape[:, None] * basis
-            derived = np.column_stack(
-                [
-                    np.polynomial.chebyshev.chebval(
-                        2.0 * u - 1.0, np.polynomial.chebyshev.chebder(row)
-                    )
-                    for row in np.eye(degree + 1)
-                ]
-            )
+            every = map(chebyshev.chebder, np.eye(degree + 1))
+            derived = np.column_stack([chebyshev.chebval(2.0 * u - 1.0, row) for row in every])
             return (slope[:, None] * basis + 2.0 * shape[:, None] * derived) / length
 
         # With a whole number of samples per cycle the slip has few different ones.
@@ -338,7 +312,8 @@ class _Fold:
         """Return the amplitude of each cycle over that of the shape."""
         phase, number = self.phase, self.number
         values = shape.value(phase)
-        design = np.column_stack([values - values.mean(), np.ones(len(phase)), shape.rate(phase)])
+        rate = shape.value(phase, 1)
+        design = np.column_stack([values - values.mean(), np.ones(len(phase)), rate])
         relative = np.ones(self.count)
         for cycle in range(self.count):
             rows = number == cycle
@@ -349,7 +324,7 @@ class _Fold:
 
     def _shifts(self, shape: _Shape) -> FloatArray:
         """Return the derivatives of the positions by delay, period and offset."""
-        rate = -shape.rate(self.phase)
+        rate = -shape.value(self.phase, 1)
         return np.column_stack([rate, rate * self._turns, np.ones(len(rate))])
 
     def _covariance(self, jacobian: FloatArray, residual: FloatArray) -> FloatArray:
@@ -370,14 +345,16 @@ class _Fold:
         return errors @ errors.T / _OFFSETS
 
 
-def _measures(shape: _Shape, fold: _Fold) -> tuple[Cycle, Cycle]:
-    """Return the measures of a shape, and their standard errors, without those of the stick."""
-    grid = np.linspace(0.0, fold.period, _GRID, endpoint=False)
-    position, velocity = shape.value(grid), shape.rate(grid)
+def _measures(
+    shape: _Shape, fold: _Fold, stick: _Stick | None, period_error: float
+) -> tuple[Cycle, Cycle]:
+    """Return the measures of a shape, and their standard errors."""
+    grid, period = np.linspace(0.0, fold.period, _GRID, endpoint=False), fold.period
+    position, velocity = shape.value(grid), shape.value(grid, 1)
     highest, lowest = (_refined(grid, sign * position) for sign in (1.0, -1.0))
     fastest, slowest = (_refined(grid, sign * velocity) for sign in (1.0, -1.0))
     at = np.array([highest, lowest, fastest, slowest])
-    positions, velocities = shape.value(at), shape.rate(at)
+    positions, velocities = shape.value(at), shape.value(at, 1)
     rows, rates = shape.rows(at, 0), shape.rows(at, 1)
     peak, peak_row = velocities[2], rates[2]
     if shape.fastest is not None:
@@ -390,17 +367,17 @@ def _measures(shape: _Shape, fold: _Fold) -> tuple[Cycle, Cycle]:
         amplitude=float(positions[0] - positions[1]) / 2.0,
         velocity_amplitude=float(peak - velocities[3]) / 2.0,
         midpoint=float(positions[0] + positions[1]) / 2.0,
-        period=fold.period,
-        frequency=1.0 / fold.period,
-        stick_fraction=0.0,
+        period=period,
+        frequency=1.0 / period,
+        stick_fraction=0.0 if stick is None else stick.fit.stick_time / period,
     )
     errors = Cycle(
         amplitude=error((rows[0] - rows[1]) / 2.0),
         velocity_amplitude=error((peak_row - rates[3]) / 2.0),
         midpoint=error((rows[0] + rows[1]) / 2.0),
-        period=0.0,
-        frequency=0.0,
-        stick_fraction=0.0,
+        period=period_error,
+        frequency=period_error / period**2,
+        stick_fraction=0.0 if stick is None else stick.time_error / period,
     )
     return cycle, errors
 
@@ -417,8 +394,8 @@ def _refined(grid: FloatArray, values: FloatArray) -> float:
 def _clustered(jacobian: FloatArray, residual: FloatArray, number: IntArray) -> FloatArray:
     """Return the covariance of a least-squares fit, by its noise or by the scatter of the cycles.
 
-    Whichever is larger in the trace after scaling: cycles that differ make the residuals of one
-    cycle depend on each other.
+    Whichever has the larger standard errors: cycles that differ make the residuals of one cycle
+    depend on each other. Their scatter is the sandwich of Liang and Zeger (Biometrika 1986).
     """
     freedom = max(len(residual) - jacobian.shape[1], 1)
     inverse = np.linalg.pinv(jacobian.T @ jacobian)

@@ -4,11 +4,13 @@ from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from enum import StrEnum
+from functools import reduce
 from itertools import pairwise
 from typing import Any, NamedTuple, Self
 
 import numpy as np
 
+from stickslip_ros.arrays import FloatArray
 from stickslip_ros.physics.measures.breakpoints import Breakpoints
 from stickslip_ros.physics.measures.drift import Drift
 from stickslip_ros.text import quantity
@@ -19,16 +21,16 @@ EQUILIBRIUM_SPEED = 1e-3
 UNBOUNDED_BELT_SPEEDS = 1e3
 """Speed of the slide, in belt speeds, above which a sampled motion counts as unbounded."""
 
-STEADY = 1e-3
+STEADY_CHANGE = 1e-3
 """Largest relative difference between the amplitudes of the measured cycles of a steady motion."""
 
-STEADY_UNDER_NOISE = 0.01
+STEADY_CHANGE_UNDER_NOISE = 0.01
 """The same under noise."""
 
 LEAST_CYCLES = 3
 """Number of cycles needed to decide whether a motion is steady."""
 
-GRAZING = 1e-8
+GRAZING_FRACTION = 1e-8
 """Stick fraction up to which a cycle counts as touching the belt speed without sticking.
 
 The stick fraction grows with the root of the distance from grazing; this value is the effect of
@@ -182,6 +184,49 @@ class Measures:
         return asdict(self)
 
 
+@dataclass(frozen=True)
+class CycleMeans:
+    """Means over cycles, with standard errors."""
+
+    cycle: Cycle
+    """Measures of the mean cycle, SI units."""
+    errors: Cycle | None
+    """Their standard errors, SI units; None if they are not known."""
+    sticks: bool
+    """Whether the cycles stick."""
+    amplitudes: FloatArray
+    """Amplitude of each cycle, m; shape (cycles,)."""
+
+    @classmethod
+    def over(cls, cycles: Sequence[Cycle], share: float = 0.0) -> Self:
+        """Return the means over single cycles, which stick if more than this share of them does.
+
+        The error of a mean is the standard deviation of the cycles over the root of their number;
+        below three it is not known.
+        """
+        mean, errors = Cycle(*np.mean(cycles, axis=0).tolist()), None
+        if len(cycles) >= LEAST_CYCLES:
+            scatter = np.std(cycles, axis=0, ddof=1) / len(cycles) ** 0.5
+            errors = Cycle(*scatter.tolist())
+        sticks = sum(cycle.stick_fraction > 0.0 for cycle in cycles) > share * len(cycles)
+        return cls(mean, errors, sticks, np.array([cycle.amplitude for cycle in cycles]))
+
+    def measures(self, resting: bool, steady: bool | None, trend: Trend | None) -> Measures:
+        """Return the measures of a motion with this mean; one that is `resting` has no period."""
+        count = len(self.amplitudes)
+        if resting:
+            regime = Regime.EQUILIBRIUM
+            return without_cycles(self.cycle, regime, count, steady=steady, trend=trend)
+        return Measures(
+            **self.cycle._asdict(),
+            cycles=count,
+            regime=Regime.STICK_SLIP if self.sticks else Regime.PURE_SLIP,
+            steady=steady,
+            trend=trend,
+            errors=None if self.errors is None else self.errors._asdict(),
+        )
+
+
 def with_drift(measures: Measures, drift: Drift) -> Measures:
     """Return the measures of a run with these trends."""
     unknown = measures.regime in (None, Regime.UNBOUNDED, Regime.UNDERSAMPLED)
@@ -197,9 +242,8 @@ def measures_of(report: Mapping[str, Any]) -> Measures:
     return Measures(**{measure.name: report[measure.name] for measure in fields(Measures)})
 
 
-@dataclass
-class _Stretch:
-    """Ends, extremes and stick time of a part of a motion, extended as the motion continues."""
+class _Stretch(NamedTuple):
+    """Ends, extremes and stick time of a part of a motion."""
 
     start: float
     end: float
@@ -207,33 +251,36 @@ class _Stretch:
     highest: float
     slowest: float
     fastest: float
-    stick_time: float = 0.0
+    stick_time: float
 
     @classmethod
-    def from_breakpoint(cls, breakpoints: Breakpoints, row: int) -> Self:
-        time, position, velocity = (
-            float(column[row])
-            for column in (breakpoints.time, breakpoints.position, breakpoints.velocity)
-        )
-        return cls(time, time, position, position, velocity, velocity)
-
-    def extend(self, breakpoints: Breakpoints, first: int, last: int) -> None:
-        """Continue to the breakpoint `last`; the one before `first` is the end so far."""
-        if last < first:
-            return
-        rows = slice(first, last + 1)
+    def between(cls, breakpoints: Breakpoints, first: int, last: int) -> Self:
+        """Return the part from one breakpoint to another."""
         # Stretches are short: lists take a fraction of the time of arrays.
-        position = breakpoints.position[rows].tolist()
-        velocity = breakpoints.velocity[rows].tolist()
-        self.end = float(breakpoints.time[last])
-        self.lowest = min(self.lowest, *position)
-        self.highest = max(self.highest, *position)
-        self.slowest = min(self.slowest, *velocity)
-        self.fastest = max(self.fastest, *velocity)
-        stuck = breakpoints.sticking[rows]
-        if stuck.any():
-            durations = np.diff(breakpoints.time[first - 1 : last + 1])
-            self.stick_time += float(durations[stuck].sum())
+        time = breakpoints.time[first : last + 1]
+        position = breakpoints.position[first : last + 1].tolist()
+        velocity = breakpoints.velocity[first : last + 1].tolist()
+        stuck = breakpoints.sticking[first + 1 : last + 1]
+        return cls(
+            float(time[0]),
+            float(time[-1]),
+            min(position),
+            max(position),
+            min(velocity),
+            max(velocity),
+            float(np.diff(time)[stuck].sum()) if stuck.any() else 0.0,
+        )
+
+    def followed_by(self, later: "_Stretch") -> "_Stretch":
+        return _Stretch(
+            self.start,
+            later.end,
+            min(self.lowest, later.lowest),
+            max(self.highest, later.highest),
+            min(self.slowest, later.slowest),
+            max(self.fastest, later.fastest),
+            self.stick_time + later.stick_time,
+        )
 
     @property
     def duration(self) -> float:
@@ -247,7 +294,7 @@ class _Stretch:
             midpoint=(self.highest + self.lowest) / 2.0,
             period=self.duration,
             frequency=1.0 / self.duration,
-            stick_fraction=stick_fraction if stick_fraction > GRAZING else 0.0,
+            stick_fraction=stick_fraction if stick_fraction > GRAZING_FRACTION else 0.0,
         )
 
 
@@ -283,11 +330,12 @@ class CycleMeter:
         """Trends of the run, for its user to feed."""
         self.within = 0.0
         """Range, m, in which a slide counts as held."""
+        self.unbounded = False
+        """Whether the motion is reported as one that diverges."""
         self._cycles: deque[Cycle] = deque(maxlen=window)
         self._amplitudes: deque[float] = deque(maxlen=max(window, LEAST_CYCLES))
         self._belt_speed = self._fastest_belt = 0.0
         self._fastest = 0.0
-        self._unbounded = False
         self.ends: list[float] = []
         """Time, s, at which each cycle ended that `feed` returned last."""
         self.interrupt()
@@ -300,16 +348,6 @@ class CycleMeter:
         self._whole = False
         self._recent: list[_Stretch] = []
         self._sticking_since: float | None = None
-
-    def report_run_away(self, unbounded: bool = True) -> None:
-        """Report that the motion is unbounded, or take that back.
-
-        Parameters
-        ----------
-        unbounded : bool, optional
-            Whether the motion is unbounded.
-        """
-        self._unbounded = unbounded
 
     def feed(
         self, breakpoints: Breakpoints, belt_speed: float, fastest_belt: float | None = None
@@ -336,25 +374,24 @@ class CycleMeter:
             return []
         self._belt_speed = belt_speed
         self._fastest_belt = abs(belt_speed) if fastest_belt is None else fastest_belt
-        first = len(self._last)
-        breakpoints = self._last.followed_by(breakpoints)
+        breakpoints, last = self._last.followed_by(breakpoints), 0
         if self._open is None:
-            self._open = _Stretch.from_breakpoint(breakpoints, 0)
-            first = 1
+            self._open = _Stretch.between(breakpoints, 0, 0)
         completed: list[Cycle] = []
         for edge in self._upward_crossings(breakpoints):
-            self._open.extend(breakpoints, first, edge)
+            self._open = self._open.followed_by(_Stretch.between(breakpoints, last, edge))
             if self._whole and self._open.duration > 0.0:
                 completed.append(self._open.as_cycle())
                 self.ends.append(self._open.end)
-            self._open = _Stretch.from_breakpoint(breakpoints, edge)
+            self._open = _Stretch.between(breakpoints, edge, edge)
             self._whole = True
             self._recent = []
-            first = edge + 1
+            last = edge
         self._cycles.extend(completed)
         self._amplitudes.extend(cycle.amplitude for cycle in completed)
-        self._open.extend(breakpoints, first, len(breakpoints) - 1)
-        self._follow_recent(breakpoints, first)
+        end = _Stretch.between(breakpoints, last, len(breakpoints) - 1)
+        self._open = self._open.followed_by(end)
+        self._follow_recent(breakpoints, last)
         self._follow_sticking(breakpoints)
         self._last = breakpoints[len(breakpoints) - 1 :]
         return completed
@@ -367,7 +404,7 @@ class CycleMeter:
         Measures
             Measures in SI units.
         """
-        if self._unbounded:
+        if self.unbounded:
             return without_cycles(None, Regime.UNBOUNDED, steady=True)
         return with_drift(self._measures(), self.drift)
 
@@ -383,7 +420,7 @@ class CycleMeter:
         if held is not None:
             # What rounding leaves of a motion may grow over a few cycles by chance.
             enough = len(self._amplitudes) > 2 * LEAST_CYCLES
-            trend = _trend(self._amplitudes, True, STEADY) if enough else None
+            trend = _trend(self._amplitudes, True, STEADY_CHANGE) if enough else None
             return without_cycles(held, Regime.HELD, steady=trend is None, trend=trend)
         if not self._cycles or since_turn > STALE_PERIODS * period:
             recent = self._recent_motion()
@@ -395,25 +432,14 @@ class CycleMeter:
                 return without_cycles(None, None)
             steady = True if self._lasts(since_turn) else None
             return without_cycles(recent, Regime.EQUILIBRIUM, steady=steady)
-        mean = Cycle(*np.mean(self._cycles, axis=0).tolist())
-        resting = mean.velocity_amplitude < self._equilibrium_speed
-        share = STEADY
+        means = CycleMeans.over(self._cycles)
+        resting = means.cycle.velocity_amplitude < self._equilibrium_speed
+        share = STEADY_CHANGE
         if self.drift.resolution > 0.0:  # what the sensor tells differs from cycle to cycle
-            share = max(STEADY_UNDER_NOISE, self.drift.resolution / max(self._amplitudes))
+            share = max(STEADY_CHANGE_UNDER_NOISE, self.drift.resolution / max(self._amplitudes))
         trend = _trend(self._amplitudes, resting, share)
         steady = trend is None if len(self._amplitudes) >= LEAST_CYCLES else None
-        count = len(self._cycles)
-        if resting:
-            return without_cycles(mean, Regime.EQUILIBRIUM, count, steady=steady, trend=trend)
-        regime = Regime.STICK_SLIP if mean.stick_fraction > 0.0 else Regime.PURE_SLIP
-        return Measures(
-            **mean._asdict(),
-            cycles=count,
-            regime=regime,
-            steady=steady,
-            trend=trend,
-            errors=errors_of_means(self._cycles),
-        )
+        return means.measures(resting, steady, trend)
 
     def _held(self, at_rest: bool) -> Cycle | None:
         """Return the motion of three cycles and since, or only since; None beyond `within`."""
@@ -452,7 +478,7 @@ class CycleMeter:
         before = np.maximum(rising - 1, 0)
         return np.where(speed[before] <= speed[rising], before, rising).tolist()
 
-    def _follow_recent(self, breakpoints: Breakpoints, first: int) -> None:
+    def _follow_recent(self, breakpoints: Breakpoints, row: int) -> None:
         """Keep the extremes of at least the last half of the stretch since the last crossing.
 
         Once the stretch is longer than the last cycle, everything before the last doubling is
@@ -460,32 +486,25 @@ class CycleMeter:
         """
         assert self._open is not None
         if not self._recent:
-            self._recent = [_Stretch.from_breakpoint(breakpoints, first - 1)]
-        row, last = first, len(breakpoints) - 1
+            self._recent = [_Stretch.between(breakpoints, row, row)]
+        last = len(breakpoints) - 1
         earliest = self._open.start + (self._cycles[-1].period if self._cycles else 0.0)
-        while row <= last:
+        while row < last:
             current = self._recent[-1]
             due = max(2.0 * current.start - self._open.start, earliest)
             side = "left" if due > current.start else "right"
-            doubled = row + int(np.searchsorted(breakpoints.time[row:], due, side))
-            current.extend(breakpoints, row, min(doubled, last))
+            doubled = row + 1 + int(np.searchsorted(breakpoints.time[row + 1 :], due, side))
+            part = _Stretch.between(breakpoints, row, min(doubled, last))
+            self._recent[-1] = current.followed_by(part)
             if doubled <= last:
-                self._recent = [current, _Stretch.from_breakpoint(breakpoints, doubled)]
-            row = doubled + 1
+                self._recent = [self._recent[-1], _Stretch.between(breakpoints, doubled, doubled)]
+            row = doubled
 
     def _recent_motion(self) -> Cycle | None:
         """Return the latest part of a stretch without crossings, as if it were a cycle."""
         if not self._recent or self._recent[0].duration <= 0.0:
             return None
-        merged = replace(self._recent[0])
-        for part in self._recent[1:]:
-            merged.end = part.end
-            merged.lowest = min(merged.lowest, part.lowest)
-            merged.highest = max(merged.highest, part.highest)
-            merged.slowest = min(merged.slowest, part.slowest)
-            merged.fastest = max(merged.fastest, part.fastest)
-            merged.stick_time += part.stick_time
-        return merged.as_cycle()
+        return reduce(_Stretch.followed_by, self._recent).as_cycle()
 
     def _follow_sticking(self, breakpoints: Breakpoints) -> None:
         slipping = np.flatnonzero(~breakpoints.sticking[1:])
@@ -515,14 +534,6 @@ def _trend(amplitudes: Sequence[float], resting: bool, share: float) -> Trend | 
     if grows:
         return Trend.GROWING
     return Trend.DECAYING if first - last > share * first else Trend.VARYING
-
-
-def errors_of_means(cycles: Sequence[Cycle]) -> dict[str, float] | None:
-    """Return the standard error of each mean by its name, from the scatter; None below 3 cycles."""
-    if len(cycles) < LEAST_CYCLES:
-        return None
-    errors = np.std(cycles, axis=0, ddof=1) / len(cycles) ** 0.5
-    return dict(zip(Cycle._fields, errors.tolist(), strict=True))
 
 
 def without_cycles(

@@ -97,7 +97,8 @@ def fit_line(time: FloatArray, value: FloatArray, noise: float = 0.0) -> tuple[f
     """Return the slope of a line and its standard error; the mean of the times is zero.
 
     Each value has at least the standard deviation `noise`: few may agree by chance. Residuals that
-    follow each other count as one, by their first autocorrelation.
+    follow each other count as one, by their first autocorrelation: fewer by (1 - r) / (1 + r)
+    (Bayley and Hammersley, 1946).
     """
     square = float(time @ time)
     mean, slope = float(value.mean()), float(time @ value) / square

@@ -14,25 +14,26 @@ _NORMAL_MEDIAN = 0.6745
 """Median magnitude of a normal variable of deviation 1."""
 _IMPULSE = 10.0
 """Size of an impulse, in standard deviations of the noise."""
-_LINE = 3
+_LINE_HALF_WIDTH = 3
 """Half of the width of a line in the spectrum, in frequencies."""
 _LINE_SHARE, _LINE_MEDIANS = 0.2, 30.0
 """Least power of a line, as a share of all and in medians."""
 FEW_SAMPLES, LEAST_SAMPLES = 10.0, 4.0
 """Samples per cycle below which cycles are measured together only, and not at all."""
-FEWEST = 32
+FEWEST_SAMPLES = 32
 """Number of samples from which the noise is estimated."""
 
 
 def white_noise(signal: FloatArray) -> float:
     """Return the standard deviation of the white noise of a signal sampled at equal steps.
 
-    High differences suppress a smooth motion: at 60 samples per cycle the sixth leaves a millionth
-    of it. Their median is robust against stick edges and impulses. Where no three successive
+    High differences suppress a smooth motion (Hall, Kay and Titterington, Biometrika 1990): at 60
+    samples per cycle the sixth leaves a millionth of it. Their median is robust against stick edges
+    and impulses. Where no three successive
     orders agree, or the spectrum is one of lines, the differences are of the motion itself, and the
     noise counts as zero; so it does below 32 samples.
     """
-    if len(signal) < FEWEST:
+    if len(signal) < FEWEST_SAMPLES:
         return 0.0
     # The n-th differences of white noise of deviation 1 have the variance (2n)! / n!^2.
     deviations = [
@@ -59,7 +60,9 @@ def _agree(lower: float, higher: float) -> bool:
 def impulses(signal: FloatArray, noise: float) -> BoolArray:
     """Return which samples are impulses: single samples far from both of their neighbours.
 
-    `noise` is the standard deviation. The first two and the last two samples never are impulses.
+    The second differences beside an impulse have the other sign and are half as large, unlike those
+    of a motion. `noise` is the standard deviation. The first two and the last two samples never are
+    impulses.
     """
     found = np.zeros(len(signal), np.bool_)
     if len(signal) < 5:
@@ -83,9 +86,9 @@ def strongest_line(signal: FloatArray) -> float | None:
     """
     power = _spectrum(signal)
     at = int(np.argmax(power))
-    around = slice(max(at - _LINE, 0), at + _LINE + 1)
+    around = slice(max(at - _LINE_HALF_WIDTH, 0), at + _LINE_HALF_WIDTH + 1)
     stands_out = power[at] > _LINE_MEDIANS * float(np.median(power))
-    if at <= _LINE or not stands_out or power[around].sum() < _LINE_SHARE * power.sum():
+    if at <= _LINE_HALF_WIDTH or not stands_out or power[around].sum() < _LINE_SHARE * power.sum():
         return None
     bins = np.arange(len(power))[around]
     return float(bins @ power[around] / power[around].sum()) / len(signal)

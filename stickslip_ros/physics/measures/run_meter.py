@@ -4,14 +4,18 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import islice
 from math import isfinite
-from typing import Any, NamedTuple, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
 from stickslip_ros.arrays import BoolArray, FloatArray, IntArray
 from stickslip_ros.physics.measures.cycle_fit import MeanCycle
-from stickslip_ros.physics.measures.reading import EXACT, SampleAssumptions
-from stickslip_ros.physics.measures.sample_meter import MotionObserver, SampleMeter
+from stickslip_ros.physics.measures.sample_meter import (
+    EXACT,
+    MotionObserver,
+    SampleAssumptions,
+    SampleMeter,
+)
 from stickslip_ros.samples import ForceColumns
 from stickslip_ros.stamps import NANOSECONDS
 
@@ -66,13 +70,6 @@ class ForceMeter:
         return None if self._first is None else float(self._magnitude[0])
 
 
-class SettledForces(NamedTuple):
-    """Published forces, and whether each acted."""
-
-    sent: ForceColumns
-    acted: BoolArray
-
-
 class DroppedForces:
     """Forces that are reported as dropped, each kept until it is found among the published ones."""
 
@@ -115,21 +112,20 @@ class ForceSettler:
         """Whether each held force acted, as far as it is known."""
         self._dropped = DroppedForces()
 
-    def feed(self, sent: ForceColumns, dropped: ForceColumns) -> SettledForces:
-        """Add published forces and dropped ones; return the forces that are settled."""
+    def feed(
+        self, sent: ForceColumns, dropped: ForceColumns, *, last: bool = False
+    ) -> tuple[ForceColumns, BoolArray]:
+        """Add published forces and dropped ones; return those that are settled and which acted.
+
+        With these as the `last` ones, all are: no more reports follow.
+        """
         self._held = self._held.followed_by(sent)
         self._acted = np.concatenate([self._acted, np.isfinite(sent.force)])
         self._dropped.add(dropped)
         undecided = ForceColumns(self._held.stamp, np.where(self._acted, self._held.force, np.nan))
         self._acted[self._dropped.among(undecided)] = False
-        return self._release(max(len(self._held) - HELD_FORCES, 0))
-
-    def finish(self) -> SettledForces:
-        """Return the forces still held: no more reports follow."""
-        return self._release(len(self._held))
-
-    def _release(self, number: int) -> SettledForces:
-        settled = SettledForces(self._held[:number], self._acted[:number])
+        number = len(self._held) - (0 if last else min(len(self._held), HELD_FORCES))
+        settled = self._held[:number], self._acted[:number]
         self._held, self._acted = self._held[number:], self._acted[number:]
         return settled
 
@@ -187,24 +183,23 @@ class RunMeter:
         self._settler = ForceSettler()
         self._observer = observer
 
-    def feed_forces(self, forces: ForceColumns, dropped: ForceColumns) -> SettledForces:
-        """Add the forces that follow, published and dropped; return those that are settled."""
+    def feed_forces(self, forces: ForceColumns, dropped: ForceColumns) -> None:
+        """Add the forces that follow, published and dropped."""
         self.force.feed(forces)
         self.motion.drift.force.feed(forces.stamp / NANOSECONDS, forces.force)
         self.dropped += len(dropped)
-        return self._apply(self._settler.feed(forces, dropped))
+        self._apply(*self._settler.feed(forces, dropped))
 
-    def finish(self) -> SettledForces:
-        """End the run: forces not reported as dropped have acted. Return these forces."""
-        return self._apply(self._settler.finish())
+    def finish(self) -> None:
+        """End the run: forces not reported as dropped have acted."""
+        none = ForceColumns(np.empty(0, np.int64), np.empty(0))
+        self._apply(*self._settler.feed(none, none, last=True))
 
-    def _apply(self, settled: SettledForces) -> SettledForces:
-        sent, acted = settled
+    def _apply(self, sent: ForceColumns, acted: BoolArray) -> None:
         self.applied.feed(ForceColumns(sent.stamp, np.where(acted, sent.force, 0.0)))
         if self._observer is not None:
             time = (sent.stamp - self.motion.origin) / NANOSECONDS
             self._observer.take_control(time, sent.force, acted)
-        return settled
 
     def report(self, *, quick: bool = False) -> dict[str, Any]:
         """Return the measures and counts by name, ready for JSON; SI units.

@@ -1,13 +1,14 @@
 """The measures of a motion from its samples."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import inf
-from typing import Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
 from stickslip_ros.arrays import BoolArray, FloatArray
+from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.measures.breakpoints import (
     STICK_SHARE,
     Breakpoints,
@@ -26,13 +27,86 @@ from stickslip_ros.physics.measures.cycle_measures import (
 from stickslip_ros.physics.measures.drift import Drift
 from stickslip_ros.physics.measures.noise import FEW_SAMPLES, LEAST_SAMPLES
 from stickslip_ros.physics.measures.noisy_meter import NoisyCycleMeter
-from stickslip_ros.physics.measures.reading import EXACT, SampleAssumptions
 from stickslip_ros.physics.measures.sampling_grid import LONGEST_GAP, SamplingGrid
+from stickslip_ros.physics.model.friction import LAWS
+from stickslip_ros.physics.model.sensor import Sensor
 from stickslip_ros.samples import SampleColumns
 from stickslip_ros.stamps import NANOSECONDS
 
-_SEVERAL = 4
+_LASTING_SAMPLES = 4
 """Number of fast samples in one direction that are no impulse of a noisy record."""
+
+
+class SampleAssumptions(NamedTuple):
+    """How samples are to be read. Without arguments they are exact."""
+
+    stick_speed: float | None = 0.0
+    """Largest relative speed, m/s, at which exact samples stick; None for friction with a memory
+    on a belt whose speed is not known, see `STICK_SHARE`."""
+    noisy: bool | None = False
+    """Whether the samples have noise; None if it is to be found from them."""
+    within: float = 0.0
+    """Step of the actuator over the stiffness, m: the range in which it can hold the slide."""
+    varies: bool = False
+    """Whether belt, load, disturbance or reference vary: then nothing is a drift."""
+
+
+EXACT = SampleAssumptions()
+"""Assumptions for exact samples."""
+
+UNKNOWN = SampleAssumptions(0.0, None)
+"""Assumptions for samples of which nothing is known."""
+
+_CHANGING_KINDS = ("ramp", "sine", "trapezoid", "table", "topic")
+"""Kinds of courses and references that keep changing."""
+
+
+def reading_of(
+    plant: Mapping[str, Any], fastest_belt: float = 0.0, *, given: float | None = None
+) -> SampleAssumptions:
+    """Return how samples of a plant are to be read, by its parameters as far as they are known.
+
+    Samples of an exact sensor stick at exactly the speed of the belt, those of friction with a
+    memory at `STICK_SHARE` of its fastest speed, m/s. A sensor that errs gives samples with noise.
+    Parameters that no plant can have count as unknown. With a stick speed that is `given`, m/s, the
+    samples are read as exact ones.
+    """
+    (noisy, within), changing = _resolution(plant), varies(plant)
+    if given is not None:
+        return SampleAssumptions(given, within=within, varies=changing)
+    if not plant:
+        return UNKNOWN
+    law = LAWS.get(str(plant.get("friction.law")))
+    if law is None or not law.states:
+        stick_speed = 0.0
+    else:
+        stick_speed = STICK_SHARE * fastest_belt if fastest_belt else None
+    return SampleAssumptions(stick_speed, noisy, within, changing)
+
+
+def varies(parameters: Mapping[str, Any]) -> bool:
+    """Return whether a course or a reference among the parameters of a node keeps changing."""
+    return any(
+        name.endswith(".kind") and str(value) in _CHANGING_KINDS
+        for name, value in parameters.items()
+    )
+
+
+def _resolution(plant: Mapping[str, Any]) -> tuple[bool | None, float]:
+    """Return whether the sensor errs, and the step of the actuator over the stiffness, m.
+
+    None and 0 where the values are not those of a sensor and an actuator.
+    """
+    prefix = "sensor."
+    values = {name.removeprefix(prefix): plant[name] for name in plant if name.startswith(prefix)}
+    try:
+        sensor = Sensor.from_values(values)
+        lengths = sensor.position_resolution, sensor.position_noise, sensor.velocity_noise
+        within = float(plant.get("actuator.resolution", 0.0)) / float(plant.get("stiffness") or inf)
+        known = all(0.0 <= float(value) < inf for value in (*lengths, within))
+    except (ArithmeticError, TypeError, ValueError):
+        return None, 0.0
+    return (not sensor.exact, within) if known else (None, 0.0)
 
 
 @dataclass(frozen=True)
@@ -79,7 +153,12 @@ class SampleMeter:
         `reading` says how the samples are to be read, and may change as more is known of them.
         Raises InvalidInputError if its stick speed is negative or not finite.
         """
-        self.reading = reading.checked()
+        speed = reading.stick_speed
+        if speed is not None and not 0.0 <= speed < inf:
+            raise InvalidInputError(
+                f"stick_speed = {speed} is refused: must be finite and at least 0 (m/s)"
+            )
+        self.reading = reading
         self.origin = 0
         """Stamp of time zero for the observer, ns."""
         self.samples = 0
@@ -126,10 +205,7 @@ class SampleMeter:
                 self._meter.interrupt()
                 self._noisy_meter.interrupt()
                 self._last = None
-            found = self._feed_segment(segment, jittered)
-            ends = (self._noisy_meter if self.noisy else self._meter).ends
-            self.drift.feed_cycles(ends, found)
-            cycles += found
+            cycles += self._feed_segment(segment, jittered)
         self._last = samples[-1:]
         return cycles
 
@@ -172,7 +248,7 @@ class SampleMeter:
         """
         limit = UNBOUNDED_BELT_SPEEDS * self._fastest_belt
         unbounded = self._unbounded_speed > limit
-        self._meter.report_run_away(unbounded)
+        self._meter.unbounded = unbounded
         self._meter.within = self._noisy_meter.within = self.reading.within
         few = not self.noisy and self._per_cycle < FEW_SAMPLES and self._noisy_meter.line
         if unbounded or not (self.noisy or few):
@@ -189,48 +265,42 @@ class SampleMeter:
         stamp = samples.stamp
         time = (stamp - stamp[0] + float(self._elapsed)) * 1e-9
         self._elapsed += int(stamp[-1] - stamp[0])
-        given, cycles, cycle_ends = self.reading.noisy, list[Cycle](), list[float]()
-        new = slice(0 if self._last is None else 1, None)
+        new, belt = slice(0 if self._last is None else 1, None), samples.belt_velocity
         self.drift.position.feed(time[new], samples.position[new])
-
-        def feed_noisy() -> list[Cycle]:
-            return self._noisy_meter.feed(
-                time[new], samples.position[new], samples.velocity[new], samples.belt_velocity[new]
+        given, breakpoints, cycles = self.reading.noisy, None, list[Cycle]()
+        if not given or self._observer is not None:
+            with np.errstate(over="ignore", invalid="ignore"):
+                breakpoints = breakpoints_from_samples(
+                    time,
+                    samples.position,
+                    samples.velocity,
+                    belt,
+                    stick_speed=self._present_stick_speed(samples),
+                    exact_times=not jittered,
+                )
+            if self._last is not None:
+                breakpoints = breakpoints[1:]  # the first sample was fed with the previous block
+            cycles = self._meter.feed(breakpoints, float(belt[-1]), self._fastest_belt)
+            if cycles and len(time) > 1:
+                self._per_cycle = cycles[-1].period / float(np.median(np.diff(time)))
+        if given is not False or self._per_cycle < FEW_SAMPLES:
+            under_noise = self._noisy_meter.feed(
+                time[new], samples.position[new], samples.velocity[new], belt[new]
             )
-
-        if given is not False:
-            cycles, cycle_ends = feed_noisy(), self._noisy_meter.ends
-            if given and self._observer is None:
-                return cycles
-        with np.errstate(over="ignore", invalid="ignore"):
-            breakpoints = breakpoints_from_samples(
-                time,
-                samples.position,
-                samples.velocity,
-                samples.belt_velocity,
-                stick_speed=self._present_stick_speed(samples),
-                exact_times=not jittered,
-            )
-        if self._last is not None:
-            breakpoints = breakpoints[1:]  # the first sample was fed with the previous block
-        exact = self._meter.feed(breakpoints, float(samples.belt_velocity[-1]), self._fastest_belt)
-        if exact and len(time) > 1:
-            self._per_cycle = exact[-1].period / float(np.median(np.diff(time)))
-        if self._per_cycle < FEW_SAMPLES and given is False:
-            feed_noisy()
-        if not self.noisy:
-            cycles, cycle_ends = exact, self._meter.ends
-        if self._observer is not None:
+            cycles = under_noise if self.noisy else cycles
+        ends = (self._noisy_meter if self.noisy else self._meter).ends
+        self.drift.feed_cycles(ends, cycles)
+        if self._observer is not None and breakpoints is not None:
             observed = (stamp - self.origin) / NANOSECONDS
             # Rounding may put a breakpoint after the last sample.
-            ends = np.minimum(np.searchsorted(time, breakpoints.time), len(time) - 1)
+            rows = np.minimum(np.searchsorted(time, breakpoints.time), len(time) - 1)
             known = LONGEST_GAP * float(np.median(np.diff(observed))) if len(observed) > 1 else inf
             self._observer.take_motion(
                 MeasuredMotion(
                     replace(breakpoints, time=np.interp(breakpoints.time, time, observed)),
-                    samples.belt_velocity[ends],
+                    belt[rows],
                     cycles,
-                    (np.array(cycle_ends) + (observed[0] - time[0])).tolist(),
+                    (np.array(ends) + (observed[0] - time[0])).tolist(),
                     known,
                 )
             )
@@ -259,7 +329,7 @@ class SampleMeter:
 def _lasting(fast: BoolArray, direction: FloatArray) -> BoolArray:
     """Return which fast samples end several fast ones in one direction: impulses go back."""
     lasting = fast.copy()
-    for lag in range(1, _SEVERAL):
+    for lag in range(1, _LASTING_SAMPLES):
         lasting[lag:] &= fast[:-lag] & (direction[lag:] == direction[:-lag])
         lasting[:lag] = False
     return lasting

@@ -130,10 +130,9 @@ class SlipMeter:
         for name in ("stick_time", "drop", "slip_time", "stick_velocity"):
             report[name] = _distribution(np.array(columns[name]))
         if report["stick_time"] is not None:
-            longer = (
-                report["stick_time"]["median"] > _STICKING_RATIO * report["slip_time"]["median"]
-            )
-            report["regime"] = Regime.STICK_SLIP if longer else Regime.PURE_SLIP
+            stick, slip = (report[name]["median"] for name in ("stick_time", "slip_time"))
+            sticks = stick > _STICKING_RATIO * slip
+            report["regime"] = Regime.STICK_SLIP if sticks else Regime.PURE_SLIP
         each = {
             name: [value if isfinite(value) else None for value in values]
             for name, values in columns.items()
@@ -170,7 +169,7 @@ class SlipMeter:
             bottom = start + int(last[int(np.argmax(over))])
             top = max(start - span, begin)
             top += int(np.argmax(smooth[top : start + 1]))
-            found += self._slip(smooth, top, bottom)
+            found.append(self._slip(smooth, top, bottom))
             self._begin = bottom
         # What is found must not depend on the blocks: the filters reach back.
         kept = max(self._begin - span - _MEDIAN, 0)
@@ -180,8 +179,8 @@ class SlipMeter:
             self._ended -= kept
         return found
 
-    def _slip(self, smooth: FloatArray, top: int, bottom: int) -> list[Slip]:
-        """Return the slip between two rows, unless the stick before it is not whole."""
+    def _slip(self, smooth: FloatArray, top: int, bottom: int) -> Slip:
+        """Return the slip between two rows, with the stick before it if that is whole."""
         tenth = (smooth[top] - smooth[bottom]) / 10.0
         rows = smooth[top : bottom + 1]
         start = top + int(np.flatnonzero(rows >= smooth[top] - tenth)[-1])
@@ -194,16 +193,14 @@ class SlipMeter:
             half = slice(first, (first + start) // 2 + 1)
             time = self._time[half]
             slope, error = fit_line(time - float(time.mean()), smooth[half])
-        return [
-            Slip(
-                time=float(self._time[start]),
-                stick_time=stick_time,
-                drop=float(smooth[top] - smooth[bottom]),
-                slip_time=float(self._time[end] - self._time[start]),
-                stick_velocity=slope,
-                stick_velocity_error=error,
-            )
-        ]
+        return Slip(
+            time=float(self._time[start]),
+            stick_time=stick_time,
+            drop=float(smooth[top] - smooth[bottom]),
+            slip_time=float(self._time[end] - self._time[start]),
+            stick_velocity=slope,
+            stick_velocity_error=error,
+        )
 
 
 def _distribution(values: FloatArray) -> dict[str, float] | None:

@@ -37,8 +37,6 @@ class StickFit:
     """Middle of the stick, or instant of the highest speed, s."""
     stick_time: float
     """Duration of the stick, s; 0 without."""
-    gap: float
-    """Belt speed less the highest speed, m/s; 0 with a stick."""
     offset: float
     """Displacement relative to the belt during the stick, m."""
     residual: FloatArray
@@ -70,7 +68,8 @@ def fit_stick(
 ) -> StickFit:
     """Fit the motion around a stick at time 0, with a drop of the friction where the data show one.
 
-    `relative` is the displacement relative to the belt, x - v_b t, m, at each `time`, s. The scale
+    Nonlinear least squares, with the motion integrated from its edges (single shooting). `relative`
+    is the displacement relative to the belt, x - v_b t, m, at each `time`, s. The scale
     of the fit is the angular `frequency` of the cycle, rad/s, and `stick_time`, s, the first guess.
     Without `sticks` the highest speed is below that of the belt, which is above 0 m/s.
     """
@@ -78,7 +77,7 @@ def fit_stick(
     problem = _Problem(
         time * frequency, relative * frequency / belt_speed, sticks, reach * frequency
     )
-    start = np.zeros(len(_NAMES))
+    start = np.zeros(len(_LOWEST))
     start[_SIZE] = max(stick_time * frequency, 0.05) if sticks else 0.02
     start[_STIFFNESS], start[_OFFSET] = 1.2, float(np.median(problem.relative))
     best, free = problem.solve(start, _SMOOTH), _SMOOTH
@@ -90,12 +89,10 @@ def fit_stick(
         if gain > _JUMP_LEVEL * problem.squares(best) / max(len(time) - len(_ALL), 1):
             best, free = dropping, _ALL
     length = belt_speed / frequency
-    size = float(best[_SIZE])
     units = np.array([1.0 / frequency, 1.0 / frequency, *([1.0] * (len(free) - 2))])
     return StickFit(
         centre=float(best[_CENTRE]) / frequency,
-        stick_time=size / frequency if sticks else 0.0,
-        gap=0.0 if sticks else size * belt_speed,
+        stick_time=float(best[_SIZE]) / frequency if sticks else 0.0,
         offset=float(best[_OFFSET]) * length,
         residual=-problem.residual(best) * length,
         jacobian=problem.jacobian(best, free) * length / units,
@@ -103,8 +100,7 @@ def fit_stick(
     )
 
 
-_NAMES = ("centre", "size", "stiffness", "slope", "second", "third", "offset", "jump")
-_CENTRE, _SIZE, _STIFFNESS, _SLOPE, _SECOND, _THIRD, _OFFSET, _JUMP = range(len(_NAMES))
+_CENTRE, _SIZE, _STIFFNESS, _SLOPE, _SECOND, _THIRD, _OFFSET, _JUMP = range(8)
 _SMOOTH = [_CENTRE, _SIZE, _STIFFNESS, _SLOPE, _SECOND, _THIRD, _OFFSET]
 _ALL = [*_SMOOTH, _JUMP]
 _LOWEST = np.array([-np.inf, 0.0, 0.0, -20.0, -20.0, -20.0, -np.inf, 0.0])
@@ -134,9 +130,7 @@ class _Problem:
             return np.append(self.residual(every), self._weight * every[[_SECOND, _THIRD]])
 
         def jacobian(part: FloatArray) -> FloatArray:
-            prior = np.zeros((2, len(free)))
-            for row, index in enumerate((_SECOND, _THIRD)):
-                prior[row, free.index(index)] = self._weight
+            prior = self._weight * np.eye(len(start))[np.ix_([_SECOND, _THIRD], free)]
             return np.concatenate([self.jacobian(whole(part), free), prior])
 
         self._weight = 0.0

@@ -19,6 +19,7 @@ from stickslip_ros.physics.motion import RecordedMotion
 from stickslip_ros.samples import ForceColumns, Reference, Sample, SampleColumns
 from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.studies.simulate import sensor_meter
+from tests.physics.measures.records import columns, milliseconds
 
 COUNT = 4000
 TIME = np.arange(COUNT) * 1e-3
@@ -70,9 +71,7 @@ def test_a_loop_whose_integral_winds_up_is_not_at_rest(sensor: tuple[str, ...]) 
 
 
 def samples(position: np.ndarray, belt: float = 0.04) -> SampleColumns:
-    unknown, stamp = np.full(COUNT, np.nan), np.arange(1, COUNT + 1) * 1_000_000
-    velocity = np.gradient(position, 1e-3)
-    return SampleColumns(stamp, position, velocity, unknown, unknown, np.full(COUNT, belt))
+    return columns(milliseconds(COUNT), position, np.gradient(position, 1e-3), belt)
 
 
 @pytest.mark.parametrize(("rate", "drifts"), [(0.0, False), (0.3, False), (2.0, True)])
@@ -83,7 +82,7 @@ def test_a_force_that_grows_is_a_drift_even_if_the_slide_does_not_move(
     meter = RunMeter(20)
     meter.motion.feed(samples(np.full(COUNT, 4e-4), belt=0.0))
     noise = np.random.default_rng(0).standard_normal(COUNT)
-    forces = ForceColumns(np.arange(1, COUNT + 1) * 1_000_000, 400.0 + rate * TIME + 0.1 * noise)
+    forces = ForceColumns(milliseconds(COUNT), 400.0 + rate * TIME + 0.1 * noise)
     meter.feed_forces(forces, forces[:0])
     report = meter.report()
     assert report["regime"] == "stuck"
@@ -127,10 +126,9 @@ def test_eight_cycles_that_agree_within_half_a_step_by_chance_are_no_drift() -> 
 
 
 def test_a_belt_that_varies_makes_no_drift_but_a_note() -> None:
-    columns = samples(4e-4 * (1.0 + 0.1 * TIME))
-    columns.belt_velocity[:] = 0.04 + 0.01 * TIME
     meter = RunMeter(20)
-    meter.motion.feed(columns)
+    position = 4e-4 * (1.0 + 0.1 * TIME)
+    meter.motion.feed(columns(milliseconds(COUNT), position, belt_velocity=0.04 + 0.01 * TIME))
     report = meter.report()
     assert report["drift"] is None
     assert any("a drift is not judged" in note for note in report["notes"])

@@ -6,13 +6,12 @@ import pytest
 from benchmarks import measures_under_noise as study
 from stickslip_ros.physics.measures import Measures, Regime
 from stickslip_ros.physics.measures.noise import strongest_line, white_noise
-from stickslip_ros.physics.measures.reading import UNKNOWN, SampleAssumptions
-from stickslip_ros.physics.measures.sample_meter import SampleMeter
-from stickslip_ros.samples import SampleColumns
+from stickslip_ros.physics.measures.sample_meter import UNKNOWN, SampleAssumptions
 from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.studies.options import SettlingOptions
 from stickslip_ros.studies.settling import ControlledDrive, MotionState, settle
 from stickslip_ros.studies.simulate import sensor_meter, simulate
+from tests.physics.measures.records import columns, fed
 
 NOISY = SampleAssumptions(noisy=True)
 PERIOD = 0.0639242
@@ -25,14 +24,9 @@ def measured(
     reading: SampleAssumptions = NOISY,
     belt: float = 0.04,
 ) -> Measures:
-    count = len(time)
-    if velocity is None:
-        velocity = np.diff(position, prepend=position[0]) / (time[1] - time[0])
-    assert velocity is not None
-    unknown, stamp = np.full(count, np.nan), np.rint(time * 1e9).astype(np.int64)
-    meter = SampleMeter(20, reading=reading)
-    meter.feed(SampleColumns(stamp, position, velocity, unknown, unknown, np.full(count, belt)))
-    return meter.measures()
+    return fed(
+        columns(np.rint(time * 1e9).astype(np.int64), position, velocity, belt), reading
+    ).measures()
 
 
 def told(amplitude: float, noise: float, count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:

@@ -6,13 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from stickslip_ros.physics.measures.run_meter import (
-    ForceMeter,
-    ForceSettler,
-    RunMeter,
-    SettledForces,
-)
-from stickslip_ros.samples import ForceColumns, SampleColumns
+from stickslip_ros.physics.measures.run_meter import ForceMeter, ForceSettler, RunMeter
+from stickslip_ros.samples import ForceColumns
+from tests.physics.measures.records import columns
 
 PERIOD = 10_000_000  # of 100 Hz, in ns
 
@@ -30,8 +26,7 @@ def test_the_report_of_a_run() -> None:
     # Two and a quarter turns at 0.75 Hz, seen from the trough on.
     angle = 2.0 * np.pi * 0.75 * time
     position, velocity = -np.cos(angle), 1.5 * np.pi * np.sin(angle)
-    unknown, belt = np.full(300, np.nan), np.full(300, 6.0)
-    meter.motion.feed(SampleColumns(forces.stamp, position, velocity, unknown, unknown, belt))
+    meter.motion.feed(columns(forces.stamp, position, velocity, 6.0))
     meter.force.feed(forces)
     report = meter.report()
     assert report["samples"] == 300
@@ -116,20 +111,17 @@ def test_as_many_forces_as_were_dropped_are_found_in_whatever_order_they_come(
 ) -> None:
     dropped = data.draw(st.lists(st.sampled_from(sent), unique_by=id)) if sent else []
     events = [(True, force) for force in sent] + [(False, force) for force in dropped]
-    settler = ForceSettler()
-    parts: list[SettledForces] = []
+    settler, acted = ForceSettler(), Counter[tuple[int, float]]()
+    none = ForceColumns(np.array([], np.int64), np.array([]))
+
+    def feed(sent: ForceColumns, dropped: ForceColumns, *, last: bool = False) -> None:
+        settled, acting = settler.feed(sent, dropped, last=last)
+        kept = settled[acting]
+        acted.update(zip(kept.stamp.tolist(), kept.force.tolist(), strict=True))
+
     for is_sent, (stamp, force) in data.draw(st.permutations(events)):
         one = ForceColumns(np.array([stamp]), np.array([force]))
-        parts.append(settler.feed(one, one[:0]) if is_sent else settler.feed(one[:0], one))
-    parts.append(settler.finish())
-    acted = Counter(
-        force
-        for part in parts
-        for *force_, acted in zip(
-            part.sent.stamp.tolist(), part.sent.force.tolist(), part.acted, strict=True
-        )
-        if acted
-        for force in [tuple(force_)]
-    )
+        feed(*((one, none) if is_sent else (none, one)))
+    feed(none, none, last=True)
     finite = Counter(force for force in sent if np.isfinite(force[1]))
     assert acted == finite - Counter(force for force in dropped if np.isfinite(force[1]))

@@ -1,5 +1,6 @@
 from dataclasses import replace
 from functools import cache
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -7,27 +8,22 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.measures.cycle_measures import Regime
-from stickslip_ros.physics.measures.reading import SampleAssumptions
 from stickslip_ros.physics.measures.run_meter import RunMeter
-from stickslip_ros.physics.measures.sample_meter import SampleMeter
+from stickslip_ros.physics.measures.sample_meter import (
+    UNKNOWN,
+    SampleAssumptions,
+    SampleMeter,
+    reading_of,
+)
 from stickslip_ros.physics.motion.motion import Motion
 from stickslip_ros.samples import SampleColumns
 from tests.examples import examples
 from tests.physics.drives import LIMIT_CYCLES, PAPER
+from tests.physics.measures.records import columns, fed, feed
 
 SECOND = 10**9
-
-
-def columns(
-    stamp: npt.NDArray[np.int64],
-    position: npt.NDArray[np.float64],
-    velocity: npt.NDArray[np.float64],
-    belt_velocity: npt.NDArray[np.float64],
-) -> SampleColumns:
-    """Nothing is known of the rest."""
-    unknown = np.full(len(stamp), np.nan)
-    return SampleColumns(stamp, position, velocity, unknown, unknown, belt_velocity)
 
 
 def later(samples: SampleColumns, nanoseconds: int) -> SampleColumns:
@@ -58,13 +54,6 @@ def still(stamp: npt.NDArray[np.int64]) -> SampleColumns:
     return columns(stamp, rest, rest, rest + 1.0)
 
 
-def in_blocks(first: SampleColumns, second: SampleColumns, blocks: int) -> list[SampleColumns]:
-    """One after the other, as one block or as two."""
-    if blocks == 2:
-        return [first, second]
-    return [first.followed_by(second)]
-
-
 def test_measures_of_a_limit_cycle() -> None:
     meter = SampleMeter(window=20)
     cycles = meter.feed(limit_cycle())
@@ -86,11 +75,8 @@ def test_measures_of_a_limit_cycle() -> None:
 @given(st.lists(st.integers(1, 7000), max_size=12).map(sorted))
 def test_the_size_of_the_blocks_does_not_matter(starts: list[int]) -> None:
     whole, in_blocks = SampleMeter(window=20), SampleMeter(window=20)
-    samples = limit_cycle()
-    expected = whole.feed(samples)
-    cycles = []
-    for start, end in zip([0, *starts], [*starts, 7001], strict=True):
-        cycles += in_blocks.feed(samples[start:end])
+    expected = whole.feed(limit_cycle())
+    cycles = feed(in_blocks, limit_cycle(), starts)
     assert len(cycles) == len(expected)
     for cycle, expected_cycle in zip(cycles, expected, strict=True):
         # Time is counted from the start of a block; adding it up rounds.
@@ -117,8 +103,7 @@ def test_what_is_lost_is_counted_exactly(rate: int, lost: set[int], starts: list
 
 
 def test_a_loss_at_the_start_is_counted_once_the_period_is_known() -> None:
-    meter = SampleMeter(window=20)
-    meter.feed(still(stamps(1000, 10))[np.array([0, 2])])
+    meter = fed(still(stamps(1000, 10))[np.array([0, 2])])
     meter.feed(still(stamps(1000, 10))[np.array([3, 4, 5])])
     assert meter.lost_samples == 1
 
@@ -127,9 +112,7 @@ def test_measures_bridge_what_was_lost() -> None:
     samples = limit_cycle()
     kept = np.random.default_rng(1).random(len(samples.stamp)) > 0.1
     kept[:2] = True
-    whole, holed = SampleMeter(window=20), SampleMeter(window=20)
-    whole.feed(samples)
-    holed.feed(samples[kept])
+    whole, holed = fed(samples), fed(samples[kept])
     assert holed.lost_samples == np.count_nonzero(~kept[: np.flatnonzero(kept)[-1]])
     expected, measures = whole.measures(), holed.measures()
     assert measures.cycles == expected.cycles
@@ -138,21 +121,24 @@ def test_measures_bridge_what_was_lost() -> None:
     assert measures.stick_fraction == pytest.approx(expected.stick_fraction, abs=1e-3)
 
 
-def test_no_cycle_spans_a_long_gap() -> None:
-    samples = limit_cycle()
-    meter = SampleMeter(window=20)
-    meter.feed(samples[:3000])
+@pytest.mark.parametrize(("late", "lost"), [(0.0, 300), (0.2, 0)])
+def test_no_cycle_spans_a_long_gap(late: float, lost: int) -> None:
+    """On no grid it starts a new segment."""
+    samples = read_late(limit_cycle(), late)
+    meter = fed(samples[:3000])
     cycles = meter.feed(samples[3300:7001])
-    assert meter.lost_samples == 300
-    assert [cycle.period for cycle in cycles] == pytest.approx([7.06772953] * len(cycles), rel=1e-6)
+    assert meter.lost_samples == lost
+    assert meter.duration == pytest.approx(67.0, abs=0.1)
+    assert [cycle.period for cycle in cycles] == pytest.approx(
+        [7.06772953] * len(cycles), rel=1e-3 if late else 1e-6
+    )
 
 
 @pytest.mark.parametrize("gap", [1.2345678, 60.00004, 700.0005, 86400.0003])
 def test_a_new_segment_is_no_loss(gap: float) -> None:
     """The gap is no whole number of periods of 1 ms, as after a pause in real time."""
     first = still(stamps(1000, 5000))
-    meter = SampleMeter(window=20)
-    meter.feed(first)
+    meter = fed(first)
     meter.feed(later(first, 4_999_000_000 + round(gap * SECOND)))
     assert meter.samples == 10_000
     assert meter.lost_samples == 0
@@ -163,9 +149,7 @@ def test_a_new_segment_is_no_loss(gap: float) -> None:
 def test_a_new_segment_may_have_another_rate(rates: tuple[int, int], blocks: int) -> None:
     first = still(stamps(rates[0], 100))
     second = still(stamps(rates[1], 100, start=int(first.stamp[-1]) + 1_234_567_800))
-    meter = SampleMeter(window=20)
-    for part in in_blocks(first, second, blocks):
-        meter.feed(part)
+    meter = fed(first.followed_by(second), starts=[100] if blocks == 2 else [])
     assert meter.samples == 200
     assert meter.lost_samples == 0
 
@@ -173,9 +157,9 @@ def test_a_new_segment_may_have_another_rate(rates: tuple[int, int], blocks: int
 @pytest.mark.parametrize("blocks", [1, 2])
 def test_stamps_that_go_back_start_a_new_segment(blocks: int) -> None:
     samples = limit_cycle()
-    twice = samples[:5000], samples[1000:6000]
+    twice = samples[:5000].followed_by(samples[1000:6000])
     meter = SampleMeter(window=20)
-    cycles = [cycle for part in in_blocks(*twice, blocks) for cycle in meter.feed(part)]
+    cycles = feed(meter, twice, [5000] if blocks == 2 else [])
     assert meter.samples == 10_000
     assert meter.lost_samples == 0
     assert [cycle.period for cycle in cycles] == pytest.approx([7.06772953] * len(cycles), rel=1e-6)
@@ -198,8 +182,7 @@ def test_rows_that_are_not_finite_are_lost(column: str) -> None:
 @pytest.mark.parametrize(("speed", "regime"), [(999.0, None), (1001.0, Regime.UNBOUNDED)])
 def test_a_thousand_belt_speeds_are_running_away(speed: float, regime: Regime | None) -> None:
     samples = replace(still(stamps(100, 3)), velocity=np.array([0.0, -speed, speed]))
-    meter = SampleMeter(window=20)
-    meter.feed(samples)
+    meter = fed(samples)
     assert meter.measures().regime is regime
 
 
@@ -219,18 +202,15 @@ def read_late(samples: SampleColumns, latest: float, seed: int = 1) -> SampleCol
 def test_jittered_stamps_are_measured(latest: float, seed: int, starts: list[int]) -> None:
     """However they are cut into blocks."""
     samples = read_late(limit_cycle(), latest, seed)
-    whole, in_blocks, exact = (SampleMeter(window=20) for _ in range(3))
+    whole, in_blocks = SampleMeter(window=20), SampleMeter(window=20)
     cycles = whole.feed(samples)
-    exact.feed(limit_cycle())
-    measures, expected = whole.measures(), exact.measures()
+    measures, expected = whole.measures(), fed(limit_cycle()).measures()
     assert measures.cycles == expected.cycles
     assert measures.amplitude == pytest.approx(expected.amplitude, rel=1e-4)
     assert measures.velocity_amplitude == pytest.approx(expected.velocity_amplitude, rel=1e-4)
     assert measures.period == pytest.approx(expected.period, rel=1e-3)
     assert measures.stick_fraction == pytest.approx(expected.stick_fraction, abs=2e-3)
-    same = []
-    for start, end in zip([0, *starts], [*starts, 7001], strict=True):
-        same += in_blocks.feed(samples[start:end])
+    same = feed(in_blocks, samples, starts)
     assert len(same) == len(cycles)
     for cycle, expected_cycle in zip(same, cycles, strict=True):
         assert cycle == pytest.approx(expected_cycle, rel=1e-9)
@@ -242,8 +222,7 @@ def test_states_that_were_really_taken_at_jittered_stamps_are_measured() -> None
     samples = read_late(still(stamps(100, 7001)), 0.5)
     time = samples.stamp * 1e-9
     samples = replace(samples, position=np.sin(time), velocity=np.cos(time))
-    meter = SampleMeter(window=20)
-    meter.feed(samples)
+    meter = fed(samples)
     measures = meter.measures()
     assert meter.lost_samples == 0
     assert measures.cycles == 10
@@ -256,36 +235,23 @@ def test_states_that_were_really_taken_at_jittered_stamps_are_measured() -> None
 def test_what_is_lost_of_jittered_samples_is_counted(lost: set[int], seed: int) -> None:
     lost = {number for number in lost if number % 10}  # never over the longest gap
     kept = np.array([number for number in range(200) if number not in lost])
-    meter = SampleMeter(window=20)
-    meter.feed(read_late(still(stamps(1000, 200)), 0.2, seed)[kept])
+    meter = fed(read_late(still(stamps(1000, 200)), 0.2, seed)[kept])
     assert meter.samples == len(kept)
     assert meter.lost_samples == len(lost)
-
-
-def test_a_long_gap_between_jittered_samples_starts_a_new_segment() -> None:
-    samples = read_late(limit_cycle(), 0.2)
-    meter = SampleMeter(window=20)
-    meter.feed(samples[:3000])
-    cycles = meter.feed(samples[3300:7001])
-    assert meter.lost_samples == 0
-    assert meter.duration == pytest.approx(67.0, abs=0.1)
-    assert [cycle.period for cycle in cycles] == pytest.approx([7.06772953] * len(cycles), rel=1e-3)
 
 
 def test_many_samples_off_every_grid_take_no_longer_than_on_one() -> None:
     """With time that grew as the square of their number this would take minutes."""
     time = 1e-3 * np.arange(200_000)
     samples = columns(stamps(1000, len(time)), np.sin(time), np.cos(time), np.full(len(time), 2.0))
-    meter = SampleMeter(window=20)
-    meter.feed(read_late(samples, 0.2))
+    meter = fed(read_late(samples, 0.2))
     assert meter.lost_samples == 0
     assert meter.measures().cycles == 20
 
 
 def test_many_segments_in_one_block_take_time_in_proportion() -> None:
     """Each looks only a little ahead: seen from every one to the end it would be 4e8 steps."""
-    meter = SampleMeter(window=20)
-    meter.feed(still(np.full(20_000, SECOND)))
+    meter = fed(still(np.full(20_000, SECOND)))
     assert meter.samples == 20_000
     assert meter.lost_samples == 0
     assert meter.duration == 0.0
@@ -297,8 +263,7 @@ def test_many_segments_in_one_block_take_time_in_proportion() -> None:
 def test_a_stamp_of_another_time_is_no_loss(number: int, wild: int) -> None:
     samples = later(limit_cycle(), 1_700_000_000 * SECOND)
     samples.stamp[number] = wild
-    meter = SampleMeter(window=20)
-    meter.feed(samples)
+    meter = fed(samples)
     assert meter.samples == 7001
     assert meter.lost_samples == 0
     assert meter.duration == pytest.approx(70.0, abs=0.03)
@@ -320,8 +285,7 @@ def test_no_value_overflows(column: str, value: float, latest: float) -> None:
     samples = read_late(limit_cycle(), latest)
     values = getattr(samples, column).copy()
     values[100:7000:3] = value
-    meter = SampleMeter(window=20)
-    meter.feed(replace(samples, **{column: values}))
+    meter = fed(replace(samples, **{column: values}))
     measured = meter.measures().as_dict().values()
     assert np.isfinite([figure for figure in measured if isinstance(figure, float)]).all()
     too_large = abs(value) > 1e100
@@ -337,9 +301,7 @@ def test_a_leap_onto_the_belt_hides_no_extremes() -> None:
         belt_velocity=np.full(4, 0.2),
     )
     meter = SampleMeter(window=20)
-    cycles = []
-    for part in (samples, later(samples, 400_000_000)):
-        cycles += meter.feed(part)
+    cycles = feed(meter, samples.followed_by(later(samples, 400_000_000)), [4])
     assert [cycle.amplitude for cycle in cycles] == pytest.approx([0.16], rel=1e-3)
 
 
@@ -388,21 +350,68 @@ def noisy(samples: SampleColumns, error: float) -> SampleColumns:
 def test_noisy_samples_stick_near_the_velocity_of_the_belt(starts: list[int]) -> None:
     """However they are cut into blocks."""
     samples = noisy(limit_cycle(), 3e-4)
-    exact, meter = SampleMeter(window=20), RunMeter(window=20, reading=SampleAssumptions(1e-3))
-    exact.feed(samples)
-    assert exact.measures().regime is Regime.PURE_SLIP
-    for start, end in zip([0, *starts], [*starts, 7001], strict=True):
-        meter.motion.feed(samples[start:end])
-    measures = meter.motion.measures()
+    assert fed(samples).measures().regime is Regime.PURE_SLIP
+    near = SampleAssumptions(1e-3)
+    measures = fed(samples, near, starts).measures()
     (expected,) = (cycle for cycle in LIMIT_CYCLES if cycle.belt_speed == 0.2)
     assert measures.cycles == 9
     assert measures.regime is Regime.STICK_SLIP
     assert measures.amplitude == pytest.approx(expected.amplitude, rel=1e-4)
     assert measures.period == pytest.approx(expected.period, rel=1e-3)
     # The slide leaves the belt slowly and is near its velocity for some time.
-    without_noise = SampleMeter(window=20, reading=SampleAssumptions(1e-3))
-    without_noise.feed(limit_cycle())
-    stick_fraction = without_noise.measures().stick_fraction
+    stick_fraction = fed(limit_cycle(), near).measures().stick_fraction
     assert stick_fraction is not None
     assert expected.stick_fraction < stick_fraction < expected.stick_fraction + 0.02
     assert measures.stick_fraction == pytest.approx(stick_fraction, abs=1e-3)
+
+
+ENCODER = {"sensor.position_resolution": 1e-6, "sensor.velocity": "difference"}
+STATIC = {"friction.law": "stribeck", "belt_speed": 0.04}
+MEMORY = {"friction.law": "lugre", "belt_speed": -0.04}
+
+
+@pytest.mark.parametrize(
+    ("plant", "fastest_belt", "expected"),
+    [
+        ({}, 0.0, UNKNOWN),
+        (STATIC, 0.04, SampleAssumptions(0.0, noisy=False)),
+        ({**STATIC, **ENCODER}, 0.04, SampleAssumptions(0.0, noisy=True)),
+        ({**STATIC, "sensor.velocity_noise": 1e-6}, 0.04, SampleAssumptions(0.0, noisy=True)),
+        ({**STATIC, "sensor.velocity": "exact"}, 0.04, SampleAssumptions(0.0, noisy=False)),
+        (MEMORY, 0.0, SampleAssumptions(None, noisy=False)),
+        (MEMORY, 0.05, SampleAssumptions(5e-4, noisy=False)),
+        ({**MEMORY, **ENCODER}, 0.05, SampleAssumptions(5e-4, noisy=True)),
+    ],
+)
+def test_law_belt_and_sensor_decide(
+    plant: dict[str, Any], fastest_belt: float, expected: SampleAssumptions
+) -> None:
+    assert reading_of(plant, fastest_belt) == expected
+
+
+def test_a_stick_speed_that_is_given_is_for_samples_as_they_are() -> None:
+    assert reading_of({**STATIC, **ENCODER}, 0.04, given=1e-3) == SampleAssumptions(
+        1e-3, noisy=False
+    )
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"sensor.velocity": "exactly"},
+        {"sensor.position_resolution": "fine"},
+        {"sensor.position_resolution": float("inf")},
+        {"sensor.position_resolution": -1.0},
+        {"sensor.position_noise": [1]},
+    ],
+)
+def test_whether_a_sensor_errs_that_there_cannot_be_is_found_from_the_samples(
+    change: dict[str, Any],
+) -> None:
+    assert reading_of({**STATIC, **ENCODER, **change}).noisy is None
+
+
+@pytest.mark.parametrize("stick_speed", [-1e-9, np.inf, np.nan])
+def test_a_stick_speed_that_is_none_is_refused(stick_speed: float) -> None:
+    with pytest.raises(InvalidInputError, match=r"stick_speed = .* must be finite"):
+        SampleMeter(20, reading=SampleAssumptions(stick_speed))

@@ -14,10 +14,15 @@ from hypothesis import strategies as st
 
 from benchmarks import measures_under_noise as study
 from stickslip_ros.physics.measures import Measures, Regime
-from stickslip_ros.physics.measures.reading import EXACT, UNKNOWN, SampleAssumptions
-from stickslip_ros.physics.measures.sample_meter import SampleMeter
+from stickslip_ros.physics.measures.sample_meter import (
+    EXACT,
+    UNKNOWN,
+    SampleAssumptions,
+    SampleMeter,
+)
 from stickslip_ros.samples import SampleColumns
 from tests.examples import examples
+from tests.physics.measures.records import columns, fed, feed, milliseconds
 
 NOISY = SampleAssumptions(noisy=True)
 COMMITTED = json.loads(
@@ -34,15 +39,12 @@ def samples(
     position, velocity = position[:count].copy(), velocity[:count].copy()
     if noise > 0.0:
         position += noise * np.random.default_rng(seed).standard_normal(count)
-        velocity = np.diff(position, prepend=position[0]) / 1e-3
-    stamp, unknown = np.arange(count) * 1_000_000, np.full(count, np.nan)
-    return SampleColumns(stamp, position, velocity, unknown, unknown, np.full(count, belt_speed))
+        velocity = None
+    return columns(milliseconds(count), position, velocity, belt_speed)
 
 
-def measured(columns: SampleColumns, reading: SampleAssumptions = NOISY) -> Measures:
-    meter = SampleMeter(20, reading=reading)
-    meter.feed(columns)
-    return meter.measures()
+def measured(samples: SampleColumns, reading: SampleAssumptions = NOISY) -> Measures:
+    return fed(samples, reading).measures()
 
 
 def test_what_the_study_has_found_is_as_good_as_it_is_to_be() -> None:
@@ -73,15 +75,9 @@ def test_a_twentieth_of_the_study_agrees_with_it(case: study.Case) -> None:
 @examples(quick=3, thorough=30, deadline=None)
 @given(st.lists(st.integers(1, 799), max_size=6).map(sorted))
 def test_blocks_of_any_length_give_the_same(starts: list[int]) -> None:
-    columns = samples(noise=1e-6, count=800)
-    meter = SampleMeter(6, reading=NOISY)
-    cycles = [
-        cycle
-        for start, end in zip([0, *starts], [*starts, 800], strict=True)
-        for cycle in meter.feed(columns[start:end])
-    ]
-    whole = SampleMeter(6, reading=NOISY)
-    assert cycles == whole.feed(columns)
+    record = samples(noise=1e-6, count=800)
+    meter, whole = SampleMeter(6, reading=NOISY), SampleMeter(6, reading=NOISY)
+    assert feed(meter, record, starts) == whole.feed(record)
     assert meter.measures() == whole.measures()
 
 
@@ -90,23 +86,19 @@ def test_blocks_of_any_length_give_the_same(starts: list[int]) -> None:
 def test_blocks_of_any_length_give_the_same_where_the_motion_comes_to_rest(
     starts: list[int],
 ) -> None:
-    columns = samples(noise=1e-6, count=6000)
+    record = samples(noise=1e-6, count=6000)
     decay = np.exp(-np.arange(6000) / 800.0)
-    position = 4e-4 + decay * (columns.position - 4e-4)
+    position = 4e-4 + decay * (record.position - 4e-4)
     position += 1e-6 * np.random.default_rng(4).standard_normal(6000)
-    columns = replace(columns, position=position)
-    meter, whole = SampleMeter(20, reading=NOISY), SampleMeter(20, reading=NOISY)
-    for start, end in zip([0, *starts], [*starts, 6000], strict=True):
-        meter.feed(columns[start:end])
-    whole.feed(columns)
-    assert meter.measures() == whole.measures()
-    assert whole.measures().regime is Regime.EQUILIBRIUM
+    record = replace(record, position=position)
+    whole = measured(record)
+    assert fed(record, NOISY, starts).measures() == whole
+    assert whole.regime is Regime.EQUILIBRIUM
 
 
 @pytest.mark.parametrize(("noise", "noisy"), [(0.0, False), (1e-8, True), (1e-6, True)])
 def test_noise_of_which_nothing_is_told_is_found(noise: float, noisy: bool) -> None:
-    meter = SampleMeter(20, reading=UNKNOWN)
-    meter.feed(samples(noise=noise))
+    meter = fed(samples(noise=noise), UNKNOWN)
     assert meter.noisy is noisy
     assert meter.position_noise == (pytest.approx(noise, rel=0.2) if noisy else None)
     measures = meter.measures()
@@ -127,10 +119,8 @@ def test_rounding_of_numbers_in_a_motion_that_dies_out_is_no_noise(
     time = np.arange(count) * 1e-3
     part = 1e-5 * np.exp(-decay * time)
     position, velocity = 4e-4 + part * np.sin(100.0 * time), 100.0 * part * np.cos(100.0 * time)
-    unknown, belt = np.full(count, np.nan), np.full(count, 0.04)
-    stamp = np.arange(count) * 1_000_000
-    columns = SampleColumns(stamp, position, velocity, unknown, unknown, belt)
-    assert measured(columns, UNKNOWN) == measured(columns, EXACT)
+    record = columns(milliseconds(count), position, velocity)
+    assert measured(record, UNKNOWN) == measured(record, EXACT)
 
 
 @pytest.mark.parametrize(
@@ -143,24 +133,15 @@ def test_a_vibration_of_a_thousandth_of_the_belt_speed_is_none(
     time = np.arange(4000) * 1e-3
     noise = np.random.default_rng(0).standard_normal(4000)
     position = amplitude * 0.04 / 100.0 * np.sin(100.0 * time) + 1e-9 * noise
-    unknown, belt = np.full(4000, np.nan), np.full(4000, 0.04)
-    stamp = np.arange(4000) * 1_000_000
-    velocity = np.gradient(position, time)
-    found = measured(SampleColumns(stamp, position, velocity, unknown, unknown, belt))
+    found = measured(columns(milliseconds(4000), position, np.gradient(position, time)))
     assert found.regime is regime
     assert found.velocity_amplitude == pytest.approx(amplitude * 0.04, rel=0.02)
     assert (found.period is None) == (regime is Regime.EQUILIBRIUM)
 
 
 def test_a_belt_that_moves_backward_gives_the_same() -> None:
-    columns = samples(noise=1e-6)
-    turned = replace(
-        columns,
-        position=-columns.position,
-        velocity=-columns.velocity,
-        belt_velocity=-columns.belt_velocity,
-    )
-    measures = measured(turned)
+    record = samples(noise=1e-6)
+    measures = measured(columns(record.stamp, -record.position, -record.velocity, -0.04))
     assert measures.regime is Regime.STICK_SLIP
     assert measures.stick_fraction == pytest.approx(0.1001, abs=2e-3)
     assert measures.midpoint == pytest.approx(-326.3e-6, rel=1e-3)
@@ -168,12 +149,12 @@ def test_a_belt_that_moves_backward_gives_the_same() -> None:
 
 def test_lost_samples_and_impulses_change_little() -> None:
     """A twentieth of the samples is lost, and every hundredth is far off."""
-    columns = samples(noise=1e-6, count=3000)
+    record = samples(noise=1e-6, count=3000)
     random = np.random.default_rng(5)
-    position = columns.position.copy()
+    position = record.position.copy()
     position[50::100] += 3e-4 * random.choice([-1.0, 1.0], 30)
     kept = np.sort(random.choice(3000, 2850, replace=False))
-    measures = measured(replace(columns, position=position)[kept])
+    measures = measured(replace(record, position=position)[kept])
     assert measures.regime is Regime.STICK_SLIP
     assert measures.steady
     assert measures.stick_fraction == pytest.approx(0.1001, abs=3e-3)
@@ -189,8 +170,8 @@ def test_a_jittered_clock_changes_nothing_if_the_stamps_are_right() -> None:
     from scipy.interpolate import CubicHermiteSpline
 
     told = CubicHermiteSpline(grid, position, velocity)(at) + 1e-6 * random.standard_normal(2000)
-    columns = replace(samples(noise=1e-6), stamp=np.rint(at * 1e9).astype(np.int64), position=told)
-    measures = measured(columns)
+    record = replace(samples(noise=1e-6), stamp=np.rint(at * 1e9).astype(np.int64), position=told)
+    measures = measured(record)
     assert measures.regime is Regime.STICK_SLIP
     assert measures.stick_fraction == pytest.approx(0.1001, abs=3e-3)
     assert measures.period == pytest.approx(0.0639242, rel=1e-4)
@@ -214,11 +195,11 @@ def test_a_slide_at_rest_shows_its_noise_as_nothing() -> None:
     [(1, True), (3, False), *(pytest.param(50, each, marks=pytest.mark.long) for each in (0, 1))],
 )
 def test_the_cycles_before_a_gap_count_until_there_are_others(count: int, rounded: bool) -> None:
-    columns = samples(noise=1e-6, count=2000 + count)
+    record = samples(noise=1e-6, count=2000 + count)
     if rounded:
-        columns = replace(columns, position=np.rint(columns.position / 1e-5) * 1e-5)
-    columns.stamp[2000:] += 12_345_678_901
-    measures = measured(columns)
+        record = replace(record, position=np.rint(record.position / 1e-5) * 1e-5)
+    record.stamp[2000:] += 12_345_678_901
+    measures = measured(record)
     assert measures.cycles == 20
     assert measures.regime is Regime.STICK_SLIP
 
@@ -234,9 +215,9 @@ def test_a_slide_that_is_held_before_a_gap_may_have_few_samples_after_it() -> No
 def test_the_memory_is_bounded() -> None:
     """A window has 1300 samples; twice as many are held at most, and a little."""
     meter = SampleMeter(20, reading=NOISY)
-    columns, held = samples(noise=1e-6, count=8000), []
+    record, held = samples(noise=1e-6, count=8000), []
     for repeat in range(4):
-        meter.feed(replace(columns, stamp=columns.stamp + repeat * 8_000_000_000))
+        meter.feed(replace(record, stamp=record.stamp + repeat * 8_000_000_000))
         held.append(meter.held)
     assert max(held) < 4000
 

@@ -48,7 +48,7 @@ def test_it_is_found_to_run_away_at_a_thousand_times_the_speed_scale(unit: float
     assert motion.position == stopped_at
     meter = CycleMeter(window=20)
     meter.feed(motion.take_breakpoints(), drive.belt_speed)
-    meter.report_run_away()
+    meter.unbounded = True
     measures = meter.measures()
     assert measures.regime is Regime.UNBOUNDED
     assert measures.period is None

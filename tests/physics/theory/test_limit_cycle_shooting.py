@@ -49,7 +49,7 @@ def ends_in(drive: Drive, position: float, periods: int = 150) -> Regime | None:
     meter = CycleMeter(window=1)
     meter.feed(motion.take_breakpoints(), drive.belt_speed)
     if motion.unbounded:
-        meter.report_run_away()
+        meter.unbounded = True
     return meter.measures().regime
 
 
