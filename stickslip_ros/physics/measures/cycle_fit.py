@@ -217,7 +217,7 @@ class _Fold:
         return _Shape(
             known,
             lambda phase, derivative: rows(phase, derivative, size),
-            found,
+            found.astype(np.float64),
             covariance,
             fastest,
         )

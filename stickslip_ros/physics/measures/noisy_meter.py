@@ -25,11 +25,6 @@ from stickslip_ros.physics.measures.noise import (
     FEW_SAMPLES,
     FEWEST_SAMPLES,
     LEAST_SAMPLES,
-    impulses,
-    strongest_line,
-    white_noise,
-)
-from stickslip_ros.physics.measures.single_cycles import (
     PRECISION,
     REVERSAL,
     Extremes,
@@ -37,9 +32,12 @@ from stickslip_ros.physics.measures.single_cycles import (
     Point,
     cycle_between,
     fit_reach,
+    impulses,
     rest,
+    strongest_line,
     trend_under_noise,
     vertex,
+    white_noise,
 )
 
 _FEW_STEPS = 25.0
@@ -81,12 +79,12 @@ class _Columns:
         return NoisySamples(*self._table[:, : self._count])
 
     def append(self, samples: NoisySamples) -> None:
-        end = self._count + len(samples.time)
+        end = self._count + len(samples)
         if end > self._table.shape[1]:
             larger = np.empty((5, 2 * end))
             larger[:, : self._count] = self._table[:, : self._count]
             self._table = larger
-        self._table[:, self._count : end] = samples
+        self._table[:, self._count : end] = list(vars(samples).values())
         self._count = end
 
     def cut(self, row: int) -> None:
@@ -106,8 +104,8 @@ class NoisyCycleMeter:
     """Measures positions with noise, fed in blocks of samples of any length.
 
     It keeps the samples of the last `window` cycles at most, and calls functions of them: those of
-    `single_cycles` as cycles end, and for the measures `fit_mean_cycle`, as long as the cycles are
-    alike; otherwise the measures are means over the cycles.
+    `noise` as cycles end, and for the measures `fit_mean_cycle`, as long as the cycles are alike;
+    otherwise the measures are means over the cycles.
 
     The noise is found from the positions. Velocities are used for one purpose: to tell whether they
     have noise.
@@ -159,10 +157,10 @@ class NoisyCycleMeter:
         completed: list[Cycle] = []
         new = NoisySamples(time, position, velocity, belt, position)
         self._fastest_belt = max(self._fastest_belt, float(np.abs(belt).max(initial=0.0)))
-        while len(new.time) > 0:
+        while len(new) > 0:
             due = _BATCH - self._count % _BATCH
-            part, new = new.part(slice(due)), new.part(slice(due, None))
-            self._count += len(part.time)
+            part, new = new[:due], new[due:]
+            self._count += len(part)
             self._take(part)
             if self._count % _LOOK_INTERVAL == 0 or self._count == _FIRST_LOOK:
                 self._look()
@@ -189,7 +187,7 @@ class NoisyCycleMeter:
         """
         recent, resting = self._recent(), self._resting()
         # Few samples after a gap tell less than the cycles before it.
-        enough = len(recent.time) >= (FEWEST_SAMPLES if self._before.cycles else 1)
+        enough = len(recent) >= (FEWEST_SAMPLES if self._before.cycles else 1)
         if enough and 0.0 < self._resolved >= float(np.ptp(recent.position)):
             return self._rest(recent, Regime.HELD), None
         window = _Window(self._held.samples, self._cycles, self._starts)
@@ -203,7 +201,7 @@ class NoisyCycleMeter:
             # The second half of what has come since the last cycle.
             samples = window.samples
             first = samples.row(self._starts[-1]) if self._cycles else 0
-            return self._rest(samples.part(slice((first + len(self._held)) // 2, None))), None
+            return self._rest(samples[(first + len(samples)) // 2 :]), None
         fit = None if quick else self._fit(window.samples, window.starts)
         if fit is not None:
             return self._found(window.samples, fit, fit.noise), fit
@@ -241,7 +239,7 @@ class NoisyCycleMeter:
     def _fit(self, held: NoisySamples, starts: Sequence[float]) -> MeanCycle | None:
         if len(starts) <= LEAST_CYCLES:
             return None
-        part = held.part(slice(held.row(starts[0]), held.row(starts[-1])))
+        part = held[held.row(starts[0]) : held.row(starts[-1])]
         belt = float(np.median(part.belt))
         if float(np.ptp(part.belt)) > 1e-6 * abs(belt):
             return None
@@ -258,12 +256,12 @@ class NoisyCycleMeter:
     def _recent(self) -> NoisySamples:
         """Return the samples of the last part of the run, of several cycles if there are any."""
         samples = self._held.samples
-        row = len(samples.time) - min(max(self._count // 4, _FIRST_LOOK), _LOOK_LENGTH)
+        row = len(samples) - min(max(self._count // 4, _FIRST_LOOK), _LOOK_LENGTH)
         if self._cycles and 2.0 * self._cycles[-1].amplitude > self._resolved:
             # What seems to be a last cycle may have ended by noise, long after.
             period = min(cycle.period for cycle in self._cycles)
             row = min(row, samples.row(float(samples.time[-1]) - LEAST_CYCLES * period))
-        return samples.part(slice(max(row, 0), None))
+        return samples[max(row, 0) :]
 
     def _resting(self) -> bool:
         """Return whether no reversal has come for several periods."""
@@ -274,24 +272,23 @@ class NoisyCycleMeter:
 
     def _take(self, part: NoisySamples) -> None:
         """Hold samples without impulses; the last two wait for those that follow."""
-        waiting = len(self._raw.time)
-        raw = NoisySamples(*(np.concatenate(pair) for pair in zip(self._raw, part, strict=True)))
-        first, last = min(waiting, 2), len(raw.time) - 2
+        raw = self._raw.followed_by(part)
+        first, last = min(len(self._raw), 2), len(raw) - 2
         if last <= first:
             self._raw = raw
             return
-        self._raw = raw.part(slice(last - 2 if last > 2 else 0, None))
+        self._raw = raw[max(last - 2, 0) :]
         position = raw.position
         middle = np.sort([position[:-2], position[1:-1], position[2:]], axis=0)[1]
-        raw = raw._replace(median=np.concatenate([position[:1], middle, position[-1:]]))
+        raw = replace(raw, median=np.concatenate([position[:1], middle, position[-1:]]))
         rows = np.arange(first, last)
         if self.noise > 0.0:
             rows = rows[~impulses(position, self.noise)[first:last]]
-        self._held.append(raw.part(rows))
+        self._held.append(raw[rows])
 
     def _look(self) -> None:
         """Estimate the noise, and the step of an encoder, from the last samples."""
-        recent = self._held.samples.part(slice(-_LOOK_LENGTH, None))
+        recent = self._held.samples[-_LOOK_LENGTH:]
         noise = white_noise(recent.position)
         moved = float(np.ptp(recent.median)) if len(self._held) > 0 else 0.0
         farthest = float(np.abs(recent.position).max(initial=0.0))

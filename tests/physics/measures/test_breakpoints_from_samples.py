@@ -226,31 +226,3 @@ def test_the_unit_of_length_changes_nothing(
     assert np.array_equal(breakpoints.position, unit * expected.position)
     assert np.array_equal(breakpoints.velocity, unit * expected.velocity)
     assert np.array_equal(breakpoints.sticking, expected.sticking)
-
-
-@given(st.integers(0, 1000), st.integers(5, 100), st.sampled_from([0.0, 1e-2, 1.0]))
-def test_exact_samples_have_their_edges_where_the_slide_has_the_velocity_of_the_belt(
-    seed: int, count: int, noise: float
-) -> None:
-    """Bit for bit: r s / 2 is the relative displacement on landing, r s / 3 on leaving."""
-    time, position, velocity, belt = random_samples(seed, count, noise)
-    velocity = np.where(np.random.default_rng(seed).random(len(time)) < 0.5, belt, velocity)
-    breakpoints = breakpoints_from_samples(time, position, velocity, belt)
-    stuck = velocity == belt
-    edges: dict[float, tuple[float, float]] = {}
-    for n in np.flatnonzero(stuck[1:] != stuck[:-1]):
-        landing = bool(stuck[n + 1])
-        step = time[n + 1] - time[n]
-        riding = belt[n + 1] if landing else belt[n]
-        slipped = position[n + 1] - position[n] - riding * step
-        speed = (velocity[n] if landing else velocity[n + 1]) - riding
-        slip = np.clip((2.0 if landing else 3.0) * slipped / speed, 0.0, step)
-        instant = slip if landing else step - slip
-        start = position[n + 1] - riding * step if landing else position[n]
-        edges[time[n] + instant] = start + riding * instant, riding
-    for instant, (at, riding) in edges.items():
-        here = breakpoints.time == instant
-        assert at in breakpoints.position[here]
-        assert riding in breakpoints.velocity[here]
-    ridden = np.flatnonzero(stuck[1:] & stuck[:-1]) + 1
-    assert np.isin(time[ridden], breakpoints.time[breakpoints.sticking]).all()

@@ -106,14 +106,14 @@ def check_equilibrium(measures: Measures, position: float) -> None:
     assert measures.amplitude < 1e-3
 
 
-def test_vibrations_that_die_out_end_in_equilibrium() -> None:
-    # Above the Hopf speed; mu(-0.6) = 0.4 - 0.45 0.6 + 0.6 0.6^3.
-    check_equilibrium(measured(recorded(ABOVE_HOPF, 0.0, 0.0, 200.0), 0.6), 0.2596)
-
-
-def test_a_motion_that_never_turns_ends_in_equilibrium() -> None:
-    # mu(-0.4) = 0.4 - 0.45 0.4 + 0.6 0.4^3
-    check_equilibrium(measured(recorded(OVERDAMPED, 0.0, 0.0, 60.0), 0.4), 0.2584)
+@pytest.mark.parametrize(
+    ("drive", "duration", "position"), [(ABOVE_HOPF, 200.0, 0.2596), (OVERDAMPED, 60.0, 0.2584)]
+)
+def test_a_motion_that_dies_out_or_never_turns_ends_in_equilibrium(
+    drive: Drive, duration: float, position: float
+) -> None:
+    """Where the friction is mu(-v) = 0.4 - 0.45 v + 0.6 v^3 for v = 0.6 and v = 0.4."""
+    check_equilibrium(measured(recorded(drive, 0.0, 0.0, duration), drive.belt_speed), position)
 
 
 def test_cycles_of_long_ago_do_not_count() -> None:

@@ -100,29 +100,29 @@ def test_creep_is_a_drift() -> None:
     assert report["trend"] == "drifting"
 
 
+def rates(sizes: np.ndarray, middles: np.ndarray, step: float) -> dict[str, float]:
+    """Return the drift of cycles of 64 ms, seen by an encoder with steps."""
+    drift, ends = Drift(), (np.arange(len(sizes)) * 0.064).tolist()
+    drift.resolution = step
+    measured = zip(sizes.tolist(), middles.tolist(), strict=True)
+    drift.feed_cycles(ends, [Cycle(size, 1e-3, mid, 0.064, 15.6, 0.0) for size, mid in measured])
+    return drift.rates(0.064)
+
+
 @pytest.mark.parametrize(("change", "drifts"), [(0.5e-6, False), (3e-6, True)])
 def test_a_drift_of_cycles_within_a_step_of_the_encoder_does_not_matter(
     change: float, drifts: bool
 ) -> None:
     """The midpoint moves by a quarter of a step, or by one and a half."""
-    drift, ends = Drift(), np.arange(60) * 0.064
-    drift.resolution = 2e-6
-    middles = (1e-5 + change * ends / ends[-1]).tolist()
-    drift.feed_cycles(
-        ends.tolist(), [Cycle(4e-6, 1e-3, middle, 0.064, 15.6, 0.0) for middle in middles]
-    )
-    assert ("position" in drift.rates(0.064)) is drifts
+    middles = 1e-5 + change * np.linspace(0.0, 1.0, 60)
+    assert ("position" in rates(np.full(60, 4e-6), middles, 2e-6)) is drifts
 
 
 def test_eight_cycles_that_agree_within_half_a_step_by_chance_are_no_drift() -> None:
-    drift, ends = Drift(), np.arange(28) * 0.064
-    drift.resolution = 5e-6
-    sizes = 4.4e-4 - 5.8e-6 * np.maximum(ends - ends[-8], 0.0)
-    cycles = [Cycle(size, 1e-3, 1e-5, 0.064, 15.6, 0.0) for size in sizes.tolist()]
-    drift.feed_cycles(ends.tolist(), cycles)
-    assert drift.rates(0.064) == {}
-    drift.resolution = 1e-6
-    assert drift.rates(0.064).keys() == {"amplitude"}
+    sizes = 4.4e-4 - 5.8e-6 * 0.064 * np.maximum(np.arange(28) - 20, 0)
+    middles = np.full(28, 1e-5)
+    assert rates(sizes, middles, 5e-6) == {}
+    assert rates(sizes, middles, 1e-6).keys() == {"amplitude"}
 
 
 def test_a_belt_that_varies_makes_no_drift_but_a_note() -> None:
