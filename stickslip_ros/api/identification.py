@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from stickslip_ros.api.display import Parts, Shown, shown_in_notebooks
+from stickslip_ros.api.results import Parts, Result
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.identification.findings import Findings
 from stickslip_ros.identification.fit import Estimate
@@ -19,9 +19,11 @@ from stickslip_ros.scenarios.files import Scenario, load_scenario
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from stickslip_ros.plots.style import FigureStyle
+
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Model(Shown):
+class Model(Result):
     """A model that was fitted to recordings; it prints as the tables of `stickslip identify`."""
 
     findings: Findings
@@ -104,28 +106,10 @@ class Model(Shown):
         written_scenario(self.findings, Path(path))
         return load_scenario(str(path))
 
-    def plot(self, *, style: str = "screen") -> "Figure":
-        """Return the figure that `stickslip identify --plot` draws.
-
-        Parameters
-        ----------
-        style : {"screen", "paper", "paper-double"}
-            What the figure is for: a screen, or one column or two of a journal.
-
-        Returns
-        -------
-        matplotlib.figure.Figure
-            Friction curve with its band, residuals, free run.
-
-        Raises
-        ------
-        InvalidInputError
-            If `style` is unknown.
-        """
+    def _figure(self, style: "FigureStyle") -> "Figure":
         from stickslip_ros.plots.identification_figure import identification_figure
-        from stickslip_ros.plots.style import style_named
 
-        return shown_in_notebooks(identification_figure(self.findings, style=style_named(style)))
+        return identification_figure(self.findings, style=style)
 
     def _parts(self) -> Parts:
         found = self.findings

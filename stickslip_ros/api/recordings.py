@@ -1,5 +1,6 @@
 """Recorded runs: the samples in a bag or a table, and their measures."""
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -7,10 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from stickslip_ros.api.display import Parts, Shown, shown_in_notebooks
-from stickslip_ros.api.frames import Quantity, data_frame, data_set
+from stickslip_ros.api.results import Parts, Quantity, Table, TabularResult
 from stickslip_ros.arrays import FloatArray
+from stickslip_ros.bags.reader import Recording
 from stickslip_ros.bags.report import report_of_recording
+from stickslip_ros.bags.table_file import is_table
+from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.loop.trajectory import QUANTITIES
 from stickslip_ros.physics.measures.cycle_measures import Measures, measures_of
 from stickslip_ros.physics.measures.slips import SlipThreshold
@@ -19,13 +22,15 @@ from stickslip_ros.plots.measure_table import measure_table, why_no_cycle
 from stickslip_ros.plots.run_history import RunHistory
 from stickslip_ros.plots.units import Units
 from stickslip_ros.samples import ForceColumns, SampleColumns
+from stickslip_ros.scenarios.curve_file import CURVES, as_pairs
+from stickslip_ros.scenarios.parameter_field import known_parameters
+from stickslip_ros.scenarios.parameters import PlantParameters
 from stickslip_ros.stamps import NANOSECONDS
-from stickslip_ros.studies.recorded_drive import recorded_drive
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-    from pandas import DataFrame
-    from xarray import Dataset
+
+    from stickslip_ros.plots.style import FigureStyle
 
 _COLUMNS = {name: Quantity(*labelled) for name, labelled in QUANTITIES.items()} | {
     "stamp": Quantity("stamp", "ns")
@@ -37,7 +42,7 @@ Part = SampleColumns | ForceColumns
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class RecordedRun(Shown):
+class RecordedRun(TabularResult):
     """A recorded run, or a part of it; it prints as a table of its measures."""
 
     path: Path
@@ -63,76 +68,23 @@ class RecordedRun(Shown):
         """Sentences on the parts that are missing in the bag."""
         return self.report["missing"]
 
-    def plot(self, *, style: str = "screen") -> "Figure":
-        """Return the figure that `stickslip report --plot` draws.
-
-        Parameters
-        ----------
-        style : {"screen", "paper", "paper-double"}
-            What the figure is for: a screen, or one column or two of a journal.
-
-        Returns
-        -------
-        matplotlib.figure.Figure
-            Motion, force, phase portrait, cycles and friction law.
-
-        Raises
-        ------
-        InvalidInputError
-            If `style` is unknown.
-        """
+    def _figure(self, style: "FigureStyle") -> "Figure":
         from stickslip_ros.plots.run_figure import DrawnRun, run_figure
-        from stickslip_ros.plots.style import style_named
 
         drawn = DrawnRun.recorded(self.path, self._history, self.report, self.drive)
-        return shown_in_notebooks(run_figure(drawn, style=style_named(style)))
+        return run_figure(drawn, style=style)
 
-    def to_pandas(self) -> "DataFrame":
-        """Return the samples as a table.
-
-        Returns
-        -------
-        pandas.DataFrame
-            A row for each sample, by its time from the first one; SI units, which are in
-            `attrs["units"]`. `control_force` is the answer to the sample, NaN where none came;
-            `stamp` is in ns.
-
-        Raises
-        ------
-        RunError
-            If pandas is not installed.
-        """
-        return data_frame(self._columns(), _COLUMNS, Units.for_drive(self.drive), index="time")
-
-    def to_xarray(self) -> "Dataset":
-        """Return the samples as a data set.
-
-        Returns
-        -------
-        xarray.Dataset
-            A variable for each column of `to_pandas` over the dimension `time`, with `units` and
-            `long_name`.
-
-        Raises
-        ------
-        RunError
-            If xarray is not installed.
-        """
-        columns = self._columns()
-        time = columns.pop("time")
-        variables = {name: (("time",), values) for name, values in columns.items()}
-        attrs = {"bag": str(self.path)}
-        return data_set(variables, {"time": time}, _COLUMNS, Units.for_drive(self.drive), attrs)
-
-    def _columns(self) -> dict[str, Any]:
+    def _table(self) -> Table:
         samples = self.samples
         first = int(samples.stamp[0]) if len(samples) else 0
-        columns: dict[str, Any] = {
+        time = (samples.stamp - first) / NANOSECONDS
+        columns = {
             **vars(samples),
-            "time": (samples.stamp - first) / NANOSECONDS,
+            "time": time,
             "control_force": _answers(samples, self.forces),
         }
-        return {name: columns[name] for name in _COLUMNS}
+        units, source = Units.for_drive(self.drive), {"bag": str(self.path)}
+        return Table(columns, _COLUMNS, units, {"time": time}, source, "time")
 
     def _parts(self) -> Parts:
         units = Units.for_drive(self.drive)
@@ -289,6 +241,29 @@ def _recorded_run(path: Path, drive: Drive | None, **options: Any) -> RecordedRu
         drive,
         history,
     )
+
+
+def recorded_drive(bag: Path, namespace: str | None = None) -> Drive | None:
+    """Return the drive whose parameters were recorded, None where they are not or not all.
+
+    A table has none.
+    """
+    if is_table(bag):
+        return None
+    with Recording(bag, namespace) as recording:
+        texts = recording.metadata("stickslip_ros/plant") or {}
+        curves = recording.metadata(CURVES) or {}
+    try:
+        values = {
+            name: json.loads(text)
+            for name, text in texts.items()
+            if name in known_parameters(PlantParameters)
+        }
+        known = {path: as_pairs(json.loads(text)) for path, text in curves.items()}
+        plant = PlantParameters.validated(values, str(bag), known)
+    except (ValueError, RecursionError, InvalidInputError):
+        return None
+    return plant.as_drive() if values.keys() >= set(plant.drive_names()) else None
 
 
 def _answers(samples: SampleColumns, forces: ForceColumns) -> FloatArray:

@@ -1,11 +1,9 @@
 """Simulated runs: trajectory and measures of a scenario."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from stickslip_ros.api.display import Parts, Shown, shown_in_notebooks
-from stickslip_ros.api.frames import Quantity, data_frame, data_set, provenance
+from stickslip_ros.api.results import Parts, Quantity, Table, TabularResult, provenance
 from stickslip_ros.api.scenarios import ScenarioLike, as_scenario
 from stickslip_ros.physics.loop.trajectory import (
     MEASURED,
@@ -24,14 +22,14 @@ from stickslip_ros.studies import simulate as simulation
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-    from pandas import DataFrame
-    from xarray import Dataset
+
+    from stickslip_ros.plots.style import FigureStyle
 
 _COLUMNS = {name: Quantity(*labelled) for name, labelled in {**QUANTITIES, **MEASURED}.items()}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Run(Shown):
+class Run(TabularResult):
     """A simulated run; it prints as a table of its measures."""
 
     scenario: Scenario
@@ -50,68 +48,16 @@ class Run(Shown):
     _history: RunHistory
     """The data of the figure."""
 
-    def plot(self, *, style: str = "screen") -> "Figure":
-        """Return the figure that `stickslip simulate --plot` draws.
-
-        Parameters
-        ----------
-        style : {"screen", "paper", "paper-double"}
-            What the figure is for: a screen, or one column or two of a journal.
-
-        Returns
-        -------
-        matplotlib.figure.Figure
-            Motion, force, phase portrait, cycles and friction law.
-
-        Raises
-        ------
-        InvalidInputError
-            If `style` is unknown.
-        """
+    def _figure(self, style: "FigureStyle") -> "Figure":
         from stickslip_ros.plots.run_figure import DrawnRun, run_figure
-        from stickslip_ros.plots.style import style_named
 
         drawn = DrawnRun.simulated(self.scenario, self._history, self.truth or self.measures)
-        return shown_in_notebooks(run_figure(drawn, style=style_named(style)))
+        return run_figure(drawn, style=style)
 
-    def to_pandas(self) -> "DataFrame":
-        """Return the trajectory as a table.
-
-        Returns
-        -------
-        pandas.DataFrame
-            A row for each sample, by its time; SI units, which are in `attrs["units"]`.
-
-        Raises
-        ------
-        RunError
-            If pandas is not installed.
-        """
-        return data_frame(vars(self.trajectory), self._columns, self._units, index="time")
-
-    def to_xarray(self) -> "Dataset":
-        """Return the trajectory as a data set.
-
-        Returns
-        -------
-        xarray.Dataset
-            A variable for each column over the dimension `time`, with `units` and `long_name`; its
-            own attributes name scenario, overrides and version.
-
-        Raises
-        ------
-        RunError
-            If xarray is not installed.
-        """
-        columns = dict(vars(self.trajectory))
-        time = columns.pop("time")
-        variables = {name: (("time",), values) for name, values in columns.items()}
-        attrs = provenance(self.scenario)
-        return data_set(variables, {"time": time}, self._columns, self._units, attrs)
-
-    @property
-    def _columns(self) -> Mapping[str, Quantity]:
-        return {name: _COLUMNS[name] for name in vars(self.trajectory)}
+    def _table(self) -> Table:
+        columns = vars(self.trajectory)
+        time = {"time": self.trajectory.time}
+        return Table(columns, _COLUMNS, self._units, time, provenance(self.scenario), "time")
 
     @property
     def _units(self) -> Units:

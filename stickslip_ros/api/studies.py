@@ -10,23 +10,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from stickslip_ros.api.display import Parts, Shown, shown_in_notebooks
-from stickslip_ros.api.frames import (
-    Quantity,
-    data_frame,
-    data_set,
-    names_of,
-    of_measure,
-    of_parameter,
-    provenance,
-)
+from stickslip_ros.api.results import Parts, Quantity, Table, TabularResult, provenance
 from stickslip_ros.api.scenarios import ScenarioLike, as_scenario
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.plots.measure_table import LABELS
 from stickslip_ros.plots.study_tables import basin_table, sweep_table, units_of
 from stickslip_ros.quantities import number_of
 from stickslip_ros.scenarios.files import Scenario
-from stickslip_ros.scenarios.keywords import described, parameter_of
+from stickslip_ros.scenarios.keywords import described, keyword_of, parameter_of
 from stickslip_ros.studies import transitions as theory
 from stickslip_ros.studies.basin import (
     POSITION,
@@ -46,17 +38,16 @@ from stickslip_ros.text import shown
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-    from pandas import DataFrame
-    from xarray import Dataset
 
     from stickslip_ros.plots.study_figure import Colour
+    from stickslip_ros.plots.style import FigureStyle
 
 Values = tuple[float | str, float | str, int] | tuple[float | str, float | str, int, str]
 """First and last value, how many, and optionally "log"."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class _Result(Shown):
+class _Result(TabularResult):
     """The points of a study as columns."""
 
     study: Study
@@ -69,97 +60,29 @@ class _Result(Shown):
         """The scenario that was varied."""
         return self.study.scenario
 
-    def to_pandas(self) -> "DataFrame":
-        """Return the points as a table.
-
-        Returns
-        -------
-        pandas.DataFrame
-            A row for each point; SI units, which are in `attrs["units"]`. Parameters have their
-            keywords as names, the other columns are those of the table that the command writes.
-
-        Raises
-        ------
-        RunError
-            If pandas is not installed.
-        """
-        values = self._values()
-        values |= {"turning_points": self.columns.turning_points}
-        quantities = self._quantities()
-        return data_frame(
-            {name: values[name] for name in quantities}, quantities, units_of(self.study)
-        )
-
-    def to_xarray(self) -> "Dataset":
-        """Return the points as a data set.
-
-        Returns
-        -------
-        xarray.Dataset
-            A variable for each column, with `units` and `long_name`. Its dimensions are the varied
-            parameters by their keywords, or `point` for a random sample; `direction` for a sweep
-            that is carried on; `turning_point` for the turning points, filled up with NaN. In
-            `regime` and `reason` "" stands for none.
-
-        Raises
-        ------
-        RunError
-            If xarray is not installed.
-        """
-        plan = self.study.plan
-        names = names_of(plan.parameters)
-        values = self._values()
-        values |= {name: _texts(values[name]) for name in ("regime", "reason")}
-        coordinates: dict[str, Any] = {}
-        dimensions, shape = ["point"], [plan.size]
-        if isinstance(plan, Grid):
-            dimensions, shape = list(names), list(plan.shape)
-            coordinates = {name: axis.values() for name, axis in zip(names, plan.axes, strict=True)}
-            if plan.continuation:
-                dimensions, shape = ["direction", *dimensions], [len(plan.directions), *shape]
-                coordinates["direction"] = [str(direction) for direction in plan.directions]
-        variables = {
-            name: (dimensions, np.asarray(column).reshape(shape))
-            for name, column in values.items()
-            if name not in coordinates
-        }
-        points = _padded(self.columns.turning_points)
-        variables["turning_points"] = (
-            [*dimensions, "turning_point"],
-            points.reshape(*shape, points.shape[1]),
-        )
-        quantities = self._quantities()
-        attrs = provenance(self.scenario)
-        return data_set(variables, coordinates, quantities, units_of(self.study), attrs)
-
-    def _values(self) -> dict[str, Any]:
-        """Return the columns by name, but for the turning points, which are of unequal length."""
+    def _table(self) -> Table:
         columns, plan = self.columns, self.study.plan
-        found: dict[str, Any] = dict(
-            zip(names_of(plan.parameters), columns.values.values(), strict=True)
-        )
-        if isinstance(plan, Grid) and plan.continuation:
-            found["direction"] = [str(plan.direction(number)) for number in range(plan.size)]
-        found |= {name: getattr(columns, name) for name in COLUMNS if name != "turning_points"}
-        found["regime"] = np.array(
-            [None if regime is None else str(regime) for regime in columns.regime], dtype=object
-        )
-        return found
-
-    def _quantities(self) -> dict[str, Quantity]:
-        """Return what each column is, in the order of the columns."""
-        parameters = self.study.plan.parameters
-        found = {
-            name: of_parameter(parameter)
-            for name, parameter in zip(names_of(parameters), parameters, strict=True)
+        names = [keyword_of(parameter) for parameter in plan.parameters]
+        found: dict[str, Any] = dict(zip(names, columns.values.values(), strict=True))
+        quantities = dict(zip(names, map(_of_parameter, plan.parameters), strict=True))
+        dimensions: dict[str, Any] = {"point": range(plan.size)}
+        if isinstance(plan, Grid):
+            values = (axis.values() for axis in plan.axes)
+            dimensions = dict(zip(names, values, strict=True))
+            if plan.continuation:
+                ways = [str(direction) for direction in plan.directions]
+                found["direction"] = np.repeat(ways, plan.size // len(ways)).astype(object)
+                quantities["direction"] = Quantity("direction in which it is carried on")
+                dimensions = {"direction": ways, **dimensions}
+        found |= {name: getattr(columns, name) for name in COLUMNS} | {
+            "regime": np.array([regime and str(regime) for regime in columns.regime], dtype=object)
         }
-        if self.study.plan.continuation:
-            found["direction"] = Quantity("direction in which it is carried on")
-        found |= {name: of_measure(name) for name in MEASURES}
-        found["steady"] = Quantity("whether the motion has settled")
-        found["turning_points"] = Quantity("displacement where the velocity is zero", "m")
-        found["reason"] = Quantity("why there is no cycle")
-        return found
+        quantities |= {name: _of_measure(name) for name in MEASURES}
+        quantities["steady"] = Quantity("whether the motion has settled")
+        quantities["turning_points"] = Quantity("displacement where the velocity is zero", "m")
+        quantities["reason"] = Quantity("why there is no cycle")
+        units, attributes = units_of(self.study), provenance(self.scenario)
+        return Table(found, quantities, units, dimensions, attributes)
 
 
 class Sweep(_Result):
@@ -196,12 +119,12 @@ class Sweep(_Result):
         InvalidInputError
             If `colour` is unknown, or given for a sweep over one parameter, or `style` is unknown.
         """
-        from stickslip_ros.plots.study_figure import sweep_figure
-        from stickslip_ros.plots.style import style_named
+        return self._drawn(style, colour=colour)
 
-        return shown_in_notebooks(
-            sweep_figure(self.columns, self.study, colour, style=style_named(style))
-        )
+    def _figure(self, style: "FigureStyle", colour: "Colour" = "regime") -> "Figure":
+        from stickslip_ros.plots.study_figure import sweep_figure
+
+        return sweep_figure(self.columns, self.study, colour, style=style)
 
     def _parts(self) -> Parts:
         yield sweep_table(self.study, self.columns)
@@ -220,36 +143,20 @@ class Basin(_Result):
         """The motions that the starts lead to, the one with most starts first."""
         return self.basins.attractors
 
-    def plot(self, *, style: str = "screen") -> "Figure":
-        """Return the figure that `stickslip basin --plot` draws.
-
-        Parameters
-        ----------
-        style : {"screen", "paper", "paper-double"}
-            What the figure is for: a screen, or one column or two of a journal.
-
-        Returns
-        -------
-        matplotlib.figure.Figure
-            Which motion each start leads to.
-
-        Raises
-        ------
-        InvalidInputError
-            If `style` is unknown.
-        """
+    def _figure(self, style: "FigureStyle") -> "Figure":
         from stickslip_ros.plots.study_figure import basin_figure
-        from stickslip_ros.plots.style import style_named
 
-        return shown_in_notebooks(
-            basin_figure(self.columns, self.basins, self.study, style=style_named(style))
+        return basin_figure(self.columns, self.basins, self.study, style=style)
+
+    def _table(self) -> Table:
+        table = super()._table()
+        return table._replace(
+            columns={**table.columns, "attractor": self.basins.places},
+            quantities={
+                **table.quantities,
+                "attractor": Quantity("place in the attractors, from 0"),
+            },
         )
-
-    def _values(self) -> dict[str, Any]:
-        return super()._values() | {"attractor": self.basins.places}
-
-    def _quantities(self) -> dict[str, Quantity]:
-        return super()._quantities() | {"attractor": Quantity("place in the attractors, from 0")}
 
     def _parts(self) -> Parts:
         yield basin_table(self.study, self.basins)
@@ -441,14 +348,10 @@ def _course(
     )
 
 
-def _texts(values: Any) -> Any:
-    """Return texts, of which some are None, as an array that a file can hold."""
-    return np.array([value or "" for value in values], dtype=str)
+def _of_measure(name: str) -> Quantity:
+    return Quantity(*LABELS.get(name, (name.replace("_", " "), "")))
 
 
-def _padded(rows: list[tuple[float, ...]]) -> Any:
-    """Return rows of unequal length as an array, filled up with NaN."""
-    found = np.full((len(rows), max(map(len, rows), default=0)), np.nan)
-    for number, row in enumerate(rows):
-        found[number, : len(row)] = row
-    return found
+def _of_parameter(parameter: str) -> Quantity:
+    known = described(parameter)
+    return Quantity(known.meaning.rstrip("."), known.unit or "")

@@ -1,11 +1,20 @@
 """Theory and design: the stability of a scenario, and gains for it."""
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
+from math import nan
 from typing import TYPE_CHECKING, Any
 
-from stickslip_ros.api.display import Parts, Shown, shown_in_notebooks
-from stickslip_ros.api.frames import Quantity, data_frame
+import numpy as np
+
+from stickslip_ros.api.results import (
+    Parts,
+    Quantity,
+    Result,
+    Table,
+    TabularResult,
+    provenance,
+)
 from stickslip_ros.api.scenarios import ScenarioLike, as_scenario
 from stickslip_ros.errors import InvalidInputError, RunError
 from stickslip_ros.physics.model.control import Washout
@@ -21,11 +30,12 @@ from stickslip_ros.text import shown
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-    from pandas import DataFrame
+
+    from stickslip_ros.plots.style import FigureStyle
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Stability(Shown):
+class Stability(Result):
     """Results of theory for a scenario; it prints as tables. SI units; None does not exist.
 
     The keys are those of `stickslip stability --json`.
@@ -48,35 +58,13 @@ class Stability(Shown):
     notes: Mapping[str, str]
     """Why a value does not exist, by its place."""
 
-    def plot(self, *, style: str = "screen") -> "Figure":
-        """Return the figure that `stickslip stability --plot` draws.
-
-        Parameters
-        ----------
-        style : {"screen", "paper", "paper-double"}
-            What the figure is for: a screen, or one column or two of a journal.
-
-        Returns
-        -------
-        matplotlib.figure.Figure
-            Where the sampled loop is stable, and the critical gain over the delay of the force.
-            Without a controller: the bifurcation diagram over the belt speed.
-
-        Raises
-        ------
-        InvalidInputError
-            If there is no linear sampled loop, or if the theory of limit cycles does not cover a
-            drive without a controller, or if `style` is unknown.
-        """
+    def _figure(self, style: "FigureStyle") -> "Figure":
         reason = stabilities.why_no_figure(self.scenario)
         if reason is not None:
             raise InvalidInputError(f"there is nothing to draw: {reason}")
         from stickslip_ros.plots.stability_figure import scenario_stability_figure
-        from stickslip_ros.plots.style import style_named
 
-        return shown_in_notebooks(
-            scenario_stability_figure(self.scenario, style=style_named(style))
-        )
+        return scenario_stability_figure(self.scenario, style=style)
 
     def _parts(self) -> Parts:
         found = {name: value for name, value in vars(self).items() if name != "scenario"}
@@ -114,7 +102,7 @@ def stability(scenario: ScenarioLike) -> Stability:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Proposal(Shown):
+class Proposal(TabularResult):
     """Gains for a range of belt speeds; it prints as tables."""
 
     design: designing.Design
@@ -156,50 +144,24 @@ class Proposal(Shown):
             raise RunError(self._nothing)
         return scenario
 
-    def plot(self, *, style: str = "screen") -> "Figure":
-        """Return the figure that `stickslip design --plot` draws.
-
-        Parameters
-        ----------
-        style : {"screen", "paper", "paper-double"}
-            What the figure is for: a screen, or one column or two of a journal.
-
-        Returns
-        -------
-        matplotlib.figure.Figure
-            The decay rate over cutoff frequency and linear gain, and the force limit.
-
-        Raises
-        ------
-        InvalidInputError
-            If `style` is unknown.
-        RunError
-            If there is nothing to propose.
-        """
+    def _figure(self, style: "FigureStyle") -> "Figure":
         if self.design.map_around() is None:
             raise RunError(self._nothing)
         from stickslip_ros.plots.stability_figure import design_figure
-        from stickslip_ros.plots.style import style_named
 
-        return shown_in_notebooks(design_figure(self.design, style=style_named(style)))
+        return design_figure(self.design, style=style)
 
-    def to_pandas(self) -> "DataFrame":
-        """Return the checks as a table.
-
-        Returns
-        -------
-        pandas.DataFrame
-            A row for each belt speed; SI units, which are in `attrs["units"]`.
-
-        Raises
-        ------
-        RunError
-            If pandas is not installed.
-        """
-        columns = {name: [asdict(check)[name] for check in self.checks] for name in CHECKS}
+    def _table(self) -> Table:
+        task = self.design.task
+        checks = [
+            {name: nan if value is None else value for name, value in vars(check).items()}
+            for check in self.checks
+        ]
+        columns = {name: np.array([check[name] for check in checks]) for name in CHECKS}
         quantities = {name: Quantity(*labelled) for name, labelled in CHECKS.items()}
-        units = Units.for_drive(self.design.task.drive)
-        return data_frame(columns, quantities, units)
+        speeds = {"belt_speed": columns["belt_speed"]}
+        attributes = provenance(task.scenario) if task.scenario else {}
+        return Table(columns, quantities, Units.for_drive(task.drive), speeds, attributes)
 
     @property
     def _nothing(self) -> str:

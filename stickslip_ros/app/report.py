@@ -71,13 +71,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> None:
     """Run the command."""
+    from stickslip_ros.api.recordings import recorded_drive
     from stickslip_ros.bags.report import report_of_recording
     from stickslip_ros.bags.table_file import is_table
     from stickslip_ros.physics.measures.slips import SlipThreshold
     from stickslip_ros.plots.measure_table import slip_table, why_no_cycle
     from stickslip_ros.plots.run_history import RunHistory
     from stickslip_ros.plots.units import Units
-    from stickslip_ros.studies.recorded_drive import recorded_drive
 
     plot: Path | None = arguments.plot
     bags: list[Path] = arguments.bags
@@ -134,8 +134,8 @@ def _draw(
     histories: Mapping[str, "RunHistory"],
     reports: Mapping[str, Mapping[str, Any]],
 ) -> None:
+    from stickslip_ros.api.recordings import recorded_drive
     from stickslip_ros.plots.run_figure import DrawnRun, run_figure
-    from stickslip_ros.studies.recorded_drive import recorded_drive
 
     runs = [
         DrawnRun.recorded(

@@ -75,15 +75,16 @@ class Basins:
         found = np.full(len(regime), -1)
         attractors: list[Attractor] = []
         while len(left := np.flatnonzero(found < 0)):
-            first = left[0]
+            first = int(left[0])
             allowed = 0.02 * amplitude[first]
             alike = (regime[left] == regime[first]) & (steady[left] == steady[first])
             for each in (amplitude, midpoint):
                 alike &= np.abs(each[left] - each[first]) <= allowed
+            alike[0] = True  # also where an amplitude is not finite
             found[left[alike]] = len(attractors)
             share = (count := int(alike.sum())) / len(regime)
             attractor = Attractor(
-                regime=regime[first],
+                regime=regime.item(first),
                 steady=bool(steady[first]),
                 amplitude=float(amplitude[first]) if cycle[first] else None,
                 midpoint=float(midpoint[first]) if cycle[first] else None,

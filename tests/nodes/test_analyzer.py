@@ -9,6 +9,7 @@ import pytest
 from rclpy.duration import Duration
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
+from stickslip_ros.api.recordings import recorded_drive
 from stickslip_ros.bags.reader import Recording
 from stickslip_ros.bags.recorder import Recorder
 from stickslip_ros.bags.report import report_of_recording
@@ -24,7 +25,6 @@ from stickslip_ros.nodes.analyzer import AnalyzerNode
 from stickslip_ros.nodes.base.managed import ERROR
 from stickslip_ros.nodes.plant import PlantNode
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
-from stickslip_ros.studies.recorded_drive import recorded_drive
 from tests.bags.runs import full_disk
 from tests.nodes.graph import PATIENCE, Graph
 

@@ -1,0 +1,219 @@
+"""What all results have in common: they print, draw themselves, and become tables."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Mapping, Sequence
+from functools import partial
+from html import escape
+from importlib import import_module
+from io import BytesIO
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from stickslip_ros.errors import RunError
+from stickslip_ros.plots.units import Units
+from stickslip_ros.scenarios.files import Scenario
+from stickslip_ros.tables import TextTable
+from stickslip_ros.text import printable
+from stickslip_ros.versions import versions
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from pandas import DataFrame
+    from xarray import Dataset
+
+    from stickslip_ros.plots.style import FigureStyle
+
+Parts = Iterable[TextTable | str]
+"""Tables and sentences that a result prints as."""
+
+
+class Result(ABC):
+    """A result that prints as tables, plain in a terminal, HTML in a notebook, and has a figure."""
+
+    @abstractmethod
+    def _parts(self) -> Parts:
+        """Return the tables and sentences."""
+
+    @abstractmethod
+    def _figure(self, style: "FigureStyle") -> "Figure":
+        """Return the figure; what draws is imported here."""
+
+    def plot(self, *, style: str = "screen") -> "Figure":
+        """Return the figure that the command of this result draws with `--plot`.
+
+        Parameters
+        ----------
+        style : {"screen", "paper", "paper-double"}
+            What the figure is for: a screen, or one column or two of a journal.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            The figure, which notebooks show.
+
+        Raises
+        ------
+        InvalidInputError
+            If there is nothing to draw, or `style` is unknown.
+        RunError
+            If a design has nothing to propose.
+        """
+        return self._drawn(style)
+
+    def _drawn(self, style: str, **options: Any) -> "Figure":
+        """Return the figure in the style of that name, as notebooks show it."""
+        from stickslip_ros.plots.style import style_named
+
+        figure = self._figure(style_named(style), **options)
+        vars(figure)["_repr_png_"] = partial(_png, figure)  # pyplot does not know it
+        return figure
+
+    def __repr__(self) -> str:
+        return "\n".join(
+            printable(part) if isinstance(part, str) else "\n".join(part.lines())
+            for part in self._parts()
+        )
+
+    def _repr_html_(self) -> str:
+        return "\n".join(
+            f"<p>{escape(printable(part))}</p>" if isinstance(part, str) else part.html()
+            for part in self._parts()
+        )
+
+
+class Quantity(NamedTuple):
+    """Label and SI unit of a column."""
+
+    label: str
+    unit: str = ""
+
+
+class Table(NamedTuple):
+    """The data of a result, from which tables of other packages are made."""
+
+    columns: Mapping[str, Any]
+    """Values by name: an array each, a list of texts, or a list of tuples of unequal length."""
+    quantities: Mapping[str, Quantity]
+    """What the columns are, in their order; those that are not there are left out."""
+    units: Units
+    dimensions: Mapping[str, Any]
+    """What the values depend on, in row-major order; a range has no values of its own."""
+    attributes: Mapping[str, str]
+    row_names: str | None = None
+    """Column that is the index of a table of pandas."""
+
+    def units_of(self, columns: Any) -> dict[str, str]:
+        """Return the unit of each column of numbers, by the CF conventions: 1 without any."""
+        return {
+            name: self.units.of_unit(quantity.unit) or "1"
+            for name, quantity in self.quantities.items()
+            if name in columns and columns[name].dtype.kind in "fi"
+        }
+
+
+class TabularResult(Result):
+    """A result that also becomes tables; pandas and xarray are imported on first use."""
+
+    @abstractmethod
+    def _table(self) -> Table:
+        """Return the data."""
+
+    def to_pandas(self) -> "DataFrame":
+        """Return the data as a table of pandas.
+
+        Returns
+        -------
+        pandas.DataFrame
+            A row for each sample of a run by its time, each point of a study, or each check of a
+            design; SI units, which are in `attrs["units"]`. Varied parameters have their keywords
+            as names. A `control_force` that was recorded is the answer to the sample of its row,
+            NaN where none came, and `stamp` is in ns.
+
+        Raises
+        ------
+        RunError
+            If pandas is not installed.
+        """
+        table = self._table()
+        columns = table.columns
+        names = [name for name in table.quantities if name in columns]
+        frame = _optional("pandas").DataFrame({name: columns[name] for name in names})
+        frame.attrs["units"] = table.units_of(frame)
+        return frame if table.row_names is None else frame.set_index(table.row_names)
+
+    def to_xarray(self) -> "Dataset":
+        """Return the data as a data set of xarray.
+
+        Returns
+        -------
+        xarray.Dataset
+            A variable for each column of `to_pandas`, with `units` and `long_name`; its own
+            attributes name the scenario, overrides and version, or the bag. The dimension of a run
+            is `time`, of a design `belt_speed`. Those of a study are the varied parameters by their
+            keywords, or `point` for a random sample; `direction` for a sweep that is carried on;
+            `turning_point` for the turning points, filled up with NaN. Where a text does not exist
+            it is "".
+
+        Raises
+        ------
+        RunError
+            If xarray is not installed.
+        """
+        table = self._table()
+        shape = [len(values) for values in table.dimensions.values()]
+        coordinates = {
+            name: values
+            for name, values in table.dimensions.items()
+            if not isinstance(values, range)
+        }
+        variables: dict[str, Any] = {}
+        for name in table.quantities:
+            if name in coordinates or name not in table.columns:
+                continue
+            dimensions, values = [*table.dimensions], table.columns[name]
+            if isinstance(values, list):
+                dimensions.append(name.removesuffix("s"))
+                values = _padded(values)
+            elif values.dtype == object:
+                values = np.array([value or "" for value in values], dtype=str)
+            variables[name] = dimensions, values.reshape(*shape, *values.shape[1:])
+        found = _optional("xarray").Dataset(variables, coordinates, dict(table.attributes))
+        for name in found.variables:
+            found[name].attrs["long_name"] = table.quantities[name].label
+        for name, unit in table.units_of(found).items():
+            found[name].attrs["units"] = unit
+        return found
+
+
+def provenance(scenario: Scenario) -> dict[str, str]:
+    """Return the attributes of a data set: scenario, overrides and version."""
+    return {
+        "scenario": scenario.name,
+        "overrides": " ".join(scenario.overrides),
+        "stickslip_ros": versions().get("stickslip_ros", ""),
+    }
+
+
+def _padded(rows: Sequence[tuple[float, ...]]) -> Any:
+    """Return rows of unequal length as an array, filled up with NaN."""
+    found = np.full((len(rows), max(map(len, rows), default=0)), np.nan)
+    for number, row in enumerate(rows):
+        found[number, : len(row)] = row
+    return found
+
+
+def _optional(package: str) -> Any:
+    try:
+        return import_module(package)
+    except ModuleNotFoundError as error:
+        raise RunError(
+            f"to_{package} needs {error.name}, which is not installed: "
+            "pip install 'stickslip_ros[analysis]'"
+        ) from None
+
+
+def _png(figure: "Figure") -> bytes:
+    stream = BytesIO()
+    figure.savefig(stream, format="png")
+    return stream.getvalue()
