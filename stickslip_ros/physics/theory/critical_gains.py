@@ -13,7 +13,7 @@ from stickslip_ros.physics.model.drive_system import MEMORY, POSITION, SPEED
 from stickslip_ros.physics.model.functions import zero_between
 from stickslip_ros.physics.theory.gain_intervals import (
     GainInterval,
-    covered_gains,
+    gains_of,
     nearest_to_zero,
 )
 from stickslip_ros.physics.theory.hopf import ComplexPair, first_lyapunov_coefficient
@@ -76,7 +76,7 @@ def critical_gains(drive: Drive, gains: ContinuousControl) -> CriticalGains | No
     (-0.935296, 31.468)
     """
     require("the critical gain", drive, SPRING, AUTONOMOUS)
-    own = covered_gains(gains)
+    own = gains_of(gains)
     static = STATIC.lack(drive) is None
     find = _critical_linear_gain if static else _critical_gain_of_any_order
     linear = None if own is None else find(drive, own)
@@ -229,7 +229,7 @@ def limit_cycle_from_hopf(drive: Drive, gains: ContinuousControl) -> LimitCycle 
     >>> round(cycle.measures.amplitude, 4), cycle.stable
     (0.1154, True)
     """
-    own, critical = covered_gains(gains), critical_gains(drive, gains)
+    own, critical = gains_of(gains), critical_gains(drive, gains)
     if own is None or critical is None:
         return None
     found: list[FloatArray] = []

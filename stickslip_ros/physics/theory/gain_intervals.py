@@ -36,13 +36,9 @@ class GainInterval(NamedTuple):
         return self.low if self.low >= 0.0 else self.high
 
 
-def gains_of(law: ControlLaw | None) -> Washout | None:
+def gains_of(law: ControlLaw | ContinuousControl | None) -> Washout | None:
     """Return the gains of a law that the theory of gains covers; None for any other law."""
-    return None if law is None else covered_gains(law.continuous)
-
-
-def covered_gains(control: ContinuousControl | None) -> Washout | None:
-    """Return a continuous control if the theory of gains covers it, else None."""
+    control = law.continuous if isinstance(law, ControlLaw) else law
     return control if isinstance(control, Washout) else None
 
 

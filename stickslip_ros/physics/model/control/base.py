@@ -98,10 +98,8 @@ class ContinuousControl(Protocol):
 
         Parameters
         ----------
-        position, speed : float, array or expression
-            Displacement x and speed y of the slide.
-        states : sequence of float, array or expression
-            Values of `states`.
+        position, speed, states
+            As in `state_rates`.
 
         Returns
         -------

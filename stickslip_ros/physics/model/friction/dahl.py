@@ -7,8 +7,8 @@ from typing import Any, ClassVar
 from stickslip_ros.physics.model.friction.base import FrictionLaw
 from stickslip_ros.physics.model.friction.lugre import (
     LEAST_SIZE,
-    approached,
     bristle_stiffness,
+    deflection_after,
 )
 
 
@@ -71,8 +71,7 @@ class Dahl(FrictionLaw):
         duration: float,
     ) -> Sequence[float]:
         """Return z, which approaches that of steady slip; see `FrictionMemory.memory_after`."""
-        (steady,) = self.memory_at(relative_speed, 1.0 if relative_speed > 0.0 else -1.0)
-        return (approached(memory[0], steady, abs(relative_speed) * duration),)
+        return (deflection_after(self, relative_speed, memory[0], duration),)
 
     def refusal(self) -> str | None:
         """Refuse a coefficient of zero; see `SteadyFriction.refusal`."""

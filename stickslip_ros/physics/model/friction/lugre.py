@@ -21,8 +21,12 @@ def bristle_stiffness() -> Any:
     )
 
 
-def approached(deflection: float, steady: float, path: float) -> float:
-    """Return the deflection after a path (m), with z' = v_r (1 - s z / |steady|)."""
+def deflection_after(
+    law: FrictionLaw, relative_speed: float, deflection: float, duration: float
+) -> float:
+    """Return z after a duration at a constant speed, with z' = v_r (1 - s z / |z_steady|)."""
+    (steady,) = law.memory_at(relative_speed, 1.0 if relative_speed > 0.0 else -1.0)
+    path = abs(relative_speed) * duration
     return steady + (deflection - steady) * exp(-path / abs(steady))
 
 
@@ -200,8 +204,7 @@ class LuGre(CurveFollower):
         duration: float,
     ) -> Sequence[float]:
         """Return z, which approaches that of steady slip; see `FrictionMemory.memory_after`."""
-        (steady,) = self.memory_at(relative_speed, 1.0 if relative_speed > 0.0 else -1.0)
-        return (approached(memory[0], steady, abs(relative_speed) * duration),)
+        return (deflection_after(self, relative_speed, memory[0], duration),)
 
     def warning(self) -> str | None:
         """Say that the law is not passive, if so; see `SteadyFriction.warning`."""

@@ -17,15 +17,16 @@ from stickslip_ros.physics.model.constants import constants_of
 from stickslip_ros.physics.model.control import (
     CONTROL_LAWS,
     NO_REFERENCE,
-    ControlLaw,
     VelocityFeedback,
     Washout,
 )
+from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.motion import Motion, RecordedMotion
 from stickslip_ros.samples import Sample
-from tests.physics.drives import FEED_DRIVE
+from tests.physics.drives import FEED_DRIVE, PAPER
 
-LAWS: list[ControlLaw] = [Washout(20.0, -3000.0, -1e4), VelocityFeedback(-500.0, 2e4)]
+Law = Washout | VelocityFeedback
+LAWS: list[Law] = [Washout(20.0, -3000.0, -1e4), VelocityFeedback(-500.0, 2e4)]
 laws = pytest.mark.parametrize("law", LAWS, ids=lambda law: law.name)
 REST = (2.584e-4, 0.0)
 
@@ -39,7 +40,7 @@ def test_all_laws_are_tested() -> None:
 
 
 @laws
-def test_its_constants_are_described_and_the_common_ones_come_last(law: ControlLaw) -> None:
+def test_its_constants_are_described_and_the_common_ones_come_last(law: Law) -> None:
     names = law.constants()
     assert names[-2:] == ["force_limit", "start_after"]
     for name in names:
@@ -50,7 +51,7 @@ def test_its_constants_are_described_and_the_common_ones_come_last(law: ControlL
 
 
 @laws
-def test_it_answers_with_finite_numbers_and_keeps_the_size_of_its_state(law: ControlLaw) -> None:
+def test_it_answers_with_finite_numbers_and_keeps_the_size_of_its_state(law: Law) -> None:
     state = law.initial_state(at(*REST), NO_REFERENCE)
     for elapsed, position, velocity in ((0.0, *REST), (1e-3, 0.1, -2.0), (1e9, -5.0, 3.0)):
         force, following = law.respond(state, elapsed, at(position, velocity), NO_REFERENCE)
@@ -62,7 +63,7 @@ def test_it_answers_with_finite_numbers_and_keeps_the_size_of_its_state(law: Con
 
 @laws
 @given(st.floats(1e-5, 0.5))
-def test_its_linear_form_is_that_of_its_answers(law: ControlLaw, period: float) -> None:
+def test_its_linear_form_is_that_of_its_answers(law: Law, period: float) -> None:
     """From sample to sample, forces and states are those of finite differences."""
     linear = law.linear_feedback(period)
     assert linear is not None
@@ -94,48 +95,35 @@ def test_its_linear_form_is_that_of_its_answers(law: ControlLaw, period: float) 
 
 
 @laws
-def test_at_rest_its_states_stay(law: ControlLaw) -> None:
-    control = law.continuous
-    assert control is not None
-    rest = control.rest(*REST)
-    assert list(control.state_rates(*REST, rest)) == [0.0] * len(control.states)
-
-
-@laws
-def test_silenced_it_has_the_same_states_and_no_force(law: ControlLaw) -> None:
-    control = law.continuous
-    assert control is not None
-    silent = control.silenced()
-    own = [0.1] * len(control.states)
+def test_at_rest_its_states_stay_and_silenced_it_has_the_same_and_no_force(law: Law) -> None:
+    rest, own = law.rest(*REST), [0.1] * len(law.states)
+    assert list(law.state_rates(*REST, rest)) == [0.0] * len(own)
+    silent = law.silenced()
     assert silent.control_force(0.3, 0.2, own) == 0.0
-    assert list(silent.state_rates(0.3, 0.2, own)) == list(control.state_rates(0.3, 0.2, own))
+    assert list(silent.state_rates(0.3, 0.2, own)) == list(law.state_rates(0.3, 0.2, own))
 
 
 @laws
-def test_its_bound_is_no_less_than_the_energy_that_it_gives(law: ControlLaw) -> None:
+def test_its_bound_is_no_less_than_the_energy_that_it_gives(law: Law) -> None:
     """For a slide that swings about the equilibrium."""
-    control = law.continuous
-    assert control is not None
     phase = np.linspace(0.0, 2.0 * np.pi, 4001)[:-1]
     omega = 90.0
-    own: FloatArray = np.zeros(len(control.states))
+    own: FloatArray = np.zeros(len(law.states))
     for size in (0.01, 0.1):
         speed, position = size * np.cos(phase), size / omega * np.sin(phase)
         states: list[FloatArray] = []
         if own.size:  # w' = y - d w, periodic
-            d = law.corner_frequency  # type: ignore[attr-defined]
-            response = size / (d + 1j * omega)
+            response = size / (law.corner_frequency + 1j * omega)
             states = [np.real(response * np.exp(1j * phase))]
-        given_energy = np.mean(control.control_force(position, speed, states) * speed)
-        allowed = np.mean(control.bound(speed) * speed)
+        given_energy = np.mean(law.control_force(position, speed, states) * speed)
+        allowed = np.mean(law.bound(speed) * speed)
         assert given_energy <= allowed + 1e-12 * abs(allowed)
 
 
 @laws
-def test_the_faster_it_is_sampled_the_nearer_it_is_to_its_equations(law: ControlLaw) -> None:
+def test_the_faster_it_is_sampled_the_nearer_it_is_to_its_equations(law: Law) -> None:
     def run(rate: float | None) -> Motion:
-        control = law.continuous if rate is None else None
-        motion = RecordedMotion(FEED_DRIVE, 0.0, 0.0, control)
+        motion = RecordedMotion(FEED_DRIVE, 0.0, 0.0, law if rate is None else None)
         if rate is None:
             simulate_continuous(motion, law, 0.2, CycleMeter(20))
         else:
@@ -152,7 +140,7 @@ def test_the_faster_it_is_sampled_the_nearer_it_is_to_its_equations(law: Control
 
 
 @laws
-def test_its_state_goes_from_the_motion_to_the_controller_and_back(law: ControlLaw) -> None:
+def test_its_state_goes_from_the_motion_to_the_controller_and_back(law: Law) -> None:
     """The state of the equations, in the units of the sampled law."""
     motion = Motion(FEED_DRIVE, 1e-4, -0.05, law.continuous)
     motion.advance(0.013)
@@ -167,18 +155,57 @@ def test_its_state_goes_from_the_motion_to_the_controller_and_back(law: ControlL
 
 
 @laws
-def test_a_change_of_drive_or_constants_keeps_its_state(law: ControlLaw) -> None:
+def test_a_change_of_drive_or_constants_keeps_its_state(law: Law) -> None:
     motion = Motion(FEED_DRIVE, 1e-4, -0.05, law.continuous)
     motion.advance(0.013)
     state, place = motion.control_state, (motion.position, motion.velocity)
     for drive in (replace(FEED_DRIVE, mass=30.0), replace(FEED_DRIVE, normal_force=400.0)):
         motion.drive = drive
         assert motion.control_state == pytest.approx(state, rel=1e-14)
-    control = law.continuous
-    assert control is not None
-    motion.control = control.silenced()
+    motion.control = law.silenced()
     assert motion.control_state == pytest.approx(state, rel=1e-14)
     assert (motion.position, motion.velocity) == pytest.approx(place, rel=1e-14)
     assert motion.applied_force == 0.0
-    motion.control = Washout(50.0, -1.0, 0.0) if motion.control_state else control
+    motion.control = Washout(50.0, -1.0, 0.0) if motion.control_state else law
     assert motion.control_state == pytest.approx(state, rel=1e-14)
+
+
+@given(st.floats(-1e6, 1e6), st.floats(-1e6, 1e6), st.floats(-1.0, 1.0), st.floats(-1.0, 1.0))
+def test_the_force_of_velocity_feedback_is_that_of_a_damper_and_a_spring(
+    velocity_gain: float, position_gain: float, position: float, velocity: float
+) -> None:
+    law = VelocityFeedback(velocity_gain, position_gain)
+    sample = at(position, velocity)
+    force, state = law.respond((), 0.1, sample, NO_REFERENCE)
+    assert force == position_gain * position + velocity_gain * velocity
+    assert state == law.initial_state(sample, NO_REFERENCE) == ()
+    assert Controller(law).answer(sample) == force
+
+
+@pytest.mark.parametrize("drive", [PAPER, FEED_DRIVE], ids=["paper", "feed_drive"])
+@pytest.mark.parametrize(("damping", "stiffness"), [(0.3, 0.0), (-0.01, 0.0), (0.1, 0.5)])
+def test_velocity_feedback_without_sampling_is_a_drive_with_other_damping_and_stiffness(
+    drive: Drive, damping: float, stiffness: float
+) -> None:
+    """Through stick and slip; shares of the critical damping and of the stiffness."""
+    damper = damping * (drive.stiffness * drive.mass) ** 0.5
+    spring = stiffness * drive.stiffness
+    control = VelocityFeedback(-damper, -spring)
+    controlled = Motion(drive, 0.0, drive.belt_speed, control)
+    other = Motion(
+        replace(drive, damping=drive.damping + damper, stiffness=drive.stiffness + spring),
+        0.0,
+        drive.belt_speed,
+    )
+    modes: set[bool] = set()
+    for _ in range(40):
+        for motion in (controlled, other):
+            motion.advance(0.5 / drive.angular_frequency)
+        modes.add(other.sticking)
+        assert controlled.sticking == other.sticking
+        found = controlled.position / drive.length_scale, controlled.velocity / drive.speed_scale
+        wanted = other.position / drive.length_scale, other.velocity / drive.speed_scale
+        assert found == pytest.approx(wanted, abs=1e-12)
+        force = -damper * controlled.velocity - spring * controlled.position
+        assert controlled.applied_force == pytest.approx(force, abs=1e-12 * drive.normal_force)
+    assert modes == {True, False}
