@@ -30,7 +30,7 @@ from rosbags.typesys import Stores, get_typestore
 from benchmarks.slices import Row, by_turns, compare_rates, show
 from stickslip_ros.bags import Recording
 from stickslip_ros.bags.definitions import message_definition
-from stickslip_ros.bags.recorder import QosProfile, Recorder
+from stickslip_ros.bags.recorder import Recorder
 from stickslip_ros.messages.codec import pack_joint_state, pack_wrench
 
 ROUNDS = 60
@@ -94,7 +94,7 @@ def sample(stamp: int) -> tuple[Message, Message]:
 def ours(directory: Path, resources: ExitStack, *, flushes: bool) -> Run:
     recorder = resources.enter_context(Recorder(directory))
     for topic, type_name in TYPES.items():
-        recorder.add_topic(topic, type_name, QosProfile(depth=1000))
+        recorder.add_topic(topic, type_name, 1000)
     return Run(recorder.write, lambda m: (m[0], m[2], m[1]), recorder.flush if flushes else None)
 
 
@@ -146,7 +146,7 @@ def reading() -> list[Row]:
 def record(directory: Path, flush_every: int) -> None:
     with Recorder(directory) as recorder:
         for topic, type_name in TYPES.items():
-            recorder.add_topic(topic, type_name, QosProfile(depth=1000))
+            recorder.add_topic(topic, type_name, 1000)
         for number in range(1, READ_SAMPLES + 1):
             for channel, stamp, data in sample(10**9 + number * 10**6):
                 recorder.write(channel, data, stamp)

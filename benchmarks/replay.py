@@ -23,7 +23,7 @@ from rclpy.experimental import EventsExecutor
 from benchmarks.lateness import SLEEP_LOOP, lateness, lateness_rows, sleep_loop
 from benchmarks.parties import ROS_ARGUMENTS, ros
 from benchmarks.slices import Row, show
-from stickslip_ros.bags.recorder import QosProfile, Recorder
+from stickslip_ros.bags.recorder import Recorder
 from stickslip_ros.messages.codec import pack_joint_state, pack_wrench
 from stickslip_ros.messages.topics import CONTROL_FORCE, DEEP, JOINT_STATES
 from stickslip_ros.nodes.base.child_process import start_child
@@ -74,9 +74,7 @@ def record(bag: Path) -> None:
     step = round(PERIOD * NANOSECONDS)
     with Recorder(bag) as recorder:
         states, forces = (
-            recorder.add_topic(
-                f"{DEFAULT_NAMESPACE}/{topic.name}", topic.type_name, QosProfile(DEEP)
-            )
+            recorder.add_topic(f"{DEFAULT_NAMESPACE}/{topic.name}", topic.type_name, DEEP)
             for topic in (JOINT_STATES, CONTROL_FORCE)
         )
         for number in range(SAMPLES):

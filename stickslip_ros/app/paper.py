@@ -88,20 +88,12 @@ def _draw_figures(folder: Path, style: str | None) -> "dict[int, PaperFigure]":
 def _draw(number: int, path: Path, style: str | None) -> "PaperFigure":
     load_matplotlib()
     from stickslip_ros.paper.drawing import paper_figure, save_paper_figure
-    from stickslip_ros.paper.figures import (
-        BifurcationFigure,
-        compute_figure,
-        transition_marks,
-        unstable_equilibria,
-    )
+    from stickslip_ros.paper.figures import compute_figure
     from stickslip_ros.plots.style import STYLES
 
     figure = compute_figure(number)
-    marks, unstable = {}, None
-    if isinstance(figure, BifurcationFigure):
-        marks, unstable = transition_marks(figure), unstable_equilibria(figure)
     look = STYLES[style or "screen"]
-    drawn = paper_figure(figure, marks, unstable, style=look)
+    drawn = paper_figure(figure, style=look)
     with writing("--out", path):
         save_paper_figure(drawn, path, look)
     return figure

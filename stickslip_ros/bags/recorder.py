@@ -12,7 +12,7 @@ from collections import deque
 from collections.abc import Callable, Collection, Generator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack, closing, contextmanager, suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from io import BufferedWriter, FileIO
 from math import inf
 from pathlib import Path
@@ -35,28 +35,24 @@ Compression = Literal["lz4", "zstd", "none"]
 _LAST_STAMP = 2**63 - 1
 
 
-@dataclass(frozen=True)
-class QosProfile:
-    """QoS that the publisher of a recorded topic offers, also when the bag is played back."""
+def offered_qos(depth: int) -> str:
+    """Return the QoS that a publisher of ours offers, as rosbag2 stores it with a channel.
 
-    depth: int
-    durability: Literal["volatile", "transient_local"] = "volatile"
-
-    def to_yaml(self) -> str:
-        """Return the profile as rosbag2 stores it with a channel: a YAML list of one profile."""
-        unlimited = {"sec": 9223372036, "nsec": 854775807}
-        profile = {
-            "history": "keep_last",
-            "depth": self.depth,
-            "reliability": "reliable",
-            "durability": self.durability,
-            "deadline": dict(unlimited),
-            "lifespan": dict(unlimited),
-            "liveliness": "automatic",
-            "liveliness_lease_duration": dict(unlimited),
-            "avoid_ros_namespace_conventions": False,
-        }
-        return yaml.safe_dump([profile], sort_keys=False).strip()
+    It is YAML: a list of one profile, which a player offers again.
+    """
+    unlimited = {"sec": 9223372036, "nsec": 854775807}
+    profile = {
+        "history": "keep_last",
+        "depth": depth,
+        "reliability": "reliable",
+        "durability": "volatile",
+        "deadline": dict(unlimited),
+        "lifespan": dict(unlimited),
+        "liveliness": "automatic",
+        "liveliness_lease_duration": dict(unlimited),
+        "avoid_ros_namespace_conventions": False,
+    }
+    return yaml.safe_dump([profile], sort_keys=False).strip()
 
 
 def check_new_bag(path: Path) -> None:
@@ -160,16 +156,20 @@ class Recorder:
         self._sync: Future[None] | None = None
         self._in_background(_sync_directories, [*(new.parent for new in made), self.directory])
 
-    def add_topic(self, name: str, type_name: str, qos: QosProfile) -> int:
+    def add_topic(self, name: str, type_name: str, depth: int) -> int:
         """Add a topic, such as `/feed_drive/joint_states`, and return its channel for `write`.
 
-        An example of a type is `sensor_msgs/msg/JointState`. Raises BagError if the topic is
-        already in the bag, its type is not installed, or the bag is closed or fails.
+        An example of a type is `sensor_msgs/msg/JointState`; `depth` is that of the history that
+        its publisher offers. Raises BagError if the topic is already in the bag, its type is not
+        installed, or the bag is closed or fails.
         """
         if name in self._topics:
             raise BagError(f"the topic {name} is already in the bag {self.directory}")
         definition = message_definition(type_name).encode()
-        metadata = {"offered_qos_profiles": qos.to_yaml(), "topic_type_hash": type_hash(type_name)}
+        metadata = {
+            "offered_qos_profiles": offered_qos(depth),
+            "topic_type_hash": type_hash(type_name),
+        }
         return self.add_channel(
             Channel(0, name, "cdr", metadata, 0), Schema(0, definition, "ros2msg", type_name)
         )

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple, TypeVar
 
 from std_msgs.msg import Float64
 
-from stickslip_ros.bags.recorder import QosProfile, Recorder, check_new_bag
+from stickslip_ros.bags.recorder import Recorder, check_new_bag
 from stickslip_ros.errors import BagError, InvalidInputError, MessageError
 from stickslip_ros.messages.cdr import Refused
 from stickslip_ros.messages.codec import (
@@ -304,8 +304,7 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
 
     def _add_topic(self, recorder: Recorder, topic: Topic[Any]) -> None:
         name = self.resolve_topic_name(topic.name)
-        qos = QosProfile(depth=topic.depth)
-        self._channels[topic.name] = recorder.add_topic(name, topic.type_name, qos)
+        self._channels[topic.name] = recorder.add_topic(name, topic.type_name, topic.depth)
 
     def _keep_parameters(self, node: str, values: Mapping[str, Any]) -> None:
         """Put the parameters of a node into the bag, and the curves in the files that they name."""

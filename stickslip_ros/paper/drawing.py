@@ -1,7 +1,6 @@
 """Drawing the paper's figures: bifurcation diagrams and phase portraits."""
 
 import re
-from collections.abc import Mapping
 from itertools import cycle
 from math import ceil
 from pathlib import Path
@@ -22,6 +21,8 @@ from stickslip_ros.paper.figures import (
     PaperFigure,
     Portrait,
     PortraitFigure,
+    transition_marks,
+    unstable_equilibria,
 )
 from stickslip_ros.physics.measures.breakpoints import Breakpoints
 from stickslip_ros.plots.style import (
@@ -58,21 +59,10 @@ _LETTERS = 44
 _UNITS = Units(dimensionless=True, terse=True)
 
 
-def paper_figure(
-    figure: PaperFigure,
-    marks: Mapping[str, float] | None = None,
-    unstable: FloatArray | None = None,
-    *,
-    style: FigureStyle = SCREEN,
-) -> Figure:
-    """Return the drawing of a figure.
-
-    Of a bifurcation diagram, `marks` are vertical lines: the values of the parameter, by a name
-    such as that of a Hopf point. `unstable` is the displacement of the unstable equilibrium for
-    each value of the parameter, NaN where there is none.
-    """
+def paper_figure(figure: PaperFigure, *, style: FigureStyle = SCREEN) -> Figure:
+    """Return the drawing of a figure; a bifurcation diagram has what theory tells, too."""
     if isinstance(figure, BifurcationFigure):
-        return _bifurcation(figure, marks or {}, unstable, style=style)
+        return _bifurcation(figure, style=style)
     return _portraits(figure, style=style)
 
 
@@ -85,13 +75,7 @@ def save_paper_figure(drawn: Figure, path: Path, style: FigureStyle = SCREEN) ->
 
 
 @styled
-def _bifurcation(
-    figure: BifurcationFigure,
-    marks: Mapping[str, float],
-    unstable: FloatArray | None,
-    *,
-    style: FigureStyle,
-) -> Figure:
+def _bifurcation(figure: BifurcationFigure, *, style: FigureStyle) -> Figure:
     drawn = style.figure(8.0, 5.5, narrow=1.25)
     style.set_title(drawn, *figure.title.split(": "))
     above, below = drawn.subplots(2, 1, sharex=True, height_ratios=(3.0, 1.0))
@@ -106,7 +90,8 @@ def _bifurcation(
             marker: Any = {"marker": look.marker, "color": look.colour, "ls": "", "mew": 0.0}
             above.plot(values, diagram.position[rows], **marker, ms=1.8)
             handles.append(Line2D([], [], **marker, ms=5.0, label=look.label))
-    if unstable is not None and np.isfinite(unstable).any():
+    unstable = unstable_equilibria(figure)
+    if np.isfinite(unstable).any():
         dashed: Any = {"color": GREEN, "lw": 1.2, "ls": (0, (4.0, 2.0))}
         above.plot(figure.values, unstable, **dashed)
         handles.append(Line2D([], [], **dashed, label="unstable equilibrium"))
@@ -117,7 +102,7 @@ def _bifurcation(
     below.set_ylim(0.0, max(1.05 * float(np.nanmax(stick, initial=0.0)), _LEAST_STICK_FRACTION))
     below.set_xlabel(typeset(figure.parameter))
     below.margins(x=0.01)
-    for (name, value), dashes in zip(marks.items(), cycle(DASHES)):
+    for (name, value), dashes in zip(transition_marks(figure).items(), cycle(DASHES)):
         for axes in (above, below):
             line = axes.axvline(
                 value, color="black", lw=1.0, ls=dashes, label=f"{name} {value:.5g}"

@@ -19,7 +19,6 @@ from stickslip_ros.physics.model.control import Washout
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import Coulomb, FrictionLaw, Linear, Stribeck
 from stickslip_ros.physics.motion import RecordedMotion
-from stickslip_ros.progress import Progress
 from stickslip_ros.studies.settling import (
     BifurcationDiagram,
     ControlledDrive,
@@ -168,9 +167,7 @@ class PortraitFigure:
 PaperFigure = BifurcationFigure | PortraitFigure
 
 
-def compute_figure(
-    number: int, progress: Progress = lambda _: None, *, points: int = POINTS
-) -> PaperFigure:
+def compute_figure(number: int, *, points: int = POINTS) -> PaperFigure:
     """Return the data of figure `number`, one of `NUMBERS`.
 
     `points` is the number of drives in a bifurcation diagram.
@@ -178,9 +175,11 @@ def compute_figure(
     if number in _BIFURCATIONS:
         plan = _BIFURCATIONS[number]
         values, drives = bifurcation_drives(number, points)
-        diagram = bifurcation_diagram(drives, progress)
+        diagram = bifurcation_diagram(drives)
         return BifurcationFigure(number, plan.title, plan.parameter, values, diagram)
-    return _portrait_figure(number, _PORTRAITS[number], progress)
+    title, panels = _PORTRAITS[number]
+    computed = (Panel(name, tuple(map(portrait_of, cases))) for name, cases in panels.items())
+    return PortraitFigure(number, title, tuple(computed))
 
 
 def bifurcation_drives(number: int, points: int = POINTS) -> tuple[FloatArray, list[Drive]]:
@@ -278,19 +277,6 @@ class _Bifurcation:
 class _Portraits(NamedTuple):
     title: str
     panels: Mapping[str, Sequence[PortraitCase]]
-
-
-def _portrait_figure(number: int, plan: _Portraits, progress: Progress) -> PortraitFigure:
-    panels: list[Panel] = []
-    total, done = sum(map(len, plan.panels.values())), 0
-    for title, cases in plan.panels.items():
-        drawn: list[Portrait] = []
-        for case in cases:
-            drawn.append(portrait_of(case))
-            done += 1
-            progress(done / total)
-        panels.append(Panel(title, tuple(drawn)))
-    return PortraitFigure(number, plan.title, tuple(panels))
 
 
 def _cases(

@@ -9,7 +9,7 @@ from PIL import Image
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
 
-from stickslip_ros.bags.recorder import QosProfile, Recorder
+from stickslip_ros.bags.recorder import Recorder
 from stickslip_ros.messages.codec import pack_joint_state
 from stickslip_ros.testing import ClosedLoop
 from tests.app.conftest import REFERENCE, Run
@@ -105,7 +105,7 @@ def test_parameters_that_are_none_are_no_drive(
     stickslip: Run, tmp_path: Path, parameters: dict[str, str]
 ) -> None:
     with Recorder(tmp_path / "bag") as recorder:
-        channel = recorder.add_topic(STATES, "sensor_msgs/msg/JointState", QosProfile(depth=10))
+        channel = recorder.add_topic(STATES, "sensor_msgs/msg/JointState", 10)
         recorder.add_metadata("stickslip_ros/plant", parameters)
         for stamp in STAMPS[:100]:
             position, velocity = motion(stamp / 1e9)

@@ -6,7 +6,7 @@ from contextlib import contextmanager
 import numpy as np
 from mcap.writer import Writer
 
-from stickslip_ros.bags.recorder import QosProfile, Recorder
+from stickslip_ros.bags.recorder import Recorder
 from stickslip_ros.messages.codec import pack_joint_state, pack_wrench
 from stickslip_ros.messages.topics import TOPICS
 
@@ -45,7 +45,7 @@ def write_bag(directory, messages, *, topics=(), flush_every=0):
         def channel(topic):
             if topic not in channels:
                 kind = _TYPES.get(topic.rpartition("/")[2], "std_msgs/msg/Float64")
-                channels[topic] = recorder.add_topic(topic, kind, QosProfile(depth=10))
+                channels[topic] = recorder.add_topic(topic, kind, 10)
             return channels[topic]
 
         for topic in topics:

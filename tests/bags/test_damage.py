@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from mcap.opcode import Opcode
 
 from stickslip_ros.bags import Recording
-from stickslip_ros.bags.recorder import QosProfile, Recorder
+from stickslip_ros.bags.recorder import Recorder
 from stickslip_ros.bags.report import report_of_recording
 from stickslip_ros.errors import StickslipError
 from stickslip_ros.messages.codec import pack_joint_state, pack_wrench
@@ -81,9 +81,8 @@ class SoundFile:
 def sound(tmp_path_factory):
     directory = tmp_path_factory.mktemp("sound") / "bag"
     with Recorder(directory) as recorder:
-        qos = QosProfile(depth=10)
         kinds = {STATES: "sensor_msgs/msg/JointState", FORCES: "geometry_msgs/msg/WrenchStamped"}
-        channels = [recorder.add_topic(topic, kind, qos) for topic, kind in kinds.items()]
+        channels = [recorder.add_topic(topic, kind, 10) for topic, kind in kinds.items()]
         for number, data in enumerate(MESSAGES):
             recorder.write(channels[number % 2], data, number)
             if number % (2 * PAIRS) == 2 * PAIRS - 1:

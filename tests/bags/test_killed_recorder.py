@@ -9,7 +9,7 @@ from threading import Timer
 import pytest
 
 from stickslip_ros.bags.reader import Recording
-from stickslip_ros.bags.recorder import Compression, QosProfile, Recorder
+from stickslip_ros.bags.recorder import Compression, Recorder
 
 pytestmark = pytest.mark.process
 
@@ -59,10 +59,7 @@ def record_without_end(bag: Path, seed: int) -> None:
     chance = random.Random(seed)
     compression, size = chance.choice(COMPRESSIONS), chance.choice([0, 20_000, 200_000])
     recorder = Recorder(bag, compression, max_bag_size=size)
-    channels = {
-        topic: recorder.add_topic(topic, "std_msgs/msg/Float64", QosProfile(depth=1))
-        for topic in TOPICS
-    }
+    channels = {topic: recorder.add_topic(topic, "std_msgs/msg/Float64", 1) for topic in TOPICS}
     number = 0
     while True:
         end = number + chance.randrange(1, 300)

@@ -13,13 +13,13 @@ from rosbags.rosbag2 import Writer as RosbagsWriter
 from rosbags.typesys import Stores, get_typestore
 
 from stickslip_ros.bags.reader import Recording
-from stickslip_ros.bags.recorder import QosProfile, Recorder
+from stickslip_ros.bags.recorder import Recorder
 from stickslip_ros.errors import BagError
 from stickslip_ros.messages.codec import pack_joint_state, pack_wrench
 from tests.bags.runs import FORCES, write_bag
 from tests.bags.runs import STATES as JOINT_STATES
 
-QOS = QosProfile(depth=10)
+DEPTH = 10
 COUNT = 600
 
 
@@ -32,7 +32,7 @@ STATES = [state(number) for number in range(COUNT)]
 
 def record(directory, numbers, flush_every=100):
     with Recorder(directory) as recorder:
-        channel = recorder.add_topic(JOINT_STATES, "sensor_msgs/msg/JointState", QOS)
+        channel = recorder.add_topic(JOINT_STATES, "sensor_msgs/msg/JointState", DEPTH)
         recorder.add_metadata("scenario", {"name": "first"})
         recorder.add_metadata("scenario", {"name": "paper"})
         recorder.attach("scenario.yaml", b"plant:", "text/yaml")
@@ -239,13 +239,13 @@ def test_one_of_several_drives_is_chosen_by_its_namespace(tmp_path):
 
 def test_forces_of_strangers_do_not_get_in_the_way(tmp_path):
     with Recorder(tmp_path / "bag") as recorder:
-        recorder.add_topic("/joint_states", "std_msgs/msg/Float64", QOS)
+        recorder.add_topic("/joint_states", "std_msgs/msg/Float64", DEPTH)
         for topic, kind, data in (
             ("/one/joint_states", "sensor_msgs/msg/JointState", state(1)),
             ("/one/control_force", "geometry_msgs/msg/WrenchStamped", pack_wrench(1, 4.0)),
             ("/two/control_force", "geometry_msgs/msg/WrenchStamped", pack_wrench(1, 5.0)),
         ):
-            recorder.write(recorder.add_topic(topic, kind, QOS), data, 1)
+            recorder.write(recorder.add_topic(topic, kind, DEPTH), data, 1)
     with Recording(tmp_path / "bag") as recording:
         assert recording.control_forces.force.tolist() == [4.0]
 

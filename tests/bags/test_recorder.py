@@ -17,22 +17,22 @@ from rosbags.rosbag2 import Reader
 
 from stickslip_ros.bags.definitions import message_definition, type_hash
 from stickslip_ros.bags.reader import Recording
-from stickslip_ros.bags.recorder import QosProfile, Recorder, check_new_bag
+from stickslip_ros.bags.recorder import Recorder, check_new_bag
 from stickslip_ros.errors import BagError
 from stickslip_ros.messages.codec import pack_joint_state, pack_wrench
 from tests.bags.runs import FORCES, full_disk
 from tests.bags.runs import STATES as JOINT_STATES
 from tests.nodes.graph import wait_for
 
-QOS = QosProfile(depth=2000)
+DEPTH = 2000
 
 END = struct.pack("<BQ4x BQ20x", Opcode.DATA_END, 4, Opcode.FOOTER, 20) + MCAP0_MAGIC
 """Of a file without a summary."""
 
 
 def add_topics(recorder):
-    states = recorder.add_topic(JOINT_STATES, "sensor_msgs/msg/JointState", QOS)
-    return states, recorder.add_topic(FORCES, "geometry_msgs/msg/WrenchStamped", QOS)
+    states = recorder.add_topic(JOINT_STATES, "sensor_msgs/msg/JointState", DEPTH)
+    return states, recorder.add_topic(FORCES, "geometry_msgs/msg/WrenchStamped", DEPTH)
 
 
 def record(directory, count, **options):
@@ -46,7 +46,7 @@ def record(directory, count, **options):
 
 
 def add_a(recorder):
-    return recorder.add_topic("/a", "std_msgs/msg/Float64", QOS)
+    return recorder.add_topic("/a", "std_msgs/msg/Float64", DEPTH)
 
 
 def stamps_in(directory):
@@ -173,7 +173,7 @@ def test_a_bag_may_be_empty_have_stamps_in_any_order_and_get_a_topic_late(tmp_pa
         for stamp in (50, 20, 90):
             recorder.write(channel, bytes(12), stamp)
         recorder.flush()
-        late = recorder.add_topic("/b", "std_msgs/msg/Float64", QOS)
+        late = recorder.add_topic("/b", "std_msgs/msg/Float64", DEPTH)
         recorder.write(late, bytes(12), 30)
     assert information(tmp_path / "bag")["starting_time"] == {"nanoseconds_since_epoch": 20}
     assert information(tmp_path / "bag")["duration"] == {"nanoseconds": 70}
@@ -377,14 +377,14 @@ def test_what_is_refused_or_fails_leaves_the_bag_whole(tmp_path):
         with pytest.raises(BagError, match="/a is already in the bag"):
             add_a(recorder)
         with pytest.raises(BagError, match="not installed"):
-            recorder.add_topic("/b", "std_msgs/msg/Nothing", QOS)
+            recorder.add_topic("/b", "std_msgs/msg/Nothing", DEPTH)
         recorder.write(channel, bytes(12), 8)
         raise KeyError
     assert stamps_in(tmp_path / "bag") == ([7, 8], True)
     content = (tmp_path / "bag" / "bag_0.mcap").read_bytes()
     for refused in (
         lambda: recorder.write(channel, bytes(12), 9),
-        lambda: recorder.add_topic("/b", "std_msgs/msg/Float64", QOS),
+        lambda: recorder.add_topic("/b", "std_msgs/msg/Float64", DEPTH),
         lambda: recorder.attach("a", b"", "text/plain"),
         lambda: recorder.add_metadata("a", {}),
         recorder.flush,

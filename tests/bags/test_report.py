@@ -3,7 +3,7 @@ from mcap.writer import CompressionType
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 
-from stickslip_ros.bags.recorder import QosProfile, Recorder
+from stickslip_ros.bags.recorder import Recorder
 from stickslip_ros.bags.report import report_of_recording
 from stickslip_ros.errors import BagError, InvalidInputError
 from tests.bags.runs import (
@@ -114,7 +114,7 @@ def test_other_recorders_layouts_and_messages_give_the_same_report(tmp_path):
 
 def test_a_growing_bag_is_measured_as_far_as_it_goes(tmp_path):
     with Recorder(tmp_path / "bag") as recorder:
-        channel = recorder.add_topic(STATES, "sensor_msgs/msg/JointState", QosProfile(1))
+        channel = recorder.add_topic(STATES, "sensor_msgs/msg/JointState", 1)
         for count, stamp in enumerate(STAMPS, 1):
             recorder.write(channel, state(stamp), stamp)
             if count in (400, 800):

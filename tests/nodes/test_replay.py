@@ -3,11 +3,12 @@
 from pathlib import Path
 
 import pytest
+from mcap.records import Channel, Schema
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 
-from stickslip_ros.bags.recorder import QosProfile, Recorder
+from stickslip_ros.bags.recorder import Recorder, offered_qos
 from stickslip_ros.messages.codec import pack_header, pack_wrench, unpack_header
 from stickslip_ros.messages.topics import CLOCK, CONTROL_FORCE, JOINT_STATES, RECORDED
 from stickslip_ros.nodes import replay
@@ -114,9 +115,12 @@ def test_part_and_topics_are_chosen_and_the_clock_shows_recorded_time(
 
 def test_a_latched_message_reaches_a_late_subscriber(graph: Graph, tmp_path: Path) -> None:
     with Recorder(tmp_path / "bag") as recorder:
-        qos = QosProfile(depth=1, durability="transient_local")
-        latched = recorder.add_topic("/latched", "std_msgs/msg/Header", qos)
-        other = recorder.add_topic(FORCES, CONTROL_FORCE.type_name, QosProfile(depth=10))
+        latching = offered_qos(1).replace("volatile", "transient_local")
+        latched = recorder.add_channel(
+            Channel(0, "/latched", "cdr", {"offered_qos_profiles": latching}, 0),
+            Schema(0, b"", "ros2msg", "std_msgs/msg/Header"),
+        )
+        other = recorder.add_topic(FORCES, CONTROL_FORCE.type_name, 10)
         recorder.write(latched, pack_header(7), SECOND)
         recorder.write(other, pack_wrench(SECOND, 0.0), SECOND)
     forces = graph.listen(CONTROL_FORCE)

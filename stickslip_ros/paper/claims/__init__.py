@@ -5,7 +5,7 @@ A claim is a row of `claims.toml`, with all of its words, and a function that co
 
 import tomllib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.resources import files
 from string import Formatter
 from typing import Any, NamedTuple
@@ -22,31 +22,19 @@ from stickslip_ros.paper.claims import (
     stability,
     washout,
 )
-from stickslip_ros.paper.claims.verdict import Evidence, Verdict
+from stickslip_ros.paper.claims.verdict import Evidence, Finding, Verdict
 
-COMPUTATIONS = (
-    model.computes
-    | stability.computes
-    | coefficients.computes
-    | bifurcation_diagrams.computes
-    | phase_portraits.computes
-    | washout.computes
-    | control_effect.computes
+_PARTS = (
+    model,
+    stability,
+    coefficients,
+    bifurcation_diagrams,
+    phase_portraits,
+    washout,
+    control_effect,
 )
+COMPUTATIONS = {claim: compute for part in _PARTS for claim, compute in part.computes.items()}
 """The computation of each decidable claim, by its identifier."""
-
-
-@dataclass(frozen=True)
-class Finding:
-    """A claim compared with the result of the equations."""
-
-    computed: float | str | None
-    """The number, or the result in words; None if not decidable."""
-    difference: float | None
-    """Computed minus printed number; for a formula the largest deviation at the tested points."""
-    verdict: Verdict
-    remark: str
-    """The correction, or why it does not hold or is not decidable, and further evidence."""
 
 
 @dataclass(frozen=True)
@@ -73,12 +61,13 @@ class Claim:
         if self.undecidable is not None:
             return Finding(None, None, Verdict.UNDECIDABLE, self.undecidable)
         result = COMPUTATIONS[self.identifier](evidence)
-        verdict, computed, difference, correction = result.judge(self.printed)
+        finding = result.judge(self.printed)
         words, values = _Words(), {**vars(paper_values), **result.values}
+        computed = finding.computed
         if computed is None:
             computed = words.vformat(self.computed, (), values)
-        remark = f"{correction} {words.vformat(self.remark, (), values)}".strip()
-        return Finding(computed, difference, verdict, remark)
+        remark = f"{finding.remark} {words.vformat(self.remark, (), values)}".strip()
+        return replace(finding, computed=computed, remark=remark)
 
 
 class Chapter(NamedTuple):

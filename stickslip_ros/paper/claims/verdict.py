@@ -1,10 +1,11 @@
 """Results of computations for the claims of the paper, and how they decide the verdict."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from decimal import Decimal
 from enum import StrEnum
 from functools import cache
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -24,15 +25,17 @@ class Verdict(StrEnum):
     UNDECIDABLE = "not decidable"
 
 
-class Judgement(NamedTuple):
-    """The verdict on a claim, without the words of its row."""
+@dataclass(frozen=True)
+class Finding:
+    """A claim compared with the result of the equations."""
 
-    verdict: Verdict
-    computed: float | str | None = None
-    """The number, or what is found for a formula; None if the row says it in words."""
-    difference: float | None = None
+    computed: float | str | None
+    """The number, or the result in words; None if not decidable, or if the row has the words."""
+    difference: float | None
     """Computed minus printed number; for a formula the largest deviation at the tested points."""
-    correction: str = ""
+    verdict: Verdict
+    remark: str = ""
+    """The correction, or why it does not hold or is not decidable, and further evidence."""
 
 
 class Evidence:
@@ -61,7 +64,7 @@ class Result:
     def __init__(self, values: Mapping[str, Any]) -> None:
         self.values = values
 
-    def judge(self, printed: Any) -> Judgement:
+    def judge(self, printed: Any) -> Finding:
         """Judge the printed number or formula, or None for a statement in words."""
         raise NotImplementedError
 
@@ -80,7 +83,7 @@ class Number(Result):
         super().__init__(values)
         self._value, self._corrections = value, corrections or {}
 
-    def judge(self, printed: Any) -> Judgement:
+    def judge(self, printed: Any) -> Finding:
         """Judge the printed number."""
         difference = self._value - printed
         if abs(difference) <= _ROUNDING * max(1.0, abs(printed)):
@@ -93,7 +96,7 @@ class Number(Result):
                 if agrees(printed, value):
                     verdict, correction = Verdict.CORRECTED, f"{what}: {value:.6g}."
                     break
-        return Judgement(verdict, self._value, difference, correction)
+        return Finding(self._value, difference, verdict, correction)
 
 
 class Formula(Result):
@@ -115,18 +118,18 @@ class Formula(Result):
         super().__init__(values)
         self._printed, self._true, self._corrections = printed, true, corrections or {}
 
-    def judge(self, printed: Any) -> Judgement:
+    def judge(self, printed: Any) -> Finding:
         """Judge the printed formula by its values."""
         true = np.asarray(self._true)
         rounding = _ROUNDING * max(1.0, float(np.abs(true).max()))
         difference = None if self._printed is None else _distance(self._printed, true)
         if difference is not None and difference <= rounding:
-            return Judgement(Verdict.HOLDS, "the same", 0.0)
+            return Finding("the same", 0.0, Verdict.HOLDS)
         found = "cannot be evaluated" if difference is None else "something else"
         for correction, values in self._corrections.items():
             if _distance(values, true) <= rounding:
-                return Judgement(Verdict.CORRECTED, found, difference, f"{correction} it agrees.")
-        return Judgement(Verdict.FAILS, found, difference)
+                return Finding(found, difference, Verdict.CORRECTED, f"{correction} it agrees.")
+        return Finding(found, difference, Verdict.FAILS)
 
 
 class Observation(Result):
@@ -136,11 +139,11 @@ class Observation(Result):
         super().__init__(values)
         self._holds, self._holds_corrected = holds, holds_corrected
 
-    def judge(self, printed: Any) -> Judgement:
+    def judge(self, printed: Any) -> Finding:
         """Judge the statement."""
         if self._holds:
-            return Judgement(Verdict.HOLDS)
-        return Judgement(Verdict.CORRECTED if self._holds_corrected else Verdict.FAILS)
+            return Finding(None, None, Verdict.HOLDS)
+        return Finding(None, None, Verdict.CORRECTED if self._holds_corrected else Verdict.FAILS)
 
 
 _Computation = TypeVar("_Computation", bound=Callable[..., Result])

@@ -13,7 +13,7 @@ from rclpy.qos import (
 )
 from sensor_msgs.msg import JointState
 
-from stickslip_ros.bags.recorder import QosProfile
+from stickslip_ros.bags.recorder import offered_qos
 from stickslip_ros.errors import BagError, InvalidInputError
 from stickslip_ros.messages.codec import pack_header
 from stickslip_ros.messages.topics import DEEP, JOINT_STATES
@@ -187,7 +187,7 @@ def test_a_recorded_profile_is_offered_again() -> None:
     assert profile.liveliness is LivelinessPolicy.AUTOMATIC
     assert profile.deadline.nanoseconds == 2_500_000_000
     assert (profile.history, profile.depth) == (HistoryPolicy.KEEP_LAST, DEEP)
-    ours = recorded_profile(QosProfile(depth=JOINT_STATES.depth).to_yaml())
+    ours = recorded_profile(offered_qos(JOINT_STATES.depth))
     for policy in ("history", "depth", "reliability", "durability"):
         assert getattr(ours, policy) == getattr(qos_profile(JOINT_STATES), policy)
     # No depth is too deep for the middleware; a latched topic keeps what it kept.
