@@ -235,18 +235,16 @@ class CreepingDrive(DriveSystem):
 
     def _compiled(self, mode: Mode, instant: Instant) -> tuple[float, float]:
         """Return the relative speed of creep, and its measure of viscosity."""
-        if self.structure not in _compiled:
-            creep = self._creep
-            _compiled[self.structure] = hy.cfunc(
-                [creep.relative_speed, creep.viscous], list(self.variables)
-            )
+        function = self.shared("creep", self._function)
         values = [*self.constants.values(), *instant.inputs, *mode.switches, instant.time]
-        function = _compiled[self.structure]
         options = {"time": 0.0} if function.is_time_dependent else {}
         found = function(
             np.array(instant.state), pars=np.array(values[: function.nparams]), **options
         )
         return float(found[0]), float(found[1])
+
+    def _function(self) -> Any:
+        return hy.cfunc([self._creep.relative_speed, self._creep.viscous], list(self.variables))
 
 
 class _Creep(NamedTuple):
@@ -255,6 +253,3 @@ class _Creep(NamedTuple):
     relative_speed: Any
     viscous: Any
     flow: Flow
-
-
-_compiled: dict[int, Any] = {}

@@ -72,13 +72,6 @@ class _Parts(NamedTuple):
     load: Sequence[Any]
 
 
-class _SymbolicDrive(NamedTuple):
-    """The drive and its control with expressions for their constants."""
-
-    drive: Drive
-    control: ContinuousControl | None
-
-
 @dataclass(frozen=True)
 class _Expressions:
     """The parts of the flows of a drive, as expressions."""
@@ -507,8 +500,20 @@ class DriveSystem(HybridSystem):
 
     @cached_property
     def _expressions(self) -> "_Expressions":
-        state, _, inputs, switches, time = self.symbols
-        drive, control = self._symbolic
+        state, constants, inputs, switches, time = self.symbols
+        drive, control = self.drive, self.control
+        drive = replace(
+            drive,
+            mass=constants.get("mass", drive.mass),
+            stiffness=constants.get("stiffness", drive.stiffness),
+            damping=constants["damping"],
+            belt_speed=constants["belt_speed"],
+            bias_force=constants.get("bias_force", 0.0),
+            friction=with_symbols(drive.friction, "friction", constants),
+            actuator=with_symbols(drive.actuator, "actuator", constants),
+        )
+        if control is not None:
+            control = with_symbols(control, "control", constants)
         own, lagging = state[self.control_states], state[self.actuator_states]
         x = state[POSITION]
 
@@ -539,24 +544,6 @@ class DriveSystem(HybridSystem):
             normal=equations.normal_force(drive, time, parts.load),
             reaction=lambda speed: equations.reaction(drive, x, speed, force(speed)),
             part_rates=part_rates,
-        )
-
-    @cached_property
-    def _symbolic(self) -> _SymbolicDrive:
-        drive, constants = self.drive, self.symbols.constants
-        symbolic = replace(
-            drive,
-            mass=constants.get("mass", drive.mass),
-            stiffness=constants.get("stiffness", drive.stiffness),
-            damping=constants["damping"],
-            belt_speed=constants["belt_speed"],
-            bias_force=constants.get("bias_force", 0.0),
-            friction=with_symbols(drive.friction, "friction", constants),
-            actuator=with_symbols(drive.actuator, "actuator", constants),
-        )
-        control = self.control
-        return _SymbolicDrive(
-            symbolic, None if control is None else with_symbols(control, "control", constants)
         )
 
     def _memory(self, instant: Instant) -> Sequence[float]:

@@ -100,8 +100,7 @@ class Motion(HybridMotion):
         x, y = position / drive.length_scale, velocity / drive.speed_scale
         state = self._system.initial_state(x, y)
         if memory is not None:
-            for number, (each, unit) in enumerate(zip(memory, self._memory_units, strict=True)):
-                state[MEMORY + number] = each / unit
+            self._put_memory(state, memory)
         self._set_clock()
         self._set_state(state)
 
@@ -111,6 +110,10 @@ class Motion(HybridMotion):
         units = self._memory_units
         own = self._instant.state[MEMORY : MEMORY + len(units)].tolist()
         return tuple(each * unit for each, unit in zip(own, units, strict=True))
+
+    def _put_memory(self, state: list[float], memory: Sequence[float]) -> None:
+        for number, (each, unit) in enumerate(zip(memory, self._memory_units, strict=True)):
+            state[MEMORY + number] = each / unit
 
     @property
     def _memory_units(self) -> Sequence[float]:
@@ -317,8 +320,7 @@ class Motion(HybridMotion):
             x, y = position / drive.length_scale, velocity / drive.speed_scale
         state = system.initial_state(x, y)
         if (law.name, law.states) == (old_law.name, old_law.states):
-            for number, (each, unit) in enumerate(zip(memory, self._memory_units, strict=True)):
-                state[MEMORY + number] = each / unit
+            self._put_memory(state, memory)
         if control is not None:
             state[system.control_states] = [
                 each / scale

@@ -193,11 +193,11 @@ class ShootingMotion(VariationalMotion):
         of the friction law (SI) is that of steady slip by default.
         """
         scale, drive = self._drive.length_scale, self._drive
-        state = np.array(self._system.initial_state(position / scale, 0.0))
+        found = self._system.initial_state(position / scale, 0.0)
         if memory is None:
             memory = drive.friction.memory_at(-drive.belt_speed, -copysign(1.0, drive.belt_speed))
-        own = slice(MEMORY, MEMORY + len(self._memory_units))
-        state[own] = np.array(memory) / self._memory_units
+        self._put_memory(found, memory)
+        state = np.array(found)
         state[self._system.control_states] = np.asarray(filter_states) / scale
         return state
 

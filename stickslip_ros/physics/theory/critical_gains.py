@@ -76,12 +76,17 @@ def critical_gains(drive: Drive, gains: ContinuousControl) -> CriticalGains | No
     (-0.935296, 31.468)
     """
     require("the critical gain", drive, SPRING, AUTONOMOUS)
-    own = gains_of(gains)
-    static = STATIC.lack(drive) is None
-    find = _critical_linear_gain if static else _critical_gain_of_any_order
-    linear = None if own is None else find(drive, own)
-    if own is None or linear is None:
+    own, unit = gains_of(gains), drive.normal_force / drive.speed_scale
+    if own is None:
         return None
+    without, with_unit = (expand(drive, replace(own, linear_gain=each)) for each in (0.0, unit))
+    if without is None or with_unit is None:
+        return None
+    find = _critical_linear_gain if STATIC.lack(drive) is None else _critical_gain_of_any_order
+    dimensionless = find(without.jacobian, with_unit.jacobian)
+    if dimensionless is None:
+        return None
+    linear = dimensionless * unit
     critical = replace(own, linear_gain=linear)
     if SMOOTH.lack(drive) is not None:
         return CriticalGains(linear, nan, None)
@@ -115,35 +120,24 @@ def why_no_linear_gain(drive: Drive, gains: Washout) -> str | None:
     )
 
 
-def _critical_linear_gain(drive: Drive, gains: Washout) -> float | None:
+def _critical_linear_gain(without: FloatArray, with_unit: FloatArray) -> float | None:
     """Return the linear gain at which the last determinant of Routh and Hurwitz changes sign.
 
     A static friction law enters the Jacobian of eq. 20 by its slope at the belt speed only. The
-    determinant is then affine in the gain: two values give its zero.
+    determinant is then affine in the gain: those at gains of zero and one give its zero.
     """
-    unit = drive.normal_force / drive.speed_scale
-    margins: list[float] = []
-    for linear in (0.0, unit):
-        expansion = expand(drive, replace(gains, linear_gain=linear))
-        if expansion is None:
-            return None
-        margins.append(float(hurwitz_determinants(expansion.jacobian)[-1]))
+    margins = [float(hurwitz_determinants(each)[-1]) for each in (without, with_unit)]
     slope = margins[1] - margins[0]
     least = _ROUNDING * max(1.0, *map(abs, margins))
-    return None if slope > -least else -margins[0] / slope * unit
+    return None if slope > -least else -margins[0] / slope
 
 
-def _critical_gain_of_any_order(drive: Drive, gains: Washout) -> float | None:
+def _critical_gain_of_any_order(without: FloatArray, with_unit: FloatArray) -> float | None:
     """Return the end nearest to zero of the gains with which the equilibrium is stable.
 
     The characteristic polynomial is p(s) + k q(s): where s = j w is an eigenvalue, p conj(q) is
     real there, which is a polynomial equation for w^2, and k = -p/q.
     """
-    unit = drive.normal_force / drive.speed_scale
-    expansions = [expand(drive, replace(gains, linear_gain=linear)) for linear in (0.0, unit)]
-    if expansions[0] is None or expansions[1] is None:
-        return None
-    without, with_unit = (each.jacobian for each in expansions if each is not None)
     p = np.poly(without)
     q = np.poly(with_unit) - p
     powers = 1j ** np.arange(len(p))[::-1]
@@ -156,21 +150,20 @@ def _critical_gain_of_any_order(drive: Drive, gains: Washout) -> float | None:
 
     found = [-np.polyval(p, 1j * w) / np.polyval(q, 1j * w) for w in frequencies]
     ends = sorted({float(each.real) for each in found})
-    bounds = [-inf, *ends, inf]
-    intervals: list[GainInterval] = []
-    for low, high in pairwise(bounds):
-        inside = _between(low, high)
-        if margin(inside) < 0.0:
-            intervals.append(GainInterval(low, high))
-    if not intervals:
+    stable = [
+        GainInterval(low, high)
+        for low, high in pairwise([-inf, *ends, inf])
+        if margin(_between(low, high)) < 0.0
+    ]
+    if not stable:
         return None
-    end = nearest_to_zero(intervals).critical
+    end = nearest_to_zero(stable).critical
     if not isfinite(end):
         return None
     step = 1e-6 * max(abs(end), 1.0)
     if margin(end - step) * margin(end + step) < 0.0:
         end = zero_between(margin, end - step, end + step)
-    return end * unit
+    return end
 
 
 def _is_frequency(root: complex) -> bool:
