@@ -20,7 +20,7 @@ from stickslip_ros.physics.motion.compiled_flow import (
     flow_rates,
     parameter_values,
 )
-from stickslip_ros.physics.motion.recorded_motion import RecordedMotion
+from stickslip_ros.physics.motion.motion import RecordedMotion
 
 _GRAZING = 1e-12
 """Rate of a margin below which a motion grazes a guard: the instant has no derivative there."""

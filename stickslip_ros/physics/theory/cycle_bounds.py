@@ -19,7 +19,7 @@ from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.drive_system import UNBOUNDED_SPEED
 from stickslip_ros.physics.model.equations import acceleration, reaction
 from stickslip_ros.physics.model.friction import SteadyPart
-from stickslip_ros.physics.motion.recorded_motion import RecordedMotion
+from stickslip_ros.physics.motion.motion import RecordedMotion
 from stickslip_ros.physics.theory.requirements import (
     AUTONOMOUS,
     SPRING,
