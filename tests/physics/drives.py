@@ -1,9 +1,11 @@
-"""The drives of the two shipped scenarios, and reference values of the first one's limit cycles."""
+"""The drives of the two shipped scenarios, reference values of limit cycles, and their measures."""
 
 from typing import NamedTuple
 
+from stickslip_ros.physics.measures.cycle_measures import CycleMeter, Measures
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import Stribeck
+from stickslip_ros.physics.motion import RecordedMotion
 
 PAPER = Drive(
     mass=1.0,
@@ -42,3 +44,16 @@ LIMIT_CYCLES = [
     LimitCycle(0.46, 0.337968726, 0.335036166, 0.0, 6.36478480, 0.313080028),
 ]
 """Of the paper's drive, computed with another integrator, to nine digits."""
+
+
+def settled(motion: RecordedMotion, transient: float, measured: float, window: int = 1) -> Measures:
+    """The measures of what a motion does after a transient; both last so many natural periods."""
+    period = motion.drive.natural_period
+    motion.advance(transient * period)
+    motion.take_breakpoints()
+    motion.advance(measured * period)
+    meter = CycleMeter(window)
+    meter.feed(motion.take_breakpoints(), motion.drive.belt_speed)
+    if motion.unbounded:
+        meter.unbounded = True
+    return meter.measures()

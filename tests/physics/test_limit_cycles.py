@@ -4,24 +4,17 @@ from dataclasses import replace
 
 import pytest
 
-from stickslip_ros.physics.measures.cycle_measures import CycleMeter, Measures, Regime
+from stickslip_ros.physics.measures.cycle_measures import Measures, Regime
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.motion import RecordedMotion
-from tests.physics.drives import FEED_DRIVE, LIMIT_CYCLES, PAPER, LimitCycle
+from tests.physics.drives import FEED_DRIVE, LIMIT_CYCLES, PAPER, LimitCycle, settled
 
 # In natural periods. The slowest transient, at belt speed 0.46, dies out e-fold in four.
 TRANSIENT, MEASURED = 400, 40
 
 
-def settled(drive: Drive) -> Measures:
-    """The measures of what the drive does from rest, after the transient."""
-    motion = RecordedMotion(drive, 0.0, 0.0)
-    motion.advance(TRANSIENT * drive.natural_period)
-    motion.take_breakpoints()
-    motion.advance(MEASURED * drive.natural_period)
-    meter = CycleMeter(window=MEASURED)
-    meter.feed(motion.take_breakpoints(), drive.belt_speed)
-    return meter.measures()
+def measures(drive: Drive) -> Measures:
+    return settled(RecordedMotion(drive, 0.0, 0.0), TRANSIENT, MEASURED, MEASURED)
 
 
 def check(measured: Measures, cycle: LimitCycle, length: float = 1.0, time: float = 1.0) -> None:
@@ -39,9 +32,9 @@ def check(measured: Measures, cycle: LimitCycle, length: float = 1.0, time: floa
 
 @pytest.mark.parametrize("cycle", LIMIT_CYCLES, ids=lambda cycle: f"belt speed {cycle.belt_speed}")
 def test_limit_cycle_of_the_paper(cycle: LimitCycle) -> None:
-    check(settled(replace(PAPER, belt_speed=cycle.belt_speed)), cycle)
+    check(measures(replace(PAPER, belt_speed=cycle.belt_speed)), cycle)
 
 
 def test_limit_cycle_in_si_units() -> None:
     (at_04,) = (cycle for cycle in LIMIT_CYCLES if cycle.belt_speed == 0.4)
-    check(settled(FEED_DRIVE), at_04, length=1e-3, time=1e-2)
+    check(measures(FEED_DRIVE), at_04, length=1e-3, time=1e-2)

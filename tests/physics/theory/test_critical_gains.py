@@ -7,7 +7,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from stickslip_ros.physics.measures.cycle_measures import CycleMeter, Measures, Regime
+from stickslip_ros.physics.measures.cycle_measures import Regime
 from stickslip_ros.physics.model.control import Washout
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import Exponential, Linear
@@ -16,7 +16,7 @@ from stickslip_ros.physics.theory.closed_forms import CubicLoop
 from stickslip_ros.physics.theory.critical_gains import critical_gains, limit_cycle_from_hopf
 from stickslip_ros.physics.theory.limit_cycles import limit_cycle_of_run
 from stickslip_ros.physics.theory.linear import expand
-from tests.physics.drives import PAPER
+from tests.physics.drives import PAPER, settled
 from tests.physics.theory.test_hopf import cubic_drives
 
 
@@ -93,16 +93,11 @@ SUBCRITICAL = Washout(0.2, -0.16, 2.0)
 """Beyond the critical gain (-0.148), with more cubic gain than the critical one (0.649)."""
 
 
-def settled(gains: Washout, position: float, filter_state: float) -> Measures:
+def ends_in(gains: Washout, position: float, filter_state: float) -> Regime | None:
     """What the loop does from there in the end; the slide rests at the start."""
     motion = ShootingMotion(PAPER, gains)
     motion.start(np.array([position, 0.0, filter_state]))
-    motion.advance(300.0 * PAPER.natural_period)
-    motion.take_breakpoints()
-    motion.advance(20.0 * PAPER.natural_period)
-    meter = CycleMeter(window=10)
-    meter.feed(motion.take_breakpoints(), PAPER.belt_speed)
-    return meter.measures()
+    return settled(motion, 300.0, 20.0, window=10).regime
 
 
 def test_an_unstable_cycle_separates_rest_from_vibration() -> None:
@@ -114,8 +109,7 @@ def test_an_unstable_cycle_separates_rest_from_vibration() -> None:
     distance = PAPER.equilibrium_position - cycle.position
     for factor, regime in ((0.99, Regime.EQUILIBRIUM), (1.01, Regime.STICK_SLIP)):
         start = PAPER.equilibrium_position - factor * distance
-        found = settled(SUBCRITICAL, start, factor * cycle.filter_state)
-        assert found.regime is regime
+        assert ends_in(SUBCRITICAL, start, factor * cycle.filter_state) is regime
     outer = limit_cycle_of_run(PAPER, 0.0, gains=SUBCRITICAL)
     assert outer.stable
     assert outer.position < cycle.position

@@ -8,7 +8,6 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from stickslip_ros.physics.measures.cycle_measures import CycleMeter
 from stickslip_ros.physics.model.control import Washout
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import Coulomb, Exponential, Linear, Stribeck
@@ -17,7 +16,7 @@ from stickslip_ros.physics.theory.closed_forms import CubicLoop
 from stickslip_ros.physics.theory.critical_gains import critical_gains
 from stickslip_ros.physics.theory.hopf import hopf_points
 from stickslip_ros.physics.theory.linear import expand, hurwitz_determinants, jacobians
-from tests.physics.drives import PAPER
+from tests.physics.drives import PAPER, settled
 
 cubic_drives = st.builds(
     lambda mass, stiffness, normal_force, damping, belt_speed, static, drop, speed: Drive(
@@ -100,12 +99,7 @@ def speed_amplitude(drive: Drive, gains: Washout | None, periods: int) -> float:
     motion = RecordedMotion(drive, 0.0, 0.0, control=gains)
     expansion = expand(drive)
     motion.restart(expansion.equilibrium[0] * drive.length_scale, 0.03 * drive.speed_scale)
-    for _ in range(periods // 100):
-        motion.take_breakpoints()
-        motion.advance(100 * drive.natural_period)
-    meter = CycleMeter(window=20)
-    meter.feed(motion.take_breakpoints(), drive.belt_speed)
-    amplitude = meter.measures().velocity_amplitude
+    amplitude = settled(motion, periods - 100, 100, window=20).velocity_amplitude
     return amplitude / drive.speed_scale
 
 

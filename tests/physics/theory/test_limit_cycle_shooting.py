@@ -25,7 +25,7 @@ from stickslip_ros.physics.theory.limit_cycles import (
 from stickslip_ros.physics.theory.linear import expand
 from stickslip_ros.physics.theory.sticking import sticking_onset
 from tests.physics import drives
-from tests.physics.drives import FEED_DRIVE, LIMIT_CYCLES, PAPER
+from tests.physics.drives import FEED_DRIVE, LIMIT_CYCLES, PAPER, settled
 
 # Rest is stable, and so is stick-slip: between them there is an unstable cycle of pure slip.
 SUDDEN = replace(PAPER, friction=Exponential(0.4, 0.25, 0.05, 0.0))
@@ -42,15 +42,7 @@ def returns(drive: Drive, cycle: LimitCycle, offset: float = 0.0) -> float:
 
 
 def ends_in(drive: Drive, position: float, periods: int = 150) -> Regime | None:
-    motion = RecordedMotion(drive, position, 0.0)
-    motion.advance(periods * drive.natural_period)
-    motion.take_breakpoints()
-    motion.advance(3.0 * drive.natural_period)
-    meter = CycleMeter(window=1)
-    meter.feed(motion.take_breakpoints(), drive.belt_speed)
-    if motion.unbounded:
-        meter.unbounded = True
-    return meter.measures().regime
+    return settled(RecordedMotion(drive, position, 0.0), periods, 3.0).regime
 
 
 def check(found: list[LimitCycle], cycle: drives.LimitCycle, length: float, time: float) -> None:
