@@ -100,3 +100,20 @@ def test_a_law_that_changes_suddenly_is_not_stepped_over(decay_speed: float) -> 
         one_by_one.advance(0.01)
     assert in_one_go.position == pytest.approx(one_by_one.position, rel=0.0, abs=1e-9)
     assert in_one_go.velocity == pytest.approx(one_by_one.velocity, rel=0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    "law",
+    [Stribeck(0.0, 0.0, 0.5), Coulomb(0.0), Linear(0.0, 0.0), Exponential(0.0, 0.0, 0.5, 0.0)],
+    ids=lambda law: law.name,
+)
+@pytest.mark.parametrize("belt_speed", [0.2, 0.0, -0.5])
+def test_without_friction_it_passes_the_speed_of_the_belt_unmoved(
+    law: FrictionLaw, belt_speed: float
+) -> None:
+    """A friction coefficient of zero is allowed: the slide vibrates freely."""
+    drive = replace(PAPER, damping=0.0, belt_speed=belt_speed, friction=law)
+    motion = RecordedMotion(drive, 1.0, 0.0)
+    motion.advance(20.0)
+    found = motion.position, motion.velocity
+    assert found == pytest.approx((np.cos(20.0), -np.sin(20.0)), rel=1e-12)
