@@ -77,6 +77,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> None:
     """Run the command."""
+    from stickslip_ros.identification.findings import notes_on
     from stickslip_ros.identification.identify import fixed_of, identify_recordings
     from stickslip_ros.identification.record import read_all
     from stickslip_ros.identification.scenario import curve_files
@@ -113,7 +114,7 @@ def run(arguments: argparse.Namespace) -> None:
             for number, record in enumerate(records, start=1):
                 name = str(path) if len(records) == 1 else f"{path}, part {number}"
                 checks.append({"recording": name, **found.check(record)})
-                notes += found.notes_on(record)
+                notes += notes_on(found, record)
     if arguments.json:
         print_json(as_dict(found, own, checks, notes))
     else:

@@ -233,10 +233,6 @@ class DriveTask:
         fit = self._with_optional(fit, least_share=0.0)
         return Candidate(fit, _held_out(fit))
 
-    def unfinished(self, near: Refinement) -> Candidate:
-        """Return a fit to short segments that is out of the choice."""
-        return Candidate(near, near.losses, "much worse in the search: not fitted further")
-
     def _regression(self, law: IdentifiedLaw, shape: float | None = None) -> Regression:
         fixed = {name: 0.0 for name in LINEAR if name not in self.free} | {
             name: value for name, value in self.fixed.items() if name != DELAY
@@ -247,12 +243,9 @@ class DriveTask:
         segments, starts = segments_of(self.records, length)
         directions = self.rows.directions
         task = Trajectories(law, directions, self.predictors, segments, starts, self.normal_force)
-        return task.chosen(np.arange(len(segments)) % self.stride == 0)
-
-    @property
-    def stride(self) -> int:
-        """Of the segments of long records one of so many is used."""
-        return -(-sum(len(each.position) for each in self.records) // _MOST_SAMPLES)
+        # Of the segments of long records one of so many is used.
+        stride = -(-sum(len(each.position) for each in self.records) // _MOST_SAMPLES)
+        return task.chosen(np.arange(len(segments)) % stride == 0)
 
     def _known(self, values: Mapping[str, float]) -> dict[str, float]:
         own = {name: value * self.normal_force for name, value in self.friction.items()}
@@ -299,7 +292,7 @@ def drive_candidates(task: DriveTask, law: str, progress: Callable[[str], None])
     return [
         task.finished(each)
         if _loss(each) <= _HOPELESS_LOSS_RATIO * least
-        else task.unfinished(each)
+        else Candidate(each, each.losses, "much worse in the search: not fitted further")
         for each in found
     ]
 

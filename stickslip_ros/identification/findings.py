@@ -125,90 +125,15 @@ class Findings:
     @property
     def notes(self) -> Sequence[str]:
         """Sentences on what makes the model doubtful."""
-        found: list[str] = []
-        if self.chosen.error >= POOR_ERROR:
-            found.append(
-                f"the model does not describe the recordings: its error is {self.chosen.error:.0%} "
-                "of what it predicts; an input may be missing (a disturbance, the velocity of the "
-                "belt), or have another sign or unit"
-            )
-        found += self._notes_on_samples
-        fit = self.chosen.fit
-        if fit.used < _USED_SHARE:
-            found.append(
-                f"{fit.used:.0%} of the samples were used, in parts over the whole length: the "
-                "recordings are long; choose a part by --from and --to"
-            )
-        if fit.repetition is not None:
-            found.append(
-                f"the errors repeat every {fit.repetition} samples: the motion takes a whole "
-                "number of samples, so that rounding does not average out; the intervals may be "
-                "too narrow"
-            )
-        return found
-
-    @property
-    def _notes_on_samples(self) -> Sequence[str]:
-        found: list[str] = []
-        for name in dict.fromkeys(record.name for record in self.records):
-            own = [record for record in self.records if record.name == name]
-            missing = float(np.mean(np.concatenate([record.lost for record in own])))
-            if missing > _MISSING_SHARE:
-                used = ", and not fitted" if self.has_spring else ""
-                found.append(
-                    f"{100.0 * missing:.2g} % of the samples of {name} are missing: they are "
-                    f"interpolated{used}"
-                )
-            if own[0].left_out > 0.0:
-                found.append(
-                    f"{100.0 * own[0].left_out:.2g} % of the samples of {name} are left out: they "
-                    f"are in parts of less than {FEWEST} samples between gaps"
-                )
-        fastest = self._fastest
-        if not _SPEEDS_OF_MACHINES[0] <= fastest <= _SPEEDS_OF_MACHINES[1]:
-            found.append(
-                f"the slide is as fast as {fastest:.3g} m/s: check the units of time, position and "
-                "belt velocity"
-            )
-        return found
+        return _notes(self)
 
     @cached_property
     def unidentified(self) -> Mapping[str, str]:
         """Reasons why a parameter of the plant is not told, and the run that would tell it."""
-        found: dict[str, str] = {}
-        if "normal_force" not in self.fixed:
-            found["normal_force"] = (
-                "only friction forces can be told: it is taken as 1 N, so that coefficients are in "
-                "N and viscous ones in N s/m; give it by --fix plant.normal_force=..."
-            )
-        if not self.has_spring:
-            found |= self._merged_on_an_axis()
-        else:
-            found |= self._merged_at_one_belt_speed()
-            if not self.stuck and self.law not in ("coulomb", "dahl"):
-                found["friction.static"] = (
-                    "no record shows sticking: it is the curve extended to rest; run below "
-                    f"{1e3 * self.slowest:.3g} mm/s"
-                )
-        if self._rivals:
-            found["friction.law"] = (
-                f"{_listed([self.chosen.label, *self._rivals])} predict held-out parts alike, but "
-                "differ in friction at speeds that were hardly recorded: the simplest is taken; "
-                f"run with relative speeds from rest to {1e3 * self._fastest:.3g} mm/s"
-            )
-        for name, estimate in self.fitted.items():
-            if estimate.standard_error < _VAGUE_ERROR * abs(estimate.value) or name in found:
-                continue
-            sure = f"{estimate.value:.4g} has a standard error of {estimate.standard_error:.2g}"
-            if isinf(estimate.standard_error):
-                sure = f"{estimate.value:.4g} is one of many values that fit alike"
-            found[name] = (
-                f"{sure}: the recordings do not tell it; a run with other speeds and forces may"
-            )
-        return found
+        return _untold(self)
 
     @cached_property
-    def _rivals(self) -> Sequence[str]:
+    def rivals(self) -> Sequence[str]:
         """Laws that predict as well as the one that was chosen, and have another friction."""
         found: list[str] = []
         for each in self.candidates:
@@ -217,51 +142,18 @@ class Findings:
             if same or not self.as_good.get(each.label) or each.remark:
                 continue
             for number, sign in enumerate(self.directions):
-                own, other = self.friction(number), each.fit.friction(sign, self._fastest)
+                own, other = self.friction(number), each.fit.friction(sign, self.fastest)
                 away = np.abs(np.interp(own.speed, other.speed, other.force) - own.force)
                 if float(away.max()) > _FRICTION_DIFFERENCE * float(own.force.max()):
                     found.append(each.label)
                     break
         return found
 
-    def _merged_on_an_axis(self) -> dict[str, str]:
-        both = len(self.directions) > 1
-        found = {
-            "damping": "viscous damping and the viscous part of friction are one where the belt is "
-            "at rest: it is in the friction, and taken as 0",
-            "stiffness": "no spring is looked for on a belt at rest: it is taken as 0; give it by "
-            "--fix plant.stiffness=...",
-            "bias_force": _BY_DIRECTION
-            if both
-            else "it merges with the static friction of a single direction, and is taken as 0; run "
-            "in both directions",
-            "friction.static": "no row at rest is fitted: it is the curve at its slowest steady "
-            f"speed extended to rest; run below {1e3 * self.slowest:.3g} mm/s",
-        }
-        if self.law == "coulomb":  # its static coefficient is that of slip
-            del found["friction.static"]
-        return {name: why for name, why in found.items() if name not in self.fixed}
-
-    def _merged_at_one_belt_speed(self) -> dict[str, str]:
+    @property
+    def one_belt_speed(self) -> bool:
+        """Whether the belt has one velocity in all records."""
         belts = np.concatenate([record.belt_velocity for record in self.records])
-        found: dict[str, str] = {}
-        single = float(np.ptp(belts)) <= 1e-3 * float(np.abs(belts).max())
-        for name in ("damping", "bias_force"):
-            if name in self.fixed or name in self.fitted:
-                continue
-            if single and name == "damping":
-                found[name] = (
-                    "at one belt speed it merges with a linear part of friction, and is taken as "
-                    "0; run at several belt speeds"
-                )
-            elif name == "bias_force" and len(self.directions) == 1:
-                found[name] = (
-                    "in one direction it merges with the static friction, and is taken as 0; run "
-                    "in both directions"
-                )
-            elif name == "bias_force" and self.chosen.by_direction:
-                found[name] = _BY_DIRECTION
-        return found
+        return float(np.ptp(belts)) <= 1e-3 * float(np.abs(belts).max())
 
     @cached_property
     def _filtered(self) -> Sequence[Filtered]:
@@ -297,10 +189,11 @@ class Findings:
 
     def friction(self, direction: int = 0) -> Friction:
         """Return the friction curve over the recorded speeds, in one of `directions`."""
-        return self.chosen.fit.friction(self.directions[direction], self._fastest)
+        return self.chosen.fit.friction(self.directions[direction], self.fastest)
 
     @property
-    def _fastest(self) -> float:
+    def fastest(self) -> float:
+        """Fastest speed |v_r| that was recorded, m/s."""
         return max(float(each.max()) for each in self._speeds)
 
     @cached_property
@@ -366,15 +259,6 @@ class Findings:
             found["closed_loop_force_error"] = _relative(force[START:], led.force[START:])
         return found
 
-    def notes_on(self, record: Record) -> Sequence[str]:
-        """Sentences on what cannot be predicted of a record, and why."""
-        if self.servo is None or record.reference is None or record.led is not None:
-            return []
-        return [
-            f"the reference of {record.name} has no {FEWEST} samples in a row: the closed loop is "
-            "not predicted"
-        ]
-
 
 def _usual(belt: FloatArray) -> float:
     """Return the median speed of a belt where it moves, in its more frequent direction."""
@@ -391,5 +275,118 @@ def _relative(found: FloatArray, measured: FloatArray) -> float:
     return rms(found - measured) / rms(measured) if np.isfinite(found).all() else inf
 
 
-def _listed(names: Sequence[str]) -> str:
-    return f"{', '.join(names[:-1])} and {names[-1]}"
+def notes_on(found: Findings, record: Record) -> Sequence[str]:
+    """Return sentences on what cannot be predicted of a record, and why."""
+    if found.servo is None or record.reference is None or record.led is not None:
+        return []
+    return [
+        f"the reference of {record.name} has no {FEWEST} samples in a row: the closed loop is "
+        "not predicted"
+    ]
+
+
+def _notes(found: Findings) -> Sequence[str]:
+    """Return sentences on what makes the model doubtful."""
+    notes: list[str] = []
+    if found.chosen.error >= POOR_ERROR:
+        notes.append(
+            f"the model does not describe the recordings: its error is {found.chosen.error:.0%} "
+            "of what it predicts; an input may be missing (a disturbance, the velocity of the "
+            "belt), or have another sign or unit"
+        )
+    for name in dict.fromkeys(record.name for record in found.records):
+        own = [record for record in found.records if record.name == name]
+        missing = float(np.mean(np.concatenate([record.lost for record in own])))
+        if missing > _MISSING_SHARE:
+            used = ", and not fitted" if found.has_spring else ""
+            notes.append(
+                f"{100.0 * missing:.2g} % of the samples of {name} are missing: they are "
+                f"interpolated{used}"
+            )
+        if own[0].left_out > 0.0:
+            notes.append(
+                f"{100.0 * own[0].left_out:.2g} % of the samples of {name} are left out: they "
+                f"are in parts of less than {FEWEST} samples between gaps"
+            )
+    if not _SPEEDS_OF_MACHINES[0] <= found.fastest <= _SPEEDS_OF_MACHINES[1]:
+        notes.append(
+            f"the slide is as fast as {found.fastest:.3g} m/s: check the units of time, position "
+            "and belt velocity"
+        )
+    fit = found.chosen.fit
+    if fit.used < _USED_SHARE:
+        notes.append(
+            f"{fit.used:.0%} of the samples were used, in parts over the whole length: the "
+            "recordings are long; choose a part by --from and --to"
+        )
+    if fit.repetition is not None:
+        notes.append(
+            f"the errors repeat every {fit.repetition} samples: the motion takes a whole "
+            "number of samples, so that rounding does not average out; the intervals may be "
+            "too narrow"
+        )
+    return notes
+
+
+def _untold(found: Findings) -> dict[str, str]:
+    """Return why parameters of the plant are not told, and the run that would tell each."""
+    why = {
+        "normal_force": "only friction forces can be told: it is taken as 1 N, so that "
+        "coefficients are in N and viscous ones in N s/m; give it by --fix plant.normal_force=..."
+    }
+    slower = f"run below {1e3 * found.slowest:.3g} mm/s"
+    one_direction = len(found.directions) == 1
+    if not found.has_spring:
+        why["damping"] = (
+            "viscous damping and the viscous part of friction are one where the belt is at rest: "
+            "it is in the friction, and taken as 0"
+        )
+        why["stiffness"] = (
+            "no spring is looked for on a belt at rest: it is taken as 0; give it by "
+            "--fix plant.stiffness=..."
+        )
+        why["bias_force"] = (
+            "it merges with the static friction of a single direction, and is taken as 0; run in "
+            "both directions"
+            if one_direction
+            else _BY_DIRECTION
+        )
+        if found.law != "coulomb":  # its static coefficient is that of slip
+            why["friction.static"] = (
+                "no row at rest is fitted: it is the curve at its slowest steady speed extended "
+                f"to rest; {slower}"
+            )
+    else:
+        if found.one_belt_speed:
+            why["damping"] = (
+                "at one belt speed it merges with a linear part of friction, and is taken as 0; "
+                "run at several belt speeds"
+            )
+        if one_direction:
+            why["bias_force"] = (
+                "in one direction it merges with the static friction, and is taken as 0; run in "
+                "both directions"
+            )
+        elif found.chosen.by_direction:
+            why["bias_force"] = _BY_DIRECTION
+        if not found.stuck and found.law not in ("coulomb", "dahl"):
+            why["friction.static"] = (
+                f"no record shows sticking: it is the curve extended to rest; {slower}"
+            )
+    known = {*found.fixed, *found.fitted} - {"friction.static"}
+    why = {name: reason for name, reason in why.items() if name not in known}
+    if found.rivals:
+        names = ", ".join([found.chosen.label, *found.rivals[:-1]])
+        why["friction.law"] = (
+            f"{names} and {found.rivals[-1]} predict held-out parts alike, but differ in friction "
+            "at speeds that were hardly recorded: the simplest is taken; run with relative speeds "
+            f"from rest to {1e3 * found.fastest:.3g} mm/s"
+        )
+    for name, estimate in found.fitted.items():
+        if estimate.standard_error < _VAGUE_ERROR * abs(estimate.value) or name in why:
+            continue
+        sure = f"{estimate.value:.4g} has a standard error of {estimate.standard_error:.2g}"
+        if isinf(estimate.standard_error):
+            sure = f"{estimate.value:.4g} is one of many values that fit alike"
+        why[name] = f"{sure}: the recordings do not tell it; a run with other speeds and forces may"
+    return why

@@ -322,29 +322,35 @@ class SaturatingAdapter(TableAdapter):
         return np.column_stack([np.ones_like(speed), 1.0 - np.exp(-speed / shape), speed])
 
 
-class BristledTableAdapter(IdentifiedLaw):
+class _DerivedAdapter(IdentifiedLaw):
+    """A law that is made from another one, whose friction in steady slip it has."""
+
+    def __init__(self, own: IdentifiedLaw) -> None:
+        """Take the adapter of the other law."""
+        self.own, self.name, self.deflection = own, own.name, own.deflection
+        self.least, self.shaped, self.least_shape = own.least, own.shaped, own.least_shape
+
+    @override
+    def terms(self, speed: FloatArray, shape: float) -> FloatArray:
+        return self.own.terms(speed, shape)
+
+    @override
+    def coordinates_of(self, forces: Sequence[float], shape: float) -> dict[str, float]:
+        return self.own.coordinates_of(forces, shape)
+
+
+class BristledTableAdapter(_DerivedAdapter):
     """A table that friction follows over a path, as bristles do: F' = |v_r| (F_table - F) / d.
 
     It is the LuGre law without damping of the bristles, of one deflection d at all speeds.
     """
 
-    name = "lugre"
-    smallest = "force_0"
-
-    def __init__(self, curve: TableAdapter, deflection: float) -> None:
+    def __init__(self, table: TableAdapter, deflection: float) -> None:
         """Take the table in steady slip, and the deflection, m."""
-        self.curve, self.deflection = curve, deflection
-        self.least, self.shaped, self.least_shape = curve.least, curve.shaped, curve.least_shape
+        super().__init__(table)
+        self.name, self.deflection, self.smallest = "lugre", deflection, table.smallest
         self.memory = "bristle_stiffness", "bristle_damping"
-        self.coordinates = (*curve.coordinates, *self.memory)
-
-    @override
-    def terms(self, speed: FloatArray, shape: float) -> FloatArray:
-        return self.curve.terms(speed, shape)
-
-    @override
-    def coordinates_of(self, forces: Sequence[float], shape: float) -> dict[str, float]:
-        return self.curve.coordinates_of(forces, shape)
+        self.coordinates = (*table.coordinates, *self.memory)
 
     @override
     def joined(self, directions: Sequence[Values]) -> dict[str, float]:
@@ -359,7 +365,7 @@ class BristledTableAdapter(IdentifiedLaw):
 
     @override
     def friction(self, values: Values, normal_force: float) -> FrictionLaw:
-        return _bristled(self, self.curve, values, normal_force)
+        return _bristled(self, self.own, values, normal_force)
 
 
 class BristleAdapter(ExponentialAdapter):
@@ -376,24 +382,16 @@ class BristleAdapter(ExponentialAdapter):
         return _bristled(self, EXPONENTIAL, values, normal_force)
 
 
-class DirectionalAdapter(IdentifiedLaw):
+class DirectionalAdapter(_DerivedAdapter):
     """A law that has constants of its own in each direction of slip."""
 
     def __init__(self, own: IdentifiedLaw) -> None:
         """Take the adapter of each direction."""
-        self.own, self.name, self.deflection = own, own.name, own.deflection
+        super().__init__(own)
         self.coordinates, self.by_differences = (
             [*names, *(REVERSE + name for name in names)]
             for names in (own.coordinates, own.by_differences)
         )
-
-    @override
-    def terms(self, speed: FloatArray, shape: float) -> FloatArray:
-        return self.own.terms(speed, shape)
-
-    @override
-    def coordinates_of(self, forces: Sequence[float], shape: float) -> dict[str, float]:
-        return self.own.coordinates_of(forces, shape)
 
     @override
     def static_force(self, values: Values) -> float:
