@@ -101,6 +101,53 @@ class DriveTask:
         self.rows = Rows.of(parts, None)
         self.predictors = [Predictor(record) for record in records]
 
+    def candidates(self, law: str, progress: Callable[[str], None]) -> list[Candidate]:
+        """Return the fits of the laws that compete, or of the one that is asked for, fitted first.
+
+        Laws without a memory are searched first. Those with a memory follow if the errors of the
+        best one are more than noise, and friction without a law if theirs are, too. What predicts
+        much worse in the search is not fitted further.
+        """
+        found: list[Refinement] = []
+        for each in STATIC_LAWS:
+            if law in (AUTO, each.name):
+                progress(each.name)
+                found.append(self.searched(each, thorough=not any(map(is_white, found))))
+        if law == self.table.name:
+            progress(law)
+            found.append(self.searched(self.table))
+        if len(self.rows.directions) > 1 and found and not any(map(is_white, found)):
+            best = min(found, key=_loss).law
+            progress(f"{best.name} by direction")
+            found.append(self.searched(DirectionalAdapter(best)))
+        # A memory changes the motion near sticking: it does not explain an input that is missing.
+        near = not found or (law == AUTO and min(map(_share, found)) < _MISSING_INPUT_ERROR)
+        if near and not any(map(is_white, found)):
+            bristles: Refinement | None = None
+            for each in MEMORY_LAWS:
+                if law not in (AUTO, each.name):
+                    continue
+                progress(each.name)
+                if each is not DAHL and any(map(is_white, found)):
+                    break
+                found.append(self.searched(each, like=bristles))
+                if each is LUGRE:
+                    bristles = found[-1]
+        if law == AUTO and not any(map(is_white, found)):
+            progress(self.table.name)
+            found.append(self.searched(self.table))
+        least = min(map(_loss, found))
+        return [
+            self.finished(each)
+            if _loss(each) <= _HOPELESS_LOSS_RATIO * least
+            else Candidate(each, each.losses, "much worse in the search: not fitted further")
+            for each in found
+        ]
+
+    def adjusted(self, found: Candidate) -> Candidate:
+        """Return what was chosen as it is: its whole motion is fitted already."""
+        return found
+
     @cached_property
     def constants(self) -> Mapping[str, float]:
         """Mass and stiffness by the regression; InvalidInputError where one is not above zero."""
@@ -251,50 +298,6 @@ class DriveTask:
         own = {name: value * self.normal_force for name, value in self.friction.items()}
         own |= {name: self.friction[name] for name in _SPEEDS if name in self.friction}
         return {DELAY: 0.0, **values, **own, **self.fixed}
-
-
-def drive_candidates(task: DriveTask, law: str, progress: Callable[[str], None]) -> list[Candidate]:
-    """Return the fits of the laws that compete, or of the one that is asked for, fitted first.
-
-    Laws without a memory are searched first. Those with a memory follow if the errors of the best
-    one are more than noise, and friction without a law if theirs are, too. What predicts much worse
-    in the search is not fitted further.
-    """
-    found: list[Refinement] = []
-    for each in STATIC_LAWS:
-        if law in (AUTO, each.name):
-            progress(each.name)
-            found.append(task.searched(each, thorough=not any(map(is_white, found))))
-    if law == task.table.name:
-        progress(law)
-        found.append(task.searched(task.table))
-    if len(task.rows.directions) > 1 and found and not any(map(is_white, found)):
-        best = min(found, key=_loss).law
-        progress(f"{best.name} by direction")
-        found.append(task.searched(DirectionalAdapter(best)))
-    # A memory changes the motion near sticking: it does not explain an input that is missing.
-    near = not found or (law == AUTO and min(map(_share, found)) < _MISSING_INPUT_ERROR)
-    if near and not any(map(is_white, found)):
-        bristles: Refinement | None = None
-        for each in MEMORY_LAWS:
-            if law not in (AUTO, each.name):
-                continue
-            progress(each.name)
-            if each is not DAHL and any(map(is_white, found)):
-                break
-            found.append(task.searched(each, like=bristles))
-            if each is LUGRE:
-                bristles = found[-1]
-    if law == AUTO and not any(map(is_white, found)):
-        progress(task.table.name)
-        found.append(task.searched(task.table))
-    least = min(map(_loss, found))
-    return [
-        task.finished(each)
-        if _loss(each) <= _HOPELESS_LOSS_RATIO * least
-        else Candidate(each, each.losses, "much worse in the search: not fitted further")
-        for each in found
-    ]
 
 
 def _falling(values: Mapping[str, float]) -> Mapping[str, float]:

@@ -5,7 +5,7 @@ from math import inf, isfinite
 
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.identification.axes import AXIS_LAWS, AxisTask
-from stickslip_ros.identification.drives import AUTO, DRIVE_LAWS, DriveTask, drive_candidates
+from stickslip_ros.identification.drives import AUTO, DRIVE_LAWS, DriveTask
 from stickslip_ros.identification.findings import Findings
 from stickslip_ros.identification.fit import choose
 from stickslip_ros.identification.laws import DELAY, MEMORY_LAWS, STATIC_LAWS
@@ -45,9 +45,7 @@ def identify_recordings(
     for each in read:
         known |= each.known
     for target, value in fixed.items():
-        if target not in _UNITS:
-            raise InvalidInputError(f"{target} is refused: {_allowed(target)}")
-        known[target.removeprefix("plant.")] = number_of(target, value, _UNITS[target])
+        known[target.removeprefix("plant.")] = _constant(target, value)
     return identify([record for each in read for record in each.records], law, known, progress)
 
 
@@ -59,15 +57,21 @@ def fixed_of(texts: Sequence[str]) -> dict[str, float]:
     found: dict[str, float] = {}
     for text in texts:
         name, equals, value = text.partition("=")
-        if not equals or name.strip() in found:
+        target = name.strip()
+        if not equals or target in found:
             raise InvalidInputError(
                 f"--fix {text}: must be plant.PARAMETER=VALUE, each parameter once, as in "
                 "plant.mass=95"
             )
-        if name.strip() not in _UNITS:
-            raise InvalidInputError(f"{name} is refused: {_allowed(name.strip())}")
-        found[name.strip()] = number_of(name.strip(), value, _UNITS[name.strip()])
+        found[target] = _constant(target, value)
     return found
+
+
+def _constant(target: str, value: float | str) -> float:
+    """Return a constant by NODE.PARAMETER in SI units; refuse one that cannot be given."""
+    if target not in _UNITS:
+        raise InvalidInputError(f"{target} is refused: {_allowed(target)}")
+    return number_of(target, value, _UNITS[target])
 
 
 def identify(
@@ -100,22 +104,16 @@ def identify(
             f"law {law} is refused for a drive {kind}: must be one of {AUTO}, {', '.join(known)}"
         )
     _check_friction(fixed, law, spring=spring)
-    axis = None
-    if spring:
-        candidates = drive_candidates(DriveTask(records, fixed), law, progress)
-    else:
-        axis = AxisTask(records, fixed)
-        candidates = axis.candidates(law, progress)
+    task = (DriveTask if spring else AxisTask)(records, fixed)
+    candidates = task.candidates(law, progress)
     chosen, as_good = choose(
         [each for each in candidates if law != AUTO or not each.remark] or candidates
     )
-    if axis is not None:
-        chosen = axis.adjusted(chosen)
     servos = [servo_of(record) for record in records]
     return Findings(
         records,
         candidates,
-        chosen,
+        task.adjusted(chosen),
         as_good,
         fixed.get("normal_force", 1.0),
         fixed,

@@ -74,16 +74,13 @@ def test_coulomb_friction_needs_no_table() -> None:
     assert found.as_good["exponential"]
 
 
-def test_the_controller_is_found_from_the_record() -> None:
-    found = servo_of(record("coulomb"))
+def test_the_controller_is_found_from_the_record_if_the_forces_are_its_own() -> None:
+    own = record("coulomb")
+    found = servo_of(own)
     assert found is not None
     assert found.difference_samples == 2
     assert found.position_gain == pytest.approx(SERVO.position_gain, rel=0.01)
     assert found.velocity_gain == pytest.approx(SERVO.velocity_gain, rel=0.01)
-
-
-def test_a_force_of_another_origin_or_without_a_reference_has_no_controller() -> None:
-    own = record("coulomb")
     other = np.random.default_rng(0).normal(size=len(own.position))
     assert servo_of(replace(own, force=other, reference=None)) is None
     assert servo_of(replace(own, force=other)) is None
