@@ -18,7 +18,7 @@ from stickslip_ros.physics.loop.trajectory import QUANTITIES
 from stickslip_ros.physics.measures.cycle_measures import Measures, measures_of
 from stickslip_ros.physics.measures.slips import SlipThreshold
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.plots.measure_table import measure_table, why_no_cycle
+from stickslip_ros.plots.measure_table import report_tables
 from stickslip_ros.plots.run_history import RunHistory
 from stickslip_ros.plots.units import Units
 from stickslip_ros.samples import ForceColumns, SampleColumns
@@ -87,13 +87,8 @@ class RecordedRun(TabularResult):
         return Table(columns, _COLUMNS, units, {"time": time}, source, "time")
 
     def _parts(self) -> Parts:
-        units = Units.for_drive(self.drive)
-        yield measure_table(str(self.path), {"": self.report}, {"": units})
-        yield from [*self.missing, *self.report["notes"]]
-        if len(self.samples):
-            reason = why_no_cycle(self.measures.regime, self.report["duration"], self.drive)
-            if reason is not None:
-                yield reason
+        path = str(self.path)
+        return report_tables({path: self.report}, {path: self.drive})
 
 
 def read_bag(

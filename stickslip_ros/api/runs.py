@@ -12,7 +12,7 @@ from stickslip_ros.physics.loop.trajectory import (
     TrajectoryRecorder,
 )
 from stickslip_ros.physics.measures.cycle_measures import Measures
-from stickslip_ros.plots.measure_table import measure_table, measured_and_true, why_no_cycle
+from stickslip_ros.plots.measure_table import simulation_tables
 from stickslip_ros.plots.run_history import RunHistory
 from stickslip_ros.plots.units import Units
 from stickslip_ros.progress import Progress
@@ -64,13 +64,7 @@ class Run(TabularResult):
         return Units.for_drive(self.scenario.plant.as_drive())
 
     def _parts(self) -> Parts:
-        title = f"{self.scenario.name}, {self.duration:g} {self._units.of_unit('s')}".rstrip()
-        columns = measured_and_true(self.measures, self.truth)
-        yield measure_table(title, columns, dict.fromkeys(columns, self._units))
-        drive = self.scenario.plant.as_drive()
-        reason = why_no_cycle((self.truth or self.measures).regime, self.duration, drive)
-        if reason is not None:
-            yield reason
+        return simulation_tables(self.scenario, self.duration, self.measures, self.truth)
 
 
 def simulate(

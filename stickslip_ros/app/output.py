@@ -176,6 +176,6 @@ def print_parts(parts: Iterable[TextTable | str]) -> None:
     """Print tables and sentences, one after the other."""
     for part in parts:
         if isinstance(part, str):
-            print(part)
+            print(printable(part))
         else:
             print_table(*part)

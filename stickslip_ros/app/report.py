@@ -17,9 +17,8 @@ from stickslip_ros.app.arguments import (
     speed,
     write_figure,
 )
-from stickslip_ros.app.output import print_json, print_table, print_values
+from stickslip_ros.app.output import print_json, print_parts
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.text import printable
 
 if TYPE_CHECKING:
     from stickslip_ros.plots.run_history import RunHistory
@@ -75,9 +74,8 @@ def run(arguments: argparse.Namespace) -> None:
     from stickslip_ros.bags.report import report_of_recording
     from stickslip_ros.bags.table_file import is_table
     from stickslip_ros.physics.measures.slips import SlipThreshold
-    from stickslip_ros.plots.measure_table import slip_table, why_no_cycle
+    from stickslip_ros.plots.measure_table import report_tables
     from stickslip_ros.plots.run_history import RunHistory
-    from stickslip_ros.plots.units import Units
 
     plot: Path | None = arguments.plot
     bags: list[Path] = arguments.bags
@@ -111,22 +109,8 @@ def run(arguments: argparse.Namespace) -> None:
         result = results[0] if len(results) == 1 else {"reports": results}
         print_json(result)
         return
-    several = len(reports) > 1
     drives = {str(bag): recorded_drive(bag, arguments.namespace) for bag in bags}
-    print_values(
-        "" if several else str(bags[0]),
-        {bag if several else "": report for bag, report in reports.items()},
-        {bag if several else "": Units.for_drive(drive) for bag, drive in drives.items()},
-    )
-    for bag, report in reports.items():
-        if report["slips"] is not None:
-            print_table(*slip_table(report["slips"], Units.for_drive(drives[bag])))
-        sentences = [*report["missing"], *report["notes"]]
-        if report["samples"] > 0:
-            reason = why_no_cycle(report["regime"], report["duration"], drives[bag])
-            sentences += [] if reason is None else [reason]
-        for sentence in sentences:
-            print(printable(f"{bag}: {sentence}") if several else sentence)
+    print_parts(report_tables(reports, drives))
 
 
 def _draw(

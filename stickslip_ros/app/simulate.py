@@ -19,7 +19,7 @@ from stickslip_ros.app.arguments import (
     write_figure,
     writing,
 )
-from stickslip_ros.app.output import print_json, print_values, progress_bar
+from stickslip_ros.app.output import print_json, print_parts, progress_bar
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.files import written
 from stickslip_ros.studies.options import DEFAULT_PERIODS
@@ -68,7 +68,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> None:
     """Run the command."""
-    from stickslip_ros.plots.measure_table import measured_and_true, why_no_cycle
+    from stickslip_ros.plots.measure_table import simulation_tables
     from stickslip_ros.plots.run_history import RunHistory
     from stickslip_ros.plots.units import Units
     from stickslip_ros.studies.settling import check_continuous
@@ -104,17 +104,13 @@ def run(arguments: argparse.Namespace) -> None:
 
             drawn = DrawnRun.simulated(scenario, history, true)
             write_figure(arguments, lambda style: run_figure(drawn, style=style))
-    measures = true if told is None else told.measures()
+    measures, truth = (true, None) if told is None else (told.measures(), true)
     if arguments.json:
-        truth = None if told is None else true.as_dict()
-        values = {**measures.as_dict(), "truth": truth, "duration": duration}
+        own = None if truth is None else truth.as_dict()
+        values = {**measures.as_dict(), "truth": own, "duration": duration}
         print_json({**values, **provenance(scenario)})
     else:
-        columns = measured_and_true(measures, None if told is None else true)
-        print_values(f"{scenario.name}, {shown}", columns, dict.fromkeys(columns, units))
-        reason = why_no_cycle(true.regime, duration, scenario.plant.as_drive())
-        if reason is not None:
-            print(reason)
+        print_parts(simulation_tables(scenario, duration, measures, truth))
 
 
 @contextmanager

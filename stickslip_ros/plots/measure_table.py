@@ -1,12 +1,13 @@
-"""The tables of measures: those of runs side by side, those of slips, and why there are none."""
+"""The tables of runs: measures side by side, slips, and why there is no regime."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from math import inf
 from typing import Any
 
 from stickslip_ros.physics.measures.cycle_measures import Measures, Regime, trend_text
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.plots.units import NOISE, SI, Units
+from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.tables import TextTable
 
 LABELS: dict[str, tuple[str, str]] = {
@@ -65,11 +66,46 @@ _LARGEST_RATIO = 10.0
 """Ratio of belt speed and Hopf speed beyond which the unit is probably wrong."""
 
 
-def measured_and_true(measures: Measures, truth: Measures | None) -> dict[str, dict[str, Any]]:
-    """Return the columns of a simulated run: with a sensor also those of the motion itself."""
-    if truth is None:
-        return {"": measures.as_dict()}
-    return {"measured": measures.as_dict(), "true": truth.as_dict()}
+def simulation_tables(
+    scenario: Scenario, duration: float, measures: Measures, truth: Measures | None
+) -> Iterator[TextTable | str]:
+    """Yield the measures of a simulated run, and why it has no regime.
+
+    With a sensor there are also the measures of the motion itself, the `truth`.
+    """
+    drive = scenario.plant.as_drive()
+    units = Units.for_drive(drive)
+    columns = {"": measures} if truth is None else {"measured": measures, "true": truth}
+    values = {name: each.as_dict() for name, each in columns.items()}
+    title = f"{scenario.name}, {duration:g} {units.of_unit('s')}".rstrip()
+    yield measure_table(title, values, dict.fromkeys(values, units))
+    reason = why_no_cycle((truth or measures).regime, duration, drive)
+    if reason is not None:
+        yield reason
+
+
+def report_tables(
+    reports: Mapping[str, Mapping[str, Any]], drives: Mapping[str, Drive | None]
+) -> Iterator[TextTable | str]:
+    """Yield the measures of recordings side by side, then slips and sentences of each.
+
+    The reports and the drives that were recorded are by the path of the recording.
+    """
+    units = {name: Units.for_drive(drives[name]) for name in reports}
+    if len(reports) > 1:
+        yield measure_table("", reports, units)
+    else:
+        ((path, only),) = reports.items()
+        yield measure_table(path, {"": only}, {"": units[path]})
+    for path, report in reports.items():
+        if report["slips"] is not None:
+            yield slip_table(report["slips"], units[path])
+        sentences = [*report["missing"], *report["notes"]]
+        if report["samples"] > 0:
+            reason = why_no_cycle(report["regime"], report["duration"], drives[path])
+            sentences += [] if reason is None else [reason]
+        for sentence in sentences:
+            yield f"{path}: {sentence}" if len(reports) > 1 else sentence
 
 
 def measure_table(
