@@ -2,11 +2,9 @@
 
 import csv
 import json
-from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from io import StringIO
 from math import nan
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -175,22 +173,3 @@ def test_any_reason_is_read_back() -> None:
     write_csv(stream := StringIO(), columns, {})
     rows = list(csv.DictReader(StringIO(stream.getvalue(), newline="")))
     assert read["reason"] == [row["reason"] for row in rows] == [reason] * 2
-
-
-@one_of(["both ways"])
-def test_computing_columns_in_another_way_changes_no_bit(
-    study: Study, columns: Columns, tmp_path: Path
-) -> None:
-    path = tmp_path / "study.part"
-    counts: list[float] = []
-    with ThreadPoolExecutor(2) as threads:
-        others = [
-            compute_columns(study, executor=threads, in_flight=3),
-            compute_columns(study, path=path, progress=counts.append),
-            compute_columns(study, path=path, progress=counts.append),
-        ]
-    assert counts[-2:] == [study.plan.size] * 2
-    points = list(columns.points())
-    for other in others:
-        assert list(other.points()) == points
-    assert path.exists()

@@ -299,16 +299,6 @@ def test_what_cannot_be_written_is_refused(tmp_path: Path) -> None:
             Journal(speeds(5), path)
 
 
-def test_points_come_in_order_whatever_the_order_of_the_pieces() -> None:
-    study = speeds(7)
-    expected = points_of(study)
-    with Journal(study) as journal:
-        for numbers in ([4, 5], [6], [0, 1], [3, 2]):
-            journal.add(Piece([expected[number] for number in numbers], None))
-        assert list(journal.columns.points()) == expected
-        assert journal.count == 7
-
-
 @pytest.mark.parametrize("carry", [None, Continuation.UP])
 def test_a_million_points_need_less_than_two_gigabytes(carry: Continuation | None) -> None:
     study, count = speeds(5_000, carry=carry), 5_000
