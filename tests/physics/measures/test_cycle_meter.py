@@ -173,8 +173,7 @@ def test_no_cycle_spans_an_interruption() -> None:
     whole = vibration(8.0)
     first = meter.feed(whole[:14], 1.0)
     meter.interrupt()
-    later = Breakpoints(whole.time + 1000.0, whole.position, whole.velocity, whole.sticking)
-    second = meter.feed(later[16:], 1.0)
+    second = meter.feed(replace(whole, time=whole.time + 1000.0)[16:], 1.0)
     assert (len(first), len(second)) == (2, 2)
     assert [cycle.period for cycle in [*first, *second]] == pytest.approx([2.0 * pi] * 4)
 
@@ -231,16 +230,9 @@ def course(*amplitudes: float) -> Breakpoints:
     breakpoints = vibration(len(amplitudes) + 1.25)
     # From trough to trough: the one that begins a cycle and the one that ends it are as deep.
     sizes = np.concatenate([np.repeat([amplitudes[0], *amplitudes], 4), [amplitudes[-1]] * 2])
-    return replace_size(breakpoints, sizes[: len(breakpoints)])
-
-
-def replace_size(breakpoints: Breakpoints, sizes: np.ndarray) -> Breakpoints:
-    return Breakpoints(
-        breakpoints.time,
-        breakpoints.position * sizes,
-        breakpoints.velocity * sizes,
-        breakpoints.sticking,
-    )
+    sizes = sizes[: len(breakpoints)]
+    position, velocity = breakpoints.position * sizes, breakpoints.velocity * sizes
+    return replace(breakpoints, position=position, velocity=velocity)
 
 
 @pytest.mark.parametrize(
