@@ -14,9 +14,9 @@ from xml.etree import ElementTree
 
 from stickslip_ros.messages.topics import TOPICS
 from stickslip_ros.physics.measures.cycle_measures import Regime
+from stickslip_ros.physics.model.constants import Parameter
 from stickslip_ros.physics.theory.closed_forms import CubicLoop
 from stickslip_ros.scenarios.files import load_scenario
-from stickslip_ros.scenarios.parameter_field import Parameter, parameters_of
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, NodeParameters, ReplayParameters
 from stickslip_ros.studies.stability import stability
 
@@ -39,10 +39,10 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 def parameters() -> Iterator[str]:
     """Yield a table for what every node has, and one for each node."""
-    common = {parameter.name for parameter in parameters_of(NodeParameters)}
-    models = {"every node": NodeParameters, **NODE_PARAMETERS, "replay": ReplayParameters}
+    common = NodeParameters()
+    models = {"every node": common, **NODE_PARAMETERS, "replay": ReplayParameters()}
     for node, model in models.items():
-        own = [p for p in parameters_of(model) if model is NodeParameters or p.name not in common]
+        own = [p for p in model.known.values() if model is common or p.name not in common.known]
         yield f"## {node}\n"
         yield table(
             ["parameter", "unit", "default", "allowed", "can be changed", "meaning"],
@@ -64,7 +64,7 @@ def _parameter_row(parameter: Parameter) -> list[str]:
         parameter.unit or "",
         f"`{default}`" if default not in ("", [], parameter.unset) else default or "empty",
         allowed,
-        parameter.fixed.changes,
+        parameter.changes,
         parameter.meaning.removesuffix("."),
     ]
 

@@ -16,7 +16,6 @@ from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.identification.identify import fixed_of
 from stickslip_ros.quantities import number_of
 from stickslip_ros.scenarios.files import load_scenario, parse_override
-from stickslip_ros.scenarios.parameter_field import known_parameters
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
 from stickslip_ros.studies.plan import Axis
 
@@ -96,7 +95,7 @@ def test_a_plain_number_is_as_before_and_loads_no_pint(value: float) -> None:
 
 def test_each_unit_of_a_parameter_converts_to_itself() -> None:
     for model in NODE_PARAMETERS.values():
-        for name, parameter in known_parameters(model).items():
+        for name, parameter in model.known.items():
             if parameter.kind is float and parameter.unit:
                 assert number_of(name, f"3 {parameter.unit}", parameter.unit) == 3.0
 

@@ -23,7 +23,6 @@ from stickslip_ros.plots.run_history import RunHistory
 from stickslip_ros.plots.units import Units
 from stickslip_ros.samples import ForceColumns, SampleColumns
 from stickslip_ros.scenarios.curve_file import CURVES, as_pairs
-from stickslip_ros.scenarios.parameter_field import known_parameters
 from stickslip_ros.scenarios.parameters import PlantParameters
 from stickslip_ros.stamps import NANOSECONDS
 
@@ -252,10 +251,10 @@ def recorded_drive(bag: Path, namespace: str | None = None) -> Drive | None:
         values = {
             name: json.loads(text)
             for name, text in texts.items()
-            if name in known_parameters(PlantParameters)
+            if name in PlantParameters().known
         }
         known = {path: as_pairs(json.loads(text)) for path, text in curves.items()}
-        plant = PlantParameters.validated(values, str(bag), known)
+        plant = PlantParameters().changed(values, str(bag), known)
     except (ValueError, RecursionError, InvalidInputError):
         return None
     return plant.as_drive() if values.keys() >= set(plant.drive_names()) else None

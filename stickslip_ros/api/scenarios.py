@@ -5,7 +5,7 @@ from typing import Any
 
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.scenarios.files import Scenario, load_scenario
-from stickslip_ros.scenarios.keywords import overrides_of
+from stickslip_ros.scenarios.keywords import parameter_of
 
 ScenarioLike = Scenario | str | Path
 """A scenario, its name, or the path of its file."""
@@ -69,8 +69,9 @@ def scenario(
     else:
         chosen = name_or_path if law is None else name_or_path.with_controller(law)
     control = ["plant.expects_control=false"] if controller is None else []
-    texts = [*control, *overrides, *overrides_of(parameters, chosen.nodes)]
-    return chosen.overridden(texts) if texts else chosen
+    values = {parameter_of(keyword, chosen.nodes): each for keyword, each in parameters.items()}
+    texts = [*control, *overrides]
+    return chosen.overridden(texts, values) if texts or values else chosen
 
 
 def as_scenario(given: ScenarioLike) -> Scenario:

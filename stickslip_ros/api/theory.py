@@ -23,7 +23,6 @@ from stickslip_ros.plots.units import Units
 from stickslip_ros.progress import Progress
 from stickslip_ros.quantities import number_of
 from stickslip_ros.scenarios.files import Scenario
-from stickslip_ros.scenarios.keywords import override
 from stickslip_ros.studies import design as designing
 from stickslip_ros.studies import stability as stabilities
 from stickslip_ros.text import shown
@@ -212,7 +211,7 @@ def design(
     """
     chosen = as_scenario(scenario)
     if force_limit is not None:
-        chosen = chosen.overridden([override(f"{chosen.controller.node}.force_limit", force_limit)])
+        chosen = chosen.overridden([], {f"{chosen.controller.node}.force_limit": force_limit})
     task = designing.Task.from_scenario(chosen, _range(belt_speed))
     return Proposal(designing.design(task, progress))
 

@@ -353,7 +353,7 @@ def scenario_of(
             "--base SCENARIO takes omitted values from another scenario"
         )
         tell(sentence)
-    warning = scenario.plant.friction.as_law().warning()
+    warning = scenario.plant.friction.selected.warning()
     if warning is not None:
         tell(f"{scenario.path}: {warning}")
     check_speeds(arguments, scenario)
@@ -363,9 +363,8 @@ def scenario_of(
 def check_speeds(arguments: argparse.Namespace, scenario: "Scenario", *speeds: float) -> None:
     """Refuse belt speeds (m/s) far beyond the scales of a drive and its law, but for --yes."""
     from stickslip_ros.plots.units import Units
-    from stickslip_ros.scenarios.parameter_field import known_parameters
 
-    plant, known = scenario.plant, known_parameters(type(scenario.plant))
+    plant, known = scenario.plant, scenario.plant.known
     used = [name for name in plant.drive_names() if name.startswith("friction.")]
     own = [plant.flat()[name] for name in used if known[name].unit == "m/s"]
     drive = plant.as_drive()

@@ -35,7 +35,7 @@ def main() -> None:
 
 def _demonstrate() -> None:
     scenario = load_scenario(_SCENARIO, ["plant.pace=lockstep", f"plant.duration={_DURATION}"])
-    switched_on = scenario.controller.as_law().start_after
+    switched_on = scenario.controller.control_law.start_after
     controller = scenario.controller.node.replace("_", " ")
     bag = default_bag(_SCENARIO)
     load_matplotlib()

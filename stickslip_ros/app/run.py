@@ -205,11 +205,10 @@ def record(
 def _dashboard(namespace: str, bag: Path, scenario: "Scenario") -> Generator[None]:
     """Serve the page in a process of its own, which has no part in whether the run succeeds."""
     from stickslip_ros.nodes.base.child_process import start_child
-    from stickslip_ros.scenarios.parameter_field import parameters_of
 
     command = "-m", "stickslip_ros.app.main", "dashboard", "--namespace", namespace
     plant = scenario.plant.flat()
-    named = filter(None, (plant[p.name] for p in parameters_of(type(scenario.plant)) if p.file))
+    named = filter(None, (plant[p.name] for p in scenario.plant.known.values() if p.file))
     process = start_child([sys.executable, *command, *(f"--read={p}" for p in (bag, *named))])
     try:
         yield

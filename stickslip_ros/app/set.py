@@ -30,7 +30,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> None:
     """Run the command."""
     from stickslip_ros.scenarios.files import parse_override
-    from stickslip_ros.scenarios.parameter_field import known_parameters
     from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
 
     namespace = namespace_of(arguments.namespace)
@@ -58,7 +57,7 @@ def run(arguments: argparse.Namespace) -> None:
         if not answer.successful:
             refusals.append(answer.reason or "refused without a reason")
             continue
-        known = known_parameters(NODE_PARAMETERS[node])
+        known = NODE_PARAMETERS[node].known
         for name, value in given[node].items():
             set_to = f"{namespace}/{node}: {name} = {shown(value)} {known[name].unit or ''}"
             print(printable(set_to.rstrip()))

@@ -9,8 +9,8 @@ from stickslip_ros.app.output import print_json, print_table
 from stickslip_ros.text import printable
 
 if TYPE_CHECKING:
+    from stickslip_ros.physics.model.constants import Parameter
     from stickslip_ros.scenarios.files import Scenario
-    from stickslip_ros.scenarios.parameter_field import Parameter
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -28,7 +28,6 @@ def run(arguments: argparse.Namespace) -> None:
     """Run the command."""
     from stickslip_ros.plots.units import Units
     from stickslip_ros.scenarios.files import load_scenario
-    from stickslip_ros.scenarios.parameter_field import known_parameters
     from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
 
     load = partial(
@@ -58,7 +57,7 @@ def run(arguments: argparse.Namespace) -> None:
     for node, parameters in found.items():
         # Where the drive is dimensionless, so are the parameters of the loop.
         unit = str if node == "analyzer" else units.of_unit
-        known = known_parameters(NODE_PARAMETERS[node])
+        known = NODE_PARAMETERS[node].known
         rows = [
             [name, _text(known[name], row["value"]), unit(row["unit"] or ""), row["source"]]
             for name, row in parameters.items()

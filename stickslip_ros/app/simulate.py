@@ -128,7 +128,7 @@ def _recorder(
         return
     rate = scenario.plant.rate
     every = _samples(arguments.every, rate)
-    measured = not scenario.plant.as_sensor().exact
+    measured = not scenario.plant.sensor.exact
     if out.suffix.lower() != ".csv":
         raise InvalidInputError(f"--out {out}: must end in .csv")
     check_new("--out", out)

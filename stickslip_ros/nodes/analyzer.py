@@ -45,7 +45,6 @@ from stickslip_ros.nodes.base.ros_topics import qos_profile, waiting_messages
 from stickslip_ros.physics.measures.cycle_measures import trend_text
 from stickslip_ros.physics.measures.run_meter import RunMeter
 from stickslip_ros.scenarios.curve_file import CURVES, Pairs, read_pairs
-from stickslip_ros.scenarios.parameter_field import known_parameters
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, AnalyzerParameters
 from stickslip_ros.stamps import END_OF_TIME, NANOSECONDS
 from stickslip_ros.text import quantity
@@ -73,7 +72,7 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
     """Subscribes to joint_states and control_force; writes a bag, publishes limit_cycle/*."""
 
     def __init__(self, **options: Any) -> None:
-        super().__init__("analyzer", AnalyzerParameters, **options)
+        super().__init__("analyzer", AnalyzerParameters(), **options)
         self._bags_opened = 0
         self._bag: Path | None = None
 
@@ -219,7 +218,7 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
 
     def _ask_for_parameters(self, node: str) -> None:
         """Ask a node for its parameters, to be kept in the bag."""
-        names = list(known_parameters(NODE_PARAMETERS[node]))
+        names = list(NODE_PARAMETERS[node].known)
         self._parameter_calls[node] = parameters_call(
             self, node, names, partial(self._keep_parameters, node)
         )
@@ -311,7 +310,7 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         self._keep(f"stickslip_ros/{node}", values)
         if node == "plant":
             self._meter.motion.reading = self.parameters.reading_of(values)
-        known, curves = known_parameters(NODE_PARAMETERS[node]), dict[str, Pairs]()
+        known, curves = NODE_PARAMETERS[node].known, dict[str, Pairs]()
         for name, path in values.items():
             if known[name].file and path and isinstance(path, str):
                 with suppress(InvalidInputError):  # the node may run on another machine
@@ -345,7 +344,7 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
 
 def main() -> None:
     """Run the node as a process."""
-    sys.exit(run_node(AnalyzerNode, AnalyzerParameters))
+    sys.exit(run_node(AnalyzerNode, AnalyzerParameters()))
 
 
 if __name__ == "__main__":

@@ -22,6 +22,7 @@ from stickslip_ros.scenarios.files import known_law
 from stickslip_ros.scenarios.parameters import (
     CONTROLLER_PARAMETERS,
     DEFAULT_LAW,
+    ControllerChoice,
     ControllerParameters,
     controller_node,
 )
@@ -40,7 +41,7 @@ class ControllerNode(ManagedNode[ControllerParameters]):
     def connect(self) -> None:
         """Publish forces; subscribe to the newest reference only."""
         self._force = self.read_last = self.advertise(CONTROL_FORCE)
-        kind = self.parameters.reference_group.kind
+        kind = self.parameters.reference.kind
         self._given = NO_REFERENCE
         self._reference = None
         if kind is ReferenceKind.TOPIC:
@@ -63,7 +64,7 @@ class ControllerNode(ManagedNode[ControllerParameters]):
     def apply_parameters(self) -> None:
         """Use new constants from the next joint state on."""
         if self.active:
-            self._controller.law = self.parameters.as_law()
+            self._controller.law = self.parameters.control_law
             self._controller.follows = self._followed()
 
     def diagnose(self) -> Diagnosis:
@@ -76,7 +77,7 @@ class ControllerNode(ManagedNode[ControllerParameters]):
         )
 
     def _followed(self) -> ReferenceSource:
-        follows = self.parameters.reference_group
+        follows = self.parameters.reference
         if follows.kind is ReferenceKind.TOPIC:
             return lambda _: self._given
         return follows.signal(period=0.0).reference
@@ -132,7 +133,7 @@ def _chosen() -> ControllerNode:
 
 def main() -> None:
     """Run the node as a process."""
-    sys.exit(run_node(_chosen, ControllerParameters))
+    sys.exit(run_node(_chosen, ControllerChoice()))
 
 
 if __name__ == "__main__":

@@ -45,7 +45,7 @@ class PlantNode(ManagedNode[PlantParameters]):
     """Publishes joint_states and receives control_force; a pacer drives one sampled loop."""
 
     def __init__(self, **options: Any) -> None:
-        super().__init__("plant", PlantParameters, **options)
+        super().__init__("plant", PlantParameters(), **options)
         self._next_start = LOCKSTEP_START
         self._has_started = False
         self.elapsed = 0.0
@@ -125,7 +125,7 @@ class PlantNode(ManagedNode[PlantParameters]):
 
     def _warn_of_friction(self) -> None:
         """Log what a user of the friction law should know, once."""
-        warning = self.parameters.friction.as_law().warning()
+        warning = self.parameters.friction.selected.warning()
         if warning is not None and warning != self._warned:
             self.get_logger().warning(warning)
         self._warned = warning
@@ -256,7 +256,7 @@ def _packed(sample: Sample) -> bytes:
 
 def main() -> None:
     """Run the node as a process."""
-    sys.exit(run_node(PlantNode, PlantParameters))
+    sys.exit(run_node(PlantNode, PlantParameters()))
 
 
 if __name__ == "__main__":

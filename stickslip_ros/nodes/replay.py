@@ -41,7 +41,7 @@ class ReplayNode(ManagedNode[ReplayParameters]):
     """Publishes the topics of a bag under their recorded names."""
 
     def __init__(self, **options: Any) -> None:
-        super().__init__("replay", ReplayParameters, **options)
+        super().__init__("replay", ReplayParameters(), **options)
         self._player: Player | None = None
         self._waiting_for = ""
 
@@ -244,7 +244,7 @@ class _OneReplay(ReplayNode):
 
 def main() -> None:
     """Run the node as a process."""
-    sys.exit(run_node(ReplayNode, ReplayParameters))
+    sys.exit(run_node(ReplayNode, ReplayParameters()))
 
 
 if __name__ == "__main__":

@@ -9,7 +9,6 @@ import numpy as np
 from stickslip_ros.identification.findings import Findings
 from stickslip_ros.identification.fit import QUANTILE, Candidate, Estimate
 from stickslip_ros.plots.units import SI
-from stickslip_ros.scenarios.parameter_field import parameters_of
 from stickslip_ros.scenarios.parameters import PlantParameters
 from stickslip_ros.tables import TextTable
 
@@ -35,7 +34,7 @@ def identification_tables(
     `own` is what the model predicts of the first recording that it was fitted to, `checks` of
     others; `notes` are sentences on both.
     """
-    units = {each.name: each.unit or "" for each in parameters_of(PlantParameters)}
+    units = {each.name: each.unit or "" for each in PlantParameters().known.values()}
     rows = [
         [
             f"plant.{name}",

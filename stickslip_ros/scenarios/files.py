@@ -3,7 +3,7 @@
 from collections.abc import Generator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Self
 
@@ -13,11 +13,9 @@ from stickslip_ros.physics.measures.cycle_measures import CycleMeter
 from stickslip_ros.physics.measures.drift import resolved
 from stickslip_ros.physics.measures.sample_meter import SampleAssumptions, varies
 from stickslip_ros.physics.model.control import ControlLaw
-from stickslip_ros.quantities import QUANTITY, number_of
 from stickslip_ros.scenarios import DEFAULT_NAMESPACE, ros_yaml
 from stickslip_ros.scenarios.foreign_laws import CONTROLLERS
-from stickslip_ros.scenarios.keywords import described
-from stickslip_ros.scenarios.parameter_field import known_parameters
+from stickslip_ros.scenarios.keywords import described, in_own_unit, override, plain
 from stickslip_ros.scenarios.parameters import (
     CONTROLLER_PARAMETERS,
     DEFAULT_LAW,
@@ -29,7 +27,6 @@ from stickslip_ros.scenarios.parameters import (
 )
 from stickslip_ros.scenarios.ros_yaml import PARAMETERS_KEY, LineError
 from stickslip_ros.scenarios.sections import ScenarioFile, read_file
-from stickslip_ros.scenarios.validation import ParameterGroup
 from stickslip_ros.tables import TextTable
 from stickslip_ros.text import did_you_mean
 
@@ -100,7 +97,7 @@ class Scenario:
     @property
     def control_law(self) -> ControlLaw | None:
         """Control law with its constants; None without control."""
-        return self.controller.as_law() if self.plant.expects_control else None
+        return self.controller.control_law if self.plant.expects_control else None
 
     @property
     def reading(self) -> SampleAssumptions:
@@ -119,7 +116,7 @@ class Scenario:
             Number of the last cycles.
         """
         meter, reading = CycleMeter(cycles), self.reading
-        meter.drift.resolution = step = self.plant.as_sensor().position_resolution
+        meter.drift.resolution = step = self.plant.sensor.position_resolution
         meter.drift.judged = not reading.varies
         meter.within = max(resolved(step), reading.within)
         return meter
@@ -145,7 +142,9 @@ class Scenario:
     @property
     def controller_names(self) -> list[str]:
         """Constants of the control law, as NODE.PARAMETER."""
-        return [f"{self.controller.node}.{name}" for name in self.controller.law_names()]
+        return [
+            f"{self.controller.node}.{name}" for name in self.controller.control_law.constants()
+        ]
 
     def as_dict(self) -> dict[str, dict[str, Any]]:
         """Return the parameters of every node.
@@ -165,7 +164,7 @@ class Scenario:
             for name, why in getattr(self, node).unused().items()
         }
         if not self.plant.expects_control:
-            known = known_parameters(type(self.controller))
+            known = self.controller.known
             for name, value in self.controller.flat().items():
                 if [value] != [known[name].default]:
                     name = f"{self.controller.node}.{name}"
@@ -192,13 +191,15 @@ class Scenario:
         """
         return self._changed(values, {})
 
-    def overridden(self, overrides: Sequence[str]) -> Self:
+    def overridden(self, overrides: Sequence[str], values: Mapping[str, Any] | None = None) -> Self:
         """Return the scenario with further overrides.
 
         Parameters
         ----------
         overrides : Sequence[str]
             Texts NODE.PARAMETER=VALUE, the value written as in a scenario file.
+        values : Mapping[str, Any], optional
+            Further values by NODE.PARAMETER, which act after the texts.
 
         Returns
         -------
@@ -211,15 +212,21 @@ class Scenario:
             If a name is unknown, a value is not allowed, or a parameter has no effect.
         """
         given: dict[str, Any] = {}
-        sources: dict[str, str] = {}
-        for override in overrides:
-            node, parameter, value = parse_override(override)
+        for text in overrides:
+            node, parameter, value = parse_override(text)
             given[f"{node}.{parameter}"] = value
-            sources[node] = f"{sources.get(node, f'{self.path} with')} {override:.80}"
+        texts = [*overrides]
+        for name, value in (values or {}).items():
+            given[name] = in_own_unit(name, plain(value))
+            texts.append(override(name, plain(value)))
+        sources: dict[str, str] = {}
+        for text in texts:
+            node = text.partition(".")[0]
+            sources[node] = f"{sources.get(node, f'{self.path} with')} {text:.80}"
         changed = self._changed(given, {node: f"{each}, {node}" for node, each in sources.items()})
         for reason in (why for name, why in changed.unused().items() if name in given):
             raise InvalidInputError(reason)
-        last = {text.partition("=")[0]: text for text in (*self.overrides, *overrides)}
+        last = {text.partition("=")[0]: text for text in (*self.overrides, *texts)}
         return replace(
             changed,
             overrides=tuple(last.values()),
@@ -248,7 +255,7 @@ class Scenario:
         if known_law(law) == self.controller.law:
             return self
         others = {**self.other_controllers, self.controller.law: self.controller}
-        controller = others.pop(law, None) or CONTROLLER_PARAMETERS[law]()
+        controller = others.pop(law, None) or CONTROLLER_PARAMETERS[law]
         overrides = [
             each for each in self.overrides if not each.startswith(f"{self.controller.node}.")
         ]
@@ -266,28 +273,24 @@ class Scenario:
             name = f"{other.node}.force_limit"
             if name in self.sources and own not in self.sources:
                 sources = {**self.sources, own: self.sources[name]}
-                return replace(self.changed({own: other.as_law().force_limit}), sources=sources)
+                return replace(self.changed({own: other.control_law.force_limit}), sources=sources)
         return self
-
-    def _parameters_of(self, node: str) -> ParameterGroup:
-        """Return the parameters of a node; refuse those of a controller that is not in use."""
-        if node not in self.nodes:
-            raise InvalidInputError(
-                f"{node}: is not the controller in use, which is {self.controller.node}"
-            )
-        return getattr(self, node)
 
     def _changed(self, values: Mapping[str, Any], sources: Mapping[str, str]) -> Self:
         """Return the scenario with other values; `sources` names their source by node."""
         by_node: dict[str, dict[str, Any]] = {}
         for target, value in values.items():
             node, _, parameter = target.partition(".")
-            by_node.setdefault(node, {})[parameter] = value
+            absolute = _absolute(node, parameter, value, Path())
+            by_node.setdefault(node, {})[parameter] = absolute
         own = self.controller.node
         changes: dict[str, Any] = {}
         for node, new in by_node.items():
-            absolute, source = _absolute(node, new, Path()), sources.get(node, node)
-            changed = self._parameters_of(node).changed(absolute, source)
+            if node not in self.nodes:
+                raise InvalidInputError(
+                    f"{node}: is not the controller in use, which is {self.controller.node}"
+                )
+            changed = getattr(self, node).changed(new, sources.get(node, node))
             changes["controller" if node == own else node] = changed
         return replace(self, **changes)
 
@@ -413,20 +416,16 @@ def load_scenario(
     values: dict[str, dict[str, Any]] = {node: {} for node in NODE_PARAMETERS}
     sources: dict[str, str] = {}
     other_sections: list[str] = []
-
-    def set_value(file: ScenarioFile, node: str, name: str, value: Any) -> None:
-        values[node][name] = _absolute(node, {name: value}, file.path.parent)[name]
-        sources[f"{node}.{name}"] = FILE if file is files[0] else BASE
-        if file.path not in given:
-            NODE_PARAMETERS[node].check_bounds(name, value)
-
     for file in files[::-1]:
         with _contents_kept(file.path, given):
-            other_sections = file.apply(
-                partial(set_value, file), namespace, other_nodes=other_nodes
-            )
+            found, other_sections = file.values(namespace, other_nodes=other_nodes)
+            for node, name, value in found:
+                values[node][name] = _absolute(node, name, value, file.path.parent)
+                sources[f"{node}.{name}"] = FILE if file is files[0] else BASE
+                if file.path not in given:
+                    NODE_PARAMETERS[node].check_bounds(name, value)
     models: dict[str, Any] = {
-        node: NODE_PARAMETERS[node].validated(parameters, f"{path}, {node}")
+        node: NODE_PARAMETERS[node].changed(parameters, f"{path}, {node}")
         for node, parameters in values.items()
         if parameters or node in ("plant", controller_node(law), "analyzer")
     }
@@ -468,15 +467,11 @@ def _contents_kept(path: Path, given: Sequence[Path | None]) -> Generator[None]:
         ) from None
 
 
-def _absolute(node: str, values: Mapping[str, Any], folder: Path) -> dict[str, Any]:
-    """Return values of a node with absolute paths for those relative to a folder."""
-    known = known_parameters(NODE_PARAMETERS[node])
-    return {
-        name: str((folder / value).absolute())
-        if name in known and known[name].file and value and isinstance(value, str)
-        else value
-        for name, value in values.items()
-    }
+def _absolute(node: str, name: str, value: Any, folder: Path) -> Any:
+    """Return a value; a path that is relative to a folder as an absolute one."""
+    known = NODE_PARAMETERS[node].known
+    is_path = name in known and known[name].file and value and isinstance(value, str)
+    return str((folder / value).absolute()) if is_path else value
 
 
 def known_law(name: str) -> str:
@@ -548,30 +543,24 @@ def _path_of_base(file: ScenarioFile) -> Path | None:
         raise InvalidInputError(f"{file.path}: base: {error}") from None
 
 
-def parse_override(override: str) -> tuple[str, str, Any]:
+def parse_override(text: str) -> tuple[str, str, Any]:
     """Return node, parameter and value of a text NODE.PARAMETER=VALUE.
 
     The value is not checked. Raises InvalidInputError for an unknown node or parameter.
     """
-    target, equals, text = override.partition("=")
+    target, equals, written = text.partition("=")
     node, _, parameter = target.partition(".")
-    known = [
-        f"{node}.{name}"
-        for node, model in NODE_PARAMETERS.items()
-        for name in known_parameters(model)
-    ]
-    given = f"{override:.80}"
+    known = [f"{node}.{name}" for node, model in NODE_PARAMETERS.items() for name in model.known]
+    given = f"{text:.80}"
     if equals and target in known:
-        value, its = ros_yaml.parse(text, f"{given}: the value"), described(target)
-        if its.kind is float and isinstance(value, str) and QUANTITY.fullmatch(value):
-            value = number_of(target, value, its.unit)
-        return node, parameter, value
+        value = ros_yaml.parse(written, f"{given}: the value")
+        return node, parameter, in_own_unit(target, value)
     if not equals or not parameter:
         meant = did_you_mean(target, known, "as in plant.belt_speed=0.2")
         raise InvalidInputError(f"{given}: must be NODE.PARAMETER=VALUE; {meant}")
     if node not in NODE_PARAMETERS:
         meant = did_you_mean(node, NODE_PARAMETERS)
         raise InvalidInputError(f"{given}: unknown node {node:.80}; {meant}")
-    every = f"{node} has {', '.join(sorted(known_parameters(NODE_PARAMETERS[node])))}"
+    every = f"{node} has {', '.join(sorted(NODE_PARAMETERS[node].known))}"
     meant = did_you_mean(target, known, every)
     raise InvalidInputError(f"{given}: unknown parameter {parameter:.80}; {meant}")

@@ -8,11 +8,10 @@ from math import inf, isinf
 from typing import Any, Generic, TypeVar, cast
 
 from stickslip_ros.errors import InvalidInputError, in_words
-from stickslip_ros.physics.model.constants import Constant, constants_of
+from stickslip_ros.physics.model.constants import LARGEST, SMALLEST, Parameter, constants_of
 from stickslip_ros.physics.model.control import CONTROL_LAWS, ControlLaw
 from stickslip_ros.physics.model.friction import LAWS, CurveFollower, FrictionLaw
 from stickslip_ros.scenarios.law_trial import try_control_law, try_friction_law
-from stickslip_ros.scenarios.parameter_field import LARGEST, SMALLEST
 from stickslip_ros.scenarios.validation import ParameterGroup
 
 _Law = TypeVar("_Law", bound=FrictionLaw | ControlLaw)
@@ -109,7 +108,7 @@ class LawFamily(Generic[_Law]):
             raise ValueError(refusal)
         return law
 
-    def _check_constant(self, constant: Constant) -> None:
+    def _check_constant(self, constant: Parameter) -> None:
         name, default = constant.name, constant.default
         if name in self.reserved or name.startswith("_") or not name.isascii():
             raise InvalidInputError(
@@ -131,7 +130,7 @@ class LawFamily(Generic[_Law]):
                         f"as in law {law.name}, or have another name"
                     )
 
-    def _check_default(self, constant: Constant, default: Any) -> None:
+    def _check_default(self, constant: Parameter, default: Any) -> None:
         least = max(constant.at_least, SMALLEST if constant.positive else -LARGEST)
         number = isinstance(default, int if constant.whole else int | float)
         if not number or not (least <= default <= LARGEST or (isinf(default) and default > 0.0)):
@@ -145,7 +144,17 @@ FRICTION_LAWS = LawFamily(
     "stickslip_ros.friction_laws",
     FrictionLaw,
     LAWS,
-    reserved={"law", "curve", "as_law", "file", "reverse", *dir(ParameterGroup)},
+    reserved={
+        "law",
+        "curve",
+        "file",
+        "points",
+        "reverse",
+        "selected",
+        "names",
+        "given",
+        *dir(ParameterGroup),
+    },
     one_namespace=True,
     trial=try_friction_law,
 )
@@ -154,7 +163,7 @@ CONTROLLERS = LawFamily(
     ControlLaw,
     CONTROL_LAWS,
     reserved={
-        "law", "node", "reference", "as_law", "reference_group", "as_controller", "law_names",
+        "law", "node", "reference", "control_law", "as_controller",
         "autostart", "wait_for", "use_sim_time",
         *dir(ParameterGroup),
     },
@@ -179,7 +188,7 @@ def add_laws_of_other_packages() -> None:
         family.add(entry, package)
 
 
-def _one_for_all(constant: Constant) -> Mapping[str, str]:
+def _one_for_all(constant: Parameter) -> Mapping[str, str]:
     """Return what must be the same for all constants of one name, in words."""
     bounds = [f"at least {constant.at_least:g}"] if constant.at_least > -inf else []
     bounds += ["above 0"] if constant.positive else []

@@ -2,21 +2,20 @@
 
 import re
 from collections.abc import Iterator
-from dataclasses import replace
-from math import isnan, nan
-from typing import Annotated, Any, Self
+from dataclasses import dataclass, field, make_dataclass, replace
+from functools import cached_property
+from math import nan
+from typing import Any, Self
 
-from pydantic import (
-    AfterValidator,
-    PrivateAttr,
-    ValidationInfo,
-    ValidatorFunctionWrapHandler,
-    create_model,
-    field_validator,
-    model_validator,
+from typing_extensions import override
+
+from stickslip_ros.physics.model.constants import (
+    Changes,
+    Parameter,
+    constant,
+    constants_of,
+    described_by,
 )
-
-from stickslip_ros.physics.model.constants import Constant, constants_of
 from stickslip_ros.physics.model.friction import (
     LAWS,
     CurveFollower,
@@ -26,131 +25,130 @@ from stickslip_ros.physics.model.friction import (
 )
 from stickslip_ros.scenarios.curve_file import Pairs, read_curve
 from stickslip_ros.scenarios.foreign_laws import FRICTION_LAWS, add_laws_of_other_packages
-from stickslip_ros.scenarios.parameter_field import Fixed, field, field_of, known_parameters
-from stickslip_ros.scenarios.validation import ParameterGroup, refused
+from stickslip_ros.scenarios.validation import ParameterGroup
 from stickslip_ros.text import shown
 
-_AS_FORWARD = nan
-"""Value of a constant of backward slip that is the one of forward slip."""
 
-
-def _known_curve(name: str) -> str:
-    if name in _known_curves():
-        return name
-    if _known_law(name):
-        raise refused(f"law {name} has a memory: a curve must be a static law")
-    return name
-
-
-def _known_curves() -> list[str]:
-    """Return the names of the laws that a law with a memory can follow."""
-    return [
-        name for name, law in LAWS.items() if not law.states and not issubclass(law, CurveFollower)
-    ]
-
-
-def _known_law(name: str) -> str:
-    if name in LAWS:
-        return name
-    if name in FRICTION_LAWS.refused:
-        raise refused(FRICTION_LAWS.refused[name])
-    raise ValueError(f"no law {name}")
-
-
-def _constants_of_laws(*, reverse: bool = False) -> dict[str, Any]:
-    """Return a field for each constant of the laws that is one number, by name."""
-    described = _reverse_field_of if reverse else field_of
-    laws: dict[str, list[str]] = {}
-    constants: dict[str, Constant] = {}
+def _constants_of_laws(*, reverse: bool = False) -> Any:
+    """Return a group of the constants of the laws that are one number, in one direction of slip."""
+    users: dict[str, list[str]] = {}
+    found: dict[str, Parameter] = {}
     for law in LAWS.values():
-        for name, constant in constants_of(law).items():
-            if isinstance(constant.default, tuple):
-                continue
-            if reverse and (constant.whole or name in law.direction_independent):
-                continue
-            constants.setdefault(name, constant)
-            laws.setdefault(name, []).append(law.name)
-    return {
-        name: described(constant, [] if name in constants_of(FrictionLaw) else laws[name])
-        for name, constant in constants.items()
-    }
-
-
-def _reverse_field_of(constant: Constant, laws: list[str]) -> Any:
-    """Return type and description of the parameter for a constant of backward slip."""
-    meaning = f"{constant.meaning.removesuffix('.')}, for v_r < 0."
-    return field_of(replace(constant, default=_AS_FORWARD, meaning=meaning), laws)
+        for name, each in constants_of(law).items():
+            directed = not (each.whole or name in law.direction_independent)
+            if not isinstance(each.default, tuple) and (directed or not reverse):
+                found.setdefault(name, each)
+                users.setdefault(name, []).append(law.name)
+    described: list[tuple[str, Any, Any]] = []
+    for name, each in found.items():
+        meaning = each.meaning.removesuffix(".") + (", for v_r < 0" if reverse else "")
+        if name not in constants_of(FrictionLaw):
+            meaning += f" ({', '.join(users[name])})"
+        own = replace(each, meaning=f"{meaning}.")
+        if reverse:
+            own = replace(own, default=nan, unset="as forward")
+        described.append((name, Any, described_by(own)))
+    return make_dataclass("_Constants", described, bases=(ParameterGroup,), frozen=True)
 
 
 def _curve(direction: str = "") -> Any:
-    return field(
+    return constant(
         "",
         f"CSV file of relative speeds (m/s, from 0 on) and coefficients{direction} (table).",
-        fixed=Fixed.RUNNING,
+        changes=Changes.AT_START,
         file=True,
     )
 
 
 add_laws_of_other_packages()
 
+_FOLLOWERS = [name for name, law in LAWS.items() if issubclass(law, CurveFollower)]
+_CURVES = [name for name, law in LAWS.items() if not law.states and name not in _FOLLOWERS]
+"""The laws that a law with a memory can follow."""
 
-class ReverseFriction(
-    create_model("_Reverse", __base__=ParameterGroup, **_constants_of_laws(reverse=True))
-):
+
+@dataclass(frozen=True)
+class ReverseFriction(_constants_of_laws(reverse=True)):
     """Coefficients of backward slip, v_r < 0, where they differ from those of forward slip."""
 
     file: str = _curve(" for v_r < 0; empty: as forward")
+    points: Pairs = ()
+    """What is in the file of a table."""
 
-    @field_validator("*", mode="wrap")
-    @classmethod
-    def _as_forward(cls, value: Any, handler: ValidatorFunctionWrapHandler) -> Any:
-        """Take nan, which no bounds allow, as one object: groups of parameters then compare."""
-        return _AS_FORWARD if isinstance(value, float) and isnan(value) else handler(value)
+    @property
+    def given(self) -> dict[str, Any]:
+        """The coefficients and the file that are not as those of forward slip, by name."""
+        values = ((name, getattr(self, name)) for name in self.known)
+        return {name: value for name, value in values if value == value and value != ""}
 
-    def __setstate__(self, state: dict[Any, Any]) -> None:
-        super().__setstate__(state)
-        values = self.__dict__
-        values |= {name: _AS_FORWARD for name, value in values.items() if value != value}
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, ReverseFriction):
+            return NotImplemented
+        return (self.given, self.points) == (other.given, other.points)
+
+    def __hash__(self) -> int:
+        return hash((self.points, *self.given.items()))
 
 
+@dataclass(frozen=True)
 class _ChosenLaw(ParameterGroup):
-    law: Annotated[str, AfterValidator(_known_law)] = field(
-        "stribeck", "Friction law.", choices=LAWS
-    )
-    curve: Annotated[str, AfterValidator(_known_curve)] = field(
+    law: str = constant("stribeck", "Friction law.", choices=LAWS, refused=FRICTION_LAWS.refused)
+    curve: str = constant(
         "exponential",
-        "Static law that a law with a memory has in steady slip "
-        f"({', '.join(name for name, law in LAWS.items() if issubclass(law, CurveFollower))}).",
-        choices=_known_curves(),
+        f"Static law that a law with a memory has in steady slip ({', '.join(_FOLLOWERS)}).",
+        choices=_CURVES,
+        refused={
+            **{
+                name: f"law {name} has a memory: a curve must be a static law"
+                for name in LAWS
+                if name not in _CURVES
+            },
+            **FRICTION_LAWS.refused,
+        },
     )
 
 
-class Friction(create_model("_Constants", __base__=_ChosenLaw, **_constants_of_laws())):
+@dataclass(frozen=True)
+class Friction(_constants_of_laws(), _ChosenLaw):
     """Friction law and its coefficients; each law uses those of its formula."""
 
     file: str = _curve()
-    reverse: ReverseFriction = ReverseFriction()
+    reverse: ReverseFriction = field(default_factory=ReverseFriction)
+    points: Pairs = ()
+    """What is in the file of a table."""
 
-    _law: FrictionLaw = PrivateAttr()
+    @override
+    def completed(self, prefix: str, curves: dict[str, Pairs]) -> Self:
+        in_use = any(issubclass(kind, Table) for kind in self._kinds())
+        if in_use and not self.file:
+            raise ValueError(
+                f"{prefix}file = {shown(self.file)} is refused: must be the path of a CSV file for "
+                f"law {Table.name}"
+            )
 
-    @model_validator(mode="after")
-    def _constants_fit_together(self, info: ValidationInfo) -> Self:
-        """Refuse constants that the law refuses, under their names as parameters."""
-        for kind in self._kinds():
-            if issubclass(kind, Table) and not self.file:
-                raise ValueError(
-                    f"friction.file = {shown(self.file)} is refused: must be the path of a CSV "
-                    f"file for law {kind.name}"
-                )
-        forward = self._constants(self, "friction", info.context)
-        reverse = self._constants(self.reverse, "friction.reverse", info.context)
+        def read(group: Any, name: str) -> Any:
+            own = in_use and group.file
+            pairs = read_curve(f"{prefix}{name}", group.file, _refusal, curves) if own else ()
+            return replace(group, points=pairs)
+
+        found = replace(read(self, "file"), reverse=read(self.reverse, "reverse.file"))
+        assert found.selected is not None  # raises ValueError for what does not fit together
+        return found
+
+    @cached_property
+    def selected(self) -> FrictionLaw:
+        """The friction law with its constants, in SI units.
+
+        Raises ValueError, with the names of the parameters, for constants that the law refuses.
+        """
+        forward, reverse = self._given(self), self._given(self.reverse)
 
         def make() -> FrictionLaw:
-            law = self._made(dict(forward))
+            law = self._made(forward)
             return Directional(law, self._made(reverse, law)) if reverse else law
 
         try:
-            self._law = FRICTION_LAWS.made(make, *self._kinds())
+            return FRICTION_LAWS.made(make, *self._kinds())
         except ValueError as refusal:
 
             def parameter(match: re.Match[str]) -> str:
@@ -160,11 +158,6 @@ class Friction(create_model("_Constants", __base__=_ChosenLaw, **_constants_of_l
             names = "|".join(name for kind in self._kinds() for name in kind.constants())
             text = re.sub(rf"\b(reverse\.)?({names}) = ", parameter, str(refusal))
             raise ValueError(text) from None
-        return self
-
-    def as_law(self) -> FrictionLaw:
-        """Return the friction law in SI units."""
-        return self._law
 
     def names(self) -> list[str]:
         """Return the names of the parameters that make the law.
@@ -179,13 +172,14 @@ class Friction(create_model("_Constants", __base__=_ChosenLaw, **_constants_of_l
             if described.simplifies and getattr(self, name) == described.default
         }
         own = [name for name in self._parameters() if name not in simple]
-        return [*own, *(f"reverse.{name}" for name in self._given(self.reverse))]
+        given = [name for name in self._parameters() if name in self.reverse.given]
+        return [*own, *(f"reverse.{name}" for name in given)]
 
+    @override
     def not_used(self) -> Iterator[tuple[str, str]]:
-        """Yield the parameters that the law does not use; see `ParameterGroup.not_used`."""
         law = " with the curve ".join(kind.name for kind in self._kinds())
         used = ("law", *self._parameters())
-        for name in known_parameters(type(self)):
+        for name in self.known:
             own = name.removeprefix("reverse.")
             if own not in used:
                 users = ", ".join(
@@ -201,43 +195,30 @@ class Friction(create_model("_Constants", __base__=_ChosenLaw, **_constants_of_l
     def _parameters(self) -> list[str]:
         return [name for law in self._kinds() for name in law_parameters(law)]
 
+    def _given(self, group: Any) -> dict[str, Any]:
+        """Return what a group gives for the constants of the law, of a table its points."""
+        names = (*self._parameters(), "points")
+        values = {
+            name: getattr(group, name, nan) for name in names if name not in ("curve", "file")
+        }
+        return {name: each for name, each in values.items() if each == each and each != ()}
+
     def _made(self, values: dict[str, Any], law: FrictionLaw | None = None) -> FrictionLaw:
         """Return the law with these constants, and others at their defaults or as in a `law`."""
         kind, *curves = self._kinds()
-        values.pop("curve", None)
-        if curves:
-            (curve,) = curves
-            of_curve = {name: values.pop(name) for name in curve.constants() if name in values}
+        own = dict(values)
+        for curve in curves:
+            of_curve = {name: own.pop(name) for name in curve.constants() if name in own}
             known = law.curve if isinstance(law, CurveFollower) else curve()
-            values["curve"] = replace(known, **of_curve)
-        return kind(**values) if law is None else replace(law, **values)
-
-    def _given(self, group: "Friction | ReverseFriction") -> dict[str, Any]:
-        """Return the values of a group for the parameters of the law, by name."""
-        known = type(group).model_fields
-        values = {name: getattr(group, name) for name in self._parameters() if name in known}
-        return {name: value for name, value in values.items() if value not in ("", _AS_FORWARD)}
-
-    def _constants(
-        self,
-        group: "Friction | ReverseFriction",
-        prefix: str,
-        curves: dict[str, Pairs] | None,
-    ) -> dict[str, Any]:
-        """Return the constants of the law that a group gives, those of a table from its file."""
-        values = self._given(group)
-        if "file" in values:
-            path = values.pop("file")
-            values["points"] = read_curve(f"{prefix}.file", path, _refusal, curves)
-            self._curves[path] = values["points"]
-        return values
+            own["curve"] = replace(known, **of_curve)
+        return kind(**own) if law is None else replace(law, **own)
 
 
 def law_parameters(law: type[FrictionLaw]) -> list[str]:
     """Return the names of the parameters of a friction law, in the group `friction`."""
     if issubclass(law, Table):
         return ["file"]
-    return [name for name in law.constants() if name in Friction.model_fields]
+    return [name for name in law.constants() if name in Friction.__dataclass_fields__]
 
 
 def _refusal(points: Pairs) -> str | None:

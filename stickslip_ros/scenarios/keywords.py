@@ -3,11 +3,13 @@
 import json
 from collections.abc import Mapping, Sequence
 from functools import cache
+from sys import float_info
 from typing import Any
 
 from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.physics.model.constants import Parameter
+from stickslip_ros.quantities import QUANTITY, number_of
 from stickslip_ros.scenarios import ros_yaml
-from stickslip_ros.scenarios.parameter_field import Parameter, known_parameters
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
 from stickslip_ros.text import did_you_mean
 
@@ -20,7 +22,7 @@ def keyword_of(parameter: str) -> str:
 def described(parameter: str) -> Parameter:
     """Return the description of NODE.PARAMETER."""
     node, _, name = parameter.partition(".")
-    return known_parameters(NODE_PARAMETERS[node])[name]
+    return NODE_PARAMETERS[node].known[name]
 
 
 def parameter_of(keyword: str, nodes: Sequence[str]) -> str:
@@ -51,14 +53,33 @@ def parameter_of(keyword: str, nodes: Sequence[str]) -> str:
     return found[0]
 
 
+def plain(value: Any) -> Any:
+    """Return a value as a scenario file has it: a number, a list, or else a text."""
+    value = value.item() if hasattr(value, "item") else value  # a number of numpy's
+    tiny = isinstance(value, float) and 0.0 < abs(value) < float_info.min  # a text to ROS
+    return value if isinstance(value, int | float | list) and not tiny else str(value)
+
+
 def override(parameter: str, value: Any) -> str:
-    """Return the text NODE.PARAMETER=VALUE, the value written as in a scenario file."""
-    return f"{parameter}={_written(value)}"
+    """Return the text NODE.PARAMETER=VALUE, the plain value written as in a scenario file."""
+    if isinstance(value, float):
+        return f"{parameter}={value!r}"
+    text = value if isinstance(value, str) else json.dumps(value)
+    try:
+        quoted = isinstance(value, str) and not (
+            text.isprintable() and ros_yaml.parse(text, "") == text
+        )
+    except InvalidInputError:
+        quoted = True
+    return f"{parameter}={json.dumps(text) if quoted else text}"
 
 
-def overrides_of(values: Mapping[str, Any], nodes: Sequence[str]) -> list[str]:
-    """Return the texts NODE.PARAMETER=VALUE for values by keyword."""
-    return [override(parameter_of(keyword, nodes), value) for keyword, value in values.items()]
+def in_own_unit(parameter: str, value: Any) -> Any:
+    """Return a value for NODE.PARAMETER; of a text with a unit the number in the parameter's."""
+    its = described(parameter)
+    if its.kind is float and isinstance(value, str) and QUANTITY.fullmatch(value):
+        return number_of(parameter, value, its.unit)
+    return value
 
 
 @cache
@@ -66,23 +87,8 @@ def _parameters(nodes: tuple[str, ...]) -> Mapping[str, tuple[str, ...]]:
     """Return NODE.PARAMETER of each keyword."""
     found: dict[str, tuple[str, ...]] = {}
     for node in nodes:
-        for name in known_parameters(NODE_PARAMETERS[node]):
+        for name in NODE_PARAMETERS[node].known:
             parameter = f"{node}.{name}"
             keyword = keyword_of(parameter)
             found[keyword] = (*found.get(keyword, ()), parameter)
     return found
-
-
-def _written(value: Any) -> str:
-    if hasattr(value, "item"):  # a number of numpy's
-        value = value.item()
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, int | float):
-        return repr(value)
-    text = str(value)
-    try:
-        plain = text.isprintable() and ros_yaml.parse(text, "") == text
-    except InvalidInputError:
-        plain = False
-    return text if plain else json.dumps(text)

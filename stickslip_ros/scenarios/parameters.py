@@ -6,26 +6,34 @@ models. The nested field `friction.static` is the ROS parameter of that name.
 
 import re
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import fields
-from math import isinf, pi, sqrt
+from dataclasses import dataclass, field, replace
+from functools import cache
+from math import inf, isinf, pi, sqrt
 from typing import TYPE_CHECKING, Any, Literal, Self
 
-from pydantic import create_model, model_validator
 from typing_extensions import override
 
 from stickslip_ros.physics.loop.controller import Controller
 from stickslip_ros.physics.loop.sampled_loop import LOCKSTEP_START, SampledLoop
 from stickslip_ros.physics.measures.sample_meter import SampleAssumptions, reading_of
-from stickslip_ros.physics.model.actuator import Actuator
-from stickslip_ros.physics.model.constants import constants_of
+from stickslip_ros.physics.model.actuator import IDEAL_ACTUATOR, Actuator
+from stickslip_ros.physics.model.constants import (
+    SMALLEST,
+    Changes,
+    Parameter,
+    constant,
+    constants_of,
+    described_by,
+    parameters_of,
+)
 from stickslip_ros.physics.model.control import CONTROL_LAWS, ControlLaw
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.sensor import Sensor
+from stickslip_ros.physics.model.sensor import EXACT_SENSOR, Sensor
 from stickslip_ros.physics.model.signals import SignalKind
 from stickslip_ros.scenarios import Pace
+from stickslip_ros.scenarios.curve_file import Pairs
 from stickslip_ros.scenarios.foreign_laws import CONTROLLERS
 from stickslip_ros.scenarios.friction_parameters import Friction
-from stickslip_ros.scenarios.parameter_field import SMALLEST, Fixed, field, field_of
 from stickslip_ros.scenarios.signal_parameters import (
     BeltParameters,
     DisturbanceParameters,
@@ -40,35 +48,36 @@ if TYPE_CHECKING:
 
 _SHORTEST = 1e-3
 """Shortest time-out or period of a node, s."""
-_OF_DRIVE = [each.name for each in fields(Drive) if each.type is float]
+_OF_DRIVE = constants_of(Drive)
 """Parameters of the plant that the drive takes unchanged."""
-_DEFAULTS = {each.name: each.default for each in fields(Drive)}
-"""Defaults of the drive; only constants that may be absent have one."""
 _NAME = "[A-Za-z_][A-Za-z0-9_]*"
 _NODE_NAME = re.compile(f"/?({_NAME}/)*{_NAME}")
 
 
+@dataclass(frozen=True)
 class Initial(ParameterGroup):
     """State of the slide at the first sample."""
 
-    position: float = field(0.0, "Initial displacement of the slide.", "m")
-    velocity: float = field(0.0, "Initial velocity of the slide.", "m/s")
+    position: float = constant(0.0, "Initial displacement of the slide.", "m")
+    velocity: float = constant(0.0, "Initial velocity of the slide.", "m/s")
 
 
+@dataclass(frozen=True)
 class NodeParameters(ParameterGroup):
     """Parameters that every node has."""
 
-    autostart: bool = field(True, "Configure and activate the node at start.", fixed=Fixed.ACTIVE)
-    wait_for: list[str] = field(
+    autostart: bool = constant(
+        True, "Configure and activate the node at start.", changes=Changes.AT_REST
+    )
+    wait_for: list[str] = constant(
         [],
         "Nodes that must subscribe to this node's topics before it activates.",
-        fixed=Fixed.ACTIVE,
+        changes=Changes.AT_REST,
     )
-    use_sim_time: bool = field(False, "Take ROS time from /clock.")
+    use_sim_time: bool = constant(False, "Take ROS time from /clock.")
 
-    @model_validator(mode="after")
-    def _names_are_possible(self) -> Self:
-        """Refuse to wait for an invalid node name."""
+    @override
+    def completed(self, prefix: str, curves: dict[str, Pairs]) -> Self:
         if not all(_NODE_NAME.fullmatch(name) for name in self.wait_for):
             raise ValueError(
                 f"wait_for = {shown(self.wait_for)} is refused: must be names of nodes, "
@@ -77,158 +86,135 @@ class NodeParameters(ParameterGroup):
         return self
 
 
-def _group_of(part: type, fixed: Fixed) -> type[ParameterGroup]:
-    """Return the parameters for the constants of a part of the plant."""
-    constants = constants_of(part).items()
-    described: dict[str, Any] = {name: field_of(each, fixed=fixed) for name, each in constants}
-    return create_model(part.__name__, __base__=ParameterGroup, **described)
-
-
-class SensorParameters(_group_of(Sensor, Fixed.ACTIVE)):
-    """Constants of the sensor."""
-
-    @model_validator(mode="after")
-    def _constants_fit_together(self) -> Self:
-        """Refuse constants that the sensor refuses."""
-        refusal = Sensor(**dict(self)).refusal()
-        if refusal is not None:
-            raise ValueError(f"sensor.{refusal}")
-        return self
-
-    @override
-    def not_used(self) -> Iterator[tuple[str, str]]:
-        if not Sensor(**dict(self)).spans:
-            yield "difference_samples", "by the velocity exact; difference uses it"
-
-
-class ActuatorParameters(_group_of(Actuator, Fixed.NEVER)):
-    """Constants of the actuator."""
-
-
+@dataclass(frozen=True)
 class PlantParameters(NodeParameters):
     """Parameters of the plant node."""
 
-    mass: float = field(1.0, "Mass of the slide.", "kg", ge=SMALLEST)
-    damping: float = field(0.02, "Viscous damping of the transmission.", "N s/m", ge=0.0)
-    stiffness: float = field(
-        1.0, "Stiffness of the transmission; 0 for an axis that no spring holds.", "N/m", ge=0.0
+    mass: float = described_by(_OF_DRIVE["mass"])
+    damping: float = described_by(_OF_DRIVE["damping"])
+    stiffness: float = described_by(_OF_DRIVE["stiffness"])
+    normal_force: float = described_by(_OF_DRIVE["normal_force"])
+    belt_speed: float = described_by(_OF_DRIVE["belt_speed"])
+    bias_force: float = described_by(_OF_DRIVE["bias_force"])
+    friction: Friction = field(default_factory=Friction)
+    initial: Initial = field(default_factory=Initial)
+    rate: float = constant(
+        100.0, "Samples per second.", "Hz", changes=Changes.AT_REST, at_least=1e-6, at_most=1e9
     )
-    normal_force: float = field(
-        1.0, "Force that presses the slide onto the belt.", "N", ge=SMALLEST
-    )
-    belt_speed: float = field(0.4, "Speed of the belt (feed speed), positive or negative.", "m/s")
-    bias_force: float = field(0.0, "Constant force on the slide, such as an offset.", "N")
-    friction: Friction = Friction()
-    initial: Initial = Initial()
-    rate: float = field(100.0, "Samples per second.", "Hz", fixed=Fixed.ACTIVE, ge=1e-6, le=1e9)
-    pace: Pace = field(
+    pace: Pace = constant(
         Pace.LOCKSTEP,
         "Pace of the samples: by the clock (realtime), or after each answer (lockstep).",
-        choices=Pace,
-        strict=False,
-        fixed=Fixed.ACTIVE,
+        changes=Changes.AT_REST,
     )
-    real_time_factor: float = field(
-        1.0, "Simulated time divided by wall time (realtime).", fixed=Fixed.ACTIVE, ge=SMALLEST
+    real_time_factor: float = constant(
+        1.0,
+        "Simulated time divided by wall time (realtime).",
+        changes=Changes.AT_REST,
+        positive=True,
     )
-    force_delay: float = field(
-        0.0, "Delay from a sample to the start of its force.", "s", fixed=Fixed.ACTIVE, ge=0.0
+    force_delay: float = constant(
+        0.0,
+        "Delay from a sample to the start of its force.",
+        "s",
+        changes=Changes.AT_REST,
+        at_least=0.0,
     )
-    force_jitter: float = field(
-        0.0, "Largest random addition to the delay of a force.", "s", fixed=Fixed.ACTIVE, ge=0.0
+    force_jitter: float = constant(
+        0.0,
+        "Largest random addition to the delay of a force.",
+        "s",
+        changes=Changes.AT_REST,
+        at_least=0.0,
     )
-    force_jitter_seed: int = field(
-        0, "Seed of the random delays.", fixed=Fixed.ACTIVE, ge=0, le=1_000_000_000
+    force_jitter_seed: int = constant(
+        0,
+        "Seed of the random delays.",
+        whole=True,
+        changes=Changes.AT_REST,
+        at_least=0,
+        at_most=1_000_000_000,
     )
-    force_timeout: float = field(
-        0.1, "Age up to which the last force is held (realtime).", "s", fixed=Fixed.ACTIVE, ge=0.0
+    force_timeout: float = constant(
+        0.1,
+        "Age up to which the last force is held (realtime).",
+        "s",
+        changes=Changes.AT_REST,
+        at_least=0.0,
     )
-    reply_timeout: float = field(
+    reply_timeout: float = constant(
         10.0,
         "Longest wall time to wait for a force or the recorder (lockstep).",
         "s",
-        fixed=Fixed.ACTIVE,
-        ge=_SHORTEST,
+        changes=Changes.AT_REST,
+        at_least=_SHORTEST,
     )
-    expects_control: bool = field(
-        True, "Whether the plant expects forces from a controller.", fixed=Fixed.ACTIVE
+    expects_control: bool = constant(
+        True, "Whether the plant expects forces from a controller.", changes=Changes.AT_REST
     )
-    flow_window: int = field(
+    flow_window: int = constant(
         1000,
         "Largest lead of the plant over the recorder (lockstep).",
         "samples",
-        fixed=Fixed.ACTIVE,
-        ge=200,
-        le=4_000,
+        whole=True,
+        changes=Changes.AT_REST,
+        at_least=200,
+        at_most=4_000,
     )
-    duration: float = field(
-        float("inf"),
+    duration: float = constant(
+        inf,
         "Simulated time after which the plant pauses.",
         "s",
-        fixed=Fixed.ACTIVE,
-        ge=0.0,
-        allow_inf_nan=True,
+        changes=Changes.AT_REST,
+        at_least=0.0,
     )
-    publish_clock: bool = field(False, "Publish simulated time on /clock.", fixed=Fixed.CONFIGURED)
-    load: LoadParameters = LoadParameters()
-    belt: BeltParameters = BeltParameters()
-    disturbance: DisturbanceParameters = DisturbanceParameters()
-    sensor: SensorParameters = SensorParameters()
-    actuator: ActuatorParameters = ActuatorParameters()
-    publish_truth: bool = field(
+    publish_clock: bool = constant(
+        False, "Publish simulated time on /clock.", changes=Changes.AT_BUILD
+    )
+    load: LoadParameters = field(default_factory=LoadParameters)
+    belt: BeltParameters = field(default_factory=BeltParameters)
+    disturbance: DisturbanceParameters = field(default_factory=DisturbanceParameters)
+    sensor: Sensor = EXACT_SENSOR
+    actuator: Actuator = IDEAL_ACTUATOR
+    publish_truth: bool = constant(
         False,
         "Publish the true state and the force of the actuator, too.",
-        fixed=Fixed.CONFIGURED,
+        changes=Changes.AT_BUILD,
     )
 
-    @model_validator(mode="after")
-    def _spring_is_none_or_some(self) -> Self:
-        """Refuse a stiffness so small that the scales of the drive overflow."""
-        if 0.0 < self.stiffness < SMALLEST:
+    @override
+    def completed(self, prefix: str, curves: dict[str, Pairs]) -> Self:
+        natural = sqrt(self.stiffness / self.mass) / (2.0 * pi)
+        lowest, _ = self.load.signal(self.period).bounds
+        if 0.0 < self.stiffness < SMALLEST:  # the scales of the drive overflow
             raise ValueError(
                 f"stiffness = {self.stiffness} N/m is refused: must be 0 or at least {SMALLEST:g}"
             )
-        return self
-
-    @model_validator(mode="after")
-    def _delay_is_bounded(self) -> Self:
-        """Refuse a delay of more than a million samples."""
         if (self.force_delay + self.force_jitter) * self.rate > 1e6:
             raise ValueError(
                 f"force_delay = {self.force_delay} s and force_jitter = {self.force_jitter} s "
                 "must not exceed 1e6 periods of rate together"
             )
-        return self
-
-    @model_validator(mode="after")
-    def _samples_are_short(self) -> Self:
-        """Refuse a sampling period of more than a thousand natural periods."""
-        natural = sqrt(self.stiffness / self.mass) / (2.0 * pi)
         if self.rate < natural / 1000.0:
             raise ValueError(
                 f"rate = {self.rate} Hz must be at least a thousandth of the natural frequency, "
                 f"{natural:g} Hz with mass = {self.mass} kg and stiffness = {self.stiffness} N/m"
             )
-        return self
-
-    @model_validator(mode="after")
-    def _slide_stays_on_the_belt(self) -> Self:
-        """Refuse a load that would lift the slide off the belt."""
-        lowest, _ = self.load.signal(self.period).bounds
-        if self.normal_force + lowest < 0.0:
+        if self.normal_force + lowest < 0.0:  # the slide is lifted off the belt
             load = "file" if self.load.kind is SignalKind.TABLE else "amplitude"
             raise ValueError(
                 f"load.{load} = {shown(getattr(self.load, load))} is refused: must leave a normal "
                 f"force of at least 0 N, with normal_force = {self.normal_force} N and a load down "
                 f"to {lowest} N"
             )
-        return self
+        return super().completed(prefix, curves)
 
     @override
     def not_used(self) -> Iterator[tuple[str, str]]:
         if self.pace is Pace.LOCKSTEP:
             yield "real_time_factor", "by the pace lockstep; realtime uses it"
         yield from super().not_used()
+        if not self.sensor.spans:
+            yield "sensor.difference_samples", "by the velocity exact; difference uses it"
 
     @property
     def period(self) -> float:
@@ -243,29 +229,24 @@ class PlantParameters(NodeParameters):
 
     def as_drive(self) -> Drive:
         """Return the drive."""
-        values = {name: getattr(self, name) for name in _OF_DRIVE}
         return Drive(
-            **values,
-            friction=self.friction.as_law(),
+            **{name: getattr(self, name) for name in _OF_DRIVE},
+            friction=self.friction.selected,
             belt=self.belt.signal(self.period),
             load=self.load.signal(self.period),
-            actuator=self.as_actuator(),
+            actuator=self.actuator,
         )
-
-    def as_actuator(self) -> Actuator:
-        """Return the actuator."""
-        return Actuator(**dict(self.actuator))
-
-    def as_sensor(self) -> Sensor:
-        """Return the sensor."""
-        return Sensor(**dict(self.sensor))
 
     def drive_names(self) -> list[str]:
         """Return the flat names of the drive's parameters, with those of its friction law.
 
-        Those at a default of the drive are none of them.
+        Those at a default that simplifies the equations are none of them.
         """
-        own = [name for name in _OF_DRIVE if getattr(self, name) != _DEFAULTS.get(name)]
+        own = [
+            name
+            for name, described in _OF_DRIVE.items()
+            if not (described.simplifies and getattr(self, name) == described.default)
+        ]
         return [*own, "friction.law", *(f"friction.{name}" for name in self.friction.names())]
 
     def as_loop(
@@ -289,48 +270,73 @@ class PlantParameters(NodeParameters):
             hold_late=hold_late,
             expects_control=self.expects_control,
             disturbance=self.disturbance.signal(self.period),
-            sensor=self.as_sensor(),
+            sensor=self.sensor,
             overtaken=overtaken,
             advance=advance,
         )
 
 
+DEFAULT_LAW = next(iter(CONTROL_LAWS))
+"""Control law of a scenario that names none."""
+
+
+@dataclass(frozen=True)
+class ControllerChoice(NodeParameters):
+    """Parameters of a controller node before its law is known."""
+
+    law: str = constant(DEFAULT_LAW, "Control law.", changes=Changes.AT_BUILD, choices=CONTROL_LAWS)
+
+
+@dataclass(frozen=True)
 class ControllerParameters(NodeParameters):
-    """Parameters of a controller node: those of its control law; see `controller_model`."""
+    """Parameters of a controller node: those of every node, and the constants of its control law.
 
-    law: str = field(
-        next(iter(CONTROL_LAWS)), "Control law.", fixed=Fixed.CONFIGURED, choices=CONTROL_LAWS
-    )
+    A constant is also an attribute, such as `linear_gain`.
+    """
 
-    @model_validator(mode="after")
-    def _constants_fit_together(self) -> Self:
-        """Refuse constants that the law refuses."""
-        CONTROLLERS.made(self.as_law, CONTROL_LAWS[self.law])
-        return self
+    control_law: ControlLaw = field(default_factory=CONTROL_LAWS[DEFAULT_LAW])
+    """The control law with its constants."""
+    reference: ReferenceParameters = field(default_factory=ReferenceParameters)
+    """The reference; of kind none for a law that follows none."""
+
+    def __getattr__(self, name: str) -> Any:
+        law = self.__dict__.get("control_law")
+        if law is not None and name in constants_of(type(law)):
+            return getattr(law, name)
+        raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+
+    @property
+    @override
+    def known(self) -> Mapping[str, Parameter]:
+        return _parameters_of_law(type(self.control_law))
+
+    @override
+    def replaced(self, values: Mapping[str, Any]) -> Self:
+        own = {name: each for name, each in values.items() if name in self.__dataclass_fields__}
+        constants = {name: each for name, each in values.items() if name not in own}
+        constants.pop("law", None)
+        law = self.control_law
+        made = CONTROLLERS.made(lambda: replace(law, **constants), type(law))
+        return replace(self, **own, control_law=made)
+
+    @override
+    def not_used(self) -> Iterator[tuple[str, str]]:
+        return super().not_used() if self.control_law.follows_reference else iter(())
+
+    @property
+    def law(self) -> str:
+        """Name of the control law."""
+        return self.control_law.name
 
     @property
     def node(self) -> str:
         """Name of the node and of its section."""
         return controller_node(self.law)
 
-    def as_law(self) -> ControlLaw:
-        """Return the control law with its constants."""
-        known = type(self).model_fields
-        law = CONTROL_LAWS[self.law]
-        return law(**{name: getattr(self, name) for name in law.constants() if name in known})
-
-    @property
-    def reference_group(self) -> ReferenceParameters:
-        """The reference; of kind none for a law that follows none."""
-        return getattr(self, "reference", ReferenceParameters())
-
     def as_controller(self, state: tuple[float, ...] | None = None) -> Controller:
         """Return the controller, with the state of its law at the first sample."""
-        return Controller(self.as_law(), self.reference_group.signal(period=0.0).reference, state)
-
-    def law_names(self) -> list[str]:
-        """Return the names of the constants of the control law."""
-        return CONTROL_LAWS[self.law].constants()
+        follows = self.reference.signal(period=0.0).reference
+        return Controller(self.control_law, follows, state)
 
 
 def controller_node(law: str) -> str:
@@ -338,69 +344,74 @@ def controller_node(law: str) -> str:
     return f"{law}_controller"
 
 
-def controller_model(law: type[ControlLaw]) -> type[ControllerParameters]:
-    """Return the parameters of the controller node of a law."""
+@cache
+def _parameters_of_law(law: type[ControlLaw]) -> Mapping[str, Parameter]:
+    """Return the parameters of the controller node of a law by flat name."""
     described = constants_of(law)
-    own_law = field(
-        law.name, "Control law of the node.", fixed=Fixed.CONFIGURED, choices=[law.name]
+    own_law = replace(
+        ControllerChoice().known["law"],
+        default=law.name,
+        meaning="Control law of the node.",
+        choices=(law.name,),
     )
-    fields: dict[str, Any] = {"law": (Literal[law.name], own_law)}
-    for name in law.constants():
-        if not isinstance(described[name].default, tuple):
-            fields[name] = field_of(described[name])
-    if law.follows_reference:
-        fields["reference"] = ReferenceParameters, ReferenceParameters()
-    title = "".join(word.capitalize() for word in law.name.split("_"))
-    model = create_model(
-        f"{title}ControllerParameters",
-        __base__=ControllerParameters,
-        __module__=__name__,
-        **fields,
+    reference = parameters_of(ReferenceParameters(), "reference.")
+    found = (
+        *parameters_of(NodeParameters()),
+        own_law,
+        *(described[n] for n in law.constants() if not isinstance(described[n].default, tuple)),
+        *(reference if law.follows_reference else ()),
     )
-    model.__doc__ = f"Parameters of the {controller_node(law.name)} node."
-    return model
+    return {parameter.name: parameter for parameter in found}
 
 
+@dataclass(frozen=True)
 class AnalyzerParameters(NodeParameters):
     """Parameters of the analyzer node."""
 
-    bag: str = field("", "Directory to record to; empty: no recording.", fixed=Fixed.ACTIVE)
-    window: int = field(
-        20, "Number of cycles to average.", "cycles", fixed=Fixed.ACTIVE, ge=1, le=100_000
+    bag: str = constant("", "Directory to record to; empty: no recording.", changes=Changes.AT_REST)
+    window: int = constant(
+        20,
+        "Number of cycles to average.",
+        "cycles",
+        whole=True,
+        changes=Changes.AT_REST,
+        at_least=1,
+        at_most=100_000,
     )
-    stick_speed: float = field(
+    stick_speed: float = constant(
         -1.0,
         "Largest relative speed of a slide that sticks; below 0: automatic, that is 0, with "
         "friction with a memory a hundredth of the belt speed, and found by fits under noise.",
         "m/s",
-        fixed=Fixed.ACTIVE,
-        ge=-1.0,
+        changes=Changes.AT_REST,
+        at_least=-1.0,
     )
-    flush_period: float = field(
+    flush_period: float = constant(
         1.0,
         "Longest wall time until a recorded message is on disk.",
         "s",
-        fixed=Fixed.CONFIGURED,
-        ge=_SHORTEST,
+        changes=Changes.AT_BUILD,
+        at_least=_SHORTEST,
     )
-    max_bag_size: int = field(
+    max_bag_size: int = constant(
         0,
         "Size at which the bag continues in a new file; 0: no limit.",
         "bytes",
-        fixed=Fixed.ACTIVE,
-        ge=0,
-        le=2**62,
+        whole=True,
+        changes=Changes.AT_REST,
+        at_least=0,
+        at_most=2**62,
     )
-    max_bag_duration: float = field(
+    max_bag_duration: float = constant(
         0.0,
         "Recorded time at which the bag continues in a new file; 0: no limit.",
         "s",
-        fixed=Fixed.ACTIVE,
-        ge=0.0,
-        le=1e9,
+        changes=Changes.AT_REST,
+        at_least=0.0,
+        at_most=1e9,
     )
-    compression: Literal["lz4", "zstd", "none"] = field(
-        "lz4", "Compression of the bag.", fixed=Fixed.ACTIVE, choices=("lz4", "zstd", "none")
+    compression: Literal["lz4", "zstd", "none"] = constant(
+        "lz4", "Compression of the bag.", changes=Changes.AT_REST, choices=("lz4", "zstd", "none")
     )
 
     @property
@@ -413,56 +424,46 @@ class AnalyzerParameters(NodeParameters):
         return reading_of(plant, fastest_belt, given=self.given_stick_speed)
 
 
+@dataclass(frozen=True)
 class ReplayParameters(NodeParameters):
     """Parameters of the replay node, which scenarios do not contain."""
 
-    bag: str = field(
-        "", "Bag to replay: its directory or one of its files.", fixed=Fixed.CONFIGURED
+    bag: str = constant(
+        "", "Bag to replay: its directory or one of its files.", changes=Changes.AT_BUILD
     )
-    rate: float = field(1.0, "Recorded time divided by wall time.", fixed=Fixed.ACTIVE, ge=SMALLEST)
-    loop: bool = field(False, "Start again at the end of the bag.", fixed=Fixed.ACTIVE)
-    start: float = field(
+    rate: float = constant(
+        1.0, "Recorded time divided by wall time.", changes=Changes.AT_REST, positive=True
+    )
+    loop: bool = constant(False, "Start again at the end of the bag.", changes=Changes.AT_REST)
+    start: float = constant(
         0.0,
         "Recorded time to start at, from the bag's first message.",
         "s",
-        fixed=Fixed.CONFIGURED,
-        ge=0.0,
-        le=1e10,
+        changes=Changes.AT_BUILD,
+        at_least=0.0,
+        at_most=1e10,
     )
-    duration: float = field(
-        float("inf"),
+    duration: float = constant(
+        inf,
         "Recorded time to replay.",
         "s",
-        fixed=Fixed.CONFIGURED,
-        ge=SMALLEST,
-        allow_inf_nan=True,
+        changes=Changes.AT_BUILD,
+        positive=True,
     )
-    topics: list[str] = field(
-        [], "Topics to replay; empty: all topics of the bag.", fixed=Fixed.CONFIGURED
+    topics: list[str] = constant(
+        [], "Topics to replay; empty: all topics of the bag.", changes=Changes.AT_BUILD
     )
-    clock: bool = field(False, "Publish recorded time on /clock.", fixed=Fixed.CONFIGURED)
+    clock: bool = constant(False, "Publish recorded time on /clock.", changes=Changes.AT_BUILD)
 
 
-DEFAULT_LAW = next(iter(CONTROL_LAWS))
-"""Control law of a scenario that names none."""
-
-CONTROLLER_PARAMETERS: dict[str, type[ControllerParameters]] = {
-    name: controller_model(law) for name, law in CONTROL_LAWS.items()
+CONTROLLER_PARAMETERS: dict[str, ControllerParameters] = {
+    name: ControllerParameters(control_law=law()) for name, law in CONTROL_LAWS.items()
 }
-"""The parameter model of the controller node of each control law, by name of the law."""
+"""The parameters of the controller node of each control law at their defaults, by law."""
 
-
-def __getattr__(name: str) -> Any:
-    """Return the model of a controller by the name of its class, as pickle looks for it."""
-    for model in CONTROLLER_PARAMETERS.values():
-        if model.__name__ == name:
-            return model
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-
-
-NODE_PARAMETERS: dict[str, type[NodeParameters]] = {
-    "plant": PlantParameters,
-    **{controller_node(name): model for name, model in CONTROLLER_PARAMETERS.items()},
-    "analyzer": AnalyzerParameters,
+NODE_PARAMETERS: dict[str, NodeParameters] = {
+    "plant": PlantParameters(),
+    **{controller_node(name): each for name, each in CONTROLLER_PARAMETERS.items()},
+    "analyzer": AnalyzerParameters(),
 }
-"""The parameter model of each node, by node name; a run has one of the controllers."""
+"""The parameters of each node at their defaults, by node name; a run has one of the controllers."""

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from math import isfinite
 from typing import Any
 
-from stickslip_ros.scenarios.parameter_field import Parameter, parameters_of
+from stickslip_ros.physics.model.constants import Parameter
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
 from stickslip_ros.scenarios.ros_yaml import PARAMETERS_KEY
 from stickslip_ros.scenarios.sections import BASE_SECTION
@@ -19,7 +19,7 @@ def scenario_schema() -> dict[str, Any]:
     (`friction: {law: ...}`) or flat (`friction.law: ...`), as in ROS.
     """
     sections: dict[str, Any] = {
-        node: _section(_parameters(list(parameters_of(model))))
+        node: _section(_parameters(list(model.known.values())))
         for node, model in NODE_PARAMETERS.items()
     }
     base = {

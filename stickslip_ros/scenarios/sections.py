@@ -1,7 +1,7 @@
 """Reading a scenario file: sections of node name patterns, each with parameters."""
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from io import TextIOWrapper
 from itertools import chain, takewhile
 from pathlib import Path
@@ -10,7 +10,6 @@ from typing import Any, NamedTuple
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.files import open_regular
 from stickslip_ros.scenarios import ros_yaml
-from stickslip_ros.scenarios.parameter_field import known_parameters
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
 from stickslip_ros.scenarios.ros_yaml import PARAMETERS_KEY, LineError
 from stickslip_ros.text import did_you_mean, shown
@@ -20,9 +19,6 @@ _LARGEST = 1_000_000
 """Largest number of characters in a scenario file."""
 BASE_SECTION = "scenario"
 """Last part of the name of the section that names the base and belongs to no node."""
-
-SetValue = Callable[[str, str, Any], None]
-"""Takes node, flat name and value of a parameter."""
 
 
 class ScenarioFile(NamedTuple):
@@ -43,16 +39,19 @@ class ScenarioFile(NamedTuple):
             if "*" not in name and section_matches(pattern, f"{namespace.rstrip('/')}/{name}")
         }
 
-    def apply(self, set_value: SetValue, namespace: str, *, other_nodes: bool) -> list[str]:
-        """Pass each parameter of the nodes in `namespace` to `set_value`.
+    def values(
+        self, namespace: str, *, other_nodes: bool
+    ) -> tuple[list[tuple[str, str, Any]], list[str]]:
+        """Return node, flat name and value of each parameter of the nodes in `namespace`.
 
-        Return the sections of unknown nodes. Raises InvalidInputError for an unknown parameter
+        Also return the sections of unknown nodes. Raises InvalidInputError for an unknown parameter
         and, unless `other_nodes` is set, for an unknown node.
         """
+        found: list[tuple[str, str, Any]] = []
         other_sections: list[str] = []
         for pattern, parameters in self.sections:
             known = {
-                node: known_parameters(model)
+                node: model.known
                 for node, model in NODE_PARAMETERS.items()
                 if section_matches(pattern, f"{namespace.rstrip('/')}/{node}")
             }
@@ -75,9 +74,8 @@ class ScenarioFile(NamedTuple):
                             name, {*chain(*known.values())}, "docs/parameters.md lists all"
                         )
                     )
-                for node in takers:
-                    set_value(node, name, value)
-        return other_sections
+                found += [(node, name, value) for node in takers]
+        return found, other_sections
 
 
 def read_file(path: Path, namespace: str) -> ScenarioFile:

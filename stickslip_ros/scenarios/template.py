@@ -3,9 +3,9 @@
 from collections.abc import Iterator
 from textwrap import wrap
 
+from stickslip_ros.physics.model.constants import Parameter
 from stickslip_ros.scenarios import ros_yaml
 from stickslip_ros.scenarios.files import Scenario
-from stickslip_ros.scenarios.parameter_field import Parameter, parameters_of
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, NodeParameters
 from stickslip_ros.scenarios.ros_yaml import PARAMETERS_KEY
 
@@ -30,10 +30,10 @@ def commented_file(scenario: Scenario, heading: str) -> str:
     return "\n".join(lines) + "\n"
 
 
-def own_first(model: type[NodeParameters]) -> list[Parameter]:
+def own_first(node: NodeParameters) -> list[Parameter]:
     """Return the parameters of a node, those that every node has at the end."""
-    common = NodeParameters.model_fields
-    return sorted(parameters_of(model), key=lambda parameter: parameter.name in common)
+    common = NodeParameters().known
+    return sorted(node.known.values(), key=lambda parameter: parameter.name in common)
 
 
 def _section(parameters: list[Parameter], values: dict[str, object]) -> Iterator[str]:

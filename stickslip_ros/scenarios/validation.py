@@ -1,17 +1,17 @@
-"""Validation of parameters: an error names the parameter, its value and what is allowed."""
+"""Groups of parameters: checked, changed, and given by flat name."""
 
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, fields, replace
 from enum import StrEnum
-from math import inf
+from functools import cache
+from math import inf, isfinite, isnan
 from operator import attrgetter
 from typing import Any, Self
 
-from pydantic import BaseModel, ConfigDict, PrivateAttr, ValidationError
-from pydantic_core import PydanticCustomError
-
 from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.physics.model.constants import LARGEST, SMALLEST, Parameter, parameters_of
 from stickslip_ros.scenarios.curve_file import Pairs
-from stickslip_ros.scenarios.parameter_field import LARGEST, SMALLEST, known_parameters
 from stickslip_ros.text import by_group, did_you_mean, shown
 
 _KIND_NAMES = {
@@ -23,155 +23,192 @@ _KIND_NAMES = {
 }
 
 
-_REFUSED = "refused"
+@dataclass(frozen=True)
+class ParameterGroup:
+    """A group of parameters: those of a node, or a part of them.
 
+    It is made of its defaults, and changed by `changed`, which checks every value.
+    """
 
-def refused(reason: str) -> PydanticCustomError:
-    """Return the error for a value that is refused for a reason other than its bounds."""
-    return PydanticCustomError(_REFUSED, "{reason}", {"reason": reason})
+    @property
+    def known(self) -> Mapping[str, Parameter]:
+        """The parameters by flat name, in order of definition."""
+        return _known(type(self))
 
-
-class ParameterGroup(BaseModel):
-    """A group of parameters: those of a node, or a part of them."""
-
-    model_config = ConfigDict(
-        frozen=True, extra="forbid", strict=True, allow_inf_nan=False, validate_default=True
-    )
-
-    _curves: dict[str, Pairs] = PrivateAttr(default_factory=dict[str, Pairs])
-    """Pairs in the files of this group, by path."""
-
-    @classmethod
-    def validated(
-        cls, values: Mapping[str, Any], source: str, curves: Mapping[str, Pairs] | None = None
+    def changed(
+        self, values: Mapping[str, Any], source: str, curves: Mapping[str, Pairs] | None = None
     ) -> Self:
-        """Return the parameters given by flat name, the others at their defaults.
+        """Return the parameters with others given by flat name.
 
-        Files whose `curves` are given by path are not read. Raises InvalidInputError that names
-        `source`, parameter, value and what is allowed.
+        Only files that are given are read, and of these only files whose `curves` are not given by
+        path. Raises InvalidInputError that names `source`, parameter, value and what is allowed.
         """
-        return cls._validated(values, {}, source, curves)
-
-    def changed(self, values: Mapping[str, Any], source: str) -> Self:
-        """Return the parameters with others given by flat name; see `validated`.
-
-        The groups in which nothing changes are not validated again, and only files that are given
-        are read.
-        """
-        names = {name.partition(".")[0] for name in values}
-        kept: dict[str, Any] = {}
-        given: dict[str, Any] = {}
-        for name, each in self:
-            if not isinstance(each, ParameterGroup):
-                given[name] = each
-            elif name in names:
-                given |= {f"{name}.{inner}": value for inner, value in each.flat().items()}
-            else:
-                kept[name] = each
-        curves = {path: each for path, each in self.curves().items() if path not in values.values()}
-        return self._validated({**given, **values}, kept, source, curves)
-
-    def curves(self) -> dict[str, Pairs]:
-        """Return the pairs in the files that these parameters were made from, by path."""
-        found = dict(self._curves)
-        for _, each in self:
-            if isinstance(each, ParameterGroup):
-                found |= each.curves()
-        return found
-
-    @classmethod
-    def _validated(
-        cls,
-        values: Mapping[str, Any],
-        kept: Mapping[str, Any],
-        source: str,
-        curves: Mapping[str, Pairs] | None = None,
-    ) -> Self:
-        known = known_parameters(cls)
+        known = self.known
         for name, value in values.items():
             if name not in known:
                 raise InvalidInputError(
                     f"{source}: unknown parameter {name:.80} = {shown(value)}; "
                     f"{did_you_mean(name, known, f'known are {by_group(known)}')}"
                 )
-        try:
-            return cls.model_validate({**kept, **_nested(values)}, context=dict(curves or {}))
-        except ValidationError as error:
-            raise InvalidInputError(f"{source}: {_explain(cls, error, values)}") from None
+        complaints: list[str] = []
+        taken: dict[str, Any] = {}
+        for name in (name for name in known if name in values):
+            try:
+                taken[name] = checked(known[name], values[name])
+            except InvalidInputError as error:
+                complaints.append(str(error))
+        if not complaints:
+            kept = {
+                path: each for path, each in self.curves().items() if path not in taken.values()
+            }
+            changed = _changed(self, taken, "", {**kept, **(curves or {})}, complaints)
+            if not complaints:
+                return changed
+        raise InvalidInputError(f"{source}: {'; '.join(complaints)}")
 
-    @classmethod
-    def check_bounds(cls, name: str, value: Any) -> None:
+    def check_bounds(self, name: str, value: Any) -> None:
         """Refuse a value that is out of its own bounds; other parameters do not matter.
 
         Raises InvalidInputError that names parameter, value and what is allowed.
         """
-        if name not in known_parameters(cls):
+        if name not in self.known:
             raise InvalidInputError(f"unknown parameter {name:.80}")
-        try:
-            cls.model_validate(_nested({name: value}))
-        except ValidationError as error:
-            place = tuple(name.split("."))
-            if any(detail["loc"][: len(place)] == place for detail in error.errors()):
-                raise InvalidInputError(_explain(cls, error, {name: value})) from None
+        checked(self.known[name], value)
+
+    def replaced(self, values: Mapping[str, Any]) -> Self:
+        """Return the group with other values of its own fields, by name."""
+        return replace(self, **values)
+
+    def completed(self, prefix: str, curves: dict[str, Pairs]) -> Self:
+        """Return the group with what is in its files; those whose `curves` are known are not read.
+
+        Raises ValueError, with a sentence, if its values do not fit together. `prefix` is what its
+        parameters have before their names.
+        """
+        return self
+
+    def curves(self) -> dict[str, Pairs]:
+        """Return the pairs in the files that these parameters were made from, by path."""
+        own: Any = self
+        found = {own.file: own.points} if getattr(self, "points", ()) else {}
+        for each in fields(self):
+            group = getattr(self, each.name)
+            if isinstance(group, ParameterGroup):
+                found |= group.curves()
+        return found
 
     def flat(self) -> dict[str, Any]:
         """Return the values by flat name, as plain Python types."""
-        values = ((name, attrgetter(name)(self)) for name in known_parameters(type(self)))
+        values = ((name, attrgetter(name)(self)) for name in self.known)
         return {name: str(value) if isinstance(value, StrEnum) else value for name, value in values}
 
     def unused(self) -> dict[str, str]:
         """Return why parameters have no effect, by flat name, of those not at their defaults."""
-        values, known = self.flat(), known_parameters(type(self))
+        values, known = self.flat(), self.known
         return {
             name: f"{name} is not used {why}"
             for name, why in self.not_used()
-            if [values[name]] != [known[name].default]  # of lists, a nan equals itself
+            if not known[name].is_default(values[name])
         }
 
     def not_used(self) -> Iterator[tuple[str, str]]:
         """Yield the parameters that have no effect beside the others, each with the reason."""
-        for group, each in self:
-            if isinstance(each, ParameterGroup):
-                yield from ((f"{group}.{name}", why) for name, why in each.not_used())
+        for each in fields(self):
+            group = getattr(self, each.name)
+            if isinstance(group, ParameterGroup):
+                yield from ((f"{each.name}.{name}", why) for name, why in group.not_used())
 
 
-def _explain(model: type[BaseModel], error: ValidationError, values: Mapping[str, Any]) -> str:
-    """Return one line on the values that are refused and what is allowed."""
-    known = known_parameters(model)
-    complaints: list[str] = []
-    for detail in error.errors():
-        place = [part for part in detail["loc"] if isinstance(part, str)]
-        name = ".".join(place)
-        if name not in known:
-            complaints.append(detail["msg"].removeprefix("Value error, "))
-            continue
-        if detail["type"] == _REFUSED:
-            complaints.append(f"{name} = {shown(detail['input'])} is refused: {detail['msg']}")
-            continue
-        parameter = known[name]
-        allowed = _KIND_NAMES[parameter.kind]
-        if parameter.kind is float and parameter.finite:
-            allowed = "a finite number"
-        value = values.get(name, detail["input"])
-        number = isinstance(value, int | float) and not isinstance(value, bool)
-        extreme = number and (LARGEST < abs(value) < inf or 0 < value < SMALLEST)
-        bounds = parameter.limits if extreme else parameter.bounds
-        if bounds:
-            allowed = bounds if parameter.choices else f"{allowed} {bounds}"
-        unit = f"{'' if bounds else ' in'} {parameter.unit}" if parameter.unit else ""
-        if parameter.unset:
-            unit += f", or nan ({parameter.unset})"
-        text = ", not text" if isinstance(value, str) and parameter.kind is not str else ""
-        complaints.append(f"{name} = {shown(value)} is refused: must be {allowed}{unit}{text}")
-    return "; ".join(complaints)
+@cache
+def _known(kind: type) -> Mapping[str, Parameter]:
+    return {parameter.name: parameter for parameter in parameters_of(kind())}
 
 
-def _nested(values: Mapping[str, Any]) -> dict[str, Any]:
-    nested: dict[str, Any] = {}
+def _changed(
+    part: Any,
+    values: Mapping[str, Any],
+    prefix: str,
+    curves: dict[str, Pairs],
+    complaints: list[str],
+) -> Any:
+    """Return a group, or a part of a drive, with other values; reasons against it are added."""
+    own: dict[str, Any] = {}
+    inner: dict[str, dict[str, Any]] = {}
     for name, value in values.items():
-        *groups, last = name.split(".")
-        group = nested
-        for each in groups:
-            group = group.setdefault(each, {})
-        group[last] = value
-    return nested
+        group, dot, rest = name.partition(".")
+        if dot:
+            inner.setdefault(group, {})[rest] = value
+        else:
+            own[group] = value
+    for group, each in inner.items():
+        own[group] = _changed(getattr(part, group), each, f"{prefix}{group}.", curves, complaints)
+    if complaints and not prefix:
+        return part
+    try:
+        if isinstance(part, ParameterGroup):
+            return part.replaced(own).completed(prefix, curves)
+        changed = replace(part, **own)
+        refusal = changed.refusal() if hasattr(changed, "refusal") else None
+        if refusal is not None:
+            complaints.append(f"{prefix}{refusal}")
+        return changed
+    except ValueError as error:
+        complaints.append(str(error))
+        return part
+
+
+def checked(parameter: Parameter, value: Any) -> Any:
+    """Return the value of a parameter, as its type.
+
+    Raises InvalidInputError that names parameter, value and what is allowed.
+    """
+    kind = parameter.kind
+    if parameter.choices:
+        if isinstance(value, str) and value in parameter.choices:
+            return parameter.choices[parameter.choices.index(value)]
+    elif kind is float:
+        if isinstance(value, int | float) and not isinstance(value, bool):
+            with suppress(OverflowError):
+                number = float(value)
+                if parameter.unset and isnan(number):
+                    return parameter.default
+                if _within(parameter, number):
+                    return number
+    elif kind is int:
+        if isinstance(value, int) and not isinstance(value, bool) and _within(parameter, value):
+            return value
+    elif kind is list:
+        if isinstance(value, list) and all(isinstance(each, str) for each in value):
+            return [*value]
+    elif isinstance(value, kind):
+        return value
+    raise InvalidInputError(_refusal(parameter, value))
+
+
+def _within(parameter: Parameter, number: float) -> bool:
+    least, largest = parameter.least, parameter.largest
+    return (
+        (isfinite(number) or not (parameter.finite or isnan(number)))
+        and (least is None or number >= least)
+        and (largest is None or number <= largest)
+    )
+
+
+def _refusal(parameter: Parameter, value: Any) -> str:
+    """Return one line on a value that is refused and what is allowed."""
+    refused = f"{parameter.name} = {shown(value)} is refused: "
+    if isinstance(value, str) and value in parameter.refused:
+        return refused + parameter.refused[value]
+    kind = parameter.kind
+    allowed = "a finite number" if kind is float and parameter.finite else _KIND_NAMES[kind]
+    extreme = isinstance(value, int | float) and (
+        LARGEST < abs(value) < inf or 0 < value < SMALLEST
+    )
+    bounds = parameter.limits if extreme else parameter.bounds
+    if bounds:
+        allowed = bounds if parameter.choices else f"{allowed} {bounds}"
+    unit = f"{'' if bounds else ' in'} {parameter.unit}" if parameter.unit else ""
+    if parameter.unset:
+        unit += f", or nan ({parameter.unset})"
+    text = ", not text" if isinstance(value, str) and kind is not str else ""
+    return f"{refused}must be {allowed}{unit}{text}"

@@ -22,7 +22,6 @@ from stickslip_ros.physics.theory.linear_sampled_loop import (
 from stickslip_ros.physics.theory.stability_map import StabilityMap
 from stickslip_ros.progress import Progress
 from stickslip_ros.scenarios.files import Scenario, parameter_file
-from stickslip_ros.scenarios.keywords import override
 from stickslip_ros.scenarios.parameters import controller_node
 from stickslip_ros.studies.controller_trial import FILTER_SETTLED, Bench, Outcome, Rest, Vibration
 from stickslip_ros.studies.design_search import (
@@ -98,7 +97,7 @@ class Design:
             f"{scenario.controller.node}.{name}": value for name, value in self._constants.items()
         }
         proposed["plant.belt_speed"] = copysign(min(max(abs(own), low), high), own)
-        return scenario.overridden([override(name, value) for name, value in proposed.items()])
+        return scenario.overridden([], proposed)
 
     @property
     def parameter_file(self) -> str | None:

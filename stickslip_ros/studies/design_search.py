@@ -11,6 +11,7 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.physics.model.constants import LARGEST, SMALLEST
 from stickslip_ros.physics.model.control import Washout
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.drive_system import SPEED
@@ -18,7 +19,6 @@ from stickslip_ros.physics.model.functions import zero_between
 from stickslip_ros.physics.model.sensor import EXACT_SENSOR, Sensor
 from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop, why_no_linear_loop
 from stickslip_ros.scenarios.files import Scenario
-from stickslip_ros.scenarios.parameter_field import LARGEST, SMALLEST
 from stickslip_ros.studies.controller_trial import Vibration
 from stickslip_ros.studies.options import OWN_SPEED_RANGE
 from stickslip_ros.studies.stability import hopf_distance, hopf_ratio, number_text
@@ -104,9 +104,9 @@ class Task:
             plant.as_drive(),
             plant.rate,
             plant.force_delay,
-            min(law.force_limit, plant.as_actuator().limit),
+            min(law.force_limit, plant.actuator.limit),
             (low, high),
-            plant.as_sensor(),
+            plant.sensor,
             scenario,
         )
 

@@ -10,8 +10,8 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.physics.model.constants import Parameter
 from stickslip_ros.quantities import number_of
-from stickslip_ros.scenarios.parameter_field import Parameter, known_parameters
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
 from stickslip_ros.studies.options import Continuation
 from stickslip_ros.text import by_group, did_you_mean, shown
@@ -173,7 +173,7 @@ class Axis:
                 f"{self.parameter:.80}: must be a parameter of {' or '.join(_NODES)}; "
                 + did_you_mean(self.parameter, _numbers(*_NODES), "as in plant.belt_speed")
             )
-        known = known_parameters(NODE_PARAMETERS[node])
+        known = NODE_PARAMETERS[node].known
         if name not in known:
             numbers = by_group(each.partition(".")[2] for each in _numbers(node))
             every = f"numbers of {node} are {numbers}"
@@ -210,7 +210,7 @@ class ListedAxis(Axis):
 def _numbers(*nodes: str) -> Iterator[str]:
     """Yield the parameters of nodes that are numbers, as NODE.PARAMETER."""
     for node in nodes:
-        for name, parameter in known_parameters(NODE_PARAMETERS[node]).items():
+        for name, parameter in NODE_PARAMETERS[node].known.items():
             if parameter.kind in (int, float):
                 yield f"{node}.{name}"
 

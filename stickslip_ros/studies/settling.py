@@ -25,6 +25,7 @@ from stickslip_ros.physics.measures.cycle_measures import (
     Regime,
 )
 from stickslip_ros.physics.measures.sample_meter import MeasuredMotion
+from stickslip_ros.physics.model.constants import constants_of
 from stickslip_ros.physics.model.control import ContinuousControl, ControlLaw
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.motion import RecordedMotion
@@ -100,7 +101,7 @@ class ControlledDrive:
         reference: ReferenceSource = no_reference
         if law is not None and law.follows_reference:
             check_reference(scenario)
-            reference = scenario.controller.reference_group.signal(period=0.0).reference
+            reference = scenario.controller.reference.signal(period=0.0).reference
         loop = plant if sampled else None
         return cls(drive, law, loop, reference, plant.duration, scenario.cycle_meter)
 
@@ -127,7 +128,7 @@ def unit_period(drive: Drive, duration: float) -> float:
 
 def check_reference(scenario: Scenario) -> None:
     """Raise InvalidInputError if the controller needs a reference from a topic."""
-    kind = scenario.controller.reference_group.kind
+    kind = scenario.controller.reference.kind
     if scenario.plant.expects_control and kind == "topic":
         raise InvalidInputError(
             f"{scenario.controller.node}.reference.kind = {kind} is refused: without nodes there "
@@ -144,9 +145,10 @@ def check_continuous(scenario: Scenario) -> None:
             f"the control law {law.name} is defined for samples only: it has no continuous form"
         )
     for group in ("sensor", "actuator"):
-        default = type(getattr(plant, group))().flat()
-        for name, value in getattr(plant, group).flat().items():
-            if value != default[name]:
+        part = getattr(plant, group)
+        for name, described in constants_of(type(part)).items():
+            value = getattr(part, name)
+            if value != described.default:
                 raise InvalidInputError(
                     f"plant.{group}.{name} = {value} is refused: continuous control has no {group}"
                 )

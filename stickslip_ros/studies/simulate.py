@@ -36,7 +36,7 @@ def default_duration(scenario: Scenario) -> float:
 
 def sensor_meter(scenario: Scenario) -> SampleMeter | None:
     """Return what measures the samples that a sensor tells; None with an exact sensor."""
-    if scenario.plant.as_sensor().exact:
+    if scenario.plant.sensor.exact:
         return None
     return SampleMeter(scenario.analyzer.window, reading=scenario.reading)
 

@@ -107,7 +107,7 @@ def stability(scenario: Scenario) -> tuple[Section, Notes]:
         for place in _BY_THIRD_DERIVATIVES:
             if not {place, place.split(".")[0]} & notes.keys():
                 notes[place] = reason
-    ideal = plant.as_sensor().exact and plant.as_actuator() == IDEAL_ACTUATOR
+    ideal = plant.sensor.exact and plant.actuator == IDEAL_ACTUATOR
     if not ideal and "closed_loop" not in notes:
         notes["closed_loop"] = "sensor and actuator are omitted: control is continuous here"
     return found, notes
@@ -118,7 +118,7 @@ def _omitted(plant: PlantParameters) -> list[str]:
     sentences: list[str] = []
     if plant.force_jitter > 0.0:
         sentences.append("force_jitter is omitted: the delay of the force is constant here")
-    sensor, actuator = plant.as_sensor(), plant.as_actuator()
+    sensor, actuator = plant.sensor, plant.actuator
     values = {
         "sensor.position_resolution": sensor.position_resolution,
         "sensor.position_noise": sensor.position_noise,
@@ -291,7 +291,7 @@ def _sampled_loop(
     if law is None:
         notes["sampled_loop"] = _NO_CONTROL
         return dict.fromkeys(_SAMPLED_LOOP)
-    loop = LinearSampledLoop.from_drive(drive, rate, force_delay, plant.as_sensor())
+    loop = LinearSampledLoop.from_drive(drive, rate, force_delay, plant.sensor)
     if loop is None or law.linear_feedback(1.0 / rate) is None:
         reason = why_no_linear_loop(drive, rate, force_delay)
         notes["sampled_loop"] = reason or not_linear(law.name)
@@ -392,15 +392,13 @@ def stability_map(scenario: Scenario) -> tuple[StabilityMap, CriticalGainCurves]
     """
     plant = scenario.plant
     drive, gains = plant.as_drive(), gains_of(scenario.control_law)
-    loop = LinearSampledLoop.from_drive(drive, plant.rate, plant.force_delay, plant.as_sensor())
+    loop = LinearSampledLoop.from_drive(drive, plant.rate, plant.force_delay, plant.sensor)
     assert loop is not None
     assert gains is not None
     rates = plant.rate * np.array((0.1, 0.3, 1.0))
     latest = min(0.2 * drive.natural_period, LONGEST_DELAY / rates.max())
     delays = np.linspace(0.0, latest, 41)
-    curves = CriticalGainCurves.over(
-        drive, gains.corner_frequency, rates, delays, plant.as_sensor()
-    )
+    curves = CriticalGainCurves.over(drive, gains.corner_frequency, rates, delays, plant.sensor)
     return StabilityMap.around(loop, gains), curves
 
 

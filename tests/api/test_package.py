@@ -12,7 +12,7 @@ import pytest
 import stickslip_ros as ss
 
 SOURCE = Path(__file__).parents[2]
-HEAVY = {"numpy", "scipy", "heyoka", "matplotlib", "rclpy", "pydantic", "pandas", "xarray", "yaml"}
+HEAVY = {"numpy", "scipy", "heyoka", "matplotlib", "rclpy", "pandas", "xarray", "yaml"}
 
 
 def loaded_after(code: str) -> set[str]:

@@ -8,14 +8,11 @@ import pytest
 import stickslip_ros as ss
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.scenarios.files import load_scenario
-from stickslip_ros.scenarios.keywords import keyword_of, overrides_of, parameter_of
-from stickslip_ros.scenarios.parameter_field import known_parameters
+from stickslip_ros.scenarios.keywords import keyword_of, parameter_of
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
 from stickslip_ros.studies.study import COLUMNS
 
-EVERY = [
-    f"{node}.{name}" for node, model in NODE_PARAMETERS.items() for name in known_parameters(model)
-]
+EVERY = [f"{node}.{name}" for node, model in NODE_PARAMETERS.items() for name in model.known]
 OF_PAPER = load_scenario("paper").nodes
 SHIPPED = Path(__file__).parents[2] / "config"
 SHARED = {"autostart", "wait_for", "use_sim_time"}
@@ -93,8 +90,8 @@ def test_numbers_of_numpy_are_numbers() -> None:
     found = ss.scenario("paper", belt_speed=np.float64(0.1), window=np.int64(7), mass=2)
     assert (found.plant.belt_speed, found.analyzer.window, found.plant.mass) == (0.1, 7, 2.0)
     assert found.overrides == ("plant.belt_speed=0.1", "analyzer.window=7", "plant.mass=2")
-    limit = "washout_controller.force_limit=inf"
-    assert overrides_of({"force_limit": float("inf")}, OF_PAPER) == [limit]
+    limited = ss.scenario("paper", force_limit=float("inf"))
+    assert limited.overrides == ("washout_controller.force_limit=inf",)
 
 
 def test_a_scenario_can_be_changed_again() -> None:

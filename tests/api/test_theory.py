@@ -50,7 +50,7 @@ def test_a_design_runs_and_keeps_to_its_limit() -> None:
     assert "force_jitter is omitted" in (one.remark or "")
     scenario = one.scenario
     assert scenario.plant.belt_speed == 0.04
-    assert scenario.controller.as_law() == one.controller
+    assert scenario.controller.control_law == one.controller
     assert scenario.washout_controller.force_limit == 200.0
     run = ss.simulate(ss.scenario(scenario, start_after=3.0), duration=8)
     assert run.measures.regime == "equilibrium"

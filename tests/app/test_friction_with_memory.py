@@ -75,5 +75,5 @@ def test_a_sweep_shows_the_hysteresis_of_a_subcritical_hopf_point() -> None:
 def test_the_gains_of_a_design_hold_in_its_trials() -> None:
     proposal = ss.design(ss.scenario(scenario(), expects_control=True), belt_speed=(0.02, 0.05))
     assert (
-        proposal.scenario.controller.as_law().linear_gain < -848.0
+        proposal.scenario.controller.control_law.linear_gain < -848.0
     )  # the critical gain at 40 mm/s

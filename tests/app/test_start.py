@@ -19,16 +19,15 @@ HEAVY = {
     "mcap",
     "numpy",
     "pint",
-    "pydantic",
     "rclpy",
     "rich",
     "scipy",
     "yaml",
 }
 """Packages that take long to import, each more than a tenth of what Python itself takes."""
-READING = {"mcap", "numpy", "pydantic", "yaml"}
+READING = {"mcap", "numpy", "yaml"}
 """What the report of a bag needs."""
-INTEGRATING = {"heyoka", "numpy", "pydantic", "yaml"}
+INTEGRATING = {"heyoka", "numpy", "yaml"}
 """What a simulation needs."""
 
 PROGRAM = """

@@ -12,7 +12,6 @@ from markdown_it import MarkdownIt
 import stickslip_ros
 from stickslip_ros.app.commands import COMMANDS
 from stickslip_ros.app.main import command_parser
-from stickslip_ros.scenarios.parameter_field import known_parameters
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
 from tests.docs.page import CHECKOUT, pages, public_names, spans
 
@@ -63,7 +62,7 @@ def test_the_drawing_of_the_model_is_that_of_the_script() -> None:
 def test_the_model_names_every_parameter_of_the_drive_and_its_controller() -> None:
     named = set(re.findall(r"`(plant|washout_controller)\.([\w.]+)`", text_of("docs/model.md")))
     for node, name in named:
-        assert name in known_parameters(NODE_PARAMETERS[node])
+        assert name in NODE_PARAMETERS[node].known
     drive = {"mass", "damping", "stiffness", "normal_force", "belt_speed"}
     gains = {"corner_frequency", "linear_gain", "cubic_gain"}
     assert {("plant", name) for name in drive} <= named

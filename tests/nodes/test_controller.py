@@ -26,7 +26,7 @@ from stickslip_ros.samples import Reference, Sample
 from stickslip_ros.scenarios.parameters import (
     CONTROLLER_PARAMETERS,
     NODE_PARAMETERS,
-    controller_model,
+    ControllerParameters,
 )
 from tests.nodes.graph import PATIENCE, Graph
 
@@ -57,7 +57,9 @@ def servo() -> Iterator[partial[ControllerNode]]:
     """The node of a law that follows a reference."""
     node = "servo_controller"
     CONTROL_LAWS[Servo.name] = Servo
-    CONTROLLER_PARAMETERS[Servo.name] = NODE_PARAMETERS[node] = controller_model(Servo)
+    CONTROLLER_PARAMETERS[Servo.name] = NODE_PARAMETERS[node] = ControllerParameters(
+        control_law=Servo()
+    )
     try:
         yield partial(ControllerNode, Servo.name)
     finally:
@@ -102,7 +104,7 @@ def test_a_law_has_a_node_of_its_name_and_its_constants_as_parameters(graph: Gra
 
 def test_what_is_no_later_finite_state_is_dropped_and_the_filter_goes_on(graph: Graph) -> None:
     loop = Loop(graph, partial(ControllerNode, "washout"))
-    law = CONTROLLER_PARAMETERS["washout"]().as_controller()
+    law = CONTROLLER_PARAMETERS["washout"].as_controller()
 
     def check(stamp: int, velocity: float) -> None:
         sample = Sample(stamp, 0.0, velocity, 0.0, 0.0, 0.0)

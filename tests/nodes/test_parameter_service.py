@@ -27,18 +27,18 @@ from stickslip_ros.nodes.base.managed import ERROR, ManagedNode
 from stickslip_ros.nodes.plant import PlantNode
 from stickslip_ros.nodes.replay import ReplayNode
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
-from stickslip_ros.scenarios.parameter_field import parameters_of
+from stickslip_ros.physics.model.constants import Changes
 from tests.nodes.graph import Graph
 from tests.scenarios import values
 from tests.scenarios.values import CONFLICTS, MODELS, UNKNOWN, bad_values, good_values
 
 SECOND = 1_000_000_000
 LEFT_OPEN = {
-    "unconfigured": ("", "active", "configured"),
-    "inactive": ("", "active"),
-    "active": ("",),
+    "unconfigured": (Changes.LIVE, Changes.AT_REST, Changes.AT_BUILD),
+    "inactive": (Changes.LIVE, Changes.AT_REST),
+    "active": (Changes.LIVE,),
 }
-"""By state: what is fixed from which state on may still be set."""
+"""By state: which parameters may still be set."""
 NODES: dict[str, type[ManagedNode[Any]]] = {
     "plant": PlantNode,
     "washout_controller": WashoutControllerNode,
@@ -69,7 +69,7 @@ def set_all(graph: Graph, node: str, **changes: Any) -> str:
 
 def told(graph: Graph, node: str) -> dict[str, Any]:
     """Return the node's parameters as it tells them."""
-    names = [parameter.name for parameter in parameters_of(MODELS[node])]
+    names = [parameter.name for parameter in MODELS[node].known.values()]
     request = GetParameters.Request(names=names)
     values = graph.call(GetParameters, f"/test/{node}/get_parameters", request).values
     found = [parameter_value_to_python(value) for value in values]
@@ -95,7 +95,7 @@ def test_bad_values_are_refused_in_every_state_and_change_nothing(graph: Graph, 
     node = graph.add(NODES[name], autostart=False, **given)
     bad = [
         (parameter.name, value)
-        for parameter in parameters_of(MODELS[name])
+        for parameter in MODELS[name].known.values()
         for value in bad_values(parameter)
     ]
     unknown = [item for item in UNKNOWN.items() if item[0] not in told(graph, name)]
@@ -114,11 +114,11 @@ def test_bad_values_are_refused_in_every_state_and_change_nothing(graph: Graph, 
 @pytest.mark.parametrize("name", NODES)
 def test_good_values_are_taken_exactly_in_every_state(graph: Graph, name: str) -> None:
     node = graph.add(NODES[name], autostart=False)
-    known = list(parameters_of(MODELS[name]))
+    known = list(MODELS[name].known.values())
     states = in_turn(node) if name != "replay" else ["unconfigured"]  # it would want a bag
     for state, choice in zip(states, (-1, -2, -1), strict=False):
         start = told(graph, name)
-        settable = {p.name for p in known if p.fixed in LEFT_OPEN[state]}
+        settable = {p.name for p in known if p.changes in LEFT_OPEN[state]}
         changes = [(p.name, good_values(p)[max(choice, -len(good_values(p)))]) for p in known]
         reasons = set_each(graph, name, *changes)
         now = bits(told(graph, name))
@@ -137,7 +137,7 @@ def test_good_values_are_taken_exactly_in_every_state(graph: Graph, name: str) -
 @pytest.mark.parametrize("name", ["plant", "replay"])
 def test_what_ros2_dumps_it_loads_again(graph: Graph, name: str, tmp_path: Path) -> None:
     node = graph.add(NODES[name], autostart=False)
-    given = {p.name: good_values(p)[-1] for p in parameters_of(MODELS[name]) if p.kind is float}
+    given = {p.name: good_values(p)[-1] for p in MODELS[name].known.values() if p.kind is float}
     given |= {"friction.minimum_speed": 1e-5, "friction.minimum": 0.0, "friction.static": 5e-5}
     for choice in ({n: v for n, v in given.items() if n in told(graph, name)}, {}):
         set_each(graph, name, *choice.items())
@@ -197,7 +197,7 @@ def test_ranges_tell_the_bounds_wherever_a_slider_can_show_them(graph: Graph) ->
     }
     for name, some in expected.items():
         graph.add(NODES[name], autostart=False)
-        known = list(parameters_of(MODELS[name]))
+        known = list(MODELS[name].known.values())
         request = DescribeParameters.Request(names=[parameter.name for parameter in known])
         answer = graph.call(DescribeParameters, f"/test/{name}/describe_parameters", request)
         ranges: dict[str, tuple[float, float]] = {}
@@ -214,7 +214,11 @@ def test_one_bad_value_refuses_all(graph: Graph) -> None:
     node = graph.add(PlantNode, autostart=False)
     for _ in in_turn(node):
         before = told(graph, "plant")
-        good = {p.name: good_values(p)[0] for p in parameters_of(MODELS["plant"]) if not p.fixed}
+        good = {
+            p.name: good_values(p)[0]
+            for p in MODELS["plant"].known.values()
+            if p.changes is Changes.LIVE
+        }
         for name, bad in (("mass", 0.0), ("friction.law", "dry"), ("masss", 1.0), ("mass", None)):
             reason = set_all(graph, "plant", **(good | {name: bad}))
             assert f"{name} = {bad!r}" in reason

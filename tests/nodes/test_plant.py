@@ -76,7 +76,7 @@ def test_jittered_forces_act_as_they_do_without_ros_and_overtaken_ones_are_publi
 
     motion = Motion(PlantParameters().as_drive(), 0.0, 0.0)
     loop = SampledLoop(motion, 100.0, SECOND, **network)
-    controller = CONTROLLER_PARAMETERS["washout"]().as_controller()
+    controller = CONTROLLER_PARAMETERS["washout"].as_controller()
     positions = [loop.sample.position]
     for _ in range(300):
         answer(loop, controller)

@@ -13,7 +13,6 @@ import pytest
 from stickslip_ros import nodes
 from stickslip_ros.bags.reader import Recording
 from stickslip_ros.messages.topics import JOINT_STATES
-from stickslip_ros.scenarios.parameter_field import known_parameters
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, ReplayParameters
 from tests.nodes.graph import PATIENCE, Graph
 from tests.nodes.processes import Processes
@@ -116,7 +115,7 @@ def test_help_names_every_parameter(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr("sys.argv", ["node", "--help"])
-    for node, model in {**NODE_PARAMETERS, "replay": ReplayParameters}.items():
+    for node, model in {**NODE_PARAMETERS, "replay": ReplayParameters()}.items():
         name = node if Path(nodes.__path__[0], f"{node}.py").exists() else "controller"
         with pytest.raises(SystemExit) as ended:
             import_module(f"stickslip_ros.nodes.{name}").main()
@@ -124,7 +123,7 @@ def test_help_names_every_parameter(
         assert ended.value.code == 0
         assert "--ros-args" in shown
         if node == name:
-            assert all(f"  {parameter}  (" in shown for parameter in known_parameters(model))
+            assert all(f"  {parameter}  (" in shown for parameter in model.known)
 
 
 FULL = """

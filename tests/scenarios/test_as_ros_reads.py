@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.scenarios.files import load_scenario
-from stickslip_ros.scenarios.parameter_field import known_parameters
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
 from stickslip_ros.scenarios.sections import read_file
 from tests.examples import examples
@@ -24,11 +23,9 @@ def taken(path: str) -> dict[str, dict[str, Any]]:
     """Return the values by node that a scenario file sets itself; raise if it is refused."""
     load_scenario(path)
     values: dict[str, dict[str, Any]] = {node: {} for node in NODE_PARAMETERS}
-
-    def take(node: str, name: str, value: Any) -> None:
+    found, _ = read_file(Path(path), "/feed_drive").values("/feed_drive", other_nodes=False)
+    for node, name, value in found:
         values[node][name] = value
-
-    read_file(Path(path), "/feed_drive").apply(take, "/feed_drive", other_nodes=False)
     return values
 
 
@@ -41,7 +38,7 @@ def test_every_value_is_that_of_ros(tmp_path: Path, read_by_ros: ReadByRos, seed
     except InvalidInputError:
         return
     for node in NODES:
-        known, own = known_parameters(NODE_PARAMETERS[node]), values[node]
+        known, own = NODE_PARAMETERS[node].known, values[node]
         # A section for all has what only one of them knows.
         by_ros = {k: v for k, v in read_by_ros(path, node=node).items() if k in known}
         ours = {name: value for name, value in own.items() if value is not OWN.get(name)}

@@ -5,8 +5,8 @@ from typing import Any
 import pytest
 
 from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.physics.model.constants import Parameter
 from stickslip_ros.scenarios.files import load_scenario, parameter_file
-from stickslip_ros.scenarios.parameter_field import Parameter, parameters_of
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, NodeParameters
 from tests.scenarios.files import refusal, scenario_file
 from tests.scenarios.values import CONFLICTS, MODELS, UNKNOWN, bad_values, bits, good_values
@@ -15,21 +15,21 @@ TEXTS = ["1" + 400 * "0", 5000 * "9", "0x" + 5000 * "f", "1e400", "[1]", "[yes]"
 models = pytest.mark.parametrize("model", MODELS.values(), ids=MODELS.keys())
 
 
-def taken_or_refused(model: type[NodeParameters], name: str, value: Any) -> Any:
+def taken_or_refused(model: NodeParameters, name: str, value: Any) -> Any:
     try:
-        return model.validated({name: value}, "test").flat()[name]
+        return model.changed({name: value}, "test").flat()[name]
     except InvalidInputError as error:
         return str(error)
 
 
 @models
 def test_bad_values_are_refused_with_name_value_and_what_is_allowed(
-    model: type[NodeParameters],
+    model: NodeParameters,
 ) -> None:
-    for parameter in parameters_of(model):
+    for parameter in model.known.values():
         for value in bad_values(parameter):
             with pytest.raises(InvalidInputError) as caught:
-                model.validated({parameter.name: value}, "test")
+                model.changed({parameter.name: value}, "test")
             message = str(caught.value)
             assert message.startswith(f"test: {parameter.name} = {value!r:.80}")
             assert " is refused: must be " in message
@@ -38,19 +38,19 @@ def test_bad_values_are_refused_with_name_value_and_what_is_allowed(
 
 
 @models
-def test_good_values_are_taken_as_they_are(model: type[NodeParameters]) -> None:
-    for parameter in parameters_of(model):
+def test_good_values_are_taken_as_they_are(model: NodeParameters) -> None:
+    for parameter in model.known.values():
         for value in good_values(parameter):
             taken = taken_or_refused(model, parameter.name, value)
             assert bits(taken) == bits(value) or any(each in taken for each in CONFLICTS)
 
 
 @models
-def test_unknown_names_are_refused(model: type[NodeParameters]) -> None:
+def test_unknown_names_are_refused(model: NodeParameters) -> None:
     for name, value in UNKNOWN.items():
-        if name not in {parameter.name for parameter in parameters_of(model)}:
+        if name not in {parameter.name for parameter in model.known.values()}:
             with pytest.raises(InvalidInputError, match="unknown parameter") as caught:
-                model.validated({name: value}, "test")
+                model.changed({name: value}, "test")
             assert len(str(caught.value)) < 1000
 
 
@@ -62,7 +62,7 @@ def test_so_are_they_in_a_file_and_as_an_override(tmp_path: Any, node: str) -> N
         assert " is refused: must be " in message
         assert len(message) < 500
 
-    for number, parameter in enumerate(parameters_of(NODE_PARAMETERS[node])):
+    for number, parameter in enumerate(NODE_PARAMETERS[node].known.values()):
         # ROS reads null as text.
         values = [each for each in bad_values(parameter) if each not in ([b"\1"], [None], None)]
         value = values[number % len(values)]

@@ -45,10 +45,10 @@ def test_a_pattern_for_all_nodes_chooses_none(tmp_path: Path) -> None:
     path = scenario_file(tmp_path, section("/**", "{force_limit: 5.0}"))
     scenario = load_scenario(path)
     assert scenario.controller.law == "washout"
-    assert scenario.controller.as_law().force_limit == 5.0
+    assert scenario.controller.control_law.force_limit == 5.0
     assert scenario.given == {"washout_controller.force_limit"}
     assert "force_limit" in repr(scenario)
-    assert scenario.with_controller("velocity_feedback").controller.as_law().force_limit == 5.0
+    assert scenario.with_controller("velocity_feedback").controller.control_law.force_limit == 5.0
 
 
 def test_sections_of_two_controllers_need_a_choice(tmp_path: Path) -> None:
@@ -110,10 +110,10 @@ def test_the_force_limit_follows_another_law(tmp_path: Path) -> None:
         load_scenario(path, controller="velocity_feedback"),
         scenario.with_controller("velocity_feedback"),
     ):
-        assert other.controller.as_law().force_limit == 120.0
+        assert other.controller.control_law.force_limit == 120.0
         name = "velocity_feedback_controller.force_limit"
         assert name in other.given
         assert name not in other.left_to_defaults
     own = BASE + limited + section("/**/velocity_feedback_controller", "{force_limit: 30.0}")
     other = load_scenario(scenario_file(tmp_path, own), controller="velocity_feedback")
-    assert other.controller.as_law().force_limit == 30.0
+    assert other.controller.control_law.force_limit == 30.0

@@ -25,7 +25,6 @@ from stickslip_ros.scenarios.foreign_laws import (
     add_laws_of_other_packages,
 )
 from stickslip_ros.scenarios.law_trial import try_control_law, try_friction_law
-from stickslip_ros.scenarios.parameter_field import parameters_of
 from stickslip_ros.scenarios.parameters import NodeParameters
 from tests.scenarios.foreign_laws import BRAKE, FALLING, write_package
 
@@ -95,8 +94,8 @@ def test_a_law_of_another_package_is_found_with_its_constants(install: Install) 
     assert list(LAWS)[-1] == "falling"
     falling = LAWS["falling"]
     assert falling.constants() == ("static", "fall")
-    plant = parameters_anew().PlantParameters
-    known = {parameter.name: parameter for parameter in parameters_of(plant)}
+    plant = parameters_anew().PlantParameters()
+    known = {parameter.name: parameter for parameter in plant.known.values()}
     assert known["friction.law"].choices == tuple(LAWS)
     fall = known["friction.fall"]
     assert (fall.unit, fall.default, fall.bounds) == ("s/m", 0.2, "at least 0")
@@ -104,10 +103,10 @@ def test_a_law_of_another_package_is_found_with_its_constants(install: Install) 
     assert known["friction.static"].meaning == "Static (break-away) coefficient mu_s."
 
     given = {"friction.law": "falling", "friction.fall": 0.7}
-    law = plant.validated(given, "test").as_drive().friction
+    law = plant.changed(given, "test").as_drive().friction
     assert law == falling(static=0.4, fall=0.7)
     assert law.coefficient(0.3, 1.0) == Linear(0.4, 0.7).coefficient(0.3, 1.0)
-    both = plant.validated(given | {"friction.reverse.fall": 0.3}, "test").as_drive().friction
+    both = plant.changed(given | {"friction.reverse.fall": 0.3}, "test").as_drive().friction
     assert both == Directional(falling(0.4, fall=0.7), falling(0.4, fall=0.3))
     for name, value, reason in (
         ("fall", 11, "fall = 11.0 must not exceed 10 friction.static = 10.0"),
@@ -115,7 +114,7 @@ def test_a_law_of_another_package_is_found_with_its_constants(install: Install) 
         ("reverse.fall", -1.0, "reverse.fall = -1.0 is refused: must"),
     ):
         with pytest.raises(InvalidInputError) as refused:
-            plant.validated(given | {f"friction.{name}": value}, "test")
+            plant.changed(given | {f"friction.{name}": value}, "test")
         assert str(refused.value).startswith(f"test: friction.{reason}")
 
 
@@ -128,7 +127,7 @@ def test_a_constant_of_several_laws_names_them_all(install: Install) -> None:
         .replace("self.fall", "self.viscous")
     )
     assert FRICTION_LAWS.refused == {}
-    known = {each.name: each for each in parameters_of(parameters_anew().PlantParameters)}
+    known = {each.name: each for each in parameters_anew().PlantParameters().known.values()}
     assert known["friction.kinetic"].meaning == (
         "Kinetic coefficient mu_k (exponential, rate_state, falling)."
     )
@@ -150,12 +149,12 @@ IN_TERMS = (
 def test_whole_numbers_and_tuples_are_constants(install: Install) -> None:
     install(IN_TERMS)
     assert FRICTION_LAWS.refused == {}
-    plant = parameters_anew().PlantParameters
-    known = {parameter.name for parameter in parameters_of(plant)}
+    plant = parameters_anew().PlantParameters()
+    known = {parameter.name for parameter in plant.known.values()}
     assert "friction.terms" in known
     assert known.isdisjoint({"friction.fall", "friction.reverse.fall", "friction.reverse.terms"})
     given = {"friction.law": "falling", "friction.terms": 1, "friction.reverse.static": 0.3}
-    drive = plant.validated(given, "test").as_drive()
+    drive = plant.changed(given, "test").as_drive()
     falling = LAWS["falling"]
     assert drive.friction == Directional(falling(0.4, terms=1), falling(0.3, terms=1))
     assert drive.friction.scaled(2.0).forward == falling(0.4, terms=1, fall=(0.4, 0.2))
@@ -171,7 +170,7 @@ def test_whole_numbers_and_tuples_are_constants(install: Install) -> None:
         (1.5, "friction.terms = 1.5 is refused: must be a whole number at least 1"),
     ):
         with pytest.raises(InvalidInputError) as refused:
-            plant.validated(given | {"friction.terms": value}, "test")
+            plant.changed(given | {"friction.terms": value}, "test")
         assert str(refused.value) == f"test: {reason}"
 
 
@@ -207,7 +206,7 @@ OTHER_CONSTANTS = {
         "kinetic with bounds above 0 and default 0.2: must be at least 0, 0.25 as in law expon"
     ),
     '    law: Any = constant(0.2, "Fall.")': "law: the name cannot be that of a parameter",
-    '    copy: Any = constant(0.2, "Fall.")': "copy: the name cannot",
+    '    flat: Any = constant(0.2, "Fall.")': "flat: the name cannot",
     '    _fall: Any = constant(0.2, "Fall.")': "_fall: the name cannot",
 }
 
@@ -244,10 +243,10 @@ def test_a_law_that_does_not_fit_is_refused(
 
 def test_what_is_refused_is_told_to_who_names_it(install: Install) -> None:
     install(FALLING.replace("FrictionLaw)", "object)"))
-    plant = parameters_anew().PlantParameters  # the others can be used
-    assert plant().friction.law == "stribeck"
+    plant = parameters_anew().PlantParameters()  # the others can be used
+    assert plant.friction.law == "stribeck"
     with pytest.raises(InvalidInputError) as refused:
-        plant.validated({"friction.law": "falling"}, "test")
+        plant.changed({"friction.law": "falling"}, "test")
     whole = "foreign:Falling of package foreign-laws is no class derived from FrictionLaw"
     assert str(refused.value).startswith(f"test: friction.law = 'falling' is refused: {whole}")
 
@@ -325,11 +324,11 @@ def test_what_motion_and_theory_ask_of_a_law_is_tried(
 def test_values_for_which_a_law_fails_are_refused_with_their_names(install: Install) -> None:
     speed = "characteristic_speed = property(lambda self: self.fall)\n\n    def coefficient"
     install(FALLING.replace(STEADY, speed))
-    plant = parameters_anew().PlantParameters
+    plant = parameters_anew().PlantParameters()
     for direction in ("", "reverse."):
         chosen = {"friction.law": "falling", f"friction.{direction}fall": 0.0}
         with pytest.raises(InvalidInputError) as refused:
-            plant.validated(chosen, "test")
+            plant.changed(chosen, "test")
         told = str(refused.value)
         assert told.startswith("test: law falling with ")
         assert "fall=0.0" in told or "friction.fall = 0.0" in told
@@ -371,17 +370,17 @@ def test_the_control_law_of_another_package_has_a_node_with_parameters(install: 
     assert CONTROLLERS.refused == {}
     assert list(CONTROL_LAWS)[-1] == "brake"
     model = parameters_anew().NODE_PARAMETERS["brake_controller"]
-    known = {parameter.name: parameter for parameter in parameters_of(model)}
+    known = {parameter.name: parameter for parameter in model.known.values()}
     assert list(known)[-3:] == ["strength", "force_limit", "start_after"]
     strength = known["strength"]
     assert (strength.unit, strength.default, strength.bounds) == ("N s/m", 1.0, "at least 0")
     assert known["law"].choices == ("brake",)
-    parameters = model.validated({"strength": 3, "force_limit": 0.5}, "test")
+    parameters = model.changed({"strength": 3, "force_limit": 0.5}, "test")
     assert parameters.node == "brake_controller"
     brake: Any = CONTROL_LAWS["brake"]
-    assert parameters.as_law() == brake(strength=3.0, force_limit=0.5)
+    assert parameters.control_law == brake(strength=3.0, force_limit=0.5)
     with pytest.raises(InvalidInputError, match=r"test: strength = 2000000.0 must not exceed 1e6"):
-        model.validated({"strength": 2e6}, "test")
+        model.changed({"strength": 2e6}, "test")
 
 
 def test_control_laws_share_names_of_constants(install: Install) -> None:
@@ -404,7 +403,7 @@ STRENGTH = '    strength: Any = constant(1.0, "Force per velocity", "N s/m", at_
                 f'{STRENGTH}\n    {name}: Any = constant(1.0, "G.")',
                 f"has a constant {name}: ",
             )
-            for name in ("law", *NodeParameters.model_fields, "as_law", "copy")
+            for name in ("law", *NodeParameters().known, "control_law", "flat")
         ),
     ],
 )

@@ -10,7 +10,6 @@ from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.model.constants import constants_of
 from stickslip_ros.physics.model.friction import LAWS, Directional, Exponential, Stribeck, Table
 from stickslip_ros.scenarios.files import load_scenario, parameter_file
-from stickslip_ros.scenarios.parameter_field import known_parameters
 from stickslip_ros.scenarios.parameters import PlantParameters
 from stickslip_ros.scenarios.schema import scenario_schema
 from stickslip_ros.scenarios.template import commented_file
@@ -28,7 +27,7 @@ def curve(tmp_path: Path) -> Path:
 
 
 def test_every_constant_has_one_for_backward_slip() -> None:
-    known = known_parameters(PlantParameters)
+    known = PlantParameters().known
     for law in LAWS.values():
         for constant in constants_of(law).values():
             if constant.whole or constant.name in law.direction_independent:
@@ -65,7 +64,7 @@ def test_a_refusal_names_the_parameter() -> None:
         ("exponent", 0.5, f"exponent = 0.5 {finite} 1"),
     ):
         with pytest.raises(InvalidInputError) as caught:
-            PlantParameters.validated({f"friction.{name}": value}, "test")
+            PlantParameters().changed({f"friction.{name}": value}, "test")
         assert str(caught.value) == f"test: friction.{message}"
 
 
@@ -132,7 +131,7 @@ def test_a_file_of_a_base_is_relative_to_the_base(curve: Path, tmp_path: Path) -
     for friction in (load_scenario(path, each).plant.friction for each in ([], ["plant.rate=9"])):
         assert Path(friction.file).samefile(curve)
         assert Path(friction.file).is_absolute()
-        assert friction.as_law() == Table(POINTS)
+        assert friction.selected == Table(POINTS)
 
 
 def refused(path: Path) -> str:

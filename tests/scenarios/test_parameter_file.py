@@ -42,7 +42,7 @@ def test_no_value_is_taken_for_another(
 
 
 def test_ros_reads_the_same(tmp_path: Path, read_by_ros: ReadByRos) -> None:
-    plant = PlantParameters.validated({"belt_speed": 1e-7, "wait_for": ["analyzer"]}, "test")
+    plant = PlantParameters().changed({"belt_speed": 1e-7, "wait_for": ["analyzer"]}, "test")
     values = plant.flat()
     path = scenario_file(tmp_path, parameter_file({"plant": values, "analyzer": {"wait_for": []}}))
     assert Path(path).read_text().count("wait_for") == 1  # ROS has no empty list

@@ -1,16 +1,16 @@
 """The models of the nodes' parameters, and the values derived from them."""
 
+from dataclasses import FrozenInstanceError
 from math import inf
 from typing import Any
 
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
-from pydantic import ValidationError
 
 from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.physics.model.constants import Changes, Parameter
 from stickslip_ros.physics.model.friction import LAWS
-from stickslip_ros.scenarios.parameter_field import Parameter, parameters_of
 from stickslip_ros.scenarios.parameters import (
     NODE_PARAMETERS,
     ControllerParameters,
@@ -29,21 +29,22 @@ FIXED: dict[str, set[str]] = {
 
 
 def known(node: str) -> dict[str, Parameter]:
-    return {parameter.name: parameter for parameter in parameters_of(NODE_PARAMETERS[node])}
+    return {parameter.name: parameter for parameter in NODE_PARAMETERS[node].known.values()}
 
 
 def test_defaults_and_what_may_change_while_active() -> None:
     """docs/parameters.md has names, units and defaults; test_generated.py compares it."""
     for node, model in NODE_PARAMETERS.items():
-        values, parameters = model().flat(), known(node)
+        values, parameters = model.flat(), known(node)
         for name, parameter in parameters.items():
             assert values[name] == parameter.default or values[name] is parameter.default  # nan
-        fixed = {name for name, parameter in parameters.items() if parameter.fixed}
+        fixed = {
+            name for name, parameter in parameters.items() if parameter.changes is not Changes.LIVE
+        }
         assert fixed >= FIXED[node]
-        made = model()
-        if isinstance(made, ControllerParameters):
-            assert fixed.isdisjoint(made.law_names())
-    assert {p.name for p in known("plant").values() if p.fixed}.isdisjoint(
+        if isinstance(model, ControllerParameters):
+            assert fixed.isdisjoint(model.control_law.constants())
+    assert {p.name for p in known("plant").values() if p.changes is not Changes.LIVE}.isdisjoint(
         PlantParameters().drive_names()
     )
 
@@ -53,31 +54,31 @@ def test_every_friction_law_can_be_chosen_and_made() -> None:
     for name, law in LAWS.items():
         if name == "table":  # it needs a file
             continue
-        plant = PlantParameters.validated({"friction.law": name}, "test")
+        plant = PlantParameters().changed({"friction.law": name}, "test")
         assert type(plant.as_drive().friction) is law
 
 
 def test_a_law_gets_the_constants_of_its_formula() -> None:
     values = {"static": 0.5, "kinetic": 0.3, "decay_speed": 0.07, "viscous": 0.02}
     flat = {f"friction.{name}": value for name, value in values.items()}
-    plant = PlantParameters.validated({"friction.law": "exponential", **flat}, "test")
+    plant = PlantParameters().changed({"friction.law": "exponential", **flat}, "test")
     assert vars(plant.as_drive().friction) == {**values, "exponent": 1.0}
 
 
 def test_the_last_sample_of_a_plant() -> None:
     for duration, rate, last in ((2.0, 100.0, 200), (0.1, 3.0, 0), (inf, 100.0, None)):
-        plant = PlantParameters.validated({"duration": duration, "rate": rate}, "test")
+        plant = PlantParameters().changed({"duration": duration, "rate": rate}, "test")
         assert plant.last_sample == last
 
 
 def test_no_node_is_waited_for_that_cannot_be() -> None:
     for name in ("1bad", "", "a-b", "/", "a//b", "a/", "a/1b", "ä", "a\n"):
         with pytest.raises(InvalidInputError, match=r"test: wait_for = .* must be names of nodes"):
-            PlantParameters.validated({"wait_for": ["plant", name]}, "test")
+            PlantParameters().changed({"wait_for": ["plant", name]}, "test")
 
 
 def test_parameters_cannot_be_assigned() -> None:
-    with pytest.raises(ValidationError):
+    with pytest.raises(FrozenInstanceError):
         PlantParameters().mass = 2.0
 
 
@@ -86,7 +87,7 @@ LIMITED = {"break_away": 0.5, "elements": 3, "exponent": 2.0, "difference_sample
 
 
 @st.composite
-def values_of(draw: st.DrawFn, model: type[NodeParameters]) -> dict[str, Any]:
+def values_of(draw: st.DrawFn, model: NodeParameters) -> dict[str, Any]:
     """Values for some of the parameters, within all bounds."""
     numbers = st.floats(1e-3, 1e3)
     strategies: dict[type, st.SearchStrategy[Any]] = {
@@ -96,7 +97,7 @@ def values_of(draw: st.DrawFn, model: type[NodeParameters]) -> dict[str, Any]:
         str: st.text(),
         list: st.lists(st.from_regex("/?([A-Z]+/)?[a-z_][a-z0-9_]*", fullmatch=True)),
     }
-    parameters = {parameter.name: parameter for parameter in parameters_of(model)}
+    parameters = {parameter.name: parameter for parameter in model.known.values()}
     values: dict[str, Any] = {}
     for name in sorted(draw(st.sets(st.sampled_from(sorted(parameters))))):
         kind, choices = parameters[name].kind, parameters[name].choices
@@ -124,9 +125,9 @@ def test_flat_values_give_the_parameters_again(node: str, data: st.DataObject) -
     values = data.draw(values_of(model))
     delay = values.get("force_delay", 0.0) + values.get("force_jitter", 0.0)
     assume(delay * values.get("rate", 100.0) <= 1e6)
-    parameters = model.validated(values, "test")
+    parameters = model.changed(values, "test")
     flat = parameters.flat()
     assert {name: flat[name] for name in values} == values
     assert set(flat) == set(known(node))
     assert {type(value) for value in flat.values()} <= {bool, int, float, str, list}
-    assert model.validated(flat, "test") == parameters
+    assert model.changed(flat, "test") == parameters

@@ -12,7 +12,7 @@ from tests.scenarios.files import refusal
 
 
 def test_the_plant_has_the_parts_of_its_parameters() -> None:
-    plant = PlantParameters.validated(
+    plant = PlantParameters().changed(
         {
             "sensor.position_resolution": 0.25,
             "sensor.velocity": "difference",
@@ -20,9 +20,9 @@ def test_the_plant_has_the_parts_of_its_parameters() -> None:
         },
         "here",
     )
-    assert PlantParameters().as_sensor() == EXACT_SENSOR
+    assert PlantParameters().sensor == EXACT_SENSOR
     assert PlantParameters().as_drive().actuator == IDEAL_ACTUATOR
-    assert plant.as_sensor() == Sensor(0.25, velocity=MeasuredVelocity.DIFFERENCE)
+    assert plant.sensor == Sensor(0.25, velocity=MeasuredVelocity.DIFFERENCE)
     drive = plant.as_drive()
     assert drive.actuator == Actuator(time_constant=0.5)
     loop = plant.as_loop(Motion(drive, 0.15, 0.3))
@@ -32,7 +32,7 @@ def test_the_plant_has_the_parts_of_its_parameters() -> None:
 
 def test_constants_that_do_not_fit_together_are_refused() -> None:
     for overrides, sentence in (
-        (["sensor.difference_samples=301"], "difference_samples = 301 must not exceed 300"),
+        (["sensor.difference_samples=301"], "a whole number at least 1 and at most 300"),
         (
             ["sensor.velocity=difference", "sensor.velocity_noise=0.1"],
             "sensor.velocity_noise = 0.1 m/s must be 0",

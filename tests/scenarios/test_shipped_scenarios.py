@@ -50,12 +50,12 @@ def test_the_defaults_are_those_of_the_paper() -> None:
     for law in CONTROLLER_PARAMETERS:
         scenario = load_scenario("paper", controller=law)
         for node in scenario.nodes:
-            assert getattr(scenario, node) == NODE_PARAMETERS[node]()
+            assert getattr(scenario, node) == NODE_PARAMETERS[node]
 
 
 def test_the_drive_and_the_controller_of_a_scenario() -> None:
     scenario = load_scenario("feed_drive")
-    drive, washout = scenario.plant.as_drive(), scenario.washout_controller.as_law()
+    drive, washout = scenario.plant.as_drive(), scenario.washout_controller.control_law
     assert (drive.mass, drive.damping, drive.stiffness) == (100.0, 200.0, 1e6)
     assert (drive.normal_force, drive.belt_speed) == (1000.0, 0.04)
     assert vars(drive.friction) == {"static": 0.4, "minimum": 0.25, "minimum_speed": 0.05}
@@ -76,7 +76,7 @@ def test_a_scenario_is_found_in_an_installation(
 def test_the_axis_has_the_gains_of_its_drive() -> None:
     """243.45 V/(m/s), 160.18 1/s and 35.15065 N/V, of at most 10 V, and no spring."""
     axis = load_scenario("axis")
-    law = axis.controller.as_law()
+    law = axis.controller.control_law
     assert law.velocity_gain == pytest.approx(-243.45 * 35.15065, rel=1e-6)
     assert law.position_gain == pytest.approx(160.18 * law.velocity_gain, rel=1e-6)
     assert (law.force_limit, axis.plant.stiffness) == (pytest.approx(10.0 * 35.15065), 0.0)

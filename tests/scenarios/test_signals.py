@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.physics.model.constants import Changes
 from stickslip_ros.physics.model.signals import (
     NO_SIGNAL,
     impulse,
@@ -16,7 +17,6 @@ from stickslip_ros.physics.model.signals import (
     trapezoid,
 )
 from stickslip_ros.scenarios.files import load_scenario
-from stickslip_ros.scenarios.parameter_field import Fixed, known_parameters
 from stickslip_ros.scenarios.parameters import PlantParameters
 from tests.scenarios.files import plant, refusal, scenario_file, section
 
@@ -37,7 +37,7 @@ def test_each_kind_gives_its_signal() -> None:
             "trapezoid": trapezoid(0.5, 1.0, 4.0, 2.0),
         }.items():
             values = {**given, f"{part}.kind": kind, "rate": 50.0}
-            parameters = PlantParameters.validated(values, "test")
+            parameters = PlantParameters().changed(values, "test")
             assert getattr(parameters, part).signal(parameters.period) == signal
             if part != "disturbance":
                 assert getattr(parameters.as_drive(), part) == signal
@@ -126,12 +126,12 @@ def test_a_load_that_lifts_the_slide_is_refused() -> None:
 
 
 def test_when_they_can_be_changed() -> None:
-    known = known_parameters(PlantParameters)
+    known = PlantParameters().known
     for part in ("belt", "load", "disturbance"):
-        assert known[f"{part}.file"].fixed is Fixed.RUNNING
-        assert known[f"{part}.amplitude"].fixed is Fixed.NEVER
-    assert known["belt.kind"].fixed is known["load.kind"].fixed is Fixed.ACTIVE
-    assert known["disturbance.kind"].fixed is Fixed.NEVER
+        assert known[f"{part}.file"].changes is Changes.AT_START
+        assert known[f"{part}.amplitude"].changes is Changes.LIVE
+    assert known["belt.kind"].changes is known["load.kind"].changes is Changes.AT_REST
+    assert known["disturbance.kind"].changes is Changes.LIVE
     for name in ("friction.file", "friction.reverse.file"):
-        assert known[name].fixed is Fixed.RUNNING
+        assert known[name].changes is Changes.AT_START
         assert known[name].file

@@ -59,7 +59,7 @@ def test_without_control_the_controller_has_no_parameters() -> None:
 
 
 def test_a_reference_of_a_step_has_no_frequency() -> None:
-    reference = ReferenceParameters.validated({"kind": "step", "frequency": 2.0}, "a node")
+    reference = ReferenceParameters().changed({"kind": "step", "frequency": 2.0}, "a node")
     assert reference.unused() == {
         "frequency": "frequency is not used by the kind step; kinds that use it: sine, trapezoid"
     }
@@ -86,4 +86,4 @@ def test_a_complete_file_is_taken_whatever_its_law_does_not_use(tmp_path: Path) 
 
 def test_older_values_are_read() -> None:
     values = {**PlantParameters().flat(), "friction.viscous": 5.0, "belt.frequency": 3.0}
-    assert PlantParameters.validated(values, "a bag").friction.viscous == 5.0
+    assert PlantParameters().changed(values, "a bag").friction.viscous == 5.0

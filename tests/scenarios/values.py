@@ -5,10 +5,10 @@ import struct
 from math import inf, nan
 from typing import Any
 
-from stickslip_ros.scenarios.parameter_field import Parameter
+from stickslip_ros.physics.model.constants import Parameter
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, ReplayParameters
 
-MODELS = {**NODE_PARAMETERS, "replay": ReplayParameters}
+MODELS = {**NODE_PARAMETERS, "replay": ReplayParameters()}
 
 OF_EVERY_TYPE: list[Any] = [None, True, 7, 0.5, "no such word", [True], [7], [0.5], [b"\1"]]
 """One value of each type that ROS knows, a list of strings excepted."""

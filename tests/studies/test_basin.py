@@ -96,7 +96,7 @@ def test_under_the_papers_law_everything_leads_to_the_one_attractor() -> None:
 def test_beyond_the_critical_cubic_gain_rest_cycle_and_running_away_coexist() -> None:
     corner = "washout_controller.corner_frequency=0.5"
     drive = paper().plant.as_drive()
-    washout = paper(corner).washout_controller.as_law()
+    washout = paper(corner).washout_controller.control_law
     critical = critical_gains(drive, washout)
     assert critical is not None
     assert critical.cubic is not None

@@ -264,7 +264,7 @@ WASHOUT = Washout(3.0, -2.0, 0.0)
 def test_without_a_scenario_the_parameter_file_has_the_gains_alone(tmp_path: Path) -> None:
     text = Design(FEED, WASHOUT).parameter_file
     assert text is not None
-    assert load_scenario(scenario_file(tmp_path, text)).controller.as_law() == WASHOUT
+    assert load_scenario(scenario_file(tmp_path, text)).controller.control_law == WASHOUT
 
 
 def test_of_a_scenario_it_is_that_scenario_with_the_gains(tmp_path: Path) -> None:
@@ -280,7 +280,7 @@ def test_of_a_scenario_it_is_that_scenario_with_the_gains(tmp_path: Path) -> Non
         read = load_scenario(scenario_file(folder, text))
         assert (read.plant.mass, read.plant.stiffness, read.analyzer.window) == (90.0, 1e6, 7)
         assert read.plant.belt_speed == expected
-        assert read.controller.as_law() == WASHOUT
+        assert read.controller.control_law == WASHOUT
         names = {name for name, value in scenario.as_dict()["plant"].items() if value != []}
         assert all(f'"{name}":' in text for name in names)
 

@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 
 from stickslip_ros.errors import StickslipError
 from stickslip_ros.scenarios.files import Scenario, load_scenario
-from stickslip_ros.scenarios.parameter_field import parameters_of
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
 from stickslip_ros.studies.simulate import simulate
 from tests.examples import examples
@@ -24,7 +23,7 @@ SAMPLES = 100
 @st.composite
 def extremes(draw: st.DrawFn, node: str) -> dict[str, Any]:
     """Values of some parameters of a node, at their bounds more often than not."""
-    known = {parameter.name: parameter for parameter in parameters_of(NODE_PARAMETERS[node])}
+    known = {parameter.name: parameter for parameter in NODE_PARAMETERS[node].known.values()}
     names = draw(st.sets(st.sampled_from(sorted(known)), min_size=1, max_size=5))
     values = {}
     for name in sorted(names):
@@ -38,10 +37,8 @@ def simulated(plant: dict[str, Any], controller: dict[str, Any], continuous: boo
     try:
         scenario: Scenario = replace(
             PAPER,
-            plant=type(PAPER.plant).validated(PAPER.plant.flat() | plant, "plant"),
-            controller=type(PAPER.controller).validated(
-                PAPER.controller.flat() | controller, "controller"
-            ),
+            plant=PAPER.plant.changed(plant, "plant"),
+            controller=PAPER.controller.changed(controller, "controller"),
         )
         duration = min(
             2.0 * scenario.plant.as_drive().natural_period, SAMPLES / scenario.plant.rate

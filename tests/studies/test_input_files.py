@@ -7,7 +7,6 @@ from random import Random
 import pytest
 
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.scenarios.parameter_field import known_parameters
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
 from stickslip_ros.studies import runner
 from stickslip_ros.studies.journal import Journal
@@ -65,7 +64,7 @@ def test_every_parameter_that_names_a_file_is_tried() -> None:
     named = {
         f"{node}.{name}"
         for node, model in NODE_PARAMETERS.items()
-        for name, parameter in known_parameters(model).items()
+        for name, parameter in model.known.items()
         if parameter.file
     }
     assert named == {f"plant.{name}" for name in FILES}

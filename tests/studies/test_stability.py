@@ -13,7 +13,7 @@ from stickslip_ros.physics.theory.linear import expand
 from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop
 from stickslip_ros.plots.study_tables import stability_tables
 from stickslip_ros.scenarios.files import Scenario, load_scenario
-from stickslip_ros.scenarios.parameters import controller_model
+from stickslip_ros.scenarios.parameters import ControllerParameters
 from stickslip_ros.studies.design import Task
 from stickslip_ros.studies.stability import (
     Notes,
@@ -39,7 +39,9 @@ def damped() -> Scenario:
 @pytest.fixture
 def switching(monkeypatch: pytest.MonkeyPatch) -> Scenario:
     monkeypatch.setitem(CONTROL_LAWS, Switching.name, Switching)
-    return replace(load_scenario("feed_drive"), controller=controller_model(Switching)())
+    return replace(
+        load_scenario("feed_drive"), controller=ControllerParameters(control_law=Switching())
+    )
 
 
 def test_velocity_feedback_has_a_theory_without_gains(damped: Scenario) -> None:
@@ -56,7 +58,7 @@ def test_velocity_feedback_has_a_theory_without_gains(damped: Scenario) -> None:
     assert closed["hopf_speeds"][0] < found["open_loop"]["hopf_speeds"][0]
     loop = LinearSampledLoop.from_drive(FEED_DRIVE, 1000.0)
     assert loop is not None
-    assert sampled["spectral_radius"] == loop.spectral_radius(damped.controller.as_law())
+    assert sampled["spectral_radius"] == loop.spectral_radius(damped.controller.control_law)
     assert sampled["decay_rate"] == pytest.approx(-expected[0].real, rel=0.1)
     assert sampled["stable"] is closed["stable"]
     assert all(closed[name] is None for name in GAINS)

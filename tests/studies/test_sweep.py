@@ -36,7 +36,7 @@ def test_over_the_gain_the_vibration_ends_where_theory_has_it() -> None:
     scenario = paper("washout_controller.cubic_gain=0.0")
     found = compute_columns(sweep_study(scenario, [GAIN], continuous=True))
     drive = scenario.plant.as_drive()
-    critical = critical_gains(drive, scenario.washout_controller.as_law())
+    critical = critical_gains(drive, scenario.washout_controller.control_law)
     assert critical is not None
     rests = found.values[GAIN.parameter] < critical.linear
     assert 0 < rests.sum() < GAIN.count

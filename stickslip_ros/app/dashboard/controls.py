@@ -14,12 +14,11 @@ from nicegui.events import GenericEventArguments
 from stickslip_ros.app.dashboard.elements import call, named
 from stickslip_ros.app.dashboard.listener import Answer, ListenerNode
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.model.constants import constants_of
+from stickslip_ros.physics.model.constants import SMALLEST, Changes, Parameter, constants_of
 from stickslip_ros.physics.model.control import CONTROL_LAWS, ControlLaw
 from stickslip_ros.plots.units import Units, plain_name
 from stickslip_ros.quantities import number_of
 from stickslip_ros.scenarios.keywords import described
-from stickslip_ros.scenarios.parameter_field import SMALLEST, Fixed, Parameter, known_parameters
 from stickslip_ros.scenarios.parameters import (
     CONTROLLER_PARAMETERS,
     NODE_PARAMETERS,
@@ -30,7 +29,7 @@ from stickslip_ros.scenarios.parameters import (
 def main_parameters(law: str) -> list[str]:
     """Return the parameters with a slider, as NODE.PARAMETER: belt speed and own gains of a law."""
     common = constants_of(ControlLaw)
-    known = known_parameters(CONTROLLER_PARAMETERS[law])
+    known = CONTROLLER_PARAMETERS[law].known
     own = [
         f"{controller_node(law)}.{name}"
         for name in CONTROL_LAWS[law].constants()
@@ -44,7 +43,7 @@ def other_parameters(law: str) -> list[str]:
     names = [
         f"{node}.{name}"
         for node in ("plant", controller_node(law))
-        for name, parameter in known_parameters(NODE_PARAMETERS[node]).items()
+        for name, parameter in NODE_PARAMETERS[node].known.items()
         if _is_adjustable(parameter)
     ]
     return [name for name in names if name not in main_parameters(law)]
@@ -310,4 +309,4 @@ async def report(answer: Answer, refusal: ui.label) -> None:
 
 
 def _is_adjustable(parameter: Parameter) -> bool:
-    return parameter.kind is float and parameter.fixed is Fixed.NEVER
+    return parameter.kind is float and parameter.changes is Changes.LIVE

@@ -46,7 +46,7 @@ class Frames:
         values = self._listener.parameters["plant"]
         if values is not self._drive_of[0]:
             try:
-                drive = PlantParameters.validated(values, "plant").as_drive() if values else None
+                drive = PlantParameters().changed(values, "plant").as_drive() if values else None
             except InvalidInputError:  # a plant of another version
                 drive = None
             self._drive_of = values, drive

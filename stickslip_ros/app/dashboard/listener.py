@@ -44,7 +44,6 @@ from stickslip_ros.nodes.base.ros_topics import PollingNode, qos_profile, waitin
 from stickslip_ros.nodes.base.spinner import steady_clock
 from stickslip_ros.running.controller_search import DASHBOARD
 from stickslip_ros.samples import ForceColumns, SampleColumns
-from stickslip_ros.scenarios.parameter_field import known_parameters
 from stickslip_ros.scenarios.parameters import (
     CONTROLLER_PARAMETERS,
     DEFAULT_LAW,
@@ -403,7 +402,7 @@ class ListenerNode(PollingNode):
             self._tell(f"{node}: {health.message}")
 
     def _ask_parameters(self, node: str) -> None:
-        names = list(known_parameters(NODE_PARAMETERS[node]))
+        names = list(NODE_PARAMETERS[node].known)
         if node in self._asked_parameters:
             self._asked_parameters[node].close()
         self._asked_parameters[node] = parameters_call(self, node, names, partial(self._know, node))
@@ -415,7 +414,7 @@ class ListenerNode(PollingNode):
     def _allowed(self, node: str, values: Mapping[str, Any]) -> dict[str, Any]:
         """Return the values of known parameters; None for what a node of ours never has."""
         model = NODE_PARAMETERS[node]
-        known = known_parameters(model)
+        known = model.known
         allowed: dict[str, Any] = dict.fromkeys(name for name in values if name in known)
         for name in allowed:
             if not known[name].file or values[name] in ("", *self.readable):

@@ -74,7 +74,7 @@ def bifurcation(plant: Values) -> BifurcationBranches:
 
 def stability_map(plant: Values, law: str, controller: Values) -> StabilityMap:
     """Return the decay rates over the gains, around those in use."""
-    model = CONTROLLER_PARAMETERS[law].validated(controller, law).as_law()
+    model = CONTROLLER_PARAMETERS[law].changed(controller, law).control_law
     gains = gains_of(model)
     if gains is None:
         raise InvalidInputError(f"{why_no_gains(model)}")
@@ -88,7 +88,7 @@ def decay(plant: Values, law: str, controller: Values) -> Decay:
     uncontrolled, slowest = exponents.tolist(), -float(exponents.real.max())
     if not (controller and plant.get("expects_control")):
         return Decay(uncontrolled, slowest, [], None)
-    model = CONTROLLER_PARAMETERS[law].validated(controller, law).as_law()
+    model = CONTROLLER_PARAMETERS[law].changed(controller, law).control_law
     multipliers = np.linalg.eigvals(loop.transition_matrix(model)).astype(complex)
     lasting = multipliers[np.abs(multipliers) > 0.0]
     controlled = (loop.rate * np.log(lasting)).tolist()
@@ -106,13 +106,13 @@ def friction_curve(plant: Values) -> FrictionCurve:
 
 
 def _drive(plant: Values) -> Drive:
-    return PlantParameters.validated(plant, "plant").as_drive()
+    return PlantParameters().changed(plant, "plant").as_drive()
 
 
 def _loop(plant: Values) -> LinearSampledLoop:
-    parameters = PlantParameters.validated(plant, "plant")
+    parameters = PlantParameters().changed(plant, "plant")
     drive, rate, delay = parameters.as_drive(), parameters.rate, parameters.force_delay
-    loop = LinearSampledLoop.from_drive(drive, rate, delay, parameters.as_sensor())
+    loop = LinearSampledLoop.from_drive(drive, rate, delay, parameters.sensor)
     if loop is None:
         raise InvalidInputError(f"{why_no_linear_loop(drive, rate, delay)}")
     return loop

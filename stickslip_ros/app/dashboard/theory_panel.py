@@ -89,7 +89,7 @@ class TheoryPanel:
         law = self._listener.law
         values = self._listener.parameters[controller_node(law)]
         try:
-            return gains_of(CONTROLLER_PARAMETERS[law].validated(values, law).as_law())
+            return gains_of(CONTROLLER_PARAMETERS[law].changed(values, law).control_law)
         except InvalidInputError:  # a controller of another version
             return None
 

@@ -92,17 +92,16 @@ class DroppedMessages:
 
 
 class ManagedNode(PollingNode, ParameterNode[ParametersT], ABC):
-    """A managed (lifecycle) node whose parameters come from one validated model.
+    """A managed (lifecycle) node whose parameters are one group.
 
     A subclass defines in `connect`, and optionally in `start` and `stop`, what it does when it is
     configured, activated and deactivated. An exception there is logged, and the transition fails.
-    `model` is a class of `stickslip_ros.scenarios.parameters`; the options are those of
-    `ParameterNode`.
+    `defaults` are the parameters at their defaults; the options are those of `ParameterNode`.
     """
 
-    def __init__(self, name: str, model: type[ParametersT], **options: Any) -> None:
+    def __init__(self, name: str, defaults: ParametersT, **options: Any) -> None:
         """Make the node; see the class."""
-        super().__init__(name, model, **options)
+        super().__init__(name, defaults, **options)
         self.stopped = Future()
         """Done when the node's process may end; its result is the error that caused it, or None."""
         self.steady_clock = steady_clock(self)

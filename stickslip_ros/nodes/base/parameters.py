@@ -1,4 +1,4 @@
-"""ROS parameters of a node, from one validating model."""
+"""ROS parameters of a node, from a group of parameters."""
 
 from collections.abc import Mapping
 from typing import Any, Generic, TypeVar, cast
@@ -16,9 +16,9 @@ from rclpy.lifecycle import LifecycleNode
 from rclpy.parameter import Parameter
 
 from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.physics.model.constants import Changes
+from stickslip_ros.physics.model.constants import Parameter as ModelParameter
 from stickslip_ros.scenarios import LONGEST_NAMESPACE
-from stickslip_ros.scenarios.parameter_field import Fixed, known_parameters
-from stickslip_ros.scenarios.parameter_field import Parameter as ModelParameter
 from stickslip_ros.scenarios.parameters import NodeParameters
 from stickslip_ros.scenarios.ros_yaml import number_in
 from stickslip_ros.text import shown
@@ -42,18 +42,20 @@ def first_line(error: Exception) -> str:
 
 
 class ParameterNode(LifecycleNode, Generic[ParametersT]):
-    """A lifecycle node with the parameters of a model, fixed in the states that it defines."""
+    """A lifecycle node with a group of parameters, fixed in the states that these say."""
 
     def __init__(
         self,
         name: str,
-        model: type[ParametersT],
+        defaults: ParametersT,
         *,
         context: Context | None = None,
         namespace: str | None = None,
         overrides: Mapping[str, Any] | None = None,
     ) -> None:
         """Declare the parameters: values of the command line, then `overrides` by flat name.
+
+        Others are at their `defaults`.
 
         Raises InvalidInputError for a parameter that is refused.
         """
@@ -77,9 +79,8 @@ class ParameterNode(LifecycleNode, Generic[ParametersT]):
             ) from None
         self.active = False
         """Whether the node is in the state active."""
-        self._model = model
-        self._known = known_parameters(model)
-        self.parameters = self._declare()
+        self._known = defaults.known
+        self.parameters = self._declare(defaults)
         """The parameters in effect."""
 
     @property
@@ -132,13 +133,13 @@ class ParameterNode(LifecycleNode, Generic[ParametersT]):
             result.reason = "; ".join(new)
         return result
 
-    def _declare(self) -> ParametersT:
+    def _declare(self, defaults: ParametersT) -> ParametersT:
         given = {
             name: cast(Parameter, parameter).value
             for name, parameter in self.get_parameters_by_prefix("").items()
             if name not in _OWNED_BY_ROS
         }
-        validated = self._model.validated(given, self.get_fully_qualified_name())
+        validated = defaults.changed(given, self.get_fully_qualified_name())
         for name, parameter in self._known.items():
             if name == "use_sim_time":
                 continue  # declared by rclpy
@@ -154,19 +155,19 @@ class ParameterNode(LifecycleNode, Generic[ParametersT]):
         """Refuse changes of parameters that are fixed in the present state."""
         present = self.parameters.flat()
         states = {
-            Fixed.NEVER: False,
-            Fixed.ACTIVE: self.active,
-            Fixed.CONFIGURED: self.configured,
-            Fixed.RUNNING: True,
+            Changes.LIVE: ("", False),
+            Changes.AT_REST: ("active", self.active),
+            Changes.AT_BUILD: ("configured", self.configured),
+            Changes.AT_START: ("running", True),
         }
         for name, value in values.items():
             if name not in self._known:
                 continue
-            fixed = self._known[name].fixed
-            if states[fixed] and value != present[name]:
+            state, fixed = states[self._known[name].changes]
+            if fixed and value != present[name]:
                 raise InvalidInputError(
                     f"{source}: {name} = {shown(value)} is refused: {name} cannot be changed while "
-                    f"the node is {fixed}, and is {shown(present[name])}"
+                    f"the node is {state}, and is {shown(present[name])}"
                 )
 
     def _as_meant(self, name: str, value: Any) -> Any:

@@ -35,7 +35,7 @@ from stickslip_ros.nodes.base.network import (
 )
 from stickslip_ros.nodes.base.parameters import first_line
 from stickslip_ros.nodes.base.spinner import spin, stop_on_signals
-from stickslip_ros.scenarios.parameter_field import parameters_of
+from stickslip_ros.physics.model.constants import Changes
 from stickslip_ros.scenarios.parameters import NodeParameters
 from stickslip_ros.standard_streams import open_closed_streams
 
@@ -88,17 +88,17 @@ def ros_context(domain: int, arguments: Sequence[str]) -> Generator[Context]:
         rclpy.try_shutdown(context=None if context is rclpy.get_default_context() else context)
 
 
-def run_node(make: Callable[[], ManagedNode[Any]], model: type[NodeParameters]) -> int:
+def run_node(make: Callable[[], ManagedNode[Any]], parameters: NodeParameters) -> int:
     """Run the node that `make` returns as a process, until SIGINT, SIGTERM or SIGHUP.
 
-    `--help` prints the docstring of the module of `make`, and the parameters of `model`. Returns
+    `--help` prints the docstring of the module of `make`, and the `parameters`. Returns
     the exit status: 0 done, 1 the node failed, 2 a parameter or an argument was refused. The reason
     is printed on standard error.
     """
     open_closed_streams()
     parser = argparse.ArgumentParser(
         description=sys.modules[make.__module__].__doc__,
-        epilog=_parameter_help(model),
+        epilog=_parameter_help(parameters),
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument(
@@ -158,14 +158,14 @@ def _this_process_only_here() -> Mapping[str, str]:
     return variables if elsewhere_free else {DISCOVERY_RANGE: "LOCALHOST"}
 
 
-def _parameter_help(model: type[NodeParameters]) -> str:
+def _parameter_help(parameters: NodeParameters) -> str:
     lines = ["parameters:"]
-    for parameter in parameters_of(model):
+    for parameter in parameters.known.values():
         unit, default = f" {parameter.unit}" if parameter.unit else "", parameter.default
         if parameter.unset:
             default, unit = parameter.unset, f";{unit}" if unit else ""
         bounds = f"; {parameter.bounds}" if parameter.bounds else ""
-        when = f"; set {parameter.fixed.changes}" if parameter.fixed else ""
+        when = "" if parameter.changes is Changes.LIVE else f"; set {parameter.changes}"
         lines.append(f"  {parameter.name}  (default {default}{unit}{bounds}{when})")
         lines.append(f"      {parameter.meaning}")
     return "\n".join(lines)

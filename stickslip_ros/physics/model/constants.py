@@ -1,16 +1,21 @@
-"""The constants of a part of a drive: their description, their units, and symbols for them."""
+"""The description of a parameter; units of the constants of a drive, and symbols for them."""
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from enum import StrEnum
 from functools import cache
-from math import inf
+from math import ceil, inf, isinf, isnan
 from typing import Any, TypeVar
 
 _Part = TypeVar("_Part")
 
+SMALLEST, LARGEST = 1e-30, 1e30
+"""Magnitudes, in SI units, between which no product or power in the physics overflows."""
+
 _KEY = "constant"
+_UNTOLD = (LARGEST, 2**62)
+"""Limits that only a mistake exceeds: tables and messages omit them."""
 
 _BASE_UNITS: Mapping[str, tuple[int, int, int]] = {
     "m": (1, 0, 0),
@@ -20,30 +25,102 @@ _BASE_UNITS: Mapping[str, tuple[int, int, int]] = {
     "Hz": (0, -1, 0),
     "rad": (0, 0, 0),
     "1": (0, 0, 0),
+    "samples": (0, 0, 0),
+    "cycles": (0, 0, 0),
+    "bytes": (0, 0, 0),
 }
 """Powers of length, time and force in each unit."""
 
 
+class Changes(StrEnum):
+    """When a parameter can be changed, in words."""
+
+    LIVE = "at any time"
+    AT_REST = "while inactive"
+    AT_BUILD = "before configured"
+    AT_START = "at the start of the node"
+
+
 @dataclass(frozen=True)
-class Constant:
-    """Description of one constant."""
+class Parameter:
+    """Description of one parameter: of a constant of a part, or of an option of a node."""
 
     name: str
-    """Name of the field."""
-    default: float | tuple[float, ...] | StrEnum
-    """Default value; a member of the enumeration where the constant is a choice."""
+    """Name of the field; of a parameter of a node the flat name, such as friction.static."""
+    default: Any
+    """Default value; a tuple of numbers for a table."""
     meaning: str
     """Meaning, as a sentence."""
-    unit: str | None
+    unit: str | None = None
     """Unit, such as "N s/m"; None for a pure number."""
-    at_least: float
+    at_least: float = -inf
     """Smallest allowed value."""
-    positive: bool
+    at_most: float = inf
+    """Largest allowed value."""
+    positive: bool = False
     """Whether the value must be above zero."""
     whole: bool = False
-    """Whether it is a whole number that makes the equations, such as a number of elements."""
+    """Whether it is a whole number; one that makes the equations, such as a number of elements."""
     simplifies: bool = False
     """Whether whole values stay numbers in the equations, such as an exponent of 1."""
+    changes: Changes = Changes.LIVE
+    """When it can be changed."""
+    choices: tuple[str, ...] = ()
+    """Allowed values of a text; empty: any."""
+    refused: Mapping[str, str] = field(default_factory=dict[str, str])
+    """Reasons against some values of a text, by value."""
+    unset: str = ""
+    """Meaning of nan, in words; empty: nan is refused."""
+    file: bool = False
+    """Whether it is the path of a file, or empty."""
+
+    @property
+    def kind(self) -> type:
+        """Type: bool, int, float, str or list (of str)."""
+        if isinstance(self.default, bool | str | list):
+            return type(self.default)
+        return int if self.whole else float
+
+    @property
+    def finite(self) -> bool:
+        """Whether a number must be finite."""
+        return self.kind is not float or not isinf(self.default)
+
+    @property
+    def least(self) -> float | None:
+        """Smallest value of a number, if it has one."""
+        least = max(self.at_least, SMALLEST if self.positive else -inf)
+        if least == -inf:
+            return -LARGEST if self.kind is float and self.finite else None
+        return ceil(least) if self.whole else least
+
+    @property
+    def largest(self) -> float | None:
+        """Largest value of a number, if it has one."""
+        if self.at_most == inf:
+            return LARGEST if self.kind is float and self.finite else None
+        return self.at_most
+
+    @property
+    def bounds(self) -> str:
+        """Allowed values in words, without the limits that only a mistake exceeds; empty: any."""
+        return self._in_words(self._told).replace(f"at least {SMALLEST:g}", "above 0")
+
+    @property
+    def limits(self) -> str:
+        """Allowed values in words, with these limits."""
+        return self._in_words(self._limits)
+
+    @property
+    def range(self) -> tuple[float, float] | None:
+        """Smallest and largest value, if the parameter has both and at least one is its own."""
+        ends = tuple(self._limits.values())
+        # nan is in no range.
+        return ends if self._told and len(ends) == 2 and not self.unset else None
+
+    def is_default(self, value: Any) -> bool:
+        """Return whether a value is the default; nan is nan."""
+        return value == self.default or (value != value and self.default != self.default)
 
     def stays(self, value: Any) -> bool:
         """Return whether a value stays a number in the symbolic equations.
@@ -61,30 +138,57 @@ class Constant:
         number = isinstance(value, int | float)
         return self.whole or (self.simplifies and number and float(value).is_integer())
 
+    def text(self, value: Any) -> str:
+        """Return a value for a reader: nan as its meaning."""
+        return self.unset if self.unset and isnan(value) else str(value)
+
+    @property
+    def _limits(self) -> dict[str, float]:
+        limits = {"at least": self.least, "at most": self.largest}
+        return {word: limit for word, limit in limits.items() if limit is not None}
+
+    @property
+    def _told(self) -> dict[str, float]:
+        return {word: each for word, each in self._limits.items() if abs(each) not in _UNTOLD}
+
+    def _in_words(self, limits: Mapping[str, float]) -> str:
+        if self.choices:
+            return f"one of {', '.join(self.choices)}"
+        return " and ".join(
+            f"{word} {f'{limit:g}' if isinstance(limit, float) else limit}"
+            for word, limit in limits.items()
+        )
+
 
 def constant(
-    default: float | tuple[float, ...] | StrEnum,
+    default: Any,
     meaning: str,
     unit: str | None = None,
     *,
     at_least: float = -inf,
+    at_most: float = inf,
     positive: bool = False,
     whole: bool = False,
     simplifies: bool = False,
+    changes: Changes = Changes.LIVE,
+    choices: Iterable[str] = (),
+    refused: Mapping[str, str] | None = None,
+    unset: str = "",
+    file: bool = False,
 ) -> Any:
-    """Describe a constant, as the default of a dataclass field.
+    """Describe a constant, or an option of a node, as the default of a dataclass field.
 
     Parameters
     ----------
-    default : float, tuple of float or StrEnum
+    default : float, tuple of float, str, bool, list of str or StrEnum
         Default value; a tuple for a table, a member of an enumeration for a choice.
     meaning : str
         Meaning, as a sentence; shown in help texts and in the documentation.
     unit : str, optional
         Unit of m, s, N, kg, Hz and rad, such as "N s/m" or "N/(m s)"; the scaling derives from it.
         By default the constant is a pure number.
-    at_least : float, optional
-        Smallest allowed value.
+    at_least, at_most : float, optional
+        Smallest and largest allowed value.
     positive : bool, optional
         Whether the value must be above zero.
     whole : bool, optional
@@ -93,6 +197,16 @@ def constant(
     simplifies : bool, optional
         Whether whole values simplify the equations, such as a factor of 0 or an exponent of 1 or 2.
         They stay numbers in the symbolic equations.
+    changes : Changes, optional
+        When the value can be changed; by default at any time.
+    choices : iterable of str, optional
+        Allowed values of a text; those of an enumeration are known.
+    refused : mapping of str to str, optional
+        Reasons against some other values of a text.
+    unset : str, optional
+        Meaning of nan, in words; by default nan is refused.
+    file : bool, optional
+        Whether it is the path of a file, or empty.
 
     Returns
     -------
@@ -115,12 +229,40 @@ def constant(
     'N/m'
     """
     unit_powers(unit)
-    described = Constant("", default, meaning, unit, at_least, positive, whole, simplifies)
-    return field(default=default, metadata={_KEY: described})
+    known = default
+    if isinstance(default, StrEnum):
+        choices, known = list(type(default)), str(default)
+    elif type(default) is int and not whole and abs(default) <= LARGEST:
+        known = float(default)
+    described = Parameter(
+        name="",
+        default=known,
+        meaning=meaning,
+        unit=unit,
+        at_least=at_least,
+        at_most=at_most,
+        positive=positive,
+        whole=whole,
+        simplifies=simplifies,
+        changes=changes,
+        choices=tuple(choices),
+        refused=refused or {},
+        unset=unset,
+        file=file,
+    )
+    metadata = {_KEY: described}
+    if isinstance(default, list):
+        return field(default_factory=default.copy, metadata=metadata)
+    return field(default=default, metadata=metadata)
+
+
+def described_by(parameter: Parameter) -> Any:
+    """Return a dataclass field with the description and the default of a parameter."""
+    return field(default=parameter.default, metadata={_KEY: parameter})
 
 
 @cache
-def constants_of(part: type) -> Mapping[str, Constant]:
+def constants_of(part: type) -> Mapping[str, Parameter]:
     """Return the constants of a part's class by name, in the order of their definition.
 
     Parameters
@@ -130,7 +272,7 @@ def constants_of(part: type) -> Mapping[str, Constant]:
 
     Returns
     -------
-    mapping of str to Constant
+    mapping of str to Parameter
         Description of each field made with `constant`.
     """
     return {
@@ -138,6 +280,16 @@ def constants_of(part: type) -> Mapping[str, Constant]:
         for each in fields(part)
         if _KEY in each.metadata
     }
+
+
+def parameters_of(part: Any, prefix: str = "") -> Iterator[Parameter]:
+    """Yield the constants of a part, and of the parts in it under their flat names, in order."""
+    for each in fields(part):
+        name, value = f"{prefix}{each.name}", getattr(part, each.name)
+        if _KEY in each.metadata:
+            yield replace(each.metadata[_KEY], name=name)
+        elif is_dataclass(value):
+            yield from parameters_of(value, f"{name}.")
 
 
 @dataclass(frozen=True)
@@ -261,7 +413,7 @@ def _values(part: Any) -> dict[str, Any]:
 
 
 @cache
-def _fields(kind: type) -> tuple[tuple[str, Constant | None], ...]:
+def _fields(kind: type) -> tuple[tuple[str, Parameter | None], ...]:
     """Return the names of the fields of a class, each with its description if it has one."""
     constants = constants_of(kind)
     return tuple((each.name, constants.get(each.name)) for each in fields(kind))

@@ -9,8 +9,8 @@ from typing_extensions import override
 
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.model.actuator import IDEAL_ACTUATOR, Actuator
-from stickslip_ros.physics.model.constants import Scales, scaled
-from stickslip_ros.physics.model.friction import FrictionLaw
+from stickslip_ros.physics.model.constants import Scales, constant, scaled
+from stickslip_ros.physics.model.friction import FrictionLaw, Stribeck
 from stickslip_ros.physics.model.signals import NO_SIGNAL, Signal
 
 
@@ -36,17 +36,26 @@ class Drive:
     258.4
     """
 
-    mass: float
+    mass: float = constant(1.0, "Mass of the slide.", "kg", positive=True)
     """Mass m of the slide, kg."""
-    damping: float
+    damping: float = constant(0.02, "Viscous damping of the transmission.", "N s/m", at_least=0.0)
     """Viscous damping c, N s/m."""
-    stiffness: float
+    stiffness: float = constant(
+        1.0,
+        "Stiffness of the transmission; 0 for an axis that no spring holds.",
+        "N/m",
+        at_least=0.0,
+    )
     """Stiffness k of the transmission, N/m; 0 for an axis that no spring holds."""
-    normal_force: float
+    normal_force: float = constant(
+        1.0, "Force that presses the slide onto the belt.", "N", positive=True
+    )
     """Force N that presses the slide onto the belt, N."""
-    belt_speed: float
+    belt_speed: float = constant(
+        0.4, "Speed of the belt (feed speed), positive or negative.", "m/s"
+    )
     """Belt (feed) speed v_belt, m/s; positive, negative or zero."""
-    friction: FrictionLaw
+    friction: FrictionLaw = field(default_factory=Stribeck)
     """Friction law; its speeds are in m/s."""
     belt: Signal = NO_SIGNAL
     """Signal added to the belt speed, m/s."""
@@ -54,7 +63,9 @@ class Drive:
     """Signal added to the normal force, N."""
     actuator: Actuator = IDEAL_ACTUATOR
     """Actuator that exerts the control force."""
-    bias_force: float = 0.0
+    bias_force: float = constant(
+        0.0, "Constant force on the slide, such as an offset.", "N", simplifies=True
+    )
     """Constant force on the slide, N, such as an offset of the drive or a weight."""
 
     @property

@@ -9,7 +9,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from stickslip_ros.physics.model.constants import constant, constants_of
+from stickslip_ros.physics.model.constants import Changes, constant, constants_of
 
 Measure = Callable[[int, float, float], tuple[float, float]]
 """Returns the measured position (m) and velocity (m/s) for the number of a sample, and its true
@@ -56,21 +56,40 @@ class Sensor:
     """
 
     position_resolution: float = constant(
-        0.0, "Step of the measured position; 0 for none.", "m", at_least=0.0
+        0.0,
+        "Step of the measured position; 0 for none.",
+        "m",
+        at_least=0.0,
+        changes=Changes.AT_REST,
     )
     position_noise: float = constant(
-        0.0, "Standard deviation of the noise of the position.", "m", at_least=0.0
+        0.0,
+        "Standard deviation of the noise of the position.",
+        "m",
+        at_least=0.0,
+        changes=Changes.AT_REST,
     )
     velocity: MeasuredVelocity = constant(
-        MeasuredVelocity.EXACT, "Velocity: the true one, or the difference of measured positions."
+        MeasuredVelocity.EXACT,
+        "Velocity: the true one, or the difference of measured positions.",
+        changes=Changes.AT_REST,
     )
     difference_samples: int = constant(
-        1, "Number of samples that a difference spans.", at_least=1, whole=True
+        1,
+        "Number of samples that a difference spans.",
+        at_least=1,
+        at_most=LONGEST_DIFFERENCE,
+        whole=True,
+        changes=Changes.AT_REST,
     )
     velocity_noise: float = constant(
-        0.0, "Standard deviation of the noise of an exact velocity.", "m/s", at_least=0.0
+        0.0,
+        "Standard deviation of the noise of an exact velocity.",
+        "m/s",
+        at_least=0.0,
+        changes=Changes.AT_REST,
     )
-    seed: int = constant(0, "Seed of the noise.", at_least=0, whole=True)
+    seed: int = constant(0, "Seed of the noise.", at_least=0, whole=True, changes=Changes.AT_REST)
 
     @property
     def exact(self) -> bool:
@@ -108,11 +127,6 @@ class Sensor:
             return (
                 f"velocity_noise = {self.velocity_noise} m/s must be 0 with velocity = "
                 f"{self.velocity}, which has the noise of the positions"
-            )
-        if self.difference_samples > LONGEST_DIFFERENCE:
-            return (
-                f"difference_samples = {self.difference_samples} must not exceed "
-                f"{LONGEST_DIFFERENCE}"
             )
         return None
 

@@ -117,7 +117,7 @@ def test_the_limit_in_the_map_is_the_critical_gain(reference: dict[str, Any]) ->
 
 
 def test_a_law_without_these_gains_has_no_map_and_still_a_decay_rate() -> None:
-    values = CONTROLLER_PARAMETERS["velocity_feedback"]().flat()
+    values = CONTROLLER_PARAMETERS["velocity_feedback"].flat()
     with pytest.raises(InvalidInputError, match="velocity_feedback"):
         stability_map(PLANT, "velocity_feedback", values)
     assert decay(PLANT, "velocity_feedback", values).rate is not None

@@ -21,7 +21,7 @@ class Thing:
 
 class Listener(ManagedNode[NodeParameters]):
     def __init__(self, **options: Any) -> None:
-        super().__init__("listener", NodeParameters, **options)
+        super().__init__("listener", NodeParameters(), **options)
         self.stamps: list[int] = []
         self.always: list[int] = []
         self.amplitudes: list[float] = []

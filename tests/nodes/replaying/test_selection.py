@@ -73,7 +73,7 @@ def record(bag: Path, *messages: tuple[str, float]) -> str:
 
 
 def selection(bag: str, **parameters: object) -> Selection:
-    return Selection(ReplayParameters.validated({"bag": bag, **parameters}, "/replay"), "/replay")
+    return Selection(ReplayParameters().changed({"bag": bag, **parameters}, "/replay"), "/replay")
 
 
 def heard(bag: str, **parameters: object) -> list[tuple[str, float]]:

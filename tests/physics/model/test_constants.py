@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from stickslip_ros.physics.model.constants import (
-    Constant,
+    Parameter,
     Scales,
     constant,
     constants_of,
@@ -29,11 +29,11 @@ class Part:
 
 def test_the_constants_of_a_part() -> None:
     assert dict(constants_of(Part)) == {
-        "stiffness": Constant(
+        "stiffness": Parameter(
             "stiffness", 3.0, "Stiffness of the part.", "N/m", float("-inf"), positive=True
         ),
-        "loss": Constant("loss", 0.5, "Loss of the part.", None, 0.0, positive=False),
-        "amplitude": Constant(
+        "loss": Parameter("loss", 0.5, "Loss of the part.", None, 0.0, positive=False),
+        "amplitude": Parameter(
             "amplitude", 6.0, "Amplitude of the part.", "N", float("-inf"), positive=False
         ),
     }

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.model.constants import (
-    Constant,
+    Parameter,
     constants_of,
     numbers,
     structure,
@@ -49,7 +49,7 @@ CURVES = (Stribeck, Coulomb, Exponential, Table)
 every_law = pytest.mark.parametrize("kind", LAWS.values(), ids=LAWS)
 
 
-def values(constant: Constant) -> st.SearchStrategy[float]:
+def values(constant: Parameter) -> st.SearchStrategy[float]:
     """Values within the bounds of a constant."""
     if constant.name == "break_away":
         return st.floats(0.0, 0.99)
