@@ -82,7 +82,6 @@ setup(
         "numpy>=2",
         "pillow>=10.1",  # the oldest wheels for 3.12
         "pint>=0.24.4",  # the first that works with the flexparser of today
-        "pydantic>=2.5",  # the first for 3.12; 1, which distributions still ship, has another API
         "pyyaml>=6.0.1",  # the first that builds with the Cython of today
         "rich>=13",
         "scipy>=1.13",  # the first built for numpy 2

@@ -31,7 +31,6 @@ KEYS = {
     "pillow": {"python3-pil"},
     "pint": {"python3-pint"},
     "playwright": {"chromium-browser"},  # what it drives; itself it has no key
-    "pydantic": {"python3-pydantic"},
     "pytest": {"python3-pytest"},
     "pytest-timeout": {"python3-pytest-timeout"},
     "pyyaml": {"python3-yaml"},
