@@ -4,12 +4,15 @@ from abc import ABC, abstractmethod
 from array import array
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray, Table
-from stickslip_ros.physics.motion.motion import Motion
 from stickslip_ros.samples import Sample
+
+if TYPE_CHECKING:
+    from stickslip_ros.physics.motion.motion import Motion
 
 _ROUNDING = 1e-6
 """Share of a period by which a sample may be missed for rounding."""
@@ -102,7 +105,9 @@ class SampleRecorder(ABC):
             self.keep(row)
         self._number = number + 1
 
-    def sampling(self, motion: Motion, advance: Callable[[float], None]) -> Callable[[float], None]:
+    def sampling(
+        self, motion: "Motion", advance: Callable[[float], None]
+    ) -> Callable[[float], None]:
         """Return an `advance` (s) of a motion without sampled loop that stops to take samples."""
 
         def advance_and_take(duration: float) -> None:
@@ -115,7 +120,7 @@ class SampleRecorder(ABC):
 
         return advance_and_take
 
-    def take_due(self, motion: Motion) -> None:
+    def take_due(self, motion: "Motion") -> None:
         """Keep the sample that is due at the present instant of such a motion, if one is."""
         number = self._number
         if number - self._now * self._rate > _ROUNDING:

@@ -119,7 +119,13 @@ class Parameter:
         return ends if self._told and len(ends) == 2 and not self.unset else None
 
     def is_default(self, value: Any) -> bool:
-        """Return whether a value is the default; nan is nan."""
+        """Return whether a value is the default; nan is nan.
+
+        Parameters
+        ----------
+        value : bool, int, float, str or list of str
+            Value of the parameter.
+        """
         return value == self.default or (value != value and self.default != self.default)
 
     def stays(self, value: Any) -> bool:
