@@ -125,6 +125,11 @@ class Parameter:
         ----------
         value : bool, int, float, str or list of str
             Value of the parameter.
+
+        Returns
+        -------
+        bool
+            True if it is.
         """
         return value == self.default or (value != value and self.default != self.default)
 
@@ -145,7 +150,18 @@ class Parameter:
         return self.whole or (self.simplifies and number and float(value).is_integer())
 
     def text(self, value: Any) -> str:
-        """Return a value for a reader: nan as its meaning."""
+        """Return a value for a reader: nan as its meaning.
+
+        Parameters
+        ----------
+        value : float
+            Value of the parameter.
+
+        Returns
+        -------
+        str
+            The value, or what nan means for this parameter.
+        """
         return self.unset if self.unset and isnan(value) else str(value)
 
     @property

@@ -24,7 +24,12 @@ STORED: dict[str, dict[str, Any]] = json.loads(
 
 
 @pytest.mark.parametrize(
-    ("law", "seed"), [(law, seed) for law, seeds in STORED.items() for seed in seeds]
+    ("law", "seed"),
+    [
+        pytest.param(law, seed, marks=[pytest.mark.long] * (number > 1))
+        for law, seeds in STORED.items()
+        for number, seed in enumerate(seeds)
+    ],
 )
 def test_a_motion_is_that_of_its_reference(law: str, seed: str) -> None:
     drive = random_memory_drive(law, int(seed))

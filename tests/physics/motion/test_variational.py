@@ -68,7 +68,13 @@ def followed(motion: Any, read: Callable[[Any], Any]) -> FloatArray:
     return np.array(found)
 
 
-@pytest.mark.parametrize(("law", "moves"), [(law, i % 2 == 0) for i, law in enumerate(LAWS)])
+@pytest.mark.parametrize(
+    ("law", "moves"),
+    [
+        pytest.param(law, i % 2 == 0, marks=[pytest.mark.long] * (law not in ("coulomb", "dahl")))
+        for i, law in enumerate(LAWS)
+    ],
+)
 def test_derivatives_are_those_of_differences(law: str, moves: bool) -> None:
     drive = drive_of(law, moves=moves)
     scaled = in_units_of(drive, drive)
