@@ -39,6 +39,8 @@ def run_to_the_end(graph: Graph, bag: Path, window: int = 20, **plant_parameters
     plant = graph.add(PlantNode, **parameters)
     graph.wait_until(lambda: plant.active, "plant active")
     graph.wait_until(lambda: not plant.active, "plant pauses")
+    # The run may be shorter than it takes the analyzer to ask.
+    graph.wait_until(lambda: analyzer._parameter_calls["plant"].answer, "parameters are known")
     graph.deactivate("analyzer")
 
 
