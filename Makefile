@@ -57,7 +57,7 @@ check: setup
 	@$(MAKE) --no-print-directory --jobs=2 --output-sync=target lint test-quick
 
 test-quick: setup
-	$(PYTEST) -m 'not process and not long and not slow' $(PYTEST_OPTIONS)
+	$(PYTEST) --numprocesses=2 -m 'not process and not long and not slow' $(PYTEST_OPTIONS)
 
 # Which tests are slow, by the processor time that they take: tests/slow.txt.
 slow: setup

@@ -9,7 +9,7 @@ import pytest
 LIST = Path(__file__).with_name("slow.txt")
 """The functions of slow tests, one a line; `make check` leaves them out."""
 
-LIMIT = 0.15
+LIMIT = 0.1
 """Processor time of a test, with its processes, above which it is slow, s."""
 
 _MEASURED = "processor time"
