@@ -20,6 +20,7 @@ def test_stability_is_that_of_the_command() -> None:
     assert isinstance(ours.plot(), Figure)
 
 
+@pytest.mark.long
 def test_without_control_the_figure_is_the_bifurcation_diagram() -> None:
     figure = ss.stability(ss.scenario("paper", expects_control=False)).plot()
     assert figure.get_suptitle() == "Bifurcation diagram, paper, no control"

@@ -7,6 +7,7 @@ import pytest
 from tests.app.conftest import Run
 
 
+@pytest.mark.long
 def test_the_servo_gives_way_by_what_exceeds_the_friction(stickslip: Run, tmp_path: Path) -> None:
     measures = stickslip.json("simulate", "axis", "--plot", "axis.png")
     # The largest force less the mean friction, over the gain of the position.

@@ -89,6 +89,7 @@ def test_recordings_that_are_checked(stickslip: Run, log: Path) -> None:
     assert "late.csv has no" not in done.stdout
 
 
+@pytest.mark.long
 def test_a_bag_of_a_loop_is_identified(stickslip: Run) -> None:
     known = ("--fix", "plant.mass=100", "--fix", "plant.damping=200")
     known += ("--fix", "plant.normal_force=1000")
