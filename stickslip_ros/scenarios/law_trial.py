@@ -132,7 +132,7 @@ def _try_symbols(part: Any, equations: _Equations, points: Sequence[Sequence[flo
     """Compare the equations of a part with those that heyoka compiles for the integrator."""
     import heyoka as hy  # only where a package has a law
 
-    constants = numbers(part, "constant")
+    constants = dict(numbers(part, "constant"))
     symbols = {name: hy.expression(name) for name in constants}
     variables = [hy.expression(f"variable[{number}]") for number in range(len(points[0]))]
     try:

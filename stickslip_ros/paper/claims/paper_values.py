@@ -222,7 +222,7 @@ def rates(drive: Drive, states: FloatArray, gains: Washout | None = None) -> Flo
     n is 2, or 3 with `gains` (SI), for eq. 5 and eq. 19.
     """
     system = drive_system(drive, gains)
-    signs = np.sign(states[1] - system.constants["belt_speed"])
+    signs = np.sign(states[1] - system.drive.belt_speed)
     modes = [parameter_values(system, Mode(SLIP, (sign,)), (0.0,)) for sign in signs.tolist()]
     return flow_rates(system, SLIP).at(states, np.array(modes).T)[0]
 

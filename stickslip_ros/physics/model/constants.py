@@ -370,28 +370,31 @@ def _factors(unit: str) -> Iterator[tuple[int, str, int]]:
             yield sign, name, int(power or 1)
 
 
-def numbers(part: Any, prefix: str) -> dict[str, float]:
-    """Return the constants of a part by name; those of a table or of a part of it one by one."""
-    if not _fields(type(part)):
-        return {}
-    return {
-        name: number
-        for field, value in _values(part).items()
-        for name, number in _items(f"{prefix}.{field}", value).items()
-    }
+def numbers(part: Any, name: str) -> Iterator[tuple[str, float]]:
+    """Yield name and value of each constant of a part, those of a table or a part of it, too.
+
+    A number is one constant.
+    """
+    if is_dataclass(part):
+        for own, each in _values(part).items():
+            yield from numbers(each, f"{name}.{own}")
+    elif isinstance(part, tuple):
+        table: tuple[Any, ...] = part
+        for number, each in enumerate(table):
+            yield from numbers(each, f"{name}[{number}]")
+    else:
+        yield name, float(part)
 
 
-def with_symbols(part: _Part, prefix: str, symbols: Mapping[str, Any]) -> _Part:
+def with_symbols(part: Any, name: str, symbols: Mapping[str, Any]) -> Any:
     """Return a part with the expressions of these names for its constants, see `numbers`."""
-    changes: dict[str, Any] = {}
-    for name, value in _values(part).items():
-        own = f"{prefix}.{name}"
-        if is_dataclass(value):
-            changes[name] = with_symbols(value, own, symbols)
-            continue
-        found = [symbols[each] for each in _items(own, value)]
-        changes[name] = tuple(found) if isinstance(value, tuple) else found[0]
-    return replace(part, **changes)  # type: ignore[type-var]
+    if is_dataclass(part):
+        inner = _values(part).items()
+        found = {own: with_symbols(each, f"{name}.{own}", symbols) for own, each in inner}
+        return replace(part, **found)  # type: ignore[type-var]
+    if isinstance(part, tuple):
+        return tuple(symbols[each] for each, _ in numbers(part, name))
+    return symbols[name]
 
 
 def structure(part: Any) -> Any:
@@ -439,13 +442,3 @@ def _fields(kind: type) -> tuple[tuple[str, Parameter | None], ...]:
     """Return the names of the fields of a class, each with its description if it has one."""
     constants = constants_of(kind)
     return tuple((each.name, constants.get(each.name)) for each in fields(kind))
-
-
-def _items(name: str, value: Any) -> dict[str, float]:
-    """Return a number, or those of a tuple or of a part, by name."""
-    if is_dataclass(value):
-        return numbers(value, name)
-    if not isinstance(value, tuple):
-        return {name: float(value)}
-    items: tuple[float, ...] = value
-    return {f"{name}[{number}]": float(each) for number, each in enumerate(items)}

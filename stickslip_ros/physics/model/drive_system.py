@@ -1,6 +1,6 @@
 """A drive as a hybrid system: slip and stick of the slide, and the modes of its law and signals."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from itertools import accumulate
@@ -151,27 +151,9 @@ class DriveSystem(HybridSystem):
         self._steady = not self.drive.belt.pieces
         self._limits_by_series = law.characteristic_speed != inf and not law.sticks
         self._frequency, self._stiffness = drive.angular_frequency, self.drive.stiffness
-        constants: dict[str, float] = {
-            "damping": self.drive.damping,
-            "belt_speed": self.drive.belt_speed,
-            **({"bias_force": self.drive.bias_force} if has_bias else {}),
-            **numbers(law, "friction"),
-            **numbers(self.drive.actuator, "actuator"),
-            **(numbers(self.control, "control") if self.control is not None else {}),
-            # Of a slide with a memory that counts as sticking; it has no part in the motion.
-            **({} if law.sticks else {"stick_speed": 0.0}),
-            **(
-                {}
-                if not self._limits_by_series
-                else {"step_limiter": 1.0 / (_CHANGE_IN_A_STEP * law.characteristic_speed)}
-            ),
-        }
         if isinstance(drive, ScaledDrive):
-            free = ("mass", "stiffness", "bias_force")
-            constants |= {name: getattr(self.drive, name) for name in free}
-            of_law = (name for name in constants if name.startswith("friction."))
+            of_law = (name for name, _ in numbers(law, "friction"))
             self.free_constants = ("mass", "damping", "stiffness", "bias_force", *of_law)
-        self.constants = constants
         self.structure = structure_number(
             (
                 *(type(self), self.states, self._may_lift, drive.has_spring, has_bias),
@@ -191,6 +173,23 @@ class DriveSystem(HybridSystem):
         self._seen_at = self._seen_belt_speed = inf
         self._characteristic_speed = law.characteristic_speed
         self.limits_steps = law.characteristic_speed != inf and law.sticks
+
+    def named_constants(self) -> Iterator[tuple[str, float]]:
+        """Yield name and value of each constant."""
+        drive, law = self.drive, self.drive.friction
+        own = ["damping", "belt_speed", *(["bias_force"] if drive.bias_force != 0.0 else [])]
+        yield from ((name, getattr(drive, name)) for name in own)
+        yield from numbers(law, "friction")
+        yield from numbers(drive.actuator, "actuator")
+        if self.control is not None:
+            yield from numbers(self.control, "control")
+        if not law.sticks:
+            # Of a slide with a memory that counts as sticking; it has no part in the motion.
+            yield "stick_speed", 0.0
+        if self._limits_by_series:
+            yield "step_limiter", 1.0 / (_CHANGE_IN_A_STEP * law.characteristic_speed)
+        free = [name for name in self.free_constants if name in Drive.__dataclass_fields__]
+        yield from ((name, getattr(drive, name)) for name in free if name not in own)
 
     @cached_property
     def autonomous(self) -> bool:

@@ -5,7 +5,8 @@ variational equations and the jumps of the derivatives at a guard.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from array import array
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import inf
@@ -103,14 +104,21 @@ class HybridSystem(ABC):
     """Number of the structure; see `structure_number`."""
     states: tuple[str, ...]
     """Names of the states."""
-    constants: Mapping[str, float]
-    """Values of the constants by name."""
     free_constants: tuple[str, ...] = ()
     """Names of the constants by which a motion may have derivatives."""
     inputs: tuple[str, ...]
     """Names of values that are set from outside and held."""
     switches: tuple[str, ...]
     """Names of values that are constant in each mode."""
+
+    @abstractmethod
+    def named_constants(self) -> Iterator[tuple[str, float]]:
+        """Yield name and value of each constant, in an order that the structure gives."""
+
+    @cached_property
+    def constants(self) -> "array[float]":
+        """Values of the constants, the first of `index`; a motion may set one."""
+        return array("d", [value for _, value in self.named_constants()])
 
     @abstractmethod
     def flow(self, name: str) -> Flow:
@@ -206,7 +214,8 @@ class HybridSystem(ABC):
         return self.shared("index", self._numbered)
 
     def _numbered(self) -> Mapping[str, int]:
-        names = (*self.constants, *self.inputs, *self.switches, "epoch")
+        own = [name for name, _ in self.named_constants()]
+        names = (*own, *self.inputs, *self.switches, "epoch")
         return {name: number for number, name in enumerate(names)}
 
     @cached_property
@@ -215,7 +224,7 @@ class HybridSystem(ABC):
         par = {name: hy.par[number] for name, number in self.index.items()}
         return Symbols(
             self.variables,
-            {name: par[name] for name in self.constants},
+            {name: par[name] for name, _ in self.named_constants()},
             tuple(par[name] for name in self.inputs),
             tuple(par[name] for name in self.switches),
             par["epoch"] + hy.time,

@@ -206,7 +206,7 @@ def parameter_values(
     system: HybridSystem, mode: Mode, inputs: Sequence[float], time: float = 0.0
 ) -> FloatArray:
     """Return the values of a system's parameters in a mode, in the order of its expressions."""
-    return np.array([*system.constants.values(), *inputs, *mode.switches, time])
+    return np.array([*system.constants, *inputs, *mode.switches, time])
 
 
 def evaluated(compiled: Any, state: FloatArray, parameters: FloatArray) -> FloatArray:

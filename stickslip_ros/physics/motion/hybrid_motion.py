@@ -61,16 +61,15 @@ class HybridMotion:
         """Continue with a system that has the same states; its mode is found by `_set_state`."""
         self._system = system
         self._clocked, self._switch_time = not system.autonomous, inf
-        self._constants = array("d", system.constants.values())
         self._prepared_by_detail: dict[Detail, dict[str, _Prepared]] = {}
         self._prepared = self._prepared_by_detail.setdefault(self._detail, {})
 
     def _set_constant(self, name: str, value: float) -> None:
-        """Set a constant of the system, for this motion only."""
-        index = self._system.index[name]
-        if self._constants[index] == value:
+        """Set a constant of the system."""
+        constants, index = self._system.constants, self._system.index[name]
+        if constants[index] == value:
             return
-        self._constants[index] = value
+        constants[index] = value
         for prepared in self._prepared_by_detail.values():
             for flow, _ in prepared.values():
                 if flow is not None and index < len(flow.parameters):
@@ -116,7 +115,7 @@ class HybridMotion:
         name, system, flow = mode.flow, self._system, None
         if Detail.DERIVATIVES in self._detail or not system.has_closed_form(mode):
             flow = self._integrators.flow(system, name, self._detail)
-            flow.load(self._constants)
+            flow.load(system.constants)
         prepared = self._prepared[name] = flow, system.shared_flow(name).transitions
         return prepared
 

@@ -91,7 +91,7 @@ def compiled(law: FrictionLaw) -> Any:
     """
     key = structure(law)
     if key not in _compiled:
-        names = (*law.states, *law.switches, *numbers(law, "law"))
+        names = (*law.states, *law.switches, *dict(numbers(law, "law")))
         speed, sign, *others = heyoka.make_vars("speed", "sign", *names)
         symbols = dict(zip(names, others, strict=True))
         symbolic = with_symbols(law, "law", symbols)
@@ -224,7 +224,7 @@ def test_arrays_and_symbols_give_what_numbers_give(
     close = {"rel": 1e-14, "abs": 1e-14 * largest_term(law)}
     found = law.coefficient(relative_speeds, directions)
     assert found.tolist() == pytest.approx(one_by_one, **close)
-    constants = list(numbers(law, "law").values())
+    constants = [value for _, value in numbers(law, "law")]
     # A power of a symbol keeps 1e-12 away from zero. Bristles are stiff.
     close["abs"] *= 100.0 * (1.0 + getattr(law, "bristle_damping", 0.0))
     for speed, sign in zip(relative_speeds.tolist(), directions.tolist(), strict=True):
@@ -240,7 +240,7 @@ def test_arrays_and_symbols_give_what_numbers_give(
 def largest_term(law: FrictionLaw) -> float:
     """Size of what may cancel in a coefficient at speeds below 5 m/s."""
     of_speeds = law.coefficient(np.array([-5.0, -1.0, 1.0, 5.0]), np.array([-1.0, -1.0, 1.0, 1.0]))
-    constants = map(abs, numbers(law, "law").values())
+    constants = (abs(value) for _, value in numbers(law, "law"))
     return max(1.0, *np.abs(of_speeds).tolist(), *constants)
 
 
