@@ -1,9 +1,9 @@
 """Stability of a scenario by theory, without a simulation of it."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from math import copysign, isclose, isinf, isnan
-from typing import Any, TypeVar, cast
+from typing import Any, NamedTuple, TypeVar, cast
 
 import numpy as np
 
@@ -53,15 +53,17 @@ _STICKING = ("onset_speed_approximate", "onset_speed", "speed_ranges", "searched
 
 _GAINS = ("critical_linear_gain", "first_lyapunov_coefficient", "critical_cubic_gain")
 
-_BY_THIRD_DERIVATIVES = (
-    "open_loop.first_lyapunov_coefficients",
-    "closed_loop.first_lyapunov_coefficients",
-    "closed_loop.first_lyapunov_coefficient",
-    "closed_loop.critical_cubic_gain",
-)
 _SAMPLED_GAINS = ("critical_linear_gain", "stable_linear_gains")
 
 _SAMPLED_LOOP = ("spectral_radius", "stable", "decay_rate", "settling_time", *_SAMPLED_GAINS)
+
+
+class _Noted(NamedTuple):
+    """A quantity or a section of them, with a note."""
+
+    value: Any
+    note: str | None
+    """Why it does not exist, or what it omits; None if there is nothing to say."""
 
 
 def stability(scenario: Scenario) -> tuple[Section, Notes]:
@@ -72,49 +74,55 @@ def stability(scenario: Scenario) -> tuple[Section, Notes]:
     plant = scenario.plant
     drive = plant.as_drive()
     require("the theory of stability", drive, AUTONOMOUS)
-    law = scenario.control_law
-    notes: Notes = {}
-    expansion = expand(drive)
-    found: Section = {
-        "equilibrium_position": drive.equilibrium_position if expansion else None,
-        "open_loop": _open_loop(drive, expansion, notes),
-        "sticking": _sticking(drive, notes),
-        "closed_loop": _closed_loop(drive, law, notes),
-        "sampled_loop": _sampled_loop(drive, law, plant, notes),
-        "closed_forms": _closed_forms(drive, law),
-    }
-    for loop in ("open_loop", "closed_loop"):
-        if found[loop]["stable"] is None and found[loop]["eigenvalues"]:
-            notes[f"{loop}.stable"] = "it is neutral: a small deviation neither decays nor grows"
-    omitted = _omitted(plant)
-    if omitted and "sampled_loop" not in notes:
-        notes["sampled_loop"] = "; ".join(omitted)
-    if expansion is None:
-        reach = float(max(drive.friction.limits)) * drive.length_scale
-        shown = f"{reach:.4g}" if drive.is_dimensionless else quantity(reach, "m")
-        reason = (
-            "the belt is at rest, and friction holds the slide anywhere within mu_s N / k = "
-            f"{shown}" + (" of bias_force / k" if drive.bias_force else "")
-        )
-        for place, value in _places(found):
-            if value is None and not {place, place.split(".")[0]} & notes.keys():
-                notes[place] = reason
-    elif found["closed_forms"] is None:
-        notes["closed_forms"] = "closed forms exist for the cubic Stribeck law only"
+    law, expansion = scenario.control_law, expand(drive)
+    position = drive.equilibrium_position if expansion else None
+    return _separated(
+        {
+            "equilibrium_position": _Noted(position, _held(drive)),
+            "open_loop": _open_loop(drive, expansion),
+            "sticking": _sticking(drive),
+            "closed_loop": _closed_loop(drive, law, plant),
+            "sampled_loop": _sampled_loop(drive, law, plant),
+            "closed_forms": _closed_forms(drive, law),
+        }
+    )
+
+
+def _separated(found: Section) -> tuple[Section, Notes]:
+    """Return the quantities without their notes, and the notes by place."""
+    values, notes = Section(), Notes()
+    for name, value in found.items():
+        if isinstance(value, _Noted):
+            value, note = value
+            if note is not None:
+                notes[name] = note
+        if isinstance(value, dict):
+            value, inner = _separated(cast(Section, value))
+            notes |= {f"{name}.{place}": note for place, note in inner.items()}
+        values[name] = value
+    return values, notes
+
+
+def _held(drive: Drive) -> str | None:
+    """Return why a drive has no single equilibrium; None if its belt moves."""
+    if drive.belt_speed:
+        return None
+    reach = float(max(drive.friction.limits)) * drive.length_scale
+    shown = f"{reach:.4g}" if drive.is_dimensionless else quantity(reach, "m")
+    return (
+        "the belt is at rest, and friction holds the slide anywhere within mu_s N / k = "
+        f"{shown}" + (" of bias_force / k" if drive.bias_force else "")
+    )
+
+
+def _kinked(drive: Drive) -> str | None:
+    """Return why a drive has no first Lyapunov coefficient; None if it may have one."""
     kink = SMOOTH.lack(drive)
-    if kink is not None:
-        reason = f"the first Lyapunov coefficient needs {SMOOTH.need}: {kink}"
-        for place in _BY_THIRD_DERIVATIVES:
-            if not {place, place.split(".")[0]} & notes.keys():
-                notes[place] = reason
-    ideal = plant.sensor.exact and plant.actuator == IDEAL_ACTUATOR
-    if not ideal and "closed_loop" not in notes:
-        notes["closed_loop"] = "sensor and actuator are omitted: control is continuous here"
-    return found, notes
+    return kink and f"the first Lyapunov coefficient needs {SMOOTH.need}: {kink}"
 
 
-def _omitted(plant: PlantParameters) -> list[str]:
-    """Return sentences on what of the loop the linear theory leaves out."""
+def _omitted(plant: PlantParameters) -> str | None:
+    """Return what of the loop the linear theory leaves out, in sentences."""
     sentences: list[str] = []
     if plant.force_jitter > 0.0:
         sentences.append("force_jitter is omitted: the delay of the force is constant here")
@@ -130,51 +138,39 @@ def _omitted(plant: PlantParameters) -> list[str]:
     if names:
         verb = "is" if len(names) == 1 else "are"
         sentences.append(f"{', '.join(names)} {verb} omitted: the loop is linear here")
-    return sentences
+    return "; ".join(sentences) or None
 
 
-def _covered(place: str, notes: Notes, otherwise: _Found, function: Callable[[], _Found]) -> _Found:
-    """Return what a function returns; note it, and return `otherwise`, if it refuses the drive."""
+def _covered(function: Callable[[], _Found]) -> tuple[_Found | None, str | None]:
+    """Return what a function returns, or else why it refuses the drive."""
     try:
-        return function()
+        return function(), None
     except NotCoveredError as error:
-        notes[place] = str(error)
-        return otherwise
+        return None, str(error)
 
 
-def _places(found: Section) -> Iterator[tuple[str, Any]]:
-    """Yield the quantities with their places; within sections as section.name."""
-    for section, value in found.items():
-        if isinstance(value, dict):
-            quantities = cast(Section, value)
-            yield from ((f"{section}.{name}", each) for name, each in quantities.items())
-        else:
-            yield section, value
-
-
-def _eigenvalues(drive: Drive, expansion: Expansion | None) -> Section:
+def _eigenvalues(drive: Drive, expansion: Expansion | None, reason: str | None) -> Section:
     if expansion is None:
-        return dict.fromkeys(("equilibrium_position", "eigenvalues", "stable"))
-    values = expansion.eigenvalues * drive.angular_frequency
+        names = ("equilibrium_position", "eigenvalues", "stable")
+        return dict.fromkeys(names, _Noted(None, reason))
+    values, stable = expansion.eigenvalues * drive.angular_frequency, expansion.stable
+    neutral = "it is neutral: a small deviation neither decays nor grows"
     return {
         "equilibrium_position": float(expansion.equilibrium[POSITION]) * drive.length_scale,
         "eigenvalues": [[float(value.real), float(value.imag)] for value in values],
-        "stable": expansion.stable,
+        "stable": _Noted(stable, neutral if stable is None else None),
     }
 
 
-def _open_loop(drive: Drive, expansion: Expansion | None, notes: Notes) -> Section:
-    place = "open_loop.limit_cycles"
+def _open_loop(drive: Drive, expansion: Expansion | None) -> Section:
     points = hopf_points(drive)
-    cycles = _covered(place, notes, [], lambda: limit_cycles(drive))
-    if not points:
-        notes["open_loop.hopf_speeds"] = _why_no_hopf_speed(drive)
-    if not cycles and place not in notes:
-        notes[place] = "no periodic motion was found, or the drive is too stiff to integrate"
+    cycles, reason = _covered(lambda: limit_cycles(drive))
+    if not cycles and reason is None:
+        reason = "no periodic motion was found, or the drive is too stiff to integrate"
     return {
-        **_eigenvalues(drive, expansion),
-        **_hopf_points(points),
-        "limit_cycles": [_cycle(cycle) for cycle in cycles],
+        **_eigenvalues(drive, expansion, _held(drive)),
+        **_hopf_points(points, None if points else _why_no_hopf_speed(drive), _kinked(drive)),
+        "limit_cycles": _Noted([_cycle(cycle) for cycle in cycles or ()], reason),
     }
 
 
@@ -189,12 +185,15 @@ def _why_no_hopf_speed(drive: Drive) -> str:
     )
 
 
-def _hopf_points(points: list[HopfPoint]) -> Section:
+def _hopf_points(
+    points: list[HopfPoint], reason: str | None = None, kinked: str | None = None
+) -> Section:
+    sigmas = [_known(point.first_lyapunov_coefficient) for point in points]
     return {
-        "hopf_speeds": [point.belt_speed for point in points],
+        "hopf_speeds": _Noted([point.belt_speed for point in points], reason),
         "hopf_angular_frequencies": [point.angular_frequency for point in points],
         "crossing_speeds": [point.crossing_speed for point in points],
-        "first_lyapunov_coefficients": [_known(p.first_lyapunov_coefficient) for p in points],
+        "first_lyapunov_coefficients": _Noted(sigmas, kinked),
     }
 
 
@@ -203,131 +202,117 @@ def _known(value: float) -> float | None:
     return None if isnan(value) else value
 
 
-def _sticking(drive: Drive, notes: Notes) -> Section:
-    onset = _covered("sticking", notes, None, lambda: sticking_onset(drive))
+def _sticking(drive: Drive) -> Section | _Noted:
+    onset, reason = _covered(lambda: sticking_onset(drive))
     if onset is None:
-        return dict.fromkeys(_STICKING)
-    if onset.no_approximate is not None:
-        notes["sticking.onset_speed_approximate"] = onset.no_approximate
-    if onset.no_exact is not None:
-        notes["sticking.onset_speed"] = onset.no_exact
+        return _Noted(dict.fromkeys(_STICKING), reason)
     lowest, highest = onset.followed
+    searched = None
     if not onset.ranges:
-        notes["sticking.speed_ranges"] = (
-            f"the slide sticks at no belt speed from {lowest:.4g} to {highest:.4g} m/s"
-        )
+        searched = f"the slide sticks at no belt speed from {lowest:.4g} to {highest:.4g} m/s"
     elif len(onset.ranges) > 1:
-        notes["sticking.speed_ranges"] = (
+        searched = (
             f"between the ranges the slide overtakes the belt; searched from {lowest:.4g} to "
             f"{highest:.4g} m/s"
         )
     return {
-        "onset_speed_approximate": onset.approximate,
-        "onset_speed": onset.exact,
-        "speed_ranges": [list(ends) for ends in onset.ranges],
+        "onset_speed_approximate": _Noted(onset.approximate, onset.no_approximate),
+        "onset_speed": _Noted(onset.exact, onset.no_exact),
+        "speed_ranges": _Noted([list(ends) for ends in onset.ranges], searched),
         "searched_speeds": [lowest, highest],
     }
 
 
-def _closed_loop(drive: Drive, law: ControlLaw | None, notes: Notes) -> Section:
+def _closed_loop(drive: Drive, law: ControlLaw | None, plant: PlantParameters) -> _Noted:
     control = None if law is None else law.continuous
     if law is None or control is None:
-        notes["closed_loop"] = (
+        nothing = _eigenvalues(drive, None, None) | dict.fromkeys(_GAINS) | _hopf_points([])
+        return _Noted(
+            {**nothing, "limit_cycles": []},
             _NO_CONTROL
             if law is None
-            else f"the control law {law.name} has no equations for continuous control"
+            else f"the control law {law.name} has no equations for continuous control",
         )
-        nothing = _eigenvalues(drive, None) | dict.fromkeys(_GAINS)
-        return {**nothing, **_hopf_points([]), "limit_cycles": []}
-    expansion = expand(drive, control)
     points = hopf_points(drive, control)
-    if not points:
-        notes["closed_loop.hopf_speeds"] = (
-            "with these gains no pair of eigenvalues crosses the imaginary axis at any belt speed"
-        )
-    place = "closed_loop.limit_cycles"
-    possible = _covered(
-        place,
-        notes,
-        (),
+    no_hopf_speed = (
+        "with these gains no pair of eigenvalues crosses the imaginary axis at any belt speed"
+    )
+    possible, reason = _covered(
         lambda: (
             limit_cycle_from_hopf(drive, control),
             limit_cycle_of_run(drive, 0.0, gains=control),
         ),
     )
-    cycles = [cycle for cycle in possible if cycle is not None]
+    cycles = [cycle for cycle in possible or () if cycle is not None]
     if len(cycles) > 1 and isclose(cycles[0].position, cycles[1].position, rel_tol=1e-6):
         cycles.pop()
-    if not cycles and place not in notes:
+    if not cycles and reason is None:
         started = " or from the Hopf point at the critical linear gain" if gains_of(law) else ""
-        notes[place] = (
+        reason = (
             f"none found from rest at zero displacement{started}; there is no search for others, "
             "and none in a very stiff loop"
         )
-    return {
-        **_eigenvalues(drive, expansion),
-        **_critical_gains(drive, law, notes),
-        **_hopf_points(points),
-        "limit_cycles": [_cycle(cycle) for cycle in cycles],
-    }
+    ideal = plant.sensor.exact and plant.actuator == IDEAL_ACTUATOR
+    return _Noted(
+        {
+            **_eigenvalues(drive, expand(drive, control), _held(drive)),
+            **_critical_gains(drive, law),
+            **_hopf_points(points, None if points else no_hopf_speed, _kinked(drive)),
+            "limit_cycles": _Noted([_cycle(cycle) for cycle in cycles], reason),
+        },
+        None if ideal else "sensor and actuator are omitted: control is continuous here",
+    )
 
 
-def _critical_gains(drive: Drive, law: ControlLaw, notes: Notes) -> Section:
-    gains = gains_of(law)
+def _critical_gains(drive: Drive, law: ControlLaw) -> Section:
+    gains, kinked = gains_of(law), _kinked(drive)
     critical = None if gains is None else critical_gains(drive, gains)
     if critical is not None:
-        values = critical.linear, _known(critical.first_lyapunov_coefficient), critical.cubic
+        sigma = _known(critical.first_lyapunov_coefficient)
+        values = critical.linear, _Noted(sigma, kinked), _Noted(critical.cubic, kinked)
         return dict(zip(_GAINS, values, strict=True))
     reason = why_no_gains(law) if gains is None else why_no_linear_gain(drive, gains)
-    if reason is not None:
-        notes |= dict.fromkeys((f"closed_loop.{name}" for name in _GAINS), reason)
-    return dict.fromkeys(_GAINS)
+    return dict.fromkeys(_GAINS, _Noted(None, reason or _held(drive)))
 
 
-def _sampled_loop(
-    drive: Drive, law: ControlLaw | None, plant: PlantParameters, notes: Notes
-) -> Section:
+def _sampled_loop(drive: Drive, law: ControlLaw | None, plant: PlantParameters) -> _Noted:
     rate, force_delay = plant.rate, plant.force_delay
     if law is None:
-        notes["sampled_loop"] = _NO_CONTROL
-        return dict.fromkeys(_SAMPLED_LOOP)
+        return _Noted(dict.fromkeys(_SAMPLED_LOOP), _NO_CONTROL)
     loop = LinearSampledLoop.from_drive(drive, rate, force_delay, plant.sensor)
     if loop is None or law.linear_feedback(1.0 / rate) is None:
         reason = why_no_linear_loop(drive, rate, force_delay)
-        notes["sampled_loop"] = reason or not_linear(law.name)
-        return dict.fromkeys(_SAMPLED_LOOP)
+        return _Noted(dict.fromkeys(_SAMPLED_LOOP), reason or not_linear(law.name))
     radius = loop.spectral_radius(law)
-    if radius >= 1.0:
-        notes["sampled_loop.settling_time"] = "a deviation from the equilibrium does not decay"
-    values = radius, radius < 1.0, loop.decay_rate(law), loop.settling_time(law)
-    return dict(zip(_SAMPLED_LOOP, (*values, *_sampled_gains(loop, law, notes)), strict=True))
+    growing = "a deviation from the equilibrium does not decay" if radius >= 1.0 else None
+    settling_time = _Noted(loop.settling_time(law), growing)
+    values = radius, radius < 1.0, loop.decay_rate(law), settling_time, *_sampled_gains(loop, law)
+    return _Noted(dict(zip(_SAMPLED_LOOP, values, strict=True)), _omitted(plant))
 
 
-def _sampled_gains(
-    loop: LinearSampledLoop, law: ControlLaw, notes: Notes
-) -> tuple[float | None, list[list[float]] | None]:
+def _sampled_gains(loop: LinearSampledLoop, law: ControlLaw) -> tuple[_Noted, _Noted]:
     """Return the critical linear gain and the stable intervals."""
     gains = gains_of(law)
-    reason = why_no_gains(law)
-    intervals = [] if gains is None else loop.stable_linear_gains(gains.corner_frequency)
-    if gains is not None and not intervals:
+    if gains is None:
+        nothing = _Noted(None, why_no_gains(law))
+        return nothing, nothing
+    intervals = loop.stable_linear_gains(gains.corner_frequency)
+    reason = None
+    if not intervals:
         reason = (
             "no linear gain stabilises the equilibrium at this rate and delay with a cutoff "
             f"frequency of {gains.corner_frequency:g} rad/s"
         )
-    if reason is not None:
-        notes |= dict.fromkeys((f"sampled_loop.{name}" for name in _SAMPLED_GAINS), reason)
-    if gains is None:
-        return None, None
     critical = loop.critical_linear_gain(gains.corner_frequency)
-    return critical, [[interval.low, interval.high] for interval in intervals]
+    stable = [[interval.low, interval.high] for interval in intervals]
+    return _Noted(critical, reason), _Noted(stable, reason)
 
 
-def _closed_forms(drive: Drive, law: ControlLaw | None) -> Section | None:
+def _closed_forms(drive: Drive, law: ControlLaw | None) -> Section | _Noted:
     """Return the closed forms of the cubic Stribeck law, in the same units; omit missing ones."""
     cubic = CubicLoop.from_drive(drive)
     if cubic is None:
-        return None
+        return _Noted(None, _held(drive) or "closed forms exist for the cubic Stribeck law only")
     speed, force = drive.speed_scale, drive.normal_force
     gains = gains_of(law)
 
