@@ -34,7 +34,7 @@ from stickslip_ros.messages.codec import unpack_header
 from stickslip_ros.messages.topics import JOINT_STATES, RECORDED, Topic
 from stickslip_ros.nodes.base.machine import own_domain
 from stickslip_ros.nodes.base.network import domain_variables
-from stickslip_ros.nodes.base.process import ros_context
+from stickslip_ros.nodes.base.process import loopback_session
 from stickslip_ros.nodes.base.ros_topics import message_class, qos_profile
 from stickslip_ros.physics.motion.motion import Motion
 from stickslip_ros.scenarios.files import DEFAULT_NAMESPACE, load_scenario
@@ -120,8 +120,8 @@ def soak(duration: float, *, composed: bool, burners: int, directory: Path) -> O
     Raises RuntimeError if the run fails.
     """
     bag = directory / "bag"
-    with own_domain() as domain, ros_context(domain, ["--ros-args"]) as context:
-        outside = Node("outside", context=context)
+    with own_domain() as domain, loopback_session(domain, ["--ros-args"]) as spinner:
+        outside = Node("outside", context=spinner.executor.context)
         samples, recorded = Sendings(outside, JOINT_STATES), Sendings(outside, RECORDED)
         memory: dict[str, list[int]] = {}
         next_look = 0.0

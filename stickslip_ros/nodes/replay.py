@@ -11,7 +11,6 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-import rclpy
 from rclpy.duration import Duration
 from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 from rclpy.publisher import Publisher
@@ -21,7 +20,7 @@ from std_srvs.srv import Trigger
 from stickslip_ros.errors import RunError
 from stickslip_ros.messages.topics import CLOCK, JOINT_STATES, RECORDED
 from stickslip_ros.nodes.base.managed import ERROR, OK, WARN, Diagnosis, ManagedNode
-from stickslip_ros.nodes.base.process import initialise, run_node, run_until_stopped
+from stickslip_ros.nodes.base.process import ros_session, run_node, run_until_stopped
 from stickslip_ros.nodes.base.ros_topics import message_class
 from stickslip_ros.nodes.pacing import FlowWindow
 from stickslip_ros.nodes.replaying.player import Message, Player
@@ -198,13 +197,10 @@ def replay_bag(
     InvalidInputError for refused parameters, BagError if the bag cannot be read further, and
     RunError for other failures.
     """
-    initialise()
-    try:
+    with ros_session() as spinner:
         node = _OneReplay(offering, progress, overrides=parameters)
-        run_until_stopped(node)
+        run_until_stopped(spinner, node)
         return not node.ended
-    finally:
-        rclpy.try_shutdown()
 
 
 class _OneReplay(ReplayNode):

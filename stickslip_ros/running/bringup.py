@@ -6,13 +6,11 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Collection, Iterable, Mapping, Sequence
-from contextlib import closing
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import rclpy
 from lifecycle_msgs.msg import Transition
 from rclpy.node import Node
 from rclpy.task import Future
@@ -25,9 +23,9 @@ from stickslip_ros.nodes.base.clients import (
     LifecycleClient,
     setting_call,
 )
-from stickslip_ros.nodes.base.machine import lock_namespace
-from stickslip_ros.nodes.base.process import ROS_ARGUMENTS, initialise
-from stickslip_ros.nodes.base.spinner import Spinner, stop_on_signals
+from stickslip_ros.nodes.base.machine import domain_of_environment, lock_namespace
+from stickslip_ros.nodes.base.process import ROS_ARGUMENTS, ros_session
+from stickslip_ros.nodes.base.spinner import Spinner, signal_handlers_kept, stop_on_signals
 from stickslip_ros.running.controller_search import ControllerSearch
 from stickslip_ros.running.run_monitor import Notify, OnSimulatedTime, RunMonitor
 from stickslip_ros.scenarios.files import Scenario, parameter_file
@@ -90,14 +88,15 @@ def run_nodes(
     died, or did not become ready). Raises InvalidInputError if the namespace has another run, or
     ROS refuses the settings of the environment.
     """
-    initialise()
-    try:
-        with lock_namespace(namespace, rclpy.get_default_context().get_domain_id()):
-            supervisor = _Supervisor(scenario, namespace, controller, on_simulated_time, notify)
-            with closing(supervisor):
-                return supervisor.run(bag, composed)
-    finally:
-        rclpy.try_shutdown()
+    with (
+        lock_namespace(namespace, domain_of_environment()),
+        signal_handlers_kept(),
+        ros_session() as spinner,
+    ):
+        supervisor = _Supervisor(
+            spinner, scenario, namespace, controller, on_simulated_time, notify
+        )
+        return supervisor.run(bag, composed)
 
 
 class _Supervisor:
@@ -105,6 +104,7 @@ class _Supervisor:
 
     def __init__(
         self,
+        spinner: Spinner,
         scenario: Scenario,
         namespace: str,
         user_controller: Sequence[str] | None,
@@ -118,11 +118,11 @@ class _Supervisor:
         self._notified: set[str] = set()
         self._controller: str | None = None
         self._node = Node("bringup", namespace=namespace)
-        self._spinner = Spinner()
+        self._spinner = spinner
         self._spinner.add(self._node)
         self._stop, self._hurry = Future(), Future()
         self._failure: str | None = None
-        self._signal_handlers = stop_on_signals(self._spinner.executor, self._stop, self._hurry)
+        stop_on_signals(self._spinner.executor, self._stop, self._hurry)
         self._spinner.is_cut_short = self._is_ended
         self._search = ControllerSearch(self._node, namespace, ("analyzer", "plant"))
         self._processes: dict[str, subprocess.Popen[bytes]] = {}
@@ -150,7 +150,11 @@ class _Supervisor:
                 file = Path(directory, "parameters.yaml")
                 file.write_text(parameter_file(parameters), encoding="utf-8")
                 if composed:
-                    self._compose({name: parameters[name] for name in nodes})
+                    # It loads what the nodes need.
+                    from stickslip_ros.running import composition
+
+                    chosen = {name: parameters[name] for name in nodes}
+                    composition.composed(self._spinner, chosen, self._namespace)
                 else:
                     self._spawn(nodes, file)
                 if self._user_controller:
@@ -167,22 +171,11 @@ class _Supervisor:
             raise RunError(self._failure)
         return RunOutcome(self._stop.done(), self._monitor.plant, self._controller)
 
-    def close(self) -> None:
-        self._spinner.close()
-        for number, handler in self._signal_handlers.items():
-            signal.signal(number, handler)
-
     def _is_ended(self) -> bool:
         return self._stop.done() or self._failure is not None
 
-    def _compose(self, parameters: Mapping[str, Mapping[str, Any]]) -> None:
-        from stickslip_ros.running.composition import NODE_CLASSES  # loads what the nodes need
-
-        for name, values in parameters.items():
-            self._spinner.add(NODE_CLASSES[name](namespace=self._namespace, overrides=values))
-
     def _spawn(self, nodes: Iterable[str], file: Path) -> None:
-        self._signal_handlers[signal.SIGTSTP] = signal.signal(signal.SIGTSTP, self._suspend)
+        signal.signal(signal.SIGTSTP, self._suspend)
         arguments = [*ROS_ARGUMENTS, "--params-file", str(file), "-r", f"__ns:={self._namespace}"]
         controller = self._scenario.controller
         for name in nodes:

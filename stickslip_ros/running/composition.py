@@ -1,12 +1,9 @@
 """The nodes of a closed loop in one process."""
 
-import sys
 from collections.abc import Callable, Mapping
-from contextlib import redirect_stderr
 from functools import partial
 from typing import Any
 
-from rclpy.context import Context
 from rclpy.lifecycle import TransitionCallbackReturn
 from rclpy.logging import LoggingSeverity
 from rclpy.parameter import Parameter
@@ -27,26 +24,31 @@ NODE_CLASSES: dict[str, Callable[..., ManagedNode[Any]]] = {
 """Makers of the nodes of a loop, by name."""
 
 
+def composed(
+    spinner: Spinner, parameters: Mapping[str, Mapping[str, Any]], namespace: str | None = None
+) -> dict[str, Any]:
+    """Return nodes by name, on one executor; their parameters are by node and flat name."""
+    nodes: dict[str, Any] = {}
+    for name, values in parameters.items():
+        context = spinner.executor.context
+        node = NODE_CLASSES[name](context=context, namespace=namespace, overrides=values)
+        nodes[name] = node
+        spinner.add(node)
+    return nodes
+
+
 class Composition:
     """Plant, analyzer and optionally our controller, configured, on one executor."""
 
-    def __init__(self, context: Context, parameters: Mapping[str, Mapping[str, Any]]) -> None:
-        """Make nodes with these parameters, by node and flat name; RunError if one refuses."""
-        with redirect_stderr(sys.__stderr__):  # pytest may have replaced it
-            self.spinner = Spinner(context)
-        self.nodes: dict[str, Any] = {}
+    def __init__(self, spinner: Spinner, parameters: Mapping[str, Mapping[str, Any]]) -> None:
+        """Make nodes with these parameters, see `composed`; RunError if one refuses."""
+        self.spinner = spinner
+        self.nodes = composed(spinner, parameters)
         """By name, in the order of activation."""
-        try:
-            for name, values in parameters.items():
-                node = NODE_CLASSES[name](context=context, overrides=values)
-                node.get_logger().set_level(LoggingSeverity.WARN)
-                self.nodes[name] = node
-                self.spinner.add(node)
-                if node.trigger_configure() is not TransitionCallbackReturn.SUCCESS:
-                    raise RunError(f"{name} could not be configured; see its log")
-        except BaseException:
-            self.close()
-            raise
+        for name, node in self.nodes.items():
+            node.get_logger().set_level(LoggingSeverity.WARN)
+            if node.trigger_configure() is not TransitionCallbackReturn.SUCCESS:
+                raise RunError(f"{name} could not be configured; see its log")
         self.analyzer: AnalyzerNode = self.nodes["analyzer"]
         self.plant: PlantNode = self.nodes["plant"]
 
@@ -65,8 +67,7 @@ class Composition:
             raise InvalidInputError(result.reason)
 
     def close(self) -> None:
-        """Deactivate and destroy the nodes."""
+        """Deactivate the nodes."""
         for node in reversed(self.nodes.values()):
             if node.active:
                 node.trigger_deactivate()
-        self.spinner.close()

@@ -21,7 +21,7 @@ from stickslip_ros.nodes.base.clients import LifecycleClient, parameters_call
 from stickslip_ros.nodes.base.machine import own_domain
 from stickslip_ros.nodes.base.managed import ERROR
 from stickslip_ros.nodes.base.network import domain_variables
-from stickslip_ros.nodes.base.process import ros_context
+from stickslip_ros.nodes.base.process import loopback_session
 from stickslip_ros.running.bringup import node_parameters
 from stickslip_ros.running.composition import Composition
 from stickslip_ros.running.controller_search import ControllerSearch
@@ -157,12 +157,14 @@ class ClosedLoop:
             self._directory = opened.enter_context(
                 tempfile.TemporaryDirectory(prefix="stickslip_ros_")
             )
-            self.context = opened.enter_context(ros_context(self._domain, self.ros_arguments))
+            session = loopback_session(self._domain, self.ros_arguments)
+            spinner = opened.enter_context(session)
+            self.context = spinner.executor.context
             opened.callback(self._forget)  # while ROS still runs
             parameters = node_parameters(self.scenario, self._bag_of_run)
             if not self._is_law:
                 parameters.pop(self.scenario.controller.node, None)
-            self._nodes = Composition(self.context, parameters)
+            self._nodes = Composition(spinner, parameters)
             opened.callback(self._nodes.close)
             self._start_controller(opened)
             self._opened = opened.pop_all()

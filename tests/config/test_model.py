@@ -13,7 +13,7 @@ from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
 
 from stickslip_ros.messages.codec import BELT, SLIDE, pack_joint_state, pack_wrench
-from stickslip_ros.nodes.base.process import ros_context
+from stickslip_ros.nodes.base.process import loopback_session
 from stickslip_ros.testing import own_domain
 
 CONFIG = Path(__file__).parents[2] / "config"
@@ -102,10 +102,10 @@ def test_the_control_force_is_drawn_at_the_slide() -> None:
 def test_ros_takes_it_as_a_parameter() -> None:
     """As robot_state_publisher is given it; it goes through a parser of YAML on its way."""
     arguments = ["--ros-args", "-p", f"robot_description:={TEXT}"]
-    with own_domain() as domain, ros_context(domain, arguments) as context:
-        node = Node("reader", context=context)
+    with own_domain() as domain, loopback_session(domain, arguments) as spinner:
+        node = Node("reader", context=spinner.executor.context)
+        spinner.add(node)
         text = node.declare_parameter("robot_description", "").value
-        node.destroy_node()
     assert {joint.attrib["name"] for joint in ElementTree.fromstring(text).iter("joint")} == set(
         JOINTS
     )

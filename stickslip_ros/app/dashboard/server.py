@@ -10,13 +10,11 @@ from contextlib import contextmanager
 from pathlib import Path
 from secrets import token_urlsafe
 
-import rclpy
 import uvicorn
 from fastapi import FastAPI, Request, Response
 from fastapi.middleware.trustedhost import TrustedHostMiddleware
 from jinja2 import DictLoader
 from nicegui import client, core, ui
-from rclpy.experimental import EventsExecutor
 from rclpy.task import Future
 
 from stickslip_ros.app.dashboard import DEFAULT_PORT, LARGEST_PORT
@@ -24,8 +22,8 @@ from stickslip_ros.app.dashboard.frames import Frames
 from stickslip_ros.app.dashboard.listener import ListenerNode
 from stickslip_ros.app.dashboard.page import Pages
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.nodes.base.process import initialise
-from stickslip_ros.nodes.base.spinner import spin
+from stickslip_ros.nodes.base.process import ros_session
+from stickslip_ros.nodes.base.spinner import Spinner, spin
 
 _HOST = "127.0.0.1"
 
@@ -47,15 +45,14 @@ def serve(namespace: str, port: int | None, reach: str, readable: Collection[str
     signal.signal(signal.SIGTERM, _exit)  # uvicorn passes it on when it ends
     if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:
         signal.signal(signal.SIGHUP, _exit)
-    initialise()
-    try:
+    with ros_session() as spinner:
         listener = ListenerNode(
             namespace,
             lambda states, forces, dropped: frames.feed(states, forces, dropped),
             readable,
         )
         frames: Frames = Frames(listener)
-        with _running(listener):
+        with _running(spinner, listener):
             for name in ("asyncio", "nicegui"):
                 logging.getLogger(name).addFilter(_in_one_line)
             app = FastAPI(openapi_url=None)
@@ -72,8 +69,6 @@ def serve(namespace: str, port: int | None, reach: str, readable: Collection[str
                 ws_per_message_deflate=False,  # slower than the loopback
             )
             _Server(config, pages.take_leave).run(sockets=[listening])
-    finally:
-        rclpy.try_shutdown()
 
 
 class _Server(uvicorn.Server):
@@ -135,19 +130,15 @@ def _listen(port: int | None) -> socket.socket:
 
 
 @contextmanager
-def _running(node: ListenerNode) -> Generator[None]:
-    executor = EventsExecutor()
-    executor.add_node(node)
+def _running(spinner: Spinner, node: ListenerNode) -> Generator[None]:
+    spinner.add(node)
     stop = Future()
-    thread = threading.Thread(target=spin, args=(executor, stop), name="ros", daemon=True)
+    thread = threading.Thread(target=spin, args=(spinner.executor, stop), name="ros", daemon=True)
     thread.start()
     try:
         yield
     finally:
         stop.set_result(None)
-        executor.wake()
+        spinner.executor.wake()
         thread.join()
         node.close()
-        executor.remove_node(node)
-        node.destroy_node()
-        executor.shutdown()

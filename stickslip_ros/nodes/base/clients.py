@@ -5,11 +5,10 @@ An answer arrives even if the middleware is slow or loses messages.
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import closing, suppress
+from contextlib import suppress
 from math import inf
 from typing import Any
 
-import rclpy
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from rcl_interfaces.msg import SetParametersResult
@@ -20,7 +19,7 @@ from rclpy.parameter import Parameter, parameter_value_to_python
 from rclpy.task import Future
 
 from stickslip_ros.errors import RunError
-from stickslip_ros.nodes.base.process import initialise
+from stickslip_ros.nodes.base.process import ros_session
 from stickslip_ros.nodes.base.spinner import Spinner
 
 ANSWER_TIME = 1.0
@@ -240,27 +239,22 @@ def set_parameters(
     node are set together, or none. Nothing is set unless every node is found: otherwise this raises
     NodeNotFoundError, and RunError for a node that does not answer.
     """
-    initialise()
-    try:
+    with ros_session() as spinner:
         node = Node(
             "parameter_client",
             namespace=namespace,
             enable_rosout=False,
             start_parameter_services=False,
         )
-        spinner = Spinner()
         spinner.add(node)
-        with closing(spinner):
-            calls = {name: setting_call(node, name, new) for name, new in values.items()}
-            for name, call in calls.items():
-                if not spinner.spin_until(lambda call=call: call.exists, _DISCOVERY_TIME):
-                    raise NodeNotFoundError(_not_found(node, name))
-            for name, call in calls.items():
-                if call.wait(spinner, _ANSWER_TIME) is None:
-                    raise RunError(f"the node {_full_name(node, name)} does not answer")
-            return {name: call.answer.result for name, call in calls.items()}
-    finally:
-        rclpy.try_shutdown()
+        calls = {name: setting_call(node, name, new) for name, new in values.items()}
+        for name, call in calls.items():
+            if not spinner.spin_until(lambda call=call: call.exists, _DISCOVERY_TIME):
+                raise NodeNotFoundError(_not_found(node, name))
+        for name, call in calls.items():
+            if call.wait(spinner, _ANSWER_TIME) is None:
+                raise RunError(f"the node {_full_name(node, name)} does not answer")
+        return {name: call.answer.result for name, call in calls.items()}
 
 
 def _full_name(node: Node, name: str) -> str:

@@ -1,16 +1,15 @@
-"""Initialise ROS, and run one node as a process."""
+"""ROS in this process: from its initialisation to its end, and one node as a process."""
 
 import argparse
 import sys
 from collections.abc import Callable, Generator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, closing, contextmanager
 from functools import cache
 from threading import Lock
 from typing import Any
 
 import rclpy
 from rclpy.context import Context
-from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
@@ -34,7 +33,7 @@ from stickslip_ros.nodes.base.network import (
     this_machine_only,
 )
 from stickslip_ros.nodes.base.parameters import first_line
-from stickslip_ros.nodes.base.spinner import spin, stop_on_signals
+from stickslip_ros.nodes.base.spinner import Spinner, spin, stop_on_signals
 from stickslip_ros.physics.model.constants import Changes
 from stickslip_ros.scenarios.parameters import NodeParameters
 from stickslip_ros.standard_streams import open_closed_streams
@@ -48,15 +47,17 @@ _NO_LOGS_ELSEWHERE = ("--disable-external-lib-logs", "--disable-rosout-logs")
 _initialising = Lock()
 
 
-def initialise(
+@contextmanager
+def ros_session(
     arguments: Sequence[str] = ROS_ARGUMENTS,
     *,
     context: Context | None = None,
     domain: int | None = None,
-) -> None:
-    """Initialise ROS without its signal handlers.
+) -> Generator[Spinner]:
+    """Initialise ROS without its signal handlers, and shut it down at the end.
 
-    This uses the default context and the domain of the environment, unless others are given.
+    This uses the default context and the domain of the environment, unless others are given. The
+    nodes that are added to the spinner are destroyed at the end.
     Raises InvalidInputError if nodes cannot run here, or ROS refuses the arguments.
     """
     check_machine(domain_of_environment() if domain is None else domain)
@@ -69,23 +70,26 @@ def initialise(
         )
     except Exception as error:  # its first line names the argument
         raise InvalidInputError(first_line(error)) from None
-
-
-@contextmanager
-def ros_context(domain: int, arguments: Sequence[str]) -> Generator[Context]:
-    """Initialise ROS in a domain, loopback only, with these global arguments.
-
-    This uses rclpy's default context, so that nodes need not name it, unless it is already in use.
-    """
-    with _initialising:
-        context = Context() if rclpy.ok() else rclpy.get_default_context()
-        with environment({**_this_process_only_here(), **NO_PEERS}):
-            initialise([*arguments, *_NO_LOGS_ELSEWHERE], context=context, domain=domain)
     try:
-        yield context
+        with closing(Spinner(context)) as spinner:
+            yield spinner
     finally:
         # Only without a named context can the default one be initialised again.
         rclpy.try_shutdown(context=None if context is rclpy.get_default_context() else context)
+
+
+@contextmanager
+def loopback_session(domain: int, arguments: Sequence[str]) -> Generator[Spinner]:
+    """Initialise ROS in a domain, loopback only, with these global arguments; see `ros_session`.
+
+    This uses rclpy's default context, so that nodes need not name it, unless it is already in use.
+    """
+    with ExitStack() as opened:
+        with _initialising, environment({**_this_process_only_here(), **NO_PEERS}):
+            context = Context() if rclpy.ok() else rclpy.get_default_context()
+            session = ros_session([*arguments, *_NO_LOGS_ELSEWHERE], context=context, domain=domain)
+            spinner = opened.enter_context(session)
+        yield spinner
 
 
 def run_node(make: Callable[[], ManagedNode[Any]], parameters: NodeParameters) -> int:
@@ -110,32 +114,26 @@ def run_node(make: Callable[[], ManagedNode[Any]], parameters: NodeParameters) -
     prefer_prompt_middleware()
     try:
         parser.parse_args(remove_ros_args(sys.argv)[1:])
-        initialise(sys.argv)
     except Exception as error:
         print(f"{parser.prog}: {first_line(error)}", file=sys.stderr)
         return 2
     try:
-        run_until_stopped(make())
+        with ros_session(sys.argv) as spinner:
+            run_until_stopped(spinner, make())
         return 0
     except StickslipError as error:
         print(f"{parser.prog}: {error}", file=sys.stderr)
         return 2 if isinstance(error, InvalidInputError) else 1
-    finally:
-        rclpy.try_shutdown()
 
 
-def run_until_stopped(node: ManagedNode[Any]) -> None:
+def run_until_stopped(spinner: Spinner, node: ManagedNode[Any]) -> None:
     """Run a node until a signal or the node ends this; raise the error that stopped it."""
-    executor = EventsExecutor()
-    executor.add_node(node)
-    stop_on_signals(executor, node.stopped)
-    spin(executor, node.stopped)
+    spinner.add(node)
+    stop_on_signals(spinner.executor, node.stopped)
+    spin(spinner.executor, node.stopped)
     if node.active:
         node.trigger_deactivate()
     reason = node.stopped.result()
-    executor.remove_node(node)
-    node.destroy_node()
-    executor.shutdown()
     if reason is not None:
         raise reason
 
@@ -148,13 +146,14 @@ def _this_process_only_here() -> Mapping[str, str]:
     listens on every address; then LOCALHOST, which uses shared memory, is the best available.
     """
     variables = this_machine_only()
-    context = Context()
-    with own_domain() as domain, environment({**variables, DISCOVERY_RANGE: "OFF"}):
-        initialise(["--ros-args", *_NO_LOGS_ELSEWHERE], context=context, domain=domain)
-        node = Node("which_addresses", context=context)
+    context, arguments = Context(), ["--ros-args", *_NO_LOGS_ELSEWHERE]
+    with (
+        own_domain() as domain,
+        environment({**variables, DISCOVERY_RANGE: "OFF"}),
+        ros_session(arguments, context=context, domain=domain) as spinner,
+    ):
+        spinner.add(Node("which_addresses", context=context))
         elsewhere_free = is_free(port(domain, FIRST_PROCESS), "127.0.0.2")
-        node.destroy_node()
-        rclpy.shutdown(context=context)
     return variables if elsewhere_free else {DISCOVERY_RANGE: "LOCALHOST"}
 
 

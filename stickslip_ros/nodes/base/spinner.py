@@ -6,13 +6,13 @@ Such a wait takes longer by what the clock is set back, unless something else wa
 """
 
 import signal
+import sys
 import time
-from collections.abc import Callable
-from contextlib import suppress
-from functools import partial
+from collections.abc import Callable, Generator
+from contextlib import contextmanager, redirect_stderr, suppress
+from functools import cached_property, partial
 from math import inf
 from threading import Event, Thread
-from typing import Any
 
 from rclpy.clock import Clock, ClockType
 from rclpy.context import Context
@@ -30,17 +30,21 @@ class Spinner:
     """Runs its nodes until a condition holds, a timeout ends, or the wait is cut short."""
 
     def __init__(self, context: Context | None = None) -> None:
-        self.executor: Executor = EventsExecutor(context=context)
+        with redirect_stderr(sys.__stderr__ or sys.stderr):  # pytest may have replaced it
+            self.executor: Executor = EventsExecutor(context=context)
         self.is_cut_short: Callable[[], bool] = lambda: False
         """Whether to stop waiting now."""
         self._nodes: list[Node] = []
 
     def add(self, node: Node) -> None:
         """Add a node; `close` destroys it."""
-        if not self._nodes:
-            self.clock = steady_clock(node)
         self._nodes.append(node)
         self.executor.add_node(node)
+
+    @cached_property
+    def clock(self) -> Clock:
+        """A monotonic clock for timers of the first node."""
+        return steady_clock(self._nodes[0])
 
     def spin_until(
         self, condition: Callable[[], bool], timeout: float = inf, period: float = 0.005
@@ -76,7 +80,8 @@ class Spinner:
 
     def close(self) -> None:
         """Destroy the nodes."""
-        for node in reversed(self._nodes):
+        while self._nodes:
+            node = self._nodes.pop()
             self.executor.remove_node(node)
             destroy(node)
         self.executor.shutdown()
@@ -89,10 +94,10 @@ def destroy(node: Node) -> None:
         node._state_machine.destroy_when_not_in_use()  # pyright: ignore[reportPrivateUsage]
 
 
-def stop_on_signals(executor: Executor, *stopped: Future) -> dict[signal.Signals, Any]:
+def stop_on_signals(executor: Executor, *stopped: Future) -> None:
     """Let each SIGINT, SIGTERM or SIGHUP complete the next of `stopped` with None.
 
-    SIGHUP stays ignored if it is, as under nohup. Return the previous handlers.
+    SIGHUP stays ignored if it is, as under nohup.
     """
 
     def stop(*_: object) -> None:
@@ -104,7 +109,20 @@ def stop_on_signals(executor: Executor, *stopped: Future) -> dict[signal.Signals
     numbers = [signal.SIGINT, signal.SIGTERM]
     if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:
         numbers.append(signal.SIGHUP)
-    return {number: signal.signal(number, stop) for number in numbers}
+    for number in numbers:
+        signal.signal(number, stop)
+
+
+@contextmanager
+def signal_handlers_kept() -> Generator[None]:
+    """Restore the present handlers of the signals that end or suspend a run; a context manager."""
+    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGTSTP)
+    before = {number: signal.getsignal(number) for number in numbers}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def spin(executor: Executor, until: Future) -> None:

@@ -10,8 +10,7 @@ from rclpy.node import Node
 from std_srvs.srv import Trigger
 
 from stickslip_ros.nodes.base.clients import LifecycleClient, ServiceCall, parameters_call
-from stickslip_ros.nodes.base.process import ros_context
-from stickslip_ros.nodes.base.spinner import Spinner
+from stickslip_ros.nodes.base.process import loopback_session
 from stickslip_ros.nodes.plant import PlantNode
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
 from tests.nodes.graph import Graph
@@ -22,12 +21,12 @@ ACTIVATE = Transition.TRANSITION_ACTIVATE
 
 @pytest.fixture
 def client(domain: int) -> Iterator[LifecycleClient]:
-    with ros_context(domain, ["--ros-args"]) as context:
-        spinner, asking = Spinner(context), Node("asking", context=context)
+    with loopback_session(domain, ["--ros-args"]) as spinner:
+        context = spinner.executor.context
+        asking = Node("asking", context=context)
         spinner.add(asking)
         spinner.add(WashoutControllerNode(context=context, overrides={"autostart": False}))
         yield LifecycleClient(spinner, asking, "washout_controller", 1.0)
-        spinner.close()
 
 
 def test_each_transition_is_made_once(client: LifecycleClient) -> None:
@@ -65,8 +64,8 @@ def answer_once(_: Trigger.Request, response: Trigger.Response) -> Trigger.Respo
 
 
 def test_a_service_is_asked_again_and_again_by_one_call(domain: int) -> None:
-    with ros_context(domain, ["--ros-args"]) as context:
-        node, spinner = Node("asking", context=context), Spinner(context)
+    with loopback_session(domain, ["--ros-args"]) as spinner:
+        node = Node("asking", context=spinner.executor.context)
         spinner.add(node)
         call = ServiceCall(node, Trigger, "ring")
         assert call.ask(spinner, Trigger.Request(), 0.1) is None
@@ -77,7 +76,6 @@ def test_a_service_is_asked_again_and_again_by_one_call(domain: int) -> None:
         assert answers[0] is not answers[1]
         node.destroy_service(service)
         assert call.ask(spinner, Trigger.Request(), 0.2) is None
-        spinner.close()
 
 
 class _Unlucky(Node):

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from rclpy.node import Node
 
-from stickslip_ros.nodes.base.process import ros_context
+from stickslip_ros.nodes.base.process import loopback_session
 from stickslip_ros.nodes.base.spinner import Spinner
 from tests.nodes.graph import PATIENCE
 
@@ -56,27 +56,22 @@ int pthread_cond_timedwait(
 _WAIT = """
 import ctypes, sys, threading, time
 from rclpy.node import Node
-from stickslip_ros.nodes.base.process import initialise
-from stickslip_ros.nodes.base.spinner import Spinner
+from stickslip_ros.nodes.base.process import ros_session
 
-initialise()
-spinner = Spinner()
-spinner.add(Node("waiting"))
-before = time.time()
-threading.Timer(0.2, ctypes.CDLL(sys.argv[1]).set_back, [1000]).start()
-assert not spinner.spin_until(lambda: False, 0.5)
-assert time.time() < before
-spinner.close()
+with ros_session() as spinner:
+    spinner.add(Node("waiting"))
+    before = time.time()
+    threading.Timer(0.2, ctypes.CDLL(sys.argv[1]).set_back, [1000]).start()
+    assert not spinner.spin_until(lambda: False, 0.5)
+    assert time.time() < before
 """
 
 
 @pytest.fixture
 def spinner(domain: int) -> Iterator[Spinner]:
-    with ros_context(domain, ["--ros-args"]) as context:
-        spinner = Spinner(context)
-        spinner.add(Node("waiting", context=context))
+    with loopback_session(domain, ["--ros-args"]) as spinner:
+        spinner.add(Node("waiting", context=spinner.executor.context))
         yield spinner
-        spinner.close()
 
 
 def test_time_ends_waiting_though_there_is_always_a_callback_to_run(spinner: Spinner) -> None:
