@@ -3,7 +3,6 @@
 Phase portraits are compared with closed forms, reference limit cycles and critical gains.
 """
 
-import pickle
 from dataclasses import replace
 from functools import cache
 from math import log, sqrt
@@ -12,10 +11,7 @@ import numpy as np
 import pytest
 
 from stickslip_ros.paper.figures import (
-    PRINTED_SLOPE,
     SETTLED,
-    STRIBECK,
-    TANGENT_SLOPE,
     BifurcationFigure,
     Portrait,
     PortraitCase,
@@ -24,7 +20,6 @@ from stickslip_ros.paper.figures import (
     compute_figure,
     portrait_of,
     transition_marks,
-    unit_drive,
     unstable_equilibria,
 )
 from stickslip_ros.physics.measures.cycle_measures import Regime
@@ -71,19 +66,6 @@ def stick_fractions(panel: list[Portrait]) -> list[float]:
 
 def falls(values: list[float]) -> bool:
     return bool(np.all(np.diff(values) < 0.0))
-
-
-def test_si_numbers_of_a_unit_drive_are_the_paper_s() -> None:
-    drive = unit_drive(0.3, damping=0.05, stiffness=5.0)
-    assert (drive.mass, drive.normal_force, drive.damping) == (1.0, 1.0, 0.05)
-    assert drive.natural_period == pytest.approx(2.0 * np.pi / sqrt(5.0))
-
-
-def test_slopes_of_the_linear_law() -> None:
-    step = 1e-6
-    cubic = STRIBECK.coefficient(np.array([-step, step]), -1.0)
-    assert pytest.approx((cubic[1] - cubic[0]) / (2.0 * step), rel=1e-9) == TANGENT_SLOPE
-    assert pytest.approx(3.0 * (0.4 - 0.25) / 0.5) == PRINTED_SLOPE
 
 
 def test_the_parameter_of_a_bifurcation_diagram_is_all_that_varies() -> None:
@@ -148,14 +130,6 @@ def test_near_the_hopf_speed_amplitudes_follow_the_averaged_ones() -> None:
             square = hopf_squared - portrait.drive.belt_speed**2
             averaged = 2.0 * sqrt(max(square, 0.0))
             assert portrait.measures.velocity_amplitude == pytest.approx(averaged, abs=0.005)
-
-
-def test_a_figure_can_be_sent_to_another_process() -> None:
-    figure = compute_figure(11)
-    assert isinstance(figure, PortraitFigure)
-    copy = pickle.loads(pickle.dumps(figure))
-    assert copy.portraits[0].measures == figure.portraits[0].measures
-    assert falls(stick_fractions(copy.panels[0].portraits)[:4])
 
 
 @pytest.mark.long
@@ -261,16 +235,6 @@ def test_the_critical_gain_separates_vibration_from_rest(
     gains = Washout(corner_frequency, gain, 0.0)
     found = portrait_of(PortraitCase("", PAPER, gains, duration=3000.0))
     assert (found.measures.regime is Regime.EQUILIBRIUM) == rests
-
-
-def test_a_controlled_case_may_follow_one_without_control() -> None:
-    free = PortraitCase("", PAPER, duration=100.0)
-    idle = PortraitCase("", PAPER, Washout(2.0, 0.0, 0.0), duration=100.0)
-    strong = PortraitCase("", PAPER, Washout(2.0, -1.5, 0.0), duration=100.0)
-    first, controlled, second, third = map(portrait_of, [free, strong, idle, free])
-    amplitudes = [other.measures.amplitude for other in (second, third)]
-    assert amplitudes == pytest.approx([first.measures.amplitude] * 2, rel=1e-9)
-    assert controlled.measures.amplitude != pytest.approx(first.measures.amplitude, rel=1e-2)
 
 
 def test_a_run_too_short_for_a_cycle() -> None:

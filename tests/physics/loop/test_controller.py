@@ -26,7 +26,7 @@ from stickslip_ros.physics.model.control import (
     Washout,
 )
 from stickslip_ros.physics.model.control.base import State
-from stickslip_ros.physics.model.signals import ramp, step
+from stickslip_ros.physics.model.signals import ramp
 from stickslip_ros.physics.motion import Motion
 from stickslip_ros.samples import Sample
 from tests.physics.drives import PAPER
@@ -261,18 +261,3 @@ def test_the_sample_after_a_failure_continues_from_the_last_good_one() -> None:
     with pytest.raises(RunError, match=r"fails at 1\.5 s: ZeroDivisionError"):
         controller.answer(at(2500 * MILLISECOND, velocity=0.5))
     assert controller.answer(at(3000 * MILLISECOND)) == 2.0
-
-
-def test_an_integral_of_the_error_follows_a_step() -> None:
-    """Past the transient, spring force and friction are balanced at the reference."""
-    drive = replace(PAPER, damping=1.0)
-    loop = SampledLoop(motion := Motion(drive, 0.0, 0.0), 50.0, 10**9)
-    controller = Controller(Integral(0.3), step(0.6, start=20.0).reference)
-    ends: list[float] = []
-    for number in range(5000):
-        if number == 1000:
-            ends.append(motion.position)
-        answer(loop, controller)
-        loop.advance()
-    assert abs(ends[0]) < 1e-2
-    assert motion.position == pytest.approx(0.6, abs=1e-6)

@@ -3,7 +3,6 @@
 from dataclasses import dataclass, replace
 from math import exp
 from random import Random
-from typing import Any
 
 import numpy as np
 import pytest
@@ -17,7 +16,6 @@ from stickslip_ros.physics.loop.trajectory import TrajectoryRecorder
 from stickslip_ros.physics.measures import CycleMeter
 from stickslip_ros.physics.model.actuator import Actuator
 from stickslip_ros.physics.model.control import VelocityFeedback
-from stickslip_ros.physics.model.friction import Linear
 from stickslip_ros.physics.model.sensor import Measure, Sensor
 from stickslip_ros.physics.model.signals import sine, step
 from stickslip_ros.physics.motion import Motion, RecordedMotion
@@ -168,17 +166,6 @@ def test_a_reset_puts_the_slide_back_at_the_next_sample_while_time_goes_on() -> 
     assert (sample.position, sample.velocity) == (fresh.position, fresh.velocity)
 
 
-def test_a_diverging_motion_is_reported() -> None:
-    drive = replace(PAPER, friction=Linear(static=0.4, slope=0.9))
-    loop = SampledLoop(Motion(drive, 0.0, 0.0), 10.0, SECOND)
-    for _ in range(100):
-        loop.advance()
-    assert not loop.unbounded
-    for _ in range(500):
-        loop.advance()
-    assert loop.unbounded
-
-
 def test_disturbances_and_control_add_up() -> None:
     motion = Motion(PAPER, 0.0, 0.0)
     loop = SampledLoop(motion, 10.0, SECOND, disturbance=step(0.5))
@@ -229,34 +216,8 @@ class Encoder(Sensor):
         return measure
 
 
-def loops(**options: Any) -> tuple[SampledLoop, SampledLoop]:
-    """One with the encoder, one without."""
-    return (
-        SampledLoop(Motion(PAPER, 0.1, -0.2), RATE, SECOND, sensor=Encoder(), **options),
-        SampledLoop(Motion(PAPER, 0.1, -0.2), RATE, SECOND, **options),
-    )
-
-
-def test_samples_are_measured_and_the_motion_is_true() -> None:
-    measured, true = loops()
-    last: float | None = None
-    for number in range(30):
-        assert measured.true_sample == true.true_sample == true.sample
-        noise = Random(number).gauss(0.0, 0.01)
-        position = 0.005 * round((true.sample.position + noise) / 0.005)
-        velocity = 0.0 if last is None else (position - last) * RATE
-        last = position
-        expected = true.sample._replace(position=position, velocity=velocity)
-        assert measured.sample == pytest.approx(expected, rel=1e-13)
-        # The belt and friction are known.
-        assert measured.sample[3:] == true.sample[3:]
-        assert measured.sample.stamp == true.sample.stamp
-        assert measured.advance() is measured.sample
-        true.advance()
-
-
 def test_a_reset_starts_its_history_again() -> None:
-    loop, _ = loops()
+    loop = SampledLoop(Motion(PAPER, 0.1, -0.2), RATE, SECOND, sensor=Encoder())
     for _ in range(5):
         loop.advance()
     assert loop.sample.velocity != 0.0
@@ -398,14 +359,3 @@ def test_a_reset_puts_the_lag_at_rest() -> None:
     loop.offer(loop.sample.stamp, 1.0)
     loop.advance()
     assert motion.applied_force == 0.0
-
-
-def test_a_new_drive_keeps_the_lag_in_the_loop() -> None:
-    motion = Motion(replace(PAPER, actuator=lag(0.5)), 0.0, 0.0)
-    loop = SampledLoop(motion, 10.0, SECOND)
-    for number in range(10):
-        loop.offer(loop.sample.stamp, 1.0)
-        if number == 4:
-            loop.change_drive(replace(PAPER, normal_force=3.0, actuator=lag(0.5)))
-        loop.advance()
-    assert motion.applied_force == pytest.approx(1.0 - exp(-2.0), rel=1e-12)

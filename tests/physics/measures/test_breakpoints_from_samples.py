@@ -1,4 +1,3 @@
-from dataclasses import replace
 from math import pi
 
 import numpy as np
@@ -9,9 +8,6 @@ from hypothesis import strategies as st
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.physics.measures.breakpoints import Breakpoints, breakpoints_from_samples
 from stickslip_ros.physics.measures.cycle_measures import CycleMeter, Measures, Regime
-from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.motion import RecordedMotion
-from tests.physics.drives import PAPER
 
 CYCLES = 15
 
@@ -19,45 +15,10 @@ Columns = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
 """Time, position, velocity and belt velocity of samples."""
 
 
-def breakpoints_both_ways(drive: Drive, per_cycle: int) -> tuple[Breakpoints, Breakpoints]:
-    """The breakpoints of some natural periods: the motion's own, and those from its samples."""
-    motion = RecordedMotion(drive, 0.0, 0.0)
-    motion.advance(200.0 * drive.natural_period)
-    motion.take_breakpoints()
-    step = drive.natural_period / per_cycle
-    rows = [(motion.position, motion.velocity)]
-    for _ in range(CYCLES * per_cycle):
-        motion.advance(step)
-        rows.append((motion.position, motion.velocity))
-    position, velocity = np.array(rows).T
-    belt = np.full(len(rows), drive.belt_speed)
-    time = step * np.arange(len(rows))
-    return motion.take_breakpoints(), breakpoints_from_samples(time, position, velocity, belt)
-
-
 def measured(breakpoints: Breakpoints, belt_speed: float) -> Measures:
     meter = CycleMeter(window=CYCLES)
     meter.feed(breakpoints, belt_speed)
     return meter.measures()
-
-
-@pytest.mark.parametrize("belt_speed", [0.2, 0.46, -0.3])
-@pytest.mark.parametrize(
-    ("per_cycle", "error", "stick_error"), [(600, 1e-8, 1e-5), (100, 1e-6, 1e-4)]
-)
-def test_samples_measure_what_the_motion_itself_measures(
-    belt_speed: float, per_cycle: int, error: float, stick_error: float
-) -> None:
-    own, sampled = breakpoints_both_ways(replace(PAPER, belt_speed=belt_speed), per_cycle)
-    expected, measures = measured(own, belt_speed), measured(sampled, belt_speed)
-    assert measures.cycles == expected.cycles >= CYCLES - 3
-    assert measures.regime is expected.regime
-    assert measures.amplitude == pytest.approx(expected.amplitude, rel=error)
-    assert measures.velocity_amplitude == pytest.approx(expected.velocity_amplitude, rel=error)
-    assert measures.midpoint == pytest.approx(expected.midpoint, rel=error)
-    assert measures.period == pytest.approx(expected.period, rel=error)
-    assert measures.frequency == pytest.approx(expected.frequency, rel=error)
-    assert measures.stick_fraction == pytest.approx(expected.stick_fraction, abs=stick_error)
 
 
 def test_coarse_samples_of_a_sine_give_its_turning_points() -> None:

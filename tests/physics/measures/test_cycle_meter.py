@@ -298,10 +298,3 @@ def test_a_slide_riding_a_slow_belt_is_not_at_rest() -> None:
         np.ones(50, dtype=bool),
     )
     assert measured(riding, 0.1).regime is None
-
-
-def test_every_regime_has_a_name_for_people() -> None:
-    names = [Regime.label(regime) for regime in (*Regime, None)]
-    assert names[:2] == ["stick-slip", "pure slip"]
-    assert len(set(names)) == len(Regime) + 1
-    assert Regime.label("stick_slip") == "stick-slip"

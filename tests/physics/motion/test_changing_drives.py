@@ -93,21 +93,6 @@ def test_a_belt_that_accelerates_too_much_tears_it_loose(height: float, sticks: 
     assert motion.velocity == pytest.approx(expected, rel=1e-6)
 
 
-def test_a_load_and_an_accelerating_belt_together() -> None:
-    """Broken loose where 0.05 (1 + t^2/2) reaches 0.4 (1 - t/10)."""
-    drive = replace(REST, belt=ramp(1.0, duration=20.0), load=ramp(-0.8, duration=8.0))
-    motion = RecordedMotion(drive, 0.0, 0.0)
-    expected = (-0.04 + (0.04**2 + 4.0 * 0.025 * 0.35) ** 0.5) / (2.0 * 0.025)
-    assert release(motion, 5.0) == pytest.approx(expected, abs=1e-9)
-
-
-def test_a_step_of_the_belt_tears_a_sticking_slide_loose() -> None:
-    drive = replace(REST, belt_speed=0.1, belt=step(0.2, start=0.5))
-    motion = RecordedMotion(drive, 0.0, 0.1)
-    assert release(motion, 0.6) == pytest.approx(0.5, abs=1e-12)
-    assert motion.belt_speed == pytest.approx(0.3)
-
-
 def test_signals_go_through_corners_at_the_samples_that_are_meant() -> None:
     rate = 1000.0
     for number in range(1, 400, 7):

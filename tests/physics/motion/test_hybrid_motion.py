@@ -340,15 +340,3 @@ def test_an_ended_motion_gives_its_integrator_back(monkeypatch: pytest.MonkeyPat
     Motion(drive_of(LAWS[0], 0.3), 0.0, 0.0).advance(5.0)
     monkeypatch.setattr(compiled_flow, "_compile", lambda *_: pytest.fail("compiles again"))
     Motion(drive_of(LAWS[0], 0.2), 0.0, 0.0).advance(5.0)
-
-
-def test_a_breakpoint_of_the_next_step_may_follow_at_once() -> None:
-    """Time is the sum of the steps; the last step ends with a breakpoint."""
-    motion, times = RecordedMotion(ROUNDED.drive, 0.0, 0.0), list[float]()
-    durations = (9.112469373472214e-05, 1e-4)
-    for duration in durations:
-        for before, after in pairwise([0.0, 2.2250738585e-313, 0.71875, 1.0]):
-            motion.advance((after - before) * duration)
-            times += motion.take_breakpoints().time.tolist()
-    assert all(earlier <= later for earlier, later in pairwise(times))
-    assert times[-1] == pytest.approx(sum(durations), rel=1e-12)

@@ -17,47 +17,9 @@ from tests.physics.drives import PAPER
 from tests.physics.motion import dop853
 from tests.physics.motion.dop853 import Dop853Drive, Signal
 from tests.physics.motion.random_drives import (
-    LAWS,
-    RandomSignal,
-    difference,
-    random_drive,
     sticks_of,
     without_short,
 )
-
-LONG_CASES = [
-    pytest.param(seed, directional, marks=pytest.mark.long)
-    for seed in range(2, 4)
-    for directional in (False, True)
-]
-
-
-@pytest.mark.parametrize(
-    ("seed", "directional"), [(0, True), (1, False), *LONG_CASES], ids=lambda part: str(part)
-)
-@pytest.mark.parametrize("law", LAWS)
-def test_the_motion_is_that_of_an_independent_solver(
-    law: str, seed: int, *, directional: bool
-) -> None:
-    """From rest, under a constant force; every other belt moves backward."""
-    drive = random_drive(seed, law, directional=directional)
-    draw = np.random.default_rng(seed)
-    plain = drive.plain
-    belt_speed = float(draw.uniform(0.1, 0.4)) * plain.speed_scale * (-1) ** seed
-    force = float(draw.uniform(-0.3, 0.3)) * plain.normal_force
-    constant = {"amplitude": force, "start": 0.0, "duration": float("inf")}
-    drive = replace(
-        drive,
-        plain=replace(plain, belt_speed=belt_speed),
-        force=RandomSignal("step", constant),
-        position=0.0,
-        velocity=0.0,
-    )
-    found, breakpoints = drive.motion()
-    errors = difference(drive, drive.solution(), found, sticks_of(breakpoints))
-    assert errors.state < 1e-7
-    assert errors.events < 1e-7
-
 
 SAME = [
     (Stribeck(0.4, 0.25, 0.5), dop853.stribeck(0.4, 0.25, 0.5)),

@@ -63,32 +63,6 @@ def test_rounding_at_the_limit_does_not_hold_the_slide_for_ever(
 
 
 @directions
-def test_it_lands_and_sticks(direction: float) -> None:
-    motion = RecordedMotion(replace(PAPER, belt_speed=direction * BELT), 0.0, 0.0)
-    motion.advance(2.0)
-    assert motion.sticking
-    assert motion.velocity == direction * BELT
-    breakpoints = motion.take_breakpoints()
-    landed = breakpoints[~breakpoints.sticking]
-    assert landed.velocity[-1] == direction * BELT
-    assert 0.0 < landed.time[-1] < 2.0
-
-
-@directions
-def test_it_passes_the_speed_of_a_belt_that_cannot_hold_it(direction: float) -> None:
-    """Arriving at belt speed with h = 2 > 0.4, friction changes sign and it slows down further."""
-    drive = replace(PAPER, belt_speed=direction * BELT)
-    motion = RecordedMotion(drive, direction * 2.0, direction * 0.3)
-    before = motion.friction_force
-    motion.advance(0.1)
-    assert not motion.sticking
-    assert direction * motion.velocity < BELT
-    assert direction * before < -0.3
-    assert direction * motion.friction_force > 0.3
-    assert not motion.take_breakpoints().sticking.any()
-
-
-@directions
 def test_a_jump_of_the_force_breaks_the_stick_at_once(direction: float) -> None:
     motion = RecordedMotion(SLOW, 0.0, BELT)
     motion.advance(1.0)
