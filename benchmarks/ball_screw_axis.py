@@ -1,4 +1,4 @@
-"""What does `stickslip identify` find on a real axis, and what does it predict?
+"""Findings and predictions of `stickslip identify` on a real axis.
 
 The ball-screw axis EMPS (A. Janot, M. Gautier, M. Brunot, Data set and reference models of EMPS,
 Workshop on Nonlinear System Identification Benchmarks, 2019; `STICKSLIP_DATA`, or ../shared/data,

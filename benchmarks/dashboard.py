@@ -59,7 +59,7 @@ class Figures:
 
 @dataclass(frozen=True)
 class Spent:
-    """What a dashboard has done and used so far."""
+    """Work and resources of a dashboard so far."""
 
     frames: float = 0.0
     server: float = 0.0

@@ -1,4 +1,4 @@
-"""What the pages take from the code: parameters, topics, numbers of the theory, of an example.
+"""Parts of the pages from the code: parameters, topics, numbers of the theory, of an example.
 
 Fills in what stands between `<!-- generated: NAME -->` and `<!-- end: NAME -->` on the pages beside
 this file.

@@ -1,4 +1,4 @@
-"""What `mkdocs build` does beyond mkdocs.yml: paths as in the checkout, and formulas as MathML."""
+"""Hooks of `mkdocs build`: paths as in the checkout, and formulas as MathML."""
 
 import html
 import re

@@ -1,4 +1,4 @@
-"""What an encoder of 1 um and an actuator that lags do to a washout controller.
+"""Effects of an encoder of 1 um and an actuator that lags on a washout controller.
 
 The velocity is the difference of positions over some samples. A longer difference tells smaller
 steps of the velocity, and tells them later; a lag of the actuator delays the force, too.

@@ -1,4 +1,4 @@
-"""What friction with a memory does: loops over the speed, presliding loops, and the memory itself.
+"""Effects of friction with a memory: loops over the speed, presliding loops, and the memory itself.
 
 The slide of a machine tool vibrates on a falling curve; then a force with a bias swings below
 break-away on a slide that no spring holds: with LuGre it drifts, with the elasto-plastic law not.

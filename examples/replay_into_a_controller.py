@@ -1,4 +1,4 @@
-"""What the washout controller would have answered to a recorded run with other gains.
+"""Answers of the washout controller to a recorded run, with other gains.
 
 Feeds the states of the reference bag to the control law, without ROS: once with the recorded
 parameters, which gives the recorded forces to the last bit, and once with twice the linear gain.

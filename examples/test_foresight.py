@@ -1,4 +1,4 @@
-"""What Foresight does to the feed drive when its forces come 20 ms late."""
+"""Effect of Foresight on the feed drive when its forces come 20 ms late."""
 
 import pytest
 from foresight import Foresight

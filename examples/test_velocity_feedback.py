@@ -1,4 +1,4 @@
-"""What VelocityFeedback does to the feed drive."""
+"""Effect of VelocityFeedback on the feed drive."""
 
 import pytest
 from velocity_feedback import VelocityFeedback

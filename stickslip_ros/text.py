@@ -8,8 +8,8 @@ from math import isfinite
 from typing import Any
 
 _PREFIXES = {1e9: "G", 1e6: "M", 1e3: "k", 1.0: "", 1e-3: "m", 1e-6: "µ", 1e-9: "n"}
-_LONGEST, _MOST = 80, 3
-_ALIKE = 0.6
+_LONGEST_NAME, _MOST_SUGGESTIONS = 80, 3
+_LEAST_SIMILARITY = 0.6
 """Ratio of `SequenceMatcher` above which two names are close."""
 
 
@@ -32,7 +32,7 @@ def shown(value: Any) -> str:
         text = repr(value)
     except Exception:  # a value of the code of others, or a number of more than 4300 digits
         text = f"an object of class {type(value).__name__}"
-    return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}..."
+    return text if len(text) <= _LONGEST_NAME else f"{text[:_LONGEST_NAME]}..."
 
 
 def quantity(value: float, unit: str) -> str:
@@ -72,18 +72,18 @@ def did_you_mean(name: str, known: Iterable[str], otherwise: str | None = None) 
     the unknown name (linear_gain and gain); otherwise, the most similar name is close. Of two close
     names the one that has all words of the other and more (friction.reverse.static) is omitted.
     """
-    names, name = sorted(known), name[:_LONGEST]
+    names, name = sorted(known), name[:_LONGEST_NAME]
     last = name.rpartition(".")[2]
     close = [each for each in names if each.rpartition(".")[2] == last]
     close = close or [each for each in names if _words(last) <= _words(each)]
     if not close:
         ratios = {each: _likeness(name, each) for each in names}
         best = max(ratios.values(), default=0.0)
-        close = [each for each in names if ratios[each] == best >= _ALIKE]
+        close = [each for each in names if ratios[each] == best >= _LEAST_SIMILARITY]
     parts = {each: set(re.split(r"[._]", each)) for each in close}
     close = [each for each in close if not any(parts[other] < parts[each] for other in close)]
     if close:
-        return f"did you mean {' or '.join(close[:_MOST])}?"
+        return f"did you mean {' or '.join(close[:_MOST_SUGGESTIONS])}?"
     return f"known are {', '.join(names)}" if otherwise is None else otherwise
 
 

@@ -1,4 +1,4 @@
-"""What all results have in common: they print, draw themselves, and become tables."""
+"""Base of all results: they print, draw themselves, and become tables."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
@@ -95,10 +95,10 @@ class Table(NamedTuple):
     columns: Mapping[str, Any]
     """Values by name: an array each, a list of texts, or a list of tuples of unequal length."""
     quantities: Mapping[str, Quantity]
-    """What the columns are, in their order; those that are not there are left out."""
+    """Labels and units of the columns, in order; those that are not there are left out."""
     units: Units
     dimensions: Mapping[str, Any]
-    """What the values depend on, in row-major order; a range has no values of its own."""
+    """Axes of the values, in row-major order; a range has no values of its own."""
     attributes: Mapping[str, str]
     row_names: str | None = None
     """Column that is the index of a table of pandas."""

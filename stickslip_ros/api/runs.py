@@ -110,9 +110,9 @@ def simulate(
     chosen = as_scenario(scenario)
     given = simulation.default_duration(chosen) if duration is None else duration
     length = number_of("duration", given, "s")
-    told = simulation.sensor_meter(chosen)
+    measured = simulation.sensor_meter(chosen)
     history = RunHistory()
-    recorder = TrajectoryRecorder(chosen.plant.rate, measured=told is not None)
+    recorder = TrajectoryRecorder(chosen.plant.rate, measured=measured is not None)
     true = simulation.simulate(
         chosen,
         length,
@@ -120,7 +120,7 @@ def simulate(
         progress=progress,
         observer=history,
         recorder=recorder,
-        told=told,
+        measured=measured,
     )
-    measures, truth = (true, None) if told is None else (told.measures(), true)
+    measures, truth = (true, None) if measured is None else (measured.measures(), true)
     return Run(chosen, length, continuous, measures, truth, recorder.trajectory(), history)

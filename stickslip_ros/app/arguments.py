@@ -28,14 +28,14 @@ if TYPE_CHECKING:
     from stickslip_ros.scenarios.files import Scenario
 
 DEFAULT_CONTROLLER = "(default: the one that the scenario has a section for)"
-"""What --controller is by default, for its help."""
+"""Default of --controller, for its help."""
 
 _FIGURE_FILES = (".png", ".svg", ".pdf")
 
-_FAR = 10.0
+_DOUBTFUL_RATIO = 10.0
 """Belt speed, in scales of speed, beyond which it may be in another unit."""
 
-_SMALLEST, _LARGEST = 2, 50
+_LEAST_INCHES, _MOST_INCHES = 2, 50
 """Width and height of a figure, inches."""
 _MOST_PIXELS = 2e8
 _STYLES = "screen", "paper", "paper-double"
@@ -77,8 +77,8 @@ def add_control(parser: argparse.ArgumentParser) -> Any:
     parser.add_argument(
         "--yes",
         action="store_true",
-        help=f"take belt speeds beyond {_FAR:g} times the speed scale of the drive and its "
-        "friction, which are refused otherwise: mm/s, perhaps, in place of m/s",
+        help=f"take belt speeds beyond {_DOUBTFUL_RATIO:g} times the speed scale of the drive and "
+        "its friction, which are refused otherwise: mm/s, perhaps, in place of m/s",
     )
     control = parser.add_mutually_exclusive_group()
     control.add_argument("--no-control", action="store_true", help="run without the controller")
@@ -268,10 +268,10 @@ def _size(text: str) -> tuple[float, float]:
         width, height = (float(part) for part in parts)
     except ValueError:
         width = height = float("nan")
-    if not (_SMALLEST <= width <= _LARGEST and _SMALLEST <= height <= _LARGEST):
+    if not (_LEAST_INCHES <= width <= _MOST_INCHES and _LEAST_INCHES <= height <= _MOST_INCHES):
         raise argparse.ArgumentTypeError(
-            f"{text!r} is not WIDTHxHEIGHT in inches, each from {_SMALLEST} to {_LARGEST}, such as "
-            "6x4"
+            f"{text!r} is not WIDTHxHEIGHT in inches, each from {_LEAST_INCHES} to {_MOST_INCHES}, "
+            "such as 6x4"
         )
     return width, height
 
@@ -369,11 +369,11 @@ def check_speeds(arguments: argparse.Namespace, scenario: "Scenario", *speeds: f
     own = [plant.flat()[name] for name in used if known[name].unit == "m/s"]
     drive = plant.as_drive()
     fastest, scale = max([drive.fastest_belt, *map(abs, speeds)]), max([drive.speed_scale, *own])
-    if fastest > _FAR * scale and not arguments.yes:
+    if fastest > _DOUBTFUL_RATIO * scale and not arguments.yes:
         shown, limit = Units.for_drive(drive).texts([fastest, scale], "m/s")
         raise InvalidInputError(
-            f"a belt speed of {shown} is refused: more than {_FAR:g} times {limit}, the scale of "
-            "speed of this drive and its friction; if it is meant, and in m/s, add --yes"
+            f"a belt speed of {shown} is refused: more than {_DOUBTFUL_RATIO:g} times {limit}, the "
+            "scale of speed of this drive and its friction; if it is meant, and in m/s, add --yes"
         )
 
 

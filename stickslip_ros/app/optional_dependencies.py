@@ -1,4 +1,4 @@
-"""What only some commands need: ROS, matplotlib, and the packages of the dashboard."""
+"""Dependencies of some commands only: ROS, matplotlib, and the packages of the dashboard."""
 
 import os
 from collections.abc import Generator

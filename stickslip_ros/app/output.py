@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 _ALL_SI: Mapping[str, "Units"] = {}
 
-_JUDGED, _LONG = 3.0, 60.0
+_JUDGING_TIME, _LONG_TIME = 3.0, 60.0
 """Time after which the length of a work is judged, and the length of a long one, s."""
 
 _FRAME = 3
@@ -87,16 +87,16 @@ def progress_bar(label: str, total: float | None, advice: str = "") -> Generator
     A sentence says how long it will take if that is long, with `advice` on what would be quicker.
     """
     start: tuple[float, float] | None = None
-    told = False
+    judged = False
 
     def estimate(done: float) -> None:
-        nonlocal start, told
+        nonlocal start, judged
         start = start or (monotonic(), done)
         passed, since = monotonic() - start[0], done - start[1]
-        if total is None or told or passed < _JUDGED or since <= 0.0:
+        if total is None or judged or passed < _JUDGING_TIME or since <= 0.0:
             return
-        told, left = True, passed * (total - done) / since
-        if left > _LONG:
+        judged, left = True, passed * (total - done) / since
+        if left > _LONG_TIME:
             tell(f"{label}: about {left / 60.0:.0f} min more{advice}")
 
     if not sys.stderr.isatty():

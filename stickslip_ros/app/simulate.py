@@ -83,7 +83,7 @@ def run(arguments: argparse.Namespace) -> None:
         with naming("--continuous-control:"):
             check_continuous(scenario)
     history = None if arguments.plot is None else RunHistory()
-    told = sensor_meter(scenario)
+    measured = sensor_meter(scenario)
     units = Units.for_drive(scenario.plant.as_drive())
     shown = f"{duration:g} {units.of_unit('s')}".rstrip()
     with (
@@ -97,14 +97,14 @@ def run(arguments: argparse.Namespace) -> None:
             progress=progress,
             observer=history,
             recorder=recorder,
-            told=told,
+            measured=measured,
         )
         if history is not None:
             from stickslip_ros.plots.run_figure import DrawnRun, run_figure
 
             drawn = DrawnRun.simulated(scenario, history, true)
             write_figure(arguments, lambda style: run_figure(drawn, style=style))
-    measures, truth = (true, None) if told is None else (told.measures(), true)
+    measures, truth = (true, None) if measured is None else (measured.measures(), true)
     if arguments.json:
         own = None if truth is None else truth.as_dict()
         values = {**measures.as_dict(), "truth": own, "duration": duration}

@@ -1,4 +1,4 @@
-"""What the commands that run studies have in common: their arguments, and running them."""
+"""Common part of the commands that run studies: their arguments, and running them."""
 
 import argparse
 import os

@@ -57,7 +57,7 @@ _INDEX_ENTRY = 16
 """Bytes of a log time and an offset in a message index."""
 _DATA_END = HEAD.pack(Opcode.DATA_END, 4)
 _OPCODES = frozenset((*FIELDS, Opcode.MESSAGE))
-_PRIVATE = 0x80
+_PRIVATE_FROM = 0x80
 """Opcodes from this one on are private to an application."""
 _INVENTORY = frozenset((*DEFINITIONS, Opcode.METADATA, Opcode.ATTACHMENT))
 """Records between the messages that define or describe them."""
@@ -335,8 +335,10 @@ class McapFile:
         if record.opcode not in FIELDS:
             # A private record of an application, if another record follows.
             following = self._read(record.end, 1)
-            followed = bool(following) and (following[0] in _OPCODES or following[0] >= _PRIVATE)
-            return record if record.opcode >= _PRIVATE and followed else None
+            followed = bool(following) and (
+                following[0] in _OPCODES or following[0] >= _PRIVATE_FROM
+            )
+            return record if record.opcode >= _PRIVATE_FROM and followed else None
         place = record.content
         for field in FIELDS[record.opcode]:
             if field < 0:

@@ -18,7 +18,7 @@ from stickslip_ros.files import open_regular, written
 
 METADATA_FILE = "metadata.yaml"
 
-_LARGEST = 4_000_000
+_LARGEST_METADATA = 4_000_000
 """Characters of the largest `metadata.yaml` that is read: a bag of about ten thousand files."""
 _LARGEST_QOS = 100_000
 """Characters of the longest YAML of QoS profiles that is read: about a hundred publishers."""
@@ -157,8 +157,8 @@ def _information(
 def _listed(metadata: Path) -> set[str]:
     """Return the files that a `metadata.yaml` lists."""
     with TextIOWrapper(open_regular(metadata), encoding="utf-8") as file:
-        text = file.read(_LARGEST + 1)
-    if len(text) > _LARGEST:
+        text = file.read(_LARGEST_METADATA + 1)
+    if len(text) > _LARGEST_METADATA:
         raise ValueError
     # Only this list of strings is built, whatever the file contains.
     events: Iterator[Any] = yaml.parse(text, _LOADER)

@@ -41,7 +41,7 @@ from stickslip_ros.samples import ForceColumns, ReferenceColumns, SampleColumns
 from stickslip_ros.stamps import NANOSECONDS
 from stickslip_ros.text import printable
 
-_PACKED = ".mcap.zstd"
+_PACKED_SUFFIX = ".mcap.zstd"
 """Suffix of the files that rosbag2 compressed as a whole."""
 
 
@@ -463,7 +463,7 @@ def _mcap_files(path: Path) -> list[Path]:
         raise BagError(f"the bag {path} does not exist")
     files, sqlite = [path], path.suffix == ".db3"
     if path.is_dir():
-        files = sorted([*path.glob("*.mcap"), *path.glob(f"*{_PACKED}")], key=_place_in_bag)
+        files = sorted([*path.glob("*.mcap"), *path.glob(f"*{_PACKED_SUFFIX}")], key=_place_in_bag)
         sqlite = not files and any(path.glob("*.db3"))
     if sqlite:
         raise BagError(
@@ -477,7 +477,7 @@ def _mcap_files(path: Path) -> list[Path]:
 
 def _unpacked(path: Path, opened: ExitStack) -> Path:
     """Return a file as MCAP; unpack one that rosbag2 compressed as a whole until the bag closes."""
-    if not path.name.endswith(_PACKED):
+    if not path.name.endswith(_PACKED_SUFFIX):
         return path
     directory = opened.enter_context(tempfile.TemporaryDirectory(prefix="stickslip_ros_"))
     unpacked = Path(directory, path.name.removesuffix(".zstd"))

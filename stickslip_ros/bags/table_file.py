@@ -41,7 +41,7 @@ QUANTITIES = (
 LONGEST = 9e9
 """Longest time, s, that stamps can express."""
 
-_OWN = {
+_OWN_COLUMNS = {
     "time": ("time",),
     "position": ("measured_position", "position"),
     "velocity": ("measured_velocity", "velocity"),
@@ -244,7 +244,7 @@ def own_columns(path: Path, table: Mapping[str, FloatArray]) -> dict[str, str]:
     """
     own = {
         quantity: next((name for name in names if name in table), "")
-        for quantity, names in _OWN.items()
+        for quantity, names in _OWN_COLUMNS.items()
     }
     if not own["time"] or not own["position"]:
         raise InvalidInputError(

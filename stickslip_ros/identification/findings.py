@@ -71,7 +71,7 @@ class Findings:
     _predicted: dict[tuple[Any, Record], Any] = field(
         default_factory=dict[tuple[Any, Record], Any], init=False, repr=False
     )
-    """What was predicted so far, by method of the fit and record."""
+    """Predictions so far, by method of the fit and record."""
 
     def behind(self, candidate: Candidate) -> float:
         """Return by how many standard errors a law predicts held-out parts worse than the best."""

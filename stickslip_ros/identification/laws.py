@@ -42,7 +42,7 @@ REVERSE = "reverse."
 
 
 class IdentifiedLaw(ABC):
-    """What identification knows of a friction law.
+    """A friction law as identification knows it.
 
     A regression of forces takes friction in steady slip as a sum of `terms` with unknown forces;
     it may have one shape, a speed, in which it is not linear. A search of trajectories has

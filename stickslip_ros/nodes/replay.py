@@ -30,7 +30,7 @@ from stickslip_ros.stamps import NANOSECONDS
 
 _FLOW_WINDOW = PlantParameters().flow_window
 """Joint states that may be sent and not yet recorded."""
-_SETTLED = 0.5
+_SETTLING_TIME = 0.5
 """Time, s, without a new reader after which the readers count as complete."""
 _SILENCE = 3.0
 """Time, s, after which the node logs what it waits for."""
@@ -154,7 +154,9 @@ class ReplayNode(ManagedNode[ReplayParameters]):
             return missing
         self._waiting_for = ""
         return (
-            "new readers are still appearing" if now - self._readers_changed_at < _SETTLED else ""
+            "new readers are still appearing"
+            if now - self._readers_changed_at < _SETTLING_TIME
+            else ""
         )
 
     def _look_for_readers(self) -> None:

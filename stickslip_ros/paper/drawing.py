@@ -39,7 +39,7 @@ from stickslip_ros.plots.style import (
 )
 from stickslip_ros.plots.units import Units, typeset
 
-_FIRST, _LATER, _BELT = "#888888", "#DDDDDD", "black"
+_FIRST_COLOUR, _LATER_COLOUR, _BELT_COLOUR = "#888888", "#DDDDDD", "black"
 
 _FIRST_PERIODS = 20
 """Natural periods from rest that are emphasized; more of them would merge."""
@@ -53,7 +53,7 @@ _LEAST_STICK_FRACTION = 0.1
 _KEPT_DOTS, _KEPT_COLOURS = 110.0, 128
 """Dots per inch and colours of the figures for the screen, which are kept with the sources."""
 
-_LETTERS = 44
+_LINE_LENGTH = 44
 """Letters in a line of a column in print."""
 
 _UNITS = Units(dimensionless=True, terse=True)
@@ -130,10 +130,10 @@ def _portraits(figure: PortraitFigure, *, style: FigureStyle) -> Figure:
     for number, (panel, count) in enumerate(zip(figure.panels, rows, strict=True)):
         _panel(drawn.add_subfigure(parts[number, 0]), panel, count, columns, style)
     handles: list[Artist] = [
-        Line2D([], [], color=_FIRST, lw=1.0, label=f"first {_FIRST_PERIODS} periods"),
-        Line2D([], [], color=_LATER, lw=4.0, label="later"),
+        Line2D([], [], color=_FIRST_COLOUR, lw=1.0, label=f"first {_FIRST_PERIODS} periods"),
+        Line2D([], [], color=_LATER_COLOUR, lw=4.0, label="later"),
         Line2D([], [], color=BLUE, lw=2.0, label=f"last {LAST_CYCLES} cycles"),
-        Line2D([], [], color=_BELT, lw=0.8, ls="--", label="belt speed"),
+        Line2D([], [], color=_BELT_COLOUR, lw=0.8, ls="--", label="belt speed"),
         Line2D([], [], color=GREEN, ls="", marker="o", ms=5.0, label="equilibrium"),
     ]
     if any(portrait.measures.stick_fraction for portrait in figure.portraits):
@@ -143,7 +143,7 @@ def _portraits(figure: PortraitFigure, *, style: FigureStyle) -> Figure:
 
 
 def _panel(subfigure: SubFigure, panel: Panel, rows: int, columns: int, style: FigureStyle) -> None:
-    title = fill(panel.title, _LETTERS) if style.narrow else panel.title
+    title = fill(panel.title, _LINE_LENGTH) if style.narrow else panel.title
     subfigure.suptitle(typeset(title), fontweight="bold")
     bounded = [portrait for portrait in panel.portraits if not portrait.runs_away]
     # A diverging motion gets a frame of its own: in a common one the others would be too small.
@@ -168,9 +168,9 @@ def _portrait(axes: Axes, portrait: Portrait, style: FigureStyle) -> None:
     last, measures, belt_speed = portrait.last_cycles, portrait.measures, portrait.drive.belt_speed
     whole = _framed(portrait)
     first = whole[whole.time <= _FIRST_PERIODS * portrait.drive.natural_period]
-    axes.plot(whole.position, whole.velocity, color=_LATER, lw=0.8)
-    axes.plot(first.position, first.velocity, color=_FIRST, lw=0.5)
-    axes.axhline(belt_speed, color=_BELT, lw=0.8, ls="--")
+    axes.plot(whole.position, whole.velocity, color=_LATER_COLOUR, lw=0.8)
+    axes.plot(first.position, first.velocity, color=_FIRST_COLOUR, lw=0.5)
+    axes.axhline(belt_speed, color=_BELT_COLOUR, lw=0.8, ls="--")
     if measures.period is not None:
         axes.plot(last.position, last.velocity, color=BLUE, lw=1.6)
         stuck = np.where(last.stuck, last.position, np.nan)

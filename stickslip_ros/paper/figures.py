@@ -310,13 +310,13 @@ def _gains(corner_frequency: float, gains: Sequence[tuple[float, float]]) -> lis
             f"k1 = {k1:g}, k2 = {k2:g}",
             unit_drive(0.4),
             Washout(corner_frequency, k1, k2),
-            duration=_LONG,
+            duration=_LONG_DURATION,
         )
         for k1, k2 in gains
     ]
 
 
-_LONG = 3000.0
+_LONG_DURATION = 3000.0
 """Duration in which a slow motion settles too."""
 
 _DRIVE = "drive of the paper, no control"
@@ -405,7 +405,7 @@ _PORTRAITS = {
                 _cases("v0 =", (0.48, 0.49, 0.492), partial(unit_drive, damping=damping), duration)
             )
             for damping in (0.01, 0.02)
-            for duration in (300.0, _LONG)
+            for duration in (300.0, _LONG_DURATION)
         },
     ),
     13: _Portraits(

@@ -39,7 +39,7 @@ does not print are chosen to show the behaviour that its text describes. Everyth
 and starts from rest at X = 0. Figure 1 is a drawing of the model.
 """
 
-_TOLD_BY_THE_VERDICT = ("the same", "something else")
+_FORMULA_RESULTS = ("the same", "something else")
 """Results for a formula."""
 
 _COLUMNS = ("", "claim", "printed", "computed", "verdict")
@@ -97,7 +97,7 @@ def _cells(claim: Mapping[str, Any]) -> list[str]:
         claim["place"].replace("section ", "§"),
         claim["statement"],
         _shown(claim["printed"]),
-        "" if claim["computed"] in _TOLD_BY_THE_VERDICT else _shown(claim["computed"]),
+        "" if claim["computed"] in _FORMULA_RESULTS else _shown(claim["computed"]),
         verdict if claim["verdict"] == Verdict.HOLDS else f"{verdict}: {_first_sentence(claim)}",
     ]
 

@@ -44,7 +44,7 @@ _RAW: Any = {"color": BLUE, "marker": ".", "ms": 2.0, "ls": "", "alpha": 0.5, "m
 _FITTED: Any = {"color": ORANGE, "lw": 1.2}
 _CONFIDENCE = 1.96
 """Half of a 95 % interval, in standard errors."""
-_ALIKE = 1e-9
+_EQUAL_SPREAD = 1e-9
 """Relative spread of slips below which they are shown as equal."""
 _BINS = 30
 
@@ -296,7 +296,7 @@ def _distribution(axes: Axes, values: np.ndarray, title: str, unit: str, units: 
     if len(values):
         shown = values / scale
         low, high = shown.min(), shown.max()
-        if high - low < _ALIKE * high:  # too close for bins of their own
+        if high - low < _EQUAL_SPREAD * high:  # too close for bins of their own
             low, high = low - 0.5, high + 0.5
         axes.hist(shown, bins=_BINS, range=(low, high), color=BLUE)
         axes.axvline(float(np.median(values)) / scale, color=ORANGE, lw=1.2, label="median")

@@ -83,7 +83,7 @@ class DrawnRun(NamedTuple):
     """A run to draw."""
 
     name: str
-    """What it is called beside other runs."""
+    """Name beside other runs."""
     history: RunHistory
     measures: Measures
     drive: Drive | None
@@ -212,7 +212,7 @@ def _compared(runs: Sequence[DrawnRun], style: FigureStyle) -> Figure:
 
 
 class _Panels:
-    """What the panels of a figure have in common: runs and axes."""
+    """Common part of the panels of a figure: runs and axes."""
 
     def __init__(self, runs: Sequence[DrawnRun], *, narrow: bool, short: bool) -> None:
         own = {Units.for_drive(run.drive).shortened() for run in runs}

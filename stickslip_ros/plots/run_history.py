@@ -149,7 +149,7 @@ class RunHistory:
         self.switched_on: float | None = None
         """Time of the first force that is not zero, s; None as long as there is none."""
         self.conclusions = RunAnalysis(None, None)
-        """What was concluded from a record."""
+        """Analysis of the record."""
         self._motion, self._cycles = Trace(4), Trace(2)
         self._first: list[DrawnMotion] = []
         self._switched: DrawnMotion | None = None

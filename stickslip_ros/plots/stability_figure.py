@@ -45,7 +45,7 @@ _GAINS: Any = {"color": "white", "mec": "black", "marker": "*", "ls": "", "zorde
 _LIMIT: Any = {"color": ORANGE, "lw": 2.0}
 _CONTINUOUS: Any = {"color": "black", "ls": "--", "lw": 1.2}
 _FORCE: Any = {"color": "black", "ls": (0, (5.0, 1.0, 1.0, 1.0)), "lw": 1.4}
-_BEYOND = "//"
+_BEYOND_LIMIT_HATCH = "//"
 """Hatch of gains that need more than the force limit."""
 _STEPS = [1.0, 2.0, 2.5, 5.0, 10.0]
 _LOOKS: tuple[dict[str, Any], ...] = (
@@ -69,7 +69,7 @@ _NOW: Any = {"color": GREY, "lw": 3.0, "alpha": 0.6, "zorder": 1.0}
 _ONSET: Any = {"color": "black", "lw": 0.8, "ls": DASHES[2], "zorder": 1.5}
 _BORDER: Any = {"color": "black", "lw": 0.5, "ls": DASHES[1], "zorder": 1.5}
 
-_SAME = 1e-3
+_SAME_MARK_DISTANCE = 1e-3
 """Relative distance of two belt speeds below which one mark serves for both."""
 
 
@@ -221,7 +221,12 @@ def _draw_forces(
     levels = [float(level) for level in ticks if level > 0.0]
     if limited:
         axes.contourf(
-            corners, gains, forces.T, levels=[limit, np.inf], colors="none", hatches=[_BEYOND]
+            corners,
+            gains,
+            forces.T,
+            levels=[limit, np.inf],
+            colors="none",
+            hatches=[_BEYOND_LIMIT_HATCH],
         )
     for look, width in (("white", 3.0), ("black", _FORCE["lw"])):
         drawn = axes.contour(
@@ -236,7 +241,7 @@ def _draw_forces(
     if not limited:
         return [Line2D([], [], **_FORCE, label="largest force at switch-on")]
     shown = units.text(limit, "N")
-    hatched = Patch(facecolor="white", edgecolor=INK, lw=0.0, hatch=_BEYOND)
+    hatched = Patch(facecolor="white", edgecolor=INK, lw=0.0, hatch=_BEYOND_LIMIT_HATCH)
     hatched.set_label("needs a larger force")
     return [Line2D([], [], **_FORCE, label=f"force limit {shown}"), hatched]
 
@@ -312,7 +317,7 @@ def branches_figure(
     onset, own = found.sticking_onset, found.drive.belt_speed
     for fold in found.folds:
         name = "fold"
-        if onset is not None and isclose(fold, onset, rel_tol=_SAME):
+        if onset is not None and isclose(fold, onset, rel_tol=_SAME_MARK_DISTANCE):
             name, onset = "fold, onset of sticking", None
         for branch in found.cycles:
             for end in (0, -1):

@@ -8,7 +8,7 @@ LONGEST_NAMESPACE = 200
 
 
 class Pace(StrEnum):
-    """What the plant waits for between samples: the clock, or the answer to the last sample."""
+    """Condition of the next sample: the time by the clock, or the answer to the last sample."""
 
     REALTIME = "realtime"
     LOCKSTEP = "lockstep"

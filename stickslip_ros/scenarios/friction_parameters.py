@@ -73,7 +73,7 @@ class ReverseFriction(_constants_of_laws(reverse=True)):
 
     file: str = _curve(" for v_r < 0; empty: as forward")
     points: Pairs = ()
-    """What is in the file of a table."""
+    """Content of the file of a table."""
 
     @property
     def given(self) -> dict[str, Any]:
@@ -115,7 +115,7 @@ class Friction(_constants_of_laws(), _ChosenLaw):
     file: str = _curve()
     reverse: ReverseFriction = field(default_factory=ReverseFriction)
     points: Pairs = ()
-    """What is in the file of a table."""
+    """Content of the file of a table."""
 
     @override
     def completed(self, prefix: str, curves: dict[str, Pairs]) -> Self:

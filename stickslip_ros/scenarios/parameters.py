@@ -46,7 +46,7 @@ from stickslip_ros.text import shown
 if TYPE_CHECKING:
     from stickslip_ros.physics.motion.motion import Motion
 
-_SHORTEST = 1e-3
+_SHORTEST_TIME = 1e-3
 """Shortest time-out or period of a node, s."""
 _OF_DRIVE = constants_of(Drive)
 """Parameters of the plant that the drive takes unchanged."""
@@ -146,7 +146,7 @@ class PlantParameters(NodeParameters):
         "Longest wall time to wait for a force or the recorder (lockstep).",
         "s",
         changes=Changes.AT_REST,
-        at_least=_SHORTEST,
+        at_least=_SHORTEST_TIME,
     )
     expects_control: bool = constant(
         True, "Whether the plant expects forces from a controller.", changes=Changes.AT_REST
@@ -391,7 +391,7 @@ class AnalyzerParameters(NodeParameters):
         "Longest wall time until a recorded message is on disk.",
         "s",
         changes=Changes.AT_BUILD,
-        at_least=_SHORTEST,
+        at_least=_SHORTEST_TIME,
     )
     max_bag_size: int = constant(
         0,

@@ -15,7 +15,7 @@ from stickslip_ros.scenarios.ros_yaml import PARAMETERS_KEY, LineError
 from stickslip_ros.text import did_you_mean, shown
 
 _PATTERN = re.compile(r"(/(\*\*?|[A-Za-z_]\w*))+", re.ASCII)
-_LARGEST = 1_000_000
+_LARGEST_FILE = 1_000_000
 """Largest number of characters in a scenario file."""
 BASE_SECTION = "scenario"
 """Last part of the name of the section that names the base and belongs to no node."""
@@ -115,12 +115,12 @@ def _sections(path: Path) -> Mapping[str, Mapping[str, Any]]:
     """
     try:
         with TextIOWrapper(open_regular(path), encoding="utf-8", newline="") as file:
-            text = file.read(_LARGEST + 1)
+            text = file.read(_LARGEST_FILE + 1)
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or error
         raise InvalidInputError(f"cannot read scenario {path}: {reason}") from None
-    if len(text) > _LARGEST:
-        raise InvalidInputError(f"scenario {path} is longer than {_LARGEST} characters")
+    if len(text) > _LARGEST_FILE:
+        raise InvalidInputError(f"scenario {path} is longer than {_LARGEST_FILE} characters")
     sections: dict[str, dict[str, Any]] = {}
     lines: dict[tuple[str, str], int] = {}
     for keys, line, value in ros_yaml.entries(text, str(path)):

@@ -91,7 +91,7 @@ class SignalParameters(_TimeCourse):
         file=True,
     )
     points: Pairs = ()
-    """What is in the file of a table."""
+    """Content of the file of a table."""
 
     @override
     def completed(self, prefix: str, curves: dict[str, Pairs]) -> Self:

@@ -192,8 +192,8 @@ class Bench:
                 if found.settling_time is None:
                     return replace(found, peak_force=peak)
                 slowest = max(slowest, found.settling_time)
-            told = start if measure is None else measure(number, *start)
-            controller.answer(_sample(drive, stamp, *told))
+            measured = start if measure is None else measure(number, *start)
+            controller.answer(_sample(drive, stamp, *measured))
         return Outcome(peak, slowest, grows=False)
 
     def returns(self, drive: Drive, law: Washout, speed: float) -> bool:

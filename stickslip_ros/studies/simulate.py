@@ -49,11 +49,11 @@ def simulate(
     progress: Progress = lambda _: None,
     observer: RunObserver | None = None,
     recorder: SampleRecorder | None = None,
-    told: SampleMeter | None = None,
+    measured: SampleMeter | None = None,
 ) -> Measures:
     """Return the measures of the scenario's motion over `duration` (s).
 
-    An `observer` receives the motion, a `recorder` takes its samples, and `told` those that the
+    An `observer` receives the motion, a `recorder` takes its samples, and `measured` those that the
     sensor tells. Raises InvalidInputError for
     a duration that is not allowed, or if `continuous` control does not support the scenario.
     """
@@ -80,7 +80,7 @@ def simulate(
     loop = plant.as_loop(motion, advance=None if tracer is None else tracer.advance)
     controller = None if law is None else scenario.controller.as_controller()
     return simulate_sampled(
-        loop, motion, controller, duration, meter, progress, tracer, recorder, told
+        loop, motion, controller, duration, meter, progress, tracer, recorder, measured
     )
 
 

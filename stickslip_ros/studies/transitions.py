@@ -28,7 +28,7 @@ STABILITY_LIMIT = "limit of stability"
 STICKING_LIMIT = "limit of sticking"
 """An end of a range in which a slide sticks again after release; there may be several ranges."""
 
-_MAPPED = 50
+_MAP_POINTS = 50
 """Number of values of each axis of a map."""
 
 
@@ -110,7 +110,8 @@ def transition_map(study: Study, axes: tuple[Axis, Axis]) -> TransitionMap:
     if any(axis.whole for axis in axes):
         return TransitionMap(axes[0].values(), axes[1].values(), {})
     first, second = (
-        np.array([axis.at(place / (_MAPPED - 1)) for place in range(_MAPPED)]) for axis in axes
+        np.array([axis.at(place / (_MAP_POINTS - 1)) for place in range(_MAP_POINTS)])
+        for axis in axes
     )
     names = [axis.parameter for axis in axes]
     margins: dict[str, FloatArray] = {}

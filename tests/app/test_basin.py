@@ -75,8 +75,8 @@ def test_without_ranges_the_starts_are_around_the_equilibrium(stickslip: Run) ->
 def test_a_long_one_says_what_would_be_quicker(
     stickslip: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(output, "_JUDGED", 0.0)
-    monkeypatch.setattr(output, "_LONG", -1.0)
+    monkeypatch.setattr(output, "_JUDGING_TIME", 0.0)
+    monkeypatch.setattr(output, "_LONG_TIME", -1.0)
     starts = "--sample", "2", "--position=0:1e-4", "--velocity=0:1e-4", "--transient", "1"
     for command, advice in (
         ("", "; every sample is simulated: --continuous-control is several times as fast"),

@@ -26,7 +26,7 @@ from tests.plots.texts import faults, in_styles, legend_texts
 
 @pytest.fixture(autouse=True)
 def _coarse_maps(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("stickslip_ros.studies.transitions._MAPPED", 8)
+    monkeypatch.setattr("stickslip_ros.studies.transitions._MAP_POINTS", 8)
 
 
 FREE = "plant.expects_control=false"

@@ -35,7 +35,7 @@ FREE = "plant.expects_control=false"
 @pytest.fixture
 def small_maps(monkeypatch: pytest.MonkeyPatch) -> None:
     """Compute the transitions of a map at few places."""
-    monkeypatch.setattr("stickslip_ros.studies.transitions._MAPPED", 5)
+    monkeypatch.setattr("stickslip_ros.studies.transitions._MAP_POINTS", 5)
 
 
 def found(over: str, *overrides: str, continuous: bool = False) -> dict[str, list[float]]:

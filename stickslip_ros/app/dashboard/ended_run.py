@@ -1,4 +1,4 @@
-"""What the page says of a run that has ended: its measures, its bag, and what to do next."""
+"""Card of a run that has ended: its measures, its bag, and what to do next."""
 
 import asyncio
 import shlex
@@ -17,10 +17,18 @@ from stickslip_ros.plots.units import Units
 from stickslip_ros.scenarios.files import shipped_scenarios
 from stickslip_ros.text import printable
 
-_LARGEST = 200_000_000
+_LARGEST_BAG = 200_000_000
 """Bytes of a bag that the page offers."""
 
-_SHOWN = ("regime", "amplitude", "period", "stick_fraction", "duration", "samples", "lost_samples")
+_MEASURES = (
+    "regime",
+    "amplitude",
+    "period",
+    "stick_fraction",
+    "duration",
+    "samples",
+    "lost_samples",
+)
 
 
 class EndedRun:
@@ -59,7 +67,7 @@ class EndedRun:
             if len(self._open) == 1:
                 source = Path(f"/proc/self/fd/{self._open[0].fileno()}")
             self._report = report_of_recording(source)
-            if source != bag and source.stat().st_size <= _LARGEST:
+            if source != bag and source.stat().st_size <= _LARGEST_BAG:
                 self.file = source
         except OSError as error:
             self._problem = f"the file {error.filename} cannot be opened: {error.strerror}"
@@ -73,7 +81,7 @@ class EndedRun:
         if bag and bag == self._bag:
             if self._report:
                 table = measure_table("", {"": self._report}, {"": units})
-                shown = [LABELS[name][0] for name in _SHOWN]
+                shown = [LABELS[name][0] for name in _MEASURES]
                 with ui.row().classes("gap-x-6 gap-y-1"):
                     for label, text in table.rows:
                         if label in shown:

@@ -27,7 +27,7 @@ _QUANTITIES = (("displacement", "m"), ("velocity", "m/s"), ("control force", "N"
 _UNKNOWN_PERIOD = 1.0
 _LEAST_SPAN = 1e-3
 """Least length of an axis, relative to the largest value that the drive lets expect."""
-_APART = 1.0
+_MARK_INTERVAL = 1.0
 """Time, s, between two changes of a parameter that have a mark each."""
 _COLUMNS = "time", "position", "velocity", "belt_velocity", "friction_force", "control_force"
 
@@ -81,7 +81,7 @@ class Frames:
             one
             for one, other in zip_longest(events, events[1:])
             if other is None
-            or other.when - one.when > _APART
+            or other.when - one.when > _MARK_INTERVAL
             or other.mark.split()[0] != one.mark.split()[0]
         ]
         times = [((event.stamp - newest) / NANOSECONDS, event.mark) for event in last]

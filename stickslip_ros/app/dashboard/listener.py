@@ -69,7 +69,7 @@ _LAWS = {controller_node(law): law for law in CONTROLLER_PARAMETERS}
 
 _ANSWER_TIMEOUT = 10.0
 _CYCLES_KEPT = 200
-_STILL = 0.5
+_SILENCE = 0.5
 """Time without samples, s, after which a plant in lockstep waits for a reply."""
 
 Answer = Future[str]
@@ -135,7 +135,7 @@ class ListenerNode(PollingNode):
         self.cycle_count = 0
         """Number of all cycles received."""
         self.events: deque[Event] = deque(maxlen=200)
-        """What happened, the newest last."""
+        """Events, the newest last."""
         self.moved_at = 0.0
         """Time of the newest samples on the monotonic clock, s."""
         self._answering_since: float | None = None
@@ -196,7 +196,7 @@ class ListenerNode(PollingNode):
         """Time that a plant in lockstep may still wait for a controller, s; 0 if it does not."""
         plant = self.parameters["plant"]
         still = time.monotonic() - self.moved_at
-        waiting = self.moved_at and self.health["plant"].state == "active" and still > _STILL
+        waiting = self.moved_at and self.health["plant"].state == "active" and still > _SILENCE
         if not waiting or plant.get("pace") != "lockstep" or not plant.get("expects_control"):
             return 0.0
         return max((plant.get("reply_timeout") or 0.0) - still, 0.0)

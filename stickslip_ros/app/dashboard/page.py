@@ -42,10 +42,10 @@ from stickslip_ros.text import number_in
 
 _REFRESH = 0.25
 _EVENTS = 100
-_FAREWELL = 5.0
+_FAREWELL_TIME = 5.0
 """Time, s, for open pages to fetch what they offer after the server has ended."""
 
-_LEAVING = 0.5
+_LEAVING_TIME = 0.5
 """Time, s, in which the nodes of a run that ends with the server have left."""
 _MEASURES = (
     (AMPLITUDE, "amplitude", "m"),
@@ -107,12 +107,12 @@ class Pages:
 
     async def take_leave(self) -> None:
         """Show the end of a run on open pages, with what they need once the server is gone."""
-        left = time.monotonic() + _LEAVING
+        left = time.monotonic() + _LEAVING_TIME
         while self._open and not self._listener.ended and time.monotonic() < left:
             await asyncio.sleep(0.05)
         if self._open and self._listener.ended:
             with suppress(TimeoutError):
-                async with asyncio.timeout(_FAREWELL):
+                async with asyncio.timeout(_FAREWELL_TIME):
                     await asyncio.gather(*(page.show_end(last=True) for page in self._open))
         self.theory.close()
 
@@ -400,7 +400,7 @@ class _Page:
                 self._ended.show(Units.for_drive(self._frames.drive))
             self._end.set_visibility(True)
             if last:
-                await ui.run_javascript("stickslip.end()", timeout=_FAREWELL)
+                await ui.run_javascript("stickslip.end()", timeout=_FAREWELL_TIME)
 
     def _is_active(self) -> bool:
         return self._state_of_controller() == "active"

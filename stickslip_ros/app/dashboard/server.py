@@ -32,7 +32,7 @@ _POLICY = (
     "style-src 'self' 'unsafe-inline'; font-src 'self'; img-src 'self' data:; base-uri 'none'; "
     "form-action 'none'; frame-ancestors 'none'"
 )
-"""What the page may load and run; docs/security.md says what NiceGUI needs of it."""
+"""Sources that the page may load and run; docs/security.md says what NiceGUI needs of them."""
 
 
 def serve(namespace: str, port: int | None, reach: str, readable: Collection[str]) -> None:

@@ -30,7 +30,7 @@ from stickslip_ros.scenarios.parameters import CONTROLLER_PARAMETERS, PlantParam
 Values = Mapping[str, Any]
 """Parameters of a node by flat name."""
 
-_SETTLED = 0.3
+_SETTLING_TIME = 0.3
 """Time, s, without a change before a computation starts: a slider may still move."""
 _SPEEDS = 30
 _POINTS = 61
@@ -174,7 +174,7 @@ class Theory:
                 each.asked, each.changed_at = inputs, now
         self._take()
         for each in self._results.values():
-            if self._running is None and each.is_stale and now - each.changed_at > _SETTLED:
+            if self._running is None and each.is_stale and now - each.changed_at > _SETTLING_TIME:
                 self._running = each, each.asked, self._submit(each)
 
     def close(self) -> None:

@@ -18,7 +18,7 @@ from stickslip_ros.plots.units import Units
 
 Options = dict[str, Any]
 
-_SLOWEST = 4.0
+_LARGEST_EXPONENT = 4.0
 """Largest size of an exponent that is drawn, in natural angular frequencies."""
 _PARTS = ("real", "1/s"), ("imaginary", "rad/s")
 _LEFT_OF_IT, _RIGHT_OF_IT, _ABOVE_IT = "insideEndTop", "insideEndBottom", "end"
@@ -114,7 +114,7 @@ def decay_chart(found: Decay, drive: Drive) -> Options:
     Exponents that are much faster than the drive itself are left out.
     """
     units = Units.for_drive(drive)
-    reach = _SLOWEST * drive.angular_frequency
+    reach = _LARGEST_EXPONENT * drive.angular_frequency
     series: list[Options] = []
     for name, values, colour, symbol in (
         ("without control", found.uncontrolled, ORANGE, "triangle"),

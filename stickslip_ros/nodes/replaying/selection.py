@@ -51,7 +51,7 @@ class Selection:
         self.left_out: list[str] = []
         """Topics that cannot be replayed, and why, in sentences."""
         self.lacking: list[str] = []
-        """What is missing from the bag, in sentences, as far as it was read."""
+        """Sentences on what is missing from the bag, as far as it was read."""
         self._source = source
         self._parameters = parameters
         if not parameters.bag:

@@ -30,7 +30,7 @@ from stickslip_ros.physics.theory.hopf import hopf_points
 
 computes = Computations()
 
-_CLEAR_OF_HOPF = 0.98
+_SETTLED_SHARE = 0.98
 """Share of the Hopf speed above which the motions of a diagram have not settled yet."""
 
 
@@ -87,7 +87,7 @@ def _(_: Evidence) -> Formula:
 @computes("fig-2-end")
 def _(evidence: Evidence) -> Number:
     figure = evidence.bifurcation(2)
-    end = _CLEAR_OF_HOPF * hopf_point().belt_speed
+    end = _SETTLED_SHARE * hopf_point().belt_speed
     rows = _rows(figure, lambda value, regime: regime is Regime.PURE_SLIP and value < end)
     amplitudes = [figure.diagram.measures[row].velocity_amplitude or 0.0 for row in rows]
     # By averaging r^2 = 4 (v_b1^2 - v0^2) near the Hopf point; higher orders bend the line.
@@ -113,7 +113,7 @@ def _(_: Evidence) -> Observation:
 
 
 computes["fig-2-quasi-periodic"] = lambda evidence: _periodicity(
-    evidence.bifurcation(2), _CLEAR_OF_HOPF * hopf_point().belt_speed
+    evidence.bifurcation(2), _SETTLED_SHARE * hopf_point().belt_speed
 )
 
 
@@ -130,13 +130,13 @@ def _(evidence: Evidence) -> Observation:
 @computes("fig-2-verifies")
 def _(evidence: Evidence) -> Observation:
     figure, speed = evidence.bifurcation(2), hopf_point().belt_speed
-    below = _rows(figure, lambda v, _: 0.0 < v < _CLEAR_OF_HOPF * speed)
-    above = _rows(figure, lambda v, _: v > speed / _CLEAR_OF_HOPF)
+    below = _rows(figure, lambda v, _: 0.0 < v < _SETTLED_SHARE * speed)
+    above = _rows(figure, lambda v, _: v > speed / _SETTLED_SHARE)
     measures = figure.diagram.measures
     agree = [measures[row].regime in VIBRATING for row in below]
     agree += [measures[row].regime is Regime.EQUILIBRIUM for row in above]
     return Observation(
-        all(agree), agreeing=sum(agree), total=len(agree), clear_of_hopf=_CLEAR_OF_HOPF, speed=speed
+        all(agree), agreeing=sum(agree), total=len(agree), settled_share=_SETTLED_SHARE, speed=speed
     )
 
 

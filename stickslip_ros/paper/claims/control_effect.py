@@ -313,7 +313,7 @@ def _(_: Evidence) -> Observation:
     )
 
 
-_STILL_ON_ITS_WAY = 0.02
+_SETTLING_TRACE = 0.02
 """Trace below which the motions of a bifurcation diagram have not settled yet."""
 
 
@@ -324,10 +324,10 @@ def _(evidence: Evidence) -> Observation:
         (measures.regime in VIBRATING) == (p > 0.0)
         for figure in figures
         for measures, drive in zip(figure.diagram.measures, figure.diagram.drives, strict=True)
-        if drive.belt_speed > 0.0 and abs(p := trace_of(drive)) > _STILL_ON_ITS_WAY
+        if drive.belt_speed > 0.0 and abs(p := trace_of(drive)) > _SETTLING_TRACE
     ]
     return Observation(
-        all(agree), agreeing=sum(agree), total=len(agree), still_on_its_way=_STILL_ON_ITS_WAY
+        all(agree), agreeing=sum(agree), total=len(agree), settling_trace=_SETTLING_TRACE
     )
 
 

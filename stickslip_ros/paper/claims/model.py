@@ -36,7 +36,7 @@ _SLIDE = Drive(
 )
 """A drive with no scale of one."""
 
-_FASTEST = 2.0
+_LARGEST_SPEED = 2.0
 """Largest relative speed at which the friction law is evaluated."""
 
 
@@ -47,7 +47,7 @@ def _kinetic(speed: float) -> float:
 def _smallest_kinetic() -> tuple[float, float]:
     """Return the smallest kinetic coefficient, and its relative speed."""
     # Without damping the trace is the friction's slope at the belt's speed.
-    speed = zero_between(lambda v: trace(v, 0.0), 1e-3, _FASTEST)
+    speed = zero_between(lambda v: trace(v, 0.0), 1e-3, _LARGEST_SPEED)
     return _kinetic(speed), speed
 
 
@@ -141,7 +141,7 @@ def _(_: Evidence) -> Observation:
 @computes("eq-3-range")
 def _(evidence: Evidence) -> Observation:
     smallest_at = _smallest_kinetic()[1]
-    end = zero_between(lambda v: _kinetic(v) - STRIBECK.static, smallest_at, _FASTEST)
+    end = zero_between(lambda v: _kinetic(v) - STRIBECK.static, smallest_at, _LARGEST_SPEED)
     # A slide that sticks reaches the belt's speed, and its speed spans twice the amplitude.
     fastest = 2.0 * (cycles(exact_onset() * (1.0 - 1e-6))[0].measures.velocity_amplitude or 0.0)
     highest = float(evidence.bifurcation(2).values.max())

@@ -77,17 +77,17 @@ def fit_stick(
     problem = _Problem(
         time * frequency, relative * frequency / belt_speed, sticks, reach * frequency
     )
-    start = np.zeros(len(_LOWEST))
+    start = np.zeros(len(_LOWER_BOUNDS))
     start[_SIZE] = max(stick_time * frequency, 0.05) if sticks else 0.02
     start[_STIFFNESS], start[_OFFSET] = 1.2, float(np.median(problem.relative))
-    best, free = problem.solve(start, _SMOOTH), _SMOOTH
+    best, free = problem.solve(start, _SMOOTH_PARAMETERS), _SMOOTH_PARAMETERS
     if sticks:
         start = best.copy()
         start[_JUMP] = 0.1
-        dropping = problem.solve(start, _ALL)
+        dropping = problem.solve(start, _ALL_PARAMETERS)
         gain = problem.squares(best) - problem.squares(dropping)
-        if gain > _JUMP_LEVEL * problem.squares(best) / max(len(time) - len(_ALL), 1):
-            best, free = dropping, _ALL
+        if gain > _JUMP_LEVEL * problem.squares(best) / max(len(time) - len(_ALL_PARAMETERS), 1):
+            best, free = dropping, _ALL_PARAMETERS
     length = belt_speed / frequency
     units = np.array([1.0 / frequency, 1.0 / frequency, *([1.0] * (len(free) - 2))])
     return StickFit(
@@ -101,10 +101,10 @@ def fit_stick(
 
 
 _CENTRE, _SIZE, _STIFFNESS, _SLOPE, _SECOND, _THIRD, _OFFSET, _JUMP = range(8)
-_SMOOTH = [_CENTRE, _SIZE, _STIFFNESS, _SLOPE, _SECOND, _THIRD, _OFFSET]
-_ALL = [*_SMOOTH, _JUMP]
-_LOWEST = np.array([-np.inf, 0.0, 0.0, -20.0, -20.0, -20.0, -np.inf, 0.0])
-_HIGHEST = np.array([np.inf, np.inf, 20.0, 20.0, 20.0, 20.0, np.inf, 2.0])
+_SMOOTH_PARAMETERS = [_CENTRE, _SIZE, _STIFFNESS, _SLOPE, _SECOND, _THIRD, _OFFSET]
+_ALL_PARAMETERS = [*_SMOOTH_PARAMETERS, _JUMP]
+_LOWER_BOUNDS = np.array([-np.inf, 0.0, 0.0, -20.0, -20.0, -20.0, -np.inf, 0.0])
+_UPPER_BOUNDS = np.array([np.inf, np.inf, 20.0, 20.0, 20.0, 20.0, np.inf, 2.0])
 
 
 class _Problem:
@@ -134,13 +134,13 @@ class _Problem:
             return np.concatenate([self.jacobian(whole(part), free), prior])
 
         self._weight = 0.0
-        inside = np.clip(start, _LOWEST + 1e-9, _HIGHEST - 1e-9)[free]
+        inside = np.clip(start, _LOWER_BOUNDS + 1e-9, _UPPER_BOUNDS - 1e-9)[free]
         for _ in range(2):
             found: Any = least_squares(
                 residual,
                 inside,
                 jac=jacobian,  # pyright: ignore[reportArgumentType]
-                bounds=(_LOWEST[free], _HIGHEST[free]),
+                bounds=(_LOWER_BOUNDS[free], _UPPER_BOUNDS[free]),
                 x_scale="jac",
                 ftol=1e-8,
                 xtol=1e-7,

@@ -7,7 +7,7 @@ from typing import Any
 
 from stickslip_ros.physics.model.constants import constant
 
-_FINEST = 2.0**53
+_MOST_STEPS = 2.0**53
 """Number of steps from which on floats are coarser than the steps."""
 
 
@@ -59,7 +59,7 @@ class Actuator:
                 force = copysign(limit, force)
             if resolution:
                 steps = force / resolution
-                if -_FINEST < steps < _FINEST:
+                if -_MOST_STEPS < steps < _MOST_STEPS:
                     force = round(steps) * resolution
                     if not -limit < force < limit:
                         force = copysign(limit, force)

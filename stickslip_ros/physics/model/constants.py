@@ -14,7 +14,7 @@ SMALLEST, LARGEST = 1e-30, 1e30
 """Magnitudes, in SI units, between which no product or power in the physics overflows."""
 
 _KEY = "constant"
-_UNTOLD = (LARGEST, 2**62)
+_OMITTED_LIMITS = (LARGEST, 2**62)
 """Limits that only a mistake exceeds: tables and messages omit them."""
 
 _BASE_UNITS: Mapping[str, tuple[int, int, int]] = {
@@ -104,7 +104,7 @@ class Parameter:
     @property
     def bounds(self) -> str:
         """Allowed values in words, without the limits that only a mistake exceeds; empty: any."""
-        return self._in_words(self._told).replace(f"at least {SMALLEST:g}", "above 0")
+        return self._in_words(self._stated).replace(f"at least {SMALLEST:g}", "above 0")
 
     @property
     def limits(self) -> str:
@@ -116,7 +116,7 @@ class Parameter:
         """Smallest and largest value, if the parameter has both and at least one is its own."""
         ends = tuple(self._limits.values())
         # nan is in no range.
-        return ends if self._told and len(ends) == 2 and not self.unset else None
+        return ends if self._stated and len(ends) == 2 and not self.unset else None
 
     def is_default(self, value: Any) -> bool:
         """Return whether a value is the default; nan is nan.
@@ -170,8 +170,10 @@ class Parameter:
         return {word: limit for word, limit in limits.items() if limit is not None}
 
     @property
-    def _told(self) -> dict[str, float]:
-        return {word: each for word, each in self._limits.items() if abs(each) not in _UNTOLD}
+    def _stated(self) -> dict[str, float]:
+        return {
+            word: each for word, each in self._limits.items() if abs(each) not in _OMITTED_LIMITS
+        }
 
     def _in_words(self, limits: Mapping[str, float]) -> str:
         if self.choices:

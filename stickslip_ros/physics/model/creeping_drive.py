@@ -25,10 +25,10 @@ square of this.
 _SLOWEST_CHANGE = 1e-2
 """Least speed, in the rate sensitivity, with which the spring is taken to be bent."""
 
-_LEAVE = 2.0
+_LEAVING_SPEED_RATIO = 2.0
 """Ratio of the speeds at which creep ends and begins."""
 
-_BEHIND = 1e-9
+_ENTRY_SPEED_CHANGE = 1e-9
 """Change of the speed, in that at which creep begins, of a slide that is too fast for it."""
 
 _PASSED_OVER = 1e-4
@@ -37,7 +37,7 @@ _PASSED_OVER = 1e-4
 _MOST_GROWTH = 8.0
 """Logarithm of the growth of the speed of creep in one step."""
 
-_ZERO = 2.0**-45
+_REVERSAL_SPEED = 2.0**-45
 """Speed, in that at which creep begins, behind zero at which creep changes its direction."""
 
 
@@ -120,8 +120,10 @@ class CreepingDrive(DriveSystem):
             Flow(
                 rates=rates(relative_speed),
                 guards=(
-                    Guard(parts.sign * relative_speed / limit + _ZERO, kind.reverse_creep),
-                    Guard(1.0 - viscous / (_LEAVE * limit), kind.speed_up),
+                    Guard(
+                        parts.sign * relative_speed / limit + _REVERSAL_SPEED, kind.reverse_creep
+                    ),
+                    Guard(1.0 - viscous / (_LEAVING_SPEED_RATIO * limit), kind.speed_up),
                     *self._guards_of_parts(relative_speed),
                 ),
                 marks=(UNSEEN * speed,),
@@ -136,7 +138,9 @@ class CreepingDrive(DriveSystem):
             return following
         # Behind the guard, which would otherwise end the mode again.
         speed, sign = instant.state[SPEED], mode.switches[0]
-        instant.state[SPEED] = speed - sign * max(4.0 * ulp(speed), _BEHIND * self._limit)
+        instant.state[SPEED] = speed - sign * max(
+            4.0 * ulp(speed), _ENTRY_SPEED_CHANGE * self._limit
+        )
         return mode
 
     def pass_belt(self, mode: Mode, instant: Instant) -> Mode:
@@ -155,7 +159,7 @@ class CreepingDrive(DriveSystem):
         relative_speed = instant.state[SPEED] - belt_speed
         reached = self.drive.friction.creep_limit(relative_speed, sign, self._memory(instant))
         if reached < self._least or relative_speed == 0.0:
-            instant.state[SPEED] = belt_speed + sign * self._least * (1.0 + _BEHIND)
+            instant.state[SPEED] = belt_speed + sign * self._least * (1.0 + _ENTRY_SPEED_CHANGE)
 
     def speed_up(self, mode: Mode, instant: Instant) -> Mode:
         """Slip where the slide has become fast."""
@@ -165,7 +169,7 @@ class CreepingDrive(DriveSystem):
         """Creep in the other direction, or slip if the law of that direction is less viscous."""
         following = self._toward(-mode.switches[0], mode, instant)
         _, viscous = self._compiled(following, instant)
-        creeps = viscous < _LEAVE * self._limit
+        creeps = viscous < _LEAVING_SPEED_RATIO * self._limit
         return following if creeps else Mode(SLIP, following.switches)
 
     def reach_belt(self, mode: Mode, instant: Instant) -> Mode:
@@ -222,7 +226,7 @@ class CreepingDrive(DriveSystem):
         state[SPEED] = self.belt_speed(mode, instant.time)
         following = self._toward(-self.held_force(mode, instant), mode, instant)
         relative_speed, viscous = self._compiled(following, instant)
-        if not viscous < _LEAVE * self._limit:
+        if not viscous < _LEAVING_SPEED_RATIO * self._limit:
             state[SPEED] = before
             return None
         state[SPEED] += relative_speed

@@ -23,7 +23,7 @@ _BLOCK = 1024
 _DEVIATIONS = 4.0
 """Standard deviations that noise hardly ever exceeds."""
 _WORD = 2**32
-_FINEST = 2.0**53
+_MOST_STEPS = 2.0**53
 """Number of steps from which on floats are coarser than the steps."""
 
 
@@ -156,7 +156,7 @@ class Sensor:
                 position += next(of_position.upcoming or of_position.start(number))
             if resolution:
                 steps = position / resolution
-                if -_FINEST < steps < _FINEST:
+                if -_MOST_STEPS < steps < _MOST_STEPS:
                     position = round(steps) * resolution
             if positions is not None:
                 positions.append(position)

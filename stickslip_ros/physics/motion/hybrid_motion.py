@@ -19,7 +19,7 @@ _MOST_STEPS = 1e18
 _STEPS_OF_A_PHASE = 10
 """Number of steps that the work around the integration of one phase is worth."""
 
-_DIVERGED = -1
+_DIVERGENCE = -1
 """Stands for a guard where the rates exceed any bound."""
 
 _NO_EVENT = hy.taylor_outcome.time_limit.value
@@ -161,12 +161,12 @@ class HybridMotion:
                     taylor.reset_cooldowns()  # the next integration is another phase
                     if outcome == _NOT_FINITE:
                         self._overflow(flow)
-                        guard = _DIVERGED
+                        guard = _DIVERGENCE
                     elif self._steps_left <= 0:
                         flow.take_marks()  # of a phase that is not reported
                         raise TooManyStepsError
                     elif outcome == _STEP_LIMIT:  # the rates leave a step no length
-                        guard, now = _DIVERGED, taylor.time
+                        guard, now = _DIVERGENCE, taylor.time
                     else:
                         guard, now = -outcome - 1, taylor.time
             if slaves:
@@ -188,7 +188,7 @@ class HybridMotion:
             if watched:
                 self._reach_guard()
             following = (
-                None if guard == _DIVERGED else self._transitions[guard](system, mode, instant)
+                None if guard == _DIVERGENCE else self._transitions[guard](system, mode, instant)
             )
             if has_parts and following is not None:
                 following = system.apply_pending_guards(following, instant)

@@ -22,7 +22,7 @@ from stickslip_ros.physics.motion.compiled_flow import (
 )
 from stickslip_ros.physics.motion.motion import RecordedMotion
 
-_GRAZING = 1e-12
+_GRAZING_RATE = 1e-12
 """Rate of a margin below which a motion grazes a guard: the instant has no derivative there."""
 
 _GREATEST_EFFORT = 8e6
@@ -128,7 +128,7 @@ class VariationalMotion(RecordedMotion):
         rate = float(own[:order] @ before + own[-1])
         reset = self._enslaving(following)
         found = reset @ found
-        if abs(rate) > _GRAZING:
+        if abs(rate) > _GRAZING_RATE:
             after, _ = self._rates(following)
             change: Any = np.outer((after - reset @ before) / rate, normal)
             found += change

@@ -18,7 +18,7 @@ from stickslip_ros.physics.model.drive_system import POSITION, SPEED
 
 _ROUNDING = 1e-14
 """Relative error of a multiplier."""
-_UNSEEN = 1e-9
+_UNSEEN_SHARE = 1e-9
 """Share of a turn, next to one that a difference does not see, in which gains are infinite."""
 
 
@@ -169,7 +169,7 @@ class GainBoundary:
         gains = self.gain(low)
         if self._spans:  # where a difference sees nothing, 1/G changes its sign through infinity
             turns = low * (self._spans / (2.0 * pi))
-            finite = (np.abs(turns - np.rint(turns)) > _UNSEEN) | (np.rint(turns) == 0.0)
+            finite = (np.abs(turns - np.rint(turns)) > _UNSEEN_SHARE) | (np.rint(turns) == 0.0)
             low, gains, rising = low[finite], gains[finite], rising[finite]
         # An undamped drive's own multipliers are on the circle, which is a gain of zero.
         unsure = np.abs(self.gain(low + _ROUNDING * self._period) - gains)

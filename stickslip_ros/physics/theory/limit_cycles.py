@@ -46,10 +46,10 @@ _ROUNDING = 1e-13
 _AGREEMENT = 1e-6
 """Relative tolerance for a turn of a run, or a measured period, to agree with the previous one."""
 
-_CORNER = 1e-6
+_CORNER_DISTANCE = 1e-6
 """Relative distance within which the cycle that sticks is searched for."""
 
-_RATIO = 1.1
+_DISTANCE_RATIO = 1.1
 """Ratio of one distance to the previous one."""
 
 
@@ -324,7 +324,10 @@ class _ReturnMap:
             if lands and not landed:
                 landed, outer = True, self._last_landing(outer)
             else:
-                further = [outer * _RATIO, *(corner for corner in corners if corner > outer)]
+                further = [
+                    outer * _DISTANCE_RATIO,
+                    *(corner for corner in corners if corner > outer),
+                ]
                 outer = min(further)
 
     def _last_landing(self, first: float) -> float:
@@ -336,7 +339,7 @@ class _ReturnMap:
         if self._lands(self._outermost):
             return self._outermost
         low, high = first, self._outermost
-        while high > _RATIO * low:
+        while high > _DISTANCE_RATIO * low:
             middle = sqrt(low * high)
             low, high = (middle, high) if self._lands(middle) else (low, middle)
         return low
@@ -358,7 +361,7 @@ class _ReturnMap:
         if found is None:
             return []
         distance = self._equilibrium - float(found[0][0])
-        return [distance * (1.0 - _CORNER), distance * (1.0 + _CORNER)]
+        return [distance * (1.0 - _CORNER_DISTANCE), distance * (1.0 + _CORNER_DISTANCE)]
 
     def _peak(self, inner: float, outer: float, growth: float) -> float | None:
         """Return a distance at which the growth has another sign than at both ends, if any.

@@ -25,10 +25,10 @@ from stickslip_ros.physics.theory.requirements import (
     require,
 )
 
-_AVERAGED = np.geomspace(1e-4, 1e4, 200)
+_AVERAGED_SPEEDS = np.geomspace(1e-4, 1e4, 200)
 """Dimensionless belt speeds between which averaging searches for an onset."""
 
-_FOLLOWED = np.geomspace(4.0, 0.02, 100)
+_FOLLOWED_SPEEDS = np.geomspace(4.0, 0.02, 100)
 """Belt speeds tried for the exact onset, relative to the averaged one or the drive's."""
 
 _ROUNDING = 1e-12
@@ -103,7 +103,7 @@ def sticking_onset(drive: Drive) -> StickingOnset:
     require("the onset of sticking", drive, SPRING, AUTONOMOUS, STATIC, SYMMETRIC)
     averaged = _averaged(drive)
     reference = averaged if isinstance(averaged, float) else abs(drive.belt_speed)
-    speeds = ((reference or drive.speed_scale) * _FOLLOWED).tolist()
+    speeds = ((reference or drive.speed_scale) * _FOLLOWED_SPEEDS).tolist()
     followed = _followed(drive, speeds)
     onset = followed if isinstance(followed, float) else None
     return StickingOnset(
@@ -118,8 +118,8 @@ def sticking_onset(drive: Drive) -> StickingOnset:
 
 def _averaged(drive: Drive) -> float | str:
     """Return the approximate onset (m/s), or the reason why there is none."""
-    growth = averaged_growth(drive, _AVERAGED, _AVERAGED)
-    low, high = _AVERAGED[[0, -1]] * drive.speed_scale
+    growth = averaged_growth(drive, _AVERAGED_SPEEDS, _AVERAGED_SPEEDS)
+    low, high = _AVERAGED_SPEEDS[[0, -1]] * drive.speed_scale
     if not np.any(growth):
         return (
             "by averaging vibrations up to the belt speed neither grow nor decay at any belt speed "
@@ -129,16 +129,17 @@ def _averaged(drive: Drive) -> float | str:
     if len(growing) == 0:
         return f"by averaging it sticks at no belt speed from {low:.3g} to {high:.3g} m/s"
     highest = int(growing[-1])
-    if highest == len(_AVERAGED) - 1:
+    if highest == len(_AVERAGED_SPEEDS) - 1:
         return f"by averaging it still sticks at {high:.3g} m/s, the highest belt speed tried"
     if growth[highest + 1] == 0.0:
-        last = _AVERAGED[highest] * drive.speed_scale
+        last = _AVERAGED_SPEEDS[highest] * drive.speed_scale
         return (
             f"by averaging it still sticks at {last:.3g} m/s, and at higher belt speeds vibrations "
             "up to the belt speed neither grow nor decay"
         )
     onset = zero_between(
-        lambda speed: float(averaged_growth(drive, speed, speed)), *_AVERAGED[highest : highest + 2]
+        lambda speed: float(averaged_growth(drive, speed, speed)),
+        *_AVERAGED_SPEEDS[highest : highest + 2],
     )
     return onset * drive.speed_scale
 

@@ -83,7 +83,7 @@ def test_a_loop_that_holds_within_a_step_is_held_in_the_motion_as_in_its_samples
     )
     meter = sensor_meter(scenario)
     assert meter is not None
-    assert simulate(scenario, 3.0, told=meter).regime is Regime.HELD
+    assert simulate(scenario, 3.0, measured=meter).regime is Regime.HELD
     assert meter.measures().regime is Regime.HELD
 
 

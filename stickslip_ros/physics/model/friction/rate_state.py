@@ -14,9 +14,9 @@ from stickslip_ros.physics.model.functions import exp, log, sqrt
 
 _LARGEST_RATIOS = {"kinetic": 200.0, "evolution_effect": 10.0}
 """Largest ratios of constants to the direct effect: its exponentials must not overflow."""
-_OLDEST = 10.0
+_LARGEST_LOG_AGE = 10.0
 """Logarithm of the age, in L/v_0, of a contact whose friction counts as the limit of the law."""
-_SLOWEST = 1e-20
+_SMALLEST_SPEED = 1e-20
 """Speed, in v_0, below which steady slip is not asked for."""
 
 
@@ -63,7 +63,7 @@ class RateState(FrictionLaw):
     @property
     def static(self) -> Any:  # pyright: ignore[reportIncompatibleVariableOverride]
         """Friction of an old contact that starts to slip at v_0."""
-        return self.kinetic + _OLDEST * self.evolution_effect
+        return self.kinetic + _LARGEST_LOG_AGE * self.evolution_effect
 
     @property
     def rate_sensitivity(self) -> Any:
@@ -72,7 +72,7 @@ class RateState(FrictionLaw):
 
     def coefficient(self, relative_speed: Any, sign: Any) -> Any:
         """Return mu(v_r) in steady slip, th = L/|v_r|; see `SteadyFriction.coefficient`."""
-        speed = np.maximum(relative_speed * sign / self.reference_speed, _SLOWEST)
+        speed = np.maximum(relative_speed * sign / self.reference_speed, _SMALLEST_SPEED)
         return self.friction(relative_speed, sign, (-log(speed),), ())
 
     def friction(
@@ -92,7 +92,7 @@ class RateState(FrictionLaw):
 
     def memory_at(self, relative_speed: float, sign: float) -> Sequence[float]:
         """Return ln(v_0/|v_r|); see `FrictionMemory.memory_at`."""
-        speed = max(abs(relative_speed) / self.reference_speed, _SLOWEST)
+        speed = max(abs(relative_speed) / self.reference_speed, _SMALLEST_SPEED)
         return (-float_log(speed),)
 
     def initial_memory(self, relative_speed: float) -> Sequence[float]:
