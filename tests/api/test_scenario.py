@@ -73,9 +73,6 @@ def test_refusals_are_one_sentence() -> None:
         ("autostart", True, "write plant.autostart or washout_controller.autostart or analyzer."),
         ("belt_speed", "fast", "belt_speed = 'fast' is refused: must be a finite number"),
         ("belt_speed", (1, 2), "must be a finite number"),
-        ("mass", -1.0, "mass = -1.0 is refused: must be a finite number above 0"),
-        ("window", 2.5, "window = 2.5 is refused: must be a whole number"),
-        ("friction_law", "lienar", "friction.law = 'lienar' is refused"),
     ]
     for keyword, value, meant in refused:
         with pytest.raises(InvalidInputError) as refusal:

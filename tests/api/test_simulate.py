@@ -91,22 +91,6 @@ def test_slow_samples_change_no_measure_but_by_rounding() -> None:
     assert not run.trajectory.control_force.any()
 
 
-def test_a_motion_is_integrated_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    made: list[object] = []
-    advanced: list[float] = []
-    advance = Motion.advance
-
-    def counted(motion: Motion, duration: float) -> None:
-        made.append(motion)
-        advanced.append(duration)
-        advance(motion, duration)
-
-    monkeypatch.setattr(Motion, "advance", counted)
-    ss.simulate("feed_drive", duration=0.5)
-    assert len(set(map(id, made))) == 1
-    assert sum(advanced) == pytest.approx(0.5)
-
-
 def test_a_run_away_ends_the_trajectory() -> None:
     run = ss.simulate(ss.scenario("paper", cubic_gain=10.0, initial_velocity=20.0), duration=10.0)
     assert run.measures.regime == "unbounded"

@@ -129,15 +129,9 @@ def test_refusals() -> None:
         ({"belt_speed": 0.1}, {}, "belt_speed = 0.1 is refused"),
         ({"belt_speed": "abc"}, {}, "belt_speed = 'abc' is refused"),
         ({"belt_speed": (0.1, 0.2, 2.5)}, {}, "must be (first, last, count)"),
-        ({"belt_speed": (0.1, 0.1, 3)}, {}, "two different finite numbers"),
-        ({"mass": (-1.0, 1.0, 3)}, {}, "mass = -1.0 is refused"),
         ({"window": (1, 3, 3)}, {}, "analyzer"),
-        ({"friction_law": (1, 3, 3)}, {}, "plant.friction.law: is no"),
-        ({"linear_gain": (-2, 0, 3)}, {}, "without control there is no controller"),
-        ({}, {}, "0 parameters: a sweep is over one or two"),
         ({"belt_speed": (0.1, 0.2, 3)}, {"carry": "left"}, "carry = 'left' is refused"),
         ({"belt_speed": (0.1, 0.2, 3)}, {"workers": 0}, "0 workers"),
-        ({"belt_speed": (0.1, 0.2, 3)}, {"cycles": 0}, "0 cycles to measure"),
         ({"autostart": (0, 1, 2)}, {}, "several nodes"),
     ]
     lists = [], [0.02], ["a", "b"], np.zeros((2, 2)), [0.02, float("nan")]
@@ -151,7 +145,6 @@ def test_refusals() -> None:
         ({"position": (0.0, 1.0)}, "position = (0.0, 1.0) is refused"),
         ({"velocity": 1.0}, "velocity = 1.0 is refused"),
         ({"velocity": 1.0, "sample": 3}, "velocity = 1.0 is refused"),
-        ({"sample": 0}, "0 points"),
         ({"sample": 3, "seed": -1}, "seed -1"),
     ]
     for options, meant in starts:
@@ -180,13 +173,6 @@ def test_progress_and_a_journal(tmp_path: Any) -> None:
     same = ss.sweep(FREE, belt_speed=(0.3, 0.5, 3), journal=journal, progress=again.append, **SHORT)
     assert again == [3]
     assert same.columns.turning_points == found.columns.turning_points
-
-
-@pytest.mark.process
-def test_workers_find_the_same() -> None:
-    one = ss.sweep(FREE, belt_speed=(0.3, 0.5, 4), **SHORT)
-    two = ss.sweep(FREE, belt_speed=(0.3, 0.5, 4), workers=2, **SHORT)
-    assert one.columns.turning_points == two.columns.turning_points
 
 
 def test_a_basin_of_a_grid() -> None:

@@ -35,13 +35,6 @@ def test_a_sweep_measures_the_forced_cycles(stickslip: Run) -> None:
     assert len(moving) < 40  # a rest is one turning point
 
 
-def test_a_basin_of_given_starts(stickslip: Run) -> None:
-    starts = ("--position", "-1e-3:1e-3:2", "--velocity", "-0.01:0.01:2")
-    basins = stickslip.json("basin", "axis", *starts)
-    (attractor,) = basins["attractors"]
-    assert (attractor["regime"], attractor["count"]) == ("stick_slip", 4)
-
-
 def test_a_drive_on_a_belt_goes_with_it(stickslip: Run) -> None:
     loose = ("simulate", "feed_drive", "-p", "plant.stiffness=0", "--duration", "2")
     for flags in ((), ("--continuous-control",), ("--no-control",)):

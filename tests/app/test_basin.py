@@ -50,19 +50,6 @@ def test_the_shares_are_those_of_the_table(stickslip: Run, tmp_path: Path, drive
     assert (tmp_path / "basin.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_a_sample_is_the_same_each_time_and_another_with_another_seed(
-    stickslip: Run, drive: str
-) -> None:
-    def starts(*arguments: str) -> list[list[float]]:
-        sample = ("--position", "-2:2", "--velocity", "0:2", "--sample", "6")
-        return stickslip.json("basin", drive, *sample, *arguments)["values"]
-
-    first = starts()
-    assert first == starts("--seed", "0")
-    assert first != starts("--seed", "1")
-    assert all(-2.0 <= position <= 2.0 and 0.0 <= speed <= 2.0 for position, speed in first)
-
-
 def test_without_ranges_the_starts_are_around_the_equilibrium(stickslip: Run) -> None:
     done = stickslip(
         "basin", "paper", "--no-control", "--sample", "5", "-p", "plant.belt_speed=0.6"

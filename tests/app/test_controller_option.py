@@ -4,8 +4,6 @@ from pathlib import Path
 
 import pytest
 
-from stickslip_ros.physics.model.control import CONTROL_LAWS
-from stickslip_ros.scenarios.files import load_scenario
 from tests.app.conftest import Run
 
 TWO = "/**/washout_controller: {ros__parameters: {linear_gain: -2.0}}\n" + (
@@ -42,19 +40,6 @@ def test_show_has_the_controller_in_use(stickslip: Run, two: str) -> None:
     assert (gain["value"], gain["source"], gain["unit"]) == (-0.5, "file", "N s/m")
     lines = [line.split() for line in stickslip("show", two, *VELOCITY).stdout.splitlines()]
     assert ["velocity_gain", "-0.5", "file"] in lines  # dimensionless
-
-
-def test_new_writes_the_section_of_the_law(stickslip: Run, tmp_path: Path) -> None:
-    assert stickslip("new", "mine.yaml", "--from", "paper", *VELOCITY).returncode == 0
-    mine = load_scenario(str(tmp_path / "mine.yaml"))
-    assert mine.as_dict() == load_scenario("paper", controller="velocity_feedback").as_dict()
-
-
-def test_list_has_every_control_law(stickslip: Run) -> None:
-    found = stickslip.json("list")["control_laws"]
-    assert [law["name"] for law in found] == list(CONTROL_LAWS)
-    assert found[0]["parameters"][0] == "washout_controller.corner_frequency"
-    assert found[1]["description"].startswith("Force proportional to velocity and displacement")
 
 
 @pytest.mark.process

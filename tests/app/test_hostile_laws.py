@@ -86,18 +86,14 @@ ANSWERS: dict[str, tuple[Callable[..., Any], str]] = {
     "inf": (lambda *_: (inf, ()), f"its force is inf, {NUMBER}"),
     "text": (lambda *_: ("3", ()), f"its force is '3', {NUMBER}"),
     "None": (lambda *_: (None, ()), f"its force is None, {NUMBER}"),
-    "a large int": (lambda *_: (10**400, ()), f"its force is 1{'0' * 79}..., {NUMBER}"),
     "a larger int": (lambda *_: (10**5000, ()), f"its force is an object of class int, {NUMBER}"),
     "an array": (lambda *_: (np.ones(2), ()), f"its force is array([1., 1.]), {NUMBER}"),
-    "an array of one": (lambda *_: (np.ones(1), ()), f"its force is array([1.]), {NUMBER}"),
-    "complex": (lambda *_: (1j, ()), f"its force is 1j, {NUMBER}"),
     "bool": (lambda *_: (True, ()), f"its force is True, {NUMBER}"),
     "unprintable": (
         lambda *_: (_Unprintable(), ()),
         f"its force is an object of class _Unprintable, {NUMBER}",
     ),
     "no pair": (lambda *_: None, "TypeError: cannot unpack non-iterable NoneType object"),
-    "three": (lambda *_: (0, (), 0), "ValueError: too many values to unpack (expected 2)"),
     "an error": (_raising(OSError("no\ndevice")), "OSError: no device"),
     "its own error": (
         _raising(_UnprintableError()),
@@ -105,12 +101,7 @@ ANSWERS: dict[str, tuple[Callable[..., Any], str]] = {
     ),
     "recursion": (_endless, "RecursionError: maximum recursion depth exceeded"),
     "exit": (lambda *_: sys.exit(3), "SystemExit: 3"),
-    "division": (
-        lambda _, state, elapsed, *__: (1.0 / elapsed, state),
-        "ZeroDivisionError: float division by zero",
-    ),
     "state None": (lambda *_: (0.0, None), f"its state is None, {STATE}"),
-    "state nan": (lambda *_: (0.0, (nan,)), f"its state is (nan,), {STATE}"),
     "a longer state": (lambda *_: (0.0, (1.0,)), f"its state is (1.0,), {STATE}"),
     "state of text": (lambda *_: (0.0, "a"), f"its state is 'a', {STATE}"),
 }
@@ -187,10 +178,6 @@ FORMS: dict[str, tuple[dict[str, Any], str]] = {
         {"linear_feedback": _raising(OSError("no table"))},
         "OSError: no table",
     ),
-    "linear_feedback is text": (
-        {"linear_feedback": lambda *_: "none"},
-        "AttributeError: 'str' object has no attribute 'state'",
-    ),
     "linear_feedback has a wrong shape": (
         {
             "linear_feedback": lambda *_: LinearFeedback(
@@ -205,10 +192,6 @@ FORMS: dict[str, tuple[dict[str, Any], str]] = {
         "its linear_feedback has the shapes [(2, 2), (2, 2), (2, 2), (2, 2)], which must be",
     ),
     "continuous raises": ({"continuous": property(_raising(OSError("no")))}, "OSError: no"),
-    "continuous is text": (
-        {"continuous": "text"},
-        "AttributeError: 'str' object has no attribute",
-    ),
     "continuous gives no number": (
         {"continuous": _Absolute(1.0, 1.0)},
         "TypeError: float() argument must be a string or a real number, not 'list'",

@@ -132,12 +132,6 @@ class Refused(Node):
         self.publisher.publish(message)
 
 
-class NotFinite(Refused):
-    """Answers each state with a force that is not finite."""
-
-    force, shift = float("inf"), 0
-
-
 def recorded(bag, controller, pace="lockstep"):
     overrides = ("plant.reply_timeout=0.1", f"plant.pace={pace}")
     with ClosedLoop("feed_drive", *overrides, controller=controller, bag=bag) as loop:
@@ -160,22 +154,6 @@ def test_of_forces_that_were_all_refused_none_acted(
     assert rows["peak control force sent"] == "128.6 N"
     assert rows["peak control force acting"] == rows["final control force acting"] == "0 N"
     assert ["dropped", "forces", f"{report['dropped_forces']}"] in map(str.split, text.splitlines())
-
-
-def test_of_forces_that_are_not_finite_none_acted(stickslip: Run, tmp_path: Path) -> None:
-    recorded(tmp_path / "bag", NotFinite)
-    report = stickslip.json("report", "bag")
-    assert (report["peak_force"], report["peak_applied_force"]) == (None, 0.0)
-
-
-def test_forces_that_all_acted_are_reported_once(stickslip: Run, tmp_path: Path) -> None:
-    recorded(tmp_path / "bag", "washout")
-    report = stickslip.json("report", "bag")
-    assert report["peak_applied_force"] == report["peak_force"] is not None
-    assert report["resting_applied_force"] == report["resting_force"]
-    assert report["dropped_forces"] == 0
-    rows = forces_in(stickslip("report", "bag").stdout)
-    assert [*rows] == ["peak control force", "final control force"]
 
 
 def test_a_figure_has_the_size_that_is_asked_for(stickslip: Run, tmp_path: Path) -> None:

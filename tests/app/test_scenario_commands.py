@@ -88,25 +88,6 @@ def test_new_writes_a_file_that_is_the_scenario(
     assert stickslip("simulate", "mine.yaml", "--duration", "1", "--json").returncode == 0
 
 
-def test_ros_reads_a_new_file(
-    stickslip: Run,
-    tmp_path: Path,
-    read_by_ros: Any,  # noqa: F811
-) -> None:
-    stickslip("new", "mine.yaml", "--from", "paper")
-    values = load_scenario("paper").as_dict()["plant"]
-    given = {
-        name: value for name, value in values.items() if name not in ("wait_for", "use_sim_time")
-    }
-    read = read_by_ros(str(tmp_path / "mine.yaml"))
-    assert {name for name in given if given[name] != given[name]} == {
-        name for name in read if read[name] != read[name]
-    }  # nan
-    numbers = {name: value for name, value in given.items() if value == value}
-    assert read.keys() == given.keys()
-    assert {name: read[name] for name in numbers} == numbers
-
-
 def test_new_keeps_lists_and_texts(stickslip: Run, tmp_path: Path) -> None:
     (tmp_path / "other.yaml").write_text(
         '/**/plant: {ros__parameters: {wait_for: [analyzer, "b"]}}\n'

@@ -4,16 +4,6 @@ import numpy as np
 import pytest
 
 import stickslip_ros as ss
-from tests.app.conftest import Run
-
-
-def test_off_they_change_no_bit(stickslip: Run) -> None:
-    """Also with a seed, which has no effect without noise."""
-    one = stickslip.json("simulate", "feed_drive", "--duration", "1")
-    other = stickslip.json("simulate", "feed_drive", "--duration", "1", "-p=plant.sensor.seed=5")
-    assert other["truth"] is None
-    for name in ("amplitude", "period", "stick_fraction", "velocity_amplitude"):
-        assert one[name] == other[name]
 
 
 def test_python_has_truth_and_what_is_told() -> None:

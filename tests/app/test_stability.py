@@ -51,14 +51,6 @@ def test_the_papers_drive(stickslip: Run) -> None:
     assert found["overrides"] == ["plant.belt_speed=0.49", "plant.damping=0.01"]
 
 
-def test_the_feed_drive_is_in_si_units(stickslip: Run) -> None:
-    found = stability(stickslip, "feed_drive")
-    assert found["equilibrium_position"] == pytest.approx(0.2584e-3)
-    assert found["open_loop"]["hopf_speeds"] == [pytest.approx(0.048876261, rel=1e-8)]
-    assert found["open_loop"]["hopf_angular_frequencies"] == [pytest.approx(100.0)]
-    assert found["closed_loop"]["critical_linear_gain"] == pytest.approx(-1478.46, rel=1e-5)
-
-
 @pytest.mark.parametrize(
     "overrides",
     [

@@ -81,16 +81,6 @@ def test_json_on_standard_output_and_in_a_file_are_the_same(stickslip: Run, tmp_
     assert len(found["regime"]) == len(found["turning_points"]) == 6
 
 
-def test_the_ends_of_every_sticking_range_are_reported(stickslip: Run, tmp_path: Path) -> None:
-    stiff = ("-p", "plant.stiffness=1000", "--over", "plant.belt_speed=0.1:0.6:3")
-    done = stickslip(*FREE, *stiff, "--out", "table.json")
-    assert "limit of sticking: 188.9 mm/s, 392.4 mm/s, 437.2 mm/s" in done.stdout
-    assert "Hopf point: 488.8 mm/s" in done.stdout
-    transitions = json.loads((tmp_path / "table.json").read_text())["transitions"]
-    assert transitions["limit_of_sticking"] == pytest.approx([0.18888, 0.39236, 0.43716], abs=1e-5)
-    assert transitions["hopf_point"] == pytest.approx([0.48876], abs=1e-5)
-
-
 def test_rounding_is_shown_as_zero(stickslip: Run) -> None:
     over = ("--over", "plant.belt_speed=0.002:0.06:3", "--transient", "400")
     done = stickslip("sweep", "feed_drive", *over)
@@ -173,13 +163,3 @@ def test_no_default_is_reported_for_a_varied_parameter(stickslip: Run, tmp_path:
     (line,) = stickslip("sweep", "mine.yaml", *over).stderr.splitlines()
     assert "plant.stiffness = 1.0 N/m" in line
     assert "belt_speed" not in line
-
-
-def test_control_is_sampled_unless_it_is_to_be_continuous(stickslip: Run) -> None:
-    # Three samples per second are too few for gains that suppress it in the continuous loop.
-    over = ("--over", "washout_controller.linear_gain=-8:-7:2", "--transient", "40")
-    given = ("-p", "washout_controller.cubic_gain=0", "-p", "plant.rate=3")
-    sampled = stickslip.json("sweep", "paper", *given, *over)
-    continuous = stickslip.json("sweep", "paper", *given, *over, "--continuous-control")
-    assert continuous["regime"] == ["equilibrium", "equilibrium"]
-    assert "equilibrium" not in sampled["regime"]

@@ -60,14 +60,6 @@ def test_what_is_lost_is_counted_by_the_stamps(tmp_path):
     assert (report["samples"], report["lost_samples"]) == (993, 7)
 
 
-def test_a_restarted_plant_is_measured_from_its_first_stamp(tmp_path):
-    stamps = [*STAMPS, *(stamp - 4 * SECOND for stamp in STAMPS)]
-    write_bag(tmp_path / "bag", [(STATES, stamp, state(stamp)) for stamp in stamps])
-    report = report_of_recording(tmp_path / "bag")
-    assert (report["samples"], report["lost_samples"]) == (2000, 0)
-    assert len(report["notes"]) == 1
-
-
 def test_what_a_bag_does_not_hold_is_not_measured_and_it_is_said(tmp_path):
     record(tmp_path / "forces", states=[])
     report = report_of_recording(tmp_path / "forces")

@@ -1,6 +1,5 @@
 """The controller node of any law, and references, on the real middleware."""
 
-import json
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
@@ -17,11 +16,10 @@ from stickslip_ros.messages.codec import pack_joint_state, pack_reference, unpac
 from stickslip_ros.messages.topics import CONTROL_FORCE, JOINT_STATES, REFERENCE
 from stickslip_ros.nodes.analyzer import AnalyzerNode
 from stickslip_ros.nodes.controller import ControllerNode
-from stickslip_ros.nodes.plant import PlantNode
 from stickslip_ros.physics.model.constants import constant
 from stickslip_ros.physics.model.control import CONTROL_LAWS, ControlLaw
 from stickslip_ros.physics.model.control.base import State
-from stickslip_ros.physics.model.signals import ramp, sine
+from stickslip_ros.physics.model.signals import ramp
 from stickslip_ros.samples import Reference, Sample
 from stickslip_ros.scenarios.parameters import (
     CONTROLLER_PARAMETERS,
@@ -183,41 +181,6 @@ def test_a_course_of_its_own_is_published_with_each_answer(
     expected = ramp(0.4, 1.0, 4.0)
     for number, data in enumerate(loop.references):
         assert data == pack_reference((1 + number) * SECOND, expected.reference(number))
-
-
-def test_the_analyzer_records_references_and_the_parameters_of_the_controller(
-    graph: Graph, servo: partial[ControllerNode], tmp_path: Path
-) -> None:
-    analyzer = graph.add(AnalyzerNode, bag=str(tmp_path / "bag"))
-    course = {"reference.kind": "sine", "reference.amplitude": 0.2, "reference.frequency": 2.0}
-    graph.add(servo, wait_for=["analyzer"], stiffness=7.0, **course)
-    plant = graph.add(PlantNode, wait_for=["analyzer", "servo_controller"], duration=2.0)
-    graph.wait_until(lambda: plant.diagnose()[2].get("finished"), "plant pauses")
-    graph.wait_until(
-        lambda: (
-            "servo_controller" in analyzer._parameter_calls
-            and all(call.pursue() for call in analyzer._parameter_calls.values())
-        ),
-        "parameters are known",
-    )
-    graph.deactivate("servo_controller")
-    graph.deactivate("analyzer")
-    with Recording(tmp_path / "bag") as recording:
-        states, forces, references = (
-            recording.joint_states,
-            recording.control_forces,
-            recording.references,
-        )
-        kept = recording.metadata("stickslip_ros/servo_controller")
-    assert json.loads(kept["stiffness"]) == 7.0
-    assert json.loads(kept["law"]) == "servo"
-    assert references.stamp.tolist() == states.stamp.tolist() == forces.stamp.tolist()
-    law, motion = Servo(stiffness=7.0), sine(0.2, frequency=2.0).reference
-    for n in (0, 1, 57, len(forces) - 1):
-        wanted = motion((int(states.stamp[n]) - SECOND) * 1e-9)
-        assert (references.position[n], references.velocity[n]) == wanted[:2]
-        sample = Sample(0, states.position[n], states.velocity[n], 0.0, 0.0, 0.0)
-        assert forces.force[n] == law.respond((), 0.0, sample, wanted)[0]
 
 
 def test_a_reference_of_any_clock_is_recorded_within_the_run(graph: Graph, tmp_path: Path) -> None:

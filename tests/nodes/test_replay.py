@@ -147,14 +147,3 @@ def test_a_controller_answers_a_recorded_state_with_the_recorded_forces(
     graph.add(ReplayNode, bag=str(tmp_path / "run"), **parameters)
     graph.wait_until(lambda: len(forces) == 301, "every state is answered")
     assert forces == payloads(tmp_path / "run")[FORCES]
-
-
-def test_as_fast_as_it_goes_the_analyzer_loses_nothing(graph: Graph, tmp_path: Path) -> None:
-    bag = record_states(tmp_path / "bag", 5_000)
-    graph.add(AnalyzerNode, bag=str(tmp_path / "again"))
-    node = graph.add(ReplayNode, bag=bag, rate=FAST, wait_for=["analyzer"])
-    graph.wait_until(lambda: node.diagnose()[2] and not node.active, "the bag is played")
-    graph.deactivate("analyzer")
-    again = payloads(tmp_path / "again")
-    for topic, messages in payloads(bag).items():
-        assert again[topic] == messages

@@ -8,7 +8,7 @@ import numpy as np
 
 from stickslip_ros.physics.model.actuator import Actuator
 from stickslip_ros.physics.model.constants import constant
-from stickslip_ros.physics.model.control import ControlLaw, LinearFeedback, Reference
+from stickslip_ros.physics.model.control import ControlLaw, Reference
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import FrictionLaw
 from stickslip_ros.samples import Sample
@@ -140,35 +140,6 @@ class TwoLags:
 
     def bound(self, speed: Any) -> Any:
         return np.full(np.shape(speed), np.inf)
-
-
-@dataclass(frozen=True)
-class TwoStates(ControlLaw):
-    """Two sampled states that see displacement and velocity: z' = A z + B (x, y), u = C z + D y."""
-
-    name: ClassVar[str] = "two_states"
-    gain: float = constant(-0.3, "Gain of the velocity.", "N s/m")
-    pull: float = constant(0.2, "Gain of the displacement in the first state.")
-
-    @property
-    def matrices(self) -> LinearFeedback:
-        return LinearFeedback(
-            np.array([[0.7, 0.1], [-0.2, 0.5]]),
-            np.array([[self.pull, 0.1], [0.0, -0.3]]),
-            np.array([0.4, -0.15]),
-            np.array([0.05, self.gain]),
-        )
-
-    def respond(
-        self, state: tuple[float, ...], elapsed: float, sample: Sample, reference: Reference
-    ) -> tuple[float, tuple[float, ...]]:
-        own, seen = self.matrices, np.array([sample.position, sample.velocity])
-        before = np.array(state)
-        after = own.state @ before + own.input @ seen
-        return float(own.output @ before + own.direct @ seen), tuple(after.tolist())
-
-    def linear_feedback(self, period: float) -> LinearFeedback:
-        return self.matrices
 
 
 @dataclass(frozen=True)

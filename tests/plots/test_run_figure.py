@@ -143,14 +143,6 @@ def test_axes_are_in_si_with_prefixes(reference: Drawn) -> None:
     assert "no new force: last one" not in legend_texts(reference.figure)
 
 
-def test_axes_of_the_unit_drive_are_dimensionless(limit_cycle: Drawn) -> None:
-    assert faults(limit_cycle.figure) == []
-    found = labels(limit_cycle.figure)
-    assert {"displacement $X$", "velocity $X'$", "force", "amplitude", "time"} <= found
-    assert not any("(" in label for label in found)
-    assert not any("switched on" in title for title in titles(limit_cycle.figure))
-
-
 def test_lines_have_every_extreme_of_the_bag(reference: Drawn) -> None:
     with Recording(REFERENCE) as recording:
         states, forces = recording.joint_states, recording.control_forces

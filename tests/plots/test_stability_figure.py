@@ -157,17 +157,6 @@ def test_a_design_without_a_limit_shows_contours_of_the_force() -> None:
     assert "needs a larger force" not in names
 
 
-def test_for_the_unit_drive_it_is_dimensionless() -> None:
-    loop = LinearSampledLoop.from_drive(PAPER, 100.0, 0.0)
-    assert loop is not None
-    found = StabilityMap.around(loop, Washout(2.0, -1.0, -1.0), points=11)
-    figure = stability_figure(found, None)
-    axes, bar = figure.axes
-    assert axes.get_xlabel() == "cutoff frequency $d$ (dimensionless)"
-    assert bar.get_ylabel() == "decay rate (dimensionless)"
-    assert figure.get_suptitle() == "belt speed 0.4, sample rate 100"
-
-
 def test_where_nothing_is_stable_there_is_a_figure_all_the_same() -> None:
     loop = LinearSampledLoop.from_drive(replace(FEED_DRIVE, belt_speed=0.02), 1000.0, 0.015)
     assert loop is not None

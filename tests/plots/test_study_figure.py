@@ -107,15 +107,6 @@ def test_where_up_and_down_differ_a_diagram_is_shaded() -> None:
         assert np.ptp(corners[:, 0]) == pytest.approx(0.7, abs=0.11)  # from 1.1 to 1.8 m/s
 
 
-def test_a_study_that_varies_the_scales_is_in_si() -> None:
-    overrides = (FREE, "plant.mass=1")
-    figure = diagram_figure(*swept("plant.stiffness=1e4:4e4:3", overrides=overrides))
-    section, amplitude, last = figure.axes
-    assert section.get_ylabel() == "turning points $x$ (µm)"
-    assert amplitude.get_ylabel() == "amplitude (µm)"
-    assert last.get_xlabel() == "stiffness $k$ (N/m)"
-
-
 def test_where_up_and_down_agree_nothing_is_shaded() -> None:
     figure = diagram_figure(*swept("plant.belt_speed=0.1:0.3:5", carry=Continuation.BOTH))
     assert SHADED not in legend_texts(figure)
@@ -136,13 +127,6 @@ def test_an_axis_may_be_logarithmic_below_zero() -> None:
     # What varies is not in the title.
     title = "Bifurcation diagram, paper plant.damping=0.03, no control"
     assert figure.get_suptitle() == title
-
-
-def test_under_sampled_control_there_is_a_limit_of_stability() -> None:
-    found = swept("washout_controller.linear_gain=-1.5:0.5:3", overrides=("plant.rate=20",))
-    assert any(
-        text.startswith("limit of stability -0.8") for text in legend_texts(diagram_figure(*found))
-    )
 
 
 @in_styles

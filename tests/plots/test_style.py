@@ -52,14 +52,6 @@ def test_the_suffix_gives_the_format_and_the_same_figure_the_same_file(
             assert path.read_bytes().startswith(b"%PDF")
 
 
-def test_few_colours_make_a_small_file(tmp_path: Path) -> None:
-    save(small_figure(), tmp_path / "full.png")
-    save(small_figure(), tmp_path / "small.png", colours=16)
-    assert 2 * (tmp_path / "small.png").stat().st_size < (tmp_path / "full.png").stat().st_size
-    with Image.open(tmp_path / "small.png") as image:
-        assert len(image.convert("RGB").getcolors() or []) <= 16
-
-
 def test_a_users_own_settings_neither_matter_nor_change(tmp_path: Path) -> None:
     save(small_figure(), tmp_path / "one.svg")
     with mpl.rc_context({"font.size": 30.0, "axes.facecolor": "red", "svg.fonttype": "path"}):

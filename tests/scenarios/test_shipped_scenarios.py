@@ -53,16 +53,6 @@ def test_the_defaults_are_those_of_the_paper() -> None:
             assert getattr(scenario, node) == NODE_PARAMETERS[node]
 
 
-def test_the_drive_and_the_controller_of_a_scenario() -> None:
-    scenario = load_scenario("feed_drive")
-    drive, washout = scenario.plant.as_drive(), scenario.washout_controller.control_law
-    assert (drive.mass, drive.damping, drive.stiffness) == (100.0, 200.0, 1e6)
-    assert (drive.normal_force, drive.belt_speed) == (1000.0, 0.04)
-    assert vars(drive.friction) == {"static": 0.4, "minimum": 0.25, "minimum_speed": 0.05}
-    assert (washout.corner_frequency, washout.linear_gain, washout.cubic_gain) == (20.0, -3e3, 0.0)
-    assert (washout.force_limit, washout.start_after) == (float("inf"), 5.0)
-
-
 def test_a_scenario_is_found_in_an_installation(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -6,7 +6,6 @@ from pathlib import Path
 import pytest
 
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.model.constants import Changes
 from stickslip_ros.physics.model.signals import (
     NO_SIGNAL,
     impulse,
@@ -123,15 +122,3 @@ def test_a_load_that_lifts_the_slide_is_refused() -> None:
         ("kind=sine", "amplitude=9", "duration=0.4"),
     ):
         load_scenario("paper", [f"plant.load.{value}" for value in values])
-
-
-def test_when_they_can_be_changed() -> None:
-    known = PlantParameters().known
-    for part in ("belt", "load", "disturbance"):
-        assert known[f"{part}.file"].changes is Changes.AT_START
-        assert known[f"{part}.amplitude"].changes is Changes.LIVE
-    assert known["belt.kind"].changes is known["load.kind"].changes is Changes.AT_REST
-    assert known["disturbance.kind"].changes is Changes.LIVE
-    for name in ("friction.file", "friction.reverse.file"):
-        assert known[name].changes is Changes.AT_START
-        assert known[name].file

@@ -226,13 +226,6 @@ def test_the_filter_is_carried_on(continuous: bool) -> None:
     assert rested.end.control != pytest.approx(once.end.control, abs=10 * exact)
 
 
-def test_a_free_motion_is_carried_on() -> None:
-    once, halves = _in_two_halves(ControlledDrive(PAPER))
-    assert halves.end.position == pytest.approx(once.end.position, abs=1e-9)
-    assert halves.end.velocity == pytest.approx(once.end.velocity, abs=1e-9)
-    assert halves.end.control is None
-
-
 def test_on_a_belt_at_rest_the_slide_sticks_where_friction_holds_it() -> None:
     settled = settle(ControlledDrive(replace(PAPER, belt_speed=0.0)), MotionState(0.3, 0.0))
     assert settled.measures.regime is Regime.STUCK
@@ -248,16 +241,6 @@ def test_a_motion_may_run_away_after_the_transient() -> None:
     settled = settle(ControlledDrive(drive), course=SettlingOptions(1.0, 10))
     assert settled.measures.regime is Regime.UNBOUNDED
     assert len(settled.turning_points) == 0
-
-
-def test_a_negative_belt_mirrors_the_motion() -> None:
-    one = settle(ControlledDrive(replace(PAPER, belt_speed=0.3)), MotionState(0.1, -0.2))
-    other = settle(ControlledDrive(replace(PAPER, belt_speed=-0.3)), MotionState(-0.1, 0.2))
-    assert one.measures.midpoint is not None
-    assert other.measures.midpoint == pytest.approx(-one.measures.midpoint, rel=1e-9)
-    assert other.measures.amplitude == pytest.approx(one.measures.amplitude, rel=1e-9)
-    assert other.measures.stick_fraction == pytest.approx(one.measures.stick_fraction, rel=1e-8)
-    assert other.end.position == pytest.approx(-one.end.position, abs=1e-8)
 
 
 def test_however_slow_the_belt_is_its_cycles_are_waited_for() -> None:

@@ -15,7 +15,7 @@ from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.studies.plan import Axis, Continuation, Grid
 from stickslip_ros.studies.runner import compute_columns
 from stickslip_ros.studies.settling import MotionState, SettlingOptions
-from stickslip_ros.studies.study import Point, Study, compute, pieces_of, sweep_study
+from stickslip_ros.studies.study import Point, Study, compute, sweep_study
 from tests.studies.studies import CYCLE_LOST_SPEED, EXPONENTIAL, HOPF_SPEED, SHORT, free, paper
 
 MINIMUM = Axis("plant.friction.minimum", 0.1, 0.6, 6)
@@ -62,16 +62,6 @@ def test_a_refused_diverging_or_too_stiff_point_is_a_row_with_the_reason() -> No
         assert point == Point(point.number, reason=point.reason)
 
 
-@pytest.mark.parametrize("study", MIXED, ids=["out of bounds", "runs away", "too stiff"])
-def test_every_point_is_what_it_is_alone(study: Study) -> None:
-    together = points(study)
-    assert [point.number for point in together] == list(range(study.plan.size))
-    for index in range(study.plan.size)[::-1]:
-        piece = compute(study, [index], None)
-        assert piece.points == [together[index]]
-        assert piece.end is None
-
-
 CHAINS = [
     (replace(MINIMUM, first=0.6, last=0.3, count=4), Continuation.UP, free(), 2),
     (MINIMUM, Continuation.DOWN, free(), 2),
@@ -99,20 +89,6 @@ def test_a_chain_restarts_after_a_failed_point(
     assert piece.end is not None
     only_failed = compute(study, chain[:failing], MotionState(1.0, 0.0))
     assert only_failed.end is None
-
-
-def test_a_chain_in_pieces_is_the_chain_at_once() -> None:
-    study = Study(free(), Grid((Axis("plant.belt_speed", 0.3, 0.6, 12),), Continuation.DOWN), SHORT)
-    (chain,) = study.plan.chains()
-    at_once = compute(study, chain, None)
-    for size in (1, 5, 11):
-        start, found = None, []
-        for piece in pieces_of(chain, size):
-            result = compute(study, piece, start)
-            start = result.end
-            found += result.points
-        assert found == at_once.points
-        assert start == at_once.end
 
 
 def test_the_filter_is_carried_on_and_the_control_does_not_restart() -> None:

@@ -11,7 +11,7 @@ from stickslip_ros.physics.model.friction import Linear
 from stickslip_ros.physics.theory.critical_gains import critical_gains
 from stickslip_ros.studies.plan import Axis
 from stickslip_ros.studies.runner import compute_columns
-from stickslip_ros.studies.settling import SettlingOptions, bifurcation_diagram
+from stickslip_ros.studies.settling import bifurcation_diagram
 from stickslip_ros.studies.study import sweep_study
 from tests.physics.drives import FEED_DRIVE, LIMIT_CYCLES, PAPER
 from tests.studies.studies import free, paper
@@ -20,16 +20,6 @@ SPEED = Axis("plant.belt_speed", 0.2, 0.4, 3)
 DAMPING = Axis("plant.damping", 0.01, 0.03, 3)
 STATIC = Axis("plant.friction.static", 0.4, 0.5, 2)
 GAIN = Axis("washout_controller.linear_gain", -2.0, 0.0, 6)
-
-
-def test_a_map_has_the_reference_cycles_where_its_axes_have_their_drives() -> None:
-    found = compute_columns(sweep_study(free(), [DAMPING, SPEED], course=SettlingOptions(300.0, 6)))
-    rows = slice(3, 6)
-    assert found.values["plant.damping"][rows] == pytest.approx(0.02)
-    for name in ("amplitude", "stick_fraction", "period", "midpoint"):
-        expected = [getattr(cycle, name) for cycle in LIMIT_CYCLES[:3]]
-        assert getattr(found, name)[rows] == pytest.approx(expected, abs=1e-8), name
-    assert found.values["plant.belt_speed"][rows].tolist() == pytest.approx([0.2, 0.3, 0.4])
 
 
 def test_over_the_gain_the_vibration_ends_where_theory_has_it() -> None:

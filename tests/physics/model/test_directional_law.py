@@ -23,9 +23,8 @@ from stickslip_ros.physics.model.friction import (
     Stribeck,
     Table,
 )
-from stickslip_ros.physics.model.plain_drive import PlainDriveSystem, drive_system
+from stickslip_ros.physics.model.plain_drive import drive_system
 from stickslip_ros.physics.motion import Motion
-from stickslip_ros.physics.theory.hopf import hopf_points
 from stickslip_ros.physics.theory.linear import expand
 from tests.physics.drives import PAPER
 from tests.physics.parts import Iwan
@@ -55,19 +54,6 @@ def test_each_direction_has_its_law(
 
 
 @pairs
-def test_an_array_of_speeds_gives_what_each_speed_gives(
-    forward: FrictionLaw, reverse: FrictionLaw
-) -> None:
-    law = Directional(forward, reverse)
-    speeds = np.array([-1.5, -0.3, -0.05, 0.05, 0.3, 1.5])
-    signs = np.sign(speeds)
-    one_by_one = [
-        float(law.coefficient(float(v), float(s))) for v, s in zip(speeds, signs, strict=True)
-    ]
-    np.testing.assert_allclose(law.coefficient(speeds, signs), one_by_one, rtol=1e-14)
-
-
-@pairs
 def test_the_compiled_friction_is_that_of_the_direction(
     forward: FrictionLaw, reverse: FrictionLaw
 ) -> None:
@@ -80,13 +66,6 @@ def test_the_compiled_friction_is_that_of_the_direction(
             inputs = [each, direction, *law.switches_at(each, direction, ())]
             found = float(compiled(np.array(inputs))[0])
             assert found == pytest.approx(law.coefficient(each, direction), rel=1e-14)
-
-
-@pairs
-def test_the_limits_are_those_of_the_directions(forward: FrictionLaw, reverse: FrictionLaw) -> None:
-    law = Directional(forward, reverse)
-    assert law.limits == (forward.static, reverse.static)
-    assert law.static == max(law.limits)
 
 
 @pairs
@@ -130,13 +109,6 @@ def test_laws_of_one_structure_share_their_flows() -> None:
     assert structure(tables[0]) == structure(tables[1])
     assert structure(Exponential(exponent=2.0)) != structure(Exponential())
     assert structure(Exponential(exponent=1.5)) == structure(Exponential(exponent=1.75))
-
-
-def test_a_law_without_switches_stays_plain() -> None:
-    assert isinstance(
-        drive_system(replace(PAPER, friction=Directional(Coulomb(0.4), Coulomb(0.3)))),
-        PlainDriveSystem,
-    )
 
 
 @pytest.mark.parametrize("law", [LAWS[name]() for name in ("stribeck", "lugre", "maxwell_slip")])
@@ -202,18 +174,3 @@ def test_a_law_with_a_memory_keeps_it_through_a_change_of_direction(
             found.append(motion.friction_force)
     assert min(found) == pytest.approx(-0.4, abs=2e-3)
     assert max(found) == pytest.approx(0.3, abs=2e-3)
-
-
-def test_hopf_points_are_those_of_the_direction_of_the_belt() -> None:
-    forward, reverse = Exponential(0.5, 0.2, 0.1, 0.0), Exponential(0.4, 0.3, 0.3, 0.01)
-    drive = replace(PAPER, friction=Directional(forward, reverse))
-    (ahead,) = hopf_points(drive)
-    (expected,) = hopf_points(replace(drive, friction=reverse))
-    assert ahead.belt_speed == pytest.approx(expected.belt_speed, rel=1e-12)
-    (back,) = hopf_points(replace(drive, belt_speed=-0.2))
-    (mirrored,) = hopf_points(replace(drive, friction=forward))
-    assert back.belt_speed == pytest.approx(-mirrored.belt_speed, rel=1e-12)
-    assert back.crossing_speed == pytest.approx(-mirrored.crossing_speed, rel=1e-10)
-    assert back.first_lyapunov_coefficient == pytest.approx(
-        mirrored.first_lyapunov_coefficient, rel=1e-10
-    )

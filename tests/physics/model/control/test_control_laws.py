@@ -20,10 +20,9 @@ from stickslip_ros.physics.model.control import (
     VelocityFeedback,
     Washout,
 )
-from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.motion import Motion, RecordedMotion
 from stickslip_ros.samples import Sample
-from tests.physics.drives import FEED_DRIVE, PAPER
+from tests.physics.drives import FEED_DRIVE
 
 Law = Washout | VelocityFeedback
 LAWS: list[Law] = [Washout(20.0, -3000.0, -1e4), VelocityFeedback(-500.0, 2e4)]
@@ -180,32 +179,3 @@ def test_the_force_of_velocity_feedback_is_that_of_a_damper_and_a_spring(
     assert force == position_gain * position + velocity_gain * velocity
     assert state == law.initial_state(sample, NO_REFERENCE) == ()
     assert Controller(law).answer(sample) == force
-
-
-@pytest.mark.parametrize("drive", [PAPER, FEED_DRIVE], ids=["paper", "feed_drive"])
-@pytest.mark.parametrize(("damping", "stiffness"), [(0.3, 0.0), (-0.01, 0.0), (0.1, 0.5)])
-def test_velocity_feedback_without_sampling_is_a_drive_with_other_damping_and_stiffness(
-    drive: Drive, damping: float, stiffness: float
-) -> None:
-    """Through stick and slip; shares of the critical damping and of the stiffness."""
-    damper = damping * (drive.stiffness * drive.mass) ** 0.5
-    spring = stiffness * drive.stiffness
-    control = VelocityFeedback(-damper, -spring)
-    controlled = Motion(drive, 0.0, drive.belt_speed, control)
-    other = Motion(
-        replace(drive, damping=drive.damping + damper, stiffness=drive.stiffness + spring),
-        0.0,
-        drive.belt_speed,
-    )
-    modes: set[bool] = set()
-    for _ in range(40):
-        for motion in (controlled, other):
-            motion.advance(0.5 / drive.angular_frequency)
-        modes.add(other.sticking)
-        assert controlled.sticking == other.sticking
-        found = controlled.position / drive.length_scale, controlled.velocity / drive.speed_scale
-        wanted = other.position / drive.length_scale, other.velocity / drive.speed_scale
-        assert found == pytest.approx(wanted, abs=1e-12)
-        force = -damper * controlled.velocity - spring * controlled.position
-        assert controlled.applied_force == pytest.approx(force, abs=1e-12 * drive.normal_force)
-    assert modes == {True, False}
