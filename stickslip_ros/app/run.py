@@ -89,7 +89,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Run the command; return the exit status."""
     from stickslip_ros.bags.recorder import check_new_bag
-    from stickslip_ros.plots.measure_table import why_no_cycle
+    from stickslip_ros.plots.measure_table import report_sentences
     from stickslip_ros.plots.units import Units
 
     overrides: list[str] = []
@@ -132,9 +132,8 @@ def run(arguments: argparse.Namespace) -> int:
     else:
         report, drive = results["report"], scenario.plant.as_drive()
         print_values(scenario.name, {"": {**report, **results}}, {"": Units.for_drive(drive)})
-        reason = why_no_cycle(report["regime"], report["duration"], drive)
-        if reason is not None:
-            print(reason)
+        for sentence in report_sentences(report, drive):
+            print(sentence)
     if not results["report"]["complete"]:
         raise RunError(f"the bag {bag} could not be written to its end")
     if interrupted:

@@ -17,6 +17,7 @@ from stickslip_ros.messages.topics import CONTROL_FORCE, JOINT_STATES
 from stickslip_ros.physics.measures.run_meter import RunAnalysis, RunMeter, RunObserver
 from stickslip_ros.physics.measures.sample_meter import SampleAssumptions, reading_of
 from stickslip_ros.physics.measures.slips import SlipMeter, SlipThreshold
+from stickslip_ros.physics.measures.timing import Timing
 from stickslip_ros.samples import ForceColumns, SampleColumns
 from stickslip_ros.stamps import NANOSECONDS
 from stickslip_ros.text import quantity
@@ -81,7 +82,7 @@ def report_of_recording(
     dict
         Measures (SI units) and counts by name. `complete` is True if `missing`, sentences on what
         the bag lacks, is empty. `notes` are sentences on what a table lacks, and on what makes the
-        measures doubtful.
+        measures doubtful. Late forces and missed deadlines are those of the whole run.
 
     Raises
     ------
@@ -112,6 +113,7 @@ def report_of_recording(
             observer=observer,
             reading=reading_at_recording(recording, stick_speed),
         )
+        meter.timing = _timing_of_recording(recording)
         run = _RunReader(meter, start, end, observer, take, slips)
         # Measuring each chunk by itself would take twice as long.
         for block in recording.blocks(least=20_000):
@@ -262,6 +264,15 @@ def reading_at_recording(
         with suppress(RecursionError, ValueError):
             known[name] = json.loads(text)
     return reading_of(known)
+
+
+def _timing_of_recording(recording: Recording | TableRecording) -> Timing | None:
+    kept = recording.metadata("stickslip_ros/timing") or {}
+    try:
+        timing = Timing(*(int(kept[name]) for name in Timing._fields))
+    except (KeyError, ValueError):
+        return None
+    return timing if min(timing) >= 0 and max(timing) == timing.samples else None
 
 
 def _window_at_recording(recording: Recording | TableRecording) -> int:

@@ -9,10 +9,12 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from functools import partial
 from itertools import islice
+from math import inf
 from operator import attrgetter
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
+from diagnostic_msgs.msg import DiagnosticArray
 from std_msgs.msg import Float64
 
 from stickslip_ros.bags.recorder import Recorder, check_new_bag
@@ -28,6 +30,7 @@ from stickslip_ros.messages.topics import (
     AMPLITUDE,
     CONTROL_FORCE,
     DEEP,
+    DIAGNOSTICS,
     DROPPED_FORCE,
     FREQUENCY,
     JOINT_STATES,
@@ -38,16 +41,30 @@ from stickslip_ros.messages.topics import (
     STICK_FRACTION,
     Topic,
 )
-from stickslip_ros.nodes.base.clients import ServiceCall, parameters_call
-from stickslip_ros.nodes.base.managed import ERROR, OK, Diagnosis, ManagedNode, diagnosis
+from stickslip_ros.nodes.base.clients import (
+    ANSWER_TIME,
+    NEXT_TRANSITION,
+    ServiceCall,
+    parameters_call,
+)
+from stickslip_ros.nodes.base.managed import (
+    ERROR,
+    FIRST_STAMP,
+    OK,
+    STATE,
+    Diagnosis,
+    ManagedNode,
+    diagnosis,
+)
 from stickslip_ros.nodes.base.process import run_node
 from stickslip_ros.nodes.base.ros_topics import qos_profile, waiting_messages
 from stickslip_ros.physics.measures.cycle_measures import trend_text
 from stickslip_ros.physics.measures.run_meter import RunMeter
+from stickslip_ros.physics.measures.timing import Timing
 from stickslip_ros.scenarios.curve_file import CURVES, Pairs, read_pairs
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, AnalyzerParameters
 from stickslip_ros.stamps import END_OF_TIME, NANOSECONDS
-from stickslip_ros.text import quantity
+from stickslip_ros.text import number_in, quantity
 from stickslip_ros.versions import versions
 
 ColumnsT = TypeVar("ColumnsT")
@@ -81,6 +98,7 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         if self.parameters.bag:
             check_new_bag(self._next_bag())
         self._limit_cycle = [self.advertise(t) for t in (AMPLITUDE, STICK_FRACTION, FREQUENCY)]
+        self.subscribe(DIAGNOSTICS, self._note_timing)
         self._channels: dict[str, int] = {}
         # Messages are taken in batches: single ones would each wake a thread and find cold caches.
         self._batch_period = min(0.02, self.parameters.flush_period / 2.0)
@@ -88,7 +106,9 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
     def start(self) -> None:
         """Open a bag, start to measure, and subscribe last, so that no message is lost."""
         self._meter = RunMeter(self.parameters.window, reading=self.parameters.reading_of({}))
-        self._cycles = self._newest_recorded = 0
+        self._cycles = self._newest = self._newest_recorded = 0
+        self._heard_at = inf
+        self._timings: dict[str, Timing] = {}
         self._logged = ""
         self._bag_failure = ""
         self._recorder: Recorder | None = None
@@ -128,6 +148,8 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
             self.release(end)
         for call in self._parameter_calls.values():
             call.close()
+        if self._meter.timing is not None:
+            self._keep("stickslip_ros/timing", self._meter.timing._asdict())
         self._keep("stickslip_ros/report", report)
         self._record(Recorder.close)
         self._recorder = None
@@ -177,9 +199,11 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
                 self._record(lambda recorder, topic=topic: self._add_topic(recorder, topic))
         # Without this topic drops are unknown.
         self._meter.dropped_known = DROPPED_FORCE.name in self._published
-        states = taken[JOINT_STATES]
-        if states and states[-1].stamp != self._newest_recorded:
-            self._newest_recorded = states[-1].stamp
+        if taken[JOINT_STATES]:
+            self._newest = taken[JOINT_STATES][-1].stamp
+            self._heard_at = min(self._heard_at, time.monotonic())
+        if self._newest != self._newest_recorded and self._parameters_known():
+            self._newest_recorded = self._newest
             self._recorded.publish(pack_header(self._newest_recorded))
         taken[REFERENCE] = [self._within_the_run(message) for message in taken[REFERENCE]]
         self._write(heapq.merge(*taken.values(), key=attrgetter("stamp")))
@@ -212,7 +236,7 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
 
         A stamp that is not of the run is replaced by that of the newest sample.
         """
-        newest = max(self._newest_recorded, 1)
+        newest = max(self._newest, 1)
         in_run = message.stamp > 0 and abs(message.stamp - newest) <= _REFERENCE_AGE
         return message if in_run else message._replace(stamp=newest)
 
@@ -221,6 +245,15 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         names = list(NODE_PARAMETERS[node].known)
         self._parameter_calls[node] = parameters_call(
             self, node, names, partial(self._keep_parameters, node)
+        )
+
+    def _parameters_known(self) -> bool:
+        """Return whether all nodes have told their parameters, or it is no longer waited for.
+
+        Until then no sample counts as recorded: a short run would be over without them.
+        """
+        return time.monotonic() - self._heard_at > ANSWER_TIME or all(
+            call.pursue() or not call.exists for call in self._parameter_calls.values()
         )
 
     def _look_for_controllers(self) -> None:
@@ -234,6 +267,24 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
             here = publisher.node_namespace == own and node in NODE_PARAMETERS
             if here and node not in self._parameter_calls:
                 self._ask_for_parameters(node)
+
+    def _note_timing(self, health: DiagnosticArray) -> None:
+        """Take the plant's counts of late forces and missed deadlines, and add up its activations.
+
+        What a paused plant repeats is left out: it may be from before this recording.
+        """
+        plant, before = f"{self.get_namespace().rstrip('/')}/plant", self._meter.timing
+        for status in health.status:
+            values = {entry.key: entry.value for entry in status.values}
+            paused = values.get(STATE) in NEXT_TRANSITION
+            if status.name == plant and FIRST_STAMP in values and not paused:
+                counts = (int(number_in(values.get(name, ""))) for name in Timing._fields)
+                self._timings[values[FIRST_STAMP]] = Timing(*counts)
+                self._meter.timing = Timing(*map(sum, zip(*self._timings.values(), strict=True)))
+        if self._meter.timing is not None and (
+            before is None or self._meter.timing[1:] != before[1:]
+        ):
+            self._keep("stickslip_ros/timing", self._meter.timing._asdict())
 
     def _measure(self) -> None:
         states = self._columns(JOINT_STATES, joint_state_columns)

@@ -13,6 +13,7 @@ from stickslip_ros.errors import StickslipError
 from stickslip_ros.messages.topics import RECORDED
 from stickslip_ros.nodes.base.managed import ManagedNode
 from stickslip_ros.physics.loop.sampled_loop import SampledLoop
+from stickslip_ros.physics.measures.timing import Timing
 from stickslip_ros.samples import Sample
 from stickslip_ros.scenarios.parameters import PlantParameters
 
@@ -338,20 +339,6 @@ class TimingMonitor:
             )
         before = self._counts[0]
         self._counts.append(counts)
-        number, late, missed = (now - then for now, then in zip(counts, before, strict=True))
-        if number < 100:  # too few for a meaningful share
-            return ""
-        found = [
-            f"{100.0 * count / number:.2g} % of the latest {what}"
-            for count, what in (
-                (late, "forces came late (the last one was held)"),
-                (missed, "samples missed their deadlines"),
-            )
-            if count > 0.01 * number
-        ]
-        if not found:
-            return ""
-        return (
-            f"{' and '.join(found)}: lower rate or real_time_factor, close other busy programs, "
-            "or set pace to lockstep"
-        )
+        latest = Timing(*(now - then for now, then in zip(counts, before, strict=True)))
+        few = latest.samples < 100  # too few for a meaningful share
+        return "" if few else latest.complaint("latest ")

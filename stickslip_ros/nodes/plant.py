@@ -26,6 +26,7 @@ from stickslip_ros.nodes.base.managed import (
     ERROR,
     FAILURE,
     FINISHED,
+    FIRST_STAMP,
     NEWEST_STAMP,
     OK,
     Diagnosis,
@@ -151,6 +152,7 @@ class PlantNode(ManagedNode[PlantParameters]):
         loop, pacer = self._loop, self._pacer
         values = {
             "samples": loop.sample_number + 1,
+            FIRST_STAMP: loop.stamp(0),
             NEWEST_STAMP: loop.sample.stamp,
             FINISHED: pacer.finished,
             "late_forces": loop.late_forces,

@@ -100,12 +100,17 @@ def report_tables(
     for path, report in reports.items():
         if report["slips"] is not None:
             yield slip_table(report["slips"], units[path])
-        sentences = [*report["missing"], *report["notes"]]
-        if report["samples"] > 0:
-            reason = why_no_cycle(report["regime"], report["duration"], drives[path])
-            sentences += [] if reason is None else [reason]
-        for sentence in sentences:
+        for sentence in report_sentences(report, drives[path]):
             yield f"{path}: {sentence}" if len(reports) > 1 else sentence
+
+
+def report_sentences(report: Mapping[str, Any], drive: Drive | None) -> list[str]:
+    """Return what a recording lacks, what makes its measures doubtful, and why it has no regime."""
+    sentences = [*report["missing"], *report["notes"]]
+    if report["samples"] > 0:
+        reason = why_no_cycle(report["regime"], report["duration"], drive)
+        sentences += [] if reason is None else [reason]
+    return sentences
 
 
 def measure_table(
@@ -126,7 +131,10 @@ def measure_table(
 
 
 def _tell_apart(rows: dict[str, list[str]], columns: Mapping[str, Mapping[str, Any]]) -> None:
-    """Omit the force that acted if it is unknown or equals the sent one, and drops without any."""
+    """Omit the force that acted if it is unknown or equals the sent one, and drops without any.
+
+    Omit late forces and missed deadlines, too, where no column knows them.
+    """
     for sent, (applied, label) in _SENT.items():
         known = [values.get(applied) is not None for values in columns.values()]
         cells = zip(known, rows.get(sent, [])[1:], rows.get(applied, [])[1:], strict=False)
@@ -136,6 +144,9 @@ def _tell_apart(rows: dict[str, list[str]], columns: Mapping[str, Mapping[str, A
             rows.pop(applied, None)
     if not any(values.get("dropped_forces") for values in columns.values()):
         rows.pop("dropped_forces", None)
+    for name in ("late_forces", "missed_deadlines"):
+        if all(values.get(name) is None for values in columns.values()):
+            rows.pop(name, None)
 
 
 def _row(
@@ -153,11 +164,12 @@ def _row(
 
 
 def _shown(name: str, values: Mapping[str, Any], units: Units) -> Any:
-    """Return the value to print; for a regime also whether it is steady."""
+    """Return the value to print; for a regime also whether it is steady, and doubtful."""
     value = values.get(name)
     if name == "regime":
         trend = trend_text(values, units.text)
-        return f"{Regime.label(value)}{trend and f', not steady: {trend}'}"
+        doubt = ", doubtful: late forces" if values.get("in_time") is False else ""
+        return f"{Regime.label(value)}{trend and f', not steady: {trend}'}{doubt}"
     if name == "velocity_amplitude" and value is not None:
         amplitude, midpoint = values.get("amplitude") or 0.0, values.get("midpoint") or 0.0
         return 0.0 if amplitude <= NOISE * abs(midpoint) else value  # what is left is rounding

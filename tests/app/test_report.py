@@ -44,6 +44,21 @@ def test_runs_are_set_side_by_side(stickslip: Run, tmp_path: Path) -> None:
     assert shown.count("first") >= 2  # above its column, and in the legend
 
 
+def test_a_regime_of_late_forces_is_doubtful(stickslip: Run, tmp_path: Path) -> None:
+    counts = {"samples": "1000", "late_forces": "617", "missed_deadlines": "0"}
+    record(tmp_path / "late", tables={"stickslip_ros/timing": counts})
+    record(tmp_path / "old")
+    late, old = (stickslip("report", bag, "--plot", "run.svg").stdout for bag in ("late", "old"))
+    rows = dict(line.split("  ", 1) for line in late.splitlines() if "  " in line)
+    assert rows["regime"].strip().startswith("pure slip, not steady: drifting")
+    assert rows["regime"].endswith(", doubtful: late forces")
+    assert (rows["late forces"].strip(), rows["missed deadlines"].strip()) == ("617", "0")
+    assert late.splitlines()[-1].startswith("the regime is doubtful: 62 % of the forces came late")
+    assert "doubtful" not in old
+    assert "late" not in old
+    assert "missed deadlines" not in old
+
+
 def test_a_picture_changes_nothing_of_the_report(stickslip: Run, tmp_path: Path) -> None:
     plain = stickslip.json("report", REFERENCE)
     assert (plain["steady"], plain["trend"]) == (False, "decaying")

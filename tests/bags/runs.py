@@ -2,6 +2,7 @@
 
 import resource
 from contextlib import contextmanager
+from types import MappingProxyType
 
 import numpy as np
 from mcap.writer import Writer
@@ -34,10 +35,10 @@ STAMPS = [5 * SECOND + n * SECOND // 100 for n in range(1000)]
 _TYPES = {topic.name: topic.type_name for topic in TOPICS}
 
 
-def write_bag(directory, messages, *, topics=(), flush_every=0):
+def write_bag(directory, messages, *, topics=(), tables=MappingProxyType({}), flush_every=0):
     """Record messages: topic, stamp (ns) and data of each. A topic of no name of ours is a number.
 
-    The `topics` are in the bag even if they have no message.
+    The `topics` are in the bag even if they have no message, and the `tables` of metadata by name.
     """
     channels = {}
     with Recorder(directory) as recorder:
@@ -48,6 +49,8 @@ def write_bag(directory, messages, *, topics=(), flush_every=0):
                 channels[topic] = recorder.add_topic(topic, kind, 10)
             return channels[topic]
 
+        for name, table in tables.items():
+            recorder.add_metadata(name, table)
         for topic in topics:
             channel(topic)
         for number, (topic, stamp, data) in enumerate(messages, 1):
@@ -77,8 +80,8 @@ def foreign_file(path, **options):
         writer.finish()
 
 
-def record(directory, states=STAMPS, forces=STAMPS):
+def record(directory, states=STAMPS, forces=STAMPS, **contents):
     messages = [(STATES, stamp, state(stamp)) for stamp in states]
     messages += [(FORCES, stamp, pack_wrench(stamp, stamp / SECOND)) for stamp in forces]
     messages.sort(key=lambda message: message[1])
-    write_bag(directory, messages, topics=(STATES, FORCES))
+    write_bag(directory, messages, topics=(STATES, FORCES), **contents)

@@ -47,6 +47,40 @@ def test_a_run_and_its_parts_are_measured(tmp_path):
             report_of_recording(tmp_path / "bag", **empty)
 
 
+@pytest.mark.parametrize(
+    ("late", "missed", "in_time", "note"),
+    [
+        ("10", "0", True, ""),
+        ("617", "3", False, "the regime is doubtful: 62 % of the forces came late"),
+        ("10", "500", True, "50 % of the samples missed their deadlines: lower rate"),
+    ],
+)
+def test_late_forces_and_missed_deadlines_are_told(tmp_path, late, missed, in_time, note):
+    report = report_of_recording(timed_bag(tmp_path, late, missed))
+    assert (report["late_forces"], report["missed_deadlines"]) == (int(late), int(missed))
+    assert report["in_time"] is in_time
+    assert [said[: len(note)] for said in report["notes"]] == [note] * bool(note)
+
+
+@pytest.mark.parametrize(
+    ("late", "missed"), [("1001", "0"), ("-1", "0"), ("0", "nan"), ("0", "9" * 5000), ("", "0")]
+)
+def test_of_counts_that_no_plant_has_nothing_is_claimed(tmp_path, late, missed):
+    known = ("late_forces", "missed_deadlines", "in_time")
+    record(tmp_path / "old")
+    for bag in (timed_bag(tmp_path, late, missed), tmp_path / "old"):
+        report = report_of_recording(bag)
+        assert [report[name] for name in known] == [None] * 3
+        assert report["notes"] == []
+
+
+def timed_bag(tmp_path, late, missed):
+    """Return a bag of a plant that counted so many late forces and missed deadlines."""
+    counts = {"samples": "1000", "late_forces": late, "missed_deadlines": missed}
+    record(tmp_path / "timed", tables={"stickslip_ros/timing": counts})
+    return tmp_path / "timed"
+
+
 def test_forces_ahead_of_the_first_joint_state_are_measured(tmp_path):
     record(tmp_path / "bag", states=STAMPS[500:])
     assert report_of_recording(tmp_path / "bag")["samples"] == 500

@@ -6,6 +6,8 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
+from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.duration import Duration
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
@@ -19,12 +21,14 @@ from stickslip_ros.messages.topics import (
     CONTROL_FORCE,
     DIAGNOSTICS,
     JOINT_STATES,
+    RECORDED,
     STICK_FRACTION,
 )
 from stickslip_ros.nodes.analyzer import AnalyzerNode
 from stickslip_ros.nodes.base.managed import ERROR
 from stickslip_ros.nodes.plant import PlantNode
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
+from stickslip_ros.stamps import NANOSECONDS
 from tests.bags.runs import full_disk
 from tests.nodes.graph import PATIENCE, Graph
 
@@ -37,11 +41,16 @@ def run_to_the_end(graph: Graph, bag: Path, window: int = 20, **plant_parameters
     graph.wait_until(lambda: analyzer.active, "analyzer active")
     parameters = {"wait_for": ["analyzer"], "expects_control": False, **plant_parameters}
     plant = graph.add(PlantNode, **parameters)
+    recorded = graph.listen(RECORDED)
     graph.wait_until(lambda: plant.active, "plant active")
     graph.wait_until(lambda: not plant.active, "plant pauses")
-    # The run may be shorter than it takes the analyzer to ask.
-    graph.wait_until(lambda: analyzer._parameter_calls["plant"].answer, "parameters are known")
+    last = plant.diagnose()[2]["newest_stamp"]
+    graph.wait_until(lambda: recorded and stamp_of(recorded[-1].stamp) == last, "all is recorded")
     graph.deactivate("analyzer")
+
+
+def stamp_of(time: Time) -> int:
+    return time.sec * NANOSECONDS + time.nanosec
 
 
 def test_it_records_the_bytes_it_hears_measures_them_and_logs_each_figure_once(
@@ -75,6 +84,41 @@ def test_it_records_the_bytes_it_hears_measures_them_and_logs_each_figure_once(
     assert lines[-1].startswith("stick_slip: amplitude 318.6 mm, ")
     assert all(re.fullmatch(_FIGURES, line) for line in lines)
     assert all(one != next_one for one, next_one in pairwise(lines))
+
+
+def test_it_keeps_the_counts_of_late_forces_of_each_activation_of_the_plant(
+    graph: Graph, tmp_path: Path
+) -> None:
+    analyzer = graph.add(AnalyzerNode, bag=str(tmp_path / "bag"))
+    plant = graph.publisher(DIAGNOSTICS, 1)
+    graph.wait_until(lambda: analyzer.active, "analyzer active")
+
+    def tell(name: str, state: str, first_stamp: int, *counts: int) -> None:
+        keys = "state", "first_stamp", "samples", "late_forces", "missed_deadlines"
+        values = zip(keys, map(str, (state, first_stamp, *counts)), strict=True)
+        entries = [KeyValue(key=key, value=value) for key, value in values]
+        plant.publish(DiagnosticArray(status=[DiagnosticStatus(name=name, values=entries)]))
+
+    tell("/test/plant", "inactive", 1, 900, 800, 700)  # of a recording before this one
+    tell("/test/plant", "active", 2, 100, 10, 4)
+    tell("/other/plant", "active", 2, 100, 90, 90)
+    tell("/test/plant", "deactivating", 2, 200, 30, 5)
+    tell("/test/plant", "inactive", 2, 200, 30, 5)
+    tell("/test/plant", "active", 3, 50, 1, 0)
+    graph.wait_until(lambda: len(analyzer._timings) == 2, "all is heard")
+    assert kept_timing(tmp_path / "bag") == {  # also if it is killed now
+        "samples": "250", "late_forces": "31", "missed_deadlines": "5",
+    }  # fmt: skip
+    assert "12 % of the forces came late" in analyzer.diagnose()[2]["notes"]
+    tell("/test/plant", "active", 3, 150, 1, 0)
+    graph.wait_until(lambda: analyzer._timings["3"].samples == 150, "the last is heard")
+    graph.deactivate("analyzer")
+    assert (kept_timing(tmp_path / "bag") or {})["samples"] == "350"
+
+
+def kept_timing(bag: Path) -> dict[str, str] | None:
+    with Recording(bag) as recording:
+        return recording.metadata("stickslip_ros/timing")
 
 
 def test_it_keeps_the_curves_in_files_that_parameters_name(graph: Graph, tmp_path: Path) -> None:

@@ -1,14 +1,18 @@
 """Missed deadlines and late forces: counted correctly, and told when they are too many."""
 
 from itertools import count
+from pathlib import Path
 from threading import Event, Lock
 
 import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
 
+from stickslip_ros.bags.report import report_of_recording
 from stickslip_ros.messages.codec import pack_wrench, unpack_header
 from stickslip_ros.messages.topics import CONTROL_FORCE, JOINT_STATES
 from stickslip_ros.nodes import pacing
+from stickslip_ros.nodes.analyzer import AnalyzerNode
+from stickslip_ros.nodes.base.managed import STATE
 from stickslip_ros.nodes.pacing import RealtimePacer, TimingMonitor
 from stickslip_ros.nodes.plant import PlantNode
 from stickslip_ros.physics.loop.sampled_loop import SampledLoop
@@ -73,7 +77,7 @@ def test_a_deadline_is_missed_when_the_next_one_has_passed(
         (9, 10, ""),
         (410, 0, "41 % of the latest forces came late"),
         (0, 280, "28 % of the latest samples missed their deadlines"),
-        (410, 280, "41 % of the latest forces came late (the last one was held) and 28 %"),
+        (410, 280, "41 % of the latest forces came late or not at all and 28 %"),
     ],
 )
 def test_more_than_a_hundredth_is_a_complaint(late: int, missed: int, words: str) -> None:
@@ -92,10 +96,11 @@ def test_only_the_latest_checks_count_and_none_without_a_controller() -> None:
     assert timing.check(3000, 1500, 0, controlled=True) != ""
 
 
-def test_a_plant_whose_controller_answers_every_third_sample_warns(
-    graph: Graph, often_diagnosed: None
+def test_a_plant_whose_controller_answers_every_third_sample_warns_and_so_does_the_bag(
+    graph: Graph, often_diagnosed: None, tmp_path: Path
 ) -> None:
     health = graph.health("plant")
+    graph.add(AnalyzerNode, bag=str(tmp_path / "bag"))
     force = graph.publisher(CONTROL_FORCE)
     counted = count()
 
@@ -104,7 +109,7 @@ def test_a_plant_whose_controller_answers_every_third_sample_warns(
             force.publish(pack_wrench(unpack_header(message), 0.0))
 
     graph.subscribe(JOINT_STATES, answer)
-    graph.add(PlantNode, pace="realtime", rate=500.0, wait_for=["observer"])
+    plant = graph.add(PlantNode, pace="realtime", rate=500.0, wait_for=["observer", "analyzer"])
     graph.wait_until(
         lambda: any(
             status.level == DiagnosticStatus.WARN and "forces came late" in status.message
@@ -112,3 +117,18 @@ def test_a_plant_whose_controller_answers_every_third_sample_warns(
         ),
         "a warning",
     )
+    plant.trigger_deactivate()
+    graph.wait_until(lambda: states_of(health)[-1:] == ["inactive"], "the plant tells its counts")
+    graph.deactivate("analyzer")
+    counts, report = plant.diagnose()[2], report_of_recording(tmp_path / "bag")
+    assert counts["late_forces"] > 0.6 * counts["samples"]
+    assert report["samples"] == counts["samples"]
+    assert report["late_forces"] == counts["late_forces"]
+    assert report["missed_deadlines"] == counts["missed_deadlines"]
+    assert report["in_time"] is False
+    share = 100.0 * counts["late_forces"] / counts["samples"]
+    assert report["notes"][0].startswith(f"the regime is doubtful: {share:.2g} % of the forces")
+
+
+def states_of(health: list[DiagnosticStatus]) -> list[str]:
+    return [entry.value for status in health for entry in status.values if entry.key == STATE]

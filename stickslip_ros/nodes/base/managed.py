@@ -43,6 +43,8 @@ Diagnosis = tuple[Level, str, dict[str, Any]]
 
 STATE = "state"
 """Key of a node's life-cycle state in its diagnostics."""
+FIRST_STAMP = "first_stamp"
+"""Key of the stamp of the plant's first sample since its last activation, ns."""
 NEWEST_STAMP = "newest_stamp"
 """Key of the stamp of the plant's newest sample, ns."""
 FAILURE = "failure"

@@ -16,6 +16,7 @@ from stickslip_ros.physics.measures.sample_meter import (
     SampleAssumptions,
     SampleMeter,
 )
+from stickslip_ros.physics.measures.timing import Timing
 from stickslip_ros.samples import ForceColumns
 from stickslip_ros.stamps import NANOSECONDS
 
@@ -180,6 +181,8 @@ class RunMeter:
         self.dropped_known = dropped_known
         self.dropped = 0
         """Number of forces reported as dropped."""
+        self.timing: Timing | None = None
+        """How well the run kept its time; None while it is not known."""
         self._settler = ForceSettler()
         self._observer = observer
 
@@ -206,8 +209,11 @@ class RunMeter:
 
         `notes` are sentences that say why the measures may be wrong. `quick` as in `SampleMeter`.
         """
-        motion = self.motion
+        motion, timing = self.motion, self.timing
         notes: list[str] = []
+        if timing is not None and (complaint := timing.complaint()):
+            doubt = "" if timing.in_time else "the regime is doubtful: "
+            notes.append(doubt + complaint)
         if motion.steps_back:
             notes.append(
                 f"the stamp of {motion.steps_back} of {motion.samples} samples is not later than "
@@ -230,6 +236,9 @@ class RunMeter:
             "peak_applied_force": self.applied.peak_force if self.dropped_known else None,
             "resting_applied_force": self.applied.resting_force if self.dropped_known else None,
             "dropped_forces": self.dropped if self.dropped_known else None,
+            "late_forces": None if timing is None else timing.late_forces,
+            "missed_deadlines": None if timing is None else timing.missed_deadlines,
+            "in_time": None if timing is None else timing.in_time,
             "samples": motion.samples,
             "lost_samples": motion.lost_samples,
             "duration": motion.duration,
