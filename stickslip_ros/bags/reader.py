@@ -109,7 +109,7 @@ class Recording:
     ) -> None:
         self.path = Path(path)
         self._belt_speed = belt_speed
-        self._single = _SingleJoint(0.0 if belt_speed is None else belt_speed)
+        self._slide = _SlideStates(belt_speed)
         self._namespace = namespace
         self._unreadable: list[str] = []
         self._refused: Counter[str] = Counter()
@@ -157,10 +157,8 @@ class Recording:
     @cached_property
     def joint_states(self) -> SampleColumns:
         """All joint states; raises BagError as `blocks` does."""
-        if self._belt_speed is None:
-            return self._whole(JOINT_STATES, joint_states_in)
-        self._single = _SingleJoint(self._belt_speed)
-        return self._single.completed(self._whole(JOINT_STATES, single_joint_states_in))
+        self._slide = _SlideStates(self._belt_speed)
+        return self._slide.completed(self._whole(JOINT_STATES, self._slide.decode))
 
     @cached_property
     def true_joint_states(self) -> SampleColumns:
@@ -229,12 +227,12 @@ class Recording:
             fails to read it.
         """
         states, forces, dropped = map(self._topic, (JOINT_STATES, CONTROL_FORCE, DROPPED_FORCE))
-        self._single = _SingleJoint(self._belt_speed or 0.0)
+        self._slide = slide = _SlideStates(self._belt_speed)
         gathered: list[RunBlock] = []
         count = 0
         for messages, channels in self._blocks(states, forces, dropped):
             block = RunBlock(
-                self._states(states, messages, channels),
+                slide.completed(self._decoded(states, messages, channels, slide.decode)),
                 self._decoded(forces, messages, channels, wrenches_in),
                 self._decoded(dropped, messages, channels, wrenches_in),
             )
@@ -389,14 +387,7 @@ class Recording:
     @property
     def velocity_estimated(self) -> bool:
         """Whether velocities that are not recorded were estimated from the positions so far."""
-        return self._single.estimated
-
-    def _states(
-        self, topic: str, block: MessageBlock, channels: dict[str, list[int]]
-    ) -> SampleColumns:
-        if self._belt_speed is None:
-            return self._decoded(topic, block, channels, joint_states_in)
-        return self._single.completed(self._decoded(topic, block, channels, single_joint_states_in))
+        return self._slide.estimated
 
     def _decoded(
         self,
@@ -422,10 +413,12 @@ class Recording:
         return blocks[0].followed_by(*blocks[1:])
 
 
-class _SingleJoint:
-    """Completes the samples of a joint whose belt has a known speed, block by block."""
+class _SlideStates:
+    """Decodes joint states, and completes those of a slide alone, block by block."""
 
-    def __init__(self, belt_speed: float) -> None:
+    def __init__(self, belt_speed: float | None) -> None:
+        """Take the belt speed (m/s) of a slide alone; None where the belt is a joint, too."""
+        self.decode = joint_states_in if belt_speed is None else single_joint_states_in
         self._belt_speed = belt_speed
         self._last: SampleColumns | None = None
         self.estimated = False
@@ -435,7 +428,7 @@ class _SingleJoint:
 
         A velocity that is not recorded is the difference to the position before it.
         """
-        if len(samples) == 0:
+        if self._belt_speed is None or len(samples) == 0:
             return samples
         unknown = np.isnan(samples.velocity)
         velocity, belt = samples.velocity.copy(), samples.belt_velocity.copy()
