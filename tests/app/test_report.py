@@ -6,14 +6,13 @@ from xml.etree import ElementTree
 import pytest
 from geometry_msgs.msg import WrenchStamped
 from PIL import Image
-from rclpy.node import Node
-from sensor_msgs.msg import JointState
 
 from stickslip_ros.bags.recorder import Recorder
 from stickslip_ros.messages.codec import pack_joint_state
 from stickslip_ros.testing import ClosedLoop
 from tests.app.conftest import REFERENCE, Run
 from tests.bags.runs import STAMPS, STATES, motion, record
+from tests.testing.controllers import WithoutArguments
 
 
 def texts(picture: Path) -> list[str]:
@@ -130,34 +129,23 @@ def test_parameters_that_are_none_are_no_drive(
     assert "the drive is not known" in texts(tmp_path / "run.svg")
 
 
-class Refused(Node):
+class Refused(WithoutArguments):
     """Answers each state with 128.6 N that no plant takes."""
-
-    force, shift = 128.6, 1
-
-    def __init__(self):
-        super().__init__("refused")
-        self.publisher = self.create_publisher(WrenchStamped, "control_force", 1000)
-        self.create_subscription(JointState, "joint_states", self.answer, 10)
 
     def answer(self, state):
         message = WrenchStamped(header=state.header)
-        message.header.stamp.nanosec += self.shift
-        message.wrench.force.x = self.force
-        self.publisher.publish(message)
-
-
-def recorded(bag, controller, pace="lockstep"):
-    overrides = ("plant.reply_timeout=0.1", f"plant.pace={pace}")
-    with ClosedLoop("feed_drive", *overrides, controller=controller, bag=bag) as loop:
-        return loop.run(0.5)
+        message.header.stamp.nanosec += 1
+        message.wrench.force.x = 128.6
+        self.force.publish(message)
 
 
 @pytest.mark.parametrize("pace", ["lockstep", pytest.param("realtime", marks=pytest.mark.long)])
 def test_of_forces_that_were_all_refused_none_acted(
     stickslip: Run, tmp_path: Path, pace: str
 ) -> None:
-    result = recorded(tmp_path / "bag", Refused, pace)
+    overrides = ("plant.reply_timeout=0.1", f"plant.pace={pace}")
+    with ClosedLoop("feed_drive", *overrides, controller=Refused, bag=tmp_path / "bag") as loop:
+        result = loop.run(0.5)
     assert (result.peak_force, result.peak_applied_force) == (128.6, 0.0)
     assert len(result.dropped_forces.stamp) == len(result.forces.stamp) > 1
     report = stickslip.json("report", "bag")

@@ -3,13 +3,9 @@
 from pathlib import Path
 
 import pytest
-from mcap.records import Channel, Schema
-from rclpy.qos import DurabilityPolicy, QoSProfile
-from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 
-from stickslip_ros.bags.recorder import Recorder, offered_qos
-from stickslip_ros.messages.codec import pack_header, pack_wrench, unpack_header
+from stickslip_ros.messages.codec import pack_header, unpack_header
 from stickslip_ros.messages.topics import CLOCK, CONTROL_FORCE, JOINT_STATES, RECORDED
 from stickslip_ros.nodes import replay
 from stickslip_ros.nodes.analyzer import AnalyzerNode
@@ -111,26 +107,6 @@ def test_part_and_topics_are_chosen_and_the_clock_shows_recorded_time(
     assert node.diagnose()[2]["position"] == pytest.approx(1.49)
     graph.wait_until(lambda: len(clock) == 50, "a time for each message")
     assert [m.clock.sec * SECOND + m.clock.nanosec for m in clock] == stamps(states)
-
-
-def test_a_latched_message_reaches_a_late_subscriber(graph: Graph, tmp_path: Path) -> None:
-    with Recorder(tmp_path / "bag") as recorder:
-        latching = offered_qos(1).replace("volatile", "transient_local")
-        latched = recorder.add_channel(
-            Channel(0, "/latched", "cdr", {"offered_qos_profiles": latching}, 0),
-            Schema(0, b"", "ros2msg", "std_msgs/msg/Header"),
-        )
-        other = recorder.add_topic(FORCES, CONTROL_FORCE.type_name, 10)
-        recorder.write(latched, pack_header(7), SECOND)
-        recorder.write(other, pack_wrench(SECOND, 0.0), SECOND)
-    forces = graph.listen(CONTROL_FORCE)
-    graph.add(ReplayNode, bag=str(tmp_path / "bag"))
-    graph.wait_until(lambda: len(forces) == 1, "the bag is played")
-    heard: list[Header] = []
-    late = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-    graph.observer.create_subscription(Header, "/latched", heard.append, late)
-    graph.wait_until(lambda: heard, "the latched message")
-    assert heard[0].stamp.nanosec == 7
 
 
 def test_a_controller_answers_a_recorded_state_with_the_recorded_forces(

@@ -23,7 +23,6 @@ from stickslip_ros.paper.figures import (
     unstable_equilibria,
 )
 from stickslip_ros.physics.measures.cycle_measures import Regime
-from stickslip_ros.physics.model.control import Washout
 from stickslip_ros.physics.model.friction import Coulomb, Linear
 from stickslip_ros.physics.motion.motion import Motion
 from tests.physics.drives import LIMIT_CYCLES, PAPER, LimitCycle
@@ -160,25 +159,6 @@ def test_what_the_other_portraits_show() -> None:
     assert low_corner[-1].measures.regime is Regime.EQUILIBRIUM
 
 
-def test_trajectory_of_a_decaying_vibration() -> None:
-    found = portrait_of(DECAYING)
-    time = found.trajectory.time
-    frequency = np.sqrt(1.0 - DECAY**2)
-    fading = 0.4 * np.exp(-DECAY * time)
-    position = 0.4 - fading * (
-        np.cos(frequency * time) + DECAY / frequency * np.sin(frequency * time)
-    )
-    velocity = fading / frequency * np.sin(frequency * time)
-    assert time[0] == 0.0
-    assert time[-1] == pytest.approx(600.0 * np.pi)
-    assert np.diff(time).max() < 0.11
-    assert found.trajectory.position == pytest.approx(position, abs=1e-9)
-    assert found.trajectory.velocity == pytest.approx(velocity, abs=1e-9)
-    assert found.drive.equilibrium_position == pytest.approx(0.4)
-    assert found.measures.regime is Regime.EQUILIBRIUM
-    assert found.least_relative_speed == pytest.approx(0.6)
-
-
 def test_settling_time_of_a_decaying_vibration() -> None:
     found = portrait_of(DECAYING)
     # The speed fades as 0.4 exp(-beta t) from cycle to cycle.
@@ -223,22 +203,3 @@ def test_a_diverging_motion_ends_and_does_not_affect_the_others() -> None:
     assert before.time_beyond(10.0) is None
     assert after.measures.stick_fraction == pytest.approx(before.measures.stick_fraction)
     assert after.trajectory.position.tolist() == before.trajectory.position.tolist()
-
-
-@pytest.mark.parametrize(
-    ("corner_frequency", "gain", "rests"),
-    [(2.0, -0.9, False), (2.0, -1.0, True), (0.2, -0.13, False), (0.2, -0.16, True)],
-)
-def test_the_critical_gain_separates_vibration_from_rest(
-    corner_frequency: float, gain: float, rests: bool
-) -> None:
-    gains = Washout(corner_frequency, gain, 0.0)
-    found = portrait_of(PortraitCase("", PAPER, gains, duration=3000.0))
-    assert (found.measures.regime is Regime.EQUILIBRIUM) == rests
-
-
-def test_a_run_too_short_for_a_cycle() -> None:
-    found = portrait_of(PortraitCase("", PAPER, duration=3.0))
-    assert found.measures.regime is None
-    assert found.settling_time is None
-    assert len(found.last_cycles) == len(found.trajectory)

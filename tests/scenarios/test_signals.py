@@ -95,16 +95,6 @@ def test_bad_files_are_refused(tmp_path: Path) -> None:
             plant(belt__kind="table", belt__file=name)
 
 
-@pytest.mark.parametrize("part", ["belt", "load", "disturbance"])
-def test_constants_that_make_no_signal_are_refused(part: str) -> None:
-    assert f"{part}.duration = inf s: must be above 0 and finite for a ramp" in refusal(
-        "paper", f"plant.{part}.kind=ramp"
-    )
-    assert f"{part}.duration = 1.0 s: must be at least 2/frequency = 2 s" in refusal(
-        "paper", f"plant.{part}.kind=trapezoid", f"plant.{part}.duration=1"
-    )
-
-
 def test_a_load_that_lifts_the_slide_is_refused() -> None:
     for values in (
         ("kind=step", "amplitude=-1.5"),

@@ -201,20 +201,6 @@ def test_progress_is_told_how_many_points_are_done(tmp_path: Path) -> None:
     assert again == [10]
 
 
-def test_interrupted_threads_keep_what_is_done(tmp_path: Path) -> None:
-    study, path = STUDIES["up and down"], tmp_path / "study.part"
-    with ThreadPoolExecutor(2) as threads:
-        with Journal(study, path) as journal:
-            with pytest.raises(KeyboardInterrupt):
-                run(journal, threads, in_flight=2, progress=stop_at(2))
-            done = journal.count
-            assert 2 <= done < study.plan.size
-        with Journal(study, path) as journal:
-            assert journal.count == done
-            run(journal, threads)
-            assert list(journal.columns.points()) == at_once(study)
-
-
 class _Held(Executor):
     """Finishes the task before last when the next one comes: one is finished and not asked for."""
 

@@ -1,7 +1,6 @@
 """The sampled loop: stamps, changes under way, the sensor and the actuator."""
 
 from dataclasses import dataclass, replace
-from math import exp
 from random import Random
 
 import numpy as np
@@ -20,7 +19,6 @@ from stickslip_ros.physics.model.sensor import Measure, Sensor
 from stickslip_ros.physics.model.signals import sine, step
 from stickslip_ros.physics.motion import Motion, RecordedMotion
 from stickslip_ros.samples import Sample
-from tests.examples import examples
 from tests.physics.drives import FEED_DRIVE, PAPER
 from tests.physics.parts import lag
 
@@ -301,51 +299,6 @@ def test_a_new_actuator_limits_from_the_next_command_on(time_constant: float) ->
         forces.append(motion.force)
         assert loop.sample_number == number + 1
     assert forces == [3.0, 0.4, 0.2, 3.0]
-
-
-@given(
-    st.sampled_from([0.0, 0.3, 1.7]), st.sampled_from([0.0, 2.5]), st.floats(0.02, 0.5), st.data()
-)
-@examples(quick=15, thorough=100)
-def test_a_lag_behind_delay_and_jitter_is_that_of_the_switched_command(
-    delay: float, jitter: float, time_constant: float, data: st.DataObject
-) -> None:
-    """Delay and jitter in periods. The force is that of u' = (held - u)/lag, by hand."""
-    seed = data.draw(st.integers(0, 1000))
-    disturbance = data.draw(st.floats(-0.2, 0.2))
-    drive = replace(PAPER, actuator=lag(time_constant))
-
-    class Switched(Motion):
-        """Keeps how long which command was held."""
-
-        def advance(self, duration: float) -> None:
-            pieces.append((self.force, self.disturbance, duration))
-            super().advance(duration)
-
-    pieces: list[tuple[float, float, float]] = []
-    motion = Switched(drive, 0.0, 0.0)
-    loop = SampledLoop(
-        motion,
-        10.0,
-        SECOND,
-        force_delay=delay / 10.0,
-        force_jitter=jitter / 10.0,
-        force_jitter_seed=seed,
-    )
-    loop.disturb(disturbance)
-    for number in range(10):
-        loop.offer(loop.sample.stamp, commands(number))
-        loop.advance()
-    hand, force = Motion(drive, 0.0, 0.0), 0.0
-    for command, extra, duration in pieces:
-        hand.set_forces(command, extra)
-        hand.advance(duration)
-        force = command + (force - command) * exp(-duration / time_constant)
-        assert hand.applied_force - extra == pytest.approx(force, abs=1e-12)
-    assert sum(duration for *_, duration in pieces) == pytest.approx(1.0)
-    assert {command for command, *_ in pieces} <= {0.0, *map(commands, range(10))}
-    assert {extra for _, extra, _ in pieces} == {0.0, disturbance}
-    assert (motion.position, motion.velocity) == (hand.position, hand.velocity)
 
 
 def test_a_reset_puts_the_lag_at_rest() -> None:

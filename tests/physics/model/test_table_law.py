@@ -1,7 +1,7 @@
 """A law given by a table: its points, its shape, its motion and its theory."""
 
 from dataclasses import replace
-from math import inf, log, nan
+from math import inf, nan
 from typing import Any
 
 import numpy as np
@@ -9,11 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.friction import Exponential, FrictionLaw, Table
+from stickslip_ros.physics.model.friction import Table
 from stickslip_ros.physics.model.plain_drive import drive_system
 from stickslip_ros.physics.motion import Motion
-from stickslip_ros.physics.theory.hopf import hopf_points
 from tests.physics.drives import PAPER
 
 LAW = Table(((0.0, 0.4), (0.1, 0.3), (0.3, 0.32), (0.5, 0.25)))
@@ -110,21 +108,6 @@ def test_a_scaled_table_has_scaled_speeds() -> None:
 )
 def test_points_that_make_no_table_are_refused(points: Any, refusal: str) -> None:
     assert Table(points).refusal() == refusal
-
-
-def veraszto_stepan(law: FrictionLaw) -> Drive:
-    """Mass, damping and stiffness of Veraszto and Stepan 2017; a normal force of 2 N."""
-    return Drive(0.538, 5.746, 6957.0, 2.0, 0.1, law)
-
-
-HOPF_SPEED = 0.1 * log(2.0 * (3.0 - 1.0) / 0.1 / (5.746 + 0.2))
-"""v_s ln((N (f_s - f_k)/v_s)/(c + N viscous)), m/s."""
-
-
-def test_the_hopf_speed_of_veraszto_and_stepan() -> None:
-    (point,) = hopf_points(veraszto_stepan(Exponential(3.0, 1.0, 0.1, 0.1)))
-    assert pytest.approx(0.190616073, rel=1e-8) == HOPF_SPEED
-    assert point.belt_speed == pytest.approx(HOPF_SPEED, rel=1e-10)
 
 
 def test_a_table_is_compiled_once_for_every_table() -> None:

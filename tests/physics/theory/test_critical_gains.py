@@ -20,18 +20,6 @@ from tests.physics.drives import PAPER, settled
 from tests.physics.theory.test_hopf import cubic_drives
 
 
-@pytest.mark.parametrize(
-    ("belt_speed", "damping", "corner_frequency", "gain"),
-    [(0.49, 0.01, 2.0, -0.0396), (0.4, 0.02, 2.0, -0.935), (0.4, 0.02, 0.2, -0.148)],
-)
-def test_critical_linear_gains_of_the_paper(
-    belt_speed: float, damping: float, corner_frequency: float, gain: float
-) -> None:
-    drive = replace(PAPER, belt_speed=belt_speed, damping=damping)
-    critical = critical_gains(drive, Washout(corner_frequency, 0.0, 0.0))
-    assert critical.linear == pytest.approx(gain, rel=3e-3)
-
-
 @given(cubic_drives, st.floats(0.05, 5.0), st.floats(-10.0, 10.0))
 def test_the_general_theory_agrees_with_the_closed_forms(
     drive: Drive, corner_frequency: float, cubic: float

@@ -4,8 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import assume, given
-from hypothesis import strategies as st
 
 from stickslip_ros.physics.model.control import Washout
 from stickslip_ros.physics.model.drive import Drive
@@ -19,15 +17,6 @@ LAWS = [
     Linear(0.4, 0.45),
     Exponential(0.4, 0.25, 0.3, 0.05),
 ]
-
-
-def test_the_paper_at_its_equilibrium() -> None:
-    expansion = expand(PAPER)
-    assert expansion.equilibrium == pytest.approx([0.4 - 0.45 * 0.4 + 0.6 * 0.4**3, 0.0])
-    trace = 0.45 - 0.02 - 1.8 * 0.4**2
-    assert expansion.jacobian == pytest.approx(np.array([[0.0, 1.0], [-1.0, trace]]), abs=1e-15)
-    assert expansion.eigenvalues == pytest.approx(np.roots([1.0, -trace, 1.0]), abs=1e-14)
-    assert not expansion.stable
 
 
 @pytest.mark.parametrize("law", LAWS, ids=lambda law: law.name)
@@ -65,14 +54,6 @@ def test_many_belt_speeds_at_once_are_those_one_by_one() -> None:
         assert np.array_equal(found, single.jacobian)
 
 
-@given(st.sampled_from([2, 3]), st.lists(st.floats(-2.0, 2.0), min_size=9, max_size=9))
-def test_routh_and_hurwitz_agree_with_the_eigenvalues(order: int, entries: list[float]) -> None:
-    matrix = np.array(entries[: order * order]).reshape(order, order)
-    growth = float(np.linalg.eigvals(matrix).real.max())
-    assume(abs(growth) > 1e-6)
-    assert bool(np.all(hurwitz_determinants(matrix) > 0.0)) == (growth < 0.0)
-
-
 def test_continuous_control_is_the_jacobian_of_the_paper() -> None:
     drive = Drive(1.0, 0.01, 1.0, 1.0, 0.49, Stribeck(0.4, 0.25, 0.5))
     expansion = expand(drive, Washout(2.0, -0.3, 7.0))
@@ -86,7 +67,7 @@ def test_a_neutral_equilibrium_is_neither_stable_nor_unstable() -> None:
         assert expansion.stable is stable
 
 
-@pytest.mark.parametrize("order", [4, 5])
+@pytest.mark.parametrize("order", [2, 3, 4, 5])
 def test_determinants_agree_with_eigenvalues(order: int) -> None:
     random = np.random.default_rng(1)
     matrices = random.normal(size=(500, order, order)) - 1.5 * np.eye(order)

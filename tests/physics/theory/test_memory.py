@@ -27,7 +27,6 @@ from stickslip_ros.physics.theory.critical_gains import critical_gains, limit_cy
 from stickslip_ros.physics.theory.hopf import hopf_points
 from stickslip_ros.physics.theory.limit_cycles import LimitCycle, limit_cycles, shoot
 from stickslip_ros.physics.theory.linear import equilibria, expand
-from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop
 
 CURVE = Exponential(static=0.4, kinetic=0.25, decay_speed=0.02)
 FEED = Drive(100.0, 200.0, 1e6, 1000.0, 0.04, LuGre(CURVE, 1e5, 100.0))
@@ -115,21 +114,6 @@ def test_the_critical_gain_divides_stable_from_unstable(law: FrictionLaw) -> Non
     for ratio, stable in ((1.0 + 1e-7, True), (1.0 - 1e-7, False)):
         expansion = expand(drive, replace(GAINS, linear_gain=ratio * found.linear))
         assert bool(np.all(expansion.eigenvalues.real < 0.0)) is stable
-
-
-@pytest.mark.parametrize("law", LAWS[:3], ids=lambda law: law.name)
-@pytest.mark.parametrize("delay", [0.0, 0.4e-3, 2.7e-3])
-def test_the_stable_gains_of_the_sampled_loop(law: FrictionLaw, delay: float) -> None:
-    loop = LinearSampledLoop.from_drive(replace(FEED, friction=law), 1000.0, delay)
-    intervals = loop.stable_linear_gains(20.0)
-    assert intervals
-    ends = sorted(end for interval in intervals for end in interval)
-    for gain in [*(end * (1.0 + part) for end in ends for part in (-1e-6, 1e-6))]:
-        inside = any(low < gain < high for low, high in intervals)
-        assert (loop.spectral_radius(Washout(20.0, gain, 0.0)) < 1.0) is inside
-    for gain in np.linspace(1.47 * ends[0], abs(ends[0]), 40).tolist():
-        inside = any(low < gain < high for low, high in intervals)
-        assert (loop.spectral_radius(Washout(20.0, gain, 0.0)) < 1.0) is inside
 
 
 def cycle_by_simulation(drive: Drive, duration: float) -> tuple[float, float, float]:
