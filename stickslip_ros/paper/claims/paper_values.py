@@ -273,8 +273,3 @@ def stick_fractions(portraits: Sequence[Portrait]) -> list[float]:
         for portrait in portraits
         if portrait.measures.regime in VIBRATING
     ]
-
-
-def complex_number(value: complex) -> str:
-    """Return the value in words."""
-    return f"{value.real:.4f} {'-' if value.imag < 0.0 else '+'} {abs(value.imag):.4f} i"

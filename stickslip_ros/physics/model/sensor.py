@@ -20,8 +20,6 @@ LONGEST_DIFFERENCE = 300
 
 _BLOCK = 1024
 """Number of deviates that are made at once."""
-_DEVIATIONS = 4.0
-"""Standard deviations that noise hardly ever exceeds."""
 _WORD = 2**32
 _MOST_STEPS = 2.0**53
 """Number of steps from which on floats are coarser than the steps."""

@@ -40,10 +40,6 @@ LONGEST_DELAY = 300
 SETTLED = 0.01
 """Share of its first size that a deviation has at the 1 % settling time."""
 
-ROUNDING_LEFT_OUT = (
-    "rounding, noise and limits of sensor and actuator are left out: the loop is linear"
-)
-
 
 def why_no_linear_loop(drive: Drive, rate: float, force_delay: float) -> str | None:
     """Return a sentence that says why `LinearSampledLoop.from_drive` returns None, or None."""

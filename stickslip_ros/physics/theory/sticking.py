@@ -31,6 +31,9 @@ _AVERAGED_SPEEDS = np.geomspace(1e-4, 1e4, 200)
 _FOLLOWED_SPEEDS = np.geomspace(4.0, 0.02, 100)
 """Belt speeds tried for the exact onset, relative to the averaged one or the drive's."""
 
+_Onset = tuple[float | None, str | None]
+"""An onset, m/s, and the reason why there is none: one of them is None."""
+
 _ROUNDING = 1e-12
 """Share of the belt speed below which a difference of speeds is rounding."""
 
@@ -101,39 +104,38 @@ def sticking_onset(drive: Drive) -> StickingOnset:
     (0.437163, 0.439472)
     """
     require("the onset of sticking", drive, SPRING, AUTONOMOUS, STATIC, SYMMETRIC)
-    averaged = _averaged(drive)
-    reference = averaged if isinstance(averaged, float) else abs(drive.belt_speed)
-    speeds = ((reference or drive.speed_scale) * _FOLLOWED_SPEEDS).tolist()
-    followed = _followed(drive, speeds)
-    onset = followed if isinstance(followed, float) else None
+    approximate, no_approximate = _averaged(drive)
+    reference = approximate or abs(drive.belt_speed) or drive.speed_scale
+    speeds = (reference * _FOLLOWED_SPEEDS).tolist()
+    exact, no_exact = _followed(drive, speeds)
     return StickingOnset(
-        approximate=averaged if isinstance(averaged, float) else None,
-        exact=onset,
-        no_approximate=averaged if isinstance(averaged, str) else None,
-        no_exact=followed if isinstance(followed, str) else None,
-        ranges=tuple(_ranges(drive, speeds, onset)),
+        approximate=approximate,
+        exact=exact,
+        no_approximate=no_approximate,
+        no_exact=no_exact,
+        ranges=tuple(_ranges(drive, speeds, exact)),
         followed=(speeds[-1], speeds[0]),
     )
 
 
-def _averaged(drive: Drive) -> float | str:
-    """Return the approximate onset (m/s), or the reason why there is none."""
+def _averaged(drive: Drive) -> _Onset:
+    """Return the approximate onset, or the reason why there is none."""
     growth = averaged_growth(drive, _AVERAGED_SPEEDS, _AVERAGED_SPEEDS)
     low, high = _AVERAGED_SPEEDS[[0, -1]] * drive.speed_scale
     if not np.any(growth):
-        return (
+        return None, (
             "by averaging vibrations up to the belt speed neither grow nor decay at any belt speed "
             f"from {low:.3g} to {high:.3g} m/s"
         )
     growing = np.flatnonzero(growth > 0.0)
     if len(growing) == 0:
-        return f"by averaging it sticks at no belt speed from {low:.3g} to {high:.3g} m/s"
+        return None, f"by averaging it sticks at no belt speed from {low:.3g} to {high:.3g} m/s"
     highest = int(growing[-1])
     if highest == len(_AVERAGED_SPEEDS) - 1:
-        return f"by averaging it still sticks at {high:.3g} m/s, the highest belt speed tried"
+        return None, f"by averaging it still sticks at {high:.3g} m/s, the highest belt speed tried"
     if growth[highest + 1] == 0.0:
         last = _AVERAGED_SPEEDS[highest] * drive.speed_scale
-        return (
+        return None, (
             f"by averaging it still sticks at {last:.3g} m/s, and at higher belt speeds vibrations "
             "up to the belt speed neither grow nor decay"
         )
@@ -141,11 +143,11 @@ def _averaged(drive: Drive) -> float | str:
         lambda speed: float(averaged_growth(drive, speed, speed)),
         *_AVERAGED_SPEEDS[highest : highest + 2],
     )
-    return onset * drive.speed_scale
+    return onset * drive.speed_scale, None
 
 
-def _followed(drive: Drive, speeds: Sequence[float]) -> float | str:
-    """Return the exact onset (m/s), or the reason why there is none; the speeds to try descend."""
+def _followed(drive: Drive, speeds: Sequence[float]) -> _Onset:
+    """Return the exact onset, or the reason why there is none; the speeds to try descend."""
 
     def excess(speed: float) -> float:
         at_speed = replace(drive, belt_speed=speed)
@@ -157,16 +159,16 @@ def _followed(drive: Drive, speeds: Sequence[float]) -> float | str:
             break
         above = speed
     else:
-        return f"it sticks at no belt speed from {speeds[-1]:.3g} to {speeds[0]:.3g} m/s"
+        return None, f"it sticks at no belt speed from {speeds[-1]:.3g} to {speeds[0]:.3g} m/s"
     if above is not None:
-        return zero_between(lambda speed: np.tanh(excess(speed)), speed, above)
+        return zero_between(lambda speed: np.tanh(excess(speed)), speed, above), None
     sticking = next(
         (speed for speed in speeds if release_margin(replace(drive, belt_speed=speed)) > 0.0),
         0.0,
     )
     if sticking == speed:
-        return f"it still sticks at {speed:.3g} m/s, the highest belt speed tried"
-    return (
+        return None, f"it still sticks at {speed:.3g} m/s, the highest belt speed tried"
+    return None, (
         f"above {sticking:.3g} m/s, up to {speed:.3g} m/s at least, it overtakes the belt and does "
         "not stick: no orbit touches the belt speed"
     )
