@@ -2,17 +2,20 @@
 
 import platform
 import shutil
+import signal
 import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
+from rclpy.exceptions import InvalidHandle
 from rclpy.node import Node
 
 from stickslip_ros.nodes.base.process import loopback_session
-from stickslip_ros.nodes.base.spinner import Spinner
+from stickslip_ros.nodes.base.spinner import Spinner, signal_handlers_kept
 from tests.nodes.graph import PATIENCE
 
 # What the library waits for by the system's clock takes as much longer as that is set back.
@@ -55,6 +58,7 @@ int pthread_cond_timedwait(
 
 _WAIT = """
 import ctypes, sys, threading, time
+from rclpy.exceptions import InvalidHandle
 from rclpy.node import Node
 from stickslip_ros.nodes.base.process import ros_session
 
@@ -111,3 +115,20 @@ def test_a_wait_ends_though_the_clock_is_set_back(
         timeout=PATIENCE,
         check=True,
     )
+
+
+def test_a_session_destroys_its_nodes_however_it_ends(domain: int) -> None:
+    made: list[Node] = []
+    with suppress(ZeroDivisionError), loopback_session(domain, ["--ros-args"]) as spinner:
+        made.append(Node("left_behind", context=spinner.executor.context))
+        spinner.add(made[0])
+        raise ZeroDivisionError
+    with pytest.raises(InvalidHandle):
+        made[0].get_name()
+
+
+def test_signals_have_their_handlers_again_after_a_run() -> None:
+    before = signal.getsignal(signal.SIGTERM)
+    with signal_handlers_kept():
+        signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    assert signal.getsignal(signal.SIGTERM) is before
