@@ -23,11 +23,10 @@ from stickslip_ros.physics.model.constants import (
     Parameter,
     constant,
     constants_of,
-    described_by,
     parameters_of,
 )
 from stickslip_ros.physics.model.control import CONTROL_LAWS, ControlLaw
-from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.model.drive import Drive, DriveConstants
 from stickslip_ros.physics.model.sensor import EXACT_SENSOR, Sensor
 from stickslip_ros.physics.model.signals import SignalKind
 from stickslip_ros.scenarios import Pace
@@ -48,8 +47,6 @@ if TYPE_CHECKING:
 
 _SHORTEST_TIME = 1e-3
 """Shortest time-out or period of a node, s."""
-_OF_DRIVE = constants_of(Drive)
-"""Parameters of the plant that the drive takes unchanged."""
 _NAME = "[A-Za-z_][A-Za-z0-9_]*"
 _NODE_NAME = re.compile(f"/?({_NAME}/)*{_NAME}")
 
@@ -87,15 +84,9 @@ class NodeParameters(ParameterGroup):
 
 
 @dataclass(frozen=True)
-class PlantParameters(NodeParameters):
-    """Parameters of the plant node."""
+class PlantParameters(DriveConstants, NodeParameters):
+    """Parameters of the plant node, the constants of the drive among them."""
 
-    mass: float = described_by(_OF_DRIVE["mass"])
-    damping: float = described_by(_OF_DRIVE["damping"])
-    stiffness: float = described_by(_OF_DRIVE["stiffness"])
-    normal_force: float = described_by(_OF_DRIVE["normal_force"])
-    belt_speed: float = described_by(_OF_DRIVE["belt_speed"])
-    bias_force: float = described_by(_OF_DRIVE["bias_force"])
     friction: Friction = field(default_factory=Friction)
     initial: Initial = field(default_factory=Initial)
     rate: float = constant(
@@ -230,7 +221,7 @@ class PlantParameters(NodeParameters):
     def as_drive(self) -> Drive:
         """Return the drive."""
         return Drive(
-            **{name: getattr(self, name) for name in _OF_DRIVE},
+            **{name: getattr(self, name) for name in constants_of(DriveConstants)},
             friction=self.friction.selected,
             belt=self.belt.signal(self.period),
             load=self.load.signal(self.period),
@@ -244,7 +235,7 @@ class PlantParameters(NodeParameters):
         """
         own = [
             name
-            for name, described in _OF_DRIVE.items()
+            for name, described in constants_of(DriveConstants).items()
             if not (described.simplifies and getattr(self, name) == described.default)
         ]
         return [*own, "friction.law", *(f"friction.{name}" for name in self.friction.names())]

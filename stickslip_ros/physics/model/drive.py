@@ -1,6 +1,6 @@
 """The drive: a mass on a spring and a damper, pressed onto a moving belt."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import KW_ONLY, dataclass, field, replace
 from functools import cached_property
 from math import inf, pi, sqrt
 from typing import Self
@@ -15,26 +15,8 @@ from stickslip_ros.physics.model.signals import NO_SIGNAL, Signal
 
 
 @dataclass(frozen=True)
-class Drive:
-    """Feed drive in SI units, eq. 1: m x'' + c x' + k x = N mu(x' - v_belt) + u + bias.
-
-    The scales make it dimensionless, eq. 2: X'' + 2 beta X' + X = mu(X' - v0) + U.
-    A drive with m = k = N = 1 is the dimensionless system itself. Without a spring, k = 0, the term
-    X vanishes, and the unit of speed is 1 m/s.
-
-    Examples
-    --------
-    The slide of a machine tool:
-
-    >>> from stickslip_ros.physics.model.drive import Drive
-    >>> from stickslip_ros.physics.model.friction import Stribeck
-    >>> drive = Drive(mass=100.0, damping=200.0, stiffness=1e6, normal_force=1000.0,
-    ...               belt_speed=0.04, friction=Stribeck(0.4, 0.25, 0.05))
-    >>> drive.angular_frequency
-    100.0
-    >>> round(1e6 * drive.equilibrium_position, 3)
-    258.4
-    """
+class DriveConstants:
+    """The constants of a drive itself, in SI units; the plant has them as parameters."""
 
     mass: float = constant(1.0, "Mass of the slide.", "kg", positive=True)
     """Mass m of the slide, kg."""
@@ -55,6 +37,35 @@ class Drive:
         0.4, "Speed of the belt (feed speed), positive or negative.", "m/s"
     )
     """Belt (feed) speed v_belt, m/s; positive, negative or zero."""
+    _: KW_ONLY
+    bias_force: float = constant(
+        0.0, "Constant force on the slide, such as an offset.", "N", simplifies=True
+    )
+    """Constant force on the slide, N, such as an offset of the drive or a weight."""
+
+
+@dataclass(frozen=True)
+class Drive(DriveConstants):
+    """Feed drive in SI units, eq. 1: m x'' + c x' + k x = N mu(x' - v_belt) + u + bias.
+
+    The scales make it dimensionless, eq. 2: X'' + 2 beta X' + X = mu(X' - v0) + U.
+    A drive with m = k = N = 1 is the dimensionless system itself. Without a spring, k = 0, the term
+    X vanishes, and the unit of speed is 1 m/s.
+
+    Examples
+    --------
+    The slide of a machine tool:
+
+    >>> from stickslip_ros.physics.model.drive import Drive
+    >>> from stickslip_ros.physics.model.friction import Stribeck
+    >>> drive = Drive(mass=100.0, damping=200.0, stiffness=1e6, normal_force=1000.0,
+    ...               belt_speed=0.04, friction=Stribeck(0.4, 0.25, 0.05))
+    >>> drive.angular_frequency
+    100.0
+    >>> round(1e6 * drive.equilibrium_position, 3)
+    258.4
+    """
+
     friction: FrictionLaw = field(default_factory=Stribeck)
     """Friction law; its speeds are in m/s."""
     belt: Signal = NO_SIGNAL
@@ -63,10 +74,6 @@ class Drive:
     """Signal added to the normal force, N."""
     actuator: Actuator = IDEAL_ACTUATOR
     """Actuator that exerts the control force."""
-    bias_force: float = constant(
-        0.0, "Constant force on the slide, such as an offset.", "N", simplifies=True
-    )
-    """Constant force on the slide, N, such as an offset of the drive or a weight."""
 
     @property
     def has_spring(self) -> bool:
