@@ -26,7 +26,6 @@ from stickslip_ros.scenarios.parameters import (
     ControllerParameters,
     controller_node,
 )
-from stickslip_ros.scenarios.signal_parameters import ReferenceKind
 
 
 class ControllerNode(ManagedNode[ControllerParameters]):
@@ -44,9 +43,9 @@ class ControllerNode(ManagedNode[ControllerParameters]):
         kind = self.parameters.reference.kind
         self._given = NO_REFERENCE
         self._reference = None
-        if kind is ReferenceKind.TOPIC:
+        if kind == "topic":
             self.subscribe(REFERENCE, self._on_reference, depth=1, while_active=False)
-        elif kind is not ReferenceKind.NONE:
+        elif kind != "none":
             self._reference = self.advertise(REFERENCE)
 
     def start(self) -> None:
@@ -78,7 +77,7 @@ class ControllerNode(ManagedNode[ControllerParameters]):
 
     def _followed(self) -> ReferenceSource:
         follows = self.parameters.reference
-        if follows.kind is ReferenceKind.TOPIC:
+        if follows.kind == "topic":
             return lambda _: self._given
         return follows.signal(period=0.0).reference
 

@@ -28,7 +28,6 @@ from stickslip_ros.physics.model.constants import (
 from stickslip_ros.physics.model.control import CONTROL_LAWS, ControlLaw
 from stickslip_ros.physics.model.drive import Drive, DriveConstants
 from stickslip_ros.physics.model.sensor import EXACT_SENSOR, Sensor
-from stickslip_ros.physics.model.signals import SignalKind
 from stickslip_ros.scenarios import Pace
 from stickslip_ros.scenarios.curve_file import Pairs
 from stickslip_ros.scenarios.foreign_laws import CONTROLLERS
@@ -191,7 +190,7 @@ class PlantParameters(DriveConstants, NodeParameters):
                 f"{natural:g} Hz with mass = {self.mass} kg and stiffness = {self.stiffness} N/m"
             )
         if self.normal_force + lowest < 0.0:  # the slide is lifted off the belt
-            load = "file" if self.load.kind is SignalKind.TABLE else "amplitude"
+            load = "file" if self.load.kind == "table" else "amplitude"
             raise ValueError(
                 f"load.{load} = {shown(getattr(self.load, load))} is refused: must leave a normal "
                 f"force of at least 0 N, with normal_force = {self.normal_force} N and a load down "

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from enum import StrEnum
 from functools import cached_property
 from inspect import signature
 from math import inf
@@ -12,33 +11,26 @@ from typing_extensions import override
 
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.model.constants import Changes, constant
-from stickslip_ros.physics.model.signals import NO_SIGNAL, SIGNALS, Signal, SignalKind, table
+from stickslip_ros.physics.model.signals import NO_SIGNAL, SIGNALS, Signal, table
 from stickslip_ros.scenarios.curve_file import Pairs, read_curve
 from stickslip_ros.scenarios.validation import ParameterGroup
 
-_USED = {
-    **{kind: set(signature(make).parameters) for kind, make in SIGNALS.items()},
-    SignalKind.TABLE: {"file"},
-}
-"""The parameters that each kind of signal uses."""
-_TIME_COURSE = "Time course: none, step, impulse (one sample long), ramp, sine, trapezoid or table."
+_NEEDS = {kind: list(signature(make).parameters) for kind, make in SIGNALS.items()}
+"""What the function of each kind of signal needs: parameters, the sample period, the points."""
 
 
-class ReferenceKind(StrEnum):
-    """Source of a reference."""
-
-    NONE = "none"
-    TOPIC = "topic"
-    """Given from outside; as a function of time there is none."""
-    STEP = "step"
-    RAMP = "ramp"
-    SINE = "sine"
-    TRAPEZOID = "trapezoid"
+def _kind(changes: Changes) -> Any:
+    return constant(
+        "none",
+        "Time course: none, step, impulse (one sample long), ramp, sine, trapezoid or table.",
+        changes=changes,
+        choices=("none", *SIGNALS),
+    )
 
 
 @dataclass(frozen=True)
 class _TimeCourse(ParameterGroup):
-    kind: Any = ""
+    kind: str = "none"
     amplitude: float = constant(0.0, "Amplitude of the course.")
     start: float = constant(
         0.0, "Simulated time at which the course starts.", "s", at_least=0.0, at_most=1e9
@@ -64,17 +56,17 @@ class _TimeCourse(ParameterGroup):
 
     def signal(self, period: float) -> Signal:
         """Return the signal in SI units; `period` is the sample period, s."""
-        make = SIGNALS.get(self.kind)
-        if make is None:
+        if self.kind not in SIGNALS:
             return NO_SIGNAL
         given = {**vars(self), "period": period}
-        return make(**{name: given[name] for name in signature(make).parameters})
+        return SIGNALS[self.kind](**{name: given[name] for name in _NEEDS[self.kind]})
 
     @override
     def not_used(self) -> Iterator[tuple[str, str]]:
-        kinds: Any = type(self.kind)
         for name in self.known:
-            users = [kind for kind in kinds if name in _USED.get(kind, ())]
+            need = "points" if name == "file" else name
+            kinds = self.known["kind"].choices
+            users = [kind for kind in kinds if need in _NEEDS.get(kind, ())]
             if name != "kind" and self.kind not in users:
                 yield name, f"by the kind {self.kind}; kinds that use it: {', '.join(users)}"
 
@@ -83,7 +75,7 @@ class _TimeCourse(ParameterGroup):
 class SignalParameters(_TimeCourse):
     """Signal over the time since the first sample."""
 
-    kind: SignalKind = constant(SignalKind.NONE, _TIME_COURSE, changes=Changes.AT_REST)
+    kind: str = _kind(Changes.AT_REST)
     file: str = constant(
         "",
         "CSV file of the table: time (s) and value on each line, with straight lines between.",
@@ -95,7 +87,7 @@ class SignalParameters(_TimeCourse):
 
     @override
     def completed(self, prefix: str, curves: dict[str, Pairs]) -> Self:
-        if self.kind is not SignalKind.TABLE:
+        if self.kind != "table":
             return replace(super().completed(prefix, curves), points=())
         if not self.file:
             raise ValueError(
@@ -105,7 +97,7 @@ class SignalParameters(_TimeCourse):
 
     @override
     def signal(self, period: float) -> Signal:
-        return self._table if self.kind is SignalKind.TABLE else super().signal(period)
+        return self._table if self.kind == "table" else super().signal(period)
 
     @cached_property
     def _table(self) -> Signal:
@@ -130,7 +122,7 @@ class BeltParameters(SignalParameters):
 class DisturbanceParameters(SignalParameters):
     """Disturbance force on the slide that is part of the scenario."""
 
-    kind: SignalKind = constant(SignalKind.NONE, _TIME_COURSE)
+    kind: str = _kind(Changes.LIVE)
     amplitude: float = constant(0.0, "Amplitude of the disturbance.", "N")
 
 
@@ -138,10 +130,11 @@ class DisturbanceParameters(SignalParameters):
 class ReferenceParameters(_TimeCourse):
     """Reference that the controller follows."""
 
-    kind: ReferenceKind = constant(
-        ReferenceKind.NONE,
+    kind: str = constant(
+        "none",
         "Source: none, the topic `reference`, or a time course (step, ramp, sine, trapezoid).",
         changes=Changes.AT_BUILD,
+        choices=("none", "topic", *(kind for kind in SIGNALS if kind not in ("impulse", "table"))),
     )
     amplitude: float = constant(0.0, "Largest displacement of the course.", "m")
 

@@ -157,7 +157,7 @@ def check_continuous(scenario: Scenario) -> None:
         (f"{controller.node}.force_limit", limit, float("inf")),
         ("plant.force_delay", plant.force_delay, 0.0),
         ("plant.force_jitter", plant.force_jitter, 0.0),
-        ("plant.disturbance.kind", str(plant.disturbance.kind), "none"),
+        ("plant.disturbance.kind", plant.disturbance.kind, "none"),
     ):
         if value != needed:
             raise InvalidInputError(

@@ -3,7 +3,6 @@
 from bisect import bisect_right
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from enum import StrEnum
 from functools import cached_property
 from itertools import pairwise
 from math import cos, inf, isfinite, pi
@@ -400,25 +399,8 @@ def table(points: Sequence[tuple[float, float]]) -> Signal:
     return signal
 
 
-class SignalKind(StrEnum):
-    """Shape of a signal over time."""
-
-    NONE = "none"
-    STEP = "step"
-    IMPULSE = "impulse"
-    RAMP = "ramp"
-    SINE = "sine"
-    TRAPEZOID = "trapezoid"
-    TABLE = "table"
-
-
 SIGNALS: Mapping[str, Callable[..., Signal]] = {
-    SignalKind.STEP: step,
-    SignalKind.IMPULSE: impulse,
-    SignalKind.RAMP: ramp,
-    SignalKind.SINE: sine,
-    SignalKind.TRAPEZOID: trapezoid,
-    SignalKind.TABLE: table,
+    make.__name__: make for make in (step, impulse, ramp, sine, trapezoid, table)
 }
 """The functions that make the signals, by kind."""
 

@@ -13,7 +13,7 @@ from stickslip_ros.physics.loop.sampled_loop import SampledLoop
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import LAWS as FRICTION_LAWS
 from stickslip_ros.physics.model.friction import Coulomb, Exponential
-from stickslip_ros.physics.model.signals import Signal, SignalKind, ramp, sine, step, trapezoid
+from stickslip_ros.physics.model.signals import SIGNALS, Signal, ramp, sine, step, trapezoid
 from stickslip_ros.physics.motion import Motion, RecordedMotion
 from tests.physics.drives import PAPER
 from tests.physics.motion import dop853
@@ -160,7 +160,7 @@ def test_a_fast_belt_with_a_narrow_exponential() -> None:
 
 
 def test_every_kind_and_every_law_is_tested() -> None:
-    assert {"none", *KINDS} == {*SignalKind}
+    assert {*KINDS} == {*SIGNALS}
     assert {*LAWS} - {"exponent"} == {name for name, law in FRICTION_LAWS.items() if not law.states}
 
 
