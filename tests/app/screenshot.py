@@ -72,7 +72,6 @@ def _started(*arguments: str) -> Generator[subprocess.Popen[str]]:
 
 
 def _address(dashboard: subprocess.Popen[str]) -> str:
-    assert dashboard.stderr is not None
     for line in dashboard.stderr:
         if found := re.search(r"http://127\.0\.0\.1:\d+", line):
             return found[0]

@@ -16,7 +16,6 @@ def test_it_says_what_it_waits_for_plays_to_the_end_and_is_done(
 ) -> None:
     record_states(tmp_path / "bag", 200)
     process = start_stickslip("replay", "bag", "--rate", "20", "--start", "0.5")
-    assert process.stderr is not None
     offered = process.stderr.readline()
     assert f"bag: {FORCES}, {STATES}, loopback only" in offered
     assert "waiting until a node reads them" in offered
@@ -44,6 +43,5 @@ def test_ctrl_c_ends_a_loop(
 def test_ctrl_c_ends_the_wait_for_a_reader(start_stickslip: Start, tmp_path: Path) -> None:
     record_states(tmp_path / "bag", 20)
     process = start_stickslip("replay", "bag")
-    assert process.stderr is not None
     assert "waiting" in process.stderr.readline()
     ended(process, 130, signal.SIGINT)

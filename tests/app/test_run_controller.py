@@ -126,7 +126,6 @@ def damper(node: str) -> str:
 
 def read_until(process: subprocess.Popen[str], text: str) -> str:
     """Return the first line on standard error, from now on, that has the text."""
-    assert process.stderr is not None
     return next((line for line in process.stderr if text in line), "")
 
 

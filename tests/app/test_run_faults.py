@@ -126,7 +126,6 @@ def test_a_run_that_is_interrupted_early_says_that_nothing_was_recorded(
     start_stickslip: Start, tmp_path: Path, flags: tuple[str, ...]
 ) -> None:
     process = start_stickslip("run", "feed_drive", "--external-controller", "--bag", "bag", *flags)
-    assert process.stderr is not None
     said = ""
     while "waiting for a controller" not in said:
         said = process.stderr.readline()
@@ -169,7 +168,6 @@ def test_what_killed_nodes_leave_in_shared_memory_harms_no_run(
             with subprocess.Popen(
                 command, env=environment, stdout=subprocess.PIPE, text=True
             ) as neighbour:
-                assert neighbour.stdout is not None
                 assert neighbour.stdout.readline() == "ready\n"
                 left |= shared_memory_of(neighbour.pid)
                 neighbour.kill()

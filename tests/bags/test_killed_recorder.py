@@ -44,7 +44,6 @@ def kill_a_recorder(bag: Path, seed: int) -> tuple[int, int]:
         text=True,
     )
     with process:
-        assert process.stdout is not None
         told = [process.stdout.readline()]
         kill = Timer(random.Random(seed).uniform(0.0, LONGEST_LIFE), process.kill)
         kill.start()

@@ -10,7 +10,7 @@ from stickslip_ros.identification.findings import Findings
 from stickslip_ros.identification.identify import identify
 from stickslip_ros.identification.laws import SaturatingAdapter
 from stickslip_ros.identification.record import Record
-from stickslip_ros.identification.regression import Regression, regress
+from stickslip_ros.identification.regression import regress
 from stickslip_ros.identification.servo import closed_loop, servo_of
 from stickslip_ros.identification.trajectory import Predictor, free_run
 from stickslip_ros.physics.model.friction import Coulomb
@@ -77,7 +77,6 @@ def test_coulomb_friction_needs_no_table() -> None:
 def test_the_controller_is_found_from_the_record_if_the_forces_are_its_own() -> None:
     own = record("coulomb")
     found = servo_of(own)
-    assert found is not None
     assert found.difference_samples == 2
     assert found.position_gain == pytest.approx(SERVO.position_gain, rel=0.01)
     assert found.velocity_gain == pytest.approx(SERVO.velocity_gain, rel=0.01)
@@ -89,7 +88,6 @@ def test_the_controller_is_found_from_the_record_if_the_forces_are_its_own() -> 
 
 def test_what_is_refused() -> None:
     own = record("coulomb")
-    assert own.force is not None
     refused: list[tuple[list[Record], str, dict[str, float], str]] = [
         ([own], "stribek", {}, "law stribek is refused: did you mean stribeck"),
         ([own], "dahl", {}, "law dahl is refused for a drive without a spring"),
@@ -142,12 +140,10 @@ def test_pulses_of_a_checked_record(coulomb: Findings) -> None:
 
 def test_a_controller_is_found_beside_forces_that_are_added_to_it() -> None:
     own = record("coulomb")
-    assert own.force is not None
     force = own.force.copy()
     for number in range(400, len(force), 700):
         force[number : number + 40] += 20.0
     found = servo_of(replace(own, force=force))
-    assert found is not None
     assert found.position_gain == pytest.approx(SERVO.position_gain, rel=0.01)
     added = found.added(replace(own, force=force))
     assert added[410:430] == pytest.approx(20.0, abs=1.0)
@@ -159,7 +155,6 @@ def test_a_curve_does_not_rise_far_below_the_slowest_speed() -> None:
     """A rise there is one with the force at rest: neither would be told."""
     found = identify([record("coulomb")], "table", {"force_delay": 0.0})
     fit = found.chosen.fit
-    assert isinstance(fit, Regression)
     curve = SaturatingAdapter(fit.rows.curve_speeds)
     saturating = regress(fit.rows, curve, fit.free, fit.fixed)
     assert (saturating.shapes >= 0.999 * np.quantile(fit.rows.speeds, 0.02)).all()

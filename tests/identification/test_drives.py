@@ -17,7 +17,7 @@ from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.identification.findings import Findings
 from stickslip_ros.identification.identify import identify
 from stickslip_ros.identification.record import Record, evenly_spaced
-from stickslip_ros.identification.refinement import Refinement, repetition_of
+from stickslip_ros.identification.refinement import repetition_of
 from stickslip_ros.identification.regression import filtered
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import Coulomb, Directional, FrictionLaw, Table
@@ -83,7 +83,6 @@ def test_on_a_belt_that_moves_backward_the_slide_slips_forward() -> None:
 
 def test_the_model_predicts_a_record_that_it_was_not_fitted_to(stick: Findings) -> None:
     error = stick.check(study.record("stribeck", "stick", 2, 2.5))["free_run_error"]
-    assert error is not None
     assert error < 2e-6
 
 
@@ -124,15 +123,12 @@ def test_sticking_that_the_filter_blurs_is_seen() -> None:
 @pytest.mark.long
 def test_a_missing_input_is_noted() -> None:
     own = study.record("coulomb", "ramp", 1, 2.0)
-    assert own.disturbance is not None
     half = replace(own, disturbance=np.where(np.arange(2000) < 1000, own.disturbance, 0.0))
     assert "an input may be missing" in identify([half], "coulomb").notes[0]
 
 
 def test_what_is_refused() -> None:
     sticking, own = study.record("stribeck", "stick", 1, 2.0), study.record("coulomb", "ramp", 1)
-    assert own.force is not None
-    assert own.disturbance is not None
     wrong = replace(own, force=-own.force, disturbance=-own.disturbance)
     static, kinetic = {"friction.static": 400.0}, {"friction.kinetic": 250.0}
     for record, law, fixed, message in (
@@ -258,7 +254,6 @@ def test_only_errors_of_positions_are_compared() -> None:
     velocity = np.gradient(own.position, own.period)
     velocity += 1e-3 * np.random.default_rng(0).normal(size=len(velocity))
     fit = identify([replace(own, velocity=velocity)], "coulomb").chosen.fit
-    assert isinstance(fit, Refinement)
     assert 2 * np.count_nonzero(fit.task.of_positions) == len(fit.residual)
     assert (fit.task.measured[fit.task.of_positions] == fit.task.positions).all()
 

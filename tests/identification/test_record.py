@@ -54,7 +54,6 @@ def test_a_gap_makes_two_records_and_single_losses_are_bridged() -> None:
     assert (len(first.position), len(second.position)) == (900, 1000)
     assert first.position[300] == pytest.approx(np.sin(0.3), abs=1e-6)
     assert first.position[500] == pytest.approx(np.sin(0.5), abs=1e-6)
-    assert first.force is not None
     assert first.force[510] == first.force[509]
 
 

@@ -70,11 +70,9 @@ def test_it_records_the_bytes_it_hears_measures_them_and_logs_each_figure_once(
     assert joint_state_columns(recorded)[0].stamp[-1] == 101_000_000_000
     report = report_of_recording(tmp_path / "bag")
     assert (report["samples"], report["lost_samples"]) == (10_001, 0)
-    assert stored is not None
     assert json.loads(stored["amplitude"]) == pytest.approx(report["amplitude"], rel=1e-12)
     assert amplitudes[-1].data == pytest.approx(0.318603222, rel=1e-4)
     assert fractions[-1].data == pytest.approx(0.285506954, abs=2e-3)
-    assert plant is not None
     assert json.loads(plant["belt_speed"]) == 0.2
     lines = [
         line.partition("[test.analyzer]: ")[2]
@@ -139,7 +137,6 @@ def test_it_keeps_the_curves_in_files_that_parameters_name(graph: Graph, tmp_pat
         },
     )  # fmt: skip
     with_files = recorded_drive(tmp_path / "bag")
-    assert with_files is not None
     for path in paths.values():
         Path(path).unlink()
     without = recorded_drive(tmp_path / "bag")

@@ -219,7 +219,6 @@ class Strangers:
     ) -> None:
         profile = profile_with_every_port(directory / "stranger.xml", int(domain))
         self._sniffer = start(namespaces.host, "-c", SNIFFER)
-        assert self._sniffer.stdout is not None
         assert self._sniffer.stdout.readline() == "ready\n"
         self._strangers = look(
             partial(start, namespaces.elsewhere, ROS_DOMAIN_ID=domain),
@@ -285,7 +284,6 @@ def test_a_run_is_seen_by_local_tools_and_by_no_stranger(
 ) -> None:
     run = start(namespaces.host, *command)
     if command[0] == "-c":
-        assert run.stdout is not None
         its_domain, ours = run.stdout.readline().strip(), OURS - {"/feed_drive/bringup"}
     else:
         wait_for_bag(tmp_path, run)

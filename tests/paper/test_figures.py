@@ -15,7 +15,6 @@ from stickslip_ros.paper.figures import (
     BifurcationFigure,
     Portrait,
     PortraitCase,
-    PortraitFigure,
     bifurcation_drives,
     compute_figure,
     portrait_of,
@@ -36,20 +35,13 @@ DECAYING = PortraitCase(
 RUNS_AWAY = PortraitCase("runs away", replace(PAPER, belt_speed=0.2, friction=Linear(0.4, 0.9)))
 
 
-def bifurcation(number: int, points: int) -> BifurcationFigure:
-    figure = compute_figure(number, points=points)
-    assert isinstance(figure, BifurcationFigure)
-    return figure
-
-
 @cache
 def over_belt_speed() -> BifurcationFigure:
-    return bifurcation(2, 11)
+    return compute_figure(2, points=11)
 
 
 def portraits(number: int) -> list[list[Portrait]]:
     figure = compute_figure(number)
-    assert isinstance(figure, PortraitFigure)
     assert figure.number == number
     assert figure.portraits == tuple(p for panel in figure.panels for p in panel.portraits)
     return [list(panel.portraits) for panel in figure.panels]
@@ -104,7 +96,7 @@ def test_theory_adds_the_unstable_equilibria_and_the_last_of_each_transition() -
 
 
 def test_over_the_damping_the_vibration_ends_at_the_hopf_point() -> None:
-    figure = bifurcation(3, 11)
+    figure = compute_figure(3, points=11)
     hopf = (0.45 - 1.8 * 0.477**2) / 2.0
     vibrates = [regime is Regime.PURE_SLIP for regime in regimes(figure)]
     # Close to the Hopf point the motion is slow to settle.
@@ -113,11 +105,11 @@ def test_over_the_damping_the_vibration_ends_at_the_hopf_point() -> None:
 
 
 def test_over_the_stiffness_sticking_does_not_end() -> None:
-    assert set(regimes(bifurcation(4, 5))) == {Regime.STICK_SLIP}
+    assert set(regimes(compute_figure(4, points=5))) == {Regime.STICK_SLIP}
 
 
 def test_over_the_friction_ratio_vibration_and_sticking_begin() -> None:
-    assert regimes(bifurcation(5, 3)) == [Regime.EQUILIBRIUM, *[Regime.STICK_SLIP] * 2]
+    assert regimes(compute_figure(5, points=3)) == [Regime.EQUILIBRIUM, *[Regime.STICK_SLIP] * 2]
 
 
 @pytest.mark.long

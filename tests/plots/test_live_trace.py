@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from stickslip_ros.plots.live_trace import Frame, LiveTrace
+from stickslip_ros.plots.live_trace import LiveTrace
 from stickslip_ros.samples import ForceColumns, SampleColumns
 
 NO_FORCES = ForceColumns(np.empty(0, dtype=np.int64), np.empty(0))
@@ -22,12 +22,6 @@ def states(stamps: range, position: np.ndarray) -> SampleColumns:
 
 def forces(stamps: range, force: np.ndarray) -> ForceColumns:
     return ForceColumns(np.asarray(stamps, dtype=np.int64), force)
-
-
-def frame_of(trace: LiveTrace, window: float, orbit: float, buckets: int) -> Frame:
-    frame = trace.frame(window, orbit, buckets)
-    assert frame is not None
-    return frame
 
 
 def test_before_the_first_sample_there_is_nothing_to_show() -> None:
@@ -52,7 +46,7 @@ def test_whatever_the_blocks_and_the_buckets_peaks_and_ends_are_shown(
     for begin, end in pairwise(edges):
         stamps = range(begin * 1_000_000, end * 1_000_000, 1_000_000)
         trace.feed(states(stamps, position[begin:end]), forces(stamps, -position[begin:end]))
-    frame = frame_of(trace, 1e6, 1e6, buckets)
+    frame = trace.frame(1e6, 1e6, buckets)
     assert frame.end == pytest.approx((count - 1) * 1e-3)
     assert (np.diff(frame.position.x) > 0).all()
     assert frame.position.x[-1] == 0.0
@@ -80,7 +74,7 @@ def test_a_single_sample_out_of_many_is_seen_for_as_long_as_the_window() -> None
         begin = block * SECOND
         trace.feed(states(range(begin, begin + SECOND, 1_000_000), position), NO_FORCES)
         if block % 100 in (0, 99):
-            frame = frame_of(trace, 500.0, 1.0, 300)
+            frame = trace.frame(500.0, 1.0, 300)
             seen[block] = float(frame.position.y.max()) == 7.0
     assert seen == {block: 300 <= block < 800 for block in seen}
 
@@ -91,7 +85,7 @@ def test_memory_stays_bounded_however_long_it_is_fed() -> None:
         position = np.sin(np.arange(5000) + 5000.0 * block)
         begin = block * 5 * SECOND
         trace.feed(states(range(begin, begin + 5 * SECOND, 1_000_000), position), NO_FORCES)
-    frame = frame_of(trace, 1e6, 1e6, 10_000_000)
+    frame = trace.frame(1e6, 1e6, 10_000_000)
     assert len(frame.position.x) < 250_000  # of 500,000
     assert np.nanmax(frame.position.y) > 0.99
     assert frame.position.x[0] == pytest.approx(-frame.end)
@@ -101,14 +95,14 @@ def test_stamps_that_do_not_continue_restart_the_trace() -> None:
     trace = LiveTrace(1e3)
     trace.feed(states(range(10 * SECOND, 11 * SECOND, 1_000_000), np.ones(1000)), NO_FORCES)
     trace.feed(states(range(SECOND, SECOND + 10_000_000, 1_000_000), np.zeros(10)), NO_FORCES)
-    frame = frame_of(trace, 1e3, 1e3, 100)
+    frame = trace.frame(1e3, 1e3, 100)
     assert frame.end == pytest.approx(0.009)
     assert frame.position.y.max() == 0.0
     # So do stamps that descend within a block.
     block = states(range(SECOND, 2 * SECOND, 1_000_000), np.ones(1000))
     block.stamp[500:] -= SECOND
     trace.feed(block, NO_FORCES)
-    frame = frame_of(trace, 1e3, 1e3, 100)
+    frame = trace.frame(1e3, 1e3, 100)
     assert frame.end == pytest.approx(0.499)
     assert frame.position.x[0] == pytest.approx(-0.499)
 
@@ -120,7 +114,7 @@ def test_forces_for_the_past_are_left_out() -> None:
         forces(range(0, SECOND, 1_000_000), np.ones(1000)),
     )
     trace.feed(states(range(0), np.empty(0)), forces(range(0, SECOND, 2_000_000), np.zeros(500)))
-    frame = frame_of(trace, 1e3, 1e3, 100)
+    frame = trace.frame(1e3, 1e3, 100)
     assert (np.diff(frame.force.x) > 0).all()
     assert frame.force.y.min() == 1.0
 
@@ -130,7 +124,7 @@ def test_a_line_is_broken_where_samples_are_missing() -> None:
     for begin in (1, 3):
         stamps = range(begin * SECOND, (begin + 1) * SECOND, 1_000_000)
         trace.feed(states(stamps, np.ones(1000)), forces(stamps, np.ones(1000)))
-    frame = frame_of(trace, 1e3, 1e3, 100_000)
+    frame = trace.frame(1e3, 1e3, 100_000)
     for line in (frame.position, frame.force):
         (gap,) = np.flatnonzero(np.isnan(line.y))
         assert line.x[gap - 1] == pytest.approx(-2.0)
@@ -144,7 +138,7 @@ def test_a_force_for_the_far_future_does_not_hide_the_others() -> None:
         forces(range(10**17, 10**17 + 1), np.ones(1)),
     )
     trace.feed(states(range(0), np.empty(0)), forces(range(SECOND, SECOND + 5), np.ones(5)))
-    frame = frame_of(trace, 1e3, 1e3, 100)
+    frame = trace.frame(1e3, 1e3, 100)
     assert len(frame.force.x) > 0
     assert frame.force.x.max() < 0.0
 
@@ -157,7 +151,7 @@ def test_forces_that_did_not_act_make_a_line_of_their_own(told_first: bool) -> N
     dropped = forces(stamps[40:60], np.arange(40.0, 60.0))
     trace.feed(states(stamps, np.zeros(100)), NO_FORCES, dropped if told_first else NO_FORCES)
     trace.feed(states(range(0), np.empty(0)), sent, NO_FORCES if told_first else dropped)
-    frame = frame_of(trace, 10.0, 1.0, 1000)
+    frame = trace.frame(10.0, 1.0, 1000)
     assert frame.dropped.y.tolist() == list(range(40, 60))
     y = frame.force.y
     assert y[~np.isnan(y)].tolist() == [*range(40), *range(60, 100)]

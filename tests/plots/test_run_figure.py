@@ -189,7 +189,6 @@ def test_the_shade_of_whole_cycles_is_the_stick_fraction_of_the_report() -> None
 
 def test_the_end_is_the_last_cycles(limit_cycle: Drawn) -> None:
     start, end = limit_cycle.panel(POSITION_END).get_xlim()
-    assert limit_cycle.measures.period is not None
     assert end - start == pytest.approx(LAST_CYCLES * limit_cycle.measures.period, rel=0.01)
     assert end == pytest.approx(100.0, abs=0.1)
 

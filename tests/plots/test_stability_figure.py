@@ -27,7 +27,6 @@ GAINS = Washout(20.0, -3000.0, 0.0)
 
 def map_of(force_delay: float = 0.0025, gains: Washout = GAINS) -> StabilityMap:
     loop = LinearSampledLoop.from_drive(FEED_DRIVE, 1000.0, force_delay)
-    assert loop is not None
     return StabilityMap.around(loop, gains, points=21)
 
 
@@ -54,7 +53,6 @@ def test_decay_rates_change_sign_at_the_critical_gain() -> None:
 def test_the_continuous_loop_has_its_closed_form() -> None:
     found = map_of()
     cubic = CubicLoop.from_drive(PAPER)
-    assert cubic is not None
     expected = [cubic.critical_linear_gain(d / 100.0) for d in found.corner_frequencies.tolist()]
     assert found.continuous == pytest.approx(1e4 * np.array(expected), rel=1e-9)
 
@@ -62,7 +60,6 @@ def test_the_continuous_loop_has_its_closed_form() -> None:
 def test_without_gains_it_is_around_the_critical_one() -> None:
     found = map_of(gains=Washout(20.0, 0.0, 0.0))
     critical = found.loop.critical_linear_gain(20.0)
-    assert critical is not None
     assert found.linear_gains[0] == pytest.approx(2.0 * critical)
 
 
@@ -72,7 +69,6 @@ def test_critical_gains_over_rate_and_delay() -> None:
     for row, rate in enumerate(rates):
         for column, delay in enumerate(delays):
             loop = LinearSampledLoop.from_drive(FEED_DRIVE, rate, delay)
-            assert loop is not None
             critical = loop.critical_linear_gain(20.0)
             assert found.linear_gains[row, column] == pytest.approx(critical or np.nan, nan_ok=True)
     assert np.isnan(found.linear_gains[:, 2]).all()
@@ -141,8 +137,6 @@ def test_a_design_shows_the_force_limit_as_a_contour(style: str) -> None:
 def test_the_force_at_the_proposal_is_that_of_its_check() -> None:
     found = designed(200.0)
     around, controller = found.map_around(), found.controller
-    assert around is not None
-    assert controller is not None
     forces = found.peak_forces(around)
     row, column = 40, int(np.abs(around.linear_gains - controller.linear_gain).argmin())
     assert around.corner_frequencies[row] == pytest.approx(controller.corner_frequency)
@@ -159,7 +153,6 @@ def test_a_design_without_a_limit_shows_contours_of_the_force() -> None:
 
 def test_where_nothing_is_stable_there_is_a_figure_all_the_same() -> None:
     loop = LinearSampledLoop.from_drive(replace(FEED_DRIVE, belt_speed=0.02), 1000.0, 0.015)
-    assert loop is not None
     found = StabilityMap.around(loop, replace(GAINS, linear_gain=0.0), points=11)
     assert -inf < found.decay_rates.max() < 0.0
     figure = stability_figure(found, None, style=replace(STYLES["paper"], titled=False))

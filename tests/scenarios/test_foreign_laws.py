@@ -65,8 +65,6 @@ def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Install
 def parameters_anew() -> ModuleType:
     """The module of the parameters as a process has it that starts now."""
     spec = importlib.util.spec_from_file_location("parameters_anew", parameters.__file__)
-    assert spec is not None
-    assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     sys.modules[spec.name] = module
     present = sys.modules.pop(friction_parameters.__name__)

@@ -98,8 +98,6 @@ def test_beyond_the_critical_cubic_gain_rest_cycle_and_running_away_coexist() ->
     drive = paper().plant.as_drive()
     washout = paper(corner).washout_controller.control_law
     critical = critical_gains(drive, washout)
-    assert critical is not None
-    assert critical.cubic is not None
     linear, cubic = 1.1 * critical.linear, critical.cubic + 1.0
     scenario = paper(
         corner,
@@ -208,8 +206,6 @@ def test_by_default_starts_reach_beyond_the_vibration(overrides: Sequence[str]) 
     position, velocity = default_axes(scenario, 3)
     study = basin_study(scenario, Grid((position, velocity)), course=SettlingOptions(100.0))
     for measures in compute_columns(study).points():
-        assert measures.amplitude is not None
-        assert measures.midpoint is not None
         assert position.first < measures.midpoint - measures.amplitude
         assert position.last > measures.midpoint + measures.amplitude
         assert velocity.last > (measures.velocity_amplitude or 0.0)

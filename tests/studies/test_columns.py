@@ -97,9 +97,7 @@ def as_json(
 ) -> dict[str, Any]:
     stream = StringIO()
     write_json(stream, study, columns, further or {}, provenance)
-    read = json.loads(stream.getvalue(), parse_constant=refuse)
-    assert isinstance(read, dict)
-    return read
+    return json.loads(stream.getvalue(), parse_constant=refuse)
 
 
 def test_a_table_read_back_is_the_columns_to_the_last_bit(study: Study, columns: Columns) -> None:

@@ -79,7 +79,6 @@ def test_a_proposal_brings_the_drive_to_rest_about_as_predicted() -> None:
     check_from_its_own_limit_cycle(task)
     for check in found.checks:
         assert check.vibrates
-        assert check.settling_time is not None
         # A large vibration dies out as nonlinearly as the friction is: here faster.
         assert 0.3 < check.settling_time / check.predicted_settling_time < 1.0
         assert check.peak_force == pytest.approx(check.predicted_peak_force, rel=0.02)
@@ -98,7 +97,6 @@ def test_nothing_near_a_proposal_is_much_faster() -> None:
     task = replace(FEED, belt_speeds=(0.04, 0.04))
     gains = proposal(designed(task))
     loop = LinearSampledLoop.from_drive(FEED_DRIVE, 1000.0)
-    assert loop is not None
     corners = gains.corner_frequency * np.linspace(0.5, 2.0, 31)
     linear = gains.linear_gain * np.linspace(0.5, 2.0, 31)
     assert loop.decay_rate(gains) > 0.95 * loop.decay_rates(corners, linear).max()
@@ -106,14 +104,11 @@ def test_nothing_near_a_proposal_is_much_faster() -> None:
 
 def test_margins_lead_to_the_edge_of_stability() -> None:
     loop = LinearSampledLoop.from_drive(FEED_DRIVE, 1000.0, 0.0025)
-    assert loop is not None
     gains = Washout(20.0, -3000.0, 0.0)
     found = margins([loop], gains)
     for factor in (found.gain_down, found.gain_up):
-        assert factor is not None
         at_edge = replace(gains, linear_gain=factor * gains.linear_gain)
         assert loop.spectral_radius(at_edge) == pytest.approx(1.0, abs=1e-9)
-    assert found.delay is not None
     late = replace(loop, force_delay=0.0025 + found.delay)
     assert late.spectral_radius(gains) == pytest.approx(1.0, abs=1e-9)
 
@@ -124,11 +119,8 @@ def test_margins_are_the_tightest_of_the_range() -> None:
     task = replace(FEED, belt_speeds=(0.001, 0.06))
     found = designed(task)
     tightest = found.margins
-    assert tightest is not None
-    assert tightest.gain_down is not None
     for speed in np.linspace(*task.belt_speeds, 9).tolist():
         loop = LinearSampledLoop.from_drive(replace(FEED_DRIVE, belt_speed=speed), FEED.rate)
-        assert loop is not None
         one = margins([loop], proposal(found))
         assert (one.gain_down or 0.0) <= tightest.gain_down < 1.0
         assert (one.gain_up or inf) >= (tightest.gain_up or inf) > 1.0
@@ -139,7 +131,6 @@ def test_without_damping_no_share_of_the_gain_is_unstable() -> None:
     loop = LinearSampledLoop.from_drive(
         replace(FEED_DRIVE, friction=Coulomb(0.4), damping=0.0), 1000.0
     )
-    assert loop is not None
     assert margins([loop], Washout(20.0, -3000.0, 0.0)).gain_down is None
 
 
@@ -227,7 +218,6 @@ def test_where_there_is_nothing_to_propose_it_says_why() -> None:
 )
 def test_the_force_that_it_says_would_do_does(task: Task) -> None:
     hint = re.search(r"a force limit of about (\S+) N is sufficient", designed(task).remark or "")
-    assert hint is not None
     enough = float(hint[1])
     assert enough > task.force_limit
     assert design(replace(task, force_limit=enough)).controller is not None
@@ -236,7 +226,6 @@ def test_the_force_that_it_says_would_do_does(task: Task) -> None:
 
 def test_next_to_no_margin_is_said() -> None:
     late = designed(replace(FEED, force_delay=0.018, belt_speeds=(0.02, 0.04)))
-    assert late.margins is not None
     assert late.margins.delay == pytest.approx(2e-4, rel=0.1)
     assert "the margin is very small: an additional delay of 0.0001" in (late.remark or "")
 
@@ -263,7 +252,6 @@ WASHOUT = Washout(3.0, -2.0, 0.0)
 
 def test_without_a_scenario_the_parameter_file_has_the_gains_alone(tmp_path: Path) -> None:
     text = Design(FEED, WASHOUT).parameter_file
-    assert text is not None
     assert load_scenario(scenario_file(tmp_path, text)).controller.control_law == WASHOUT
 
 
@@ -275,7 +263,6 @@ def test_of_a_scenario_it_is_that_scenario_with_the_gains(tmp_path: Path) -> Non
         overrides = (f"plant.belt_speed={belt_speed}", "plant.mass=90", "analyzer.window=7")
         scenario = load_scenario("feed_drive", overrides)
         text = Design(Task.from_scenario(scenario, belt_speeds), WASHOUT).parameter_file
-        assert text is not None
         (folder := tmp_path / str(number)).mkdir()
         read = load_scenario(scenario_file(folder, text))
         assert (read.plant.mass, read.plant.stiffness, read.analyzer.window) == (90.0, 1e6, 7)

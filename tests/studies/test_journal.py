@@ -99,7 +99,6 @@ def test_killed_it_goes_on_from_what_is_in_the_file(path: Path) -> None:
         text=True,
         cwd=Path(__file__).parents[2],
     ) as process:
-        assert process.stdout is not None
         reported = next(count for count in map(int, process.stdout) if count >= 9)
         process.send_signal(signal.SIGKILL)
         process.wait()

@@ -49,7 +49,6 @@ def test_velocity_feedback_has_a_theory_without_gains(damped: Scenario) -> None:
     closed, sampled = found["closed_loop"], found["sampled_loop"]
     more = replace(FEED_DRIVE, damping=FEED_DRIVE.damping + 1000.0)
     expansion = expand(more)
-    assert expansion is not None
     expected = expansion.eigenvalues * more.angular_frequency
     assert closed["eigenvalues"] == [
         pytest.approx([value.real, value.imag], rel=1e-10) for value in expected
@@ -57,7 +56,6 @@ def test_velocity_feedback_has_a_theory_without_gains(damped: Scenario) -> None:
     assert closed["hopf_speeds"] == pytest.approx([point.belt_speed for point in hopf_points(more)])
     assert closed["hopf_speeds"][0] < found["open_loop"]["hopf_speeds"][0]
     loop = LinearSampledLoop.from_drive(FEED_DRIVE, 1000.0)
-    assert loop is not None
     assert sampled["spectral_radius"] == loop.spectral_radius(damped.controller.control_law)
     assert sampled["decay_rate"] == pytest.approx(-expected[0].real, rel=0.1)
     assert sampled["stable"] is closed["stable"]

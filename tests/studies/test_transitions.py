@@ -100,7 +100,6 @@ def test_under_continuous_control_it_is_the_critical_gain_and_there_is_no_onset_
 def test_a_sampled_loop_has_the_limit_that_its_critical_gain_says() -> None:
     places = found("washout_controller.linear_gain=-1.5:0.5:5", "plant.force_delay=0.2")
     loop = LinearSampledLoop.from_drive(PAPER, 100.0, 0.2)
-    assert loop is not None
     assert places == {STABILITY_LIMIT: [pytest.approx(loop.critical_linear_gain(2.0), rel=1e-9)]}
 
 
@@ -127,9 +126,7 @@ def test_a_gain_that_only_its_last_determinant_likes_is_not_stable() -> None:
     overrides = ["washout_controller.corner_frequency=20", "washout_controller.linear_gain=60"]
     scenario = load_scenario("paper", [*overrides, "plant.belt_speed=0.2"])
     case = ControlledDrive.from_scenario(scenario, continuous=True)
-    assert case.law is not None
     expansion = expand(case.drive, case.law.continuous)
-    assert expansion is not None
     assert hurwitz_determinants(expansion.jacobian)[-1] > 0.0
     assert not expansion.stable
     assert hopf_margin(case) < 0.0
@@ -180,7 +177,6 @@ def test_a_map_of_a_sampled_loop_with_a_long_delay_has_the_sides_of_its_limit() 
     assert over.margins.keys() == {STABILITY_LIMIT}
     for row in (0, -1):
         loop = LinearSampledLoop.from_drive(PAPER, 100.0, float(over.first[row]))
-        assert loop is not None
         (interval,) = loop.stable_linear_gains(2.0)
         inside = (over.second > interval.low) & (over.second < interval.high)
         changed = np.flatnonzero(inside != (over.margins[STABILITY_LIMIT][row] > 0.0))
@@ -191,7 +187,6 @@ def test_the_margin_of_a_sampled_law_is_that_of_its_loop() -> None:
     plant = load_scenario("paper", ["plant.force_delay=0.05"]).plant
     drive, law = plant.as_drive(), VelocityFeedback(velocity_gain=-0.3)
     loop = LinearSampledLoop.from_drive(drive, plant.rate, plant.force_delay)
-    assert loop is not None
     margin = hopf_margin(ControlledDrive(drive, law, plant))
     assert margin == 1.0 - loop.spectral_radius(law)
     assert margin > 0.0 > hopf_margin(ControlledDrive(drive))
@@ -203,7 +198,6 @@ def test_the_margin_of_a_sampled_law_is_that_of_its_loop() -> None:
 def slope_at(drive: Drive) -> float:
     """Slope of the friction at the belt speed, by which the drive is excited."""
     expansion = expand(replace(drive, damping=0.0))
-    assert expansion is not None
     return float(expansion.jacobian[1, 1])
 
 

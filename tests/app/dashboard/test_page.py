@@ -71,7 +71,6 @@ class Served:
         return status
 
     def _read(self) -> None:
-        assert self.process.stderr is not None
         self.said += iter(self.process.stderr.readline, "")
 
 

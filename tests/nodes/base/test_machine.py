@@ -70,7 +70,6 @@ def test_a_domain_and_a_namespace_have_one_holder_until_it_is_killed() -> None:
         ExitStack() as ours,
     ):
         ours.callback(holder.kill)
-        assert holder.stdout is not None
         theirs = int(holder.stdout.readline())
         assert len({theirs, *(ours.enter_context(own_domain()) for _ in range(2))}) == 3
         ours.enter_context(lock_namespace(namespace, 8))

@@ -120,7 +120,6 @@ def test_force_limit_and_start_after_hold_for_any_law(
     samples = samples_of(moves)
     for sample in samples:
         force = free.answer(sample)
-        assert force is not None
         acts = (sample.stamp - samples[0].stamp) * 1e-9 >= start
         assert limited.answer(sample) == (max(-limit, min(limit, force)) if acts else 0.0)
         assert limited.state == free.state

@@ -64,7 +64,6 @@ def test_a_loop_whose_integral_winds_up_is_not_at_rest(sensor: tuple[str, ...]) 
         assert measures.regime is Regime.EQUILIBRIUM
         assert measures.steady is False
         assert measures.trend is Trend.DRIFTING
-        assert measures.drift is not None
         # The spring follows the force.
         assert measures.drift["position"] == pytest.approx(measures.drift["force"] / 1e6, rel=0.1)
         assert "drifting, position -" in trend_text(vars(measures))

@@ -63,7 +63,6 @@ def test_a_cycle_of_several_steps_keeps_its_regime(size: float, count: int) -> N
 @pytest.mark.parametrize("size", [5, 10])
 def test_a_stick_shows_in_a_few_steps(size: int) -> None:
     position, _, truth = study.motion(0.03)
-    assert truth.amplitude is not None
     step, time = 2.0 * truth.amplitude / size, np.arange(2500) * 1e-3
     found = measured(time, np.round(position[:2500] / step) * step, belt=0.03)
     assert found.regime is truth.regime is Regime.STICK_SLIP
@@ -82,7 +81,6 @@ def test_a_loop_that_holds_within_a_step_is_held_in_the_motion_as_in_its_samples
         ],
     )
     meter = sensor_meter(scenario)
-    assert meter is not None
     assert simulate(scenario, 3.0, measured=meter).regime is Regime.HELD
     assert meter.measures().regime is Regime.HELD
 
@@ -151,7 +149,6 @@ def test_motion_that_the_spectrum_shows_is_motion_under_large_noise() -> None:
     position = position[:6000] + 3e-4 * np.random.default_rng(0).standard_normal(6000)
     found = measured(np.arange(6000) * 1e-3, position)
     assert found.regime in (Regime.STICK_SLIP, Regime.PURE_SLIP)
-    assert found.errors is not None
     assert found.amplitude == pytest.approx(truth.amplitude, abs=3.0 * found.errors["amplitude"])
     assert found.period == pytest.approx(truth.period, rel=0.005)
 
@@ -186,8 +183,6 @@ def test_standard_errors_cover_the_rounding_of_an_encoder_without_noise(
         for part in (position[400 * number :][:2500], position[3000 + 300 * number :][:2500]):
             time = np.arange(len(part)) * 1e-3
             found = measured(time, np.round(part / step) * step, belt=belt)
-            assert found.amplitude is not None
-            assert truth.amplitude is not None
             if found.errors is None:
                 assert found.amplitude < 25.0 * step
                 continue

@@ -51,16 +51,6 @@ def test_what_was_sent_and_what_acted_are_measured_apart() -> None:
     assert report["dropped_forces"] == 2
 
 
-def test_without_knowing_what_was_dropped_nothing_is_said_of_what_acted() -> None:
-    meter = RunMeter(window=5)
-    meter.feed_forces(decaying(300), decaying(0))
-    meter.finish()
-    report = meter.report()
-    assert report["peak_force"] == 1.0
-    for name in ("peak_applied_force", "resting_applied_force", "dropped_forces"):
-        assert report[name] is None
-
-
 def test_without_forces_there_is_neither_peak_nor_rest() -> None:
     meter = ForceMeter()
     meter.feed(ForceColumns(np.array([], dtype=np.int64), np.array([])))

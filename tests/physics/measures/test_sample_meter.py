@@ -360,7 +360,6 @@ def test_noisy_samples_stick_near_the_velocity_of_the_belt(starts: list[int]) ->
     assert measures.period == pytest.approx(expected.period, rel=1e-3)
     # The slide leaves the belt slowly and is near its velocity for some time.
     stick_fraction = fed(limit_cycle(), near).measures().stick_fraction
-    assert stick_fraction is not None
     assert expected.stick_fraction < stick_fraction < expected.stick_fraction + 0.02
     assert measures.stick_fraction == pytest.approx(stick_fraction, abs=1e-3)
 

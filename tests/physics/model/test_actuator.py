@@ -34,7 +34,6 @@ def test_a_command_is_limited_rounded_and_limited(
     limit: float, resolution: float, command: float, held: float
 ) -> None:
     limiter = Actuator(limit, resolution).limiter
-    assert limiter is not None
     assert limiter(command) == held
 
 
@@ -44,7 +43,6 @@ def test_the_force_is_within_the_limit_and_near_the_command(
     limit: float, resolution: float, command: float
 ) -> None:
     limiter = Actuator(limit, resolution).limiter
-    assert limiter is not None
     force = limiter(command)
     assert abs(force) <= limit
     assert limiter(-command) == -force

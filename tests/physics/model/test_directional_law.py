@@ -128,8 +128,6 @@ def test_a_belt_that_moves_forward_has_the_law_of_backward_slip() -> None:
     for belt_speed, law in ((0.2, reverse), (-0.2, forward)):
         own = expand(replace(drive, belt_speed=belt_speed))
         other = expand(replace(drive, belt_speed=belt_speed, friction=law))
-        assert own is not None
-        assert other is not None
         np.testing.assert_allclose(own.eigenvalues, other.eigenvalues, rtol=1e-12)
         np.testing.assert_allclose(own.equilibrium, other.equilibrium, rtol=1e-14)
 

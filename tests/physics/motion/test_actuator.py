@@ -13,7 +13,6 @@ from stickslip_ros.physics.model.friction import Coulomb, Dahl, Stribeck
 from stickslip_ros.physics.model.signals import ramp
 from stickslip_ros.physics.motion import Motion, RecordedMotion
 from tests.physics.drives import FEED_DRIVE, PAPER
-from tests.physics.motion.dop853 import Dop853Drive, Function, Signal, level, none, stribeck
 from tests.physics.parts import lag
 
 LAG = replace(PAPER, actuator=lag(0.7))
@@ -46,63 +45,6 @@ def test_through_slip_the_motion_is_the_exact_solution() -> None:
         found = motion.position, motion.velocity, lagged(motion)
         assert found == pytest.approx(state[:3], abs=1e-13)
         assert motion.applied_force == pytest.approx(state[2] + disturbance, abs=1e-13)
-
-
-def lagging(
-    time: float, before: float, command: float, lag_time: float
-) -> tuple[float, Function, Function]:
-    """Return the force of an actuator from a time on, and its rate."""
-    left = before - command
-    return (
-        time,
-        lambda t: command + left * exp((time - t) / lag_time),
-        lambda t: -left / lag_time * exp((time - t) / lag_time),
-    )
-
-
-@pytest.mark.parametrize(
-    "drive",
-    [
-        replace(LAG, damping=0.4),
-        replace(FEED_DRIVE, damping=4000.0, actuator=lag(0.007)),
-    ],
-    ids=["paper", "feed_drive"],
-)
-def test_through_stick_and_slip_it_is_that_of_another_integrator(drive: Drive) -> None:
-    """A held slide breaks loose by the force that lags, slips, and sticks again."""
-    unit, normal = 1.0 / drive.angular_frequency, drive.normal_force
-    tau = drive.actuator.time_constant
-    motion = Motion(drive, 0.0, drive.belt_speed)
-    now, force, pieces, found = 0.0, 0.0, [level(-np.inf, 0.0)], list[list[float]]()
-    times, sticking = [0.0], list[bool]()
-    for command, disturbance, duration in (
-        (-0.5, 0.0, 0.4),
-        (-0.5, 0.1, 3.0),
-        (0.9, 0.1, 2.0),
-        (0.2, -0.2, 5.0),
-        (-0.3, 0.0, 5.0),
-    ):
-        motion.set_forces(command * normal, disturbance * normal)
-        motion.advance(duration * unit)
-        found.append([motion.position, motion.velocity])
-        sticking.append(motion.sticking)
-        start, own, rate = lagging(now, force, command * normal, tau)
-        pieces.append((start, lambda t, f=own, d=disturbance: f(t) + d * normal, rate))
-        now += duration * unit
-        force = own(now)
-        times.append(now)
-        assert lagged(motion) == pytest.approx(force, abs=1e-12 * normal)
-    law = drive.friction
-    curve = stribeck(law.static, law.minimum, law.minimum_speed)
-    belt, load = none().plus(drive.belt_speed), none().plus(normal)
-    constants = (drive.mass, drive.damping, drive.stiffness)
-    other = Dop853Drive(*constants, curve, curve, belt, load, Signal(pieces))
-    solution = other.run(0.0, drive.belt_speed, np.array(times))
-    expected = np.column_stack([solution.position, solution.velocity])[1:]
-    scales = [drive.length_scale, drive.speed_scale]
-    np.testing.assert_allclose(found / np.array(scales), expected / scales, atol=1e-9)
-    assert sticking == [any(a <= t <= b for a, b in solution.sticks) for t in times[1:]]
-    assert len(solution.sticks) == 2
 
 
 def test_it_breaks_loose_at_the_instant_at_which_the_lag_reaches_the_limit() -> None:

@@ -67,7 +67,6 @@ def test_a_slide_breaks_loose_from_an_accelerating_belt_by_a_law_with_an_exponen
 
 def release(motion: Motion, longest: float) -> float:
     """Return the time at which a sticking slide breaks loose, from the first change of mode."""
-    assert isinstance(motion, RecordedMotion)
     assert motion.sticking
     motion.advance(longest)
     found = motion.take_breakpoints()

@@ -12,7 +12,6 @@ from stickslip_ros.physics.theory.critical_gains import critical_gains, limit_cy
 from stickslip_ros.physics.theory.cycle_bounds import least_cycle
 from stickslip_ros.physics.theory.hopf import HopfPoint, hopf_points
 from stickslip_ros.physics.theory.limit_cycles import (
-    LimitCycle,
     limit_cycle_of_run,
     limit_cycles,
 )
@@ -115,14 +114,8 @@ def test_the_theory_of_gains_is_of_no_other_control() -> None:
 LAGS = TwoLags(1.5, -0.1, -0.05)
 
 
-def cycle_with_lags() -> LimitCycle:
-    cycle = limit_cycle_of_run(PAPER, 0.0, gains=LAGS)
-    assert cycle is not None
-    return cycle
-
-
 def test_a_cycle_with_two_states_closes() -> None:
-    cycle = cycle_with_lags()
+    cycle = limit_cycle_of_run(PAPER, 0.0, gains=LAGS)
     assert len(cycle.filter_states) == 2
     assert cycle.filter_state is None
     assert len(cycle.multipliers) == 3

@@ -33,9 +33,7 @@ from tests.physics.parts import Switching
 def loop_of(
     drive: Drive, rate: float, force_delay: float = 0.0, sensor: Sensor = EXACT_SENSOR
 ) -> LinearSampledLoop:
-    loop = LinearSampledLoop.from_drive(drive, rate, force_delay, sensor)
-    assert loop is not None
-    return loop
+    return LinearSampledLoop.from_drive(drive, rate, force_delay, sensor)
 
 
 def simulated(loop: LinearSampledLoop, gains: ControlLaw, samples: int) -> np.ndarray:

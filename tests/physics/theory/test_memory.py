@@ -126,9 +126,6 @@ def cycle_by_simulation(drive: Drive, duration: float) -> tuple[float, float, fl
     meter = CycleMeter(10)
     meter.feed(motion.take_breakpoints(), drive.belt_speed)
     measures = meter.measures()
-    assert measures.amplitude is not None
-    assert measures.period is not None
-    assert measures.stick_fraction is not None
     return measures.amplitude, measures.period, measures.stick_fraction
 
 

@@ -65,7 +65,6 @@ def test_it_answers_with_finite_numbers_and_keeps_the_size_of_its_state(law: Law
 def test_its_linear_form_is_that_of_its_answers(law: Law, period: float) -> None:
     """From sample to sample, forces and states are those of finite differences."""
     linear = law.linear_feedback(period)
-    assert linear is not None
     order = len(linear.state)
     assert linear.state.shape == (order, order)
     assert linear.input.shape == (order, 2)
