@@ -1,6 +1,5 @@
 """The models of the nodes' parameters, and the values derived from them."""
 
-from dataclasses import FrozenInstanceError
 from math import inf
 from typing import Any
 
@@ -58,13 +57,6 @@ def test_every_friction_law_can_be_chosen_and_made() -> None:
         assert type(plant.as_drive().friction) is law
 
 
-def test_a_law_gets_the_constants_of_its_formula() -> None:
-    values = {"static": 0.5, "kinetic": 0.3, "decay_speed": 0.07, "viscous": 0.02}
-    flat = {f"friction.{name}": value for name, value in values.items()}
-    plant = PlantParameters().changed({"friction.law": "exponential", **flat}, "test")
-    assert vars(plant.as_drive().friction) == {**values, "exponent": 1.0}
-
-
 def test_the_last_sample_of_a_plant() -> None:
     for duration, rate, last in ((2.0, 100.0, 200), (0.1, 3.0, 0), (inf, 100.0, None)):
         plant = PlantParameters().changed({"duration": duration, "rate": rate}, "test")
@@ -75,11 +67,6 @@ def test_no_node_is_waited_for_that_cannot_be() -> None:
     for name in ("1bad", "", "a-b", "/", "a//b", "a/", "a/1b", "ä", "a\n"):
         with pytest.raises(InvalidInputError, match=r"test: wait_for = .* must be names of nodes"):
             PlantParameters().changed({"wait_for": ["plant", name]}, "test")
-
-
-def test_parameters_cannot_be_assigned() -> None:
-    with pytest.raises(FrozenInstanceError):
-        PlantParameters().mass = 2.0
 
 
 LIMITED = {"break_away": 0.5, "elements": 3, "exponent": 2.0, "difference_samples": 3}

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from math import exp, inf
+from math import exp
 from typing import Any
 
 import heyoka
@@ -126,23 +126,6 @@ def compiled(law: FrictionLaw) -> Any:
 def test_coefficient(law: FrictionLaw, relative_speed: float, expected: float) -> None:
     sign = np.sign(relative_speed)
     assert law.coefficient(relative_speed, sign) == pytest.approx(expected, rel=1e-14)
-
-
-@every_law
-def test_a_law_is_found_by_its_name_and_made_from_its_described_constants(
-    kind: type[FrictionLaw],
-) -> None:
-    law, described = kind(), constants_of(kind)
-    made = {name: getattr(law, name) for name in law.constants()}
-    assert LAWS[law.name](**made) == law
-    assert law.refusal() is None
-    data = {"static", "points"} if issubclass(kind, Table) else set()
-    curve = {"curve"} if issubclass(kind, CurveFollower) else set()
-    assert {*described, *data, *curve} == set(made)
-    for constant in described.values():
-        assert constant.meaning.endswith(".")
-        assert constant.at_least <= constant.default < inf
-        assert constant.default > 0.0 or not constant.positive
 
 
 @every_law

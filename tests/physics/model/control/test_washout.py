@@ -65,36 +65,6 @@ def test_the_force_is_linear_plus_cubic() -> None:
     assert washout.answer(at(SECOND * 7 // 4, 0.4)) == pytest.approx(force, rel=1e-14)
 
 
-def test_changing_the_corner_frequency_does_not_jump() -> None:
-    washout = Controller(UNIT_GAIN)
-    washout.answer(at(SECOND, 0.0))
-    before = washout.answer(at(2 * SECOND, 0.7))
-    washout.law = replace(UNIT_GAIN, corner_frequency=50.0)
-    assert washout.answer(at(2 * SECOND + 1, 0.7)) == pytest.approx(before, rel=1e-7)
-    # From then on it decays with the new one.
-    later = washout.answer(at(2 * SECOND + 1 + SECOND // 10, 0.7))
-    assert later == pytest.approx(0.7 * exp(-50.0 * 0.1), rel=1e-6)
-
-
-@pytest.mark.parametrize("start_after", [0.1, 0.3, 0.7, 5.0, 1.1])
-def test_it_acts_on_the_sample_at_start_after(start_after: float) -> None:
-    washout = Controller(replace(UNIT_GAIN, start_after=start_after))
-    washout.answer(at(SECOND, 0.0))
-    due = SECOND + round(start_after * SECOND)
-    assert washout.answer(at(due - 1, 0.1)) == 0.0
-    assert washout.answer(at(due, 1.0)) != 0.0
-
-
-def test_it_follows_time_that_has_gone_back_into_the_run() -> None:
-    washout, fresh = Controller(UNIT_GAIN), Controller(UNIT_GAIN)
-    for stamp, speed in [(SECOND, 0.1), (6 * SECOND, 0.9)]:
-        washout.answer(at(stamp, speed))
-    assert washout.answer(at(2 * SECOND, 0.3)) is None
-    fresh.answer(at(2 * SECOND, 0.3))
-    for stamp, speed in [(2 * SECOND + 10**8, 0.5), (3 * SECOND, -0.4), (9 * SECOND, 0.2)]:
-        assert washout.answer(at(stamp, speed)) == fresh.answer(at(stamp, speed))
-
-
 @given(
     st.lists(
         st.tuples(st.integers(-(2**61), 2**61), st.floats(-1e100, 1e100)), min_size=1, max_size=20
