@@ -240,7 +240,7 @@ def _closed_loop(drive: Drive, law: ControlLaw | None, plant: PlantParameters) -
     possible, reason = _covered(
         lambda: (
             limit_cycle_from_hopf(drive, control),
-            limit_cycle_of_run(drive, 0.0, gains=control),
+            limit_cycle_of_run(drive, 0.0, control=control),
         ),
     )
     cycles = [cycle for cycle in possible or () if cycle is not None]

@@ -179,7 +179,7 @@ def critical(belt_speed: float, damping: float, corner_frequency: float = 2.0) -
 
 def controlled_amplitude(belt_speed: float, gains: Washout, damping: float = DAMPING) -> float:
     """Return the amplitude of the limit cycle that the motion from rest at X = 0 leads to."""
-    cycle = limit_cycle_of_run(unit_drive(belt_speed, damping=damping), 0.0, gains=gains)
+    cycle = limit_cycle_of_run(unit_drive(belt_speed, damping=damping), 0.0, control=gains)
     return 0.0 if cycle is None else cycle.measures.amplitude or 0.0
 
 

@@ -164,8 +164,8 @@ class ShootingMotion(VariationalMotion):
 
     _first_detail = Detail.MARKS | Detail.DERIVATIVES
 
-    def __init__(self, drive: Drive, gains: ContinuousControl | None = None) -> None:
-        """Start at rest at X = 0, with continuous control if `gains` (SI) are given.
+    def __init__(self, drive: Drive, control: ContinuousControl | None = None) -> None:
+        """Start at rest at X = 0, with continuous control if `control` (SI) is given.
 
         The actuator has no part in it.
         """
@@ -173,7 +173,7 @@ class ShootingMotion(VariationalMotion):
         """Whether the slide has stuck since the start."""
         self._effort = self._begun = 0.0
         self._steps_before = 0
-        super().__init__(replace(drive, actuator=IDEAL_ACTUATOR), 0.0, 0.0, gains)
+        super().__init__(replace(drive, actuator=IDEAL_ACTUATOR), 0.0, 0.0, control)
         self.start(np.zeros(self.order))
 
     @property

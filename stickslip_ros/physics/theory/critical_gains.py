@@ -240,7 +240,7 @@ def limit_cycle_from_hopf(drive: Drive, gains: ContinuousControl) -> LimitCycle 
             return None
         position, filter_state, period, *memory = guess.tolist()
         cycle = shoot(
-            drive, position, period, gains=at_gain, filter_state=filter_state, memory=memory
+            drive, position, period, control=at_gain, filter_state=filter_state, memory=memory
         )
         if cycle is None or cycle.filter_state is None:
             return None

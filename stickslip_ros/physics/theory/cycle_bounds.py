@@ -91,18 +91,18 @@ def follow(motion: RecordedMotion) -> Iterator[Breakpoints]:
         yield breakpoints
 
 
-def least_cycle(drive: Drive, gains: ContinuousControl | None = None) -> float | None:
+def least_cycle(drive: Drive, control: ContinuousControl | None = None) -> float | None:
     """Return the least speed, dimensionless, at which energy may be gained; the belt moves.
 
     It is the speed in the open loop, where every cycle turns at least as far from the equilibrium,
-    or under continuous control with `gains` (SI). None if there is no such speed: on a cycle the
+    or under continuous `control` (SI). None if there is no such speed: on a cycle the
     gain balances the loss, so that there is no cycle up to `UNBOUNDED_SPEED`, unless energy is
     conserved. Raises InvalidInputError for a drive that it does not cover, see `requirements`.
     """
     require("the energy of a cycle", drive, SPRING, AUTONOMOUS, STATIC, SYMMETRIC)
     speed, force = _net_force(drive)
-    if gains is not None:
-        force = force + gains.scaled(drive).bound(speed)
+    if control is not None:
+        force = force + control.scaled(drive).bound(speed)
     with np.errstate(invalid="ignore"):  # an infinite bound at rest
         gaining = np.abs(speed)[speed * force > 0.0]
     return None if len(gaining) == 0 else 0.95 * float(gaining.min())

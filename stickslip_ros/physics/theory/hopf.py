@@ -80,7 +80,7 @@ class ComplexPair:
         return cls(value.real, value.imag, right[:, upper], left)
 
 
-def hopf_points(drive: Drive, gains: ContinuousControl | None = None) -> list[HopfPoint]:
+def hopf_points(drive: Drive, control: ContinuousControl | None = None) -> list[HopfPoint]:
     """Return the Hopf points over the belt speed.
 
     It covers every friction law, at constant belt speed and normal force. The search covers belt
@@ -91,7 +91,7 @@ def hopf_points(drive: Drive, gains: ContinuousControl | None = None) -> list[Ho
     ----------
     drive : Drive
         Drive in SI units; of its belt speed at most the sign is used.
-    gains : ContinuousControl, optional
+    control : ContinuousControl, optional
         Continuous control in SI units, such as that of eq. 19. By default the loop is open.
 
     Returns
@@ -121,17 +121,17 @@ def hopf_points(drive: Drive, gains: ContinuousControl | None = None) -> list[Ho
     smooth = SMOOTH.lack(drive) is None
     mirrored = SYMMETRIC.lack(drive) is None
     belt_speeds = _BELT_SPEEDS if mirrored or drive.belt_speed >= 0.0 else -_BELT_SPEEDS
-    margins = _hopf_margins(drive, gains, belt_speeds)
+    margins = _hopf_margins(drive, control, belt_speeds)
     before = np.flatnonzero(np.sign(margins[:-1]) * np.sign(margins[1:]) < 0.0)
     points: list[HopfPoint] = []
     for row in before:
         speed = zero_between(
-            lambda v: float(_hopf_margins(drive, gains, np.array([v]))[0]),
+            lambda v: float(_hopf_margins(drive, control, np.array([v]))[0]),
             float(belt_speeds[row]),
             float(belt_speeds[row + 1]),
         )
         at_point = replace(drive, belt_speed=speed * drive.speed_scale)
-        expansion = expand(at_point, gains)
+        expansion = expand(at_point, control)
         assert expansion is not None
         crossing, sigma = crossing_speed(expansion), first_lyapunov_coefficient(expansion)
         if crossing is None or sigma is None or not _crosses(expansion):
@@ -212,6 +212,6 @@ def _crosses(expansion: Expansion) -> bool:
 
 
 def _hopf_margins(
-    drive: Drive, gains: ContinuousControl | None, belt_speeds: FloatArray
+    drive: Drive, control: ContinuousControl | None, belt_speeds: FloatArray
 ) -> FloatArray:
-    return hurwitz_determinants(jacobians(drive, gains, belt_speeds))[:, -1]
+    return hurwitz_determinants(jacobians(drive, control, belt_speeds))[:, -1]

@@ -86,7 +86,7 @@ def shoot(
     position: float,
     period: float,
     *,
-    gains: ContinuousControl | None = None,
+    control: ContinuousControl | None = None,
     filter_state: float | Sequence[float] = 0.0,
     memory: Sequence[float] | None = None,
 ) -> LimitCycle | None:
@@ -103,11 +103,11 @@ def shoot(
         Guess of the displacement at an upward turning point, m.
     period : float
         Guess of the period, s.
-    gains : ContinuousControl, optional
+    control : ContinuousControl, optional
         Continuous control in SI units, such as that of eq. 19. By default the loop is open.
     filter_state : float or sequence of float, optional
         Guess of the states of the control at the turning point, times N/k: in m for W of eq. 17.
-        One number applies to all of them. It is used with `gains` only.
+        One number applies to all of them. It is used with `control` only.
     memory : sequence of float, optional
         Guess of the memory of the friction law at the turning point, SI units. By default it is
         that of the equilibrium.
@@ -137,7 +137,7 @@ def shoot(
     require("shooting", drive, SPRING, AUTONOMOUS)
     if drive.belt_speed == 0.0:
         return None
-    motion = ShootingMotion(drive, gains)
+    motion = ShootingMotion(drive, control)
     state = motion.state_at(position, filter_state, memory)
     try:
         return _solve(motion, state, period)
@@ -150,7 +150,7 @@ def limit_cycle_of_run(
     position: float,
     velocity: float = 0.0,
     *,
-    gains: ContinuousControl | None = None,
+    control: ContinuousControl | None = None,
     turns: int = 200,
 ) -> LimitCycle | None:
     """Return the limit cycle that a motion leads to.
@@ -165,7 +165,7 @@ def limit_cycle_of_run(
         Displacement of the slide at the start, m.
     velocity : float, optional
         Velocity of the slide at the start, m/s.
-    gains : ContinuousControl, optional
+    control : ContinuousControl, optional
         Continuous control in SI units, such as that of eq. 19, at rest at the start. By default the
         loop is open.
     turns : int, optional
@@ -185,9 +185,9 @@ def limit_cycle_of_run(
     """
     require("the limit cycle of a run", drive, SPRING, AUTONOMOUS, SYMMETRIC)
     static = STATIC.lack(drive) is None
-    if drive.belt_speed == 0.0 or (static and least_cycle(drive, gains) is None):
+    if drive.belt_speed == 0.0 or (static and least_cycle(drive, control) is None):
         return None
-    motion = ShootingMotion(drive, gains)
+    motion = ShootingMotion(drive, control)
     motion.restart(position, velocity)
     try:
         return _cycle_ahead(motion, turns)

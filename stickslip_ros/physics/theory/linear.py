@@ -69,7 +69,7 @@ class Expansion:
         return bool(np.all(hurwitz_determinants(self.jacobian) > 0.0))
 
 
-def expand(drive: Drive, gains: ContinuousControl | None = None) -> Expansion | None:
+def expand(drive: Drive, control: ContinuousControl | None = None) -> Expansion | None:
     """Return the expansion of the equations of motion at the equilibrium.
 
     It covers every friction law, static or with a memory, at constant belt speed and normal force.
@@ -78,7 +78,7 @@ def expand(drive: Drive, gains: ContinuousControl | None = None) -> Expansion | 
     ----------
     drive : Drive
         Drive in SI units.
-    gains : ContinuousControl, optional
+    control : ContinuousControl, optional
         Continuous control in SI units, such as that of eq. 19. By default the loop is open.
 
     Returns
@@ -113,7 +113,7 @@ def expand(drive: Drive, gains: ContinuousControl | None = None) -> Expansion | 
     if drive.belt_speed == 0.0:
         return None
     states, (first, second, third) = _at_equilibrium(
-        drive, gains, np.array([drive.belt_speed / drive.speed_scale])
+        drive, control, np.array([drive.belt_speed / drive.speed_scale])
     )
     n = len(first)
     first, second, third = first[..., 0], second[..., 0], third[..., 0]
@@ -127,9 +127,11 @@ def expand(drive: Drive, gains: ContinuousControl | None = None) -> Expansion | 
     )
 
 
-def jacobians(drive: Drive, gains: ContinuousControl | None, belt_speeds: FloatArray) -> FloatArray:
+def jacobians(
+    drive: Drive, control: ContinuousControl | None, belt_speeds: FloatArray
+) -> FloatArray:
     """Return A, shape (m, n, n), at m dimensionless belt speeds of one sign."""
-    _, (first, *_) = _at_equilibrium(drive, gains, belt_speeds)
+    _, (first, *_) = _at_equilibrium(drive, control, belt_speeds)
     return np.moveaxis(first[:, : len(first)], -1, 0)
 
 
@@ -174,10 +176,10 @@ def _hurwitz_minors(jacobian: FloatArray) -> FloatArray:
 
 
 def _at_equilibrium(
-    drive: Drive, gains: ContinuousControl | None, belt_speeds: FloatArray
+    drive: Drive, control: ContinuousControl | None, belt_speeds: FloatArray
 ) -> tuple[FloatArray, list[FloatArray]]:
     """Return the equilibria at m belt speeds of one sign, (n, m), and the derivatives there."""
-    system = drive_system(replace(drive, actuator=IDEAL_ACTUATOR), gains)
+    system = drive_system(replace(drive, actuator=IDEAL_ACTUATOR), control)
     values = np.zeros((len(system.index), len(belt_speeds)))
     values[: len(system.constants)] = np.array(system.constants)[:, np.newaxis]
     values[system.index["belt_speed"]] = belt_speeds

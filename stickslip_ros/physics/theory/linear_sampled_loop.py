@@ -124,12 +124,12 @@ class LinearSampledLoop:
             return None
         return cls(drive, rate, force_delay, expansion.jacobian, sensor.spans)
 
-    def transition_matrix(self, gains: ControlLaw) -> FloatArray:
+    def transition_matrix(self, law: ControlLaw) -> FloatArray:
         """Return the matrix from the state at one sample to the state at the next.
 
         Parameters
         ----------
-        gains : ControlLaw
+        law : ControlLaw
             Control law in SI units, of which only the linear part is used.
 
         Returns
@@ -144,17 +144,17 @@ class LinearSampledLoop:
         InvalidInputError
             If the law is not linear near the equilibrium.
         """
-        feedback = gains.linear_feedback(1.0 / self.rate)
+        feedback = law.linear_feedback(1.0 / self.rate)
         if feedback is None:
-            raise InvalidInputError(f"the theory of the sampled loop: {not_linear(gains.name)}")
+            raise InvalidInputError(f"the theory of the sampled loop: {not_linear(law.name)}")
         return self._transitions(feedback)
 
-    def spectral_radius(self, gains: ControlLaw) -> float:
+    def spectral_radius(self, law: ControlLaw) -> float:
         """Return the factor by which a small deviation grows per sample, in the long run.
 
         Parameters
         ----------
-        gains : ControlLaw
+        law : ControlLaw
             Control law in SI units, linear near the equilibrium.
 
         Returns
@@ -162,14 +162,14 @@ class LinearSampledLoop:
         float
             Spectral radius of the transition matrix; the loop is stable below 1.
         """
-        return float(_spectral_radius(self.transition_matrix(gains)))
+        return float(_spectral_radius(self.transition_matrix(law)))
 
-    def decay_rate(self, gains: ControlLaw) -> float:
+    def decay_rate(self, law: ControlLaw) -> float:
         """Return the rate at which a small deviation decays.
 
         Parameters
         ----------
-        gains : ControlLaw
+        law : ControlLaw
             Control law in SI units, linear near the equilibrium.
 
         Returns
@@ -177,7 +177,7 @@ class LinearSampledLoop:
         float
             Decay rate, 1/s; below zero the deviation grows.
         """
-        radius = self.spectral_radius(gains)
+        radius = self.spectral_radius(law)
         return -log(radius) * self.rate if radius > 0.0 else inf
 
     def decay_rates(self, corner_frequencies: FloatArray, linear_gains: FloatArray) -> FloatArray:
@@ -201,12 +201,12 @@ class LinearSampledLoop:
         with np.errstate(divide="ignore"):
             return -np.log(radii) * self.rate
 
-    def settling_time(self, gains: ControlLaw) -> float | None:
+    def settling_time(self, law: ControlLaw) -> float | None:
         """Return the 1 % settling time of a small deviation.
 
         Parameters
         ----------
-        gains : ControlLaw
+        law : ControlLaw
             Control law in SI units, linear near the equilibrium.
 
         Returns
@@ -214,7 +214,7 @@ class LinearSampledLoop:
         float or None
             Time in which a deviation decays to a hundredth, s; None if it grows.
         """
-        return settling_time(self.decay_rate(gains))
+        return settling_time(self.decay_rate(law))
 
     def stable_linear_gains(self, corner_frequency: float) -> list[GainInterval]:
         """Return all linear gains of eq. 18 with which the loop is stable.

@@ -85,7 +85,7 @@ def test_its_hopf_points_are_those_of_that_drive(drive: Drive, gains: VelocityFe
 @feedback
 def test_its_limit_cycle_is_that_of_that_drive(drive: Drive, gains: VelocityFeedback) -> None:
     other = altered(drive, gains)
-    found = limit_cycle_of_run(drive, 0.0, gains=gains)
+    found = limit_cycle_of_run(drive, 0.0, control=gains)
     expected = next((cycle for cycle in limit_cycles(other) if cycle.stable), None)
     assert (found is None) == (expected is None)
     if found is None or expected is None:
@@ -115,7 +115,7 @@ LAGS = TwoLags(1.5, -0.1, -0.05)
 
 
 def test_a_cycle_with_two_states_closes() -> None:
-    cycle = limit_cycle_of_run(PAPER, 0.0, gains=LAGS)
+    cycle = limit_cycle_of_run(PAPER, 0.0, control=LAGS)
     assert len(cycle.filter_states) == 2
     assert cycle.filter_state is None
     assert len(cycle.multipliers) == 3

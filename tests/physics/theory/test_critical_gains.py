@@ -96,7 +96,7 @@ def test_an_unstable_cycle_separates_rest_from_vibration() -> None:
     for factor, regime in ((0.99, Regime.EQUILIBRIUM), (1.01, Regime.STICK_SLIP)):
         start = PAPER.equilibrium_position - factor * distance
         assert ends_in(SUBCRITICAL, start, factor * cycle.filter_state) is regime
-    outer = limit_cycle_of_run(PAPER, 0.0, gains=SUBCRITICAL)
+    outer = limit_cycle_of_run(PAPER, 0.0, control=SUBCRITICAL)
     assert outer.stable
     assert outer.position < cycle.position
 
@@ -107,7 +107,7 @@ def test_a_stable_cycle_is_the_one_that_a_run_leads_to(corner_frequency: float) 
     gains = Washout(corner_frequency, 0.8 * critical.linear, -1.0)
     cycle, by_run = (
         limit_cycle_from_hopf(PAPER, gains),
-        limit_cycle_of_run(PAPER, 0.0, gains=gains),
+        limit_cycle_of_run(PAPER, 0.0, control=gains),
     )
     assert cycle.stable
     assert cycle.position == pytest.approx(by_run.position, rel=1e-9)

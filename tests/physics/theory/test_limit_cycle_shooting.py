@@ -187,7 +187,7 @@ def test_cycles_close_and_are_stable_in_turns(
 
 
 def test_the_cycle_under_washout_control_is_what_a_long_run_leaves() -> None:
-    cycle = limit_cycle_of_run(PAPER, 0.0, gains=GAINS)
+    cycle = limit_cycle_of_run(PAPER, 0.0, control=GAINS)
     assert cycle.stable
     motion = RecordedMotion(PAPER, 0.0, 0.0, control=GAINS)
     run = simulate_continuous(motion, Washout(2.0, -0.5, 0.0), 1200.0, CycleMeter(10))
@@ -197,13 +197,13 @@ def test_the_cycle_under_washout_control_is_what_a_long_run_leaves() -> None:
 
 
 def test_shooting_from_a_rough_guess_under_control_in_si_units() -> None:
-    cycle = limit_cycle_of_run(PAPER, 0.0, gains=GAINS)
+    cycle = limit_cycle_of_run(PAPER, 0.0, control=GAINS)
     # Time in units of 10 ms, length 1 mm, force 1000 N.
     found = shoot(
         FEED_DRIVE,
         cycle.position * 0.97e-3,
         cycle.period * 1.02e-2,
-        gains=Washout(200.0, -0.5e4, 0.0),
+        control=Washout(200.0, -0.5e4, 0.0),
         filter_state=cycle.filter_state * 1.05e-3,
     )
     assert found.filter_state is not None
@@ -220,8 +220,8 @@ def test_a_guess_of_two_periods_is_no_cycle() -> None:
 
 
 def test_a_run_that_control_stills_or_that_runs_away_has_no_cycle() -> None:
-    assert limit_cycle_of_run(PAPER, 0.0, gains=Washout(2.0, -1.5, 0.0)) is None
-    assert limit_cycle_of_run(PAPER, 0.0, 5.0, gains=Washout(2.0, 0.0, 5.0)) is None
+    assert limit_cycle_of_run(PAPER, 0.0, control=Washout(2.0, -1.5, 0.0)) is None
+    assert limit_cycle_of_run(PAPER, 0.0, 5.0, control=Washout(2.0, 0.0, 5.0)) is None
     assert limit_cycle_of_run(FALLING, 4.0) is None
 
 
@@ -253,7 +253,7 @@ def test_the_cycle_of_a_slow_belt_is_where_a_run_ends(drive: Drive) -> None:
 def test_where_no_energy_is_gained_there_is_no_cycle(drive: Drive, gains: Washout | None) -> None:
     assert least_cycle(drive) is None
     assert limit_cycles(drive) == []
-    assert limit_cycle_of_run(drive, 0.0, gains=gains) is None
+    assert limit_cycle_of_run(drive, 0.0, control=gains) is None
 
 
 @pytest.mark.parametrize("drive", [PAPER, replace(PAPER, belt_speed=0.2), SUDDEN])
@@ -273,14 +273,14 @@ def test_cycles_keep_within_the_bounds_that_energy_sets(drive: Drive) -> None:
 @pytest.mark.long
 def test_a_cycle_too_stiff_to_follow_is_not_claimed() -> None:
     gains = Washout(2.0, -1e6, 0.0)
-    assert limit_cycle_of_run(replace(PAPER, belt_speed=0.1), 0.0, gains=gains) is None
+    assert limit_cycle_of_run(replace(PAPER, belt_speed=0.1), 0.0, control=gains) is None
 
 
 def test_a_controller_without_gain_leaves_the_cycle_and_adds_its_own_decay() -> None:
     for belt_speed in (0.3, 0.46):
         drive = replace(PAPER, belt_speed=belt_speed)
         (free,) = limit_cycles(drive)
-        cycle = limit_cycle_of_run(drive, 0.0, gains=Washout(0.2, 0.0, 0.0))
+        cycle = limit_cycle_of_run(drive, 0.0, control=Washout(0.2, 0.0, 0.0))
         assert cycle.position == pytest.approx(free.position, rel=1e-10)
         assert cycle.period == pytest.approx(free.period, rel=1e-11)
         both = sorted([abs(free.multipliers[0]), exp(-0.2 * free.period)], reverse=True)

@@ -202,7 +202,7 @@ def test_a_cycle_from_the_hopf_point_of_the_gain() -> None:
         FEED,
         cycle.position,
         cycle.period,
-        gains=gains,
+        control=gains,
         filter_state=cycle.filter_states,
         memory=cycle.memory,
     )

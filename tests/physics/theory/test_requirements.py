@@ -118,8 +118,10 @@ def test_an_actuator_has_no_part_in_theory_without_sampling() -> None:
         lagging, ideal = expand(LAGGING, gains), expand(PAPER, gains)
         assert lagging.jacobian.tolist() == ideal.jacobian.tolist()
         assert hopf_points(LAGGING, gains) == hopf_points(PAPER, gains)
-        assert shoot(LAGGING, -0.1, 6.4, gains=gains) == shoot(PAPER, -0.1, 6.4, gains=gains)
-        lagging, ideal = (limit_cycle_of_run(drive, 0.0, gains=gains) for drive in (LAGGING, PAPER))
+        assert shoot(LAGGING, -0.1, 6.4, control=gains) == shoot(PAPER, -0.1, 6.4, control=gains)
+        lagging, ideal = (
+            limit_cycle_of_run(drive, 0.0, control=gains) for drive in (LAGGING, PAPER)
+        )
         assert lagging == ideal
     assert limit_cycles(LAGGING) == limit_cycles(PAPER)
 
