@@ -156,6 +156,28 @@ def test_a_curve_in_a_bag_that_is_none_makes_no_drive(tmp_path: Path) -> None:
         assert recorded_drive(tmp_path / f"bag_{number}") is None
 
 
+def test_no_sample_counts_as_recorded_before_the_parameters_are(
+    graph: Graph, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A run that is over in an instant ends once its last sample is recorded."""
+    monkeypatch.setattr("stickslip_ros.nodes.analyzer.ANSWER_TIME", PATIENCE)
+    answered: list[bool] = []
+
+    def note(_: object) -> None:
+        answered.append(analyzer._parameter_calls["plant"].answer is not None)
+
+    graph.subscribe(RECORDED, note)
+    graph.add(PlantNode, autostart=False)
+    states = graph.publisher(JOINT_STATES)
+    analyzer = graph.add(AnalyzerNode, bag=str(tmp_path / "bag"), autostart=False)
+    analyzer.trigger_configure()
+    analyzer.trigger_activate()
+    graph.wait_until(lambda: states.get_subscription_count() > 0, "analyzer listens")
+    states.publish(pack_joint_state(1_000_000_000, (0.0, 0.0), (0.0, 0.4), (0.0, 0.0)))
+    graph.wait_until(lambda: answered, "the sample is recorded")
+    assert answered[0]
+
+
 def test_a_timer_that_is_due_when_it_stops_does_nothing(graph: Graph) -> None:
     analyzer = graph.add(AnalyzerNode, autostart=False)
     analyzer.trigger_configure()
