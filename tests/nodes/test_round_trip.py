@@ -29,7 +29,8 @@ def test_what_is_replayed_and_recorded_again_is_the_same(graph: Graph, tmp_path:
     truth = {"actuator.time_constant": 0.05, "publish_truth": True}
     record_run(first, belt_speed=0.45, duration=30.0, **step, **encoder, **truth)
 
-    # The nodes that are replayed tell no parameters: the noise is found from the samples.
+    # The nodes that are replayed tell no parameters: the noise is found from the samples. Nor do
+    # they tell their timing.
     graph.add(AnalyzerNode, bag=str(second))
     play(graph, first)
     graph.deactivate("analyzer")
@@ -40,7 +41,8 @@ def test_what_is_replayed_and_recorded_again_is_the_same(graph: Graph, tmp_path:
     assert messages["/test/true_joint_states"] != messages["/test/joint_states"]
     assert len(messages["/test/applied_disturbance"]) > 0
     assert messages_of(second) == messages
-    assert report_of_recording(second) == report_of_recording(first)
+    told = {"late_forces": 0, "missed_deadlines": 0, "in_time": True}
+    assert report_of_recording(first) == report_of_recording(second) | told
 
 
 def check_against_the_reference(report: dict[str, Any]) -> None:
