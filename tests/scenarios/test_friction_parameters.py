@@ -61,7 +61,13 @@ def test_a_refusal_names_the_parameter() -> None:
         ("reverse.minimum", 0.45, "reverse.minimum = 0.45 must not exceed friction.static = 0.4"),
         ("reverse.static", -0.2, f"reverse.static = -0.2 {finite} 0, or nan (as forward)"),
         ("reverse.static", inf, f"reverse.static = inf {finite} 0, or nan (as forward)"),
-        ("exponent", 0.5, f"exponent = 0.5 {finite} 1"),
+        ("exponent", 101, f"exponent = 101 {finite} 1 and at most 100"),
+        ("break_away", 1.0, f"break_away = 1.0 {finite} 0 and below 1"),
+        (
+            "reverse.break_away",
+            1.0,
+            f"reverse.break_away = 1.0 {finite} 0 and below 1, or nan (as forward)",
+        ),
     ):
         with pytest.raises(InvalidInputError) as caught:
             PlantParameters().changed({f"friction.{name}": value}, "test")

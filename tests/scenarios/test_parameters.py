@@ -69,18 +69,11 @@ def test_no_node_is_waited_for_that_cannot_be() -> None:
             PlantParameters().changed({"wait_for": ["plant", name]}, "test")
 
 
-LIMITED = {"break_away": 0.5, "elements": 3, "exponent": 2.0, "difference_samples": 3}
-"""Values of the parameters, of both directions, that have an upper limit below what is drawn."""
-
-
 @st.composite
 def values_of(draw: st.DrawFn, model: NodeParameters) -> dict[str, Any]:
     """Values for some of the parameters, within all bounds."""
-    numbers = st.floats(1e-3, 1e3)
     strategies: dict[type, st.SearchStrategy[Any]] = {
         bool: st.booleans(),
-        int: st.integers(200, 4_000),
-        float: numbers | st.integers(1, 1000),
         str: st.text(),
         list: st.lists(st.from_regex("/?([A-Z]+/)?[a-z_][a-z0-9_]*", fullmatch=True)),
     }
@@ -88,6 +81,14 @@ def values_of(draw: st.DrawFn, model: NodeParameters) -> dict[str, Any]:
     values: dict[str, Any] = {}
     for name in sorted(draw(st.sets(st.sampled_from(sorted(parameters))))):
         kind, choices = parameters[name].kind, parameters[name].choices
+        least, largest = parameters[name].least or 0, parameters[name].largest or inf
+        if kind is int:
+            strategies[int] = st.integers(int(least), int(min(largest, 4_000)))
+        elif kind is float:
+            end = min(largest, 1e3)
+            strategies[float] = st.floats(max(least, 1e-3), end)
+            if end >= 1.0:
+                strategies[float] |= st.integers(1, int(end))
         values[name] = draw(st.sampled_from(choices) if choices else strategies[kind])
     if any(name.endswith((".static", ".minimum", ".kinetic")) for name in values):
         # The largest of the coefficients.
@@ -95,8 +96,6 @@ def values_of(draw: st.DrawFn, model: NodeParameters) -> dict[str, Any]:
     assume(values.get("friction.law") not in ("table", "rate_state"))  # a file; ratios of constants
     values.pop("friction.curve", None)
     values.pop("sensor.velocity", None)  # a difference has no noise of its own
-    for name in values:
-        values[name] = LIMITED.get(name.rpartition(".")[2], values[name])
     for part in ("belt", "load", "disturbance"):
         values.pop(f"{part}.kind", None)  # it makes demands on the others
     if values.keys() & {"mass", "stiffness", "rate"}:

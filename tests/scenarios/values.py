@@ -13,7 +13,7 @@ MODELS = {**NODE_PARAMETERS, "replay": ReplayParameters()}
 OF_EVERY_TYPE: list[Any] = [None, True, 7, 0.5, "no such word", [True], [7], [0.5], [b"\1"]]
 """One value of each type that ROS knows, a list of strings excepted."""
 
-EXTREMES = [0.0, -0.0, 5e-324, -5e-324, 1e-310, 1e-30, -1.0, 200.0]
+EXTREMES = [0.0, -0.0, 5e-324, -5e-324, 1e-310, 1e-30, -1.0, 100.0, 200.0]
 EXTREMES += [1e30, 1.1e30, -1e308, 1e308, inf, -inf]
 
 UNKNOWN: dict[str, Any] = {
@@ -80,6 +80,9 @@ def _allowed(parameter: Parameter, value: float) -> bool:
     if abs(value) == inf and parameter.finite:
         return False
     limits = {
-        words: float(limit) for words, limit in re.findall(r"(at \w+) (\S+)", parameter.limits)
+        words: float(limit)
+        for words, limit in re.findall(r"(at \w+|below) (\S+)", parameter.limits)
     }
+    if value >= limits.get("below", nan):
+        return False
     return limits.get("at least", -inf) <= value <= limits.get("at most", inf)

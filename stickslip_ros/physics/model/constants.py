@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from enum import StrEnum
 from functools import cache
-from math import ceil, inf, isinf, isnan
+from math import ceil, inf, isinf, isnan, nextafter
 from typing import Any, TypeVar
 
 _Part = TypeVar("_Part")
@@ -57,6 +57,8 @@ class Parameter:
     """Smallest allowed value."""
     at_most: float = inf
     """Largest allowed value."""
+    below: float = inf
+    """Value that it must be below."""
     positive: bool = False
     """Whether the value must be above zero."""
     whole: bool = False
@@ -97,9 +99,10 @@ class Parameter:
     @property
     def largest(self) -> float | None:
         """Largest value of a number, if it has one."""
-        if self.at_most == inf:
+        largest = min(self.at_most, nextafter(self.below, -inf) if self.below < inf else inf)
+        if largest == inf:
             return LARGEST if self.kind is float and self.finite else None
-        return self.at_most
+        return largest
 
     @property
     def bounds(self) -> str:
@@ -114,9 +117,11 @@ class Parameter:
     @property
     def range(self) -> tuple[float, float] | None:
         """Smallest and largest value, if the parameter has both and at least one is its own."""
-        ends = tuple(self._limits.values())
+        least, largest = self.least, self.largest
         # nan is in no range.
-        return ends if self._stated and len(ends) == 2 and not self.unset else None
+        if not self._stated or least is None or largest is None or self.unset:
+            return None
+        return least, largest
 
     def is_default(self, value: Any) -> bool:
         """Return whether a value is the default; nan is nan.
@@ -166,7 +171,8 @@ class Parameter:
 
     @property
     def _limits(self) -> dict[str, float]:
-        limits = {"at least": self.least, "at most": self.largest}
+        upper = {"below": self.below} if self.below < inf else {"at most": self.largest}
+        limits = {"at least": self.least, **upper}
         return {word: limit for word, limit in limits.items() if limit is not None}
 
     @property
@@ -191,6 +197,7 @@ def constant(
     *,
     at_least: float = -inf,
     at_most: float = inf,
+    below: float = inf,
     positive: bool = False,
     whole: bool = False,
     simplifies: bool = False,
@@ -213,6 +220,8 @@ def constant(
         By default the constant is a pure number.
     at_least, at_most : float, optional
         Smallest and largest allowed value.
+    below : float, optional
+        Value that it must be below.
     positive : bool, optional
         Whether the value must be above zero.
     whole : bool, optional
@@ -265,6 +274,7 @@ def constant(
         unit=unit,
         at_least=at_least,
         at_most=at_most,
+        below=below,
         positive=positive,
         whole=whole,
         simplifies=simplifies,

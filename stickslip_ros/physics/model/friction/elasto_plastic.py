@@ -44,6 +44,7 @@ class ElastoPlastic(LuGre):
         0.7,
         "Deflection up to which the contact is elastic, as a share of the smallest steady one.",
         at_least=0.0,
+        below=1.0,
     )
 
     def memory_rates(
@@ -127,9 +128,3 @@ class ElastoPlastic(LuGre):
     def warning(self) -> str | None:
         """Say nothing: the condition of LuGre is not one of this law."""
         return None
-
-    def refusal(self) -> str | None:
-        """Refuse a break-away of one or more; see `SteadyFriction.refusal`."""
-        if self.break_away >= 1.0:
-            return f"break_away = {self.break_away} must be below 1"
-        return super().refusal()

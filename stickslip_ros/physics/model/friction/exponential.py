@@ -9,8 +9,6 @@ from stickslip_ros.physics.model.constants import constant
 from stickslip_ros.physics.model.friction.base import FrictionLaw
 from stickslip_ros.physics.model.functions import exp, power
 
-_LARGEST_EXPONENT = 100
-
 
 @dataclass(frozen=True)
 class Exponential(FrictionLaw):
@@ -35,7 +33,11 @@ class Exponential(FrictionLaw):
     )
     viscous: Any = constant(0.0, "Increase of the coefficient with speed.", "s/m")
     exponent: Any = constant(
-        1.0, "Exponent n of the decay from mu_s to mu_k.", at_least=1.0, simplifies=True
+        1.0,
+        "Exponent n of the decay from mu_s to mu_k.",
+        at_least=1.0,
+        at_most=100.0,  # more is nearly a step
+        simplifies=True,
     )
 
     @property
@@ -59,7 +61,5 @@ class Exponential(FrictionLaw):
         return (self.kinetic, self.static) if self.viscous == 0.0 else super().size_range
 
     def refusal(self) -> str | None:
-        """Refuse a kinetic coefficient above the static one, and a drop that is nearly a step."""
-        if self.exponent > _LARGEST_EXPONENT:
-            return f"exponent = {self.exponent} must not exceed {_LARGEST_EXPONENT}"
+        """Refuse a kinetic coefficient above the static one; see `SteadyFriction.refusal`."""
         return self.above_static("kinetic")

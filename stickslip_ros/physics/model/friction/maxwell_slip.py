@@ -8,7 +8,6 @@ from typing import Any, ClassVar
 from stickslip_ros.physics.model.constants import constant
 from stickslip_ros.physics.model.friction.lugre import CurveFollower
 
-_MOST_ELEMENTS = 20
 _AT_LIMIT = 1.0 - 2.0**-40
 """Share of its limit from which an element slips at the start of a mode, as in steady slip."""
 
@@ -37,7 +36,9 @@ class MaxwellSlip(CurveFollower):
     name: ClassVar[str] = "maxwell_slip"
     states: ClassVar[Mapping[str, str | None]] = {"z1": "m", "z2": "m", "z3": "m", "z4": "m"}
 
-    elements: Any = constant(4, "Number n of elements of the contact.", at_least=1, whole=True)
+    elements: Any = constant(
+        4, "Number n of elements of the contact.", at_least=1, at_most=20, whole=True
+    )
     attraction: Any = constant(
         100.0, "Rate C at which the elements approach steady slip.", "1/s", positive=True
     )
@@ -138,12 +139,6 @@ class MaxwellSlip(CurveFollower):
             start = z + sign * path
             after.append(limit + (start - limit) * exp(-self.attraction * slipping / size))
         return after
-
-    def refusal(self) -> str | None:
-        """Refuse too many elements; see `SteadyFriction.refusal`."""
-        if self.elements > _MOST_ELEMENTS:
-            return f"elements = {self.elements} must not exceed {_MOST_ELEMENTS}"
-        return super().refusal()
 
     def _forces(self, memory: Sequence[Any]) -> Sequence[Any]:
         """Return the force of each element in shares of its weight."""
