@@ -12,11 +12,3 @@ def test_html_holds_the_cells_whatever_is_in_them() -> None:
     assert [cell.text for cell in root.iter("th")] == [None, "<script>"]
     rows = [[cell.text for cell in row] for row in root.findall("tbody/tr")]
     assert rows == [["x & y", "1 µm"], ["机床", "\\n"]]
-
-
-def test_without_headings_there_is_no_row_of_them() -> None:
-    table = TextTable("", ["", ""], [["a", "b"]])
-    assert "<th" not in table.html()
-    assert "<caption" not in table.html()
-    for _ in range(2):
-        assert table.lines() == ["a  b"]

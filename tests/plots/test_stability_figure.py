@@ -42,14 +42,6 @@ def test_the_map_is_around_the_gains() -> None:
     assert found.decay_rates[row, column] == pytest.approx(rate)
 
 
-def test_decay_rates_change_sign_at_the_critical_gain() -> None:
-    found = map_of()
-    for row, corner_frequency in enumerate(found.corner_frequencies):
-        (interval,) = found.loop.stable_linear_gains(float(corner_frequency))
-        inside = (found.linear_gains > interval.low) & (found.linear_gains < interval.high)
-        assert np.array_equal(found.decay_rates[row] > 0.0, inside)
-
-
 def test_the_continuous_loop_has_its_closed_form() -> None:
     found = map_of()
     cubic = CubicLoop.from_drive(PAPER)

@@ -116,21 +116,6 @@ def test_a_law_of_another_package_is_found_with_its_constants(install: Install) 
         assert str(refused.value).startswith(f"test: friction.{reason}")
 
 
-def test_a_constant_of_several_laws_names_them_all(install: Install) -> None:
-    shared = 'kinetic: Any = constant(0.25, "Level.", at_least=0.0)\n    viscous: Any = constant('
-    install(
-        FALLING.replace("fall: Any = constant(", shared)
-        .replace("0.2,", "0.0,", 1)
-        .replace(', "s/m", at_least=0.0)', ', "s/m")')
-        .replace("self.fall", "self.viscous")
-    )
-    assert FRICTION_LAWS.refused == {}
-    known = {each.name: each for each in parameters_anew().PlantParameters().known.values()}
-    assert known["friction.kinetic"].meaning == (
-        "Kinetic coefficient mu_k (exponential, rate_state, falling)."
-    )
-
-
 CONSTANT = '    fall: Any = constant(0.2, "Decrease with speed", "s/m", at_least=0.0)'
 TERMS = '    terms: Any = constant(2, "Number of terms.", at_least=1, whole=True)'
 FALLS = '    fall: Any = constant((0.2, 0.1), "Decreases with speed.", "s/m")'
@@ -393,8 +378,6 @@ STRENGTH = '    strength: Any = constant(1.0, "Force per velocity", "N s/m", at_
     ("old", "new", "reason"),
     [
         ("(ControlLaw)", "(object)", "is no class derived from ControlLaw"),
-        ("def respond", "def reply", "does not define respond"),
-        ("constant(1.0", "constant(-1.0", "has the default -1.0 for its constant strength: must"),
         *(
             (
                 STRENGTH,

@@ -84,15 +84,6 @@ def test_a_bad_force_is_dropped(realtime: bool, stamp: int, force: float, verdic
     assert loop.acting == 0.75
 
 
-@paces
-def test_the_present_sample_is_answered_once(realtime: bool) -> None:
-    loop = Loop(realtime)
-    assert loop.answer(0, 0.5) is Verdict.ACCEPTED
-    assert loop.answer(0, 0.75) is Verdict.ANSWERED
-    loop.advance()
-    assert loop.acting == 0.5
-
-
 def test_lockstep_takes_no_answer_to_a_sample_that_has_passed() -> None:
     loop = Loop()
     loop.advance_by(2)
@@ -210,15 +201,6 @@ def test_nothing_is_late_where_no_control_is_expected(realtime: bool) -> None:
     assert loop.acting == 0.5
     assert not loop.controller_present
     loop.advance()
-    assert loop.late_forces == 0
-
-
-@pytest.mark.parametrize("rate", [3.0, 30.0])
-def test_answers_find_their_samples_where_stamps_are_rounded(rate: float) -> None:
-    loop = SampledLoop(Motion(PAPER, 0.0, 0.0), rate, SECOND)
-    for _ in range(100):
-        assert loop.offer(loop.sample.stamp, 0.1) is Verdict.ACCEPTED
-        loop.advance()
     assert loop.late_forces == 0
 
 

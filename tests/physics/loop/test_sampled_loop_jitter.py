@@ -191,18 +191,3 @@ def test_a_small_jitter_leaves_the_washout_stable_and_a_large_one_does_not() -> 
     assert controlled(0.008, 0.05).regime is Regime.STICK_SLIP
     # Forces that overtake keep the acting one young: twice the critical delay does no harm.
     assert controlled(0.0, 0.02).regime is Regime.EQUILIBRIUM
-
-
-@given(thousandths, thousandths, seeds)
-def test_the_motion_is_that_of_a_force_that_is_switched_at_those_instants(
-    delay: int, jitter: int, seed: int
-) -> None:
-    motion = advanced(delay / 1000, jitter / 1000, seed)
-    position, velocity = motion.position, motion.velocity
-    switches = [(0.0, NONE), *expected(delay / 1000, jitter / 1000, seed), (SAMPLES, NONE)]
-    MOTION.begin()
-    for (begin, number), (end, _) in pairwise(switches):
-        MOTION.force = (number + 1) * UNIT
-        MOTION.advance((end - begin) / 10.0)
-    assert position == pytest.approx(MOTION.position, abs=1e-9)
-    assert velocity == pytest.approx(MOTION.velocity, abs=1e-9)

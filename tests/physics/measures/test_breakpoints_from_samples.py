@@ -48,14 +48,6 @@ def test_samples_on_the_belt_stick() -> None:
     assert left == pytest.approx(3.0)
 
 
-def test_a_pair_of_equal_stamps_does_no_harm() -> None:
-    time = np.array([0.0, 1.0, 1.0, 2.0])
-    breakpoints = breakpoints_from_samples(time, np.sin(time), np.cos(time), np.full(4, 2.0))
-    assert np.isfinite(breakpoints.time).all()
-    assert np.isfinite(breakpoints.position).all()
-    assert np.isfinite(breakpoints.velocity).all()
-
-
 BELT_SPEED = 0.5
 PERIOD = 1.0
 SLIP_TIME = 0.6

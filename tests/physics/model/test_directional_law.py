@@ -132,22 +132,6 @@ def test_a_belt_that_moves_forward_has_the_law_of_backward_slip() -> None:
         np.testing.assert_allclose(own.equilibrium, other.equilibrium, rtol=1e-14)
 
 
-def held_until(drive: Drive, force: float) -> bool:
-    """Whether a slide on a belt at rest is still there after a while."""
-    motion = Motion(replace(drive, belt_speed=0.0), 0.0, 0.0)
-    motion.force = force
-    motion.advance(1.0)
-    return motion.position == 0.0
-
-
-def test_a_slide_breaks_loose_at_the_limit_of_its_direction() -> None:
-    drive = replace(PAPER, friction=Directional(Coulomb(0.4), Coulomb(0.3)))
-    assert held_until(drive, 0.4 - 1e-9)
-    assert not held_until(drive, 0.4 + 1e-9)
-    assert held_until(drive, -0.3 + 1e-9)
-    assert not held_until(drive, -0.3 - 1e-9)
-
-
 MEMORIES: Sequence[tuple[FrictionLaw, Any]] = [
     (Dahl(0.4, 20.0), Dahl(0.3, 20.0)),
     (Iwan(0.4, 5.0), Iwan(0.3, 5.0)),

@@ -93,14 +93,6 @@ def test_a_scaled_table_has_scaled_speeds() -> None:
             "point 2 of the table: the speed must be finite and above the one before",
         ),
         (
-            ((0.0, 0.4), (nan, 0.3)),
-            "point 2 of the table: the speed must be finite and above the one before",
-        ),
-        (
-            ((0.0, -0.1),),
-            "point 1 of the table: the coefficient must be a finite number at least 0",
-        ),
-        (
             ((0.0, 0.4), (0.1, nan)),
             "point 2 of the table: the coefficient must be a finite number at least 0",
         ),

@@ -231,14 +231,20 @@ def random_units(draw: Random) -> Units:
     return Units(*(float(10.0 ** draw.uniform(*ends)) for ends in ((-2, 3), (-1, 3), (-2, 4))))
 
 
-def random_drive(
-    seed: int, law: str, *, directional: bool, belt: str = "none", load: str = "none",
-    force: str = "none",
-) -> RandomDrive:  # fmt: skip
-    """Return a drive with a law, by direction or not, and signals of these kinds."""
-    names = ("none", *KINDS)
+def drive_of_place(seed: int, law: str, kind: str, place: str) -> RandomDrive:
+    """Return a drive with a signal of a kind in a place; every other one has a law by direction."""
+    number, names = KINDS.index(kind), ("none", *KINDS)
+    kinds = {"belt": "none", "load": "none", "force": "none"}
+    if place == "together":
+        others = (number + 1 + seed) % len(KINDS), (number + 2 + 2 * seed) % len(KINDS)
+        chosen = [kind, *(KINDS[each] for each in others)]
+        kinds = dict(zip(np.roll([*kinds], seed).tolist(), chosen, strict=True))
+    else:
+        kinds["force" if place == "disturbance" else place] = kind
+    belt, load, force = kinds["belt"], kinds["load"], kinds["force"]
+    directional = seed % 2 == 1
     draw = np.random.default_rng(
-        [seed, LAWS.index(law), directional, *(names.index(kind) for kind in (belt, load, force))]
+        [seed, LAWS.index(law), directional, *(names.index(each) for each in (belt, load, force))]
     )
     units = random_units(draw)
     normal, length, speed = units.normal, units.length, units.speed
@@ -268,18 +274,6 @@ def random_drive(
         float(draw.choice([0.0, draw.uniform(-1.0, 1.0)]) * length),
         float(velocity),
     )
-
-
-def drive_of_place(seed: int, law: str, kind: str, place: str) -> RandomDrive:
-    """Return a drive with a signal of a kind in a place; every other one has a law by direction."""
-    number = KINDS.index(kind)
-    others = [KINDS[(number + 1 + seed) % len(KINDS)], KINDS[(number + 2 + 2 * seed) % len(KINDS)]]
-    parts = ("belt", "load", "force")
-    if place == "together":
-        chosen = dict(zip(np.roll(parts, seed).tolist(), [kind, *others], strict=True))
-    else:
-        chosen = {"force" if place == "disturbance" else place: kind}
-    return random_drive(seed, law, directional=seed % 2 == 1, **chosen)
 
 
 SHORTEST = 1e-5

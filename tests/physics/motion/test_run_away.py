@@ -38,14 +38,6 @@ def test_it_is_found_to_run_away_at_a_thousand_times_the_speed_scale(unit: float
     assert motion.position == stopped_at
 
 
-def test_the_same_slope_is_harmless_below_the_damping() -> None:
-    motion = Motion(replace(STEEP, friction=Linear(static=0.4, slope=0.01)), 0.0, 0.0)
-    motion.advance(3000.0)
-    assert not motion.unbounded
-    # Equilibrium where the spring carries the friction, 0.4 - 0.01 0.2.
-    assert motion.position == pytest.approx(0.398, rel=1e-6)
-
-
 def test_a_restart_forgets_it() -> None:
     motion = Motion(STEEP, 0.0, 0.0)
     motion.advance(60.0)

@@ -96,16 +96,6 @@ def test_a_short_hop_off_the_belt_ends_where_it_lands() -> None:
     assert motion.position == pytest.approx(0.8 + (0.2 - hop), rel=1e-12)
 
 
-@pytest.mark.parametrize("position", [0.4, 0.3999, 0.0, -0.4])
-def test_on_a_belt_at_rest_it_stays_stuck_within_the_limit(position: float) -> None:
-    motion = Motion(replace(PAPER, belt_speed=0.0), position, 0.0)
-    motion.advance(1000.0)
-    assert motion.sticking
-    assert motion.position == pytest.approx(position, rel=1e-14)
-    assert motion.velocity == 0.0
-    assert motion.friction_force == pytest.approx(position, rel=1e-14)
-
-
 @pytest.mark.parametrize(("start", "end"), [(1.5, -0.1), (-1.5, 0.1), (0.5, 0.3), (2.05, 0.35)])
 def test_on_a_belt_at_rest_coulomb_friction_takes_the_same_from_every_swing(
     start: float, end: float

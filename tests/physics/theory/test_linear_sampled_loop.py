@@ -192,16 +192,6 @@ def test_units_do_not_matter() -> None:
     assert paper.settling_time(Washout(0.2, -0.1, 0.0)) is None
 
 
-def test_a_map_has_the_decay_rate_of_each_pair() -> None:
-    loop = loop_of(PAPER, 10.0, 0.25)
-    corners, gains = np.array([0.1, 0.3]), np.array([-1.0, -0.4, 0.2])
-    rates = loop.decay_rates(corners, gains)
-    for row, corner in enumerate(corners):
-        for column, gain in enumerate(gains):
-            expected = loop.decay_rate(Washout(corner, gain, 0.0))
-            assert rates[row, column] == pytest.approx(expected, rel=1e-12)
-
-
 @pytest.mark.parametrize("force_delay", [0.5, 1.0, 2.0])
 def test_a_coarser_loop_decays_nearly_alike(force_delay: float) -> None:
     loop = loop_of(PAPER, 100.0, force_delay)
