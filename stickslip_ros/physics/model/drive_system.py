@@ -148,7 +148,8 @@ class DriveSystem(HybridSystem):
         # Whether the normal force may fall below zero: then a guard ends the motion.
         self._may_lift = 1.0 + self.drive.load.bounds[0] < -_LIFT_ROUNDING
         has_bias = self.drive.bias_force != 0.0
-        self._steady = not self.drive.belt.pieces
+        self._steady, self._loaded = not self.drive.belt.pieces, bool(self.drive.load.pieces)
+        self._reaction = partial(equations.reaction, self.drive)
         self._limits_by_series = law.characteristic_speed != inf and not law.sticks
         self._frequency, self._stiffness = drive.angular_frequency, self.drive.stiffness
         if isinstance(drive, ScaledDrive):
@@ -194,7 +195,7 @@ class DriveSystem(HybridSystem):
     @cached_property
     def autonomous(self) -> bool:
         """Whether belt speed and load are constant."""
-        return self._steady and not self.drive.load.pieces
+        return self._steady and not self._loaded
 
     def flow(self, name: str) -> Flow:
         """Return the flow `SLIP` or `STICK`.
@@ -409,10 +410,12 @@ class DriveSystem(HybridSystem):
         if sign != 0.0 and y != belt_speed:
             return
         if self.sticks:
-            held, force = self.held_force(mode, instant), self.control_force(instant)
+            force = self.control_force(instant)
+            held = self._reaction(x, y, force) if self._steady else self.held_force(mode, instant)
             backward = sign < 0.0 or (sign == 0.0 and held > 0.0)
             limit = self.backward_limit if backward else self.forward_limit
-            limit *= self.normal_force(mode, instant.time)
+            if self._loaded:
+                limit *= self.normal_force(mode, instant.time)
             # Without a spring no displacement changes the reaction.
             margin = self._stiffness * 8.0 * ulp(abs(x) + abs(held) + abs(force) + limit)
             if sign == 0.0:
@@ -475,8 +478,8 @@ class DriveSystem(HybridSystem):
 
     def reaction(self, instant: Instant) -> float:
         """Return h = X + 2 beta X' - U - bias."""
-        state, force = instant.state, self.control_force(instant)
-        return equations.reaction(self.drive, state[POSITION], state[SPEED], force)
+        state = instant.state
+        return self._reaction(state[POSITION], state[SPEED], self.control_force(instant))
 
     def held_force(self, mode: Mode, instant: Instant) -> float:
         """Return the friction force that a slide needs to move with the belt."""

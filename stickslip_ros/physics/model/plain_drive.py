@@ -1,9 +1,5 @@
 """The drive of most motions: a static law, constant belt speed and load, no actuator states."""
 
-from functools import partial
-from math import copysign, ulp
-
-from stickslip_ros.physics.model import equations
 from stickslip_ros.physics.model.control import ContinuousControl
 from stickslip_ros.physics.model.creeping_drive import CreepingDrive
 from stickslip_ros.physics.model.drive import Drive, ScaledDrive
@@ -28,10 +24,7 @@ class PlainDriveSystem(DriveSystem):
 
     def __init__(self, drive: Drive, control: ContinuousControl | None = None) -> None:
         super().__init__(drive, control)
-        self._reaction = partial(equations.reaction, self.drive)
         self._speed = self.drive.belt_speed
-        # The speed relative to the belt with which a slide starts to slip.
-        self._least_speed = max(ulp(self._speed), ulp(1.0))
         self._coefficient = self.drive.friction.coefficient
         # Whether the belt bends the spring; without one a held force never releases the slide.
         self._loads = self._speed != 0.0 and self.drive.has_spring
@@ -78,27 +71,6 @@ class PlainDriveSystem(DriveSystem):
 
     def _slip(self, mode: Mode, sign: float, instant: Instant) -> Mode:
         return _FORWARD if sign > 0.0 else _BACKWARD
-
-    def nudge_off_guard(self, mode: Mode, instant: Instant) -> None:
-        """Move a slide that starts to slip, or sticks near its limit, by rounding errors."""
-        state, sign = instant.state, mode.switches[0]
-        y = state[SPEED]
-        if sign != 0.0 and y != self._speed:
-            return
-        x = state[POSITION]
-        force = instant.inputs[0] if self.control is None else self.control_force(instant)
-        held = self._reaction(x, y, force)
-        backward = sign < 0.0 or (sign == 0.0 and held > 0.0)
-        limit = self.backward_limit if backward else self.forward_limit
-        # Without a spring no displacement changes the reaction.
-        margin = self._stiffness * 8.0 * ulp(abs(x) + abs(held) + abs(force) + limit)
-        if sign == 0.0:
-            if abs(held) > limit - margin:
-                state[POSITION] = x - copysign(margin, held)
-            return
-        if abs(held) < limit + margin:
-            state[POSITION] = x - sign * margin
-        state[SPEED] = y + sign * self._least_speed
 
     def has_closed_form(self, mode: Mode) -> bool:
         """Return whether the slide moves in a straight line: it sticks under a held force."""
