@@ -16,6 +16,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> None:
     """Run the command."""
-    from stickslip_ros.scenarios.schema import scenario_schema
+    from stickslip_ros.scenarios.template import scenario_schema
 
     print(json.dumps(finite(scenario_schema()), indent=2))

@@ -23,8 +23,9 @@ from stickslip_ros.scenarios.foreign_laws import (
     FRICTION_LAWS,
     LawFamily,
     add_laws_of_other_packages,
+    try_control_law,
+    try_friction_law,
 )
-from stickslip_ros.scenarios.law_trial import try_control_law, try_friction_law
 from stickslip_ros.scenarios.parameters import NodeParameters
 from tests.scenarios.foreign_laws import BRAKE, FALLING, write_package
 

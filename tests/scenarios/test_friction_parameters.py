@@ -11,8 +11,7 @@ from stickslip_ros.physics.model.constants import constants_of
 from stickslip_ros.physics.model.friction import LAWS, Directional, Exponential, Stribeck, Table
 from stickslip_ros.scenarios.files import load_scenario, parameter_file
 from stickslip_ros.scenarios.parameters import PlantParameters
-from stickslip_ros.scenarios.schema import scenario_schema
-from stickslip_ros.scenarios.template import commented_file
+from stickslip_ros.scenarios.template import commented_file, scenario_schema
 from tests.scenarios.files import plant, refusal, scenario_file, section
 
 CURVE = "0,0.4\n0.1,0.3\n0.5,0.25\n"
