@@ -9,9 +9,6 @@ from matplotlib.figure import Figure
 
 import stickslip_ros as ss
 from stickslip_ros.errors import InvalidInputError, RunError
-from stickslip_ros.physics.loop.controller import answer
-from stickslip_ros.physics.loop.sampled_loop import SampledLoop
-from stickslip_ros.physics.motion.motion import Motion
 from stickslip_ros.studies.simulate import simulate
 
 COLUMNS = [
@@ -51,26 +48,6 @@ def test_twice_the_same_as_without_a_trajectory_and_as_the_command(
     assert {name: printed[name] for name in measures} == measures
 
 
-def test_the_trajectory_is_that_of_the_loop() -> None:
-    drive = ss.scenario("feed_drive", start_after=0.2, force_delay=0.0015, initial_velocity=0.01)
-    plant = drive.plant
-    motion = Motion(plant.as_drive(), 0.0, 0.01)
-    loop: SampledLoop = plant.as_loop(motion)
-    controller = drive.controller.as_controller()
-    rows: list[tuple[float, ...]] = []
-    for _ in range(501):
-        sample = loop.sample
-        force = answer(loop, controller)
-        rows.append((*sample[1:4], force, *sample[4:]))
-        loop.advance()
-    found = ss.simulate(drive, duration=0.5).trajectory
-    assert np.array_equal(found.time, np.arange(501) / 1000.0)
-    columns = np.array(rows).T
-    for name, expected in zip(COLUMNS[1:], columns, strict=True):
-        assert getattr(found, name) == pytest.approx(expected, rel=1e-9, abs=1e-12), name
-    assert np.any(found.control_force)
-
-
 def test_continuous_control_is_sampled_at_the_same_instants() -> None:
     drive = ss.scenario("feed_drive", rate=20000.0, start_after=0.05)
     sampled = ss.simulate(drive, duration=0.3).trajectory
@@ -81,14 +58,6 @@ def test_continuous_control_is_sampled_at_the_same_instants() -> None:
     assert run.trajectory.belt_position == pytest.approx(sampled.belt_position)
     expected = simulate(drive, 0.3, continuous=True)
     assert run.measures.amplitude == pytest.approx(expected.amplitude, rel=1e-9)
-
-
-def test_slow_samples_change_no_measure_but_by_rounding() -> None:
-    drive = ss.scenario("feed_drive", rate=100.0, expects_control=False)
-    run = ss.simulate(drive, duration=3.0)
-    assert run.measures.amplitude == pytest.approx(simulate(drive, 3.0).amplitude, rel=1e-9)
-    assert len(run.trajectory) == 301
-    assert not run.trajectory.control_force.any()
 
 
 def test_a_run_away_ends_the_trajectory() -> None:

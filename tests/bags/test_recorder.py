@@ -436,22 +436,6 @@ def test_on_a_full_disk_no_half_record_is_left(tmp_path):
         assert [each.log_time for each in with_an_end if isinstance(each, Message)] == before
 
 
-@pytest.mark.usefixtures("small_disk")
-def test_a_disk_that_is_full_at_the_end_leaves_what_was_finished_before(tmp_path):
-    recorder = Recorder(tmp_path / "bag", max_bag_size=50_000)
-    channel = add_a(recorder)
-    for stamp in range(3):
-        recorder.write(channel, os.urandom(60_000), stamp)
-        recorder.flush()
-    recorder.write(channel, os.urandom(60_000), 3)
-    with pytest.raises(BagError, match="can no longer be written"):
-        recorder.attach("too much", bytes(100_000), "text/plain")
-    recorder.close()
-    assert information(tmp_path / "bag")["message_count"] == 3
-    assert [stamp for _, stamp, _ in contents(tmp_path / "bag")] == [0, 1, 2]
-    assert not stamps_in(tmp_path / "bag")[1]
-
-
 def test_parents_are_made_and_the_file_is_named_after_the_directory(tmp_path, monkeypatch):
     check_new_bag(tmp_path / "a" / "b" / "bag")
     assert list(tmp_path.iterdir()) == []

@@ -5,14 +5,12 @@ from pathlib import Path
 import pytest
 from std_srvs.srv import Trigger
 
-from stickslip_ros.messages.codec import pack_header, unpack_header
-from stickslip_ros.messages.topics import CLOCK, CONTROL_FORCE, JOINT_STATES, RECORDED
+from stickslip_ros.messages.codec import unpack_header
+from stickslip_ros.messages.topics import CLOCK, CONTROL_FORCE, JOINT_STATES
 from stickslip_ros.nodes import replay
-from stickslip_ros.nodes.analyzer import AnalyzerNode
 from stickslip_ros.nodes.replay import ReplayNode
-from stickslip_ros.nodes.washout_controller import WashoutControllerNode
 from tests.nodes.graph import Graph
-from tests.nodes.runs import FORCES, STATES, messages_of, record_run, record_states
+from tests.nodes.runs import FORCES, STATES, messages_of, record_states
 
 SECOND = 1_000_000_000
 FAST = 1e6
@@ -56,19 +54,6 @@ def test_a_reader_that_comes_late_gets_the_first_message(
     assert heard == payloads(bag)[FORCES]
 
 
-def test_it_waits_for_the_nodes_named(
-    graph: Graph, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(replay, "_SILENCE", 0.0)
-    heard = graph.listen(JOINT_STATES, raw=True)
-    bag = record_states(tmp_path / "bag", 10)
-    node = graph.add(ReplayNode, bag=bag, rate=FAST, wait_for=["analyzer"])
-    graph.wait_until(lambda: "analyzer" in node.diagnose()[1], "the node says what it lacks")
-    assert heard == []
-    graph.add(AnalyzerNode)
-    graph.wait_until(lambda: len(heard) == 10, "all is heard")
-
-
 def test_paused_it_is_silent_until_it_is_resumed(graph: Graph, tmp_path: Path) -> None:
     def ask(service: str) -> Trigger.Response:
         return graph.call(Trigger, f"/test/replay/{service}", Trigger.Request())
@@ -107,19 +92,3 @@ def test_part_and_topics_are_chosen_and_the_clock_shows_recorded_time(
     assert node.diagnose()[2]["position"] == pytest.approx(1.49)
     graph.wait_until(lambda: len(clock) == 50, "a time for each message")
     assert [m.clock.sec * SECOND + m.clock.nanosec for m in clock] == stamps(states)
-
-
-def test_a_controller_answers_a_recorded_state_with_the_recorded_forces(
-    graph: Graph, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Bit for bit, if it misses no state: here the replay waits for it as for a recorder."""
-    monkeypatch.setattr(replay, "_FLOW_WINDOW", 1)
-    record_run(tmp_path / "run", belt_speed=0.45, duration=3.0)
-    forces = graph.listen(CONTROL_FORCE, raw=True)
-    recorder = graph.publisher(RECORDED)
-    graph.subscribe(CONTROL_FORCE, lambda m: recorder.publish(pack_header(unpack_header(m))))
-    graph.add(WashoutControllerNode, wait_for=["observer"])
-    parameters = {"topics": [STATES], "wait_for": ["washout_controller"], "rate": FAST}
-    graph.add(ReplayNode, bag=str(tmp_path / "run"), **parameters)
-    graph.wait_until(lambda: len(forces) == 301, "every state is answered")
-    assert forces == payloads(tmp_path / "run")[FORCES]

@@ -153,36 +153,3 @@ class Switching(ControlLaw):
         self, state: tuple[float, ...], elapsed: float, sample: Sample, reference: Reference
     ) -> tuple[float, tuple[float, ...]]:
         return -float(np.sign(sample.velocity)) * self.size, state
-
-
-@dataclass(frozen=True)
-class Pid:
-    """Controller of position, its integral and velocity, around 1, for a drive in units of one."""
-
-    states: ClassVar[Sequence[str]] = ("integral",)
-    proportional: Any
-    integral: Any
-    derivative: Any
-
-    def scaled(self, drive: Drive) -> "Pid":
-        assert (drive.mass, drive.normal_force, drive.stiffness) == (1.0, 1.0, 0.0)
-        return self
-
-    def silenced(self) -> "Pid":
-        return Pid(0.0, 0.0, 0.0)
-
-    def rest(self, position: Any, speed: Any) -> Sequence[Any]:
-        return (0.0 * position,)
-
-    def state_rates(self, position: Any, speed: Any, states: Sequence[Any]) -> Sequence[Any]:
-        return (position - 1.0,)
-
-    def control_force(self, position: Any, speed: Any, states: Sequence[Any]) -> Any:
-        proportional = self.proportional * (position - 1.0)
-        return -(proportional + self.integral * states[0] + self.derivative * speed)
-
-    def state_scales(self, drive: Drive) -> Sequence[float]:
-        return (1.0,)
-
-    def bound(self, speed: Any) -> Any:
-        return np.full(np.shape(speed), np.inf)

@@ -145,14 +145,6 @@ def test_blocks_of_any_length_give_the_same_trend(starts: list[int]) -> None:
     assert whole.rate() == pytest.approx(0.1, rel=0.05)
 
 
-@pytest.mark.parametrize("period", [0.02, 0.0639, 0.128, 0.5])
-def test_a_vibration_has_no_trend(period: float) -> None:
-    meter = TrendMeter()
-    vibration = 1.0 + np.sin(2.0 * np.pi * TIME / period)
-    meter.feed(TIME, vibration)
-    assert meter.rate(4.0 * period) is None
-
-
 @pytest.mark.parametrize("period", [0.0635, 0.0639, 0.0645])
 def test_a_force_whose_parts_are_nearly_whole_cycles_has_no_trend(period: float) -> None:
     """Parts of 64 ms: plain means of them have a beat of seconds."""

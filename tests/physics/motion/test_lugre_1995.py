@@ -7,13 +7,10 @@ import pytest
 
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import Exponential, LuGre
-from stickslip_ros.physics.motion import Motion, RecordedMotion
+from stickslip_ros.physics.motion import RecordedMotion
 from tests.physics.motion.memory_reference import Law, MemoryDrive
-from tests.physics.parts import Pid
 
 LAW = LuGre(Exponential(1.5, 1.0, 1e-3, 0.4, 2.0), 1e5, sqrt(1e5))
-FREE = Drive(1.0, 0.0, 0.0, 1.0, 0.0, LAW)
-PID = Pid(3.0, 4.0, 6.0)
 
 
 def test_it_is_not_passive() -> None:
@@ -21,34 +18,6 @@ def test_it_is_not_passive() -> None:
     assert LAW.passivity_margin == pytest.approx(0.4 - 158.1, abs=0.02)
     assert "viscous = 0.4 s/m is 157.7 s/m below" in (LAW.warning() or "")
     assert LuGre(LAW.curve, 1e5, 0.7).warning() is None
-
-
-def periods(times: np.ndarray, positions: np.ndarray) -> np.ndarray:
-    """Times between upward crossings of the reference."""
-    upward = np.flatnonzero((positions[1:] > 1.0) & (positions[:-1] <= 1.0))
-    share = (1.0 - positions[upward]) / (positions[upward + 1] - positions[upward])
-    return np.diff(times[upward] + share * (times[upward + 1] - times[upward]))
-
-
-def test_a_pid_controller_hunts_and_sampling_hardly_changes_its_period() -> None:
-    times = np.arange(0.0, 130.0, 0.01)
-    continuous = RecordedMotion(FREE, 0.0, 0.0, PID)
-    exact = [0.0]
-    for _ in times[1:]:
-        continuous.advance(0.01)
-        exact.append(continuous.position)
-    sampled, integral, found = Motion(FREE, 0.0, 0.0), 0.0, [0.0]
-    for _ in times[1:]:
-        for _ in range(10):  # 1 kHz
-            error = sampled.position - 1.0
-            integral += 1e-3 * error
-            sampled.force = -(3.0 * error + 4.0 * integral + 6.0 * sampled.velocity)
-            sampled.advance(1e-3)
-        found.append(sampled.position)
-    hunting, own = periods(times, np.array(exact)), periods(times, np.array(found))
-    assert hunting[-1] == pytest.approx(hunting[-2], rel=1e-3)  # a limit cycle
-    assert own[-1] == pytest.approx(hunting[-1], rel=0.01)
-    assert np.ptp(exact[-3000:]) > 0.1
 
 
 @pytest.mark.long
