@@ -207,7 +207,7 @@ class _RunReader:
                     f"positions, {quantity(noise, 'm')}: some slips are noise",
                 ]
         if self._observer is not None:
-            self._observer.take_conclusions(RunAnalysis(self.meter.motion.mean_cycle, slips))
+            self._observer.take_analysis(RunAnalysis(self.meter.motion.mean_cycle, slips))
         return {**report, "notes": notes, "slips": slips}
 
     def _find_slips(self, part: SampleColumns) -> None:

@@ -1,4 +1,4 @@
-"""The panels of a figure of runs: parts over time, cycles, friction law, and conclusions."""
+"""The panels of a figure of runs: parts over time, cycles, friction law, and analysis."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple, Self
@@ -229,7 +229,7 @@ def _law_between(
         axes.plot([0.0, 0.0], [-forward, backward], **look)
 
 
-def draw_conclusions(
+def draw_analysis(
     figure: Figure,
     part: GridSpec | GridSpecFromSubplotSpec,
     found: RunAnalysis,

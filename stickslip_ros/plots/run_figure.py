@@ -24,7 +24,7 @@ from stickslip_ros.plots.panels import (
     POINT,
     Pane,
     broken,
-    draw_conclusions,
+    draw_analysis,
     draw_cycles,
     draw_law,
     draw_line,
@@ -147,8 +147,8 @@ def _single(run: DrawnRun, style: FigureStyle) -> Figure:
         run = run._replace(drive=drive)
     if history.left_out:
         notes.append(f"not drawn: {history.left_out} samples without an increasing time")
-    concluded = history.conclusions
-    rows = 3 if concluded.mean_cycle is not None or concluded.slips is not None else 2
+    analysis = history.analysis
+    rows = 3 if analysis.mean_cycle is not None or analysis.slips is not None else 2
     size = (12.0, 10.0 if rows == 2 else 12.5)
     panels = _OneRun([run], narrow=style.narrow, short=style.crowded(*size))
     figure = style.figure(*size, wide=1.1 if rows == 2 else 1.4, narrow=3.0 if rows == 2 else 4.0)
@@ -168,7 +168,7 @@ def _single(run: DrawnRun, style: FigureStyle) -> Figure:
     if rows == 3:
         shape = (3, 1) if style.narrow else (1, 3)
         part = grid[2].subgridspec(*shape)
-        draw_conclusions(figure, part, concluded, panels.units, short=panels.short)
+        draw_analysis(figure, part, analysis, panels.units, short=panels.short)
     panels.portrait(figure.add_subplot(left))
     first, second = (figure.add_subplot(part) for part in cycles)
     panels.cycles(first, second)

@@ -148,7 +148,7 @@ class RunHistory:
         """Force (N) that was requested and did not act, as far as known."""
         self.switched_on: float | None = None
         """Time of the first force that is not zero, s; None as long as there is none."""
-        self.conclusions = RunAnalysis(None, None)
+        self.analysis = RunAnalysis(None, None)
         """Analysis of the record."""
         self._motion, self._cycles = Trace(4), Trace(2)
         self._first: list[DrawnMotion] = []
@@ -188,9 +188,9 @@ class RunHistory:
         time, amplitude, stick_fraction = self._cycles.columns()
         return time, amplitude, stick_fraction
 
-    def take_conclusions(self, conclusions: RunAnalysis) -> None:
-        """Keep what was concluded."""
-        self.conclusions = conclusions
+    def take_analysis(self, analysis: RunAnalysis) -> None:
+        """Keep the analysis of the whole run."""
+        self.analysis = analysis
 
     def take_motion(self, motion: MeasuredMotion) -> None:
         """Add the next part of the motion."""

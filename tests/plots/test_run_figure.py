@@ -429,7 +429,7 @@ def test_the_mean_cycle_of_a_noisy_record_is_shown(
 ) -> None:
     """Raw samples, the fit, and the edges of the stick with their intervals."""
     history, meter = noisy_record
-    history.take_conclusions(RunAnalysis(meter.mean_cycle, None))
+    history.take_analysis(RunAnalysis(meter.mean_cycle, None))
     figure = figure_of(history, meter.measures(), None, style=STYLES["paper"])
     assert faults(figure) == []
     (axes,) = (each for each in figure.axes if "mean cycle" in each.get_title())
@@ -447,7 +447,7 @@ def test_the_slips_of_a_noisy_record_are_shown_instead(
     history, meter = noisy_record
     each = {name: [1e-3, 2e-3, 4e-3] for name in ("stick_time", "drop")}
     slips = {"each": {**each, "slip_time": [4e-3, 4e-3 + 1e-18, 4e-3]}}
-    history.take_conclusions(RunAnalysis(meter.mean_cycle, slips))
+    history.take_analysis(RunAnalysis(meter.mean_cycle, slips))
     style = FigureStyle(size=(8.0, 7.0))
     figure = figure_of(history, meter.measures(), None, style=style)
     assert faults(figure) == []

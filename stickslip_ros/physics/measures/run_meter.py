@@ -152,8 +152,8 @@ class RunObserver(MotionObserver, Protocol):
         """Receive the control forces that follow, and whether each acted, as far as it is known."""
         ...
 
-    def take_conclusions(self, conclusions: RunAnalysis) -> None:
-        """Receive what was concluded, at the end of the run."""
+    def take_analysis(self, analysis: RunAnalysis) -> None:
+        """Receive the analysis of the whole run, at its end."""
         ...
 
 
