@@ -101,7 +101,7 @@ LAWS: dict[str, Law] = {
 
 @dataclass(frozen=True)
 class Features:
-    """What is compared: of a motion that slides steadily, the regime alone."""
+    """The compared measures: of a motion that slides steadily, the regime alone."""
 
     regime: str
     period: float | None = None

@@ -16,7 +16,7 @@ from stickslip_ros.scenarios.curve_file import Pairs, read_curve
 from stickslip_ros.scenarios.validation import ParameterGroup
 
 _NEEDS = {kind: list(signature(make).parameters) for kind, make in SIGNALS.items()}
-"""What the function of each kind of signal needs: parameters, the sample period, the points."""
+"""Arguments of the function of each kind of signal: parameters, the sample period, the points."""
 
 
 def _kind(changes: Changes) -> Any:

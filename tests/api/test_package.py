@@ -1,4 +1,4 @@
-"""What `import stickslip_ros as ss` offers, and what it costs."""
+"""The names that `import stickslip_ros as ss` offers, and its cost."""
 
 import ast
 import importlib.metadata

@@ -27,7 +27,7 @@ _NEWEST_AMPLITUDE = (
     "window.getElement(stickslip.cycles)?.chart.getOption().series[0].data?.at(-1)?.[1]"
 )
 _LATE = "lower rate or real_time_factor"
-"""What health and events advise where forces or samples are late."""
+"""Advice of health and events where forces or samples are late."""
 
 
 def main(directory: Path) -> str | None:

@@ -1,4 +1,4 @@
-"""What bash and zsh complete, asked of the shells themselves."""
+"""Completion in bash and zsh, asked of the shells themselves."""
 
 import shutil
 import subprocess

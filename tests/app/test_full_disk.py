@@ -1,4 +1,4 @@
-"""What commands leave where there is no room for what they write."""
+"""Files that commands leave where the disk is full."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""What a start of the command line loads, and what it leaves for later: speed, without a clock."""
+"""Modules that a start of the command line loads, and leaves for later: speed, without a clock."""
 
 import subprocess
 import sys
@@ -26,9 +26,9 @@ HEAVY = {
 }
 """Packages that take long to import, each more than a tenth of what Python itself takes."""
 READING = {"mcap", "numpy", "yaml"}
-"""What the report of a bag needs."""
+"""Modules that the report of a bag needs."""
 INTEGRATING = {"heyoka", "numpy", "yaml"}
-"""What a simulation needs."""
+"""Modules that a simulation needs."""
 
 PROGRAM = """
 import sys

@@ -44,7 +44,7 @@ _SIGNS = {
     "dask worker": "Registered to:",
 }
 _ACTIVE = "]: active"
-"""What programs print when they are up, and our nodes."""
+"""Texts that programs, and our nodes, print when they are up."""
 
 _HEARS_A_JOINT_STATE = "ros2 topic echo --once /feed_drive/joint_states"
 

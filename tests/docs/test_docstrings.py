@@ -43,7 +43,7 @@ def test_every_parameter_is_documented() -> None:
 
 
 def documented_parameters(name: str) -> Iterator[tuple[str, list[str], list[str]]]:
-    """What has parameters below a public name: its name, those that it has, and the documented."""
+    """Callables below a public name: name, parameters, and documented parameters."""
     module, _, own_name = name.rpartition(".")
     found = getattr(import_module(module), own_name)
     if inspect.isfunction(found):

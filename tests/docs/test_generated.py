@@ -1,4 +1,4 @@
-"""What the pages take from the code is that of today: docs/generate.py would change nothing."""
+"""Generated parts of the pages are those of today: docs/generate.py would change nothing."""
 
 import re
 import sys

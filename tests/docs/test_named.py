@@ -1,4 +1,4 @@
-"""What the pages name exists: links, files, parameters, commands, messages, tests, public names."""
+"""Links, files, parameters, commands, messages, tests and public names of the pages exist."""
 
 import ast
 import re

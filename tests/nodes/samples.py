@@ -1,4 +1,4 @@
-"""What an observer hears of a plant."""
+"""Messages that an observer receives from a plant."""
 
 import time
 from itertools import pairwise

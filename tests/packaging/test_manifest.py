@@ -67,7 +67,7 @@ def manifest():
 
 
 def required(extra):
-    """What setup.py asks for with an extra ("" for none): names on PyPI."""
+    """Requirements of setup.py with an extra ("" for none): names on PyPI."""
     requirements = [Requirement(text) for text in metadata.requires(PACKAGE)]
     chosen = f'extra == "{extra}"' if extra else "None"
     return {each.name for each in requirements if str(each.marker) == chosen}

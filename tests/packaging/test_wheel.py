@@ -44,7 +44,7 @@ def header(content, stem):
 
 @pytest.fixture
 def stem(wheel):
-    """What the wheel's own folders begin with: name and version."""
+    """Start of the names of the wheel's own folders: name and version."""
     return "-".join(wheel.name.split("-")[:2])
 
 
@@ -76,7 +76,7 @@ def test_names_its_extras(header):
 
 
 def distributions(requirements, extras):
-    """What pip would install for these, of what is installed here."""
+    """Installed packages that pip would install for these."""
     found = {}
     waiting = [(requirements, extras)]
     while waiting:

@@ -11,7 +11,7 @@ OWN = {"use_sim_time": False, "start_type_description_service": True}
 
 @pytest.fixture
 def read_by_ros(monkeypatch: pytest.MonkeyPatch) -> Iterator[ReadByRos]:
-    """What ROS itself gives to a node from a parameter file; RuntimeError if it gives nothing."""
+    """Parameters that ROS itself gives to a node from a file; RuntimeError if there are none."""
     context_module = pytest.importorskip("rclpy.context")
     node_module = pytest.importorskip("rclpy.node")
     from stickslip_ros.nodes.base.network import this_machine_only

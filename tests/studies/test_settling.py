@@ -1,4 +1,4 @@
-"""What a motion settles on: against reference cycles, and independent of earlier motions."""
+"""Motions that a run settles on: against reference cycles, and independent of earlier motions."""
 
 from dataclasses import replace
 from typing import Any

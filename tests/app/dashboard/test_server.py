@@ -1,4 +1,4 @@
-"""What the server answers to requests and messages that no page sends: no traceback."""
+"""Answers of the server to requests and messages that no page sends: no traceback."""
 
 import logging
 import sys

@@ -43,13 +43,13 @@ DRIVE = SCENARIO.plant.as_drive()
 
 @pytest.fixture(scope="module")
 def reference() -> dict[str, Any]:
-    """What `stickslip stability` says of the drive."""
+    """Results of `stickslip stability` for the drive."""
     return stability(SCENARIO)[0]
 
 
 @pytest.fixture
 def listener() -> Any:
-    """What a listener knows of a drive that runs."""
+    """A drive that runs, as a listener knows it."""
     parameters = {"plant": dict(PLANT), "washout_controller": dict(GAINS)}
     return SimpleNamespace(parameters=parameters, law="washout", controller="washout_controller")
 

@@ -1,4 +1,4 @@
-"""What ROS needs from this machine: domains and namespaces held by processes, and the network."""
+"""Needs of ROS on this machine: domains and namespaces held by processes, and the network."""
 
 import errno
 import os

@@ -1,4 +1,4 @@
-"""What a user's node inherits from its base: decoded topics, dropped messages, clean-up."""
+"""Inherited by a user's node: decoded topics, dropped messages, clean-up."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""What samples cannot resolve: motion below the step of an encoder, and few samples per cycle."""
+"""Limits of samples: motion below the step of an encoder, and few samples per cycle."""
 
 import numpy as np
 import pytest

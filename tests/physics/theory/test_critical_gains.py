@@ -80,7 +80,7 @@ SUBCRITICAL = Washout(0.2, -0.16, 2.0)
 
 
 def ends_in(gains: Washout, position: float, filter_state: float) -> Regime | None:
-    """What the loop does from there in the end; the slide rests at the start."""
+    """Final motion of the loop from there; the slide rests at the start."""
     motion = ShootingMotion(PAPER, gains)
     motion.start(np.array([position, 0.0, filter_state]))
     return settled(motion, 300.0, 20.0, window=10).regime

@@ -1,4 +1,4 @@
-"""What the theory covers, and the sentence with which it refuses other drives."""
+"""Drives that the theory covers, and the sentence with which it refuses others."""
 
 from collections.abc import Callable
 from dataclasses import replace
