@@ -17,7 +17,8 @@ EXECUTABLES = {
     "stickslip": "stickslip_ros.app.main:main",
 }
 
-ANALYSIS = ["pandas>=2.2.2", "xarray>=2024.6"]  # pandas: the first built for numpy 2
+# pandas and control: the first for numpy 2
+ANALYSIS = ["control>=0.10.1", "pandas>=2.2.2", "xarray>=2024.6"]
 DASHBOARD = ["contourpy", "fastapi", "jinja2", "nicegui>=3", "orjson", "uvicorn"]
 
 STUB = '#!/bin/sh\nexec "$(dirname "$0")/../../bin/$(basename "$0")" "$@"\n'
@@ -89,7 +90,7 @@ setup(
         "zstandard>=0.22",  # the oldest wheels for 3.12
     ],
     extras_require={
-        # Results as tables and data sets (to_pandas, to_xarray).
+        # Results as tables, data sets and systems (to_pandas, to_xarray, to_control).
         "analysis": ANALYSIS,
         # A web page that shows a run (stickslip dashboard); all but NiceGUI are what it stands on.
         "dashboard": DASHBOARD,

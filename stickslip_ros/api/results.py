@@ -138,7 +138,7 @@ class TabularResult(Result):
         table = self._table()
         columns = table.columns
         names = [name for name in table.quantities if name in columns]
-        frame = _optional("pandas").DataFrame({name: columns[name] for name in names})
+        frame = optional("pandas").DataFrame({name: columns[name] for name in names})
         frame.attrs["units"] = table.units_of(frame)
         return frame if table.row_names is None else frame.set_index(table.row_names)
 
@@ -178,7 +178,7 @@ class TabularResult(Result):
             elif values.dtype == object:
                 values = np.array([value or "" for value in values], dtype=str)
             variables[name] = dimensions, values.reshape(*shape, *values.shape[1:])
-        found = _optional("xarray").Dataset(variables, coordinates, dict(table.attributes))
+        found = optional("xarray").Dataset(variables, coordinates, dict(table.attributes))
         for name in found.variables:
             found[name].attrs["long_name"] = table.quantities[name].label
         for name, unit in table.units_of(found).items():
@@ -203,7 +203,8 @@ def _padded(rows: Sequence[tuple[float, ...]]) -> Any:
     return found
 
 
-def _optional(package: str) -> Any:
+def optional(package: str) -> Any:
+    """Return a package for `to_PACKAGE`; raises RunError if it is not installed."""
     try:
         return import_module(package)
     except ModuleNotFoundError as error:

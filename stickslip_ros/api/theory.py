@@ -13,11 +13,13 @@ from stickslip_ros.api.results import (
     Result,
     Table,
     TabularResult,
+    optional,
     provenance,
 )
 from stickslip_ros.api.scenarios import ScenarioLike, as_scenario
 from stickslip_ros.errors import InvalidInputError, RunError
 from stickslip_ros.physics.model.control import Washout
+from stickslip_ros.physics.theory.linear_system import LinearSystem
 from stickslip_ros.plots.study_tables import CHECKS, design_tables, stability_tables
 from stickslip_ros.plots.units import Units
 from stickslip_ros.progress import Progress
@@ -56,6 +58,56 @@ class Stability(Result):
     """Closed forms for the cubic Stribeck law; None for other laws."""
     notes: Mapping[str, str]
     """Why a value does not exist, by its place."""
+
+    @property
+    def continuous_system(self) -> LinearSystem | None:
+        """Matrices of the linear loop with continuous control; None if there is none."""
+        return stabilities.linear_systems(self.scenario)[0]
+
+    @property
+    def sampled_system(self) -> LinearSystem | None:
+        """Matrices of the linear loop as the nodes run it; None if there is none."""
+        return stabilities.linear_systems(self.scenario)[1]
+
+    def to_control(self) -> Any:
+        """Return the sampled linear loop as a system of python-control.
+
+        Returns
+        -------
+        control.StateSpace
+            System with the matrices, names and sample period of `sampled_system`: from a
+            disturbance force, N, to displacement, m, and velocity, m/s.
+
+        Raises
+        ------
+        InvalidInputError
+            If there is no linear sampled loop.
+        RunError
+            If python-control is not installed.
+
+        Examples
+        --------
+        >>> import stickslip_ros as ss
+        >>> found = ss.stability("feed_drive")
+        >>> loop, radius = found.to_control(), found.sampled_loop["spectral_radius"]
+        >>> loop.dt, bool(abs(abs(loop.poles()).max() - radius) < 1e-9)
+        (0.001, True)
+        """
+        system = self.sampled_system
+        if system is None:
+            raise InvalidInputError(
+                f"there is no linear sampled loop: {self.notes['sampled_loop']}"
+            )
+        return optional("control").StateSpace(
+            system.A,
+            system.B,
+            system.C,
+            system.D,
+            system.sample_period,
+            states=[name.replace(".", "_") for name in system.states],  # it allows no dots
+            inputs=["disturbance_force"],
+            outputs=["position", "velocity"],
+        )
 
     def _figure(self, style: "FigureStyle") -> "Figure":
         reason = stabilities.why_no_figure(self.scenario)

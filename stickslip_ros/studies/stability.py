@@ -29,6 +29,11 @@ from stickslip_ros.physics.theory.linear_sampled_loop import (
     not_linear,
     why_no_linear_loop,
 )
+from stickslip_ros.physics.theory.linear_system import (
+    LinearSystem,
+    continuous_system,
+    sampled_system,
+)
 from stickslip_ros.physics.theory.requirements import (
     AUTONOMOUS,
     SMOOTH,
@@ -288,6 +293,22 @@ def _sampled_loop(drive: Drive, law: ControlLaw | None, plant: PlantParameters) 
     settling_time = _Noted(loop.settling_time(law), growing)
     values = radius, radius < 1.0, loop.decay_rate(law), settling_time, *_sampled_gains(loop, law)
     return _Noted(dict(zip(_SAMPLED_LOOP, values, strict=True)), _omitted(plant))
+
+
+def linear_systems(scenario: Scenario) -> tuple[LinearSystem | None, LinearSystem | None]:
+    """Return the linear loop with continuous control, and the sampled one.
+
+    None where `stability` has no eigenvalues and no spectral radius. Raises as `stability` does.
+    """
+    plant, law = scenario.plant, scenario.control_law
+    drive = plant.as_drive()
+    require("the theory of stability", drive, AUTONOMOUS)
+    control = None if law is None else law.continuous
+    continuous = None if control is None else continuous_system(drive, control)
+    loop = LinearSampledLoop.from_drive(drive, plant.rate, plant.force_delay, plant.sensor)
+    if loop is None or law is None or law.linear_feedback(1.0 / plant.rate) is None:
+        return continuous, None
+    return continuous, sampled_system(loop, law)
 
 
 def _sampled_gains(loop: LinearSampledLoop, law: ControlLaw) -> tuple[_Noted, _Noted]:

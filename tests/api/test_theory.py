@@ -1,5 +1,8 @@
 """Stability and design as objects."""
 
+import sys
+from typing import Any
+
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
@@ -18,6 +21,60 @@ def test_stability_is_that_of_the_command() -> None:
     assert "Hopf speeds" in repr(ours)
     assert ours._repr_html_().count("<table>") == 2  # pyright: ignore
     assert isinstance(ours.plot(), Figure)
+
+
+DELAYED = {"force_delay": 0.0025, "actuator_time_constant": 2e-3}
+DIFFERENCE = {"sensor_velocity": "difference", "sensor_difference_samples": 3}
+
+
+@pytest.mark.parametrize(
+    ("name", "settings", "states"),
+    [
+        ("paper", {}, ("x", "y", "control.1")),
+        ("feed_drive", DELAYED,
+         ("x", "y", "actuator.force", "control.1", "force.1", "force.2", "force.3")),
+        ("feed_drive", DIFFERENCE,
+         ("x", "y", "control.1", "earlier_x.1", "earlier_x.2", "earlier_x.3")),
+        ("feed_drive", {"friction_law": "lugre"}, ("x", "y", "friction.z", "control.1")),
+    ],
+)  # fmt: skip
+def test_the_linear_loops_are_systems_with_the_poles_that_are_reported(
+    name: str, settings: dict[str, Any], states: tuple[str, ...]
+) -> None:
+    scenario = ss.scenario(name, **settings)
+    found = ss.stability(scenario)
+    sampled, continuous, loop = found.sampled_system, found.continuous_system, found.to_control()
+    assert sampled is not None
+    assert continuous is not None
+    assert sampled.states == states
+    assert loop.dt == sampled.sample_period == 1.0 / scenario.plant.rate
+    assert loop.nstates == len(states)
+    radius = found.sampled_loop["spectral_radius"]
+    assert np.abs(loop.poles()).max() == pytest.approx(radius, rel=1e-9)
+    assert np.abs(sampled.eigenvalues).max() == pytest.approx(radius, rel=1e-9)
+    reported = [complex(*pair) for pair in found.closed_loop["eigenvalues"]]
+    poles = sorted(continuous.eigenvalues, key=lambda pole: (-pole.real, -pole.imag))
+    assert poles == pytest.approx(reported, rel=1e-9)
+    # A constant force deflects the spring: the law filters what is constant, and friction has no
+    # part in a slide at rest.
+    period = sampled.sample_period
+    deflection = loop.dcgain()[0, 0]
+    assert deflection == pytest.approx(1.0 / scenario.plant.stiffness, rel=1e-6)
+    of_continuous = -continuous.C @ np.linalg.solve(continuous.A, continuous.B)
+    assert of_continuous[:, 0] == pytest.approx([deflection, 0.0], rel=1e-6, abs=1e-12)
+    moved = (sampled.C @ sampled.B)[:, 0]
+    pushed = [0.5 * period**2, period] / np.array(scenario.plant.mass)
+    assert moved == pytest.approx(pushed, rel=0.05)
+
+
+def test_without_a_linear_loop_there_is_no_system(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = ss.stability(ss.scenario("paper", expects_control=False))
+    assert (found.sampled_system, found.continuous_system) == (None, None)
+    with pytest.raises(InvalidInputError, match="no linear sampled loop: the scenario has no cont"):
+        found.to_control()
+    monkeypatch.setitem(sys.modules, "control", None)
+    with pytest.raises(RunError, match=r"to_control needs control.*stickslip_ros\[analysis\]"):
+        ss.stability("paper").to_control()
 
 
 @pytest.mark.long

@@ -12,6 +12,7 @@ SOURCE = Path(__file__).parents[2]
 KEYS = {
     "axe-playwright-python": set(),
     "contourpy": set(),
+    "control": set(),
     "distributed": set(),
     "fastapi": {"python3-fastapi"},
     "jinja2": {"python3-jinja2"},
@@ -97,7 +98,11 @@ def test_the_manifest_tells_what_has_no_key():
     keyless = " and ".join(sorted(name for name in required("dashboard") if not KEYS[name]))
     assert f"For the dashboard: {', '.join(keys)}, and {keyless} from PyPI;" in text
     keys = sorted(key for name in required("analysis") for key in KEYS[name])
-    assert f"For to_pandas and to_xarray: {', '.join(keys)}, and xarray from PyPI." in text
+    keyless = " and ".join(sorted(name for name in required("analysis") if not KEYS[name]))
+    assert (
+        f"For to_pandas, to_xarray and to_control: {', '.join(keys)}, and {keyless} from PyPI."
+        in text
+    )
 
 
 def test_the_docs_install_in_a_workspace_all_that_is_asked_for():

@@ -324,9 +324,21 @@ class LinearSampledLoop:
         after, starting = self._slide(1.0 - split)
         return after @ before, starting, after @ ending
 
-    def _slide(self, periods: float) -> tuple[FloatArray, FloatArray]:
-        """Return the transition of the slide over some periods, and the effect of a unit force."""
-        matrix, force = self.plant
+    @property
+    def disturbed(self) -> FloatArray:
+        """Effect of a disturbance force of one on the slide and its actuator in a period; (n,)."""
+        matrix, _ = self.plant
+        return self._slide(1.0, np.eye(len(matrix))[SPEED])[1]
+
+    def _slide(
+        self, periods: float, force: FloatArray | None = None
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the transition of the slide over some periods, and the effect of a unit force.
+
+        `force` are the rates by that force; by default it is the actuator's.
+        """
+        matrix, held = self.plant
+        force = held if force is None else force
         order = len(force)
         block = np.zeros((order + 1, order + 1))
         block[:order, :order], block[:order, order] = matrix, force
