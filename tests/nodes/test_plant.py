@@ -16,14 +16,11 @@ from stickslip_ros.messages.codec import (
 )
 from stickslip_ros.messages.topics import (
     APPLIED_DISTURBANCE,
-    APPLIED_FORCE,
-    CLOCK,
     CONTROL_FORCE,
     DISTURBANCE_FORCE,
     DROPPED_FORCE,
     JOINT_STATES,
     RECORDED,
-    TRUE_JOINT_STATES,
 )
 from stickslip_ros.nodes.plant import PlantNode
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
@@ -39,28 +36,6 @@ SECOND = 1_000_000_000
 def answers(graph: Graph) -> Publisher:
     """Return a publisher of control forces, matched with the plant."""
     return graph.publisher(CONTROL_FORCE, 1)
-
-
-def test_without_control_the_samples_are_those_of_the_loop_and_the_clock_shows_them(
-    graph: Graph,
-) -> None:
-    heard, clock = graph.listen(JOINT_STATES, raw=True), graph.listen(CLOCK)
-    options = {"publish_clock": True, "expects_control": False, "wait_for": ["observer"]}
-    plant = graph.add(PlantNode, duration=3.0, **options)
-    graph.wait_until(lambda: len(heard) == 301 and not plant.active, "301 samples")
-    graph.wait_until(lambda: len(clock) == 301, "as many times")
-
-    parameters = PlantParameters()
-    loop = SampledLoop(Motion(parameters.as_drive(), 0.0, 0.0), 100.0, SECOND)
-    samples = [loop.sample] + [loop.advance() for _ in range(300)]
-    columns, _ = joint_state_columns(heard)
-    assert columns.stamp.tolist() == [sample.stamp for sample in samples]
-    assert columns.position.tolist() == [sample.position for sample in samples]
-    assert columns.velocity.tolist() == [sample.velocity for sample in samples]
-    assert columns.friction_force.tolist() == [sample.friction_force for sample in samples]
-    assert columns.belt_velocity.tolist() == [0.4] * 301
-    times = [message.clock.sec * SECOND + message.clock.nanosec for message in clock]
-    assert times == columns.stamp.tolist()
 
 
 def test_jittered_forces_act_as_they_do_without_ros_and_overtaken_ones_are_published(
@@ -159,30 +134,6 @@ def test_what_comes_between_two_samples_acts_from_the_next_one(graph: Graph) -> 
     assert columns.position[1] != 0.1
     assert columns.position[2] == 0.1
     assert columns.stamp[2] == SECOND + 2 * SECOND // 100
-
-
-def test_the_truth_is_told_if_asked(graph: Graph) -> None:
-    heard = graph.listen(JOINT_STATES, raw=True)
-    true, applied = graph.listen(TRUE_JOINT_STATES, raw=True), graph.listen(APPLIED_FORCE, raw=True)
-    graph.add(
-        PlantNode,
-        wait_for=["observer"],
-        publish_truth=True,
-        **{"initial.position": 0.13, "sensor.position_resolution": 0.1, "actuator.limit": 0.2},
-    )
-    force = answers(graph)
-    graph.wait_until(lambda: len(heard) == len(true) == len(applied) == 1, "sample 0")
-    force.publish(pack_wrench(SECOND, 0.5))
-    graph.wait_until(lambda: len(heard) == len(true) == len(applied) == 2, "sample 1")
-    told, _ = joint_state_columns(heard)
-    found, _ = joint_state_columns(true)
-    assert told.position.tolist() == [0.1, 0.1]
-    assert found.position[0] == 0.13
-    assert found.position[1] != 0.13
-    assert told.stamp.tolist() == found.stamp.tolist()
-    stamps, forces = zip(*map(unpack_wrench, applied), strict=True)
-    assert list(stamps) == told.stamp.tolist()
-    assert forces == (0.0, 0.2)
 
 
 def test_a_motion_that_runs_away_deactivates_the_plant(graph: Graph) -> None:

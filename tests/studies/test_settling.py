@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 from stickslip_ros.errors import InvalidInputError, RunError
 from stickslip_ros.physics.measures.cycle_measures import Regime
 from stickslip_ros.physics.model.control import Washout
-from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import Coulomb, Exponential, Linear, LuGre
 from stickslip_ros.studies import settling
 from stickslip_ros.studies.settling import (
@@ -21,7 +20,7 @@ from stickslip_ros.studies.settling import (
     SettlingOptions,
 )
 from stickslip_ros.studies.simulate import simulate
-from tests.physics.drives import FEED_DRIVE, LIMIT_CYCLES, PAPER
+from tests.physics.drives import FEED_DRIVE, PAPER
 from tests.studies.studies import EXPONENTIAL, paper
 
 REST = MotionState(0.0, 0.0)
@@ -34,43 +33,6 @@ def settle(
     case: ControlledDrive, start: MotionState = REST, course: SettlingOptions | None = None
 ) -> Settled:
     return settling.settle(case, start, course or SettlingOptions(cycles=6))
-
-
-def in_units(mass: float, length: float, time: float) -> Drive:
-    """Return the paper's drive in other units of kg, m and s."""
-    speed = length / time
-    return Drive(
-        mass=mass,
-        damping=PAPER.damping * mass / time,
-        stiffness=mass / time**2,
-        normal_force=mass * length / time**2,
-        belt_speed=PAPER.belt_speed * speed,
-        friction=PAPER.friction.scaled(1.0 / speed),
-    )
-
-
-@pytest.mark.parametrize(
-    ("mass", "length", "time"), [(1.0, 1.0, 1.0), (1e-6, 1e4, 1e-5), (3e5, 7e-7, 20.0)]
-)
-def test_in_any_units_it_is_the_reference_limit_cycle(
-    mass: float, length: float, time: float
-) -> None:
-    for cycle in LIMIT_CYCLES:
-        drive = in_units(mass, length, time)
-        drive = replace(drive, belt_speed=cycle.belt_speed * length / time)
-        settled = settle(ControlledDrive(drive), course=SettlingOptions(300.0, 6))
-        measures = settled.measures
-        assert settled.steady
-        assert measures.cycles == 6
-        for name, unit in (
-            ("amplitude", length),
-            ("velocity_amplitude", length / time),
-            ("midpoint", length),
-            ("period", time),
-        ):
-            expected = pytest.approx(getattr(cycle, name) * unit, rel=1e-8)
-            assert getattr(measures, name) == expected, name
-        assert measures.stick_fraction == pytest.approx(cycle.stick_fraction, abs=1e-9)
 
 
 def test_a_motion_begins_with_the_memory_that_another_one_ended_with() -> None:

@@ -91,23 +91,6 @@ def test_a_chain_restarts_after_a_failed_point(
     assert only_failed.end is None
 
 
-def test_the_filter_is_carried_on_and_the_control_does_not_restart() -> None:
-    scenario = paper("plant.rate=20.0", "washout_controller.start_after=100.0")
-    gain = Axis("washout_controller.linear_gain", -2.0, -1.9, 2)
-    study = Study(scenario, Grid((gain,), Continuation.UP), SettlingOptions(5.0, 1))
-    start = MotionState(scenario.plant.as_drive().equilibrium_position, 0.0, (0.0, 0.0))
-    (at_rest,) = compute(study, [1], start).points
-    assert at_rest.regime is Regime.EQUILIBRIUM
-    # Without control that is not stable; with it, a filter that is not at rest pushes.
-    (alone,) = compute(study, [1], None).points
-    pushed = compute(
-        replace(study, course=SettlingOptions(0.0, 1)), [1], replace(start, control=(1.0, 0.0))
-    )
-    assert alone.amplitude > 1e-3
-    (point,) = pushed.points
-    assert point.amplitude > 0.1
-
-
 def test_up_the_cycle_is_kept_until_it_is_lost_and_down_rest_to_the_hopf_point() -> None:
     """Belt speeds across the range in which rest and cycle coexist, up and then down."""
     count = 18

@@ -57,20 +57,6 @@ def test_a_push_dies_out_as_the_closed_form_says(sign: float) -> None:
     assert motion.position == pytest.approx(start + sign * path, rel=1e-13)
 
 
-@pytest.mark.parametrize("force", [100.0, -100.0])
-def test_a_constant_force_leads_to_the_speed_at_which_friction_balances_it(force: float) -> None:
-    motion = Motion(AXIS, 0.0, 0.0)
-    motion.force = force
-    motion.advance(60.0)
-    coulomb, viscous = FORWARD if force > 0.0 else BACKWARD
-    sign = 1.0 if force > 0.0 else -1.0
-    net = force + AXIS.bias_force - sign * coulomb
-    assert motion.velocity == pytest.approx(net / viscous, rel=1e-13)
-    rate = viscous / AXIS.mass
-    path = net / viscous * (60.0 + expm1(-rate * 60.0) / rate)
-    assert motion.position == pytest.approx(path, rel=1e-13)
-
-
 def test_it_breaks_loose_at_its_static_friction_in_either_direction() -> None:
     for sign, (coulomb, _) in ((1.0, FORWARD), (-1.0, BACKWARD)):
         for share in (1.0 - 1e-12, 1.0 + 1e-12):

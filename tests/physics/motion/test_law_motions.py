@@ -12,7 +12,7 @@ from stickslip_ros.physics.model.friction import (
     Linear,
     Stribeck,
 )
-from stickslip_ros.physics.motion import Motion, RecordedMotion
+from stickslip_ros.physics.motion import RecordedMotion
 from tests.physics.drives import PAPER
 from tests.physics.motion import dop853
 from tests.physics.motion.dop853 import Dop853Drive, Signal
@@ -48,20 +48,6 @@ def test_same_motion(law: FrictionLaw, curve: dop853.Curve, belt: float) -> None
     found = without_short(sticks_of(motion.take_breakpoints()), 1e-9)
     assert len(expected.sticks) > 2
     assert np.array(found) == pytest.approx(np.array(expected.sticks), rel=0.0, abs=1e-9)
-
-
-@pytest.mark.parametrize("decay_speed", [0.1, 0.01, 0.001])
-def test_a_law_that_changes_suddenly_is_not_stepped_over(decay_speed: float) -> None:
-    """The steps of the integrator fit what comes, be they asked for in one go or one by one."""
-    law = Exponential(0.4, 0.25, decay_speed, 0.0)
-    in_one_go, one_by_one = (
-        Motion(replace(PAPER, belt_speed=0.2, friction=law), 0.0, 0.0) for _ in range(2)
-    )
-    in_one_go.advance(100.0)
-    for _ in range(10_000):
-        one_by_one.advance(0.01)
-    assert in_one_go.position == pytest.approx(one_by_one.position, rel=0.0, abs=1e-9)
-    assert in_one_go.velocity == pytest.approx(one_by_one.velocity, rel=0.0, abs=1e-9)
 
 
 @pytest.mark.parametrize(
