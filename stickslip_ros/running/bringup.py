@@ -150,11 +150,10 @@ class _Supervisor:
                 file = Path(directory, "parameters.yaml")
                 file.write_text(parameter_file(parameters), encoding="utf-8")
                 if composed:
-                    # It loads what the nodes need.
-                    from stickslip_ros.running import composition
+                    from stickslip_ros.running.composition import add_nodes  # loads what they need
 
                     chosen = {name: parameters[name] for name in nodes}
-                    composition.composed(self._spinner, chosen, self._namespace)
+                    add_nodes(self._spinner, chosen, self._namespace)
                 else:
                     self._spawn(nodes, file)
                 if self._user_controller:

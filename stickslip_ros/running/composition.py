@@ -24,10 +24,10 @@ NODE_CLASSES: dict[str, Callable[..., ManagedNode[Any]]] = {
 """Makers of the nodes of a loop, by name."""
 
 
-def composed(
+def add_nodes(
     spinner: Spinner, parameters: Mapping[str, Mapping[str, Any]], namespace: str | None = None
 ) -> dict[str, Any]:
-    """Return nodes by name, on one executor; their parameters are by node and flat name."""
+    """Make the nodes with these parameters, by node and flat name; the spinner runs them."""
     nodes: dict[str, Any] = {}
     for name, values in parameters.items():
         context = spinner.executor.context
@@ -41,9 +41,9 @@ class Composition:
     """Plant, analyzer and optionally our controller, configured, on one executor."""
 
     def __init__(self, spinner: Spinner, parameters: Mapping[str, Mapping[str, Any]]) -> None:
-        """Make nodes with these parameters, see `composed`; RunError if one refuses."""
+        """Make nodes with these parameters, see `add_nodes`; RunError if one refuses."""
         self.spinner = spinner
-        self.nodes = composed(spinner, parameters)
+        self.nodes = add_nodes(spinner, parameters)
         """By name, in the order of activation."""
         for name, node in self.nodes.items():
             node.get_logger().set_level(LoggingSeverity.WARN)
