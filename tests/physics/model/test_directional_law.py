@@ -90,6 +90,8 @@ def test_a_refusal_names_the_law_that_is_refused() -> None:
         Directional(good, bad).refusal()
         == "reverse.minimum = 0.25 must not exceed reverse.static = 0.2"
     )
+    assert Directional(Dahl(0.4, 20.0), Dahl(0.3, 20.0)).refusal() is None
+    assert "bristle_stiffness" in Directional(Dahl(0.4, 20.0), Dahl(0.4, 30.0)).refusal()
 
 
 def test_laws_of_two_classes_are_refused() -> None:

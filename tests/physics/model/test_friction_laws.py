@@ -23,6 +23,7 @@ from stickslip_ros.physics.model.friction import (
     LAWS,
     Coulomb,
     CurveFollower,
+    Dahl,
     Exponential,
     FrictionLaw,
     Linear,
@@ -122,6 +123,7 @@ def compiled(law: FrictionLaw) -> Any:
         (replace(GAUSSIAN, exponent=1.5), -2.0, 0.25 + 0.15 * exp(-8.0) + 0.2),
         (Coulomb(0.4, 0.1), 2.0, -0.6),
         (Coulomb(0.4, 0.1), -2.0, 0.6),
+        (Dahl(0.4, 20.0), -0.3, 0.4),
     ],
 )
 def test_coefficient(law: FrictionLaw, relative_speed: float, expected: float) -> None:
