@@ -7,7 +7,6 @@ from std_srvs.srv import Trigger
 
 from stickslip_ros.messages.codec import unpack_header
 from stickslip_ros.messages.topics import CLOCK, CONTROL_FORCE, JOINT_STATES
-from stickslip_ros.nodes import replay
 from stickslip_ros.nodes.replay import ReplayNode
 from tests.nodes.graph import Graph
 from tests.nodes.runs import FORCES, STATES, messages_of, record_states
@@ -38,20 +37,6 @@ def test_every_message_comes_as_it_was_recorded_and_then_the_node_pauses(
     node.trigger_activate()
     graph.wait_until(lambda: len(states) == 600 and not node.active, "it plays again")
     assert states[300:] == states[:300]
-
-
-def test_a_reader_that_comes_late_gets_the_first_message(
-    graph: Graph, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(replay, "_SILENCE", 0.0)
-    bag = record_states(tmp_path / "bag", 10)
-    node = graph.add(ReplayNode, bag=bag, rate=FAST)
-    graph.wait_until(lambda: "no node reads" in node.diagnose()[1], "the node says what it lacks")
-    assert STATES in node.diagnose()[1]
-    assert not node.active
-    heard = graph.listen(CONTROL_FORCE, raw=True)
-    graph.wait_until(lambda: len(heard) == 10, "all is heard")
-    assert heard == payloads(bag)[FORCES]
 
 
 def test_paused_it_is_silent_until_it_is_resumed(graph: Graph, tmp_path: Path) -> None:

@@ -6,8 +6,6 @@ from math import isnan, sqrt
 import numpy as np
 import pytest
 
-from stickslip_ros.physics.model.control import VelocityFeedback
-from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import Exponential
 from stickslip_ros.physics.theory.linear import expand, hurwitz_determinants
 from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop
@@ -181,24 +179,6 @@ def test_a_map_of_a_sampled_loop_with_a_long_delay_has_the_sides_of_its_limit() 
         inside = (over.second > interval.low) & (over.second < interval.high)
         changed = np.flatnonzero(inside != (over.margins[STABILITY_LIMIT][row] > 0.0))
         assert len(changed) <= 1  # the loop that is nearly the same has nearly the same limit
-
-
-def test_the_margin_of_a_sampled_law_is_that_of_its_loop() -> None:
-    plant = load_scenario("paper", ["plant.force_delay=0.05"]).plant
-    drive, law = plant.as_drive(), VelocityFeedback(velocity_gain=-0.3)
-    loop = LinearSampledLoop.from_drive(drive, plant.rate, plant.force_delay)
-    margin = hopf_margin(ControlledDrive(drive, law, plant))
-    assert margin == 1.0 - loop.spectral_radius(law)
-    assert margin > 0.0 > hopf_margin(ControlledDrive(drive))
-    more_damped = replace(drive, damping=drive.damping + 0.3)
-    for case in (ControlledDrive(drive, law), ControlledDrive(more_damped)):
-        assert hopf_margin(case) == pytest.approx(0.3 + 2.0 * 0.01 - slope_at(drive), rel=1e-9)
-
-
-def slope_at(drive: Drive) -> float:
-    """Slope of the friction at the belt speed, by which the drive is excited."""
-    expansion = expand(replace(drive, damping=0.0))
-    return float(expansion.jacobian[1, 1])
 
 
 def test_a_law_that_is_not_linear_has_no_margin() -> None:
