@@ -107,8 +107,10 @@ def test_the_file_has_the_trajectory_to_the_last_digit(
         assert rows_of(tmp_path / "some.csv") == rows[::7]
 
 
-@pytest.mark.long
-def test_a_run_that_fails_leaves_no_file(stickslip: Run, tmp_path: Path) -> None:
+def test_a_run_that_fails_leaves_no_file(
+    stickslip: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("stickslip_ros.physics.motion.hybrid_motion._SPARE_STEPS", 10_000)
     stiff = ("-p", "plant.damping=1e9", "--continuous-control")
     done = stickslip("simulate", "paper", *stiff, "--out", "run.csv")
     assert done.returncode == 1

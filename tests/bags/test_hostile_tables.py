@@ -187,7 +187,7 @@ def test_a_csv_file_that_was_changed_is_measured_or_refused(
 
 
 @pytest.mark.process
-@examples(quick=3, thorough=25, deadline=None)
+@examples(quick=3, thorough=10, deadline=None)
 @given(seed=st.integers(0, 2**32))
 def test_a_mat_file_that_was_changed_is_measured_or_refused(
     tmp_path_factory: pytest.TempPathFactory, seed: int

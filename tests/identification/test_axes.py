@@ -52,7 +52,7 @@ def test_what_is_known_is_not_fitted(coulomb: Findings) -> None:
 
 @pytest.mark.long
 def test_the_law_is_chosen_by_held_out_parts() -> None:
-    found = identify([record("saturating", duration=10.0)])
+    found = identify([record("saturating", duration=7.0)])
     assert found.law == "table"
     errors = {each.law: each.error for each in found.candidates}
     assert errors["table"] < 0.7 * errors["coulomb"]

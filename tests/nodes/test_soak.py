@@ -1,4 +1,4 @@
-"""Half a minute at 1 kHz beside a busy processor; `python -m benchmarks.soak` runs for longer."""
+"""Twenty seconds at 1 kHz beside a busy processor; `python -m benchmarks.soak` runs for longer."""
 
 from pathlib import Path
 
@@ -7,7 +7,7 @@ import pytest
 from benchmarks.soak import lines, soak
 from stickslip_ros.messages.topics import JOINT_STATES
 
-SECONDS, WARM_UP = 30.0, 15.0
+SECONDS, WARM_UP = 20.0, 10.0
 GROWTH = 2e6
 MESSAGE = 1e3
 """Bytes, at most, that a message takes which waits for a reader."""

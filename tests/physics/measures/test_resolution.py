@@ -162,7 +162,7 @@ def test_the_spectrum_shows_a_motion_and_no_noise() -> None:
     assert white_noise(np.sign(signal) * signal**2 + 1e-3 * noise) == pytest.approx(1e-3, rel=0.2)
 
 
-BELTS = (0.01, 0.03, 0.044)
+BELTS = (0.01, 0.044)
 
 
 @pytest.mark.parametrize(

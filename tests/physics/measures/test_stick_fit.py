@@ -28,7 +28,7 @@ def around_a_stick(stick_time: float, drop: float = 0.0) -> tuple[np.ndarray, np
     return time, landing - leaving
 
 
-@examples(quick=10, thorough=50)
+@examples(quick=10, thorough=25)
 @given(st.floats(0.003, 0.04), st.floats(-0.002, 0.002), st.floats(0.0, 0.3))
 def test_edges_of_an_exact_motion_are_found(stick_time: float, shift: float, drop: float) -> None:
     """Also where the friction drops at the departure, which is then of second order."""

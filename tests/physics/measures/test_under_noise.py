@@ -1,6 +1,6 @@
 """The measures under noise, from samples as a sensor tells them.
 
-benchmarks/measures_under_noise.json has 200 seeds for each case; here are ten.
+benchmarks/measures_under_noise.json has 200 seeds for each case; here are five for half of them.
 """
 
 import json
@@ -28,7 +28,7 @@ NOISY = SampleAssumptions(noisy=True)
 COMMITTED = json.loads(
     (Path(study.__file__).parent / "measures_under_noise.json").read_text(encoding="utf-8")
 )
-SEEDS = 10
+SEEDS = 5
 
 
 def samples(
@@ -53,10 +53,16 @@ def test_what_the_study_has_found_is_as_good_as_it_is_to_be() -> None:
     assert study.shortfalls(COMMITTED) == []
 
 
+def every_second_case() -> list[study.Case]:
+    """Half of the cases, with three belt speeds for each kind of noise."""
+    row = len(study.BELT_SPEEDS)
+    return [case for i, case in enumerate(study.CASES) if (i + i // row) % 2 == 0]
+
+
 @pytest.mark.long
-@pytest.mark.parametrize("case", study.CASES, ids=str)
-def test_a_twentieth_of_the_study_agrees_with_it(case: study.Case) -> None:
-    """The shares of so few seeds say little: of ten intervals of 95 %, seven must cover."""
+@pytest.mark.parametrize("case", every_second_case(), ids=str)
+def test_a_part_of_the_study_agrees_with_it(case: study.Case) -> None:
+    """The shares of so few seeds say little: of five intervals of 95 %, three must cover."""
     (row,) = study.study(SEEDS, workers=1, cases=[case])["cases"]
     (whole,) = (
         each
@@ -69,10 +75,10 @@ def test_a_twentieth_of_the_study_agrees_with_it(case: study.Case) -> None:
     for name in study.MEASURES:
         assert row[name]["rms"] <= 2.5 * whole[name]["rms"] + 1e-9
         if case.resolution:
-            assert row[name]["covered"] >= 0.7
+            assert row[name]["covered"] >= 0.6
 
 
-@examples(quick=3, thorough=30, deadline=None)
+@examples(quick=3, thorough=10, deadline=None)
 @given(st.lists(st.integers(1, 799), max_size=6).map(sorted))
 def test_blocks_of_any_length_give_the_same(starts: list[int]) -> None:
     record = samples(noise=1e-6, count=800)

@@ -157,7 +157,7 @@ def test_the_static_coefficient_is_the_largest(law: FrictionLaw, refusal: str | 
 
 
 @every_law
-@examples(quick=15, thorough=100)
+@examples(quick=15, thorough=50)
 @given(st.data(), speeds, signs)
 def test_friction_starts_at_its_limits_and_is_odd_where_they_are_equal(
     kind: type[FrictionLaw], data: st.DataObject, speed: float, sign: float
@@ -173,7 +173,7 @@ def test_friction_starts_at_its_limits_and_is_odd_where_they_are_equal(
 
 
 @every_law
-@examples(quick=15, thorough=100)
+@examples(quick=15, thorough=50)
 @given(st.data(), speeds, signs, st.floats(1e-3, 1e3), st.floats(1e-3, 1e3))
 def test_in_other_units_it_has_the_same_coefficient_and_characteristic_speed(
     kind: type[FrictionLaw],
@@ -194,7 +194,7 @@ def test_in_other_units_it_has_the_same_coefficient_and_characteristic_speed(
 
 
 @every_law
-@examples(quick=10, thorough=100)
+@examples(quick=10, thorough=50)
 @given(data=st.data())
 def test_arrays_and_symbols_give_what_numbers_give(
     kind: type[FrictionLaw], data: st.DataObject
@@ -230,7 +230,7 @@ def largest_term(law: FrictionLaw) -> float:
 
 
 @every_law
-@examples(quick=15, thorough=100)
+@examples(quick=15, thorough=50)
 @given(st.data(), speeds, signs)
 def test_memory_and_switches_have_the_length_that_their_names_give(
     kind: type[FrictionLaw], data: st.DataObject, speed: float, sign: float

@@ -39,7 +39,7 @@ LAWS: dict[str, FrictionLaw] = {
     "directional": Directional(Coulomb(static=0.3, viscous=0.8), Coulomb(static=0.2, viscous=0.5)),
     "dahl": Dahl(static=0.3, bristle_stiffness=1e4),
     "lugre": LuGre(CURVE, bristle_stiffness=2e4, bristle_damping=1.0),
-    "maxwell_slip": MaxwellSlip(CURVE, bristle_stiffness=2e4),
+    "maxwell_slip": MaxwellSlip(CURVE, bristle_stiffness=2e4, elements=2),
 }
 START = (1e-4, -0.01)
 PERIOD = 1e-3
