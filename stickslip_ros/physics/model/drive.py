@@ -129,18 +129,25 @@ class Drive(DriveConstants):
         """The same drive in these units, eq. 2: m = k = N = 1, or k = 0 without a spring."""
         if self.is_dimensionless:
             return self
-        scales = self.scales
-        return type(self)(
+        return self._scaled(
             mass=1.0,
             damping=self.damping_coefficient,
             stiffness=1.0 if self.has_spring else 0.0,
             normal_force=1.0,
-            belt_speed=self.belt_speed / self.speed_scale,
-            friction=self.friction.scaled(self.speed_scale, self.length_scale),
+        )
+
+    def _scaled(self, **own: float) -> Self:
+        """Return the drive in its scales, with these values of constants."""
+        scales = self.scales
+        return replace(
+            self,
+            belt_speed=self.belt_speed / scales.speed,
+            bias_force=self.bias_force / scales.force,
+            friction=self.friction.scaled(scales.speed, scales.length),
             belt=self.belt.scaled(scales, "m/s"),
             load=self.load.scaled(scales, "N"),
             actuator=scaled(self.actuator, scales),
-            bias_force=self.bias_force / self.normal_force,
+            **own,
         )
 
     @property
@@ -196,20 +203,17 @@ class ScaledDrive(Drive):
 
     @cached_property
     @override
+    def scales(self) -> Scales:
+        return self.unit.scales
+
+    @cached_property
+    @override
     def dimensionless(self) -> Self:
-        scales = self.unit.scales
-        return replace(
-            self,
+        return self._scaled(
             mass=self.mass / self.unit.mass,
-            damping=self.damping * scales.speed / scales.force,
+            damping=self.damping * self.scales.speed / self.scales.force,
             stiffness=self.stiffness / self.unit.stiffness,
-            normal_force=self.normal_force / scales.force,
-            belt_speed=self.belt_speed / scales.speed,
-            friction=self.friction.scaled(scales.speed, scales.length),
-            belt=self.belt.scaled(scales, "m/s"),
-            load=self.load.scaled(scales, "N"),
-            actuator=scaled(self.actuator, scales),
-            bias_force=self.bias_force / scales.force,
+            normal_force=self.normal_force / self.scales.force,
         )
 
 

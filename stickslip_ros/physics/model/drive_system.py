@@ -11,9 +11,9 @@ import heyoka as hy
 
 from stickslip_ros.errors import RunError
 from stickslip_ros.physics.model import equations
-from stickslip_ros.physics.model.constants import numbers, structure, with_symbols
+from stickslip_ros.physics.model.constants import constants_of, numbers, structure, with_symbols
 from stickslip_ros.physics.model.control import ContinuousControl
-from stickslip_ros.physics.model.drive import Drive, ScaledDrive
+from stickslip_ros.physics.model.drive import Drive, DriveConstants, ScaledDrive
 from stickslip_ros.physics.model.friction import FrictionLaw
 from stickslip_ros.physics.model.hybrid import (
     Flow,
@@ -189,7 +189,7 @@ class DriveSystem(HybridSystem):
             yield "stick_speed", 0.0
         if self._limits_by_series:
             yield "step_limiter", 1.0 / (_CHANGE_IN_A_STEP * law.characteristic_speed)
-        free = [name for name in self.free_constants if name in Drive.__dataclass_fields__]
+        free = [name for name in self.free_constants if name in constants_of(DriveConstants)]
         yield from ((name, getattr(drive, name)) for name in free if name not in own)
 
     @cached_property
@@ -504,13 +504,10 @@ class DriveSystem(HybridSystem):
     def _expressions(self) -> "_Expressions":
         state, constants, inputs, switches, time = self.symbols
         drive, control = self.drive, self.control
+        of_drive = constants_of(DriveConstants).keys() & constants
         drive = replace(
             drive,
-            mass=constants.get("mass", drive.mass),
-            stiffness=constants.get("stiffness", drive.stiffness),
-            damping=constants["damping"],
-            belt_speed=constants["belt_speed"],
-            bias_force=constants.get("bias_force", 0.0),
+            **{name: constants[name] for name in of_drive},
             friction=with_symbols(drive.friction, "friction", constants),
             actuator=with_symbols(drive.actuator, "actuator", constants),
         )
