@@ -1,8 +1,13 @@
-"""The friction law of Hess and Soom, for `stickslip_ros`."""
+"""The friction law of Hess and Soom, for `stickslip_ros`, and how it is identified."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from math import inf
 from typing import Any, ClassVar
 
+import numpy as np
+
+from stickslip_ros.identification.laws import IdentifiedLaw
 from stickslip_ros.physics.model.constants import constant
 from stickslip_ros.physics.model.friction import FrictionLaw
 
@@ -34,3 +39,23 @@ class HessSoom(FrictionLaw):
     def refusal(self) -> str | None:
         """Refuse a kinetic coefficient above the static one."""
         return self.above_static("kinetic")
+
+
+class IdentifiedHessSoom(IdentifiedLaw):
+    """F = F_k + D / (1 + (w/v_s)^2) + F_v w with three unknown forces and the shape v_s."""
+
+    name = "hess_soom"
+    least = 0.0, 0.0, -inf
+    shaped = True
+    coordinates = "kinetic", "rise", "decay_speed", "viscous"
+    unscaled = ("decay_speed",)
+    smallest = "kinetic"
+
+    def terms(self, speed: Any, shape: float) -> Any:
+        """Return what multiplies F_k, D and F_v."""
+        return np.column_stack([np.ones_like(speed), 1.0 / (1.0 + (speed / shape) ** 2), speed])
+
+    def coordinates_of(self, forces: Sequence[float], shape: float) -> dict[str, float]:
+        """Return the coordinates of these forces, N, and of v_s, m/s."""
+        kinetic, rise, viscous = forces
+        return {"kinetic": kinetic, "rise": rise, "decay_speed": shape, "viscous": viscous}

@@ -10,7 +10,6 @@ from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.identification.fit import Candidate
 from stickslip_ros.identification.laws import (
     DELAY,
-    STATIC_LAWS,
     BristledTableAdapter,
     IdentifiedLaw,
     SaturatingAdapter,
@@ -68,11 +67,13 @@ class AxisTask:
         self._by_delay: dict[float, Rows] = {}
         self.rows = self._rows(self.delay)
 
-    def candidates(self, law: str, progress: Callable[[str], None]) -> list[Candidate]:
+    def candidates(
+        self, law: str, laws: Sequence[IdentifiedLaw], progress: Callable[[str], None]
+    ) -> list[Candidate]:
         """Return the fits of the laws that compete, or of the one that is asked for."""
         found: list[Candidate] = []
-        for each in STATIC_LAWS:
-            if law in ("auto", each.name):
+        for each in laws:
+            if not each.memory:
                 progress(each.name)
                 found.append(self._with_delay(each))
         if law in ("auto", "table", "lugre"):

@@ -15,8 +15,6 @@ from stickslip_ros.identification.laws import (
     DELAY,
     EXPONENTIAL,
     LUGRE,
-    MEMORY_LAWS,
-    STATIC_LAWS,
     DirectionalAdapter,
     IdentifiedLaw,
     TableAdapter,
@@ -44,33 +42,19 @@ _MISSING_INPUT_ERROR = 0.5
 _HOPELESS_LOSS_RATIO = 4.0
 """A model whose squared error is larger than that of the best one by this factor is not fitted
 further."""
-_RISE_SHARE = 0.3
-"""Rise of static friction from which the search starts, as a share of the kinetic one."""
 _GIVEN_UP_LOSS_RATIO = 100.0
 """A law whose squared error after the first steps is larger than LuGre's by this factor is given
 up."""
-_STIFFNESS_RATIOS = (10.0, 100.0)
-"""Stiffnesses of bristles from which the search starts, in stiffnesses of the spring."""
-_DAMPING_RATIO = 0.03
-"""Damping of the bristles from which the search starts, as a share of the critical one."""
 _OPTIONAL_GAIN, _OPTIONAL_ERRORS = 0.05, 4.0
 """Share of the squared error, and standard errors, for which one more constant is searched."""
 _ZERO_ERRORS = 3.0
 """Standard errors by which such a constant must differ from zero."""
 AUTO = "auto"
 """Law that stands for the one that predicts held-out parts best."""
-DRIVE_LAWS = (
-    *(law.name for law in STATIC_LAWS),
-    TableAdapter.name,
-    *(law.name for law in MEMORY_LAWS),
-)
-"""Laws that can be identified for a drive on a spring."""
 _MOST_SAMPLES = 15_000
 """Samples of a drive that are fitted: minutes of work."""
 _POINTS = 8
 """Number of points of friction without a law."""
-_SPEEDS = ("minimum_speed", "decay_speed")
-"""Constants of friction that are speeds and not forces."""
 _LEAST_SHARE = 1e-9
 """Smallest friction from which a search starts, as a share of the other forces."""
 OPTIONAL = ("damping", "bias_force", DELAY)
@@ -101,7 +85,9 @@ class DriveTask:
         self.rows = Rows.of(parts, None)
         self.predictors = [Predictor(record) for record in records]
 
-    def candidates(self, law: str, progress: Callable[[str], None]) -> list[Candidate]:
+    def candidates(
+        self, law: str, laws: Sequence[IdentifiedLaw], progress: Callable[[str], None]
+    ) -> list[Candidate]:
         """Return the fits of the laws that compete, or of the one that is asked for, fitted first.
 
         Laws without a memory are searched first. Those with a memory follow if the errors of the
@@ -109,8 +95,8 @@ class DriveTask:
         much worse in the search is not fitted further.
         """
         found: list[Refinement] = []
-        for each in STATIC_LAWS:
-            if law in (AUTO, each.name):
+        for each in laws:
+            if not each.memory:
                 progress(each.name)
                 found.append(self.searched(each, thorough=not any(map(is_white, found))))
         if law == self.table.name:
@@ -124,8 +110,8 @@ class DriveTask:
         near = not found or (law == AUTO and min(map(_share, found)) < _MISSING_INPUT_ERROR)
         if near and not any(map(is_white, found)):
             bristles: Refinement | None = None
-            for each in MEMORY_LAWS:
-                if law not in (AUTO, each.name):
+            for each in laws:
+                if not each.memory:
                     continue
                 progress(each.name)
                 if each is not DAHL and any(map(is_white, found)):
@@ -172,14 +158,12 @@ class DriveTask:
             values = {**like.values, "static": like.values["kinetic"]}
             return self._nearest(law, [values], _GIVEN_UP_LOSS_RATIO * _loss(like))
         own = law.own if isinstance(law, DirectionalAdapter) else law
-        starts = [self._start(law, each) for each in self._regressions(own, thorough)]
-        if law.memory:
-            starts = [
-                {**_falling(each), "bristle_stiffness": stiffness}
-                | {"bristle_damping": _DAMPING_RATIO * sqrt(stiffness * each["mass"])}
-                for each in starts
-                for stiffness in (factor * each["stiffness"] for factor in _STIFFNESS_RATIOS)
-            ]
+        fastest = float(self.rows.speeds[-1])
+        starts = [
+            start
+            for each in self._regressions(own, thorough)
+            for start in law.starts(self._start(law, each), fastest)
+        ]
         return self._nearest(law, starts)
 
     def _start(self, law: IdentifiedLaw, fit: Regression) -> dict[str, float]:
@@ -222,7 +206,7 @@ class DriveTask:
         names = [*self.free, *(name for name in law.coordinates if name not in self.friction)]
         tried: list[Refinement] = []
         for values in starts:
-            tried.append(refine(short, names, self._known(values), most=_FIRST_STEPS))
+            tried.append(refine(short, names, self._known(law, values), most=_FIRST_STEPS))
             if is_white(tried[-1]) or _loss(tried[-1]) > most:
                 return tried[-1]
         finished: list[Refinement] = []
@@ -294,17 +278,12 @@ class DriveTask:
         stride = -(-sum(len(each.position) for each in self.records) // _MOST_SAMPLES)
         return task.chosen(np.arange(len(segments)) % stride == 0)
 
-    def _known(self, values: Mapping[str, float]) -> dict[str, float]:
-        own = {name: value * self.normal_force for name, value in self.friction.items()}
-        own |= {name: self.friction[name] for name in _SPEEDS if name in self.friction}
+    def _known(self, law: IdentifiedLaw, values: Mapping[str, float]) -> dict[str, float]:
+        own = {
+            name: value * (1.0 if name in law.unscaled else self.normal_force)
+            for name, value in self.friction.items()
+        }
         return {DELAY: 0.0, **values, **own, **self.fixed}
-
-
-def _falling(values: Mapping[str, float]) -> Mapping[str, float]:
-    """Return coordinates with a static friction above that of slip, which bristles may hide."""
-    if "rise" not in values:
-        return values
-    return {**values, "rise": max(values["rise"], _RISE_SHARE * values["kinetic"])}
 
 
 def is_white(fit: Refinement) -> bool:

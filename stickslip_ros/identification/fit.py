@@ -175,9 +175,7 @@ class Fit(ABC):
             values = self.values_at(point)
             own = self.law.constants(values, normal_force)
             own[DELAY] = values.get(DELAY, 0.0)
-            # Of a law that is followed a few deflections are tried: they have no error.
-            known = self.law.deflection > 0.0
-            return {name: own[name] for name in own if not (known and "friction." in name)}
+            return own
 
         values, linear = self._linear(lambda point: np.array([*found(point).values()]))
         fitted = np.abs(linear).sum(axis=1) > 0.0

@@ -5,23 +5,35 @@ from math import inf, isfinite
 
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.identification.axes import AXIS_LAWS, AxisTask
-from stickslip_ros.identification.drives import AUTO, DRIVE_LAWS, DriveTask
+from stickslip_ros.identification.drives import AUTO, DriveTask
 from stickslip_ros.identification.findings import Findings
 from stickslip_ros.identification.fit import choose
-from stickslip_ros.identification.laws import DELAY, MEMORY_LAWS, STATIC_LAWS
+from stickslip_ros.identification.foreign_laws import foreign_adapter, foreign_names
+from stickslip_ros.identification.laws import (
+    COMPETING,
+    DELAY,
+    KNOWN_LAWS,
+    IdentifiedLaw,
+    TableAdapter,
+)
 from stickslip_ros.identification.record import ReadRecords, Record
 from stickslip_ros.identification.regression import LINEAR
 from stickslip_ros.identification.servo import servo_of
+from stickslip_ros.physics.model.constants import constants_of
+from stickslip_ros.physics.model.friction import LAWS
 from stickslip_ros.quantities import number_of
 from stickslip_ros.scenarios.keywords import described
 from stickslip_ros.text import must_be_one_of
 
-LAWS = (AUTO, *dict.fromkeys([*AXIS_LAWS, *DRIVE_LAWS]))
-"""Friction laws that can be identified, and `AUTO`."""
-_FRICTION = ("static", "minimum", "minimum_speed", "kinetic", "decay_speed", "viscous")
-FIXABLE = (*LINEAR, "normal_force", DELAY, *(f"friction.{name}" for name in _FRICTION))
-"""Constants that can be given, by parameter of the plant."""
-_UNITS = {f"plant.{name}": described(f"plant.{name}").unit for name in FIXABLE}
+FIXABLE = (
+    *LINEAR,
+    "normal_force",
+    DELAY,
+    *dict.fromkeys(f"friction.{name}" for law in KNOWN_LAWS.values() for name in law.fixable),
+)
+"""Constants that can be given, by parameter of the plant, of the laws of this package."""
+_CONSTANTS = {name for law in LAWS.values() for name in constants_of(law)}
+"""Constants of friction laws, those of other packages among them."""
 _DELAYS = -1.0, 20.0
 """Delays that can be given, sample periods."""
 _SAME_PERIOD = 0.01
@@ -69,9 +81,11 @@ def fixed_of(texts: Sequence[str]) -> dict[str, float]:
 
 def _constant(target: str, value: float | str) -> float:
     """Return a constant by NODE.PARAMETER in SI units; refuse one that cannot be given."""
-    if target not in _UNITS:
+    name = target.removeprefix("plant.")
+    of_friction = name.removeprefix("friction.") in _CONSTANTS and name.startswith("friction.")
+    if target == name or not (name in FIXABLE or of_friction):
         raise InvalidInputError(f"{target} is refused: {_allowed(target)}")
-    return number_of(target, value, _UNITS[target])
+    return number_of(target, value, described(target).unit)
 
 
 def identify(
@@ -80,7 +94,7 @@ def identify(
     fixed: Mapping[str, float] | None = None,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Findings:
-    """Identify a drive from records of one machine, with one of `LAWS`.
+    """Identify a drive from records of one machine, with a law or with `AUTO`.
 
     A belt that is at rest in all records means an axis that no spring holds, unless a stiffness is
     given: then, and on a belt that moves, the slide is on a spring. `fixed` has the known
@@ -88,24 +102,23 @@ def identify(
     InvalidInputError if a name or a value is not allowed, or the records cannot tell a model.
     """
     fixed = {} if fixed is None else fixed
+    laws = _laws(law)
+    fixable = {*FIXABLE, *(f"friction.{name}" for own in laws for name in own.fixable)}
     for name, value in fixed.items():
-        if name not in FIXABLE:
+        if name not in fixable:
             raise InvalidInputError(f"plant.{name} is refused: {_allowed(f'plant.{name}')}")
         _check_value(name, value, records[0].period)
-    if law not in LAWS:
-        raise InvalidInputError(f"law {law} is refused: {must_be_one_of(law, LAWS)}")
     _check_records(records)
     moving = any(record.belt_velocity.any() for record in records)
     spring = fixed["stiffness"] > 0.0 if "stiffness" in fixed else moving
-    known = AXIS_LAWS if not spring else DRIVE_LAWS
-    if law not in (AUTO, *known):
-        kind = "on a spring" if spring else "without a spring"
+    if not spring and law not in (AUTO, *AXIS_LAWS) and any(own.memory for own in laws):
         raise InvalidInputError(
-            f"law {law} is refused for a drive {kind}: must be one of {AUTO}, {', '.join(known)}"
+            f"law {law} is refused for a drive without a spring: must be one of {AUTO}, "
+            f"{', '.join(AXIS_LAWS)}"
         )
-    _check_friction(fixed, law, spring=spring)
+    _check_friction(fixed, law, laws, spring=spring)
     task = (DriveTask if spring else AxisTask)(records, fixed)
-    candidates = task.candidates(law, progress)
+    candidates = task.candidates(law, laws, progress)
     chosen, as_good = choose(
         [each for each in candidates if law != AUTO or not each.remark] or candidates
     )
@@ -119,6 +132,17 @@ def identify(
         fixed,
         next((servo for servo in servos if servo is not None), None),
     )
+
+
+def _laws(law: str) -> Sequence[IdentifiedLaw]:
+    """Return the laws with constants that are fitted: those that compete, or the one named."""
+    if law in (AUTO, TableAdapter.name):
+        return COMPETING if law == AUTO else ()
+    found = KNOWN_LAWS.get(law) or foreign_adapter(law)
+    if found is None:
+        known = (AUTO, TableAdapter.name, *KNOWN_LAWS, *foreign_names())
+        raise InvalidInputError(f"law {law} is refused: {must_be_one_of(law, known)}")
+    return (found,)
 
 
 def _allowed(name: str) -> str:
@@ -154,17 +178,15 @@ def _check_records(records: Sequence[Record]) -> None:
             )
 
 
-def _check_friction(fixed: Mapping[str, float], law: str, *, spring: bool) -> None:
+def _check_friction(
+    fixed: Mapping[str, float], law: str, laws: Sequence[IdentifiedLaw], *, spring: bool
+) -> None:
     """Refuse constants of friction that the law in question does not search by themselves."""
-    known = {
-        f"friction.{name}"
-        for own in (*STATIC_LAWS, *MEMORY_LAWS)
-        if spring and own.name == law
-        for name in own.coordinates
-    }
+    searched = laws if spring and law != AUTO else ()
+    known = [f"friction.{name}" for own in searched for name in own.fixable]
     for name in fixed:
         if name.startswith("friction.") and name not in known:
-            allowed = ", ".join(f"plant.{each}" for each in FIXABLE if each in known)
+            allowed = ", ".join(f"plant.{each}" for each in known)
             raise InvalidInputError(
                 f"plant.{name} cannot be fixed with the law {law} "
                 f"{'on' if spring else 'without'} a spring: of friction "

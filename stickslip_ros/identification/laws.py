@@ -2,7 +2,7 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from math import exp, inf, sqrt
+from math import exp, inf, log, sqrt
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,7 @@ from stickslip_ros.physics.model.friction import (
     CurveFollower,
     Directional,
     FrictionLaw,
+    RateState,
     Table,
 )
 
@@ -35,6 +36,20 @@ _SLOWEST_SHAPE, _FASTEST_SHAPE = 0.01, 10.0
 """Shapes of a curve that records may tell, in fastest speeds."""
 _LEAST_FRICTION = 0.01
 """Least friction of bristles at a speed, as a share of the largest."""
+_RISE_SHARE = 0.3
+"""Rise of static friction from which the search starts, as a share of the kinetic one: bristles
+may hide it."""
+_STIFFNESS_RATIOS = (10.0, 100.0)
+"""Stiffnesses of bristles from which the search starts, in stiffnesses of the spring."""
+_DAMPING_RATIO = 0.03
+"""Damping of the bristles from which the search starts, as a share of the critical one."""
+_DIRECT_EFFECT, _LEAST_DIRECT_EFFECT = 0.03, 0.01
+"""Direct effect from which the search starts, as a share of the friction at the fastest speed; the
+least one, as a share of the friction at the reference speed."""
+_SLIP_DISTANCES, _LEAST_SLIP_DISTANCE = (0.03, 0.1), 1e-3
+"""Slip distances from which the search starts, and the least one, in amplitudes of the free
+vibration whose speed is the fastest one."""
+_REFERENCE_SPEED = float(RateState().reference_speed)
 DELAY = "force_delay"
 """Name of the constant that is not one of the drive: the time until a force acts, s."""
 REVERSE = "reverse."
@@ -61,7 +76,9 @@ class IdentifiedLaw(ABC):
     deflection: float = 0.0
     """Path over which friction follows a change of direction or speed, m; 0: immediately."""
     coordinates: Sequence[str]
-    """Names of the coordinates."""
+    """Names of the coordinates: those of the constants, and `rise` for `static`."""
+    unscaled: Sequence[str] = ()
+    """Coordinates that do not scale with the normal force, such as speeds."""
     smallest: str
     """Coordinate of the smallest friction."""
     memory: Sequence[str] = ()
@@ -103,6 +120,14 @@ class IdentifiedLaw(ABC):
             found["viscous"] = found["viscous"] or _LEAST_SHARE * found[self.smallest]
         return found
 
+    def starts(self, values: Values, fastest: float) -> Sequence[Values]:
+        """Return the coordinates from which searches of trajectories start.
+
+        `values` are those of a regression, with the mass and the stiffness; the fastest speed is
+        that of `bounds`.
+        """
+        return [values]
+
     def static_force(self, values: Values) -> float:
         """Return the static friction, N."""
         rise = values["rise"] if "rise" in self.coordinates else 0.0
@@ -114,7 +139,7 @@ class IdentifiedLaw(ABC):
         own = {"static": self.static_force(values) / normal_force}
         for name in self.coordinates:
             if name != "rise":
-                own[name] = values[name] / (1.0 if name.endswith("_speed") else normal_force)
+                own[name] = values[name] / (1.0 if name in self.unscaled else normal_force)
         return kind(**own)
 
     def drive(self, values: Values, normal_force: float, belt_speed: float = 0.0) -> Drive:
@@ -132,13 +157,21 @@ class IdentifiedLaw(ABC):
     def constants(self, values: Values, normal_force: float) -> dict[str, float]:
         """Return the parameters of the plant by flat name that coordinates stand for.
 
-        A table has none.
+        A table has none. Of a law that is followed a few deflections are tried: its constants
+        have no error, and are left out.
         """
         own = {*self.coordinates, DELAY}
         found = {name: value for name, value in values.items() if name not in own}
+        if self.deflection > 0.0:
+            return found
         for group, law in by_group(self.friction(values, normal_force)).items():
             found |= {group + name: value for name, value in numbers_of(law).items()}
         return found
+
+    @property
+    def fixable(self) -> Sequence[str]:
+        """The coordinates that can be given: they are constants of the law."""
+        return [name for name in self.coordinates if name in constants_of(LAWS[self.name])]
 
     def bounds(self, name: str, values: Values, fastest: float) -> tuple[float, float]:
         """Return the smallest and the largest value of a coordinate in the search from `values` on.
@@ -163,6 +196,17 @@ class IdentifiedLaw(ABC):
         if name.endswith("_speed"):
             return _SLOWEST_SHAPE * fastest, _FASTEST_SHAPE * fastest
         return 0.0 if name in ("rise", "damping") else _LEAST_SHARE * static, inf
+
+    def size(self, name: str, values: Values, fastest: float) -> float:
+        """Return a typical size of a coordinate of the law, from which differences are made."""
+        static = self.static_force(values)
+        if name.endswith("_speed"):
+            return fastest
+        if name in ("viscous", "bristle_damping"):
+            return static / fastest
+        if name in self.unscaled:
+            return abs(values[name])
+        return values["stiffness"] if name == "bristle_stiffness" else static
 
     def to_search(self, values: Values, fastest: float) -> dict[str, float]:
         """Return the coordinates with those in place that `straightened` names."""
@@ -201,6 +245,10 @@ class DahlAdapter(CoulombAdapter):
     def coordinates_of(self, forces: Sequence[float], shape: float) -> dict[str, float]:
         return {"static": forces[0]}
 
+    @override
+    def starts(self, values: Values, fastest: float) -> Sequence[Values]:
+        return _bristle_starts(values)
+
 
 class StribeckAdapter(IdentifiedLaw):
     """The cubic law of the paper: F = F_s - D (3 r - r^3)/2 with r = w/v_m, eq. 3."""
@@ -209,6 +257,7 @@ class StribeckAdapter(IdentifiedLaw):
     least = 0.0, 0.0
     shaped = True
     coordinates: Sequence[str] = ("minimum", "rise", "minimum_speed")
+    unscaled: Sequence[str] = ("minimum_speed",)
     smallest = "minimum"
 
     @override
@@ -236,6 +285,7 @@ class ExponentialAdapter(IdentifiedLaw):
     least = 0.0, 0.0, -np.inf
     shaped = True
     coordinates: Sequence[str] = ("kinetic", "rise", "decay_speed", "viscous")
+    unscaled: Sequence[str] = ("decay_speed",)
     smallest = "kinetic"
     straightened: Mapping[str, tuple[float, float] | None] = {
         "kinetic": (-inf, inf),
@@ -378,8 +428,89 @@ class BristleAdapter(ExponentialAdapter):
         self.coordinates = (*ExponentialAdapter.coordinates, *memory)
 
     @override
+    def starts(self, values: Values, fastest: float) -> Sequence[Values]:
+        rise = max(values["rise"], _RISE_SHARE * values["kinetic"])
+        return _bristle_starts({**values, "rise": rise})
+
+    @override
     def friction(self, values: Values, normal_force: float) -> FrictionLaw:
         return _bristled(self, EXPONENTIAL, values, normal_force)
+
+
+class RateStateAdapter(IdentifiedLaw):
+    """F = F_k + (A - B) ln(w/v_0) in steady slip, of which A is immediate.
+
+    The reference speed v_0 is that by default: another one only changes F_k. Far from v_0, F_k
+    hardly differs from the slope A - B: in the search `kinetic` is replaced by friction in steady
+    slip at the fastest speed.
+    """
+
+    name = "rate_state"
+    least = 0.0, -inf
+    coordinates: Sequence[str] = (
+        "kinetic", "direct_effect", "evolution_effect", "slip_distance",
+    )  # fmt: skip
+    unscaled: Sequence[str] = ("slip_distance",)
+    smallest = "kinetic"
+    memory: Sequence[str] = coordinates[1:]
+    straightened: Mapping[str, tuple[float, float] | None] = {"kinetic": (0.0, inf)}
+
+    @override
+    def terms(self, speed: FloatArray, shape: float) -> FloatArray:
+        decades = np.log(np.maximum(speed / _REFERENCE_SPEED, 1.0))
+        return np.column_stack([np.ones_like(speed), decades])
+
+    @override
+    def coordinates_of(self, forces: Sequence[float], shape: float) -> dict[str, float]:
+        kinetic, slope = forces
+        return {
+            "kinetic": kinetic,
+            "direct_effect": max(slope, 0.0),
+            "evolution_effect": max(-slope, 0.0),
+        }
+
+    @override
+    def starts(self, values: Values, fastest: float) -> Sequence[Values]:
+        amplitude = fastest * sqrt(values["mass"] / values["stiffness"])
+        slope = values["direct_effect"] - values["evolution_effect"]
+        direct = max(_DIRECT_EFFECT * self.to_search(values, fastest)["kinetic"], abs(slope))
+        effects = {"direct_effect": direct, "evolution_effect": direct - slope}
+        return [
+            {**values, **effects, "slip_distance": share * amplitude} for share in _SLIP_DISTANCES
+        ]
+
+    @override
+    def friction(self, values: Values, normal_force: float) -> FrictionLaw:
+        return RateState(
+            **{
+                name: values[name] / (1.0 if name in self.unscaled else normal_force)
+                for name in self.coordinates
+            }
+        )
+
+    @override
+    def bounds(self, name: str, values: Values, fastest: float) -> tuple[float, float]:
+        if name == "slip_distance":
+            amplitude = fastest * sqrt(values["mass"] / values["stiffness"])
+            return _LEAST_SLIP_DISTANCE * amplitude, amplitude
+        if name == "direct_effect":
+            return _LEAST_DIRECT_EFFECT * values["kinetic"], inf
+        if name == "evolution_effect":
+            return 0.0, inf
+        return super().bounds(name, values, fastest)
+
+    @override
+    def to_search(self, values: Values, fastest: float) -> dict[str, float]:
+        return {**values, "kinetic": values["kinetic"] + self._rise(values, fastest)}
+
+    @override
+    def from_search(self, found: Values, fastest: float) -> dict[str, float]:
+        return {**found, "kinetic": found["kinetic"] - self._rise(found, fastest)}
+
+    def _rise(self, values: Values, fastest: float) -> float:
+        """Return how far friction in steady slip rises to the fastest speed, N."""
+        slope = values["direct_effect"] - values["evolution_effect"]
+        return slope * log(fastest / _REFERENCE_SPEED)
 
 
 class DirectionalAdapter(_DerivedAdapter):
@@ -388,9 +519,9 @@ class DirectionalAdapter(_DerivedAdapter):
     def __init__(self, own: IdentifiedLaw) -> None:
         """Take the adapter of each direction."""
         super().__init__(own)
-        self.coordinates, self.by_differences = (
+        self.coordinates, self.by_differences, self.unscaled = (
             [*names, *(REVERSE + name for name in names)]
-            for names in (own.coordinates, own.by_differences)
+            for names in (own.coordinates, own.by_differences, own.unscaled)
         )
 
     @override
@@ -407,6 +538,12 @@ class DirectionalAdapter(_DerivedAdapter):
     def bounds(self, name: str, values: Values, fastest: float) -> tuple[float, float]:
         own = _by_direction(values)[name.startswith(REVERSE)]
         return self.own.bounds(name.removeprefix(REVERSE), own, fastest)
+
+    @override
+    def size(self, name: str, values: Values, fastest: float) -> float:
+        # Both directions are of a size.
+        larger = max(_by_direction(values), key=self.own.static_force)
+        return self.own.size(name.removeprefix(REVERSE), larger, fastest)
 
 
 def by_group(law: FrictionLaw) -> Mapping[str, FrictionLaw]:
@@ -434,6 +571,16 @@ def _bristled(
     return kind(curve.friction(values, normal_force), **own)
 
 
+def _bristle_starts(values: Values) -> Sequence[Values]:
+    """Return coordinates with bristles of some stiffnesses."""
+    stiffnesses = [ratio * values["stiffness"] for ratio in _STIFFNESS_RATIOS]
+    return [
+        {**values, "bristle_stiffness": stiffness}
+        | {"bristle_damping": _DAMPING_RATIO * sqrt(stiffness * values["mass"])}
+        for stiffness in stiffnesses
+    ]
+
+
 def _by_direction(values: Values) -> tuple[Values, Values]:
     """Return the coordinates of forward and of backward slip by the same names."""
     reverse = {
@@ -452,7 +599,7 @@ def _sag(decay: float, middle: float, fastest: float) -> float:
 
 COULOMB, STRIBECK, EXPONENTIAL = CoulombAdapter(), StribeckAdapter(), ExponentialAdapter()
 STATIC_LAWS: Sequence[IdentifiedLaw] = (COULOMB, STRIBECK, EXPONENTIAL)
-"""Laws without a memory, the simpler ones first."""
+"""Laws without a memory that compete, the simpler ones first."""
 LUGRE = BristleAdapter("lugre", ("bristle_stiffness", "bristle_damping"))
 DAHL = DahlAdapter()
 MEMORY_LAWS: Sequence[IdentifiedLaw] = (
@@ -462,4 +609,9 @@ MEMORY_LAWS: Sequence[IdentifiedLaw] = (
     BristleAdapter("elasto_plastic", LUGRE.memory, ("kinetic",)),
     BristleAdapter("maxwell_slip", ("bristle_stiffness",)),
 )
-"""Laws with a memory. Those after LuGre are searched from what LuGre gives."""
+"""Laws with a memory that compete. Those after LuGre are searched from what LuGre gives."""
+COMPETING = (*STATIC_LAWS, *MEMORY_LAWS)
+KNOWN_LAWS: Mapping[str, IdentifiedLaw] = {
+    each.name: each for each in (*COMPETING, RateStateAdapter())
+}
+"""All laws with constants by their name."""

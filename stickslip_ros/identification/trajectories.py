@@ -10,7 +10,7 @@ import numpy as np
 
 from stickslip_ros.arrays import BoolArray, FloatArray, IntArray
 from stickslip_ros.errors import InvalidInputError, RunError
-from stickslip_ros.identification.laws import DELAY, REVERSE, IdentifiedLaw
+from stickslip_ros.identification.laws import DELAY, IdentifiedLaw
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.trajectory import Predictor, Segment, steady_memory
 from stickslip_ros.physics.model.drive import Drive, in_units_of
@@ -230,15 +230,8 @@ class Trajectories:
         force, fastest = self.law.static_force(values), self.fastest
         found = {"bias_force": force, "damping": force / fastest}
         found[DELAY] = 100.0 * self.predictors[0].record.period
-        for name in self.law.coordinates:
-            kind = name.removeprefix(REVERSE)
-            if kind.endswith("_speed"):
-                found[name] = fastest
-            elif kind in ("viscous", "bristle_damping"):
-                found[name] = force / fastest
-            else:
-                found[name] = values["stiffness"] if kind == "bristle_stiffness" else force
-        return found
+        own = {name: self.law.size(name, values, fastest) for name in self.law.coordinates}
+        return found | own
 
     def chosen(self, which: BoolArray) -> "Trajectories":
         """Return the same with some of the segments."""

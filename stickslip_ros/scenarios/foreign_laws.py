@@ -35,6 +35,7 @@ from stickslip_ros.physics.model.friction import (
 from stickslip_ros.scenarios.validation import ParameterGroup
 
 _Law = TypeVar("_Law", bound=FrictionLaw | ControlLaw)
+_Base = TypeVar("_Base")
 _Equations = Callable[[Any, Sequence[Any]], Iterable[Any]]
 """Equations of a part with the values of its variables, both as numbers or as expressions."""
 
@@ -65,7 +66,7 @@ class LawFamily(Generic[_Law]):
     def add(self, entry: EntryPoint, package: Distribution) -> None:
         """Add the law of an entry point, or the reason against it to `refused`."""
         try:
-            law = self._loaded(entry)
+            law = loaded(entry, self.base)
             if self.laws.get(entry.name) is not law:  # the package can be on the path twice
                 self._check(entry.name, law)
                 self.laws[entry.name] = law
@@ -74,29 +75,13 @@ class LawFamily(Generic[_Law]):
             known = self.refused.get(entry.name)
             self.refused[entry.name] = f"{known}; {reason}" if known and known != reason else reason
 
-    def _loaded(self, entry: EntryPoint) -> type[_Law]:
-        try:
-            law = entry.load()
-        except (Exception, SystemExit) as error:  # the code of others: anything
-            raise InvalidInputError(f"cannot be imported: {in_words(error)}") from None
-        if not (isinstance(law, type) and issubclass(law, self.base)):
-            raise InvalidInputError(f"is no class derived from {self.base.__name__}")
-        return law
-
     def _check(self, name: str, law: type[_Law]) -> None:
         """Refuse a law that cannot be one of `laws`."""
         if not (name.isascii() and name.isidentifier()):
             raise InvalidInputError(f"has the name {name!r}: must be of letters, digits and _")
         if name in self.laws:
             raise InvalidInputError(f"has the name of another law, {_place(self.laws[name])}")
-        if getattr(law, "name", None) != name:
-            raise InvalidInputError(
-                f"has the name {getattr(law, 'name', None)!r} in its class and {name!r} in its "
-                "entry point: must be the same"
-            )
-        if isabstract(law):
-            missing = ", ".join(sorted(cast(Any, law).__abstractmethods__))
-            raise InvalidInputError(f"does not define {missing}")
+        check_class(name, law)
         if not is_dataclass(law) or "__dataclass_fields__" not in vars(law):
             raise InvalidInputError("is no dataclass: must have @dataclass(frozen=True)")
         constants = constants_of(law)
@@ -327,18 +312,46 @@ CONTROLLERS = LawFamily(
 
 def add_laws_of_other_packages() -> None:
     """Add the laws of other packages to their families, or the reasons against them."""
-    families = FRICTION_LAWS, CONTROLLERS
+    families = {family.group: family for family in (FRICTION_LAWS, CONTROLLERS)}
+    for entry, package in entries_of_other_packages(*families):
+        families[entry.group].add(entry, package)
+
+
+def entries_of_other_packages(*groups: str) -> list[tuple[EntryPoint, Distribution]]:
+    """Return the entry points of groups with their packages, by name."""
     found = [
-        (entry, package, family)
+        (entry, package)
         for package in distributions()
         # Parsing the entry points takes longer.
         for text in [package.read_text("entry_points.txt") or ""]
-        for family in families
-        if family.group in text
-        for entry in package.entry_points.select(group=family.group)
+        for group in groups
+        if group in text
+        for entry in package.entry_points.select(group=group)
     ]
-    for entry, package, family in sorted(found, key=lambda each: (each[0].name, each[0].value)):
-        family.add(entry, package)
+    return sorted(found, key=lambda each: (each[0].name, each[0].value))
+
+
+def loaded(entry: EntryPoint, base: type[_Base]) -> type[_Base]:
+    """Return the class of an entry point; InvalidInputError if none derives from `base`."""
+    try:
+        found = entry.load()
+    except (Exception, SystemExit) as error:  # the code of others: anything
+        raise InvalidInputError(f"cannot be imported: {in_words(error)}") from None
+    if not (isinstance(found, type) and issubclass(found, base)):
+        raise InvalidInputError(f"is no class derived from {base.__name__}")
+    return found
+
+
+def check_class(name: str, kind: type) -> None:
+    """Refuse a class that has another name than its entry point, or is abstract."""
+    own = getattr(kind, "name", None)
+    if own != name:
+        raise InvalidInputError(
+            f"has the name {own!r} in its class and {name!r} in its entry point: must be the same"
+        )
+    if isabstract(kind):
+        missing = ", ".join(sorted(cast(Any, kind).__abstractmethods__))
+        raise InvalidInputError(f"does not define {missing}")
 
 
 def _one_for_all(constant: Parameter) -> Mapping[str, str]:

@@ -4,7 +4,6 @@ import csv
 import shutil
 import subprocess
 import sys
-import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +13,7 @@ from stickslip_ros.scenarios.foreign_laws import CONTROLLERS
 from tests.app.conftest import Run, RunOfItsOwn
 from tests.docs.page import CHECKOUT
 from tests.physics.motion.dop853 import Curve, Dop853Drive, none
-from tests.scenarios.foreign_laws import BRAKE, FALLING, write_package
+from tests.scenarios.foreign_laws import BRAKE, FALLING, write_example, write_package
 
 pytestmark = pytest.mark.process
 
@@ -31,12 +30,8 @@ def with_packages(process_environment: dict[str, str], tmp_path: Path) -> Run:
     write_package(tmp_path, "bad", {"bad": "import no_such"}, {"bad": "bad:Law"}, CONTROLLERS.group)
     write_package(tmp_path, "falling", {"falling": FALLING}, {"falling": "falling:Falling"})
     write_package(tmp_path, "broken", {"broken": "import no_such"}, {"broken": "broken:Law"})
-    for folder in map(CHECKOUT.joinpath, ("examples/own_control_law", "examples/own_friction_law")):
-        described = tomllib.loads((folder / "pyproject.toml").read_text(encoding="utf-8"))
-        ((group, laws),) = described["project"]["entry-points"].items()
-        modules = described["tool"]["setuptools"]["py-modules"]
-        texts = {name: (folder / f"{name}.py").read_text(encoding="utf-8") for name in modules}
-        write_package(tmp_path, folder.name, texts, laws, group)
+    write_example(tmp_path, "own_control_law")
+    write_example(tmp_path, "own_friction_law")
     shutil.copy(CHECKOUT / "examples/own_friction_law" / LUBRICATED, tmp_path)
     return RunOfItsOwn(tmp_path, process_environment)
 

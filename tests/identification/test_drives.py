@@ -302,7 +302,8 @@ def test_the_study_of_100_seeds() -> None:
 @pytest.mark.long
 @pytest.mark.timeout(3600)
 @pytest.mark.parametrize(
-    ("law", "kind"), [("stribeck", "ramp"), ("exponential", "stick"), ("lugre", "taps")]
+    ("law", "kind"),
+    [("stribeck", "ramp"), ("exponential", "stick"), ("lugre", "taps"), ("rate_state", "ramp")],
 )
 def test_the_first_seed_of_the_study(law: str, kind: str) -> None:
     (case,) = study.study(1, workers=1, cases=[(law, kind)])["cases"]

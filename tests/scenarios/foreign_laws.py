@@ -1,9 +1,11 @@
 """Packages with laws of their own, written into a directory of the path."""
 
+import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 
 from stickslip_ros.scenarios.foreign_laws import FRICTION_LAWS
+from tests.docs.page import CHECKOUT
 
 FALLING = '''
 """A law of another package: the linear law, with a constant of its own name."""
@@ -66,12 +68,30 @@ def write_package(
     group: str = FRICTION_LAWS.group,
 ) -> None:
     """Write what an installation leaves: modules, and the entry points of the laws."""
+    _install(directory, package, modules, {group: laws})
+
+
+def write_example(directory: Path, name: str) -> None:
+    """Write what an installation of a package of examples/ leaves."""
+    folder = CHECKOUT / "examples" / name
+    described = tomllib.loads((folder / "pyproject.toml").read_text(encoding="utf-8"))
+    modules = described["tool"]["setuptools"]["py-modules"]
+    texts = {each: (folder / f"{each}.py").read_text(encoding="utf-8") for each in modules}
+    _install(directory, name, texts, described["project"]["entry-points"])
+
+
+def _install(
+    directory: Path,
+    package: str,
+    modules: Mapping[str, str],
+    groups: Mapping[str, Mapping[str, str]],
+) -> None:
     for name, text in modules.items():
         (directory / f"{name}.py").write_text(text, encoding="utf-8")
     described = directory / f"{package}-1.0.dist-info"
     described.mkdir()
     (described / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {package}\nVersion: 1.0\n")
-    lines = [f"{name} = {place}" for name, place in laws.items()]
-    (described / "entry_points.txt").write_text(
-        "\n".join([f"[{group}]", *lines, "", "[other]", "x = no:Thing", ""])
-    )
+    lines = ["[other]", "x = no:Thing"]
+    for group, laws in groups.items():
+        lines += [f"[{group}]", *(f"{name} = {place}" for name, place in laws.items())]
+    (described / "entry_points.txt").write_text("\n".join([*lines, ""]))
