@@ -19,7 +19,7 @@ EXECUTABLES = {
 
 # pandas and control: the first for numpy 2
 ANALYSIS = ["control>=0.10.1", "pandas>=2.2.2", "xarray>=2024.6"]
-DASHBOARD = ["contourpy", "fastapi", "jinja2", "nicegui>=3", "orjson", "uvicorn"]
+DASHBOARD = ["contourpy", "fastapi", "nicegui>=3", "orjson", "uvicorn"]
 
 STUB = '#!/bin/sh\nexec "$(dirname "$0")/../../bin/$(basename "$0")" "$@"\n'
 
@@ -55,6 +55,7 @@ setup(
     package_data={
         NAME: [
             "py.typed",
+            "api/*.html",
             "app/*.sh",
             "app/dashboard/*.css",
             "app/dashboard/*.js",
@@ -77,6 +78,7 @@ setup(
     # Each from the oldest that continuous integration runs the tests with, on Python 3.12.
     install_requires=[
         "heyoka>=7.10.1",  # the oldest wheels for Python 3.11 to 3.13; it asks for numpy 2
+        "jinja2>=3.1.6",  # the oldest that NiceGUI takes
         "lz4>=4.3.3",  # the oldest wheels for 3.12
         "matplotlib>=3.8.4",  # the first built for numpy 2
         "mcap>=1.5",  # the first whose writer can close a chunk on demand

@@ -1,7 +1,7 @@
 """Format text for messages, tables and figures."""
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from difflib import SequenceMatcher
 from math import isfinite
@@ -56,6 +56,17 @@ def prefix_for(largest: float) -> tuple[float, str]:
     """
     magnitude = abs(largest)
     return next(((scale, p) for scale, p in _PREFIXES.items() if magnitude >= scale), (1.0, ""))
+
+
+def finite(value: Any) -> Any:
+    """Return a value for JSON: null for what is infinite or not a number, which JSON lacks."""
+    if isinstance(value, Mapping):
+        return {str(key): finite(item) for key, item in value.items()}
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        return [finite(item) for item in value]
+    if isinstance(value, float) and not abs(value) < float("inf"):
+        return None
+    return value
 
 
 def by_group(names: Iterable[str]) -> str:

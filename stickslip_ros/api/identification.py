@@ -1,16 +1,19 @@
 """Identification: a model of a drive from recordings."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+from typing_extensions import override
 
 from stickslip_ros.api.results import Parts, Result
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.identification.findings import Findings
+from stickslip_ros.identification.findings import Findings, notes_on
 from stickslip_ros.identification.fit import Estimate
 from stickslip_ros.identification.identify import AUTO, identify_recordings
-from stickslip_ros.identification.record import read_all, read_records
+from stickslip_ros.identification.record import Record, read_all, read_records
 from stickslip_ros.identification.scenario import written_scenario
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.plots.identification_table import identification_tables
@@ -19,6 +22,7 @@ from stickslip_ros.scenarios.files import Scenario, load_scenario
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from stickslip_ros.api.page import Summary
     from stickslip_ros.plots.style import FigureStyle
 
 
@@ -28,6 +32,8 @@ class Model(Result):
 
     findings: Findings
     """All that was found: candidates, curves, correlations, errors."""
+    predicted: Mapping[str, Record] = field(default_factory=dict[str, Record])
+    """Recordings that are not fitted, of which the result says what it predicts, by name."""
 
     @property
     def law(self) -> str:
@@ -106,14 +112,87 @@ class Model(Result):
         written_scenario(self.findings, Path(path))
         return load_scenario(str(path))
 
-    def _figure(self, style: "FigureStyle") -> "Figure":
+    @override
+    def draw(self, style: "FigureStyle") -> "Figure":
         from stickslip_ros.plots.identification_figure import identification_figure
 
         return identification_figure(self.findings, style=style)
 
-    def _parts(self) -> Parts:
+    @cached_property
+    def predictions(self) -> dict[str, dict[str, float | None]]:
+        """What `check` returns of the first recording that was fitted, and of those to check."""
+        records = {"": self.findings.records[0], **self.predicted}
+        return {name: self.findings.check(record) for name, record in records.items()}
+
+    @property
+    def _checks(self) -> list[dict[str, Any]]:
+        return [{"recording": name, **self.predictions[name]} for name in self.predicted]
+
+    @property
+    def _notes(self) -> list[str]:
+        others = (notes_on(self.findings, record) for record in self.predicted.values())
+        return [*self.findings.notes, *(note for notes in others for note in notes)]
+
+    @override
+    def _entries(self) -> dict[str, Any]:
         found = self.findings
-        return identification_tables(found, found.check(found.records[0]), [], found.notes)
+        curves: list[dict[str, Any]] = []
+        for number, direction in enumerate(found.directions):
+            curve = found.friction(number)
+            curves.append(
+                {
+                    "direction": direction,
+                    "speed": curve.speed.tolist(),
+                    "force": curve.force.tolist(),
+                    "standard_error": curve.standard_error.tolist(),
+                }
+            )
+        return {
+            "law": found.law,
+            "parameters": {
+                name: {
+                    "value": estimate.value,
+                    "standard_error": estimate.standard_error,
+                    "interval": list(estimate.interval),
+                }
+                for name, estimate in self.parameters.items()
+            },
+            "correlations": [
+                {"parameters": [f"plant.{first}", f"plant.{second}"], "correlation": value}
+                for first, second, value in found.correlations
+            ],
+            "unidentified": self.unidentified,
+            **self.predictions[""],
+            "candidates": [
+                {
+                    "law": each.law,
+                    "constants": each.size,
+                    "held_out_error": each.error,
+                    "by_direction": each.by_direction,
+                    "as_good": found.as_good.get(each.label, False),
+                    "remark": each.remark,
+                }
+                for each in found.candidates
+            ],
+            "curves": curves,
+            "notes": self._notes,
+            "servo": None if found.servo is None else vars(found.servo),
+            "force_delay": found.delay,
+            "checks": self._checks,
+        }
+
+    @override
+    def _summary(self) -> "Summary":
+        from stickslip_ros.api.page import Summary
+
+        found = self.findings
+        names = ", ".join(dict.fromkeys(record.name for record in found.records))
+        verdict = f"friction law {found.law}, {found.chosen.error:.3%} error held out"
+        return Summary("Identified drive", names, verdict)
+
+    @override
+    def parts(self) -> Parts:
+        return identification_tables(self.findings, self.predictions[""], self._checks, self._notes)
 
 
 def identify(
@@ -125,6 +204,8 @@ def identify(
     end: float = float("inf"),
     namespace: str | None = None,
     belt_speed: float | None = None,
+    check: Sequence[Path | str] = (),
+    progress: Callable[[str], None] = lambda _: None,
 ) -> Model:
     """Fit a model to recordings of a drive.
 
@@ -144,6 +225,10 @@ def identify(
         ROS namespace of the drive, where a bag holds several.
     belt_speed : float, optional
         Belt speed, m/s, in place of what the recordings have.
+    check : sequence of Path or str, optional
+        Recordings that are not fitted, of which the result says what the model predicts.
+    progress : callable, optional
+        Receives the name of the friction law that is tried.
 
     Returns
     -------
@@ -170,12 +255,19 @@ def identify(
     >>> f"{model.drive.stiffness:.4g} N/m"
     '1e+06 N/m'
     """
+    fitted, others = ([*dict.fromkeys(map(Path, paths))] for paths in (recordings, check))
     read = read_all(
-        [Path(each) for each in recordings],
+        [*fitted, *others],
         columns,
         start=start,
         end=end,
         namespace=namespace,
         belt_speed=belt_speed,
     )
-    return Model(identify_recordings([*read.values()], law, {} if fixed is None else fixed))
+    found = identify_recordings([read[path] for path in fitted], law, dict(fixed or {}), progress)
+    predicted = {
+        str(path) if len(read[path].records) == 1 else f"{path}, part {number}": record
+        for path in others
+        for number, record in enumerate(read[path].records, start=1)
+    }
+    return Model(found, predicted)

@@ -1,14 +1,15 @@
 """Recorded runs: the samples in a bag or a table, and their measures."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from typing_extensions import override
 
-from stickslip_ros.api.results import Parts, Quantity, Table, TabularResult
+from stickslip_ros.api.results import Parts, Quantity, Result, Table, TabularResult
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.bags.reader import Recording
 from stickslip_ros.bags.report import report_of_recording
@@ -19,16 +20,20 @@ from stickslip_ros.physics.measures.cycle_measures import Measures, measures_of
 from stickslip_ros.physics.measures.slips import SlipThreshold
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.plots.measure_table import report_tables
+from stickslip_ros.plots.parameter_tables import recorded_tables
 from stickslip_ros.plots.run_history import RunHistory
 from stickslip_ros.plots.units import Units
 from stickslip_ros.samples import ForceColumns, SampleColumns
 from stickslip_ros.scenarios.curve_file import CURVES, as_pairs
-from stickslip_ros.scenarios.parameters import PlantParameters
+from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, PlantParameters
 from stickslip_ros.stamps import NANOSECONDS
+from stickslip_ros.tables import TextTable
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from stickslip_ros.api.page import Summary
+    from stickslip_ros.plots.run_figure import DrawnRun
     from stickslip_ros.plots.style import FigureStyle
 
 _COLUMNS = {name: Quantity(*labelled) for name, labelled in QUANTITIES.items()} | {
@@ -56,6 +61,8 @@ class RecordedRun(TabularResult):
     """The drive whose parameters were recorded; None if the bag does not hold them."""
     _history: RunHistory
     """The data of the figure."""
+    _is_table: bool
+    _namespace: str | None
 
     @property
     def measures(self) -> Measures:
@@ -67,11 +74,37 @@ class RecordedRun(TabularResult):
         """Sentences on the parts that are missing in the bag."""
         return self.report["missing"]
 
-    def _figure(self, style: "FigureStyle") -> "Figure":
-        from stickslip_ros.plots.run_figure import DrawnRun, run_figure
+    def as_drawn(self) -> "DrawnRun":
+        """Return what figures draw of the run."""
+        from stickslip_ros.plots.run_figure import DrawnRun
 
-        drawn = DrawnRun.recorded(self.path, self._history, self.report, self.drive)
-        return run_figure(drawn, style=style)
+        return DrawnRun.recorded(self.path, self._history, self.report, self.drive)
+
+    @property
+    def verdict(self) -> str:
+        """Regime, amplitude, frequency and stick fraction as a line of text."""
+        from stickslip_ros.plots.panels import measures_text
+
+        return measures_text(self.measures, Units.for_drive(self.drive))
+
+    def settings(self) -> Iterator[TextTable]:
+        """Yield the tables of the parameters and versions that were recorded."""
+        if not self._is_table:
+            with Recording(self.path, self._namespace) as recording:
+                names = [*NODE_PARAMETERS, "versions"]
+                found = {name: recording.metadata(f"stickslip_ros/{name}") for name in names}
+            known = {name: texts for name, texts in found.items() if texts}
+            yield from recorded_tables(known, Units.for_drive(self.drive))
+
+    @override
+    def _summary(self) -> "Summary":
+        from stickslip_ros.api.page import Summary
+
+        return Summary("Recorded run", str(self.path), self.verdict, self.settings())
+
+    @override
+    def draw(self, style: "FigureStyle") -> "Figure":
+        return Comparison((self,)).draw(style)
 
     def _table(self) -> Table:
         samples = self.samples
@@ -85,9 +118,53 @@ class RecordedRun(TabularResult):
         units, source = Units.for_drive(self.drive), {"bag": str(self.path)}
         return Table(columns, _COLUMNS, units, {"time": time}, source, "time")
 
-    def _parts(self) -> Parts:
-        path = str(self.path)
-        return report_tables({path: self.report}, {path: self.drive})
+    @override
+    def _entries(self) -> dict[str, Any]:
+        return {**self.report, "bag": str(self.path)}
+
+    @override
+    def parts(self) -> Parts:
+        return Comparison((self,)).parts()
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Comparison(Result):
+    """Recorded runs side by side."""
+
+    runs: tuple[RecordedRun, ...]
+    """The runs."""
+
+    @override
+    def draw(self, style: "FigureStyle") -> "Figure":
+        from stickslip_ros.plots.run_figure import run_figure
+
+        return run_figure(*(run.as_drawn() for run in self.runs), style=style)
+
+    @override
+    def _entries(self) -> dict[str, Any]:
+        reports = [run.to_dict() for run in self.runs]
+        for report in reports:
+            del report["versions"]
+        return {"reports": reports}
+
+    @override
+    def _summary(self) -> "Summary":
+        from stickslip_ros.api.page import Summary
+
+        found = {str(run.path): run.verdict for run in self.runs}
+        verdict = "; ".join(f"{path}: {text}" for path, text in found.items())
+        parameters = [
+            table._replace(title=str(run.path)) for run in self.runs for table in run.settings()
+        ]
+        return Summary("Recorded runs compared", ", ".join(found), verdict, parameters)
+
+    @override
+    def parts(self) -> Parts:
+        runs = {str(run.path): run for run in self.runs}
+        return report_tables(
+            {path: run.report for path, run in runs.items()},
+            {path: run.drive for path, run in runs.items()},
+        )
 
 
 def read_bag(
@@ -133,9 +210,8 @@ def read_bag(
     >>> recorded.measures.regime.value, f"{recorded.measures.amplitude:.2e}"
     ('stick_slip', '3.26e-04')
     """
-    return _recorded_run(
+    return recorded_run(
         Path(path),
-        recorded_drive(Path(path), namespace),
         table=False,
         start=start,
         end=end,
@@ -199,9 +275,8 @@ def read_table(
     >>> run.measures.regime.value, round(1e6 * run.measures.amplitude)
     ('stick_slip', 434)
     """
-    return _recorded_run(
+    return recorded_run(
         Path(path),
-        None,
         table=True,
         columns=columns,
         start=start,
@@ -212,8 +287,19 @@ def read_table(
     )
 
 
-def _recorded_run(path: Path, drive: Drive | None, **options: Any) -> RecordedRun:
-    """Return the run that a report with these options is made of."""
+def recorded_run(
+    path: Path,
+    *,
+    table: bool | None = None,
+    namespace: str | None = None,
+    kept: bool = True,
+    drawn: bool = True,
+    **options: Any,
+) -> RecordedRun:
+    """Return the run that `report_of_recording` with these options measures.
+
+    Its samples need not be `kept`; a run that is not to be `drawn` is measured faster.
+    """
     history = RunHistory()
     samples: list[SampleColumns] = []
     forces: list[ForceColumns] = []
@@ -224,16 +310,24 @@ def _recorded_run(path: Path, drive: Drive | None, **options: Any) -> RecordedRu
         else:
             forces.append(part)
 
-    made = report_of_recording(path, observer=history, take=take, **options)
+    taking: dict[str, Any] = {"take": take} if kept else {}
+    observer = history if drawn else None
+    table = is_table(path) if table is None else table
+    report = report_of_recording(
+        path, table=table, namespace=namespace, observer=observer, **taking, **options
+    )
+    drive = None if table else recorded_drive(path, namespace)
     nothing = np.empty(0)
     stamps = np.empty(0, dtype=np.int64)
     return RecordedRun(
         path,
         SampleColumns(stamps, *[nothing] * 5).followed_by(*samples),
         ForceColumns(stamps, nothing).followed_by(*forces),
-        made,
+        report,
         drive,
         history,
+        table,
+        namespace,
     )
 
 

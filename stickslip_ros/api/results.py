@@ -1,12 +1,13 @@
-"""Base of all results: they print, draw themselves, and become tables."""
+"""Base of all results: they print, become JSON, draw themselves, and are tables."""
 
+import json
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import partial
-from html import escape
 from importlib import import_module
 from io import BytesIO
-from typing import TYPE_CHECKING, Any, NamedTuple
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple, TextIO
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from stickslip_ros.errors import RunError
 from stickslip_ros.plots.units import Units
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.tables import TextTable
-from stickslip_ros.text import printable
+from stickslip_ros.text import finite, printable
 from stickslip_ros.versions import versions
 
 if TYPE_CHECKING:
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from pandas import DataFrame
     from xarray import Dataset
 
+    from stickslip_ros.api.page import Summary
     from stickslip_ros.plots.style import FigureStyle
 
 Parts = Iterable[TextTable | str]
@@ -29,15 +31,81 @@ Parts = Iterable[TextTable | str]
 
 
 class Result(ABC):
-    """A result that prints as tables, plain in a terminal, HTML in a notebook, and has a figure."""
+    """A result that prints as tables, plain in a terminal, HTML in a notebook, and has a figure.
+
+    The command of the result prints, writes and draws the same.
+    """
 
     @abstractmethod
-    def _parts(self) -> Parts:
-        """Return the tables and sentences."""
+    def parts(self) -> Parts:
+        """Return the tables and sentences that the result prints as."""
 
     @abstractmethod
-    def _figure(self, style: "FigureStyle") -> "Figure":
-        """Return the figure; what draws is imported here."""
+    def draw(self, style: "FigureStyle") -> "Figure":
+        """Return the figure in a style; what draws is imported here.
+
+        Raises InvalidInputError or RunError if there is nothing to draw.
+        """
+
+    @abstractmethod
+    def _entries(self) -> Mapping[str, Any]:
+        """Return the entries of `to_dict` but the versions; a long array is an iterator."""
+
+    @abstractmethod
+    def _summary(self) -> "Summary":
+        """Return what a page says of the result beside its tables and its figure."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the object that the command of this result prints with `--json`.
+
+        Returns
+        -------
+        dict
+            Values in SI units by name, ready for JSON: None for what does not exist or is not
+            finite. `versions` are those of the software that is in use.
+        """
+        return {
+            name: finite([*value] if isinstance(value, Iterator) else value)
+            for name, value in self._with_versions().items()
+        }
+
+    def write_json(self, stream: TextIO) -> None:
+        """Write `to_dict` as JSON; a long array as it comes, because its text takes much memory."""
+        start = "{\n"
+        for name, value in self._with_versions().items():
+            stream.write(f"{start}  {json.dumps(name)}: ")
+            if isinstance(value, Iterator):
+                cells: Iterator[Any] = value
+                for number, cell in enumerate(cells):
+                    stream.write(f"{', ' if number else '['}{json.dumps(finite(cell))}")
+                stream.write("]")
+            else:
+                text = json.dumps(finite(value), indent=2, allow_nan=False)
+                stream.write(text.replace("\n", "\n  "))
+            start = ",\n"
+        stream.write("\n}\n")
+
+    def to_html(self, path: Path | str, **options: Any) -> None:
+        """Write the page that the command of this result writes with `--html`.
+
+        Parameters
+        ----------
+        path : Path or str
+            File to write; an existing one is replaced. The page needs no other file and no network.
+        **options : Any
+            Options of `plot` except the style.
+
+        Raises
+        ------
+        OSError
+            If the file cannot be written.
+        """
+        from stickslip_ros.api.page import write_page
+
+        write_page(Path(path), self._summary(), self.parts(), partial(self.draw, **options))
+
+    def _with_versions(self) -> dict[str, Any]:
+        return {**self._entries(), "versions": versions()}
 
     def plot(self, *, style: str = "screen") -> "Figure":
         """Return the figure that the command of this result draws with `--plot`.
@@ -65,21 +133,20 @@ class Result(ABC):
         """Return the figure in the style of that name, as notebooks show it."""
         from stickslip_ros.plots.style import style_named
 
-        figure = self._figure(style_named(style), **options)
+        figure = self.draw(style_named(style), **options)
         vars(figure)["_repr_png_"] = partial(_png, figure)  # pyplot does not know it
         return figure
 
     def __repr__(self) -> str:
         return "\n".join(
             printable(part) if isinstance(part, str) else "\n".join(part.lines())
-            for part in self._parts()
+            for part in self.parts()
         )
 
     def _repr_html_(self) -> str:
-        return "\n".join(
-            f"<p>{escape(printable(part))}</p>" if isinstance(part, str) else part.html()
-            for part in self._parts()
-        )
+        from stickslip_ros.api.page import notebook_html
+
+        return notebook_html(self.parts())
 
 
 class Quantity(NamedTuple):
@@ -186,7 +253,7 @@ class TabularResult(Result):
         return found
 
 
-def provenance(scenario: Scenario) -> dict[str, str]:
+def attributes(scenario: Scenario) -> dict[str, str]:
     """Return the attributes of a data set: scenario, overrides and version."""
     return {
         "scenario": scenario.name,

@@ -1,18 +1,23 @@
 """Simulated runs: trajectory and measures of a scenario."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
-from stickslip_ros.api.results import Parts, Quantity, Table, TabularResult, provenance
+from typing_extensions import override
+
+from stickslip_ros.api.results import Parts, Quantity, Table, TabularResult, attributes
 from stickslip_ros.api.scenarios import ScenarioLike, as_scenario
 from stickslip_ros.physics.loop.trajectory import (
     MEASURED,
     QUANTITIES,
+    SampleRecorder,
     Trajectory,
     TrajectoryRecorder,
 )
 from stickslip_ros.physics.measures.cycle_measures import Measures
 from stickslip_ros.plots.measure_table import simulation_tables
+from stickslip_ros.plots.parameter_tables import scenario_tables
 from stickslip_ros.plots.run_history import RunHistory
 from stickslip_ros.plots.units import Units
 from stickslip_ros.progress import Progress
@@ -23,6 +28,7 @@ from stickslip_ros.studies import simulate as simulation
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from stickslip_ros.api.page import Summary
     from stickslip_ros.plots.style import FigureStyle
 
 _COLUMNS = {name: Quantity(*labelled) for name, labelled in {**QUANTITIES, **MEASURED}.items()}
@@ -43,12 +49,19 @@ class Run(TabularResult):
     them; with a sensor, of what it tells."""
     truth: Measures | None
     """With a sensor, the measures of the motion itself; else None."""
-    trajectory: Trajectory
-    """The motion at the samples t = n/rate, as numpy arrays."""
+    _recorder: SampleRecorder | None
+    """What has taken the samples."""
     _history: RunHistory
     """The data of the figure."""
 
-    def _figure(self, style: "FigureStyle") -> "Figure":
+    @cached_property
+    def trajectory(self) -> Trajectory:
+        """The motion at the samples t = n/rate, as numpy arrays."""
+        assert isinstance(self._recorder, TrajectoryRecorder)
+        return self._recorder.trajectory()
+
+    @override
+    def draw(self, style: "FigureStyle") -> "Figure":
         from stickslip_ros.plots.run_figure import DrawnRun, run_figure
 
         drawn = DrawnRun.simulated(self.scenario, self._history, self.truth or self.measures)
@@ -57,13 +70,29 @@ class Run(TabularResult):
     def _table(self) -> Table:
         columns = vars(self.trajectory)
         time = {"time": self.trajectory.time}
-        return Table(columns, _COLUMNS, self._units, time, provenance(self.scenario), "time")
+        return Table(columns, _COLUMNS, self._units, time, attributes(self.scenario), "time")
 
     @property
     def _units(self) -> Units:
         return Units.for_drive(self.scenario.plant.as_drive())
 
-    def _parts(self) -> Parts:
+    @override
+    def _entries(self) -> dict[str, Any]:
+        truth = None if self.truth is None else self.truth.as_dict()
+        values = {**self.measures.as_dict(), "truth": truth, "duration": self.duration}
+        return {**values, **self.scenario.provenance()}
+
+    @override
+    def _summary(self) -> "Summary":
+        from stickslip_ros.api.page import Summary
+        from stickslip_ros.plots.panels import measures_text
+
+        verdict = measures_text(self.measures, self._units)
+        parameters = scenario_tables(self.scenario, used=True)
+        return Summary("Simulated run", self.scenario.name, verdict, parameters)
+
+    @override
+    def parts(self) -> Parts:
         return simulation_tables(self.scenario, self.duration, self.measures, self.truth)
 
 
@@ -110,17 +139,33 @@ def simulate(
     chosen = as_scenario(scenario)
     given = simulation.default_duration(chosen) if duration is None else duration
     length = number_of("duration", given, "s")
-    measured = simulation.sensor_meter(chosen)
+    recorder = TrajectoryRecorder(chosen.plant.rate, measured=not chosen.plant.sensor.exact)
+    return measured_run(chosen, length, continuous=continuous, recorder=recorder, progress=progress)
+
+
+def measured_run(
+    scenario: Scenario,
+    duration: float,
+    *,
+    continuous: bool,
+    recorder: SampleRecorder | None,
+    drawn: bool = True,
+    progress: Progress,
+) -> Run:
+    """Simulate and measure a run (s); a `recorder` takes its samples.
+
+    A run that is not to be `drawn` is simulated faster.
+    """
+    measured = simulation.sensor_meter(scenario)
     history = RunHistory()
-    recorder = TrajectoryRecorder(chosen.plant.rate, measured=measured is not None)
     true = simulation.simulate(
-        chosen,
-        length,
+        scenario,
+        duration,
         continuous=continuous,
         progress=progress,
-        observer=history,
+        observer=history if drawn else None,
         recorder=recorder,
         measured=measured,
     )
     measures, truth = (true, None) if measured is None else (measured.measures(), true)
-    return Run(chosen, length, continuous, measures, truth, recorder.trajectory(), history)
+    return Run(scenario, duration, continuous, measures, truth, recorder, history)

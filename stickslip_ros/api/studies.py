@@ -1,21 +1,26 @@
 """Studies: sweeps over parameters, and basins of attraction."""
 
+from abc import abstractmethod
+from collections import Counter
 from collections.abc import Mapping
 from concurrent.futures import Executor
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from operator import index
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from typing_extensions import override
 
-from stickslip_ros.api.results import Parts, Quantity, Table, TabularResult, provenance
+from stickslip_ros.api.results import Parts, Quantity, Table, TabularResult, attributes
 from stickslip_ros.api.scenarios import ScenarioLike, as_scenario
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.physics.measures.cycle_measures import Regime
 from stickslip_ros.plots.measure_table import LABELS
-from stickslip_ros.plots.study_tables import basin_table, sweep_table, units_of
+from stickslip_ros.plots.parameter_tables import scenario_tables
+from stickslip_ros.plots.study_tables import attractor_name, basin_table, sweep_table, units_of
 from stickslip_ros.quantities import number_of
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.scenarios.keywords import described, keyword_of, parameter_of
@@ -28,7 +33,7 @@ from stickslip_ros.studies.basin import (
     basin_study,
     default_axes,
 )
-from stickslip_ros.studies.columns import Columns
+from stickslip_ros.studies.columns import Columns, Further, json_entries
 from stickslip_ros.studies.options import BASIN_COUNT, BASIN_OPTIONS
 from stickslip_ros.studies.plan import Axis, Continuation, Grid, ListedAxis, RandomSample
 from stickslip_ros.studies.runner import CountPoints, compute_columns
@@ -39,6 +44,7 @@ from stickslip_ros.text import shown
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from stickslip_ros.api.page import Summary
     from stickslip_ros.plots.study_figure import Colour
     from stickslip_ros.plots.style import FigureStyle
 
@@ -47,7 +53,7 @@ Values = tuple[float | str, float | str, int] | tuple[float | str, float | str, 
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class _Result(TabularResult):
+class Points(TabularResult):
     """The points of a study as columns."""
 
     study: Study
@@ -59,6 +65,20 @@ class _Result(TabularResult):
     def scenario(self) -> Scenario:
         """The scenario that was varied."""
         return self.study.scenario
+
+    @property
+    @abstractmethod
+    def further(self) -> Further:
+        """Further columns of a table: a value for each point, by name."""
+
+    @abstractmethod
+    def _found(self) -> dict[str, Any]:
+        """Return what belongs to all points together, for JSON."""
+
+    @override
+    def _entries(self) -> dict[str, Any]:
+        columns = json_entries(self.study, self.columns, self.further)
+        return {**self.scenario.provenance(), **self._found(), **columns}
 
     def _table(self) -> Table:
         columns, plan = self.columns, self.study.plan
@@ -81,11 +101,11 @@ class _Result(TabularResult):
         quantities["steady"] = Quantity("whether the motion has settled")
         quantities["turning_points"] = Quantity("displacement where the velocity is zero", "m")
         quantities["reason"] = Quantity("why there is no cycle")
-        units, attributes = units_of(self.study), provenance(self.scenario)
-        return Table(found, quantities, units, dimensions, attributes)
+        units = units_of(self.study)
+        return Table(found, quantities, units, dimensions, attributes(self.scenario))
 
 
-class Sweep(_Result):
+class Sweep(Points):
     """Settled motions over one or two parameters; it prints as a table of regimes."""
 
     @cached_property
@@ -94,10 +114,14 @@ class Sweep(_Result):
 
         A sweep over two parameters has none here: its figure shows them as curves.
         """
+        axis, *others = self._axes
+        return {} if others else theory.transitions(self.study, axis)
+
+    @property
+    def _axes(self) -> tuple[Axis, ...]:
         plan = self.study.plan
         assert isinstance(plan, Grid)
-        axis, *others = plan.axes
-        return {} if others else theory.transitions(self.study, axis)
+        return plan.axes
 
     def plot(self, colour: "Colour" = "regime", *, style: str = "screen") -> "Figure":
         """Return the figure that `stickslip sweep --plot` draws.
@@ -121,16 +145,48 @@ class Sweep(_Result):
         """
         return self._drawn(style, colour=colour)
 
-    def _figure(self, style: "FigureStyle", colour: "Colour" = "regime") -> "Figure":
+    @property
+    @override
+    def further(self) -> Further:
+        """The direction in which each point is carried on, if any."""
+        plan = self.study.plan
+        assert isinstance(plan, Grid)
+        if not plan.continuation:
+            return {}
+        return {"direction": [plan.direction(number) for number in range(plan.size)]}
+
+    def _found(self) -> dict[str, Any]:
+        found = self.transitions.items()
+        return {"transitions": {name.lower().replace(" ", "_"): values for name, values in found}}
+
+    @override
+    def draw(self, style: "FigureStyle", colour: "Colour" = "regime") -> "Figure":
         from stickslip_ros.plots.study_figure import sweep_figure
 
         return sweep_figure(self.columns, self.study, colour, style=style)
 
-    def _parts(self) -> Parts:
+    @override
+    def _summary(self) -> "Summary":
+        from stickslip_ros.api.page import Summary
+
+        counts = Counter(map(Regime.label, self.columns.regime))
+        verdict = ", ".join(f"{regime} at {count}" for regime, count in counts.items())
+        return Summary(
+            f"Sweep over {' and '.join(self.study.plan.parameters)}",
+            self.scenario.name,
+            f"{verdict} of {self.study.plan.size} points",
+            scenario_tables(self.scenario, used=True),
+        )
+
+    @override
+    def parts(self) -> Parts:
         yield sweep_table(self.study, self.columns)
+        units = units_of(self.study)
+        for name, values in self.transitions.items():
+            yield f"{name}: {', '.join(units.texts(values, self._axes[0].unit))}"
 
 
-class Basin(_Result):
+class Basin(Points):
     """The motion that each start leads to; it prints as a table of these motions."""
 
     @cached_property
@@ -143,7 +199,17 @@ class Basin(_Result):
         """The motions that the starts lead to, the one with most starts first."""
         return self.basins.attractors
 
-    def _figure(self, style: "FigureStyle") -> "Figure":
+    @property
+    @override
+    def further(self) -> Further:
+        """The place in the attractors of each start."""
+        return {"attractor": self.basins.places.tolist()}
+
+    def _found(self) -> dict[str, Any]:
+        return {"attractors": [asdict(attractor) for attractor in self.attractors]}
+
+    @override
+    def draw(self, style: "FigureStyle") -> "Figure":
         from stickslip_ros.plots.study_figure import basin_figure
 
         return basin_figure(self.columns, self.basins, self.study, style=style)
@@ -158,7 +224,17 @@ class Basin(_Result):
             },
         )
 
-    def _parts(self) -> Parts:
+    @override
+    def _summary(self) -> "Summary":
+        from stickslip_ros.api.page import Summary
+
+        shares = [f"{attractor_name(each)} {each.share:.1%}" for each in self.attractors]
+        parameters = scenario_tables(self.scenario, used=True)
+        title = "Basins of attraction"
+        return Summary(title, self.scenario.name, ", ".join(shares), parameters)
+
+    @override
+    def parts(self) -> Parts:
         yield basin_table(self.study, self.basins)
 
 

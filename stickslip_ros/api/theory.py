@@ -1,11 +1,12 @@
 """Theory and design: the stability of a scenario, and gains for it."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass
 from math import nan
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from typing_extensions import override
 
 from stickslip_ros.api.results import (
     Parts,
@@ -13,14 +14,22 @@ from stickslip_ros.api.results import (
     Result,
     Table,
     TabularResult,
+    attributes,
     optional,
-    provenance,
 )
 from stickslip_ros.api.scenarios import ScenarioLike, as_scenario
 from stickslip_ros.errors import InvalidInputError, RunError
 from stickslip_ros.physics.model.control import Washout
 from stickslip_ros.physics.theory.linear_system import LinearSystem
-from stickslip_ros.plots.study_tables import CHECKS, design_tables, stability_tables
+from stickslip_ros.plots.parameter_tables import scenario_tables
+from stickslip_ros.plots.study_tables import (
+    CHECKS,
+    CONTROLLER,
+    MARGINS,
+    WORST,
+    design_tables,
+    stability_tables,
+)
 from stickslip_ros.plots.units import Units
 from stickslip_ros.progress import Progress
 from stickslip_ros.quantities import number_of
@@ -32,6 +41,7 @@ from stickslip_ros.text import shown
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from stickslip_ros.api.page import Summary
     from stickslip_ros.plots.style import FigureStyle
 
 
@@ -109,7 +119,8 @@ class Stability(Result):
             outputs=["position", "velocity"],
         )
 
-    def _figure(self, style: "FigureStyle") -> "Figure":
+    @override
+    def draw(self, style: "FigureStyle") -> "Figure":
         reason = stabilities.why_no_figure(self.scenario)
         if reason is not None:
             raise InvalidInputError(f"there is nothing to draw: {reason}")
@@ -117,9 +128,26 @@ class Stability(Result):
 
         return scenario_stability_figure(self.scenario, style=style)
 
-    def _parts(self) -> Parts:
+    @override
+    def _entries(self) -> dict[str, Any]:
         found = {name: value for name, value in vars(self).items() if name != "scenario"}
-        return stability_tables(self.scenario, found, dict(self.notes))
+        return {**found, **self.scenario.provenance()}
+
+    @override
+    def _summary(self) -> "Summary":
+        from stickslip_ros.api.page import Summary
+
+        loops = {"without control": self.open_loop, "sampled loop": self.sampled_loop}
+        known = {name: loop["stable"] for name, loop in loops.items() if loop["stable"] is not None}
+        verdict = "; ".join(
+            f"{name}: {'stable' if stable else 'unstable'}" for name, stable in known.items()
+        )
+        parameters = scenario_tables(self.scenario, used=True)
+        return Summary("Stability", self.scenario.name, verdict, parameters)
+
+    @override
+    def parts(self) -> Parts:
+        return stability_tables(self.scenario, vars(self), dict(self.notes))
 
 
 def stability(scenario: ScenarioLike) -> Stability:
@@ -195,7 +223,8 @@ class Proposal(TabularResult):
             raise RunError(self._nothing)
         return scenario
 
-    def _figure(self, style: "FigureStyle") -> "Figure":
+    @override
+    def draw(self, style: "FigureStyle") -> "Figure":
         if self.design.map_around() is None:
             raise RunError(self._nothing)
         from stickslip_ros.plots.stability_figure import design_figure
@@ -211,16 +240,56 @@ class Proposal(TabularResult):
         columns = {name: np.array([check[name] for check in checks]) for name in CHECKS}
         quantities = {name: Quantity(*labelled) for name, labelled in CHECKS.items()}
         speeds = {"belt_speed": columns["belt_speed"]}
-        attributes = provenance(task.scenario) if task.scenario else {}
-        return Table(columns, quantities, Units.for_drive(task.drive), speeds, attributes)
+        source = attributes(task.scenario) if task.scenario else {}
+        return Table(columns, quantities, Units.for_drive(task.drive), speeds, source)
+
+    @override
+    def _entries(self) -> dict[str, Any]:
+        found, task = self.design, self.design.task
+        checks = [asdict(check) for check in found.checks]
+        return {
+            "belt_speeds": list(task.belt_speeds),
+            **(asdict(found.controller) if found.controller else dict.fromkeys(CONTROLLER)),
+            "force_limit": task.force_limit,
+            "worst_belt_speed": found.slowest.drive.belt_speed if found.slowest else None,
+            "decay_rate": min((check.decay_rate for check in found.checks), default=None),
+            **{name: _largest(check[name] for check in checks) for name in WORST},
+            "margins": asdict(found.margins) if found.margins else dict.fromkeys(MARGINS),
+            "checks": checks,
+            "parameter_file": found.parameter_file,
+            "remark": found.remark,
+            **(task.scenario.provenance() if task.scenario else {}),
+        }
 
     @property
     def _nothing(self) -> str:
         return f"there is nothing to propose: {self.remark}"
 
-    def _parts(self) -> Parts:
-        scenario = self.design.task.scenario
-        return design_tables(scenario.name if scenario else "", self.design)
+    @override
+    def _summary(self) -> "Summary":
+        from stickslip_ros.api.page import Summary
+
+        task, units = self.design.task, Units.for_drive(self.design.task.drive)
+        controller = {} if self.controller is None else asdict(self.controller)
+        gains = [
+            f"{label} {units.text(controller[name], unit)}"
+            for name, (label, unit) in CONTROLLER.items()
+            if name in controller
+        ]
+        return Summary(
+            "Controller design",
+            self._name,
+            ", ".join(gains) or "nothing to propose",
+            scenario_tables(task.scenario, used=True) if task.scenario else (),
+        )
+
+    @property
+    def _name(self) -> str:
+        return self.design.task.scenario.name if self.design.task.scenario else ""
+
+    @override
+    def parts(self) -> Parts:
+        return design_tables(self._name, self.design)
 
 
 def design(
@@ -266,6 +335,10 @@ def design(
         chosen = chosen.overridden([], {f"{chosen.controller.node}.force_limit": force_limit})
     task = designing.Task.from_scenario(chosen, _range(belt_speed))
     return Proposal(designing.design(task, progress))
+
+
+def _largest(values: Iterable[float | None]) -> float | None:
+    return max((value for value in values if value is not None), default=None)
 
 
 def _range(belt_speed: Any) -> tuple[float, float] | None:

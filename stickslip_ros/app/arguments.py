@@ -2,44 +2,29 @@
 
 import argparse
 import os
-import warnings
 from collections.abc import Callable, Collection, Generator
 from contextlib import contextmanager
-from dataclasses import replace
 from functools import partial
 from math import inf, isfinite, nan, ulp
 from pathlib import Path
 from tempfile import TemporaryFile
 from typing import TYPE_CHECKING, Any
 
-from stickslip_ros.app.optional_dependencies import load_matplotlib
 from stickslip_ros.app.output import tell
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.files import open_regular
 from stickslip_ros.quantities import number_of
 from stickslip_ros.scenarios import DEFAULT_NAMESPACE, LONGEST_NAMESPACE
 from stickslip_ros.text import shown
-from stickslip_ros.versions import versions
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from stickslip_ros.plots.style import FigureStyle
     from stickslip_ros.scenarios.files import Scenario
 
 DEFAULT_CONTROLLER = "(default: the one that the scenario has a section for)"
 """Default of --controller, for its help."""
 
-_FIGURE_FILES = (".png", ".svg", ".pdf")
-
 _DOUBTFUL_RATIO = 10.0
 """Belt speed, in scales of speed, beyond which it may be in another unit."""
-
-_LEAST_INCHES, _MOST_INCHES = 2, 50
-"""Width and height of a figure, inches."""
-_MOST_PIXELS = 2e8
-_STYLES = "screen", "paper", "paper-double"
-"""The names of `plots.style.STYLES`; importing that takes long."""
 
 
 def add_scenario_file(parser: argparse.ArgumentParser) -> None:
@@ -175,105 +160,6 @@ def add_namespace(parser: argparse.ArgumentParser) -> None:
 def add_network(parser: argparse.ArgumentParser, meaning: str) -> None:
     """Add --network."""
     parser.add_argument("--network", action="store_true", help=meaning)
-
-
-def add_plot(parser: argparse.ArgumentParser, shown: str) -> None:
-    """Add --plot, which draws what is `shown`, and what the figure is to look like."""
-    parser.add_argument(
-        "--plot",
-        type=Path,
-        metavar="FILE",
-        help=f"draw {shown} ({', '.join(_FIGURE_FILES)}); an existing file is replaced",
-    )
-    parser.add_argument(
-        "--size",
-        type=_size,
-        metavar="WxH",
-        help="width and height of the figure, inches, as in --size 6x4",
-    )
-    add_style(parser)
-    parser.add_argument(
-        "--dpi",
-        type=whole("a whole number of dots per inch from {} to {}", 20, 600),
-        metavar="N",
-        help="dots per inch of the figure (default: 130, in the styles for paper 300)",
-    )
-    parser.add_argument("--no-title", action="store_true", help="omit the title of the figure")
-
-
-def add_style(parser: argparse.ArgumentParser) -> None:
-    """Add --style, a name of `plots.style.STYLES`."""
-    parser.add_argument(
-        "--style",
-        choices=_STYLES,
-        help="what a figure is for: a screen, or a column (85 mm) or two (180 mm) of a journal, "
-        "with fonts of 8 points (default: screen)",
-    )
-
-
-def check_figure(arguments: argparse.Namespace) -> None:
-    """Refuse a figure that cannot be written, before anything is computed."""
-    path: Path | None = arguments.plot
-    size: tuple[float, float] | None = arguments.size
-    dpi: int | None = arguments.dpi
-    given = {
-        "--size": size is not None and f"{size[0]:g}x{size[1]:g}",
-        "--dpi": dpi,
-        "--style": arguments.style,
-        "--no-title": arguments.no_title and "",
-    }
-    shown = [
-        f"{name} {value}".rstrip() for name, value in given.items() if value not in (None, False)
-    ]
-    if path is None:
-        if shown:
-            raise InvalidInputError(f"{' '.join(shown)}: needs --plot FILE, which is not given")
-        return
-    if path.suffix.lower() not in _FIGURE_FILES:
-        raise InvalidInputError(f"--plot {path}: must end in one of {', '.join(_FIGURE_FILES)}")
-    if size is not None and dpi is not None and size[0] * size[1] * dpi**2 > _MOST_PIXELS:
-        raise InvalidInputError(
-            f"{' '.join(shown[:2])}: would be {size[0] * size[1] * dpi**2:.3g} pixels, and must be "
-            f"at most {_MOST_PIXELS:g}"
-        )
-    check_writable("--plot", path)
-    load_matplotlib()
-
-
-def write_figure(arguments: argparse.Namespace, draw: "Callable[[FigureStyle], Figure]") -> None:
-    """Draw a figure as it is asked for, and write it to the file that --plot names."""
-    from stickslip_ros.plots.style import STYLES, save
-
-    style = replace(
-        STYLES[arguments.style or "screen"],
-        size=arguments.size,
-        titled=not arguments.no_title,
-    )
-    figure = draw(style)
-    with writing("--plot", arguments.plot), warnings.catch_warnings():
-        warnings.filterwarnings("error", "constrained_layout not applied", UserWarning)
-        try:
-            save(figure, arguments.plot, dots_per_inch=arguments.dpi or style.dots_per_inch)
-        except UserWarning:
-            width, height = figure.get_size_inches()
-            raise InvalidInputError(
-                f"--size {width:g}x{height:g}: is too small for this figure"
-            ) from None
-
-
-def _size(text: str) -> tuple[float, float]:
-    """Parse WIDTHxHEIGHT, inches."""
-    parts = text.lower().split("x")
-    try:
-        width, height = (float(part) for part in parts)
-    except ValueError:
-        width = height = float("nan")
-    if not (_LEAST_INCHES <= width <= _MOST_INCHES and _LEAST_INCHES <= height <= _MOST_INCHES):
-        raise argparse.ArgumentTypeError(
-            f"{text!r} is not WIDTHxHEIGHT in inches, each from {_LEAST_INCHES} to {_MOST_INCHES}, "
-            "such as 6x4"
-        )
-    return width, height
 
 
 def check_new(option: str, path: Path) -> None:
@@ -418,15 +304,6 @@ def law_constants(*needed: str) -> list[str]:
         for constant in law.constants()
         if constant not in needed
     ]
-
-
-def provenance(scenario: "Scenario") -> dict[str, Any]:
-    """Return what a result was made from, for its JSON."""
-    return {
-        "scenario": {"name": scenario.name, **scenario.as_dict()},
-        "overrides": list(scenario.overrides),
-        "versions": versions(),
-    }
 
 
 def namespace_of(text: str) -> str:

@@ -1,19 +1,11 @@
 """`stickslip basin`: which motion a start leads to."""
 
 import argparse
-from dataclasses import asdict
 from typing import TYPE_CHECKING
 
-from stickslip_ros.app.arguments import (
-    add_json,
-    add_plot,
-    add_scenario,
-    check_figure,
-    scenario_of,
-    write_figure,
-)
-from stickslip_ros.app.output import print_table
-from stickslip_ros.app.study_command import add_running, computed, course_of, write_results
+from stickslip_ros.app.arguments import add_json, add_scenario, scenario_of
+from stickslip_ros.app.result import add_plot, check_results
+from stickslip_ros.app.study_command import add_running, computed, course_of, finish
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.studies.options import BASIN_COUNT, BASIN_OPTIONS
 
@@ -56,8 +48,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> None:
     """Run the command."""
-    from stickslip_ros.plots.study_tables import basin_table
-    from stickslip_ros.studies.basin import Basins, basin_study
+    from stickslip_ros.api.studies import Basin
+    from stickslip_ros.studies.basin import basin_study
 
     scenario = scenario_of(arguments)
     study = basin_study(
@@ -66,19 +58,10 @@ def run(arguments: argparse.Namespace) -> None:
         course=course_of(arguments, BASIN_OPTIONS),
         continuous=arguments.continuous_control,
     )
-    check_figure(arguments)
+    check_results(arguments)
     label = f"basins of {scenario.name}, {study.plan.size} starts"
     with computed(arguments, study, label) as journal:
-        columns = journal.columns
-        basins = Basins.from_columns(columns)
-        made = {"attractors": [asdict(attractor) for attractor in basins.attractors]}
-        if arguments.plot is not None:
-            from stickslip_ros.plots.study_figure import basin_figure
-
-            write_figure(arguments, lambda style: basin_figure(columns, basins, study, style=style))
-        write_results(arguments, journal, {"attractor": basins.places.tolist()}, made)
-        if not arguments.json:
-            print_table(*basin_table(study, basins))
+        finish(arguments, journal, Basin(study, journal.columns))
 
 
 def _plan(arguments: argparse.Namespace, scenario: "Scenario") -> "Plan":

@@ -2,25 +2,26 @@
 
 import argparse
 import shlex
-from collections.abc import Iterable
-from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from stickslip_ros.app.arguments import (
     add_json,
-    add_plot,
     add_scenario,
-    check_figure,
     check_new,
     check_speeds,
     law_constants,
-    provenance,
     scenario_of,
-    write_figure,
     writing,
 )
-from stickslip_ros.app.output import print_json, print_parts, progress_bar, tell
+from stickslip_ros.app.output import progress_bar, tell
+from stickslip_ros.app.result import (
+    add_html,
+    add_plot,
+    check_results,
+    print_result,
+    write_results,
+)
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.files import written
 from stickslip_ros.quantities import number_of
@@ -54,12 +55,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="write a complete scenario with the proposed gains; an existing file is refused",
     )
     add_plot(parser, "the decay rate over cutoff frequency and linear gain, and the force limit")
+    add_html(parser)
     add_json(parser)
 
 
 def run(arguments: argparse.Namespace) -> None:
     """Run the command."""
-    from stickslip_ros.plots.study_tables import design_tables
+    from stickslip_ros.api.theory import Proposal
     from stickslip_ros.studies.design import Task, design
 
     proposed = law_constants("force_limit", "start_after")
@@ -71,19 +73,17 @@ def run(arguments: argparse.Namespace) -> None:
     check_speeds(arguments, scenario, *task.belt_speeds)
     if arguments.out is not None:
         check_new("--out", arguments.out)
-    check_figure(arguments)
+    check_results(arguments)
     with progress_bar(f"designing for {scenario.name}", 1.0) as progress:
         found = design(task, progress)
-    if arguments.json:
-        print_json({**_as_dict(found), **provenance(scenario)})
-    else:
-        print_parts(design_tables(scenario.name, found))
-        if found.parameter_file is not None and arguments.out is None:
-            print(
-                "--out FILE writes the scenario with these gains, --json prints it: parameter_file"
-            )
-    if arguments.plot is not None:
-        _draw(arguments, found)
+    proposal = Proposal(found)
+    print_result(arguments, proposal)
+    if not arguments.json and found.parameter_file is not None and arguments.out is None:
+        print("--out FILE writes the scenario with these gains, --json prints it: parameter_file")
+    if arguments.plot is not None and found.map_around() is None:
+        _report_omitted(f"--plot {arguments.plot}: not drawn")
+        arguments.plot = None
+    write_results(arguments, proposal)
     if arguments.out is not None:
         _write(arguments.out, found)
 
@@ -106,38 +106,5 @@ def _write(path: Path, found: "Design") -> None:
     tell(f"{path} is written: `{shlex.join(['stickslip', 'run', str(path)])}` runs it")
 
 
-def _draw(arguments: argparse.Namespace, found: "Design") -> None:
-    from stickslip_ros.plots.stability_figure import design_figure
-
-    if found.map_around() is None:
-        _report_omitted(f"--plot {arguments.plot}: not drawn")
-    else:
-        write_figure(arguments, lambda style: design_figure(found, style=style))
-
-
 def _report_omitted(what: str) -> None:
     tell(f"stickslip design: {what}, because there is nothing to propose")
-
-
-def _as_dict(found: "Design") -> dict[str, Any]:
-    from stickslip_ros.plots.study_tables import CONTROLLER, MARGINS, WORST
-
-    controller, slowest, task = found.controller, found.slowest, found.task
-    values = asdict(controller) if controller else dict.fromkeys(CONTROLLER)
-    checks = [asdict(check) for check in found.checks]
-    return {
-        "belt_speeds": list(task.belt_speeds),
-        **values,
-        "force_limit": task.force_limit,
-        "worst_belt_speed": slowest.drive.belt_speed if slowest else None,
-        "decay_rate": min((check.decay_rate for check in found.checks), default=None),
-        **{name: _largest(check[name] for check in checks) for name in WORST},
-        "margins": asdict(found.margins) if found.margins else dict.fromkeys(MARGINS),
-        "checks": checks,
-        "parameter_file": found.parameter_file,
-        "remark": found.remark,
-    }
-
-
-def _largest(values: Iterable[float | None]) -> float | None:
-    return max((value for value in values if value is not None), default=None)

@@ -8,7 +8,7 @@ from time import monotonic
 from typing import TYPE_CHECKING, Any, Protocol
 
 from stickslip_ros.tables import TextTable
-from stickslip_ros.text import printable
+from stickslip_ros.text import finite, printable
 from stickslip_ros.versions import versions
 
 if TYPE_CHECKING:
@@ -43,17 +43,6 @@ def print_json(values: Mapping[str, Any]) -> None:
     """Print one JSON object, with null for what is not finite, and the versions in use."""
     json.dump(finite({**values, "versions": versions()}), sys.stdout, indent=2, allow_nan=False)
     print()
-
-
-def finite(value: Any) -> Any:
-    """Return a value for JSON: null for what is infinite or not a number, which JSON lacks."""
-    if isinstance(value, Mapping):
-        return {str(key): finite(item) for key, item in value.items()}
-    if isinstance(value, Sequence) and not isinstance(value, str):
-        return [finite(item) for item in value]
-    if isinstance(value, float) and not abs(value) < float("inf"):
-        return None
-    return value
 
 
 def print_values(

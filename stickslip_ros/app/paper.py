@@ -5,9 +5,10 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from stickslip_ros.app.arguments import add_json, add_style, check_writable, writing
+from stickslip_ros.app.arguments import add_json, check_writable, writing
 from stickslip_ros.app.optional_dependencies import load_matplotlib
 from stickslip_ros.app.output import print_json, print_table, progress_bar
+from stickslip_ros.app.result import add_style
 from stickslip_ros.files import written
 
 if TYPE_CHECKING:

@@ -24,7 +24,6 @@ from stickslip_ros.app.arguments import (
     law_constants,
     namespace_of,
     naming,
-    provenance,
     scenario_of,
     seconds,
 )
@@ -128,7 +127,7 @@ def run(arguments: argparse.Namespace) -> int:
         )
     if arguments.json:
         command = shlex.join([arguments.controller, *arguments.further]) if controller else None
-        print_json({**results, "controller_command": command, **provenance(scenario)})
+        print_json({**results, "controller_command": command, **scenario.provenance()})
     else:
         report, drive = results["report"], scenario.plant.as_drive()
         print_values(scenario.name, {"": {**report, **results}}, {"": Units.for_drive(drive)})

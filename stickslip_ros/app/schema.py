@@ -3,7 +3,7 @@
 import argparse
 import json
 
-from stickslip_ros.app.output import finite
+from stickslip_ros.text import finite
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -9,7 +9,6 @@ from stickslip_ros.app.output import print_json, print_table
 from stickslip_ros.text import printable
 
 if TYPE_CHECKING:
-    from stickslip_ros.physics.model.constants import Parameter
     from stickslip_ros.scenarios.files import Scenario
 
 
@@ -26,9 +25,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> None:
     """Run the command."""
-    from stickslip_ros.plots.units import Units
+    from stickslip_ros.plots.parameter_tables import scenario_tables
     from stickslip_ros.scenarios.files import load_scenario
-    from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
 
     load = partial(
         load_scenario,
@@ -38,7 +36,6 @@ def run(arguments: argparse.Namespace) -> None:
         other_nodes=True,
     )
     scenario = with_law(load, arguments.controller)
-    found = {node: _parameters(scenario, node) for node in scenario.nodes}
     bases = [str(path) for path in scenario.bases]
     if arguments.json:
         print_json(
@@ -47,23 +44,15 @@ def run(arguments: argparse.Namespace) -> None:
                 "path": str(scenario.path),
                 "bases": bases,
                 "overrides": list(scenario.overrides),
-                "parameters": found,
+                "parameters": {node: _parameters(scenario, node) for node in scenario.nodes},
                 "other_sections": list(scenario.other_sections),
             }
         )
         return
     print(printable(f"{scenario.name}: {', completed by '.join([str(scenario.path), *bases])}"))
-    units = Units.for_drive(scenario.plant.as_drive())
-    for node, parameters in found.items():
-        # Where the drive is dimensionless, so are the parameters of the loop.
-        unit = str if node == "analyzer" else units.of_unit
-        known = NODE_PARAMETERS[node].known
-        rows = [
-            [name, _text(known[name], row["value"]), unit(row["unit"] or ""), row["source"]]
-            for name, row in parameters.items()
-        ]
+    for table in scenario_tables(scenario):
         print()
-        print_table("", [node, "value", "unit", "from"], rows)
+        print_table(*table)
     for section in scenario.other_sections:
         print(printable(f"\nsection {section} is for another node"))
 
@@ -85,7 +74,3 @@ def _parameters(scenario: "Scenario", node: str) -> dict[str, dict[str, Any]]:
         }
         for parameter in own_first(NODE_PARAMETERS[node])
     }
-
-
-def _text(parameter: "Parameter", value: Any) -> str:
-    return str(value).lower() if isinstance(value, bool) else parameter.text(value)

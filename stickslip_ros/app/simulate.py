@@ -8,18 +8,22 @@ from typing import TYPE_CHECKING
 
 from stickslip_ros.app.arguments import (
     add_json,
-    add_plot,
     add_scenario,
-    check_figure,
     check_new,
     naming,
-    provenance,
     scenario_of,
     seconds,
-    write_figure,
     writing,
 )
-from stickslip_ros.app.output import print_json, print_parts, progress_bar
+from stickslip_ros.app.output import progress_bar
+from stickslip_ros.app.result import (
+    add_html,
+    add_plot,
+    check_results,
+    is_drawn,
+    print_result,
+    write_results,
+)
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.files import written
 from stickslip_ros.studies.options import DEFAULT_PERIODS
@@ -63,54 +67,41 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="time from row to row of --out, s: a multiple of the sample period (default: one)",
     )
     add_plot(parser, "motion, force, cycles and friction law")
+    add_html(parser)
     add_json(parser)
 
 
 def run(arguments: argparse.Namespace) -> None:
     """Run the command."""
-    from stickslip_ros.plots.measure_table import simulation_tables
-    from stickslip_ros.plots.run_history import RunHistory
+    from stickslip_ros.api.runs import measured_run
     from stickslip_ros.plots.units import Units
     from stickslip_ros.studies.settling import check_continuous
-    from stickslip_ros.studies.simulate import default_duration, sensor_meter, simulate
+    from stickslip_ros.studies.simulate import default_duration
 
     scenario = scenario_of(arguments)
     duration = arguments.duration
     if duration is None:
         duration = default_duration(scenario)
-    check_figure(arguments)
+    check_results(arguments)
     if arguments.continuous_control:
         with naming("--continuous-control:"):
             check_continuous(scenario)
-    history = None if arguments.plot is None else RunHistory()
-    measured = sensor_meter(scenario)
     units = Units.for_drive(scenario.plant.as_drive())
     shown = f"{duration:g} {units.of_unit('s')}".rstrip()
     with (
         _recorder(arguments, scenario) as recorder,
         progress_bar(f"simulating {shown}", 1.0) as progress,
     ):
-        true = simulate(
+        found = measured_run(
             scenario,
             duration,
             continuous=arguments.continuous_control,
-            progress=progress,
-            observer=history,
             recorder=recorder,
-            measured=measured,
+            drawn=is_drawn(arguments),
+            progress=progress,
         )
-        if history is not None:
-            from stickslip_ros.plots.run_figure import DrawnRun, run_figure
-
-            drawn = DrawnRun.simulated(scenario, history, true)
-            write_figure(arguments, lambda style: run_figure(drawn, style=style))
-    measures, truth = (true, None) if measured is None else (measured.measures(), true)
-    if arguments.json:
-        own = None if truth is None else truth.as_dict()
-        values = {**measures.as_dict(), "truth": own, "duration": duration}
-        print_json({**values, **provenance(scenario)})
-    else:
-        print_parts(simulation_tables(scenario, duration, measures, truth))
+        write_results(arguments, found)
+    print_result(arguments, found)
 
 
 @contextmanager

@@ -2,16 +2,9 @@
 
 import argparse
 
-from stickslip_ros.app.arguments import (
-    add_json,
-    add_plot,
-    add_scenario,
-    check_figure,
-    provenance,
-    scenario_of,
-    write_figure,
-)
-from stickslip_ros.app.output import print_json, print_parts, progress_bar
+from stickslip_ros.app.arguments import add_json, add_scenario, scenario_of
+from stickslip_ros.app.output import progress_bar
+from stickslip_ros.app.result import add_plot, check_results, print_result, write_results
 from stickslip_ros.errors import InvalidInputError
 
 
@@ -29,23 +22,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> None:
     """Run the command."""
-    from stickslip_ros.plots.study_tables import stability_tables
-    from stickslip_ros.studies.stability import stability, why_no_figure
+    from stickslip_ros.api.theory import stability
+    from stickslip_ros.studies.stability import why_no_figure
 
     scenario = scenario_of(arguments)
-    check_figure(arguments)
+    check_results(arguments)
     if arguments.plot is not None:
         reason = why_no_figure(scenario)
         if reason is not None:
             raise InvalidInputError(f"--plot {arguments.plot}: there is nothing to draw: {reason}")
     with progress_bar(f"theory of {scenario.name}", None):
-        found, notes = stability(scenario)
-    if arguments.plot is not None:
-        with progress_bar("drawing", None):
-            from stickslip_ros.plots.stability_figure import scenario_stability_figure
-
-            write_figure(arguments, lambda style: scenario_stability_figure(scenario, style=style))
-    if arguments.json:
-        print_json({**found, "notes": notes, **provenance(scenario)})
-    else:
-        print_parts(stability_tables(scenario, found, notes))
+        found = stability(scenario)
+    with progress_bar("drawing", None):
+        write_results(arguments, found)
+    print_result(arguments, found)

@@ -2,21 +2,21 @@
 
 import argparse
 import os
-import sys
-from collections.abc import Generator, Mapping
+from collections.abc import Generator
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from stickslip_ros.app.arguments import check_new, naming, provenance, whole, writing
-from stickslip_ros.app.output import finite, progress_bar, tell
+from stickslip_ros.app.arguments import check_new, naming, whole, writing
+from stickslip_ros.app.output import progress_bar, tell
+from stickslip_ros.app.result import print_result, write_results
 from stickslip_ros.errors import InvalidInputError, RunError
 from stickslip_ros.files import written
 from stickslip_ros.studies.options import SettlingOptions
 
 if TYPE_CHECKING:
-    from stickslip_ros.studies.columns import Further
+    from stickslip_ros.api.studies import Points
     from stickslip_ros.studies.journal import Journal
     from stickslip_ros.studies.study import Study
 
@@ -128,27 +128,22 @@ def _advice(study: "Study") -> str:
     return ""
 
 
-def write_results(
-    arguments: argparse.Namespace,
-    journal: "Journal",
-    further: "Further",
-    made: Mapping[str, Any],
+def finish(
+    arguments: argparse.Namespace, journal: "Journal", result: "Points", **options: Any
 ) -> None:
-    """Write the table of a complete journal to where it was asked for, a file or as JSON.
+    """Write and print the result of a complete journal, which need not be kept any more then.
 
-    As JSON it also holds `made`, which belongs to all points together. The journal need not be kept
-    any more then.
+    The `options` are those of the result's `plot`.
     """
-    from stickslip_ros.studies.columns import write_csv, write_json
+    from stickslip_ros.studies.columns import write_csv
 
-    study, columns, out = journal.study, journal.columns, arguments.out
-    head = finite({**provenance(study.scenario), **made})
+    write_results(arguments, result, **options)
+    out: Path | None = arguments.out
     if out is not None:
         with writing("--out", out), written(out) as stream:
             if out.suffix.lower() == ".csv":
-                write_csv(stream, columns, further)
+                write_csv(stream, result.columns, result.further)
             else:
-                write_json(stream, study, columns, further, head)
-    if arguments.json:
-        write_json(sys.stdout, study, columns, further, head)
+                result.write_json(stream)
+    print_result(arguments, result)
     journal.discard()

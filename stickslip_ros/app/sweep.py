@@ -1,25 +1,18 @@
 """`stickslip sweep`: the settled motion of a scenario over one parameter or two."""
 
 import argparse
-from typing import TYPE_CHECKING
 
 from stickslip_ros.app.arguments import (
     add_json,
-    add_plot,
     add_scenario,
-    check_figure,
     check_speeds,
     naming,
     scenario_of,
-    write_figure,
 )
-from stickslip_ros.app.output import print_table
-from stickslip_ros.app.study_command import add_running, computed, course_of, write_results
+from stickslip_ros.app.result import add_html, add_plot, check_results
+from stickslip_ros.app.study_command import add_running, computed, course_of, finish
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.studies.options import Continuation, SettlingOptions
-
-if TYPE_CHECKING:
-    from stickslip_ros.studies.columns import Further
 
 _DESCRIPTION = """Measure the settled motion of a scenario over the values of one parameter or two:
 amplitude, regime, stick fraction and turning points, for a bifurcation diagram (one parameter) or a
@@ -54,15 +47,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default="regime",
         help="quantity that the map shows (default: %(default)s)",
     )
+    add_html(parser)
     add_json(parser)
 
 
 def run(arguments: argparse.Namespace) -> None:
     """Run the command."""
-    from stickslip_ros.plots.study_tables import sweep_table, units_of
-    from stickslip_ros.studies.plan import Axis, Grid
+    from stickslip_ros.api.studies import Sweep
+    from stickslip_ros.studies.plan import Axis
     from stickslip_ros.studies.study import sweep_study
-    from stickslip_ros.studies.transitions import transitions
 
     with naming("--over"):
         axes = [Axis.parse(text) for text in arguments.over]
@@ -78,24 +71,7 @@ def run(arguments: argparse.Namespace) -> None:
         course=course_of(arguments, SettlingOptions()),
         continuous=arguments.continuous_control,
     )
-    check_figure(arguments)
-    plan = study.plan
-    assert isinstance(plan, Grid)
-    label = f"sweep of {study.scenario.name}, {plan.size} points"
-    further: Further = {}
-    if plan.continuation:
-        further = {"direction": [plan.direction(number) for number in range(plan.size)]}
+    check_results(arguments)
+    label = f"sweep of {study.scenario.name}, {study.plan.size} points"
     with computed(arguments, study, label) as journal:
-        columns, colour = journal.columns, arguments.colour
-        if arguments.plot is not None:
-            from stickslip_ros.plots.study_figure import sweep_figure
-
-            write_figure(arguments, lambda style: sweep_figure(columns, study, colour, style=style))
-        theory = transitions(study, plan.axes[0]) if len(plan.axes) == 1 else {}
-        made = {"transitions": {name.lower().replace(" ", "_"): theory[name] for name in theory}}
-        write_results(arguments, journal, further, made)
-        if not arguments.json:
-            print_table(*sweep_table(study, columns))
-            units = units_of(study)
-            for name, values in theory.items():
-                print(f"{name}: {', '.join(units.texts(values, plan.axes[0].unit))}")
+        finish(arguments, journal, Sweep(study, journal.columns), colour=arguments.colour)

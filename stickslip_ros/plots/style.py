@@ -298,18 +298,33 @@ def save(
     sources, a third as large. Raises OSError if the file cannot be written.
     """
     kind = path.suffix[1:].lower()
+    drawn = rendered(figure, kind, dots_per_inch)
+    if kind == "png" and colours is not None:
+        with Image.open(BytesIO(drawn)) as image:
+            # This method, unlike the usual one, keeps colours that few points have.
+            few = image.convert("RGB").quantize(colours, Image.Quantize.MAXCOVERAGE)
+        smaller = BytesIO()
+        few.save(smaller, format="png", optimize=True)
+        drawn = smaller.getvalue()
+    with written(path, replace=True) as stream:
+        stream.buffer.write(drawn)
+
+
+def rendered(
+    figure: Figure,
+    kind: str,
+    dots_per_inch: float = SCREEN.dots_per_inch,
+    *,
+    outlines: bool = False,
+) -> bytes:
+    """Return a figure as a file of this kind: png, svg or pdf; its texts as `outlines` if asked."""
     drawn = BytesIO()
     with rc_context():
         _use_style(SCREEN)
+        if outlines:
+            mpl.rcParams["svg.fonttype"] = "path"
         figure.savefig(drawn, format=kind, dpi=dots_per_inch, metadata=_REPRODUCIBLE.get(kind))
-    if kind == "png" and colours is not None:
-        with Image.open(drawn) as image:
-            # This method, unlike the usual one, keeps colours that few points have.
-            few = image.convert("RGB").quantize(colours, Image.Quantize.MAXCOVERAGE)
-        drawn = BytesIO()
-        few.save(drawn, format="png", optimize=True)
-    with written(path, replace=True) as stream:
-        stream.buffer.write(drawn.getvalue())
+    return drawn.getvalue()
 
 
 def _use_style(style: FigureStyle) -> None:

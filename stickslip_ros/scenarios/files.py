@@ -156,6 +156,13 @@ class Scenario:
         """
         return {node: getattr(self, node).flat() for node in self.nodes}
 
+    def provenance(self) -> dict[str, Any]:
+        """Return what a result was made from, for its JSON: name, parameters and overrides."""
+        return {
+            "scenario": {"name": self.name, **self.as_dict()},
+            "overrides": list(self.overrides),
+        }
+
     def unused(self) -> dict[str, str]:
         """Return why parameters have no effect, by NODE.PARAMETER; defaults are not listed."""
         found = {

@@ -1,7 +1,6 @@
 """The points of a study as columns: arrays in memory, or a table in a CSV or JSON file."""
 
 import csv
-import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -129,28 +128,21 @@ def write_csv(stream: TextIO, columns: Columns, further: Further) -> None:
         writer.writerow([*plan.values(number), *cells, section, reason])
 
 
-def write_json(
-    stream: TextIO, study: Study, columns: Columns, further: Further, provenance: Mapping[str, Any]
-) -> None:
-    """Write one object: the parameters, their values, and an array for each column.
+def json_entries(study: Study, columns: Columns, further: Further) -> dict[str, Any]:
+    """Return parameters, their values, and the columns for JSON; arrays are iterators.
 
     For a grid, `values` has a list for each axis, and the arrays are row-major over the axes; if
     it has a continuation, the direction is the slowest index. Otherwise `values` has the
-    parameters' values of each point. The entries of `provenance`, ready for JSON, are added.
+    parameters' values of each point.
     """
     plan = study.plan
-    how = {name: found for name, found in study.as_dict().items() if name != "scenario"}
-    separator = "{\n"
-    for name, value in {**provenance, **how, "parameters": plan.parameters}.items():
-        stream.write(f'{separator} "{name}": {json.dumps(value, allow_nan=False)}')
-        separator = ",\n"
-    values: Iterable[Any] = map(plan.values, range(plan.size))
+    values: Iterator[Any] = map(plan.values, range(plan.size))
     if isinstance(plan, Grid):
         values = ([*map(axis.value, range(axis.count))] for axis in plan.axes)
-    arrays = {"values": values, **further} | {name: columns.cells(name) for name in COLUMNS}
-    for name, cells in arrays.items():
-        stream.write(f'{separator} "{name}": [')
-        for number, cell in enumerate(cells):  # one at a time: a long text takes much memory
-            stream.write(f"{', ' if number else ''}{json.dumps(cell)}")
-        stream.write("]")
-    stream.write("\n}\n")
+    return {
+        **{name: found for name, found in study.as_dict().items() if name != "scenario"},
+        "parameters": plan.parameters,
+        "values": values,
+        **{name: iter(cells) for name, cells in further.items()},
+        **{name: columns.cells(name) for name in COLUMNS},
+    }

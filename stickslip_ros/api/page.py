@@ -1,0 +1,120 @@
+"""Results as HTML: a page to read offline, print and hand on, and the tables of a notebook."""
+
+from collections.abc import Callable, Iterable
+from datetime import datetime
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+from xml.etree import ElementTree
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+
+from stickslip_ros.errors import StickslipError
+from stickslip_ros.files import written
+from stickslip_ros.tables import TextTable
+from stickslip_ros.text import printable
+from stickslip_ros.versions import versions
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from stickslip_ros.plots.style import FigureStyle
+
+_SVG, _XLINK = "http://www.w3.org/2000/svg", "http://www.w3.org/1999/xlink"
+
+_STYLES = {"wide": "paper-double", "narrow": "paper"}
+"""Style of the figure by the width of the page: of paper or a screen, and of a telephone."""
+
+
+class Summary(NamedTuple):
+    """What a page says of a result beside what the result prints, and its figure."""
+
+    title: str
+    """What it is, such as "Simulated run"."""
+    subject: str
+    """What it is of: the scenario, or the recording."""
+    verdict: str
+    """The result in one sentence."""
+    parameters: Iterable[TextTable] = ()
+    """The parameters that it was made with, with their units."""
+
+
+def write_page(
+    path: Path,
+    summary: Summary,
+    parts: Iterable[TextTable | str],
+    draw: "Callable[[FigureStyle], Figure]",
+) -> None:
+    """Write the page of a result to `path`; an existing file is replaced.
+
+    It is one file that asks for no other. In place of a figure that cannot be drawn it says why.
+    Raises OSError if the file cannot be written.
+    """
+    figures: dict[str, Markup] = {}
+    reason = ""
+    try:
+        for name, style in _STYLES.items():
+            figures[name] = _drawing(draw, style, name, f"{summary.title}, {summary.subject}")
+    except StickslipError as error:
+        reason = printable(str(error))
+    text = _macro("page")(
+        title=printable(summary.title),
+        subject=printable(summary.subject),
+        verdict=printable(summary.verdict),
+        parameters=_printable(summary.parameters),
+        results=_printable(parts),
+        figures=figures,
+        reason=reason,
+        date=f"{datetime.now().astimezone():%Y-%m-%d %H:%M %Z}",
+        versions=versions(),
+    )
+    with written(path, replace=True) as stream:
+        stream.write(text.lstrip())
+
+
+def notebook_html(parts: Iterable[TextTable | str]) -> str:
+    """Return tables and sentences as HTML without styles of their own."""
+    return _macro("parts")(_printable(parts))
+
+
+@cache
+def _macro(name: str) -> Callable[..., str]:
+    """Return a macro of the template, as a function that returns HTML."""
+    environment = Environment(
+        loader=PackageLoader("stickslip_ros", "api"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+    )
+    return vars(environment.get_template("page.html").module)[name]
+
+
+def _printable(parts: Iterable[TextTable | str]) -> list[TextTable | str]:
+    return [printable(part) if isinstance(part, str) else part.printable() for part in parts]
+
+
+def _drawing(draw: "Callable[[FigureStyle], Figure]", style: str, name: str, label: str) -> Markup:
+    """Return a figure as SVG, its identifiers being those of no other figure on the page."""
+    from dataclasses import replace
+
+    from stickslip_ros.plots.style import STYLES, rendered
+
+    figure = draw(replace(STYLES[style], titled=False))
+    root = ElementTree.fromstring(rendered(figure, "svg", outlines=True))
+    for element in root.iter():
+        for attribute, value in element.items():
+            if attribute == "id":
+                element.set(attribute, f"{name}-{value}")
+            elif attribute.endswith("href") and value.startswith("#"):
+                element.set(attribute, f"#{name}-{value[1:]}")
+            else:
+                element.set(attribute, value.replace("url(#", f"url(#{name}-"))
+    for metadata in root.findall(f"{{{_SVG}}}metadata"):
+        root.remove(metadata)
+    for size in ("width", "height"):  # the page has it fill its column
+        del root.attrib[size]
+    root.attrib |= {"role": "img", "aria-label": printable(label)}
+    ElementTree.register_namespace("", _SVG)
+    ElementTree.register_namespace("xlink", _XLINK)
+    return Markup(ElementTree.tostring(root, encoding="unicode"))

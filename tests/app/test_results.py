@@ -1,0 +1,200 @@
+"""What a command prints, writes and draws is one result, the same as in Python."""
+
+import json
+import re
+from collections.abc import Callable
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import stickslip_ros as ss
+from stickslip_ros.api.recordings import Comparison
+from stickslip_ros.api.results import Result
+from stickslip_ros.scenarios.files import load_scenario
+from tests.app.conftest import REFERENCE, Run
+
+Made = Callable[[], Result]
+
+
+def log(folder: Path) -> str:
+    """Write a table of a drive without control, and return its path."""
+    path = folder / "log.csv"
+    if not path.exists():
+        drive = ss.scenario("feed_drive", expects_control=False, belt_speed=0.02)
+        ss.simulate(drive, duration=1.0).to_pandas().to_csv(path)
+    return str(path)
+
+
+FREE = ("paper", "--no-control")
+
+
+def free() -> ss.Scenario:
+    return load_scenario("paper", ["plant.expects_control=false"])
+
+
+def cases(folder: Path) -> dict[str, tuple[tuple[str, ...], Made]]:
+    """Return the arguments of commands, and the same results from Python."""
+    table = log(folder)
+    fixed = {"plant.mass": 100.0, "plant.damping": 200.0}
+    known = ("--law", "stribeck", "--fix", "plant.mass=100", "--fix", "plant.damping=200")
+    noisy = "plant.sensor.position_noise=1e-6"
+    runs = (lambda: ss.read_bag(REFERENCE), lambda: ss.read_table(table))
+    return {
+        "simulate": (
+            ("feed_drive", "--duration", "1"),
+            lambda: ss.simulate("feed_drive", duration=1.0),
+        ),
+        "simulate, with a sensor": (
+            ("feed_drive", "-p", noisy, "--duration", "1"),
+            lambda: ss.simulate(ss.scenario("feed_drive", noisy), duration=1.0),
+        ),
+        "sweep": (
+            (*FREE, "--over", "plant.belt_speed=0.3:0.5:3", "--carry", "both"),
+            lambda: ss.sweep(free(), belt_speed=(0.3, 0.5, 3), carry="both"),
+        ),
+        "basin": (
+            (*FREE, "--sample", "3"),
+            lambda: ss.basin(free(), sample=3),
+        ),
+        "stability": (("feed_drive",), lambda: ss.stability("feed_drive")),
+        "design": (
+            ("feed_drive", "--belt-speed", "0.04"),
+            lambda: ss.design("feed_drive", belt_speed=0.04),
+        ),
+        "identify": (
+            (table, *known, "--check", table),
+            lambda: ss.identify(table, law="stribeck", fixed=fixed, check=[table]),
+        ),
+        "report": ((REFERENCE,), runs[0]),
+        "report, of two": (
+            (REFERENCE, table),
+            lambda: Comparison((ss.read_bag(REFERENCE), ss.read_table(table))),
+        ),
+    }
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "simulate",
+        "simulate, with a sensor",
+        "sweep",
+        "basin",
+        "stability",
+        "design",
+        "identify",
+        "report",
+        "report, of two",
+    ],
+)
+def test_a_command_prints_what_python_returns(name: str, stickslip: Run, tmp_path: Path) -> None:
+    arguments, made = cases(tmp_path)[name]
+    command = name.partition(",")[0]
+    result = made()
+    printed = stickslip(command, *arguments, "--json").stdout
+    assert json.loads(printed) == result.to_dict()
+    text = stickslip(command, *arguments).stdout
+    assert all(line in text for line in repr(result).splitlines())
+
+
+class Page(HTMLParser):
+    """The tags, identifiers, references and text of a page."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__()
+        self.tags: list[str] = []
+        self.attributes: list[tuple[str, str]] = []
+        self.text = ""
+        self.feed(path.read_text(encoding="utf-8"))
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append(tag)
+        self.attributes += [(name, value or "") for name, value in attrs]
+
+    def handle_data(self, data: str) -> None:
+        self.text += f"{data} "
+
+    @property
+    def identifiers(self) -> list[str]:
+        return [value for name, value in self.attributes if name == "id"]
+
+    @property
+    def references(self) -> list[str]:
+        """What links, images, and clipping paths refer to; no namespaces."""
+        named = [v for n, v in self.attributes if n in ("href", "xlink:href", "src")]
+        return named + [
+            found for _, v in self.attributes for found in re.findall(r"url\((.*?)\)", v)
+        ]
+
+
+def page(stickslip: Run, folder: Path, *arguments: str) -> Page:
+    done = stickslip(*arguments, "--html", str(folder / "page.html"))
+    assert done.returncode == 0, done.stderr
+    return Page(folder / "page.html")
+
+
+def test_a_page_is_one_file_whose_identifiers_are_its_own(stickslip: Run, tmp_path: Path) -> None:
+    found = page(stickslip, tmp_path, "simulate", "feed_drive", "--duration", "1")
+    assert found.tags.count("svg") == 2
+    assert not {"script", "link", "iframe", "object"} & {*found.tags}
+    assert len({*found.identifiers}) == len(found.identifiers) > 10
+    inside = {f"#{each}" for each in found.identifiers}
+    assert {each for each in found.references if not each.startswith("data:")} <= inside
+    for text in ("stick-slip", "434.1 µm", "friction.static", "N s/m", "heyoka"):
+        assert text in found.text
+    assert "friction.kinetic" not in found.text  # of another law
+
+
+def test_a_name_is_text(stickslip: Run, tmp_path: Path) -> None:
+    name = "<script>alert(1)<"
+    stickslip("new", "drive.yaml", "--from", "feed_drive")
+    (tmp_path / "drive.yaml").rename(tmp_path / f"{name}.yaml")
+    found = page(stickslip, tmp_path, "simulate", f"{name}.yaml", "--duration", "1")
+    assert "script" not in found.tags
+    assert name in found.text
+
+
+@pytest.mark.parametrize(
+    ("arguments", "texts"),
+    [
+        (("report", REFERENCE), ("decaying", "washout_controller", "0.1.0")),
+        (
+            ("sweep", *FREE, "--over", "plant.belt_speed=0.3:0.5:3"),
+            ("stick-slip at", "of 3 points", "plant.belt_speed"),
+        ),
+        (("design", "feed_drive", "--belt-speed", "0.04"), ("linear gain", "verification")),
+        (("identify", "log.csv", "--law", "stribeck"), ("stribeck", "95 % interval")),
+    ],
+    ids=lambda value: value[0] if value[0].isalpha() else "",
+)
+def test_each_has_its_verdict_and_its_tables(
+    arguments: tuple[str, ...], texts: tuple[str, ...], stickslip: Run, tmp_path: Path
+) -> None:
+    if "log.csv" in arguments:
+        log(tmp_path)
+    found = page(stickslip, tmp_path, *arguments)
+    assert all(text in found.text for text in texts)
+    assert found.tags.count("svg") == 2
+
+
+def test_without_a_figure_a_page_says_why(stickslip: Run, tmp_path: Path) -> None:
+    speeds = ("--belt-speed", "0.3")
+    found = page(stickslip, tmp_path, "design", "feed_drive", *speeds, "-p", "plant.rate=20")
+    assert "There is none: there is nothing to propose" in found.text
+    assert "svg" not in found.tags
+
+
+def test_what_cannot_be_written_is_refused_first(stickslip: Run, tmp_path: Path) -> None:
+    for path, reason in (("page.txt", "must end in"), ("no/page.html", "there is no directory")):
+        done = stickslip("simulate", "feed_drive", "--html", path)
+        assert (done.returncode, reason in done.stderr) == (2, True)
+
+
+def test_python_writes_the_same_page(stickslip: Run, tmp_path: Path) -> None:
+    found: list[Any] = [page(stickslip, tmp_path, "simulate", "feed_drive", "--duration", "1")]
+    ss.simulate("feed_drive", duration=1.0).to_html(tmp_path / "other.html")
+    found.append(Page(tmp_path / "other.html"))
+    texts = [re.sub(r"\d{4}-\d\d-\d\d \d\d:\d\d", "", each.text) for each in found]
+    assert texts[0] == texts[1]
