@@ -1,8 +1,7 @@
-"""Results as HTML: a page to read offline, print and hand on, and the tables of a notebook."""
+"""The page of a result: one file to read offline, print and hand on."""
 
 from collections.abc import Callable, Iterable
 from datetime import datetime
-from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 from xml.etree import ElementTree
@@ -57,41 +56,24 @@ def write_page(
         for name, style in _STYLES.items():
             figures[name] = _drawing(draw, style, name, f"{summary.title}, {summary.subject}")
     except StickslipError as error:
-        reason = printable(str(error))
-    text = _macro("page")(
-        title=printable(summary.title),
-        subject=printable(summary.subject),
-        verdict=printable(summary.verdict),
-        parameters=_printable(summary.parameters),
-        results=_printable(parts),
-        figures=figures,
-        reason=reason,
-        date=f"{datetime.now().astimezone():%Y-%m-%d %H:%M %Z}",
-        versions=versions(),
-    )
-    with written(path, replace=True) as stream:
-        stream.write(text.lstrip())
-
-
-def notebook_html(parts: Iterable[TextTable | str]) -> str:
-    """Return tables and sentences as HTML without styles of their own."""
-    return _macro("parts")(_printable(parts))
-
-
-@cache
-def _macro(name: str) -> Callable[..., str]:
-    """Return a macro of the template, as a function that returns HTML."""
+        reason = str(error)
     environment = Environment(
         loader=PackageLoader("stickslip_ros", "api"),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
     )
-    return vars(environment.get_template("page.html").module)[name]
-
-
-def _printable(parts: Iterable[TextTable | str]) -> list[TextTable | str]:
-    return [printable(part) if isinstance(part, str) else part.printable() for part in parts]
+    environment.filters["printable"] = printable
+    text = environment.get_template("page.html").render(
+        **summary._asdict() | {"parameters": [*summary.parameters]},
+        results=[*parts],
+        figures=figures,
+        reason=reason,
+        date=f"{datetime.now().astimezone():%Y-%m-%d %H:%M %Z}",
+        versions=versions(),
+    )
+    with written(path, replace=True) as stream:
+        stream.write(text)
 
 
 def _drawing(draw: "Callable[[FigureStyle], Figure]", style: str, name: str, label: str) -> Markup:
@@ -103,6 +85,8 @@ def _drawing(draw: "Callable[[FigureStyle], Figure]", style: str, name: str, lab
     figure = draw(replace(STYLES[style], titled=False))
     root = ElementTree.fromstring(rendered(figure, "svg", outlines=True))
     for element in root.iter():
+        if element.tag == f"{{{_SVG}}}image":  # equal ones have one, which nothing refers to
+            element.attrib.pop("id", None)
         for attribute, value in element.items():
             if attribute == "id":
                 element.set(attribute, f"{name}-{value}")

@@ -19,7 +19,7 @@ from stickslip_ros.physics.loop.trajectory import QUANTITIES
 from stickslip_ros.physics.measures.cycle_measures import Measures, measures_of
 from stickslip_ros.physics.measures.slips import SlipThreshold
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.plots.measure_table import report_tables
+from stickslip_ros.plots.measure_table import doubt, report_tables
 from stickslip_ros.plots.parameter_tables import recorded_tables
 from stickslip_ros.plots.run_history import RunHistory
 from stickslip_ros.plots.units import Units
@@ -85,7 +85,7 @@ class RecordedRun(TabularResult):
         """Regime, amplitude, frequency and stick fraction as a line of text."""
         from stickslip_ros.plots.panels import measures_text
 
-        return measures_text(self.measures, Units.for_drive(self.drive))
+        return measures_text(self.measures, Units.for_drive(self.drive)) + doubt(self.report)
 
     def settings(self) -> Iterator[TextTable]:
         """Yield the tables of the parameters and versions that were recorded."""

@@ -4,6 +4,7 @@ import json
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import partial
+from html import escape
 from importlib import import_module
 from io import BytesIO
 from pathlib import Path
@@ -144,9 +145,10 @@ class Result(ABC):
         )
 
     def _repr_html_(self) -> str:
-        from stickslip_ros.api.page import notebook_html
-
-        return notebook_html(self.parts())
+        return "\n".join(
+            f"<p>{escape(printable(part))}</p>" if isinstance(part, str) else part.html()
+            for part in self.parts()
+        )
 
 
 class Quantity(NamedTuple):

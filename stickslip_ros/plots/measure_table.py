@@ -168,12 +168,16 @@ def _shown(name: str, values: Mapping[str, Any], units: Units) -> Any:
     value = values.get(name)
     if name == "regime":
         trend = trend_text(values, units.text)
-        doubt = ", doubtful: late forces" if values.get("in_time") is False else ""
-        return f"{Regime.label(value)}{trend and f', not steady: {trend}'}{doubt}"
+        return f"{Regime.label(value)}{trend and f', not steady: {trend}'}{doubt(values)}"
     if name == "velocity_amplitude" and value is not None:
         amplitude, midpoint = values.get("amplitude") or 0.0, values.get("midpoint") or 0.0
         return 0.0 if amplitude <= NOISE * abs(midpoint) else value  # what is left is rounding
     return value
+
+
+def doubt(values: Mapping[str, Any]) -> str:
+    """Return what is added to a regime of a report whose forces came late."""
+    return ", doubtful: late forces" if values.get("in_time") is False else ""
 
 
 def slip_table(slips: Mapping[str, Any], units: Units) -> TextTable:
