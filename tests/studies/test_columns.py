@@ -2,6 +2,7 @@
 
 import csv
 import json
+from collections.abc import Iterator
 from functools import partial
 from io import StringIO
 from math import nan
@@ -11,7 +12,7 @@ import numpy as np
 import pytest
 
 from stickslip_ros.physics.measures.cycle_measures import Regime
-from stickslip_ros.studies.columns import Columns, Further, write_csv, write_json
+from stickslip_ros.studies.columns import Columns, Further, json_entries, write_csv
 from stickslip_ros.studies.plan import Axis, Continuation, Grid, RandomSample
 from stickslip_ros.studies.runner import compute_columns
 from stickslip_ros.studies.settling import SettlingOptions
@@ -95,9 +96,9 @@ def refuse(constant: str) -> None:
 def as_json(
     study: Study, columns: Columns, further: Further | None = None, **provenance: Any
 ) -> dict[str, Any]:
-    stream = StringIO()
-    write_json(stream, study, columns, further or {}, provenance)
-    return json.loads(stream.getvalue(), parse_constant=refuse)
+    entries = {**provenance, **json_entries(study, columns, further or {})}
+    values = {name: [*v] if isinstance(v, Iterator) else v for name, v in entries.items()}
+    return json.loads(json.dumps(values), parse_constant=refuse)
 
 
 def test_a_table_read_back_is_the_columns_to_the_last_bit(study: Study, columns: Columns) -> None:
