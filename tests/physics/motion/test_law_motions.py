@@ -11,6 +11,7 @@ from stickslip_ros.physics.model.friction import (
     FrictionLaw,
     Linear,
     Stribeck,
+    Table,
 )
 from stickslip_ros.physics.motion import RecordedMotion
 from tests.physics.drives import PAPER
@@ -26,6 +27,10 @@ SAME = [
     (Coulomb(0.4), dop853.coulomb(0.4, 0.0)),
     (Linear(0.4, 0.1), dop853.linear(0.4, 0.1)),
     (Exponential(0.4, 0.25, 0.3, 0.02), dop853.exponential(0.4, 0.25, 0.3, 0.02, 1.0)),
+    (
+        Table(((0.0, 0.4), (0.2, 0.3), (0.5, 0.25), (0.9, 0.33))),
+        dop853.tabulated([0.0, 0.2, 0.5, 0.9], [0.4, 0.3, 0.25, 0.33]),
+    ),
 ]
 
 
