@@ -1,5 +1,6 @@
 """Simulated runs: trajectory and measures of a scenario."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -49,6 +50,8 @@ class Run(TabularResult):
     them; with a sensor, of what it tells."""
     truth: Measures | None
     """With a sensor, the measures of the motion itself; else None."""
+    notes: Sequence[str]
+    """Sentences that say why the measures may be wrong."""
     _recorder: SampleRecorder | None
     """What has taken the samples."""
     _history: RunHistory
@@ -80,6 +83,7 @@ class Run(TabularResult):
     def _entries(self) -> dict[str, Any]:
         truth = None if self.truth is None else self.truth.as_dict()
         values = {**self.measures.as_dict(), "truth": truth, "duration": self.duration}
+        values["notes"] = [*self.notes]
         return {**values, **self.scenario.provenance()}
 
     @override
@@ -93,7 +97,8 @@ class Run(TabularResult):
 
     @override
     def parts(self) -> Parts:
-        return simulation_tables(self.scenario, self.duration, self.measures, self.truth)
+        yield from simulation_tables(self.scenario, self.duration, self.measures, self.truth)
+        yield from self.notes
 
 
 def simulate(
@@ -168,4 +173,5 @@ def measured_run(
         measured=measured,
     )
     measures, truth = (true, None) if measured is None else (measured.measures(), true)
-    return Run(scenario, duration, continuous, measures, truth, recorder, history)
+    notes = simulation.notes_on(scenario, measured, measures)
+    return Run(scenario, duration, continuous, measures, truth, notes, recorder, history)

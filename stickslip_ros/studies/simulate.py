@@ -15,7 +15,7 @@ from stickslip_ros.physics.loop.simulation import (
 from stickslip_ros.physics.loop.trajectory import SampleRecorder
 from stickslip_ros.physics.measures.cycle_measures import Measures
 from stickslip_ros.physics.measures.run_meter import RunObserver
-from stickslip_ros.physics.measures.sample_meter import SampleMeter
+from stickslip_ros.physics.measures.sample_meter import NOT_JUDGED, SampleMeter
 from stickslip_ros.physics.motion import RecordedMotion
 from stickslip_ros.progress import Progress
 from stickslip_ros.scenarios.files import Scenario
@@ -39,6 +39,16 @@ def sensor_meter(scenario: Scenario) -> SampleMeter | None:
     if scenario.plant.sensor.exact:
         return None
     return SampleMeter(scenario.analyzer.window, reading=scenario.reading)
+
+
+def notes_on(scenario: Scenario, measured: SampleMeter | None, measures: Measures) -> list[str]:
+    """Return sentences that say why the measures of a run may be wrong.
+
+    They are those of its sensor's samples, which `measured` has received, or of the motion itself.
+    """
+    if measured is not None:
+        return measured.notes(measures)
+    return [NOT_JUDGED] if scenario.reading.varies else []
 
 
 def simulate(

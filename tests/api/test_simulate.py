@@ -126,3 +126,14 @@ def test_a_package_that_is_missing_is_named(
         monkeypatch.setitem(sys.modules, package, None)
         with pytest.raises(RunError, match=rf"{package}.*pip install 'stickslip_ros\[analysis\]'"):
             convert(feed_run)
+
+
+def test_what_makes_the_measures_doubtful_is_noted() -> None:
+    coarse = ss.scenario("feed_drive", sensor_position_resolution=1e-4, expects_control=False)
+    run = ss.simulate(coarse, duration=3)
+    (note,) = run.notes
+    assert note.startswith("the amplitude is only 4.6 steps of the encoder")
+    assert repr(run).splitlines()[-1] == note
+    assert ss.simulate("feed_profile", duration=0.5).notes == [
+        "belt, load, disturbance or reference vary: a drift is not judged"
+    ]

@@ -214,20 +214,7 @@ class RunMeter:
         if timing is not None and (complaint := timing.complaint()):
             doubt = "" if timing.in_time else "the regime is doubtful: "
             notes.append(doubt + complaint)
-        if motion.steps_back:
-            notes.append(
-                f"the stamp of {motion.steps_back} of {motion.samples} samples is not later than "
-                "the one before, and the motion is cut there: the plant was restarted, or the "
-                "samples of several plants are mixed"
-            )
-        measures, step = motion.measures(quick=quick), motion.drift.resolution
-        if step and measures.amplitude and measures.cycles > 2 and measures.errors is None:
-            notes.append(
-                f"the amplitude is only {measures.amplitude / step:.2g} steps of the encoder: the "
-                "standard errors are not known"
-            )
-        if not motion.drift.judged:
-            notes.append("belt, load, disturbance or reference vary: a drift is not judged")
+        measures = motion.measures(quick=quick)
         return {
             **measures.as_dict(),
             "position_noise": motion.position_noise,
@@ -242,5 +229,5 @@ class RunMeter:
             "samples": motion.samples,
             "lost_samples": motion.lost_samples,
             "duration": motion.duration,
-            "notes": notes,
+            "notes": [*notes, *motion.notes(measures)],
         }

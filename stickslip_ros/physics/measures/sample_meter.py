@@ -57,6 +57,9 @@ EXACT = SampleAssumptions()
 UNKNOWN = SampleAssumptions(0.0, None)
 """Assumptions for samples of which nothing is known."""
 
+NOT_JUDGED = "belt, load, disturbance or reference vary: a drift is not judged"
+"""Note on measures that do not say whether they drift."""
+
 _CHANGING_KINDS = ("ramp", "sine", "trapezoid", "table", "topic")
 """Kinds of courses and references that keep changing."""
 
@@ -260,6 +263,23 @@ class SampleMeter:
         self.drift.resolution = self._noisy_meter.step
         self.drift.judged = not (self.reading.varies or self._belt_varies)
         return with_drift(found, self.drift)
+
+    def notes(self, measures: Measures) -> list[str]:
+        """Return sentences that say why these measures, its last ones, may be wrong."""
+        notes: list[str] = []
+        if self.steps_back:
+            notes.append(
+                f"the stamp of {self.steps_back} of {self.samples} samples is not later than "
+                "the one before, and the motion is cut there: the plant was restarted, or the "
+                "samples of several plants are mixed"
+            )
+        step = self.drift.resolution
+        if step and measures.amplitude and measures.cycles > 2 and measures.errors is None:
+            notes.append(
+                f"the amplitude is only {measures.amplitude / step:.2g} steps of the encoder: the "
+                "standard errors are not known"
+            )
+        return notes if self.drift.judged else [*notes, NOT_JUDGED]
 
     def _feed_segment(self, samples: SampleColumns, jittered: bool) -> list[Cycle]:
         stamp = samples.stamp
