@@ -62,7 +62,9 @@ class RecordedRun(TabularResult):
     _history: RunHistory
     """The data of the figure."""
     _is_table: bool
+    """Whether it is a table, which has no parameters."""
     _namespace: str | None
+    """ROS namespace of the drive, where a bag holds several."""
 
     @property
     def measures(self) -> Measures:

@@ -43,9 +43,24 @@ class Result(ABC):
 
     @abstractmethod
     def draw(self, style: "FigureStyle") -> "Figure":
-        """Return the figure in a style; what draws is imported here.
+        """Return the figure in a style, as `plot` does in one of a name.
 
-        Raises InvalidInputError or RunError if there is nothing to draw.
+        Parameters
+        ----------
+        style : FigureStyle
+            Size, resolution and layout.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            The figure.
+
+        Raises
+        ------
+        InvalidInputError
+            If there is nothing to draw.
+        RunError
+            If a design has nothing to propose.
         """
 
     @abstractmethod
@@ -71,7 +86,13 @@ class Result(ABC):
         }
 
     def write_json(self, stream: TextIO) -> None:
-        """Write `to_dict` as JSON; a long array as it comes, because its text takes much memory."""
+        """Write `to_dict` as JSON; a long array as it comes, because its text takes much memory.
+
+        Parameters
+        ----------
+        stream : TextIO
+            Where it is written.
+        """
         start = "{\n"
         for name, value in self._with_versions().items():
             stream.write(f"{start}  {json.dumps(name)}: ")

@@ -161,6 +161,25 @@ class Sweep(Points):
 
     @override
     def draw(self, style: "FigureStyle", colour: "Colour" = "regime") -> "Figure":
+        """Return the figure in a style.
+
+        Parameters
+        ----------
+        style : FigureStyle
+            Size, resolution and layout.
+        colour : {"regime", "amplitude", "stick_fraction"}
+            What the map of a sweep over two parameters shows.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            The figure.
+
+        Raises
+        ------
+        InvalidInputError
+            If `colour` is unknown, or given for a sweep over one parameter.
+        """
         from stickslip_ros.plots.study_figure import sweep_figure
 
         return sweep_figure(self.columns, self.study, colour, style=style)
