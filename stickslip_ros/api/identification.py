@@ -13,7 +13,8 @@ from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.identification.findings import Findings, notes_on
 from stickslip_ros.identification.fit import Estimate
 from stickslip_ros.identification.identify import AUTO, identify_recordings
-from stickslip_ros.identification.record import Record, read_all, read_records
+from stickslip_ros.identification.record import Record
+from stickslip_ros.identification.recordings import read_all, read_records
 from stickslip_ros.identification.scenario import written_scenario
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.plots.identification_table import identification_tables

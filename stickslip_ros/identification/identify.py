@@ -16,7 +16,8 @@ from stickslip_ros.identification.laws import (
     IdentifiedLaw,
     TableAdapter,
 )
-from stickslip_ros.identification.record import ReadRecords, Record
+from stickslip_ros.identification.record import Record
+from stickslip_ros.identification.recordings import ReadRecords
 from stickslip_ros.identification.regression import LINEAR
 from stickslip_ros.identification.servo import servo_of
 from stickslip_ros.physics.model.constants import constants_of

@@ -11,7 +11,8 @@ import pytest
 
 from stickslip_ros.identification.findings import Findings
 from stickslip_ros.identification.identify import identify
-from stickslip_ros.identification.record import Record, read_records
+from stickslip_ros.identification.record import Record
+from stickslip_ros.identification.recordings import read_records
 
 _COLUMNS = {"time": "t", "position": "qm", "force": "vir*gtau", "reference": "qg"}
 _FILE = Path(

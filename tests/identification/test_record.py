@@ -7,8 +7,9 @@ import pytest
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.identification import record as module
-from stickslip_ros.identification.record import Record, evenly_spaced, read_all, read_records
+from stickslip_ros.identification import recordings as module
+from stickslip_ros.identification.record import Record, evenly_spaced
+from stickslip_ros.identification.recordings import read_all, read_records
 
 
 def _columns(time: np.ndarray) -> dict[str, np.ndarray]:

@@ -1,0 +1,184 @@
+"""Reads what recordings, bags or tables, have for identification."""
+
+import json
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from math import exp, inf, isfinite, nan
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from stickslip_ros.arrays import FloatArray, IntArray
+from stickslip_ros.bags.reader import Recording
+from stickslip_ros.bags.table_file import (
+    has_columns,
+    is_table,
+    own_columns,
+    quantities_of,
+    stamps_of,
+    table_of,
+)
+from stickslip_ros.errors import BagError, InvalidInputError
+from stickslip_ros.identification.laws import DELAY
+from stickslip_ros.identification.record import FEWEST, Record, evenly_spaced
+from stickslip_ros.physics.model.actuator import Actuator
+from stickslip_ros.samples import ForceColumns
+from stickslip_ros.stamps import NANOSECONDS
+
+_OPTIONAL = ("velocity", "disturbance", "reference")
+"""Quantities that a table may lack if another one of the same machine has them."""
+_MAY_LACK_VALUES = ("velocity", "reference")
+"""Quantities without which samples are used."""
+
+
+class ReadRecords(NamedTuple):
+    """The records of one recording, and what it tells of the drive."""
+
+    records: list[Record]
+    known: Mapping[str, float]
+    """Constants by parameter of the plant."""
+
+
+def read_all(
+    paths: Sequence[Path], columns: Mapping[str, str] | None = None, **options: Any
+) -> dict[Path, ReadRecords]:
+    """Return what several recordings of one machine have for identification, by path.
+
+    What identification can do without, such as a disturbance, may be a column of some tables only:
+    it is left out where a table lacks it. Options and errors are those of `read_records`.
+    """
+    tables = {path: table_of(path) for path in paths if is_table(path)}
+    lacking = {
+        path: {
+            quantity
+            for quantity, text in ({} if columns is None else columns).items()
+            if quantity in _OPTIONAL and not has_columns(table, text)
+        }
+        for path, table in tables.items()
+    }
+    nowhere = set[str].intersection(*lacking.values()) if lacking else set[str]()
+    found: dict[Path, ReadRecords] = {}
+    for path in dict.fromkeys(paths):
+        own = columns
+        if columns is not None and path in tables:
+            absent = lacking[path] - nowhere
+            own = {name: text for name, text in columns.items() if name not in absent}
+        found[path] = read_records(path, own, table=tables.get(path), **options)
+    return found
+
+
+def read_records(
+    path: Path,
+    columns: Mapping[str, str] | None = None,
+    *,
+    start: float = 0.0,
+    end: float = inf,
+    namespace: str | None = None,
+    belt_speed: float | None = None,
+    table: Mapping[str, FloatArray] | None = None,
+) -> ReadRecords:
+    """Return what a bag, or a CSV or MAT file, has for identification.
+
+    The part that is used is from `start` to `end`, s from the first sample. Each part without a
+    longer gap is a record. `columns` are those for `read_table`, `table` is what was read already.
+    `namespace` is that of the drive, if a bag holds several. `belt_speed`, m/s, is in place of the
+    column of a table, and of a bag whose joint states have a single joint. Raises BagError if the
+    recording cannot be read, and InvalidInputError if it lacks what identification needs.
+    """
+    if table is None and is_table(path):
+        table = table_of(path)
+    if table is not None:
+        stamp, found = _of_table(path, table, columns, belt_speed)
+        known: Mapping[str, float] = {}
+    else:
+        stamp, found, known = _of_bag(path, namespace, belt_speed)
+    since = (stamp - stamp[0]) / NANOSECONDS
+    part = (since >= start) & (since < end)
+    if not part.any():
+        part_of = f"from {start:g} s" + (f" to {end:g} s" if isfinite(end) else " on")
+        raise InvalidInputError(f"{path} holds no samples {part_of}: it lasts {since.max():.4g} s")
+    own = {name: values[part] for name, values in found.items()}
+    return ReadRecords(evenly_spaced(str(path), stamp[part], own), known)
+
+
+def _of_table(
+    path: Path,
+    table: Mapping[str, FloatArray],
+    columns: Mapping[str, str] | None,
+    belt_speed: float | None,
+) -> tuple[IntArray, dict[str, FloatArray]]:
+    columns = own_columns(path, table) if columns is None else columns
+    found = quantities_of(path, table, columns, belt_speed)
+    time = found.pop("time")
+    belt = found.get("belt_velocity", np.full(len(time), 0.0))
+    optional = ("force", "disturbance", "reference", "velocity")
+    used = {name: found[name] for name in optional if name in found}
+    used |= {"position": found["position"], "belt_velocity": belt}
+    for name, values in used.items():
+        count = np.count_nonzero(np.isfinite(values))
+        if name not in _MAY_LACK_VALUES and count < FEWEST <= len(values):
+            raise InvalidInputError(
+                f"{path}: {name.replace('_', ' ')} (column {columns[name]}) has {count} finite "
+                f"numbers in {len(values)} rows: identification needs at least {FEWEST}"
+            )
+    return stamps_of(path, time), used
+
+
+def _of_bag(
+    path: Path, namespace: str | None, belt_speed: float | None
+) -> tuple[IntArray, dict[str, FloatArray], dict[str, float]]:
+    with Recording(path, namespace, belt_speed=belt_speed) as recording:
+        states = recording.joint_states
+        states = states[states.is_valid]
+        if len(states) == 0:
+            raise BagError(f"the bag {path} holds no joint states: the motion is unknown")
+        forces, disturbances = recording.control_forces, recording.applied_disturbances
+        references = recording.references
+        texts = recording.metadata("stickslip_ros/plant") or {}
+    plant: dict[str, Any] = {}
+    for name, text in texts.items():
+        with suppress(ValueError, RecursionError):
+            plant[name] = json.loads(text)
+    stamp = states.stamp
+    found = {"position": states.position, "belt_velocity": states.belt_velocity}
+    found["velocity"] = states.velocity
+    if len(forces):
+        found["force"] = _held(forces, stamp, plant)
+    if len(disturbances):
+        found["disturbance"] = _since(stamp, disturbances.stamp, disturbances.force, before=0.0)
+    if len(references):
+        found["reference"] = _since(stamp, references.stamp, references.position, before=nan)
+    delay = plant.get("force_delay", 0.0)
+    known = {DELAY: float(delay)} if isinstance(delay, int | float) and delay > 0.0 else {}
+    return stamp, found, known
+
+
+def _held(forces: ForceColumns, stamp: IntArray, plant: Mapping[str, Any]) -> FloatArray:
+    """Return the force that acts from each sample on: limited, rounded and late as by the actuator.
+
+    Of a force that lags it is the mean until the next sample.
+    """
+    held = _since(stamp, forces.stamp, forces.force, before=0.0)
+    given = {name: plant.get(f"actuator.{name}") for name in ("limit", "resolution")}
+    limiter = Actuator(
+        **{name: float(value) for name, value in given.items() if isinstance(value, int | float)}
+    ).limiter
+    if limiter is not None:
+        held = np.array([limiter(each) for each in held.tolist()])
+    time_constant = plant.get("actuator.time_constant", 0.0)
+    if not isinstance(time_constant, int | float) or not time_constant > 0.0 or len(stamp) < 2:
+        return held
+    periods = float(np.median(np.diff(stamp))) / NANOSECONDS / time_constant
+    kept, force, mean = exp(-periods), 0.0, np.empty(len(held))
+    for number, command in enumerate(held.tolist()):
+        mean[number] = command + (force - command) * (1.0 - kept) / periods
+        force = command + (force - command) * kept
+    return mean
+
+
+def _since(stamp: IntArray, since: IntArray, values: FloatArray, *, before: float) -> FloatArray:
+    """Return the newest value at each stamp, and another one before the first."""
+    order = np.argsort(since, kind="stable")
+    place = np.searchsorted(since[order], stamp, "right") - 1
+    return np.where(place >= 0, values[order][np.maximum(place, 0)], before)
