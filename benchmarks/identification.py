@@ -54,7 +54,7 @@ LAWS: dict[str, FrictionLaw] = {
     ),
 }
 ASKED = ("rate_state",)
-"""Laws that do not compete."""
+"""Laws that do not compete; in no case, but --cases takes them."""
 CASES = (
     *product(("stribeck", "exponential", "coulomb", "lugre"), ("ramp", "taps")),
     ("stribeck", "stick"),
@@ -62,7 +62,6 @@ CASES = (
     ("lugre", "stick"),
     ("stribeck", "narrow"),
     ("exponential", "narrow"),
-    ("rate_state", "ramp"),
 )
 """Law and kind of run. Coulomb friction does not vibrate by itself."""
 BELTS = {"ramp": (0.02, 0.06), "taps": (0.03, 0.03), "stick": (0.02, 0.02), "narrow": (0.06, 0.06)}
