@@ -17,8 +17,8 @@ EXECUTABLES = {
     "stickslip": "stickslip_ros.app.main:main",
 }
 
-# pandas and control: the first for numpy 2
-ANALYSIS = ["control>=0.10.1", "pandas>=2.2.2", "xarray>=2024.6"]
+ANALYSIS = ["control>=0.10.1", "xarray>=2024.6"]  # control: the first for numpy 2
+MATLAB = ["h5py>=3.11"]  # the first built for numpy 2
 DASHBOARD = ["contourpy", "fastapi", "nicegui>=3", "orjson", "uvicorn"]
 
 STUB = '#!/bin/sh\nexec "$(dirname "$0")/../../bin/$(basename "$0")" "$@"\n'
@@ -83,6 +83,7 @@ setup(
         "matplotlib>=3.8.4",  # the first built for numpy 2
         "mcap>=1.5",  # the first whose writer can close a chunk on demand
         "numpy>=2",
+        "pandas>=2.2.2",  # the first built for numpy 2
         "pillow>=10.1",  # the oldest wheels for 3.12
         "pint>=0.24.4",  # the first that works with the flexparser of today
         "pyyaml>=6.0.1",  # the first that builds with the Cython of today
@@ -92,8 +93,10 @@ setup(
         "zstandard>=0.22",  # the oldest wheels for 3.12
     ],
     extras_require={
-        # Results as tables, data sets and systems (to_pandas, to_xarray, to_control).
+        # Results as data sets and systems (to_xarray, to_control).
         "analysis": ANALYSIS,
+        # MAT files of version 7.3.
+        "matlab": MATLAB,
         # A web page that shows a run (stickslip dashboard); all but NiceGUI are what it stands on.
         "dashboard": DASHBOARD,
         # Studies on a cluster (stickslip sweep --dask).
@@ -103,6 +106,7 @@ setup(
         "test": [
             *ANALYSIS,
             *DASHBOARD,
+            *MATLAB,
             "axe-playwright-python",  # checks the dashboard for accessibility
             "distributed",
             "hypothesis",

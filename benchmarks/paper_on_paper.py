@@ -125,7 +125,7 @@ def measured(stiffness: int, speed: int) -> Features:
     """Return the features of a record."""
     columns = {"time": "t", "position": f"Fnorm*{NORMAL_FORCE / stiffness!r}"}
     path = DATA / f"k{stiffness}Nm_v{speed}.mat"
-    found = quantities_of(path, table_of(path), columns)
+    found = quantities_of(table_of(path), columns).values
     return features(found["time"], found["position"], stiffness)
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from typing_extensions import override
 
 from stickslip_ros.api.results import Parts, Result
+from stickslip_ros.bags.text_table import TableFormat
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.identification.findings import Findings, notes_on
 from stickslip_ros.identification.fit import Estimate
@@ -205,6 +206,9 @@ def identify(
     end: float = float("inf"),
     namespace: str | None = None,
     belt_speed: float | None = None,
+    decimal: str | None = None,
+    skip: int | None = None,
+    encoding: str | None = None,
     check: Sequence[Path | str] = (),
     progress: Callable[[str], None] = lambda _: None,
 ) -> Model:
@@ -226,6 +230,8 @@ def identify(
         ROS namespace of the drive, where a bag holds several.
     belt_speed : float, optional
         Belt speed, m/s, in place of what the recordings have.
+    decimal, skip, encoding : optional
+        Form of the tables, as for `read_table`.
     check : sequence of Path or str, optional
         Recordings that are not fitted, of which the result says what the model predicts.
     progress : callable, optional
@@ -264,6 +270,7 @@ def identify(
         end=end,
         namespace=namespace,
         belt_speed=belt_speed,
+        form=TableFormat(decimal, skip, encoding),
     )
     found = identify_recordings([read[path] for path in fitted], law, dict(fixed or {}), progress)
     predicted = {

@@ -14,6 +14,7 @@ from stickslip_ros.arrays import FloatArray
 from stickslip_ros.bags.reader import Recording
 from stickslip_ros.bags.report import report_of_recording
 from stickslip_ros.bags.table_file import is_table
+from stickslip_ros.bags.text_table import TableFormat
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.loop.trajectory import QUANTITIES
 from stickslip_ros.physics.measures.cycle_measures import Measures, measures_of
@@ -232,17 +233,21 @@ def read_table(
     stick_speed: float | None = None,
     belt_speed: float | None = None,
     slips: SlipThreshold | None = None,
+    decimal: str | None = None,
+    skip: int | None = None,
+    encoding: str | None = None,
 ) -> RecordedRun:
-    """Read a run from a CSV or MAT file, and measure it.
+    """Read a run from a table as text, such as a CSV file, or a MAT file, and measure it.
 
     Parameters
     ----------
     path : Path or str
-        CSV file with a line of names, or MAT file of version 7 or older.
+        The file. MAT files of version 7.3 need h5py.
     columns : mapping, optional
         Where the file has `time`, `position`, `velocity`, `force`, `belt_velocity` and
-        `friction_force`: names of columns, numbers, and products of them, in SI units. By default
-        it is a file of `stickslip simulate --out`.
+        `friction_force`: columns and numbers with + - * /, brackets and `unwrap(column, turn)`,
+        in SI units. A column by itself is converted, if the table has its unit. By default it
+        is a file of `stickslip simulate --out`.
     start, end : float
         Part to read, s from the first sample.
     stick_speed : float, optional
@@ -252,6 +257,8 @@ def read_table(
         Belt velocity, m/s, in place of a column.
     slips : SlipThreshold, optional
         What counts as a slip; by default slips are not looked for.
+    decimal, skip, encoding : optional
+        Decimal mark, number of lines on top, and encoding of a text; found by default.
 
     Returns
     -------
@@ -286,6 +293,7 @@ def read_table(
         stick_speed=stick_speed,
         belt_speed=belt_speed,
         slips=slips,
+        form=TableFormat(decimal, skip, encoding),
     )
 
 

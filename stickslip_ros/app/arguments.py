@@ -18,6 +18,7 @@ from stickslip_ros.scenarios import DEFAULT_NAMESPACE, LONGEST_NAMESPACE
 from stickslip_ros.text import shown
 
 if TYPE_CHECKING:
+    from stickslip_ros.bags.text_table import TableFormat
     from stickslip_ros.scenarios.files import Scenario
 
 DEFAULT_CONTROLLER = "(default: the one that the scenario has a section for)"
@@ -92,17 +93,40 @@ def add_columns(parser: argparse.ArgumentParser) -> None:
         "--columns",
         metavar="QUANTITY=COLUMN,...",
         help="where a table has time, position, velocity, force, belt_velocity, friction_force, "
-        "disturbance and reference: names of columns, numbers and products of them, in SI units, "
-        "as in time=t,position=x,force=vir*35.15,belt_velocity=0.04",
+        "disturbance and reference: columns and numbers with + - * /, brackets and unwrap(column, "
+        "turn), in SI units, as in time=t,position=(cmd-x)*1e-3,belt_velocity=0.04; 'a name' in "
+        "quotes, #2 for the second column; a column by itself is converted, if the table has its "
+        "unit",
     )
+    parser.add_argument(
+        "--decimal", metavar="MARK", help="decimal mark of a table, . or , (default: found)"
+    )
+    parser.add_argument(
+        "--skip",
+        type=int,
+        metavar="LINES",
+        help="lines of a table before its names or, without names, its rows (default: found)",
+    )
+    parser.add_argument(
+        "--encoding", metavar="NAME", help="encoding of a table, as utf-16 (default: found)"
+    )
+
+
+def form_of(arguments: argparse.Namespace) -> "TableFormat":
+    """Return what the options say of the form of tables."""
+    from stickslip_ros.bags.text_table import TableFormat
+
+    return TableFormat(arguments.decimal, arguments.skip, arguments.encoding)
 
 
 def columns_of(text: str | None) -> dict[str, str] | None:
     """Return the columns that --columns names, by quantity."""
+    from stickslip_ros.bags.expressions import parts_of
+
     if text is None:
         return None
     found: dict[str, str] = {}
-    for part in text.split(","):
+    for part in parts_of(text):
         quantity, equals, column = (each.strip() for each in part.partition("="))
         if not (quantity and equals and column) or quantity in found:
             raise InvalidInputError(

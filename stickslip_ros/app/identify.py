@@ -11,6 +11,7 @@ from stickslip_ros.app.arguments import (
     add_part,
     check_new,
     columns_of,
+    form_of,
     writing,
 )
 from stickslip_ros.app.output import progress_bar, tell
@@ -40,7 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="RECORDING",
         nargs="+",
         type=Path,
-        help="bag, or table (.csv, .mat) with --columns; several of the same machine are fitted "
+        help="bag, or table (text, .mat) with --columns; several of the same machine are fitted "
         "together",
     )
     add_columns(parser)
@@ -103,6 +104,7 @@ def run(arguments: argparse.Namespace) -> None:
             end=arguments.end,
             namespace=arguments.namespace,
             belt_speed=arguments.belt_speed,
+            **vars(form_of(arguments)),
             check=arguments.check,
             progress=lambda law: progress(0.0, f"identifying: {law}"),
         )

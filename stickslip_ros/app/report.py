@@ -8,6 +8,7 @@ from stickslip_ros.app.arguments import (
     add_json,
     add_part,
     columns_of,
+    form_of,
     length,
     seconds,
     speed,
@@ -35,7 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=Path,
         help="bag directory, or one .mcap file; also one that is being recorded, cut off or "
         "damaged: the readable part is measured, and a sentence names what is missing. Or a table, "
-        ".csv or .mat: one of `stickslip simulate --out`, or any other with --columns",
+        "as text or .mat: one of `stickslip simulate --out`, or any other with --columns",
     )
     add_columns(parser)
     parser.add_argument(
@@ -94,6 +95,7 @@ def run(arguments: argparse.Namespace) -> None:
             namespace=arguments.namespace,
             stick_speed=arguments.stick_speed,
             belt_speed=arguments.belt_speed,
+            form=form_of(arguments),
             slips=slips,
             kept=False,
             drawn=is_drawn(arguments),

@@ -4,21 +4,34 @@ import os
 import resource
 import subprocess
 import sys
+from collections.abc import Iterator
 from io import BytesIO
+from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray
 
+_MATLAB, _HDF5 = b"MATLAB", b"\x89HDF\r\n\x1a\n"
+"""First bytes of a MAT file, and of what a file of version 7.3 has in it."""
+_DEEPEST, _WIDEST = 10, 1000
+"""Structures in structures, and columns of a matrix, that are read."""
 _MEMORY, _TIME = 1 << 30, 60
 """Bytes and seconds that reading a file may take."""
 
 
-def vectors_of(stream: BinaryIO, most: int) -> dict[str, FloatArray]:
-    """Return the variables of a MAT file that are one number or a row or column of them, by name.
+def is_mat(path: Path, stream: BinaryIO) -> bool:
+    """Return whether an open file is a MAT file, by its end or its first bytes."""
+    start = os.pread(stream.fileno(), len(_MATLAB), 0)
+    return path.suffix.lower() == ".mat" or start == _MATLAB
 
-    Raises ValueError if it cannot be read, or if these are more than `most` numbers.
+
+def vectors_of(stream: BinaryIO, most: int) -> dict[str, FloatArray]:
+    """Return the vectors and single numbers in a MAT file, by name.
+
+    `log.t` is a field of a structure, and `data[2]` the second column of a matrix. Raises
+    ValueError if the file cannot be read, or if these are more than `most` numbers.
     """
     paths = os.pathsep.join(filter(None, sys.path))
     settings = {**os.environ, "PYTHONPATH": paths, "OPENBLAS_NUM_THREADS": "1"}
@@ -37,29 +50,59 @@ def vectors_of(stream: BinaryIO, most: int) -> dict[str, FloatArray]:
 
 
 def _main() -> None:
-    """Write the variables of the file at standard input to standard output, as numpy does."""
-    from scipy.io import loadmat
-
+    """Write the vectors in the file at standard input to standard output, as numpy does."""
     resource.setrlimit(resource.RLIMIT_AS, (_MEMORY, _MEMORY))
     try:
-        found: Any = loadmat(sys.stdin.buffer, squeeze_me=True)
-    except NotImplementedError:
-        sys.exit("a MAT file of version 7.3 is refused: save it with the option -v7")
+        content = sys.stdin.buffer.read()
+        found = _of_hdf5(content) if _HDF5 in content[:1024] else _of_scipy(content)
+        vectors = {f"={name}": values for name, values in found}  # numpy takes some names itself
+    except ImportError:
+        sys.exit("a MAT file of version 7.3 is read by h5py: install it, or save the file with -v7")
     except MemoryError:
         sys.exit(f"it takes more than {_MEMORY} bytes of memory")
     except Exception as error:
         sys.exit(f"it is damaged: {type(error).__name__}")
-    variables = {name: np.atleast_1d(values) for name, values in found.items() if name[:2] != "__"}
-    vectors: dict[str, Any] = {
-        f"={name}": values  # numpy has meanings of its own for some names
-        for name, values in variables.items()
-        if values.ndim == 1 and values.dtype.kind in "biuf"
-    }
     if sum(map(len, vectors.values())) > (most := int(sys.argv[1])):
         sys.exit(f"it has more than {most} numbers")
     target = BytesIO()
     np.savez(target, **{name: values.astype(float) for name, values in vectors.items()})
     sys.stdout.buffer.write(target.getbuffer())
+
+
+def _of_scipy(content: bytes) -> Iterator[tuple[str, Any]]:
+    from scipy.io import loadmat
+
+    variables: Any = loadmat(BytesIO(content), squeeze_me=True)
+    for name, values in variables.items():
+        if name[:2] != "__":
+            yield from _vectors(name, values)
+
+
+def _of_hdf5(content: bytes) -> Iterator[tuple[str, Any]]:
+    import h5py
+
+    def of_group(prefix: str, group: Any) -> Iterator[tuple[str, Any]]:
+        for name, each in group.items():
+            if isinstance(each, h5py.Group):
+                yield from of_group(f"{prefix}{name}.", each)
+            elif each.dtype.kind in "biuf":
+                yield from _vectors(prefix + name, np.squeeze(each[()].T))
+
+    with h5py.File(BytesIO(content)) as file:
+        yield from of_group("", file)
+
+
+def _vectors(name: str, values: Any, depth: int = 0) -> Iterator[tuple[str, Any]]:
+    """Yield the vectors of a variable: itself, columns of a matrix, fields of a structure."""
+    values = np.atleast_1d(values)
+    if values.dtype.names and values.size == 1 and depth < _DEEPEST:
+        for field in values.dtype.names:
+            yield from _vectors(f"{name}.{field}", values[field].item(), depth + 1)
+    elif values.dtype.kind in "biuf" and values.ndim == 1:
+        yield name, values
+    elif values.dtype.kind in "biuf" and values.ndim == 2 and values.shape[1] <= _WIDEST:
+        for number, column in enumerate(values.T, start=1):
+            yield f"{name}[{number}]", column
 
 
 if __name__ == "__main__":

@@ -12,6 +12,7 @@ import numpy as np
 from stickslip_ros.arrays import BoolArray, IntArray
 from stickslip_ros.bags.reader import Recording
 from stickslip_ros.bags.table_file import LONGEST, TableRecording, is_table, read_table
+from stickslip_ros.bags.text_table import ANY_FORM, TableFormat
 from stickslip_ros.errors import BagError, InvalidInputError
 from stickslip_ros.messages.topics import CONTROL_FORCE, JOINT_STATES
 from stickslip_ros.physics.measures.run_meter import RunAnalysis, RunMeter, RunObserver
@@ -39,6 +40,7 @@ def report_of_recording(
     namespace: str | None = None,
     stick_speed: float | None = None,
     belt_speed: float | None = None,
+    form: TableFormat = ANY_FORM,
     slips: SlipThreshold | None = None,
     observer: RunObserver | None = None,
     take: Callable[[SampleColumns | ForceColumns], None] = lambda _: None,
@@ -50,11 +52,11 @@ def report_of_recording(
     Parameters
     ----------
     path : Path
-        A bag directory, one MCAP file, or a CSV or MAT file.
+        A bag directory, one MCAP file, or a table as text or MAT file.
     columns : mapping or None
         Where a table has its quantities, as for `read_table`.
     table : bool or None
-        Whether the file is a table; None: whether its name ends as that of one.
+        Whether the file is a table; None: whether its name or content is that of one.
     start : float
         Start of the part that is measured, s; 0 includes everything from the beginning.
     end : float
@@ -69,6 +71,8 @@ def report_of_recording(
     belt_speed : float or None
         Belt speed, m/s, of a bag whose joint states have a single joint, or in place of a column
         of a table.
+    form : TableFormat, optional
+        What is known of the form of a table; the rest is found.
     slips : SlipThreshold or None
         What counts as a slip; None: slips are not looked for.
     observer : RunObserver or None
@@ -103,7 +107,7 @@ def report_of_recording(
         raise InvalidInputError(f"the part from {start} s to {end} s is empty")
     with ExitStack() as opened:
         recording = (
-            read_table(path, columns, belt_speed)
+            read_table(path, columns, belt_speed, form)
             if (is_table(path) if table is None else table)
             else opened.enter_context(Recording(path, namespace, belt_speed=belt_speed))
         )

@@ -1,30 +1,31 @@
 """Recordings of machines as tables: CSV files, and MAT files of MATLAB."""
 
-import csv
-import os
-from collections.abc import Iterator, Mapping
+import re
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import partial
-from io import TextIOWrapper
-from itertools import islice
 from math import nan
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from stickslip_ros.arrays import FloatArray, IntArray
-from stickslip_ros.bags.compression import LARGEST as LARGEST_FILE
-from stickslip_ros.bags.mat_file import vectors_of
+from stickslip_ros.arrays import BoolArray, FloatArray, IntArray
+from stickslip_ros.bags.expressions import Expression, listed
+from stickslip_ros.bags.mat_file import is_mat, vectors_of
 from stickslip_ros.bags.reader import RunBlock
+from stickslip_ros.bags.text_table import ANY_FORM, NO_UNITS, TableFormat, TextTable, unit_factor
 from stickslip_ros.errors import BagError, InvalidInputError
 from stickslip_ros.files import open_regular
 from stickslip_ros.samples import LARGEST, ForceColumns, SampleColumns
 from stickslip_ros.stamps import NANOSECONDS
-from stickslip_ros.text import did_you_mean, must_be_one_of, shown
+from stickslip_ros.text import must_be_one_of, quantity
 
-TABLE_SUFFIXES = (".csv", ".mat")
-"""Ends of the names of files that are tables."""
+TABLE_SUFFIXES = (".csv", ".mat", ".txt", ".dat", ".tsv", ".log", ".asc")
+"""Ends of the names of files that are tables, whatever they hold."""
+
+_BAG_SUFFIXES = (".mcap", ".db3")
+_MCAP = b"\x89MCAP"
 
 QUANTITIES = (
     "time",
@@ -51,11 +52,22 @@ _OWN_COLUMNS = {
 }
 """Columns of the files that `stickslip simulate --out` writes; the first one that exists."""
 
-_MOST_NUMBERS, _MOST_COLUMNS, _LONGEST_LINE = 1 << 24, 10_000, 1 << 20
-"""Numbers and columns of a table, and characters of a line, that are read."""
+_MOST_NUMBERS = 1 << 24
+"""Numbers of a MAT file."""
 
-_LONGEST_LIST = 1000
-"""Characters of the longest list of columns in a message."""
+_UNITS = {"time": "s", "position": "m", "reference": "m", "velocity": "m/s", "belt_velocity": "m/s"}
+"""Units of quantities; the others are forces."""
+_ROTARY = {"m": "rad", "m/s": "rad/s", "N": "N m"}
+_FORCES = ("force", "disturbance", "friction_force")
+"""Quantities that hold until the next value."""
+_MERGED, _FEWEST_BETWEEN = 0.1, 0.05
+"""Share of the rows with a position that lack another quantity, from which it was recorded between
+them; fewest of its values, as a share of the positions."""
+_STEM = re.compile(r"[^\W\d_]+")
+"""What the names of columns of times have in common: Time_1 and Time_2."""
+_EVEN_ROWS, _CLOCK_ROWS, _COARSE = 10, 100_000, 0.02
+"""Fewest and most rows in which times are seen to be rounded; least step of that, as a share of the
+period."""
 
 
 @dataclass(frozen=True)
@@ -93,21 +105,28 @@ class TableRecording:
 
 
 def is_table(path: Path) -> bool:
-    """Return whether a path names a table rather than a bag."""
-    return path.suffix.lower() in TABLE_SUFFIXES
+    """Return whether a path names a table rather than a bag: by its end or its first bytes."""
+    if path.suffix.lower() in TABLE_SUFFIXES:
+        return True
+    if not path.is_file() or any(each in _BAG_SUFFIXES for each in path.suffixes):
+        return False
+    with _reading(path), open_regular(path) as stream:
+        return not stream.read(len(_MCAP)).startswith(_MCAP)
 
 
 def read_table(
-    path: Path, columns: Mapping[str, str] | None = None, belt_speed: float | None = None
+    path: Path,
+    columns: Mapping[str, str] | None = None,
+    belt_speed: float | None = None,
+    form: TableFormat = ANY_FORM,
 ) -> TableRecording:
-    r"""Read a recording from a CSV or MAT file.
+    r"""Read a recording from a table: a text such as a CSV file, or a MAT file.
 
-    A CSV file begins with the names of its columns, separated by commas, semicolons or tabs; a MAT
-    file, version 7 or older, has a variable for each column. `columns` has, for some of
-    `QUANTITIES`, the name of a column, a number, or a product of them such as `vir*35.15065`, in SI
-    units; by default the file is one of `stickslip simulate --out`. A `belt_speed` is in place of a
-    column. A velocity that is not given is the difference of the positions beside each sample. A
-    belt whose velocity is not given is at rest.
+    `columns` has, for some of `QUANTITIES`, an `Expression` of columns and numbers in SI units. A
+    column by itself is converted, if the table has its unit. By default the file is one of
+    `stickslip simulate --out`. A `belt_speed` is in place of a column. A velocity that is not given
+    is the difference of the positions beside each sample. A belt whose velocity is not given is at
+    rest. `form` is what is known of the form of a text.
 
     Examples
     --------
@@ -116,27 +135,108 @@ def read_table(
     >>> from stickslip_ros.bags.table_file import read_table
     >>> with TemporaryDirectory() as folder:
     ...     path = Path(folder, "log.csv")
-    ...     _ = path.write_text("t;x\n0;1\n0.001;3\n")
-    ...     recording = read_table(path, {"time": "t", "position": "x*1e-6"})
-    >>> recording.samples.position.tolist()
-    [1e-06, 3e-06]
+    ...     _ = path.write_text("t;x [mm]\n0;1\n0,001;3\n")
+    ...     recording = read_table(path, {"time": "t", "position": "x"})
+    >>> recording.samples.stamp.tolist(), recording.samples.position.tolist()
+    ([0, 1000000], [0.001, 0.003])
     """
-    return _recording(path, quantities_of(path, table_of(path), columns, belt_speed))
+    return _recording(path, quantities_of(table_of(path, form), columns, belt_speed))
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table of a file: what its columns are, and how they are read."""
+
+    path: Path
+    columns: Mapping[str, int]
+    """Places of the columns by name; a column has several names, such as `x` and `#2`."""
+    names: Sequence[str]
+    """Name of each column; empty if it has none."""
+    units: Sequence[str]
+    """Units that the table has for its columns; empty where it has none."""
+    read: Callable[[Sequence[int]], list[Any]]
+    """Read columns by their places, as arrays of shape (rows,), or of a constant (1,)."""
+    line: Callable[[int], str]
+    """Name the place of a row in the file."""
+    notes: Callable[[], Sequence[str]]
+    """Return sentences on how the file was read."""
+
+    def has(self, text: str) -> bool:
+        """Return whether the table has all columns of an expression."""
+        try:
+            Expression.read(self.path, text, self.columns)
+        except InvalidInputError:
+            return False
+        return True
+
+
+def table_of(path: Path, form: TableFormat = ANY_FORM) -> Table:
+    """Return the table in a text or MAT file; raises BagError."""
+    with _reading(path):
+        with open_regular(path) as stream:
+            if is_mat(path, stream):
+                found = vectors_of(stream, _MOST_NUMBERS)
+                if not found:
+                    raise ValueError("it has no column")
+                vectors = [*found.values()]
+                return Table(
+                    path,
+                    {name: place for place, name in enumerate(found)},
+                    [*found],
+                    [""] * len(found),
+                    lambda wanted: [vectors[place] for place in wanted],
+                    lambda row: f"row {row + 1}",
+                    lambda: (),
+                )
+        text = TextTable(path, form)
+        return Table(
+            path,
+            text.columns,
+            text.names,
+            text.units,
+            text.read,
+            text.line,
+            lambda: text.notes,
+        )
+
+
+@contextmanager
+def _reading(path: Path) -> Generator[None]:
+    """Turn what a file raises that cannot be read into BagError."""
+    try:
+        yield
+    except (OSError, ValueError, OverflowError, MemoryError) as error:
+        if isinstance(error, InvalidInputError):
+            raise
+        reason = getattr(error, "strerror", None) or str(error).strip() or type(error).__name__
+        raise BagError(f"{path}: the file cannot be read: {reason}") from None
+
+
+class Quantities(NamedTuple):
+    """What a table has of a run."""
+
+    values: dict[str, FloatArray]
+    """Quantities, arrays of shape (rows,); the time is s from the first row."""
+    notes: list[str]
+    """Sentences on how the table was read, and on what it lacks."""
 
 
 def quantities_of(
-    path: Path,
-    table: Mapping[str, FloatArray],
+    table: Table,
     columns: Mapping[str, str] | None = None,
     belt_speed: float | None = None,
-) -> dict[str, FloatArray]:
-    """Return the quantities that a table of the file `path` has, as arrays of shape (rows,).
+) -> Quantities:
+    """Return the quantities that a table has.
 
-    The arguments are those of `read_table`. Rows whose time is not finite are left out. Values
-    that a measure would overflow with are NaN (above 1e100) or zero (below 1e-100).
+    `columns` and `belt_speed` are those of `read_table`. Rows whose time is not finite are left
+    out. Values that a measure would overflow with are NaN (above 1e100) or zero (below 1e-100).
+    Columns with times of their own, and those of rows between the positions, are brought to the
+    times of the positions: forces hold, other values are interpolated. Raises BagError if the file
+    cannot be read, and InvalidInputError if it has not what is asked for, or no sample.
     """
+    path = table.path
     if columns is None:
-        columns = own_columns(path, table)
+        columns = own_columns(path, table.columns)
     if belt_speed is not None:
         columns = {**columns, "belt_velocity": repr(float(belt_speed))}
     for name in columns:
@@ -145,86 +245,227 @@ def quantities_of(
     lacking = [name for name in ("time", "position") if name not in columns]
     if lacking:
         raise InvalidInputError(f"{path}: no column is given for {' and '.join(lacking)}")
-    with np.errstate(over="ignore", invalid="ignore"):
-        values = {name: _value(path, table, text) for name, text in columns.items()}
-    time = values["time"]
-    if time.ndim == 0:
+    asked = {name: Expression.read(path, text, table.columns) for name, text in columns.items()}
+    clock = asked["time"]
+    if not clock.places:
         raise InvalidInputError(f"{path}: time = {columns['time']} must be a column")
-    known = np.isfinite(time)
+    main = clock.places[0]
+    own_clocks = {} if clock.places[1:] else _own_clocks(table, main)
+    used = dict.fromkeys(place for each in asked.values() for place in each.places)
+    with _reading(path):
+        places = sorted({*used, *(own_clocks.get(place, main) for place in used)})
+        raw = dict(zip(places, table.read(places), strict=True))
+    rows = max(len(raw[place]) for place in clock.places)
+    for place in used:
+        if len(raw[place]) not in (1, rows):
+            raise InvalidInputError(
+                f"{path}: {_name(table, place)} has {len(raw[place])} numbers and the time "
+                f"{columns['time']} {rows}: columns must have the same length"
+            )
+    notes = [*table.notes(), *_remarks(table, raw, [*used])]
+    factors: dict[str, float] = {}
+    for name, each in asked.items():
+        if each.bare:
+            factors[name], note = _factor(table, name, each.places[0])
+            notes += note
+    counts = len(clock.places) > 1 or raw[main].dtype.kind == "i"
+    exact = np.longdouble if counts else float  # a float has no digits for ns since 1970
+    stamped = clock.value([np.asarray(raw[place], exact) for place in clock.places])
+    known = np.isfinite(stamped)
     if not known.any():
         raise InvalidInputError(f"{path}: no time is a finite number")
-    for name, each in values.items():
-        if name != "time":
-            size = np.abs(each)
-            each = np.where(size <= LARGEST, each, nan) * (size >= 1.0 / LARGEST)
-        values[name] = np.broadcast_to(each, time.shape)[known]
-    return values
+    stamped = stamped if known.all() else stamped[known]
+    time = np.asarray((stamped - stamped[0]) * factors.get("time", 1.0), float)
+    if len(back := np.flatnonzero(np.diff(time) < 0.0)):
+        line = table.line(int(np.flatnonzero(known)[back[0] + 1]))
+        raise InvalidInputError(
+            f"{path}: the time goes back {len(back)} times, the first time at {line}: rows must be "
+            "in the order of time; a counter that wraps is time=unwrap(column, turn)"
+        )
+    values: dict[str, FloatArray] = {}
+    for name, each in asked.items():
+        if name == "time":
+            continue
+        cells: list[FloatArray] = []
+        for place in each.places:
+            own = own_clocks.get(place, main)
+            column = np.asarray(raw[place], float)
+            if own != main and not np.array_equal(raw[own], raw[main], equal_nan=True):
+                column = _at(raw[main], raw[own], column, hold=name in _FORCES)
+                notes.append(f"{name} has times of its own, those of column #{own + 1}")
+            cells.append(column if len(column) == rows else column[0])
+        value = np.broadcast_to(each.value(cells), known.shape)
+        value = value if known.all() else value[known]
+        if factors.get(name, 1.0) != 1.0:
+            value = value * factors[name]
+        size = np.abs(value)
+        small = (size < 1.0 / LARGEST) & (size > 0.0)
+        if small.any() or not np.all(size <= LARGEST):
+            value = np.where(size <= LARGEST, np.where(small, 0.0, value), nan)
+        values[name] = value
+    present = np.isfinite(values["position"])
+    if not present.any():
+        raise InvalidInputError(f"{path}: no row has a time and a position, {columns['position']}")
+    for name, value in values.items():
+        if name not in ("position", "velocity"):
+            values[name] = _between(name, time, value, present, notes)
+    even, note = _unrounded(time)
+    return Quantities({"time": even, **values}, [*notes, *note])
 
 
-def table_of(path: Path) -> dict[str, FloatArray]:
-    """Return the columns of a CSV or MAT file, and single numbers, by name; raises BagError."""
-    try:
-        with open_regular(path) as stream:
-            if os.fstat(stream.fileno()).st_size > LARGEST_FILE:
-                raise ValueError(f"it has more than {LARGEST_FILE} bytes")
-            if path.suffix.lower() == ".mat":
-                return _read_mat(stream)
-            with TextIOWrapper(stream, encoding="utf-8-sig") as file:
-                return _read_csv(file)
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or str(error).strip().partition(";")[0]
-        raise BagError(f"{path}: the file cannot be read: {reason}") from None
+def _name(table: Table, place: int) -> str:
+    names = (name for name, each in table.columns.items() if each == place and name[:1] != "#")
+    return f"column {next(names, f'#{place + 1}')}"
 
 
-def has_columns(table: Mapping[str, FloatArray], text: str) -> bool:
-    """Return whether a table has all columns of a product such as `vir*35.15065`."""
-    return all(factor in table or _is_number(factor) for factor in _factors(text))
+def _own_clocks(table: Table, clock: int) -> dict[int, int]:
+    """Return the times of each column by their places, if several are named like those of `clock`.
+
+    They are the last ones before the column.
+    """
+    stems = [(_STEM.match(name) or [""])[0].lower() for name in table.names]
+    alike = [place for place, stem in enumerate(stems) if stem and stem == stems[clock]]
+    if len(alike) < 2 or clock != alike[0]:
+        return {}
+    return {
+        place: max(each for each in alike if each < place)
+        for place in range(clock + 1, len(stems))
+        if place not in alike
+    }
 
 
-def _factors(text: str) -> list[str]:
-    return [part.strip() for part in text.split("*")]
+def _remarks(table: Table, raw: Mapping[int, FloatArray], places: Sequence[int]) -> Iterator[str]:
+    """Yield sentences on cells that are left out."""
+    for place in places:
+        if raw[place].min() >= -LARGEST and raw[place].max() <= LARGEST:
+            continue
+        bad = np.flatnonzero(~(np.abs(raw[place]) <= LARGEST))
+        value = raw[place][bad[0]]
+        yield (
+            f"{_name(table, place)} has no number in {len(bad)} of {len(raw[place])} rows"
+            f"{f', or one as large as {value:.3g}' if np.isfinite(value) else ''}; the first "
+            f"is {table.line(int(bad[0]))}"
+        )
 
 
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
+def _factor(table: Table, kind: str, place: int) -> tuple[float, list[str]]:
+    """Return what converts a column to SI units, and sentences that say so."""
+    given, unit = table.units[place], _UNITS.get(kind, "N")
+    name = f"{kind}, {_name(table, place)},"
+    if given.lower() in NO_UNITS:
+        return 1.0, []
+    factor = unit_factor(given, unit)
+    if factor is not None:
+        return factor, [] if factor == 1.0 else [f"{name} is in {given}, and converted to {unit}"]
+    rotary = _ROTARY.get(unit, unit)
+    factor = unit_factor(given, rotary)
+    if factor is not None:
+        return factor, [f"{name} is in {given}: what is in {unit} is in {rotary}"]
+    return 1.0, [f"{name} is in {given}, which is no unit of {kind}: it is taken as {unit}"]
+
+
+def _at(at: FloatArray, time: FloatArray, values: FloatArray, *, hold: bool) -> FloatArray:
+    """Return values that are known at some times at others: held, or interpolated."""
+    known = np.isfinite(time) & np.isfinite(values)
+    if not known.any():
+        return np.full(len(at), nan)
+    time, values = time[known], values[known]
+    if not hold:
+        return np.interp(at, time, values, left=nan, right=nan)
+    last = np.searchsorted(time, at, "right") - 1
+    return np.where(last >= 0, values[last], nan)
+
+
+def _between(
+    name: str, time: FloatArray, values: FloatArray, present: BoolArray, notes: list[str]
+) -> FloatArray:
+    """Return a quantity at the rows with a position, if most of them lack it."""
+    known = np.isfinite(values)
+    lacking = 1.0 - np.mean(known[present])
+    if lacking <= _MERGED or np.count_nonzero(known) < _FEWEST_BETWEEN * np.count_nonzero(present):
+        return values
+    how = "held" if name in _FORCES else "interpolated"
+    notes.append(f"{lacking:.0%} of the rows with a position have no {name}: it is {how}")
+    return np.where(known, values, _at(time, time, values, hold=name in _FORCES))
+
+
+def _unrounded(time: FloatArray) -> tuple[FloatArray, list[str]]:
+    """Return even times for times that are even up to a rounding, and a sentence that says so.
+
+    Between gaps of more than two steps of the rounding, they must be on a line to within a step.
+    """
+    steps = np.diff(time)
+    if len(time) < _EVEN_ROWS or time[-1] > LONGEST or np.ptp(steps) < 0.5 / NANOSECONDS:
+        return time, []
+    sizes = np.unique(np.rint(steps[:_CLOCK_ROWS] * NANOSECONDS))
+    if len(sizes) < 2:
+        return time, []
+    step, usual = float(np.diff(sizes).min()) / NANOSECONDS, float(np.median(steps))
+    usual = float(np.mean(steps[steps <= usual + 1.5 * step]))
+    stand = int(np.count_nonzero(steps == 0.0))
+    if step >= _COARSE * usual:
+        found, period = time.copy(), usual
+        for rows in np.split(np.arange(len(time)), np.flatnonzero(steps > usual + 2.0 * step) + 1):
+            if len(rows) < _EVEN_ROWS:
+                continue
+            own = time[rows]
+            number = np.arange(len(rows)) - (len(rows) - 1) / 2.0
+            period = float(number @ (own - own.mean()) / (number @ number))
+            short = (float(f"{period:.{digits}g}") for digits in range(1, 12))
+            period = next((p for p in short if abs(p - period) * len(rows) < 0.05 * step), period)
+            apart = own - period * np.arange(len(rows))
+            if np.ptp(apart) > 1.05 * step:
+                break
+            found[rows] = float(apart.min() + apart.max()) / 2.0 + period * np.arange(len(rows))
+        else:
+            return found - found[0], [
+                f"the times are rounded to {quantity(step, 's')}: the rows are taken as evenly "
+                f"spaced, {quantity(period, 's')} apart"
+            ]
+    if stand:
+        return time, [f"{stand} of {len(time)} rows have the time of the row before"]
+    return time, []
 
 
 def stamps_of(path: Path, time: FloatArray) -> IntArray:
     """Return times, s, as stamps, ns, from the first one; InvalidInputError if they are too far."""
-    with np.errstate(over="ignore"):
-        since = time - time[0]
-    if np.abs(since).max() > LONGEST:
+    if np.abs(time).max() > LONGEST:
         raise InvalidInputError(f"{path}: the times differ by more than {LONGEST:g} s")
-    return np.rint(since * NANOSECONDS).astype(np.int64)
+    return np.rint(time * NANOSECONDS).astype(np.int64)
 
 
-def _recording(path: Path, found: Mapping[str, FloatArray]) -> TableRecording:
-    stamp = stamps_of(path, found["time"])
-    time = found["time"] - found["time"][0]
-    notes: list[str] = []
-    position = found["position"]
-    if "velocity" not in found:
+def _recording(path: Path, found: Quantities) -> TableRecording:
+    values, notes = found.values, [*found.notes]
+    time, position = values["time"], values["position"]
+    stamp = stamps_of(path, time)
+    present = np.isfinite(position)
+    unknown, rest = np.full(len(time), nan), np.zeros(len(time))
+    velocity = values.get("velocity", unknown)
+    lacking = present & ~np.isfinite(velocity)
+    if "velocity" not in values:
         notes.append("the velocity is not recorded: it is the difference of the positions")
-    if "belt_velocity" not in found:
+    elif lacking.any():
+        notes.append(
+            f"{np.count_nonzero(lacking)} rows have a position and no velocity: it is the "
+            "difference of the positions"
+        )
+    if "belt_velocity" not in values:
         notes.append("the belt velocity is not recorded: the belt counts as at rest")
-    velocity = found.get("velocity")
-    unknown, rest = np.full(len(time), np.nan), np.zeros(len(time))
+    differences = unknown.copy()
+    differences[present] = _differences(time[present], position[present])
     samples = SampleColumns(
         stamp,
         position,
-        _differences(time, position) if velocity is None else velocity,
-        found.get("friction_force", unknown),
+        np.where(lacking, differences, velocity),
+        values.get("friction_force", unknown),
         unknown,
-        found.get("belt_velocity", rest),
+        values.get("belt_velocity", rest),
     )
     forces = ForceColumns(stamp[:0], rest[:0])
-    if "force" in found:
-        forces = ForceColumns(stamp, found["force"])
-    return TableRecording(samples, forces, velocity is None, tuple(notes))
+    if "force" in values:
+        forces = ForceColumns(stamp, values["force"])
+    estimated = 2 * np.count_nonzero(lacking) > np.count_nonzero(present)
+    return TableRecording(samples, forces, bool(estimated), tuple(notes))
 
 
 def _differences(time: FloatArray, position: FloatArray) -> FloatArray:
@@ -237,85 +478,19 @@ def _differences(time: FloatArray, position: FloatArray) -> FloatArray:
         return (position[after] - position[before]) / (time[after] - time[before])
 
 
-def own_columns(path: Path, table: Mapping[str, FloatArray]) -> dict[str, str]:
+def own_columns(path: Path, known: Mapping[str, int]) -> dict[str, str]:
     """Return the columns by quantity of a table that `stickslip simulate --out` has written.
 
     Raises InvalidInputError for another one.
     """
     own = {
-        quantity: next((name for name in names if name in table), "")
+        quantity: next((name for name in names if name in known), "")
         for quantity, names in _OWN_COLUMNS.items()
     }
     if not own["time"] or not own["position"]:
         raise InvalidInputError(
-            f"{path} has the columns {', '.join(table)[:_LONGEST_LIST]}, and not those of "
+            f"{path} has the columns {listed(known)}, and not those of "
             "`stickslip simulate --out`: say what they are, as in --columns "
             "time=t,position=x,force=u*2.5"
         )
     return {quantity: name for quantity, name in own.items() if name}
-
-
-def _value(path: Path, table: Mapping[str, FloatArray], text: str) -> FloatArray:
-    """Return a product of columns and numbers."""
-    value: FloatArray = np.ones(())
-    for factor in _factors(text):
-        if factor in table:
-            value = value * table[factor]
-        elif _is_number(factor):
-            value = value * float(factor)
-        else:
-            known = f"has {', '.join(table)[:_LONGEST_LIST]}"
-            hint = did_you_mean(factor, table, known)
-            raise InvalidInputError(f"{path} has no column {shown(factor)}; {hint}")
-    return value
-
-
-def _read_csv(file: TextIOWrapper) -> dict[str, FloatArray]:
-    def lines() -> Iterator[str]:
-        """Return all lines that are not empty; of one that is too long a part."""
-        file.seek(0)
-        return filter(str.strip, iter(partial(file.readline, _LONGEST_LINE), ""))
-
-    heading, first, *_ = *islice(lines(), 2), "", ""
-    if not first:
-        raise ValueError("it has no rows" if heading else "it is empty")
-    separator = max(",;\t", key=heading.count)
-    names = [name.strip() for name in next(csv.reader([heading], delimiter=separator), [])]
-    if not 2 <= len(names) <= _MOST_COLUMNS or len({*names}) < len(names):
-        raise ValueError(
-            f"its first line must have the names of 2 to {_MOST_COLUMNS} columns, all different"
-        )
-    if (count := first.count(separator) + 1) != len(names):
-        raise ValueError(f"it has {count} columns and {len(names)} names for them")
-    load = partial(np.loadtxt, delimiter=separator, comments=None, ndmin=2)
-    most = _MOST_NUMBERS // len(names)
-    rows = lines()
-    try:
-        table = load(islice(rows, 1, most + 1))
-    except ValueError:  # some cells are no numbers: that takes longer
-        rows = lines()
-        table = load(islice(rows, 1, most + 1), converters=_number)
-    if next(rows, None) is not None:
-        raise ValueError(f"it has more than {_MOST_NUMBERS} numbers")
-    return dict(zip(names, table.T.copy(), strict=True))
-
-
-def _number(cell: str) -> float:
-    """Return the number in a cell, NaN if there is none."""
-    try:
-        return float(cell)
-    except ValueError:
-        return nan
-
-
-def _read_mat(stream: BinaryIO) -> dict[str, FloatArray]:
-    columns = vectors_of(stream, _MOST_NUMBERS)
-    if not columns:
-        raise ValueError("it has no column")
-    length = max(map(len, columns.values()))
-    # A single number is a constant, such as the gain of an amplifier.
-    return {
-        name: values if len(values) == length else values.reshape(())
-        for name, values in columns.items()
-        if len(values) in (1, length)
-    }

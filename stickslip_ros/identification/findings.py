@@ -278,10 +278,11 @@ def _relative(found: FloatArray, measured: FloatArray) -> float:
 def notes_on(found: Findings, record: Record) -> Sequence[str]:
     """Return sentences on what cannot be predicted of a record, and why."""
     if found.servo is None or record.reference is None or record.led is not None:
-        return []
+        return record.notes
     return [
+        *record.notes,
         f"the reference of {record.name} has no {FEWEST} samples in a row: the closed loop is "
-        "not predicted"
+        "not predicted",
     ]
 
 
@@ -296,6 +297,7 @@ def _notes(found: Findings) -> Sequence[str]:
         )
     for name in dict.fromkeys(record.name for record in found.records):
         own = [record for record in found.records if record.name == name]
+        notes += [f"{name}: {note}" for note in own[0].notes]
         missing = float(np.mean(np.concatenate([record.lost for record in own])))
         if missing > _MISSING_SHARE:
             used = ", and not fitted" if found.has_spring else ""

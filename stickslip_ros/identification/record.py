@@ -1,5 +1,6 @@
 """Recordings as identification uses them: evenly spaced samples of the motion and its inputs."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import sqrt
@@ -72,6 +73,8 @@ class Record:
     """Where no sample is near, so that the motion is interpolated; None: nowhere."""
     left_out: float = 0.0
     """Share of the samples of the recording in parts that are too short for a record."""
+    notes: tuple[str, ...] = ()
+    """Sentences on how the recording was read."""
 
     @property
     def duration(self) -> float:
@@ -183,14 +186,16 @@ class Record:
         )
 
 
-def evenly_spaced(name: str, stamp: IntArray, columns: dict[str, FloatArray]) -> list[Record]:
+def evenly_spaced(
+    name: str, stamp: IntArray, columns: dict[str, FloatArray], notes: Sequence[str] = ()
+) -> list[Record]:
     """Return records with even spacing from samples whose clock may jitter and have gaps.
 
-    Stamps are in ns, columns are those of `Record`. Samples of which one is not finite count as
-    missing; only the reference may be. Velocities are left out if they are differences of the
-    positions, or if less than half of them are finite. Each part without a longer gap is a record:
-    positions between samples are interpolated, forces are held. Raises InvalidInputError if no part
-    is long enough, or the clock is not even up to gaps and jitter.
+    Stamps are in ns, columns and notes are those of `Record`. Samples of which one is not finite
+    count as missing; only the reference may be. Velocities are left out if they are differences of
+    the positions, or if less than half of them are finite. Each part without a longer gap is a
+    record: positions between samples are interpolated, forces are held. Raises InvalidInputError if
+    no part is long enough, or the clock is not even up to gaps and jitter.
     """
     columns = dict(columns)
     velocity = columns.get("velocity")
@@ -233,8 +238,9 @@ def evenly_spaced(name: str, stamp: IntArray, columns: dict[str, FloatArray]) ->
         if "velocity" in found and _is_difference(found["velocity"], found["position"], period):
             del found["velocity"]
         far = _distances(even, own) > _MISSING_DISTANCE * period
+        missing = far if far.any() else None
         records.append(
-            Record(name, period, **found, missing=far if far.any() else None, left_out=left_out)
+            Record(name, period, **found, missing=missing, left_out=left_out, notes=tuple(notes))
         )
     if not records:
         raise InvalidInputError(

@@ -12,13 +12,14 @@ import numpy as np
 from stickslip_ros.arrays import FloatArray, IntArray
 from stickslip_ros.bags.reader import Recording
 from stickslip_ros.bags.table_file import (
-    has_columns,
+    Table,
     is_table,
     own_columns,
     quantities_of,
     stamps_of,
     table_of,
 )
+from stickslip_ros.bags.text_table import ANY_FORM, TableFormat
 from stickslip_ros.errors import BagError, InvalidInputError
 from stickslip_ros.identification.laws import DELAY
 from stickslip_ros.identification.record import FEWEST, Record, evenly_spaced
@@ -41,19 +42,23 @@ class ReadRecords(NamedTuple):
 
 
 def read_all(
-    paths: Sequence[Path], columns: Mapping[str, str] | None = None, **options: Any
+    paths: Sequence[Path],
+    columns: Mapping[str, str] | None = None,
+    *,
+    form: TableFormat = ANY_FORM,
+    **options: Any,
 ) -> dict[Path, ReadRecords]:
     """Return what several recordings of one machine have for identification, by path.
 
     What identification can do without, such as a disturbance, may be a column of some tables only:
     it is left out where a table lacks it. Options and errors are those of `read_records`.
     """
-    tables = {path: table_of(path) for path in paths if is_table(path)}
+    tables = {path: table_of(path, form) for path in paths if is_table(path)}
     lacking = {
         path: {
             quantity
             for quantity, text in ({} if columns is None else columns).items()
-            if quantity in _OPTIONAL and not has_columns(table, text)
+            if quantity in _OPTIONAL and not table.has(text)
         }
         for path, table in tables.items()
     }
@@ -76,20 +81,23 @@ def read_records(
     end: float = inf,
     namespace: str | None = None,
     belt_speed: float | None = None,
-    table: Mapping[str, FloatArray] | None = None,
+    form: TableFormat = ANY_FORM,
+    table: Table | None = None,
 ) -> ReadRecords:
     """Return what a bag, or a CSV or MAT file, has for identification.
 
     The part that is used is from `start` to `end`, s from the first sample. Each part without a
-    longer gap is a record. `columns` are those for `read_table`, `table` is what was read already.
-    `namespace` is that of the drive, if a bag holds several. `belt_speed`, m/s, is in place of the
-    column of a table, and of a bag whose joint states have a single joint. Raises BagError if the
-    recording cannot be read, and InvalidInputError if it lacks what identification needs.
+    longer gap is a record. `columns` and `form` are those for `read_table`, `table` is what was
+    opened already. `namespace` is that of the drive, if a bag holds several. `belt_speed`, m/s,
+    is in place of the column of a table, and of a bag whose joint states have a single joint.
+    Raises BagError if the recording cannot be read, and InvalidInputError if it lacks what
+    identification needs.
     """
     if table is None and is_table(path):
-        table = table_of(path)
+        table = table_of(path, form)
+    notes: Sequence[str] = ()
     if table is not None:
-        stamp, found = _of_table(path, table, columns, belt_speed)
+        stamp, found, notes = _of_table(table, columns, belt_speed)
         known: Mapping[str, float] = {}
     else:
         stamp, found, known = _of_bag(path, namespace, belt_speed)
@@ -99,17 +107,15 @@ def read_records(
         part_of = f"from {start:g} s" + (f" to {end:g} s" if isfinite(end) else " on")
         raise InvalidInputError(f"{path} holds no samples {part_of}: it lasts {since.max():.4g} s")
     own = {name: values[part] for name, values in found.items()}
-    return ReadRecords(evenly_spaced(str(path), stamp[part], own), known)
+    return ReadRecords(evenly_spaced(str(path), stamp[part], own, notes), known)
 
 
 def _of_table(
-    path: Path,
-    table: Mapping[str, FloatArray],
-    columns: Mapping[str, str] | None,
-    belt_speed: float | None,
-) -> tuple[IntArray, dict[str, FloatArray]]:
-    columns = own_columns(path, table) if columns is None else columns
-    found = quantities_of(path, table, columns, belt_speed)
+    table: Table, columns: Mapping[str, str] | None, belt_speed: float | None
+) -> tuple[IntArray, dict[str, FloatArray], Sequence[str]]:
+    path = table.path
+    columns = own_columns(path, table.columns) if columns is None else columns
+    found, notes = quantities_of(table, columns, belt_speed)
     time = found.pop("time")
     belt = found.get("belt_velocity", np.full(len(time), 0.0))
     optional = ("force", "disturbance", "reference", "velocity")
@@ -122,7 +128,7 @@ def _of_table(
                 f"{path}: {name.replace('_', ' ')} (column {columns[name]}) has {count} finite "
                 f"numbers in {len(values)} rows: identification needs at least {FEWEST}"
             )
-    return stamps_of(path, time), used
+    return stamps_of(path, time), used, notes
 
 
 def _of_bag(

@@ -152,7 +152,7 @@ REFUSED: Mapping[str, Mapping[str, str]] = {
         "none.csv": "the file cannot be read",
         "log.csv": "say what they are",
         f"heading.csv --columns {COLUMNS}": "the file cannot be read: it has no rows",
-        f"text.csv --columns {COLUMNS}": "text.csv: position (column x) has 0 finite",
+        f"text.csv --columns {COLUMNS}": "text.csv: no row has a time and a position, x",
         f"{LOG} --fix mass=3": "did you mean plant.mass? must be",
         f"{LOG} --from 99": "from 99 s on: it lasts 0.999 s",
         f"{LOG} --out a.txt": "must end in .yaml",

@@ -96,37 +96,34 @@ def test_what_is_changed_in_the_numbers_of_a_mat_file_is_detected_or_read(
         with pytest.raises(BagError, match="damaged"):
             table_of(path)
     else:
-        assert len(table_of(path)["t"]) == len(TIME)
+        assert len(table_of(path).read([0])[0]) == len(TIME)
 
 
 def test_a_file_beyond_a_limit_is_refused_in_a_sentence(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("stickslip_ros.bags.table_file._MOST_NUMBERS", 1000)
+    monkeypatch.setattr("stickslip_ros.bags.text_table._MOST_NUMBERS", 1000)
     path = tmp_path / "log.csv"
     for content, sentence in (
-        ("t,x\n" + "1" * 3_000_000 + ",2\n", "columns and 2 names"),
-        (",".join(map(str, range(20_000))) + "\n1\n", "2 to 10000 columns"),
-        ("t,x\n1,2\n1,2,3\n", "number of columns changed"),
-        ("t,x\n1,2\n1\n", "number of columns changed"),
+        (",".join(map(str, range(20_000))) + "\n1\n", "more than 10000 columns"),
+        ("t,x\n1,2,3\n1,2,3\n", "line 1 has 2 names for 3 columns; with --skip 1"),
         ("t,x\n" + "1,2\n" * 600, "more than 1000 numbers"),
-        ("t,x\n" + "1,-\n" * 600, "more than 1000 numbers"),
+        ("t,x\n" + "1,-\n1,2\n" * 300, "more than 1000 numbers"),
         ("\n\n", "it is empty"),
     ):
         path.write_text(content, encoding="utf-8")
         with pytest.raises(BagError, match=sentence) as refused:
-            table_of(path)
+            read_table(path, {"time": "t", "position": "x"})
         assert len(str(refused.value)) < 300 + len(str(path))
     path.write_text(f"t,{'x' * 50_000}\n1,2\n", encoding="utf-8")
     for columns in (None, {"time": "t", "position": "y"}):
         with pytest.raises(InvalidInputError) as refused_columns:
             read_table(path, columns)
         assert len(str(refused_columns.value)) < 2000
-    for name in ("large.csv", "large.mat"):
-        (tmp_path / name).touch()
-        os.truncate(tmp_path / name, 1 << 30)
-        with pytest.raises(BagError, match="more than 268435456 bytes"):
-            table_of(tmp_path / name)
+    (tmp_path / "large.csv").touch()
+    os.truncate(tmp_path / "large.csv", 1 << 30)
+    with pytest.raises(BagError, match="it is no text"):
+        table_of(tmp_path / "large.csv")
 
 
 @pytest.mark.timeout(30)
@@ -146,6 +143,7 @@ def test_a_cell_that_no_measure_bears_is_left_out(tmp_path: Path) -> None:
     for cell in ("1e160", "-1e308", "inf", "nan"):
         path.write_text(f"t,x,u\n0,1,1\n0.1,{cell},{cell}\n0.2,1e-320,1\n", encoding="utf-8")
         recording = read_table(path, COLUMNS)
+        assert "column x has no number in 1 of 3 rows" in recording.notes[0]
         assert np.array_equal(recording.samples.position, [1.0, np.nan, 0.0], equal_nan=True)
         assert np.array_equal(recording.forces.force, [1.0, np.nan, 1.0], equal_nan=True)
 
@@ -157,7 +155,12 @@ def changed(kind: str, chance: random.Random) -> bytes:
         for _ in range(chance.choice([1, 3, 300])):
             chance.choice(rows)[chance.randrange(3)] = chance.choice(ODD_CELLS)
         rows = rows[: chance.choice([0, 1, 2, 12, 300])]
-        content = bytearray("\n".join(["t,x,u", *map(",".join, rows)]).encode())
+        separator = chance.choice([",", ",", ";", "\t", " ", "|"])
+        text = "\n".join(map(separator.join, [["t", "x", "u"], *rows]))
+        if separator != "," and chance.random() < 0.5:
+            text = text.replace(".", ",")
+        top = chance.choice(["", "", "a;b\n\n", "s,mm,N\n", '"\n', "1;2\n\n"])
+        content = bytearray((top + text).encode(chance.choice(["utf-8", "utf-8", "utf-16"])))
     else:
         stream, version = BytesIO(), chance.choice("455")
         options: dict[str, Any] = (
@@ -201,3 +204,14 @@ def measure_or_refuse(tmp_path_factory: pytest.TempPathFactory, kind: str, seed:
     with suppress(InvalidInputError):
         report = report_of_recording(path, COLUMNS, slips=SlipThreshold(1e-5, within=1e7))
         assert report["samples"] <= len(TIME)
+
+
+@examples(quick=40, thorough=1000, deadline=None)
+@given(content=st.binary(max_size=300) | st.text(alphabet="0159.,;:-T\t\n\"' xe#/µ", max_size=300))
+def test_any_bytes_are_measured_or_refused(
+    tmp_path_factory: pytest.TempPathFactory, content: bytes | str
+) -> None:
+    path = tmp_path_factory.getbasetemp() / "any.txt"
+    path.write_bytes(content.encode() if isinstance(content, str) else content)
+    with suppress(InvalidInputError):
+        report_of_recording(path, {"time": "#1", "position": "#2"})

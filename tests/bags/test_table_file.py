@@ -38,14 +38,15 @@ def test_a_csv_file_is_read_to_the_last_digit(tmp_path: Path, separator: str) ->
     assert samples.velocity.tolist() == VELOCITY.tolist()
     assert samples.belt_velocity.tolist() == [0.04] * 2001
     assert forces.force.tolist() == (POSITION * 1e6 * 2.5).tolist()
-    assert recording.notes == ()
+    note = {";": "semicolons as separators", "\t": "tabs as separators"}.get(separator)
+    assert recording.notes == (() if note is None else (f"the table is read with {note}",))
 
 
 @pytest.mark.process
 def test_a_mat_file_gives_the_same_up_to_a_limit(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    most = 4 * len(TIME) + 1
+    most = 4 * len(TIME) + 1 + 9
     monkeypatch.setattr("stickslip_ros.bags.table_file._MOST_NUMBERS", most)
     path = tmp_path / "log.mat"
     table = {"t": TIME[:, None], "x": POSITION[None, :], "v": VELOCITY, "u": POSITION, "gain": 1e6}
@@ -96,20 +97,31 @@ def test_cells_and_times_that_are_no_numbers_are_left_out(tmp_path: Path) -> Non
 
 
 def test_only_tables_are_tables() -> None:
-    names = ("a/log.CSV", "log.mat", "bags/reference", "reference_0.mcap")
-    assert [is_table(Path(name)) for name in names] == [True, True, False, False]
+    names = ("a/log.CSV", "log.mat", "log.txt", "bags/reference", "reference_0.mcap", "log")
+    assert [is_table(Path(name)) for name in names] == [True, True, True, False, False, False]
+
+
+def test_a_file_without_a_known_end_is_a_table_unless_it_is_a_bag(tmp_path: Path) -> None:
+    for name, content in (("log", b"t,x\n0,1\n"), ("bag", b"\x89MCAP0\r\n")):
+        (tmp_path / name).write_bytes(content)
+    assert [is_table(tmp_path / name) for name in ("log", "bag")] == [True, False]
 
 
 def test_columns_that_make_no_recording_are_refused(tmp_path: Path) -> None:
     path = csv_of(tmp_path / "log.csv", **lists(t=TIME, x=POSITION, v=VELOCITY))
     refusals: list[tuple[dict[str, str] | None, str]] = [
         ({"time": "t", "position": "y"}, "has no column 'y'"),
-        ({"time": "t", "position": "x*"}, "has no column ''"),
-        ({"time": "t", "position": "x/2"}, "has no column 'x/2'"),
+        ({"time": "t", "position": "x*"}, "the expression 'x*' is refused"),
+        ({"time": "t", "position": "y/2"}, "has no column 'y'"),
+        ({"time": "t", "position": "nan"}, "no row has a time and a position"),
         ({"time": "t"}, "no column is given for position"),
         ({"time": "3", "position": "x"}, "time = 3 must be a column"),
         ({"time": "t", "position": "x", "speed": "v"}, "column speed is refused"),
         ({"time": "t*1e12", "position": "x"}, "differ by more than 9e+09 s"),
+        (
+            {"time": "1-t", "position": "x"},
+            "the time goes back 2000 times, the first time at line 3",
+        ),
         ({"time": "t*nan", "position": "x"}, "no time is a finite number"),
         (None, "not those of `stickslip simulate --out`"),
     ]
@@ -123,7 +135,7 @@ def test_columns_that_make_no_recording_are_refused(tmp_path: Path) -> None:
 @pytest.mark.process
 def test_a_file_that_is_no_table_is_refused(tmp_path: Path) -> None:
     for suffix, *contents in (
-        (".csv", b"", b"t\n1\n", b"t,t\n1,2\n", b"t,x\n", b"t,x\n1,2,3\n1,2,3\n", b"\xff\xfe\0t,x"),
+        (".csv", b"", b"t\n1\n", b"t,x\n", b"t,x\n1,2,3\n1,2,3\n", b"\xff\xfe\0t,x"),
         (".mat", b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM" + bytes(400)),
     ):
         path = tmp_path / f"log{suffix}"

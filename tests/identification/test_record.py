@@ -5,7 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from stickslip_ros.arrays import FloatArray
+from stickslip_ros.bags.table_file import Table
+from stickslip_ros.bags.text_table import TableFormat
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.identification import recordings as module
 from stickslip_ros.identification.record import Record, evenly_spaced
@@ -173,9 +174,9 @@ def test_each_table_is_read_once(tables: list[Path], monkeypatch: pytest.MonkeyP
     asked: list[Path] = []
     own = module.table_of
 
-    def counted(path: Path) -> dict[str, FloatArray]:
+    def counted(path: Path, form: TableFormat) -> Table:
         asked.append(path)
-        return own(path)
+        return own(path, form)
 
     monkeypatch.setattr(module, "table_of", counted)
     found = read_all(tables, _NAMES)

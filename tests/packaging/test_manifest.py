@@ -17,6 +17,7 @@ KEYS = {
     "fastapi": {"python3-fastapi"},
     "jinja2": {"python3-jinja2"},
     "heyoka": set(),
+    "h5py": {"python3-h5py"},
     "hypothesis": {"python3-hypothesis"},
     "ipykernel": set(),
     "jsonschema": {"python3-jsonschema"},
@@ -97,12 +98,10 @@ def test_the_manifest_tells_what_has_no_key():
     keys = sorted(key for name in required("dashboard") for key in KEYS[name])
     keyless = " and ".join(sorted(name for name in required("dashboard") if not KEYS[name]))
     assert f"For the dashboard: {', '.join(keys)}, and {keyless} from PyPI;" in text
-    keys = sorted(key for name in required("analysis") for key in KEYS[name])
     keyless = " and ".join(sorted(name for name in required("analysis") if not KEYS[name]))
-    assert (
-        f"For to_pandas, to_xarray and to_control: {', '.join(keys)}, and {keyless} from PyPI."
-        in text
-    )
+    assert f"For to_xarray and to_control: {keyless} from PyPI." in text
+    ((key,),) = (KEYS[name] for name in required("matlab"))
+    assert f"For MAT files of version 7.3: {key}." in text
 
 
 def test_the_docs_install_in_a_workspace_all_that_is_asked_for():
