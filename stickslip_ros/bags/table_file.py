@@ -256,6 +256,8 @@ def quantities_of(
         places = sorted({*used, *(own_clocks.get(place, main) for place in used)})
         raw = dict(zip(places, table.read(places), strict=True))
     rows = max(len(raw[place]) for place in clock.places)
+    if not rows:
+        raise BagError(f"{path}: the file cannot be read: it has no rows")
     for place in used:
         if len(raw[place]) not in (1, rows):
             raise InvalidInputError(

@@ -1,6 +1,7 @@
 """The forms of tables as text: each is found, read to the last digit, and said."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -176,14 +177,16 @@ def test_what_is_said_of_the_form_is_used(
 
 
 def test_what_is_no_table_is_refused_with_the_options(tmp_path: Path) -> None:
-    for text in ("only words\nand more\n", "1\n2\n3\n", b"\0\1\2\3" * 100):
+    texts = ("only words\nand more\n", "1\n2\n3\n", b"\0\1\2\3" * 100, " |\n1|1\n"[:2] * 9)
+    for text in texts:
         with pytest.raises(BagError, match="encoding"):
             read(tmp_path, text, "t", "x")
-    for form, sentence in (
+    refusals: list[tuple[dict[str, Any], str]] = [
         ({"decimal": "x"}, "must be . or ,"),
         ({"skip": -1}, "must be at least 0"),
         ({"encoding": "nothing"}, "must be one of Python's"),
         ({"encoding": "hex"}, "must be one of Python's"),
-    ):
+    ]
+    for options, sentence in refusals:
         with pytest.raises(InvalidInputError, match=sentence):
-            TableFormat(**form)
+            TableFormat(**options)
