@@ -4,7 +4,7 @@ import re
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from math import nan
+from math import inf, nan
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -65,9 +65,9 @@ _MERGED, _FEWEST_BETWEEN = 0.1, 0.05
 them; fewest of its values, as a share of the positions."""
 _STEM = re.compile(r"[^\W\d_]+")
 """What the names of columns of times have in common: Time_1 and Time_2."""
-_EVEN_ROWS, _CLOCK_ROWS, _COARSE = 10, 100_000, 0.02
+_EVEN_ROWS, _CLOCK_ROWS, _COARSE, _COMMON = 10, 100_000, 0.02, 0.02
 """Fewest and most rows in which times are seen to be rounded; least step of that, as a share of the
-period."""
+period; share of the steps of time from which one is usual."""
 
 
 @dataclass(frozen=True)
@@ -399,13 +399,13 @@ def _unrounded(time: FloatArray) -> tuple[FloatArray, list[str]]:
     steps = np.diff(time)
     if len(time) < _EVEN_ROWS or time[-1] > LONGEST or np.ptp(steps) < 0.5 / NANOSECONDS:
         return time, []
-    sizes = np.unique(np.rint(steps[:_CLOCK_ROWS] * NANOSECONDS))
-    if len(sizes) < 2:
-        return time, []
-    step, usual = float(np.diff(sizes).min()) / NANOSECONDS, float(np.median(steps))
+    sizes, counts = np.unique(np.rint(steps[:_CLOCK_ROWS] * NANOSECONDS), return_counts=True)
+    sizes = sizes[counts >= _COMMON * counts.sum()]  # others are gaps and lost rows
+    step = float(np.diff(sizes).min(initial=inf)) / NANOSECONDS
+    usual = float(np.median(steps))
     usual = float(np.mean(steps[steps <= usual + 1.5 * step]))
     stand = int(np.count_nonzero(steps == 0.0))
-    if step >= _COARSE * usual:
+    if _COARSE * usual <= step < inf:
         found, period = time.copy(), usual
         for rows in np.split(np.arange(len(time)), np.flatnonzero(steps > usual + 2.0 * step) + 1):
             if len(rows) < _EVEN_ROWS:
