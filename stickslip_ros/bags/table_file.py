@@ -60,7 +60,7 @@ _UNITS = {"time": "s", "position": "m", "reference": "m", "velocity": "m/s", "be
 _ROTARY = {"m": "rad", "m/s": "rad/s", "N": "N m"}
 _FORCES = ("force", "disturbance", "friction_force")
 """Quantities that hold until the next value."""
-_MERGED, _FEWEST_BETWEEN = 0.1, 0.05
+_MERGED, _FEWEST_BETWEEN = 0.3, 0.05
 """Share of the rows with a position that lack another quantity, from which it was recorded between
 them; fewest of its values, as a share of the positions."""
 _STEM = re.compile(r"[^\W\d_]+")
