@@ -206,6 +206,7 @@ def measure_or_refuse(tmp_path_factory: pytest.TempPathFactory, kind: str, seed:
         assert report["samples"] <= len(TIME)
 
 
+@pytest.mark.process  # of bytes that begin like a MAT file
 @examples(quick=40, thorough=1000, deadline=None)
 @given(content=st.binary(max_size=300) | st.text(alphabet="0159.,;:-T\t\n\"' xe#/µ", max_size=300))
 def test_any_bytes_are_measured_or_refused(
