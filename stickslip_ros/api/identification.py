@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from typing_extensions import override
 
-from stickslip_ros.api.results import Parts, Result
+from stickslip_ros.api.results import Parts, Result, Summary
 from stickslip_ros.bags.text_table import TableFormat
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.identification.findings import Findings, notes_on
@@ -24,7 +24,6 @@ from stickslip_ros.scenarios.files import Scenario, load_scenario
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from stickslip_ros.api.page import Summary
     from stickslip_ros.plots.style import FigureStyle
 
 
@@ -184,9 +183,7 @@ class Model(Result):
         }
 
     @override
-    def _summary(self) -> "Summary":
-        from stickslip_ros.api.page import Summary
-
+    def _summary(self) -> Summary:
         found = self.findings
         names = ", ".join(dict.fromkeys(record.name for record in found.records))
         verdict = f"friction law {found.law}, {found.chosen.error:.3%} error held out"

@@ -3,12 +3,13 @@
 from collections.abc import Callable, Iterable
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 from xml.etree import ElementTree
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
+from stickslip_ros.api.results import Summary
 from stickslip_ros.errors import StickslipError
 from stickslip_ros.files import written
 from stickslip_ros.tables import TextTable
@@ -24,19 +25,6 @@ _SVG, _XLINK = "http://www.w3.org/2000/svg", "http://www.w3.org/1999/xlink"
 
 _STYLES = {"wide": "paper-double", "narrow": "paper"}
 """Style of the figure by the width of the page: of paper or a screen, and of a telephone."""
-
-
-class Summary(NamedTuple):
-    """What a page says of a result beside what the result prints, and its figure."""
-
-    title: str
-    """What it is, such as "Simulated run"."""
-    subject: str
-    """What it is of: the scenario, or the recording."""
-    verdict: str
-    """The result in one sentence."""
-    parameters: Iterable[TextTable] = ()
-    """The parameters that it was made with, with their units."""
 
 
 def write_page(

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from typing_extensions import override
 
-from stickslip_ros.api.results import Parts, Quantity, Result, Table, TabularResult
+from stickslip_ros.api.results import Parts, Quantity, Result, Summary, Table, TabularResult
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.bags.reader import Recording
 from stickslip_ros.bags.report import report_of_recording
@@ -33,7 +33,6 @@ from stickslip_ros.tables import TextTable
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from stickslip_ros.api.page import Summary
     from stickslip_ros.plots.run_figure import DrawnRun
     from stickslip_ros.plots.style import FigureStyle
 
@@ -100,9 +99,7 @@ class RecordedRun(TabularResult):
             yield from recorded_tables(known, Units.for_drive(self.drive))
 
     @override
-    def _summary(self) -> "Summary":
-        from stickslip_ros.api.page import Summary
-
+    def _summary(self) -> Summary:
         return Summary("Recorded run", str(self.path), self.verdict, self.settings())
 
     @override
@@ -151,9 +148,7 @@ class Comparison(Result):
         return {"reports": reports}
 
     @override
-    def _summary(self) -> "Summary":
-        from stickslip_ros.api.page import Summary
-
+    def _summary(self) -> Summary:
         found = {str(run.path): run.verdict for run in self.runs}
         verdict = "; ".join(f"{path}: {text}" for path, text in found.items())
         parameters = [

@@ -24,11 +24,23 @@ if TYPE_CHECKING:
     from pandas import DataFrame
     from xarray import Dataset
 
-    from stickslip_ros.api.page import Summary
     from stickslip_ros.plots.style import FigureStyle
 
 Parts = Iterable[TextTable | str]
 """Tables and sentences that a result prints as."""
+
+
+class Summary(NamedTuple):
+    """What a page says of a result beside what the result prints, and its figure."""
+
+    title: str
+    """What it is, such as "Simulated run"."""
+    subject: str
+    """What it is of: the scenario, or the recording."""
+    verdict: str
+    """The result in one sentence."""
+    parameters: Iterable[TextTable] = ()
+    """The parameters that it was made with, with their units."""
 
 
 class Result(ABC):
@@ -68,7 +80,7 @@ class Result(ABC):
         """Return the entries of `to_dict` but the versions; a long array is an iterator."""
 
     @abstractmethod
-    def _summary(self) -> "Summary":
+    def _summary(self) -> Summary:
         """Return what a page says of the result beside its tables and its figure."""
 
     def to_dict(self) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from typing_extensions import override
 
-from stickslip_ros.api.results import Parts, Quantity, Table, TabularResult, attributes
+from stickslip_ros.api.results import Parts, Quantity, Summary, Table, TabularResult, attributes
 from stickslip_ros.api.scenarios import ScenarioLike, as_scenario
 from stickslip_ros.physics.loop.trajectory import (
     MEASURED,
@@ -29,7 +29,6 @@ from stickslip_ros.studies import simulate as simulation
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from stickslip_ros.api.page import Summary
     from stickslip_ros.plots.style import FigureStyle
 
 _COLUMNS = {name: Quantity(*labelled) for name, labelled in {**QUANTITIES, **MEASURED}.items()}
@@ -87,8 +86,7 @@ class Run(TabularResult):
         return {**values, **self.scenario.provenance()}
 
     @override
-    def _summary(self) -> "Summary":
-        from stickslip_ros.api.page import Summary
+    def _summary(self) -> Summary:
         from stickslip_ros.plots.panels import measures_text
 
         verdict = measures_text(self.measures, self._units)

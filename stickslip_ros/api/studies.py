@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from typing_extensions import override
 
-from stickslip_ros.api.results import Parts, Quantity, Table, TabularResult, attributes
+from stickslip_ros.api.results import Parts, Quantity, Summary, Table, TabularResult, attributes
 from stickslip_ros.api.scenarios import ScenarioLike, as_scenario
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import InvalidInputError
@@ -44,7 +44,6 @@ from stickslip_ros.text import shown
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from stickslip_ros.api.page import Summary
     from stickslip_ros.plots.study_figure import Colour
     from stickslip_ros.plots.style import FigureStyle
 
@@ -185,9 +184,7 @@ class Sweep(Points):
         return sweep_figure(self.columns, self.study, colour, style=style)
 
     @override
-    def _summary(self) -> "Summary":
-        from stickslip_ros.api.page import Summary
-
+    def _summary(self) -> Summary:
         counts = Counter(map(Regime.label, self.columns.regime))
         verdict = ", ".join(f"{regime} at {count}" for regime, count in counts.items())
         return Summary(
@@ -244,9 +241,7 @@ class Basin(Points):
         )
 
     @override
-    def _summary(self) -> "Summary":
-        from stickslip_ros.api.page import Summary
-
+    def _summary(self) -> Summary:
         shares = [f"{attractor_name(each)} {each.share:.1%}" for each in self.attractors]
         parameters = scenario_tables(self.scenario, used=True)
         title = "Basins of attraction"

@@ -12,6 +12,7 @@ from stickslip_ros.api.results import (
     Parts,
     Quantity,
     Result,
+    Summary,
     Table,
     TabularResult,
     attributes,
@@ -41,7 +42,6 @@ from stickslip_ros.text import shown
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from stickslip_ros.api.page import Summary
     from stickslip_ros.plots.style import FigureStyle
 
 
@@ -134,9 +134,7 @@ class Stability(Result):
         return {**found, **self.scenario.provenance()}
 
     @override
-    def _summary(self) -> "Summary":
-        from stickslip_ros.api.page import Summary
-
+    def _summary(self) -> Summary:
         loops = {"without control": self.open_loop, "sampled loop": self.sampled_loop}
         known = {name: loop["stable"] for name, loop in loops.items() if loop["stable"] is not None}
         verdict = "; ".join(
@@ -266,9 +264,7 @@ class Proposal(TabularResult):
         return f"there is nothing to propose: {self.remark}"
 
     @override
-    def _summary(self) -> "Summary":
-        from stickslip_ros.api.page import Summary
-
+    def _summary(self) -> Summary:
         task, units = self.design.task, Units.for_drive(self.design.task.drive)
         controller = {} if self.controller is None else asdict(self.controller)
         gains = [

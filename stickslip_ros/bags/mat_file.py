@@ -15,7 +15,7 @@ from stickslip_ros.arrays import FloatArray
 
 _MATLAB, _HDF5 = b"MATLAB", b"\x89HDF\r\n\x1a\n"
 """First bytes of a MAT file, and of what a file of version 7.3 has in it."""
-_DEEPEST, _WIDEST = 10, 1000
+_MOST_LEVELS, _MOST_COLUMNS = 10, 1000
 """Structures in structures, and columns of a matrix, that are read."""
 _MEMORY, _TIME = 1 << 30, 60
 """Bytes and seconds that reading a file may take."""
@@ -95,12 +95,12 @@ def _of_hdf5(content: bytes) -> Iterator[tuple[str, Any]]:
 def _vectors(name: str, values: Any, depth: int = 0) -> Iterator[tuple[str, Any]]:
     """Yield the vectors of a variable: itself, columns of a matrix, fields of a structure."""
     values = np.atleast_1d(values)
-    if values.dtype.names and values.size == 1 and depth < _DEEPEST:
+    if values.dtype.names and values.size == 1 and depth < _MOST_LEVELS:
         for field in values.dtype.names:
             yield from _vectors(f"{name}.{field}", values[field].item(), depth + 1)
     elif values.dtype.kind in "biuf" and values.ndim == 1:
         yield name, values
-    elif values.dtype.kind in "biuf" and values.ndim == 2 and values.shape[1] <= _WIDEST:
+    elif values.dtype.kind in "biuf" and values.ndim == 2 and values.shape[1] <= _MOST_COLUMNS:
         for number, column in enumerate(values.T, start=1):
             yield f"{name}[{number}]", column
 

@@ -60,12 +60,12 @@ _UNITS = {"time": "s", "position": "m", "reference": "m", "velocity": "m/s", "be
 _ROTARY = {"m": "rad", "m/s": "rad/s", "N": "N m"}
 _FORCES = ("force", "disturbance", "friction_force")
 """Quantities that hold until the next value."""
-_MERGED, _FEWEST_BETWEEN = 0.3, 0.05
+_MERGED_SHARE, _BETWEEN_SHARE = 0.3, 0.05
 """Share of the rows with a position that lack another quantity, from which it was recorded between
 them; fewest of its values, as a share of the positions."""
 _STEM = re.compile(r"[^\W\d_]+")
 """What the names of columns of times have in common: Time_1 and Time_2."""
-_EVEN_ROWS, _CLOCK_ROWS, _COARSE, _COMMON = 10, 100_000, 0.02, 0.02
+_EVEN_ROWS, _CLOCK_ROWS, _COARSE_SHARE, _COMMON_SHARE = 10, 100_000, 0.02, 0.02
 """Fewest and most rows in which times are seen to be rounded; least step of that, as a share of the
 period; share of the steps of time from which one is usual."""
 
@@ -384,7 +384,9 @@ def _between(
     """Return a quantity at the rows with a position, if most of them lack it."""
     known = np.isfinite(values)
     lacking = 1.0 - np.mean(known[present])
-    if lacking <= _MERGED or np.count_nonzero(known) < _FEWEST_BETWEEN * np.count_nonzero(present):
+    if lacking <= _MERGED_SHARE or np.count_nonzero(known) < _BETWEEN_SHARE * np.count_nonzero(
+        present
+    ):
         return values
     how = "held" if name in _FORCES else "interpolated"
     notes.append(f"{lacking:.0%} of the rows with a position have no {name}: it is {how}")
@@ -400,12 +402,12 @@ def _unrounded(time: FloatArray) -> tuple[FloatArray, list[str]]:
     if len(time) < _EVEN_ROWS or time[-1] > LONGEST or np.ptp(steps) < 0.5 / NANOSECONDS:
         return time, []
     sizes, counts = np.unique(np.rint(steps[:_CLOCK_ROWS] * NANOSECONDS), return_counts=True)
-    sizes = sizes[counts >= _COMMON * counts.sum()]  # others are gaps and lost rows
+    sizes = sizes[counts >= _COMMON_SHARE * counts.sum()]  # others are gaps and lost rows
     step = float(np.diff(sizes).min(initial=inf)) / NANOSECONDS
     usual = float(np.median(steps))
     usual = float(np.mean(steps[steps <= usual + 1.5 * step]))
     stand = int(np.count_nonzero(steps == 0.0))
-    if _COARSE * usual <= step < inf:
+    if _COARSE_SHARE * usual <= step < inf:
         found, period = time.copy(), usual
         for rows in np.split(np.arange(len(time)), np.flatnonzero(steps > usual + 2.0 * step) + 1):
             if len(rows) < _EVEN_ROWS:

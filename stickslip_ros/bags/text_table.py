@@ -209,6 +209,7 @@ class TextTable:
         import pandas as pd
 
         version = tuple(map(int, pd.__version__.split(".")[:2]))
+        # From 3.1 on this is the default, and naming it is deprecated.
         exact: Any = {} if version >= (3, 1) else {"float_precision": "round_trip"}
         parts: dict[int, list[Any]] = {place: [] for place in places}
         blank: list[int] = []

@@ -69,8 +69,8 @@ def try_adapter(adapter: IdentifiedLaw) -> None:
     Raises InvalidInputError with the reason if they do not, and anything that the adapter raises.
     """
     kind = LAWS[adapter.name]
-    own = float(kind().characteristic_speed)
-    fastest = 3.0 * own if isfinite(own) else 1.0
+    scale = float(kind().characteristic_speed)
+    fastest = 3.0 * scale if isfinite(scale) else 1.0
     speeds, shape = fastest * _SPEEDS, fastest / 3.0
     forces = [0.5**number for number in range(len(adapter.least))]
     terms = adapter.terms(speeds, shape)
@@ -80,8 +80,8 @@ def try_adapter(adapter: IdentifiedLaw) -> None:
             f"{(len(speeds), len(forces))}, a column for each value of `least`"
         )
     coordinates = adapter.coordinates_of(forces, shape)
-    begun = {"mass": _MASS, "stiffness": _STIFFNESS, **adapter.start(coordinates, 1e-9)}
-    for values in adapter.starts(begun, fastest):
+    given = {"mass": _MASS, "stiffness": _STIFFNESS, **adapter.start(coordinates, 1e-9)}
+    for values in adapter.starts(given, fastest):
         missing = [name for name in adapter.coordinates if name not in values]
         if missing:
             raise InvalidInputError(f"starts without a value of {', '.join(missing)}")

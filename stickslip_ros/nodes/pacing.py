@@ -341,4 +341,4 @@ class TimingMonitor:
         self._counts.append(counts)
         latest = Timing(*(now - then for now, then in zip(counts, before, strict=True)))
         few = latest.samples < 100  # too few for a meaningful share
-        return "" if few else latest.complaint("latest ")
+        return "" if few else latest.warning("latest ")

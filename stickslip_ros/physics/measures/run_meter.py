@@ -211,7 +211,7 @@ class RunMeter:
         """
         motion, timing = self.motion, self.timing
         notes: list[str] = []
-        if timing is not None and (complaint := timing.complaint()):
+        if timing is not None and (complaint := timing.warning()):
             doubt = "" if timing.in_time else "the regime is doubtful: "
             notes.append(doubt + complaint)
         measures = motion.measures(quick=quick)

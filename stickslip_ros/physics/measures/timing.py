@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-_NOTABLE = 0.01
+_NOTABLE_SHARE = 0.01
 """Share of the forces or samples above which it matters that they came late."""
 
 
@@ -18,9 +18,9 @@ class Timing(NamedTuple):
     @property
     def in_time(self) -> bool:
         """Whether at most 1 % of the forces came late."""
-        return self.late_forces <= _NOTABLE * self.samples
+        return self.late_forces <= _NOTABLE_SHARE * self.samples
 
-    def complaint(self, which: str = "") -> str:
+    def warning(self, which: str = "") -> str:
         """Return what came late in more than 1 % of the samples, and a remedy; else nothing.
 
         `which` says of which samples, as in "latest ".
@@ -31,7 +31,7 @@ class Timing(NamedTuple):
                 (self.late_forces, "forces came late or not at all"),
                 (self.missed_deadlines, "samples missed their deadlines"),
             )
-            if count > _NOTABLE * self.samples
+            if count > _NOTABLE_SHARE * self.samples
         ]
         if not found:
             return ""
