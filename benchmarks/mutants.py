@@ -29,7 +29,7 @@ ROOMS = ("physics", "model", "motion", "measures", "theory")
 FILE = Path(__file__).with_suffix(".json")
 TIERS = (
     ("tests/physics",),
-    ("tests/studies", "tests/paper", "tests/plots", "tests/scenarios", "tests/bags", "tests/app"),
+    ("tests/studies", "tests/paper", "tests/show", "tests/scenarios", "tests/bags", "tests/app"),
 )
 TIMEOUT = 600.0
 

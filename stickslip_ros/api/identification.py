@@ -18,13 +18,13 @@ from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.recordings import read_all, read_records
 from stickslip_ros.identification.scenario import written_scenario
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.plots.identification_table import identification_tables
 from stickslip_ros.scenarios.files import Scenario, load_scenario
+from stickslip_ros.show.identification_table import identification_tables
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from stickslip_ros.plots.style import FigureStyle
+    from stickslip_ros.show.style import FigureStyle
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -115,7 +115,7 @@ class Model(Result):
 
     @override
     def draw(self, style: "FigureStyle") -> "Figure":
-        from stickslip_ros.plots.identification_figure import identification_figure
+        from stickslip_ros.show.identification_figure import identification_figure
 
         return identification_figure(self.findings, style=style)
 

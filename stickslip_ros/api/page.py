@@ -19,7 +19,7 @@ from stickslip_ros.versions import versions
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from stickslip_ros.plots.style import FigureStyle
+    from stickslip_ros.show.style import FigureStyle
 
 _SVG, _XLINK = "http://www.w3.org/2000/svg", "http://www.w3.org/1999/xlink"
 
@@ -68,7 +68,7 @@ def _drawing(draw: "Callable[[FigureStyle], Figure]", style: str, name: str, lab
     """Return a figure as SVG, its identifiers being those of no other figure on the page."""
     from dataclasses import replace
 
-    from stickslip_ros.plots.style import STYLES, rendered
+    from stickslip_ros.show.style import STYLES, rendered
 
     figure = draw(replace(STYLES[style], titled=False))
     root = ElementTree.fromstring(rendered(figure, "svg", outlines=True))

@@ -20,21 +20,21 @@ from stickslip_ros.physics.loop.trajectory import QUANTITIES
 from stickslip_ros.physics.measures.cycle_measures import Measures, measures_of
 from stickslip_ros.physics.measures.slips import SlipThreshold
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.plots.measure_table import doubt, report_tables
-from stickslip_ros.plots.parameter_tables import recorded_tables
-from stickslip_ros.plots.run_history import RunHistory
-from stickslip_ros.plots.units import Units
 from stickslip_ros.samples import ForceColumns, SampleColumns
 from stickslip_ros.scenarios.curve_file import CURVES, as_pairs
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, PlantParameters
+from stickslip_ros.show.measure_table import doubt, report_tables
+from stickslip_ros.show.parameter_tables import recorded_tables
+from stickslip_ros.show.quantities import Units
+from stickslip_ros.show.run_history import RunHistory
 from stickslip_ros.stamps import NANOSECONDS
 from stickslip_ros.tables import TextTable
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from stickslip_ros.plots.run_figure import DrawnRun
-    from stickslip_ros.plots.style import FigureStyle
+    from stickslip_ros.show.run_figure import DrawnRun
+    from stickslip_ros.show.style import FigureStyle
 
 _COLUMNS = {name: Quantity(*labelled) for name, labelled in QUANTITIES.items()} | {
     "stamp": Quantity("stamp", "ns")
@@ -78,14 +78,14 @@ class RecordedRun(TabularResult):
 
     def as_drawn(self) -> "DrawnRun":
         """Return what figures draw of the run."""
-        from stickslip_ros.plots.run_figure import DrawnRun
+        from stickslip_ros.show.run_figure import DrawnRun
 
         return DrawnRun.recorded(self.path, self._history, self.report, self.drive)
 
     @property
     def verdict(self) -> str:
         """Regime, amplitude, frequency and stick fraction as a line of text."""
-        from stickslip_ros.plots.panels import measures_text
+        from stickslip_ros.show.panels import measures_text
 
         return measures_text(self.measures, Units.for_drive(self.drive)) + doubt(self.report)
 
@@ -136,7 +136,7 @@ class Comparison(Result):
 
     @override
     def draw(self, style: "FigureStyle") -> "Figure":
-        from stickslip_ros.plots.run_figure import run_figure
+        from stickslip_ros.show.run_figure import run_figure
 
         return run_figure(*(run.as_drawn() for run in self.runs), style=style)
 

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TextIO
 import numpy as np
 
 from stickslip_ros.errors import RunError
-from stickslip_ros.plots.units import Units
 from stickslip_ros.scenarios.files import Scenario
+from stickslip_ros.show.quantities import Units
 from stickslip_ros.tables import TextTable
 from stickslip_ros.text import finite, printable
 from stickslip_ros.versions import versions
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from pandas import DataFrame
     from xarray import Dataset
 
-    from stickslip_ros.plots.style import FigureStyle
+    from stickslip_ros.show.style import FigureStyle
 
 Parts = Iterable[TextTable | str]
 """Tables and sentences that a result prints as."""
@@ -165,7 +165,7 @@ class Result(ABC):
 
     def _drawn(self, style: str, **options: Any) -> "Figure":
         """Return the figure in the style of that name, as notebooks show it."""
-        from stickslip_ros.plots.style import style_named
+        from stickslip_ros.show.style import style_named
 
         figure = self.draw(style_named(style), **options)
         vars(figure)["_repr_png_"] = partial(_png, figure)  # pyplot does not know it

@@ -17,19 +17,19 @@ from stickslip_ros.physics.loop.trajectory import (
     TrajectoryRecorder,
 )
 from stickslip_ros.physics.measures.cycle_measures import Measures
-from stickslip_ros.plots.measure_table import simulation_tables
-from stickslip_ros.plots.parameter_tables import scenario_tables
-from stickslip_ros.plots.run_history import RunHistory
-from stickslip_ros.plots.units import Units
 from stickslip_ros.progress import Progress
 from stickslip_ros.quantities import number_of
 from stickslip_ros.scenarios.files import Scenario
+from stickslip_ros.show.measure_table import simulation_tables
+from stickslip_ros.show.parameter_tables import scenario_tables
+from stickslip_ros.show.quantities import Units
+from stickslip_ros.show.run_history import RunHistory
 from stickslip_ros.studies import simulate as simulation
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from stickslip_ros.plots.style import FigureStyle
+    from stickslip_ros.show.style import FigureStyle
 
 _COLUMNS = {name: Quantity(*labelled) for name, labelled in {**QUANTITIES, **MEASURED}.items()}
 
@@ -64,7 +64,7 @@ class Run(TabularResult):
 
     @override
     def draw(self, style: "FigureStyle") -> "Figure":
-        from stickslip_ros.plots.run_figure import DrawnRun, run_figure
+        from stickslip_ros.show.run_figure import DrawnRun, run_figure
 
         drawn = DrawnRun.simulated(self.scenario, self._history, self.truth or self.measures)
         return run_figure(drawn, style=style)
@@ -87,7 +87,7 @@ class Run(TabularResult):
 
     @override
     def _summary(self) -> Summary:
-        from stickslip_ros.plots.panels import measures_text
+        from stickslip_ros.show.panels import measures_text
 
         verdict = measures_text(self.measures, self._units)
         parameters = scenario_tables(self.scenario, used=True)

@@ -18,12 +18,12 @@ from stickslip_ros.api.scenarios import ScenarioLike, as_scenario
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.measures.cycle_measures import Regime
-from stickslip_ros.plots.measure_table import LABELS
-from stickslip_ros.plots.parameter_tables import scenario_tables
-from stickslip_ros.plots.study_tables import attractor_name, basin_table, sweep_table, units_of
 from stickslip_ros.quantities import number_of
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.scenarios.keywords import described, keyword_of, parameter_of
+from stickslip_ros.show.measure_table import LABELS
+from stickslip_ros.show.parameter_tables import scenario_tables
+from stickslip_ros.show.study_tables import attractor_name, basin_table, sweep_table, units_of
 from stickslip_ros.studies import transitions as theory
 from stickslip_ros.studies.basin import (
     POSITION,
@@ -44,8 +44,8 @@ from stickslip_ros.text import shown
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from stickslip_ros.plots.study_figure import Colour
-    from stickslip_ros.plots.style import FigureStyle
+    from stickslip_ros.show.study_figure import Colour
+    from stickslip_ros.show.style import FigureStyle
 
 Values = tuple[float | str, float | str, int] | tuple[float | str, float | str, int, str]
 """First and last value, how many, and optionally "log"."""
@@ -179,7 +179,7 @@ class Sweep(Points):
         InvalidInputError
             If `colour` is unknown, or given for a sweep over one parameter.
         """
-        from stickslip_ros.plots.study_figure import sweep_figure
+        from stickslip_ros.show.study_figure import sweep_figure
 
         return sweep_figure(self.columns, self.study, colour, style=style)
 
@@ -226,7 +226,7 @@ class Basin(Points):
 
     @override
     def draw(self, style: "FigureStyle") -> "Figure":
-        from stickslip_ros.plots.study_figure import basin_figure
+        from stickslip_ros.show.study_figure import basin_figure
 
         return basin_figure(self.columns, self.basins, self.study, style=style)
 

@@ -22,8 +22,12 @@ from stickslip_ros.api.scenarios import ScenarioLike, as_scenario
 from stickslip_ros.errors import InvalidInputError, RunError
 from stickslip_ros.physics.model.control import Washout
 from stickslip_ros.physics.theory.linear_system import LinearSystem
-from stickslip_ros.plots.parameter_tables import scenario_tables
-from stickslip_ros.plots.study_tables import (
+from stickslip_ros.progress import Progress
+from stickslip_ros.quantities import number_of
+from stickslip_ros.scenarios.files import Scenario
+from stickslip_ros.show.parameter_tables import scenario_tables
+from stickslip_ros.show.quantities import Units
+from stickslip_ros.show.study_tables import (
     CHECKS,
     CONTROLLER,
     MARGINS,
@@ -31,10 +35,6 @@ from stickslip_ros.plots.study_tables import (
     design_tables,
     stability_tables,
 )
-from stickslip_ros.plots.units import Units
-from stickslip_ros.progress import Progress
-from stickslip_ros.quantities import number_of
-from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.studies import design as designing
 from stickslip_ros.studies import stability as stabilities
 from stickslip_ros.text import shown
@@ -42,7 +42,7 @@ from stickslip_ros.text import shown
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from stickslip_ros.plots.style import FigureStyle
+    from stickslip_ros.show.style import FigureStyle
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -124,7 +124,7 @@ class Stability(Result):
         reason = stabilities.why_no_figure(self.scenario)
         if reason is not None:
             raise InvalidInputError(f"there is nothing to draw: {reason}")
-        from stickslip_ros.plots.stability_figure import scenario_stability_figure
+        from stickslip_ros.show.stability_figure import scenario_stability_figure
 
         return scenario_stability_figure(self.scenario, style=style)
 
@@ -225,7 +225,7 @@ class Proposal(TabularResult):
     def draw(self, style: "FigureStyle") -> "Figure":
         if self.design.map_around() is None:
             raise RunError(self._nothing)
-        from stickslip_ros.plots.stability_figure import design_figure
+        from stickslip_ros.show.stability_figure import design_figure
 
         return design_figure(self.design, style=style)
 

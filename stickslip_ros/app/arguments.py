@@ -272,7 +272,7 @@ def scenario_of(
 
 def check_speeds(arguments: argparse.Namespace, scenario: "Scenario", *speeds: float) -> None:
     """Refuse belt speeds (m/s) far beyond the scales of a drive and its law, but for --yes."""
-    from stickslip_ros.plots.units import Units
+    from stickslip_ros.show.quantities import Units
 
     plant, known = scenario.plant, scenario.plant.known
     used = [name for name in plant.drive_names() if name.startswith("friction.")]

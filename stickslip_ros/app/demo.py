@@ -39,9 +39,9 @@ def _demonstrate() -> None:
     controller = scenario.controller.node.replace("_", " ")
     bag = default_bag(_SCENARIO)
     load_matplotlib()
-    from stickslip_ros.plots.run_figure import DrawnRun, run_figure
-    from stickslip_ros.plots.run_history import RunHistory
-    from stickslip_ros.plots.style import save
+    from stickslip_ros.show.run_figure import DrawnRun, run_figure
+    from stickslip_ros.show.run_history import RunHistory
+    from stickslip_ros.show.style import save
 
     with loading_ros():
         from stickslip_ros.nodes.base.network import keep_on_this_machine

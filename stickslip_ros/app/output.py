@@ -14,7 +14,7 @@ from stickslip_ros.versions import versions
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from stickslip_ros.plots.units import Units
+    from stickslip_ros.show.quantities import Units
 
 _ALL_SI: Mapping[str, "Units"] = {}
 
@@ -49,7 +49,7 @@ def print_values(
     title: str, columns: Mapping[str, Mapping[str, Any]], units: Mapping[str, "Units"] = _ALL_SI
 ) -> None:
     """Print values by name, one column for each of `columns`, as `measure_table` has them."""
-    from stickslip_ros.plots.measure_table import measure_table
+    from stickslip_ros.show.measure_table import measure_table
 
     print_table(*measure_table(title, columns, units))
 

@@ -90,7 +90,7 @@ def _draw(number: int, path: Path, style: str | None) -> "PaperFigure":
     load_matplotlib()
     from stickslip_ros.paper.drawing import paper_figure, save_paper_figure
     from stickslip_ros.paper.figures import compute_figure
-    from stickslip_ros.plots.style import STYLES
+    from stickslip_ros.show.style import STYLES
 
     figure = compute_figure(number)
     look = STYLES[style or "screen"]

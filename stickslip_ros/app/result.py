@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from stickslip_ros.api.results import Result
-    from stickslip_ros.plots.style import FigureStyle
+    from stickslip_ros.show.style import FigureStyle
 
 _FIGURE_FILES = (".png", ".svg", ".pdf")
 _PAGE_FILES = (".html", ".htm")
@@ -27,7 +27,7 @@ _LEAST_INCHES, _MOST_INCHES = 2, 50
 """Width and height of a figure, inches."""
 _MOST_PIXELS = 2e8
 _STYLES = "screen", "paper", "paper-double"
-"""The names of `plots.style.STYLES`; importing that takes long."""
+"""The names of `show.style.STYLES`; importing that takes long."""
 
 
 def add_plot(parser: argparse.ArgumentParser, shown: str) -> None:
@@ -55,7 +55,7 @@ def add_plot(parser: argparse.ArgumentParser, shown: str) -> None:
 
 
 def add_style(parser: argparse.ArgumentParser) -> None:
-    """Add --style, a name of `plots.style.STYLES`."""
+    """Add --style, a name of `show.style.STYLES`."""
     parser.add_argument(
         "--style",
         choices=_STYLES,
@@ -135,7 +135,7 @@ def print_result(arguments: argparse.Namespace, result: "Result") -> None:
 
 def _write_figure(arguments: argparse.Namespace, draw: "Callable[[FigureStyle], Figure]") -> None:
     """Draw a figure as it is asked for, and write it to the file that --plot names."""
-    from stickslip_ros.plots.style import STYLES, save
+    from stickslip_ros.show.style import STYLES, save
 
     style = replace(
         STYLES[arguments.style or "screen"],

@@ -88,8 +88,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Run the command; return the exit status."""
     from stickslip_ros.bags.recorder import check_new_bag
-    from stickslip_ros.plots.measure_table import report_sentences
-    from stickslip_ros.plots.units import Units
+    from stickslip_ros.show.measure_table import report_sentences
+    from stickslip_ros.show.quantities import Units
 
     overrides: list[str] = []
     if arguments.pace is not None:
@@ -143,7 +143,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _announcement(scenario: "Scenario", bag: Path, *, composed: bool) -> str:
     """Return in one line what is started."""
-    from stickslip_ros.plots.units import Units
+    from stickslip_ros.show.quantities import Units
 
     plant = scenario.plant
     pace = "lockstep" if plant.pace is Pace.LOCKSTEP else "real time"

@@ -25,8 +25,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> None:
     """Run the command."""
-    from stickslip_ros.plots.parameter_tables import scenario_tables
     from stickslip_ros.scenarios.files import load_scenario
+    from stickslip_ros.show.parameter_tables import scenario_tables
 
     load = partial(
         load_scenario,

@@ -74,7 +74,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> None:
     """Run the command."""
     from stickslip_ros.api.runs import measured_run
-    from stickslip_ros.plots.units import Units
+    from stickslip_ros.show.quantities import Units
     from stickslip_ros.studies.settling import check_continuous
     from stickslip_ros.studies.simulate import default_duration
 

@@ -25,7 +25,8 @@ from stickslip_ros.paper.figures import (
     unstable_equilibria,
 )
 from stickslip_ros.physics.measures.breakpoints import Breakpoints
-from stickslip_ros.plots.style import (
+from stickslip_ros.show.quantities import Units, typeset
+from stickslip_ros.show.style import (
     BLUE,
     DASHES,
     GREEN,
@@ -37,7 +38,6 @@ from stickslip_ros.plots.style import (
     save,
     styled,
 )
-from stickslip_ros.plots.units import Units, typeset
 
 _FIRST_COLOUR, _LATER_COLOUR, _BELT_COLOUR = "#888888", "#DDDDDD", "black"
 

@@ -23,7 +23,7 @@ from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import Coulomb, Directional, FrictionLaw, Table
 from stickslip_ros.physics.model.signals import table
 from stickslip_ros.physics.motion import Motion
-from stickslip_ros.plots.identification_table import identification_tables
+from stickslip_ros.show.identification_table import identification_tables
 from tests.identification.axis_record import record as axis_record
 
 _FAR = 4.5

@@ -17,10 +17,10 @@ from stickslip_ros.paper.figures import (
     portrait_of,
 )
 from stickslip_ros.physics.model.friction import Linear
-from stickslip_ros.plots.style import BLUE, GREEN, ORANGE, STYLES
+from stickslip_ros.show.style import BLUE, GREEN, ORANGE, STYLES
 from tests.paper.test_figures import over_belt_speed
 from tests.physics.drives import PAPER
-from tests.plots.texts import faults, in_styles, legend_texts
+from tests.show.texts import faults, in_styles, legend_texts
 
 STICKS = PortraitCase("it sticks", replace(PAPER, belt_speed=0.2), duration=100.0)
 RESTS = PortraitCase("it rests", replace(PAPER, belt_speed=0.7), duration=200.0)

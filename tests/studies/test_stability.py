@@ -11,9 +11,9 @@ from stickslip_ros.physics.model.signals import sine
 from stickslip_ros.physics.theory.hopf import hopf_points
 from stickslip_ros.physics.theory.linear import expand
 from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop
-from stickslip_ros.plots.study_tables import stability_tables
 from stickslip_ros.scenarios.files import Scenario, load_scenario
 from stickslip_ros.scenarios.parameters import ControllerParameters
+from stickslip_ros.show.study_tables import stability_tables
 from stickslip_ros.studies.design import Task
 from stickslip_ros.studies.stability import (
     Notes,

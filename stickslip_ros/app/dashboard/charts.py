@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from stickslip_ros.plots.style import BLUE, GREEN, GREY, ORANGE
+from stickslip_ros.show.style import BLUE, GREEN, GREY, ORANGE
 
 AXIS: dict[str, Any] = {
     "type": "value",

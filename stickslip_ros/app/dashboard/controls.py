@@ -16,7 +16,6 @@ from stickslip_ros.app.dashboard.listener import Answer, ListenerNode
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.model.constants import SMALLEST, Changes, Parameter, constants_of
 from stickslip_ros.physics.model.control import CONTROL_LAWS, ControlLaw
-from stickslip_ros.plots.units import Units, plain_name
 from stickslip_ros.quantities import number_of
 from stickslip_ros.scenarios.keywords import described
 from stickslip_ros.scenarios.parameters import (
@@ -24,6 +23,7 @@ from stickslip_ros.scenarios.parameters import (
     NODE_PARAMETERS,
     controller_node,
 )
+from stickslip_ros.show.quantities import Units, plain_name
 
 
 def main_parameters(law: str) -> list[str]:

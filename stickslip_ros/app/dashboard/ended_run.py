@@ -12,9 +12,9 @@ from stickslip_ros.app.dashboard.listener import ListenerNode
 from stickslip_ros.bags.report import report_of_recording
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.files import open_regular
-from stickslip_ros.plots.measure_table import LABELS, measure_table
-from stickslip_ros.plots.units import Units
 from stickslip_ros.scenarios.files import shipped_scenarios
+from stickslip_ros.show.measure_table import LABELS, measure_table
+from stickslip_ros.show.quantities import Units
 from stickslip_ros.text import printable
 
 _LARGEST_BAG = 200_000_000

@@ -14,10 +14,10 @@ from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.messages.topics import AMPLITUDE, FREQUENCY, STICK_FRACTION
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.plots.live_trace import Line, LiveTrace
-from stickslip_ros.plots.units import Units
 from stickslip_ros.samples import ForceColumns, SampleColumns
 from stickslip_ros.scenarios.parameters import PlantParameters
+from stickslip_ros.show.live_trace import Line, LiveTrace
+from stickslip_ros.show.quantities import Units
 from stickslip_ros.stamps import NANOSECONDS
 
 PERIODS = (10, 50, 200)

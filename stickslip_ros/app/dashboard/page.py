@@ -34,10 +34,10 @@ from stickslip_ros.app.dashboard.theory_panel import TheoryPanel
 from stickslip_ros.messages.topics import AMPLITUDE, FREQUENCY, STICK_FRACTION
 from stickslip_ros.physics.measures.cycle_measures import RESTS, Regime
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.plots.style import BLUE, GREEN, GREY, ORANGE, REGIMES, SKY_BLUE
-from stickslip_ros.plots.units import Units
 from stickslip_ros.quantities import number_of
 from stickslip_ros.scenarios.parameters import controller_node
+from stickslip_ros.show.quantities import Units
+from stickslip_ros.show.style import BLUE, GREEN, GREY, ORANGE, REGIMES, SKY_BLUE
 from stickslip_ros.text import number_in
 
 _REFRESH = 0.25

@@ -13,8 +13,8 @@ from stickslip_ros.physics.model.control import Washout
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.theory.bifurcation_branches import BifurcationBranches, Branch
 from stickslip_ros.physics.theory.stability_map import StabilityMap
-from stickslip_ros.plots.style import BLUE, GREEN, GREY, ORANGE, SKY_BLUE
-from stickslip_ros.plots.units import Units
+from stickslip_ros.show.quantities import Units
+from stickslip_ros.show.style import BLUE, GREEN, GREY, ORANGE, SKY_BLUE
 
 Options = dict[str, Any]
 

@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.identification.findings import Findings
 from stickslip_ros.identification.fit import QUANTILE
-from stickslip_ros.plots.style import BLUE, GREEN, ORANGE, SCREEN, FigureStyle, finish, styled
-from stickslip_ros.plots.units import SI
+from stickslip_ros.show.quantities import SI
+from stickslip_ros.show.style import BLUE, GREEN, ORANGE, SCREEN, FigureStyle, finish, styled
 
 _DOTS: Any = {"marker": ".", "ms": 2.0, "ls": "", "alpha": 0.4, "mew": 0.0, "rasterized": True}
 _SHOWN_SHARE = 0.995

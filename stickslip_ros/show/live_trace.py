@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from stickslip_ros.arrays import FloatArray, IntArray
 from stickslip_ros.physics.measures.run_meter import HELD_FORCES, DroppedForces
 from stickslip_ros.physics.measures.sampling_grid import LONGEST_GAP
-from stickslip_ros.plots.run_history import Trace, peaks
 from stickslip_ros.samples import ForceColumns, SampleColumns
+from stickslip_ros.show.run_history import Trace, peaks
 from stickslip_ros.stamps import NANOSECONDS
 
 _NONE = ForceColumns(np.empty(0, np.int64), np.empty(0))

@@ -12,16 +12,16 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
 from stickslip_ros.physics.measures.cycle_measures import Regime
-from stickslip_ros.plots.study_figure import basin_figure, diagram_figure, map_figure
-from stickslip_ros.plots.style import BLUE, GREEN, LIGHT_GREY, ORANGE, REGIMES, STYLES
 from stickslip_ros.scenarios.files import load_scenario
+from stickslip_ros.show.study_figure import basin_figure, diagram_figure, map_figure
+from stickslip_ros.show.style import BLUE, GREEN, LIGHT_GREY, ORANGE, REGIMES, STYLES
 from stickslip_ros.studies.basin import POSITION, VELOCITY, Attractor
 from stickslip_ros.studies.columns import Columns
 from stickslip_ros.studies.plan import Axis, Continuation, Grid, Plan, RandomSample
 from stickslip_ros.studies.runner import compute_columns
 from stickslip_ros.studies.settling import SettlingOptions
 from stickslip_ros.studies.study import Study
-from tests.plots.texts import faults, in_styles, legend_texts
+from tests.show.texts import faults, in_styles, legend_texts
 
 
 @pytest.fixture(autouse=True)

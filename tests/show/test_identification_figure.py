@@ -10,7 +10,7 @@ from benchmarks import identification as study
 from stickslip_ros.identification.findings import Findings
 from stickslip_ros.identification.fit import Friction
 from stickslip_ros.identification.identify import identify
-from stickslip_ros.plots.identification_figure import identification_figure
+from stickslip_ros.show.identification_figure import identification_figure
 from tests.identification.axis_record import record
 
 

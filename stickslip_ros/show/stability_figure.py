@@ -18,7 +18,9 @@ from stickslip_ros.arrays import BoolArray, FloatArray
 from stickslip_ros.physics.measures.cycle_measures import Regime
 from stickslip_ros.physics.theory.bifurcation_branches import BifurcationBranches, Branch
 from stickslip_ros.physics.theory.stability_map import CriticalGainCurves, StabilityMap
-from stickslip_ros.plots.style import (
+from stickslip_ros.scenarios.files import Scenario
+from stickslip_ros.show.quantities import Units
+from stickslip_ros.show.style import (
     BLUE,
     DASHES,
     GREEN,
@@ -35,8 +37,6 @@ from stickslip_ros.plots.style import (
     text_width,
     title_of,
 )
-from stickslip_ros.plots.units import Units
-from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.studies.design import Design
 from stickslip_ros.studies.stability import bifurcation_branches, stability_map
 

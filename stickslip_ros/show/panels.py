@@ -17,10 +17,10 @@ from stickslip_ros.physics.measures.cycle_fit import MeanCycle
 from stickslip_ros.physics.measures.cycle_measures import Measures, trend_text
 from stickslip_ros.physics.measures.run_meter import RunAnalysis
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.plots.measure_table import LABELS
-from stickslip_ros.plots.run_history import DrawnMotion, RunHistory, intervals, peaks
-from stickslip_ros.plots.style import BLUE, GREEN, GREY, LIGHT_GREY, ORANGE, REGIMES
-from stickslip_ros.plots.units import Units
+from stickslip_ros.show.measure_table import LABELS
+from stickslip_ros.show.quantities import Units
+from stickslip_ros.show.run_history import DrawnMotion, RunHistory, intervals, peaks
+from stickslip_ros.show.style import BLUE, GREEN, GREY, LIGHT_GREY, ORANGE, REGIMES
 
 MOTION: Any = {"color": BLUE, "lw": 1.0}
 BELT: Any = {"color": "black", "lw": 1.0, "ls": "--", "zorder": 2.5}

@@ -25,12 +25,12 @@ from stickslip_ros.physics.measures.sample_meter import (
 )
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.motion import RecordedMotion
-from stickslip_ros.plots.run_figure import LAST_CYCLES, DrawnRun, run_figure
-from stickslip_ros.plots.run_history import RunHistory
-from stickslip_ros.plots.style import SCREEN, STYLES, FigureStyle, save
 from stickslip_ros.samples import SampleColumns
+from stickslip_ros.show.run_figure import LAST_CYCLES, DrawnRun, run_figure
+from stickslip_ros.show.run_history import RunHistory
+from stickslip_ros.show.style import SCREEN, STYLES, FigureStyle, save
 from tests.physics.drives import FEED_DRIVE, PAPER
-from tests.plots.texts import faults, in_styles, legend_texts
+from tests.show.texts import faults, in_styles, legend_texts
 
 # Old versions of matplotlib call names that its parser of formulas has deprecated since.
 # What other tests left open is collected at any time.

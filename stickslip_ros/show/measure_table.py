@@ -6,8 +6,8 @@ from typing import Any
 
 from stickslip_ros.physics.measures.cycle_measures import Measures, Regime, trend_text
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.plots.units import NOISE, SI, Units
 from stickslip_ros.scenarios.files import Scenario
+from stickslip_ros.show.quantities import NOISE, SI, Units
 from stickslip_ros.tables import TextTable
 
 LABELS: dict[str, tuple[str, str]] = {

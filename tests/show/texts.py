@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 
-from stickslip_ros.plots.style import STYLES
+from stickslip_ros.show.style import STYLES
 
 in_styles = pytest.mark.parametrize(
     "style",

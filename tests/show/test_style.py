@@ -11,7 +11,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from PIL import Image
 
-from stickslip_ros.plots.style import (
+from stickslip_ros.scenarios.files import load_scenario
+from stickslip_ros.show.style import (
     SCREEN,
     STYLES,
     FigureStyle,
@@ -21,7 +22,6 @@ from stickslip_ros.plots.style import (
     text_width,
     title_of,
 )
-from stickslip_ros.scenarios.files import load_scenario
 
 
 @styled

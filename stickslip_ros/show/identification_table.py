@@ -8,8 +8,8 @@ import numpy as np
 
 from stickslip_ros.identification.findings import Findings
 from stickslip_ros.identification.fit import QUANTILE, Candidate, Estimate
-from stickslip_ros.plots.units import SI
 from stickslip_ros.scenarios.parameters import PlantParameters
+from stickslip_ros.show.quantities import SI
 from stickslip_ros.tables import TextTable
 
 _PREDICTIONS = {

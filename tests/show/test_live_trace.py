@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from stickslip_ros.plots.live_trace import LiveTrace
 from stickslip_ros.samples import ForceColumns, SampleColumns
+from stickslip_ros.show.live_trace import LiveTrace
 
 NO_FORCES = ForceColumns(np.empty(0, dtype=np.int64), np.empty(0))
 SECOND = 1_000_000_000

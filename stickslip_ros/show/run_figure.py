@@ -16,7 +16,8 @@ from matplotlib.patches import Patch
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.physics.measures.cycle_measures import Measures, measures_of
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.plots.panels import (
+from stickslip_ros.scenarios.files import Scenario
+from stickslip_ros.show.panels import (
     BELT,
     LEAST_PART,
     MOTION,
@@ -34,8 +35,9 @@ from stickslip_ros.plots.panels import (
     shade,
     widened,
 )
-from stickslip_ros.plots.run_history import DrawnMotion, RunHistory
-from stickslip_ros.plots.style import (
+from stickslip_ros.show.quantities import SI, Units
+from stickslip_ros.show.run_history import DrawnMotion, RunHistory
+from stickslip_ros.show.style import (
     AMBER,
     BLUE,
     GREEN,
@@ -52,8 +54,6 @@ from stickslip_ros.plots.style import (
     title_of,
     wrapped,
 )
-from stickslip_ros.plots.units import SI, Units
-from stickslip_ros.scenarios.files import Scenario
 
 LAST_CYCLES = 5
 """Number of cycles that are enlarged, and in the phase portrait."""

@@ -7,9 +7,9 @@ from itertools import groupby, islice
 from typing import Any, cast
 
 from stickslip_ros.physics.measures.cycle_measures import Regime, Trend
-from stickslip_ros.plots.measure_table import LABELS, measure_table
-from stickslip_ros.plots.units import Units
 from stickslip_ros.scenarios.files import Scenario
+from stickslip_ros.show.measure_table import LABELS, measure_table
+from stickslip_ros.show.quantities import Units
 from stickslip_ros.studies.basin import Attractor, Basins
 from stickslip_ros.studies.columns import Columns
 from stickslip_ros.studies.design import Design

@@ -18,9 +18,10 @@ from matplotlib.path import Path
 from stickslip_ros.arrays import BoolArray, FloatArray
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.measures.cycle_measures import Regime
-from stickslip_ros.plots.measure_table import LABELS
-from stickslip_ros.plots.study_tables import attractor_name
-from stickslip_ros.plots.style import (
+from stickslip_ros.show.measure_table import LABELS
+from stickslip_ros.show.quantities import Units
+from stickslip_ros.show.study_tables import attractor_name
+from stickslip_ros.show.style import (
     AMBER,
     DASHES,
     GREY,
@@ -38,7 +39,6 @@ from stickslip_ros.plots.style import (
     styled,
     title_of,
 )
-from stickslip_ros.plots.units import Units
 from stickslip_ros.studies.basin import POSITION, VELOCITY, Attractor, Basins
 from stickslip_ros.studies.columns import Columns
 from stickslip_ros.studies.plan import Axis, Continuation, Grid

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from stickslip_ros.plots.run_history import Trace, peaks
+from stickslip_ros.show.run_history import Trace, peaks
 
 FloatArray = npt.NDArray[np.float64]
 

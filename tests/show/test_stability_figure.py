@@ -15,12 +15,12 @@ from stickslip_ros.physics.theory.bifurcation_branches import BifurcationBranche
 from stickslip_ros.physics.theory.closed_forms import CubicLoop
 from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop
 from stickslip_ros.physics.theory.stability_map import CriticalGainCurves, StabilityMap
-from stickslip_ros.plots.stability_figure import branches_figure, design_figure, stability_figure
-from stickslip_ros.plots.style import STYLES
 from stickslip_ros.scenarios.files import load_scenario
+from stickslip_ros.show.stability_figure import branches_figure, design_figure, stability_figure
+from stickslip_ros.show.style import STYLES
 from stickslip_ros.studies.design import Design, Task, design
 from tests.physics.drives import FEED_DRIVE, PAPER
-from tests.plots.texts import faults, in_styles, legend_texts
+from tests.show.texts import faults, in_styles, legend_texts
 
 GAINS = Washout(20.0, -3000.0, 0.0)
 
