@@ -3,8 +3,8 @@
 Runs of a drive like feed_drive with an encoder of 1 um, whose difference a washout controller
 uses, and a force that is rounded to 0.1 N. In `ramp` the belt speed rises from 20 to 60 mm/s, in
 `taps` it is 30 mm/s; both have taps of 60 to 200 N. `stick` is stick-slip at 20 mm/s without
-control; the mass is given, since without a force only ratios can be told. `narrow` is a belt of
-60 mm/s with taps of 5 to 15 N: all relative speeds are alike, and the record cannot tell the law.
+control; the mass is given: without a force only ratios are identifiable. `narrow` is a belt of
+60 mm/s with taps of 5 to 15 N: all relative speeds are alike, and the law is not identifiable.
 The start, the taps, the belt speed (by 10 %) and all rounding differ from seed to seed.
 
 No cycle takes a whole number of samples and no coefficient a whole number of encoder steps:

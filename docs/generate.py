@@ -142,17 +142,17 @@ def numbers() -> Iterator[str]:
     cubic = CubicLoop.from_drive(scenario.plant.as_drive())
     assert cubic is not None
     opened, closed, sampled = (found[f"{loop}_loop"] for loop in ("open", "closed", "sampled"))
-    (cycle,) = opened["limit_cycles"]
+    (cycle,), sticking = opened["limit_cycles"], found["sticking"]
     rows: dict[str, Any] = {
         "$a$, $b$": (cubic.slope, cubic.cubic),
         "equilibrium $X_0$, eq. 6": found["equilibrium_position"],
         "trace $p$, eq. 8": cubic.trace,
         "eigenvalues of the open loop": _complex(opened["eigenvalues"]),
-        "Hopf speed $v_{b1}$": opened["hopf_speeds"],
-        "crossing speed there, eq. 11": opened["crossing_speeds"],
+        "critical feed speed (Hopf) $v_{b1}$": opened["hopf_speeds"],
+        "$d \\mathrm{Re} \\lambda / d v_0$ there, eq. 11": opened["crossing_speeds"],
         "first Lyapunov coefficient $\\sigma$, eq. 15": opened["first_lyapunov_coefficients"],
-        "onset of sticking $v_{b0}$, by averaging": found["sticking"]["onset_speed_approximate"],
-        "the same, exactly": found["sticking"]["onset_speed"],
+        "stick-slip onset speed $v_{b0}$, by averaging": sticking["onset_speed_approximate"],
+        "the same, exactly": sticking["onset_speed"],
         "limit cycle: amplitude, period": (cycle["amplitude"], cycle["period"]),
         "its stick fraction, and Floquet multiplier": (
             cycle["stick_fraction"],
@@ -270,9 +270,10 @@ def axis() -> Iterator[str]:
         own = [text.format(each[key]).replace("%", " %") for each in three]
         rows.append([name, text.format(known).replace("%", " %") + note, *own])
         if key == "force_error":
-            rows.append(["force error, held out", "", *map(held_out, three)])
+            rows.append(["validation error of the force", "", *map(held_out, three)])
     runs = [f"{1e3 * each['free_run_error']:.2f} mm" for each in three]
-    rows.append(["24.8 s with the recorded force and no feedback, in-sample", "", *runs])
+    name = "simulation error: 24.8 s with the recorded force and no feedback, in-sample"
+    rows.append([name, "", *runs])
     yield table(
         [
             "",
@@ -326,7 +327,7 @@ def coverage() -> Iterator[str]:
             "run",
             "seeds",
             "law recovered",
-            "“cannot tell”",
+            "“not identifiable”",
             "intervals of 95 % that cover: least to most covered constant (mean)",
             "largest bias, in standard errors",
             "seconds a run",

@@ -1,7 +1,7 @@
 """Where the uncontrolled drive sticks, slips and rests: its bifurcation diagram over belt speed.
 
 Each of 120 belt speeds is simulated until the motion has settled. The lines come from theory: the
-Hopf point and the highest belt speed at which the slide sticks.
+critical feed speed (Hopf) and the stick-slip onset speed.
 """
 
 import sys

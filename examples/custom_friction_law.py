@@ -1,8 +1,8 @@
 """A friction law of your own, without a change to the package: the rational Stribeck law.
 
-Derives a law, gives it to a drive, and computes Hopf point and limit cycles next to those with the
-law of the paper. With the rational law a stable cycle exists above the Hopf point, next to a stable
-equilibrium: the vibration begins and ends with a jump.
+Derives a law, gives it to a drive, and computes critical speed and limit cycles next to those with
+the law of the paper. With the rational law a stable cycle exists above the critical speed, next to
+a stable equilibrium: the vibration begins and ends with a jump.
 """
 
 import sys
@@ -55,9 +55,9 @@ for name, law in laws.items():
     stable = [[cycle.measures.amplitude for cycle in each if cycle.stable] for each in found]
     (line,) = cycles.plot(belt_speeds, [max(each, default=0.0) for each in stable], ".-")
     for point in hopf_points(drive):
-        print(f"{name}: Hopf point at {point.belt_speed:.4f}")
+        print(f"{name}: critical feed speed (Hopf) {point.belt_speed:.4f}")
         cycles.axvline(point.belt_speed, color=line.get_color(), ls=":")
 curve.set(xlabel="relative speed", ylabel="friction coefficient")
 curve.legend()
-cycles.set(xlabel="belt speed (dotted: Hopf point)", ylabel="amplitude of the stable cycle")
+cycles.set(xlabel="belt speed (dotted: critical speed)", ylabel="amplitude of the stable cycle")
 figure.savefig(folder / "custom_friction_law.png")

@@ -1,4 +1,4 @@
-"""A control law of your own that follows a reference: the position servo of a ball-screw axis.
+"""A control law of your own that tracks a reference: the position servo of a ball-screw axis.
 
 The axis moves by 100 mm and back. Jumps of the reference's speed bring the force to its limit.
 """

@@ -1,9 +1,10 @@
-"""A belt that slows down through the Hopf point and speeds up again, for two friction laws.
+"""A belt that slows down through the critical speed and speeds up again, for two friction laws.
 
-With the Stribeck law of the paper the Hopf point is supercritical: the vibration starts and ends
-near the same speed. With the exponential law it is subcritical: rest is stable above the Hopf
-speed, and so is stick-slip, up to the fold of the limit cycles. A small sine force near resonance
-replaces the disturbances of a real drive: without any, the slide would rest beyond the Hopf point.
+With the Stribeck law of the paper the Hopf bifurcation is supercritical: the vibration starts and
+ends near the same speed. With the exponential law it is subcritical: rest is stable above the
+critical speed, and so is stick-slip, up to the fold of the limit cycles. A small sine force
+near resonance replaces the disturbances of a real drive: without any, the slide would rest beyond
+that speed.
 """
 
 import sys
@@ -69,9 +70,9 @@ for axes, (title, (speeds, law)) in zip(panes, CASES.items(), strict=True):
         at_speed = ss.scenario(free, belt_speed=belt_speed)
         for cycle in ss.stability(at_speed).open_loop["limit_cycles"]:
             axes.plot(belt_speed, cycle["amplitude"], "k." if cycle["stable"] else "kx", ms=4)
-    axes.axvline(hopf, color="C2", ls=":", label="Hopf point")
+    axes.axvline(hopf, color="C2", ls=":", label="critical feed speed (Hopf)")
     axes.set(title=title, xlabel="belt speed", ylabel="amplitude of the displacement")
-    print(f"{title}: Hopf point at {hopf:.4f}")
+    print(f"{title}: critical feed speed (Hopf) {hopf:.4f}")
 axes.plot([], [], "k.", label="stable limit cycle, by theory")
 axes.plot([], [], "kx", ms=4, label="unstable limit cycle, by theory")
 figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=3)

@@ -31,7 +31,7 @@ def number_of(name: str, given: Any, unit: str | None) -> float:
             return _converted(found[1], found[2], unit)
     allowed = f" in {unit}, or in a unit that converts to it" if unit else " without a unit"
     turns = "; Hz and rpm count turns, of 2 pi rad" if unit and "rad" in unit else ""
-    raise InvalidInputError(f"{name} = {shown(given)} is refused: must be a number{allowed}{turns}")
+    raise InvalidInputError(f"{name} = {shown(given)} is invalid: must be a number{allowed}{turns}")
 
 
 def _converted(number: str, given: str, unit: str) -> float:

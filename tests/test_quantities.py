@@ -155,10 +155,10 @@ def test_other_parameters_and_scenario_files_take_no_unit(tmp_path: Any) -> None
         "plant.publish_truth=1s",
         "plant.friction.static=0.3N",
     ):
-        with pytest.raises(InvalidInputError, match=r"is refused: must be"):
+        with pytest.raises(InvalidInputError, match=r"is invalid: must be"):
             load_scenario("feed_drive", [override])
     path = tmp_path / "scenario.yaml"
     path.write_text("/**/plant: {ros__parameters: {belt_speed: 30mm/s}}\n")
-    with pytest.raises(InvalidInputError, match=r"'30mm/s' is refused: .* in m/s, not text"):
+    with pytest.raises(InvalidInputError, match=r"'30mm/s' is invalid: .* in m/s, not text"):
         load_scenario(str(path))
     assert speed_of("plant.belt_speed=0xA") == 10.0  # a hexadecimal number has no unit

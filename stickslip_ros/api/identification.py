@@ -48,7 +48,7 @@ class Model(Result):
 
     @property
     def unidentified(self) -> dict[str, str]:
-        """Reasons why a parameter is not told, and the run that would tell it, by parameter."""
+        """Why a parameter is not identifiable, and the run that would identify it, by parameter."""
         return {f"plant.{name}": why for name, why in self.findings.unidentified.items()}
 
     @property
@@ -186,7 +186,7 @@ class Model(Result):
     def _summary(self) -> Summary:
         found = self.findings
         names = ", ".join(dict.fromkeys(record.name for record in found.records))
-        verdict = f"friction law {found.law}, {found.chosen.error:.3%} error held out"
+        verdict = f"friction law {found.law}, validation error {found.chosen.error:.3%}"
         return Summary("Identified drive", names, verdict)
 
     @override
@@ -244,7 +244,7 @@ def identify(
     BagError
         If a recording cannot be read.
     InvalidInputError
-        If an argument is not allowed, or the recordings cannot tell a model.
+        If an argument is not allowed, or no model is identifiable from the recordings.
 
     Examples
     --------

@@ -109,7 +109,7 @@ class Sweep(Points):
 
     @cached_property
     def transitions(self) -> Mapping[str, list[float]]:
-        """Values at the Hopf point and the limits of sticking, by theory; SI units.
+        """Values at the Hopf bifurcation and the stick-slip onset, by theory; SI units.
 
         A sweep over two parameters has none here: its figure shows them as curves.
         """
@@ -199,7 +199,8 @@ class Sweep(Points):
         yield sweep_table(self.study, self.columns)
         units = units_of(self.study)
         for name, values in self.transitions.items():
-            yield f"{name}: {', '.join(units.texts(values, self._axes[0].unit))}"
+            label = theory.transition_label(name, self._axes[0].parameter)
+            yield f"{label}: {', '.join(units.texts(values, self._axes[0].unit))}"
 
 
 class Basin(Points):
@@ -317,7 +318,7 @@ def sweep(
     ['stick_slip', 'pure_slip']
     """
     if carry is not None and carry not in list(Continuation):
-        raise InvalidInputError(f"carry = {shown(carry)} is refused: must be up, down or both")
+        raise InvalidInputError(f"carry = {shown(carry)} is invalid: must be up, down or both")
     chosen = as_scenario(scenario)
     study = sweep_study(
         chosen,
@@ -424,7 +425,7 @@ def _axis(name: str, parameter: str, given: Any, *, listed: bool = False) -> Axi
     except (IndexError, TypeError, ValueError):
         others = "(first, last, count, 'log')" + (", or a list or an array" if listed else "")
         raise InvalidInputError(
-            f"{name} = {shown(given)} is refused: must be (first, last, count) or {others}"
+            f"{name} = {shown(given)} is invalid: must be (first, last, count) or {others}"
         ) from None
 
 

@@ -57,11 +57,11 @@ class Stability(Result):
     equilibrium_position: float | None
     """Displacement of a slide at rest, m."""
     open_loop: Mapping[str, Any]
-    """Eigenvalues, Hopf speeds and limit cycles without control."""
+    """Eigenvalues, critical feed speeds (Hopf) and limit cycles without control."""
     sticking: Mapping[str, Any]
     """Belt speeds at which a slide sticks."""
     closed_loop: Mapping[str, Any]
-    """Eigenvalues, Hopf speeds, limit cycles and critical gains with continuous control."""
+    """Eigenvalues, critical feed speeds, limit cycles and gains with continuous control."""
     sampled_loop: Mapping[str, Any]
     """Stability and settling of the loop as the nodes run it."""
     closed_forms: Mapping[str, Any] | None
@@ -149,7 +149,7 @@ class Stability(Result):
 
 
 def stability(scenario: ScenarioLike) -> Stability:
-    """Return equilibrium, Hopf speeds, limit cycles and critical gains of a scenario.
+    """Return equilibrium, critical speeds and gains, and limit cycles of a scenario.
 
     Parameters
     ----------
@@ -345,5 +345,5 @@ def _range(belt_speed: Any) -> tuple[float, float] | None:
         return number_of("belt_speed", low, "m/s"), number_of("belt_speed", high, "m/s")
     except (TypeError, ValueError):
         raise InvalidInputError(
-            f"belt_speed = {shown(belt_speed)} is refused: must be one speed or (lowest, highest)"
+            f"belt_speed = {shown(belt_speed)} is invalid: must be one speed or (lowest, highest)"
         ) from None

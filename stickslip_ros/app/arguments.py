@@ -259,7 +259,7 @@ def scenario_of(
             defaults.append(f"{full_name} = {values[node][name]} {unit}".rstrip())
     if defaults:
         sentence = (
-            f"{scenario.path} does not give {', '.join(defaults)}: these are the defaults; "
+            f"{scenario.path}: using defaults: {', '.join(defaults)}; "
             "--base SCENARIO takes omitted values from another scenario"
         )
         tell(sentence)
@@ -300,7 +300,7 @@ def with_law(
         with naming("--controller:"):
             if is_program(controller):
                 raise InvalidInputError(
-                    f"{controller} is refused: must be the name of a control law; only "
+                    f"{controller} is invalid: must be the name of a control law; only "
                     "`stickslip run` starts scripts and executables"
                 )
             known_law(controller)

@@ -14,7 +14,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "report": ("Analyze", "measure a recorded run, or compare several"),
     "repair": ("Analyze", "write a sound bag from one that is cut off or damaged"),
     "identify": ("Analyze", "fit a model with intervals to recordings of a machine"),
-    "stability": ("Analyze", "compute equilibrium, Hopf speeds, limit cycles and critical gains"),
+    "stability": ("Analyze", "compute equilibrium, critical speeds and gains, and limit cycles"),
     "design": ("Design", "propose controller gains that suppress the vibration"),
     "list": ("Scenarios", "list the scenarios, friction laws and control laws"),
     "show": ("Scenarios", "show every parameter of a scenario and where its value comes from"),

@@ -1,6 +1,7 @@
 """How values are printed: tables on standard output, in SI units with suitable prefixes."""
 
 import json
+import re
 import sys
 from collections.abc import Generator, Iterable, Mapping, Sequence
 from contextlib import contextmanager, suppress
@@ -145,7 +146,7 @@ def _print_framed(
         return
     styles = _styles()
     for row in rows:
-        table.add_row(*(Text(cell, styles.get(cell.partition(",")[0], "")) for cell in row))
+        table.add_row(*(Text(cell, styles.get(re.split(r" \(|,", cell)[0], "")) for cell in row))
     console.print(table)
 
 

@@ -105,7 +105,7 @@ class Expression:
             if isinstance(error, InvalidInputError):
                 raise
             raise InvalidInputError(
-                f"{source}: the expression {shown(text)} is refused: {_ALLOWED}; the columns are "
+                f"{source}: the expression {shown(text)} is invalid: {_ALLOWED}; the columns are "
                 f"{listed(columns)}"
             ) from None
         return found

@@ -241,7 +241,7 @@ def quantities_of(
         columns = {**columns, "belt_velocity": repr(float(belt_speed))}
     for name in columns:
         if name not in QUANTITIES:
-            raise InvalidInputError(f"column {name} is refused: {must_be_one_of(name, QUANTITIES)}")
+            raise InvalidInputError(f"column {name} is invalid: {must_be_one_of(name, QUANTITIES)}")
     lacking = [name for name in ("time", "position") if name not in columns]
     if lacking:
         raise InvalidInputError(f"{path}: no column is given for {' and '.join(lacking)}")

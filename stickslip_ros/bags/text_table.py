@@ -65,14 +65,14 @@ class TableFormat:
     def __post_init__(self) -> None:
         """Refuse what no table has."""
         if self.decimal not in (None, ".", ","):
-            raise InvalidInputError(f"decimal = {shown(self.decimal)} is refused: must be . or ,")
+            raise InvalidInputError(f"decimal = {shown(self.decimal)} is invalid: must be . or ,")
         if self.skip is not None and self.skip < 0:
-            raise InvalidInputError(f"skip = {self.skip} is refused: must be at least 0")
+            raise InvalidInputError(f"skip = {self.skip} is invalid: must be at least 0")
         try:
             "1".encode(self.encoding or "utf-8").decode(self.encoding or "utf-8")
         except (LookupError, ValueError):
             raise InvalidInputError(
-                f"encoding = {shown(self.encoding)} is refused: must be one of Python's, such as "
+                f"encoding = {shown(self.encoding)} is invalid: must be one of Python's, such as "
                 "utf-8, utf-16, cp1252"
             ) from None
 

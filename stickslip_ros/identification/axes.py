@@ -56,7 +56,7 @@ class AxisTask:
             hint = "" if given else "; name its column, as in --columns force=u"
             raise InvalidInputError(
                 f"{'the recorded force is always 0' if given else 'no force is recorded'}: without "
-                f"a force an axis tells nothing of its mass and its friction{hint}"
+                f"a force neither mass nor friction of an axis is identifiable{hint}"
             )
         self.records = records
         own = {name: fixed[name] for name in LINEAR if name in fixed}

@@ -76,8 +76,8 @@ class DriveTask:
         self.free = [name for name in ("mass", "stiffness") if name not in self.fixed]
         if all(not record.held_force.any() for record in records) and len(self.free) == 2:
             raise InvalidInputError(
-                "no force acts in the recordings: they tell only ratios of mass, stiffness and "
-                "friction; fix one, as in --fix plant.mass=100"
+                "no force acts in the recordings: only ratios of mass, stiffness and friction are "
+                "identifiable; fix one, as in --fix plant.mass=100"
             )
         parts = [
             filtered(each, decimated=False, delay=self.fixed.get(DELAY, 0.0)) for each in records

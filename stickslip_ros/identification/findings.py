@@ -26,7 +26,7 @@ from stickslip_ros.physics.model.drive import Drive
 _STILL_SPEED = 0.02
 """Share of the fastest speed below which a slide may stick."""
 _VAGUE_ERROR = 0.5
-"""Standard error, as a share of the value, from which a constant counts as not told."""
+"""Standard error, as a share of the value, from which a constant counts as not identifiable."""
 _USED_SHARE = 0.6
 """Share of the samples below which the fit says that it used some of them only."""
 _MISSING_SHARE = 1e-3
@@ -129,7 +129,7 @@ class Findings:
 
     @cached_property
     def unidentified(self) -> Mapping[str, str]:
-        """Reasons why a parameter of the plant is not told, and the run that would tell it."""
+        """Why a parameter of the plant is not identifiable, and the run that would identify it."""
         return _untold(self)
 
     @cached_property
@@ -162,7 +162,7 @@ class Findings:
 
     @property
     def _speeds(self) -> Sequence[FloatArray]:
-        """Size of the relative speeds of each record, m/s."""
+        """Sliding speeds of each record, m/s."""
         return [np.abs(each.relative_speed) for each in self._filtered]
 
     @property
@@ -331,9 +331,9 @@ def _notes(found: Findings) -> Sequence[str]:
 
 
 def _untold(found: Findings) -> dict[str, str]:
-    """Return why parameters of the plant are not told, and the run that would tell each."""
+    """Return why parameters of the plant are not identifiable, and the run that would help."""
     why = {
-        "normal_force": "only friction forces can be told: it is taken as 1 N, so that "
+        "normal_force": "only friction forces are identifiable: it is taken as 1 N, so that "
         "coefficients are in N and viscous ones in N s/m; give it by --fix plant.normal_force=..."
     }
     slower = f"run below {1e3 * found.slowest:.3g} mm/s"
@@ -390,5 +390,5 @@ def _untold(found: Findings) -> dict[str, str]:
         sure = f"{estimate.value:.4g} has a standard error of {estimate.standard_error:.2g}"
         if isinf(estimate.standard_error):
             sure = f"{estimate.value:.4g} is one of many values that fit alike"
-        why[name] = f"{sure}: the recordings do not tell it; a run with other speeds and forces may"
+        why[name] = f"{sure}; a run with other speeds and forces may identify it"
     return why

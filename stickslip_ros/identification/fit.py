@@ -26,7 +26,7 @@ freedom."""
 _RANK = 1e-13
 """Share of the largest eigenvalue below which rows do not tell a combination of parameters."""
 _PART = 1e-6
-"""Part in such a combination from which a parameter is not told; less is rounding error."""
+"""Part in such a combination from which a parameter is not identifiable; less is rounding error."""
 CURVE_POINTS = 40
 """Points that stand for a curve."""
 _SIGNIFICANT = 3.0
@@ -242,7 +242,7 @@ class Candidate:
 
     @property
     def error(self) -> float:
-        """Root mean square of the held-out error, as a share of the scale."""
+        """Validation error: rms of what is held out, as a share of the scale."""
         known = len(self.held_out) and self.fit.scale > 0.0
         return sqrt(float(np.mean(self.held_out))) / self.fit.scale if known else inf
 
@@ -268,7 +268,7 @@ def better_by(better: Candidate, worse: Candidate) -> float:
 def choose(candidates: Sequence[Candidate]) -> tuple[Candidate, Mapping[str, bool]]:
     """Return the simplest model that predicts as well as any, and which others do, by label.
 
-    A model is as good as the best one if the difference of their held-out errors is within three
+    A model is as good as the best one if the difference of their validation errors is within three
     standard errors, from its scatter over the parts.
     """
     best = min(candidates, key=lambda each: each.error)

@@ -50,7 +50,7 @@ def identify_recordings(
     """Identify a drive from recordings of one machine, as `identify` does from their records.
 
     `fixed` has the known constants by NODE.PARAMETER. Raises InvalidInputError if an argument is
-    not allowed, or the recordings cannot tell a model.
+    not allowed, or no model is identifiable from the recordings.
     """
     if not read:
         raise InvalidInputError("no recording is given: must be at least one")
@@ -85,7 +85,7 @@ def _constant(target: str, value: float | str) -> float:
     name = target.removeprefix("plant.")
     of_friction = name.removeprefix("friction.") in _CONSTANTS and name.startswith("friction.")
     if target == name or not (name in FIXABLE or of_friction):
-        raise InvalidInputError(f"{target} is refused: {_allowed(target)}")
+        raise InvalidInputError(f"{target} is invalid: {_allowed(target)}")
     return number_of(target, value, described(target).unit)
 
 
@@ -100,14 +100,14 @@ def identify(
     A belt that is at rest in all records means an axis that no spring holds, unless a stiffness is
     given: then, and on a belt that moves, the slide is on a spring. `fixed` has the known
     constants, of `FIXABLE`. `progress` receives the name of each law before it is fitted. Raises
-    InvalidInputError if a name or a value is not allowed, or the records cannot tell a model.
+    InvalidInputError if a name or a value is not allowed, or no model is identifiable.
     """
     fixed = {} if fixed is None else fixed
     laws = _laws(law)
     fixable = {*FIXABLE, *(f"friction.{name}" for own in laws for name in own.fixable)}
     for name, value in fixed.items():
         if name not in fixable:
-            raise InvalidInputError(f"plant.{name} is refused: {_allowed(f'plant.{name}')}")
+            raise InvalidInputError(f"plant.{name} is invalid: {_allowed(f'plant.{name}')}")
         _check_value(name, value, records[0].period)
     _check_records(records)
     moving = any(record.belt_velocity.any() for record in records)
@@ -142,7 +142,7 @@ def _laws(law: str) -> Sequence[IdentifiedLaw]:
     found = KNOWN_LAWS.get(law) or foreign_adapter(law)
     if found is None:
         known = (AUTO, TableAdapter.name, *KNOWN_LAWS, *foreign_names())
-        raise InvalidInputError(f"law {law} is refused: {must_be_one_of(law, known)}")
+        raise InvalidInputError(f"law {law} is invalid: {must_be_one_of(law, known)}")
     return (found,)
 
 
@@ -164,11 +164,11 @@ def _check_value(name: str, value: float, period: float) -> None:
     else:
         right, allowed = 0.0 <= value < inf, "a number of 0 or more"
     if not right:
-        raise InvalidInputError(f"plant.{name} = {value} is refused: must be {allowed}")
+        raise InvalidInputError(f"plant.{name} = {value} is invalid: must be {allowed}")
 
 
 def _check_records(records: Sequence[Record]) -> None:
-    """Refuse records that tell nothing, or have different sample periods."""
+    """Refuse records that identify nothing, or have different sample periods."""
     first = records[0]
     for record in records:
         record.require_motion()

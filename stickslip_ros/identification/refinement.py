@@ -22,13 +22,13 @@ from stickslip_ros.identification.trajectories import Trajectories, segments_of
 from stickslip_ros.identification.trajectory import Predictor
 
 _OWN_SHARE = 1e-5
-"""Least share of a derivative that is not one of the others, for a coordinate that can be told."""
+"""Least share of a derivative beside the others, for a coordinate that is identifiable."""
 _BOUND_DISTANCE = 1e-9
 """Distance of the start of a search from its bounds, as a share of the value."""
 _STEP = 1e-6
 """Step of the differences of coordinates, as a share of the value."""
 _RANK = 1e-9
-"""Share of the largest singular value below which the start of a segment is not told."""
+"""Share of the largest singular value below which the start of a segment is not identifiable."""
 _ROUGH_TOLERANCE, _FINAL_TOLERANCE = 0.03, 1e-6
 """Starts are good enough if better ones would lower the squared error by less than this share:
 while the constants change, and at their end."""

@@ -163,7 +163,9 @@ class Rows:
         least = _DIRECTION_SHARE * len(relative)
         directions = [sign for sign, count in counts.items() if count > least]
         if not directions:
-            raise InvalidInputError("the slide never slips in the recordings: they tell nothing")
+            raise InvalidInputError(
+                "the slide never slips in the recordings: nothing is identifiable"
+            )
         return cls(
             parts,
             {
@@ -180,7 +182,7 @@ class Rows:
 
     @cached_property
     def speeds(self) -> FloatArray:
-        """Size of the relative speeds above zero, m/s, sorted."""
+        """Sliding speeds above zero, m/s, sorted."""
         speeds = np.abs(np.concatenate([part.rows(part.relative_speed) for part in self.parts]))
         return np.sort(speeds[speeds > 0.0])
 

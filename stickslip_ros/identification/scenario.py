@@ -86,5 +86,5 @@ def _scenario(found: Findings, laws: Mapping[str, FrictionLaw], files: dict[str,
 
 def _heading(found: Findings, path: Path) -> str:
     names = ", ".join(dict.fromkeys(record.name for record in found.records))
-    law = f"law {found.law}, held-out error {found.chosen.error:.2%}"
+    law = f"law {found.law}, validation error {found.chosen.error:.2%}"
     return f"{path.stem}: a drive identified from {names}; {law}.\nstickslip simulate {path.name}"

@@ -64,7 +64,7 @@ REFERENCE = Topic(
     "sensor_msgs/msg/JointState",
     DEEP,
     meaning="Motion that the controller follows: joint `slide`, `position` m, `velocity` m/s; each "
-    "may be empty. From another node it holds until the next message; a controller with a course "
+    "may be empty. From another node it holds until the next message; a controller with a profile "
     "of its own publishes it with the stamp of each state that it answers.",
     decode=unpack_reference,
 )

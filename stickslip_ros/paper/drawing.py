@@ -38,6 +38,7 @@ from stickslip_ros.show.style import (
     save,
     styled,
 )
+from stickslip_ros.studies.transitions import transition_label
 
 _FIRST_COLOUR, _LATER_COLOUR, _BELT_COLOUR = "#888888", "#DDDDDD", "black"
 
@@ -104,9 +105,8 @@ def _bifurcation(figure: BifurcationFigure, *, style: FigureStyle) -> Figure:
     below.margins(x=0.01)
     for (name, value), dashes in zip(transition_marks(figure).items(), cycle(DASHES)):
         for axes in (above, below):
-            line = axes.axvline(
-                value, color="black", lw=1.0, ls=dashes, label=f"{name} {value:.5g}"
-            )
+            label = f"{transition_label(name)} {value:.5g}"
+            line = axes.axvline(value, color="black", lw=1.0, ls=dashes, label=label)
         handles.append(line)
     style.legend_below(drawn, handles)
     finish(drawn)

@@ -122,7 +122,7 @@ class Friction(_constants_of_laws(), _ChosenLaw):
         in_use = any(issubclass(kind, Table) for kind in self._kinds())
         if in_use and not self.file:
             raise ValueError(
-                f"{prefix}file = {shown(self.file)} is refused: must be the path of a CSV file for "
+                f"{prefix}file = {shown(self.file)} is invalid: must be the path of a CSV file for "
                 f"law {Table.name}"
             )
 

@@ -76,7 +76,7 @@ class NodeParameters(ParameterGroup):
     def completed(self, prefix: str, curves: dict[str, Pairs]) -> Self:
         if not all(_NODE_NAME.fullmatch(name) for name in self.wait_for):
             raise ValueError(
-                f"wait_for = {shown(self.wait_for)} is refused: must be names of nodes, "
+                f"wait_for = {shown(self.wait_for)} is invalid: must be names of nodes, "
                 "of letters, digits and _, not starting with a digit"
             )
         return self
@@ -177,7 +177,7 @@ class PlantParameters(DriveConstants, NodeParameters):
         lowest, _ = self.load.signal(self.period).bounds
         if 0.0 < self.stiffness < SMALLEST:  # the scales of the drive overflow
             raise ValueError(
-                f"stiffness = {self.stiffness} N/m is refused: must be 0 or at least {SMALLEST:g}"
+                f"stiffness = {self.stiffness} N/m is invalid: must be 0 or at least {SMALLEST:g}"
             )
         if (self.force_delay + self.force_jitter) * self.rate > 1e6:
             raise ValueError(
@@ -192,7 +192,7 @@ class PlantParameters(DriveConstants, NodeParameters):
         if self.normal_force + lowest < 0.0:  # the slide is lifted off the belt
             load = "file" if self.load.kind == "table" else "amplitude"
             raise ValueError(
-                f"load.{load} = {shown(getattr(self.load, load))} is refused: must leave a normal "
+                f"load.{load} = {shown(getattr(self.load, load))} is invalid: must leave a normal "
                 f"force of at least 0 N, with normal_force = {self.normal_force} N and a load down "
                 f"to {lowest} N"
             )

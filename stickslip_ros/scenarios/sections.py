@@ -92,7 +92,7 @@ def read_file(path: Path, namespace: str) -> ScenarioFile:
             base = parameters.get("base")
             if len(parameters) != 1 or not isinstance(base, str) or not base:
                 raise InvalidInputError(
-                    f"{path}: section {pattern}: {shown(parameters)} is refused: must be base, the "
+                    f"{path}: section {pattern}: {shown(parameters)} is invalid: must be base, the "
                     "name or the path of a scenario"
                 )
         else:

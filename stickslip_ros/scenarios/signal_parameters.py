@@ -22,21 +22,21 @@ _NEEDS = {kind: list(signature(make).parameters) for kind, make in SIGNALS.items
 def _kind(changes: Changes) -> Any:
     return constant(
         "none",
-        "Time course: none, step, impulse (one sample long), ramp, sine, trapezoid or table.",
+        "Time profile: none, step, impulse (one sample long), ramp, sine, trapezoid or table.",
         changes=changes,
         choices=("none", *SIGNALS),
     )
 
 
 @dataclass(frozen=True)
-class _TimeCourse(ParameterGroup):
+class _TimeProfile(ParameterGroup):
     kind: str = "none"
-    amplitude: float = constant(0.0, "Amplitude of the course.")
+    amplitude: float = constant(0.0, "Amplitude of the profile.")
     start: float = constant(
-        0.0, "Simulated time at which the course starts.", "s", at_least=0.0, at_most=1e9
+        0.0, "Simulated time at which the profile starts.", "s", at_least=0.0, at_most=1e9
     )
     duration: float = constant(
-        inf, "Duration of the course; of a ramp, the time of its rise.", "s", at_least=0.0
+        inf, "Duration of the profile; of a ramp, the time of its rise.", "s", at_least=0.0
     )
     frequency: float = constant(
         1.0,
@@ -72,7 +72,7 @@ class _TimeCourse(ParameterGroup):
 
 
 @dataclass(frozen=True)
-class SignalParameters(_TimeCourse):
+class SignalParameters(_TimeProfile):
     """Signal over the time since the first sample."""
 
     kind: str = _kind(Changes.AT_REST)
@@ -91,7 +91,7 @@ class SignalParameters(_TimeCourse):
             return replace(super().completed(prefix, curves), points=())
         if not self.file:
             raise ValueError(
-                f"{prefix}file = '' is refused: must be the path of a CSV file for a table"
+                f"{prefix}file = '' is invalid: must be the path of a CSV file for a table"
             )
         return replace(self, points=read_curve(f"{prefix}file", self.file, _check_points, curves))
 
@@ -127,16 +127,16 @@ class DisturbanceParameters(SignalParameters):
 
 
 @dataclass(frozen=True)
-class ReferenceParameters(_TimeCourse):
+class ReferenceParameters(_TimeProfile):
     """Reference that the controller follows."""
 
     kind: str = constant(
         "none",
-        "Source: none, the topic `reference`, or a time course (step, ramp, sine, trapezoid).",
+        "Source: none, the topic `reference`, or a time profile (step, ramp, sine, trapezoid).",
         changes=Changes.AT_BUILD,
         choices=("none", "topic", *(kind for kind in SIGNALS if kind not in ("impulse", "table"))),
     )
-    amplitude: float = constant(0.0, "Largest displacement of the course.", "m")
+    amplitude: float = constant(0.0, "Largest displacement of the profile.", "m")
 
 
 def _check_points(points: Pairs) -> None:

@@ -196,7 +196,7 @@ def _within(parameter: Parameter, number: float) -> bool:
 
 def _refusal(parameter: Parameter, value: Any) -> str:
     """Return one line on a value that is refused and what is allowed."""
-    refused = f"{parameter.name} = {shown(value)} is refused: "
+    refused = f"{parameter.name} = {shown(value)} is invalid: "
     if isinstance(value, str) and value in parameter.refused:
         return refused + parameter.refused[value]
     kind = parameter.kind

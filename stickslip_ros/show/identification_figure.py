@@ -53,7 +53,7 @@ def identification_figure(found: Findings, *, style: FigureStyle = SCREEN) -> Fi
     _free_run(figure, last, found)
     names = ", ".join(dict.fromkeys(Path(record.name).name for record in found.records))
     error = f"{100.0 * found.chosen.error:.4g} %"
-    title = f"Identified drive, {names}: law {found.chosen.label}, held-out error {error}"
+    title = f"Identified drive, {names}: law {found.chosen.label}, validation error {error}"
     style.set_title(figure, title)
     finish(figure)
     return figure
@@ -66,9 +66,7 @@ def _friction(axes: Axes, found: Findings) -> None:
     top = max(float(np.quantile(each, _SHOWN_SHARE)) for each in sizes if len(each))
     scale, label = SI.axis("friction force", "N", np.array([top]))
     fastest = max(float(curve.speed[-1]) for curve in curves)
-    speed_scale, speed_label = SI.axis(
-        "size of the velocity relative to the belt $v_r$", "m/s", np.array([fastest])
-    )
+    speed_scale, speed_label = SI.axis("sliding speed $|v_r|$", "m/s", np.array([fastest]))
     for curve, direction, colour in zip(curves, found.directions, (BLUE, ORANGE), strict=False):
         own, name = errors.relative_speed * direction > 0.0, _NAMES[direction]
         axes.plot(

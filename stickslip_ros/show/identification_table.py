@@ -14,8 +14,8 @@ from stickslip_ros.tables import TextTable
 
 _PREDICTIONS = {
     "force_error": "force error",
-    "free_run_error": "free run, position error",
-    "segment_error": "in segments, position error",
+    "free_run_error": "simulation error",
+    "segment_error": "multi-step prediction error",
     "position_error": "closed loop, position error",
     "closed_loop_force_error": "closed loop, force error",
 }
@@ -51,7 +51,7 @@ def identification_tables(
         yield _curve(found)
     yield TextTable(
         "laws",
-        ["law", "constants", "error held out", ""],
+        ["law", "constants", "validation error", ""],
         [
             [each.label, str(each.size), f"{each.error:.3%}", _verdict(found, each)]
             for each in sorted(found.candidates, key=lambda each: each.error)
@@ -67,7 +67,7 @@ def identification_tables(
     for first, second, share in found.correlations:
         yield f"plant.{first} and plant.{second} are correlated, {share:.3f}"
     for name, why in found.unidentified.items():
-        yield f"plant.{name} is not told: {why}"
+        yield f"plant.{name} is not identifiable: {why}"
 
 
 def _digits(estimate: Estimate) -> int:

@@ -42,6 +42,12 @@ _SENT = {
 }
 """The measure of the force that acted, and the label of the sent force where the two differ."""
 
+_MEANING: dict[str | None, str] = {
+    Regime.EQUILIBRIUM: " (steady sliding)",
+    Regime.PURE_SLIP: " (vibration without sticking)",
+}
+"""What a machine does in a regime that has its name from dynamics."""
+
 _SAME_SCALE = {
     "amplitude": "midpoint",
     "midpoint": "amplitude",
@@ -63,7 +69,7 @@ _SLIPS = {
 _DISTRIBUTION = ("mean", "standard_error", "q05", "median", "q95")
 
 _LARGEST_RATIO = 10.0
-"""Ratio of belt speed and Hopf speed beyond which the unit is probably wrong."""
+"""Ratio of belt speed and critical feed speed beyond which the unit is probably wrong."""
 
 
 def simulation_tables(
@@ -168,7 +174,8 @@ def _shown(name: str, values: Mapping[str, Any], units: Units) -> Any:
     value = values.get(name)
     if name == "regime":
         trend = trend_text(values, units.text)
-        return f"{Regime.label(value)}{trend and f', not steady: {trend}'}{doubt(values)}"
+        motion = f"{Regime.label(value)}{_MEANING.get(value, '')}"
+        return f"{motion}{trend and f', not steady: {trend}'}{doubt(values)}"
     if name == "velocity_amplitude" and value is not None:
         amplitude, midpoint = values.get("amplitude") or 0.0, values.get("midpoint") or 0.0
         return 0.0 if amplitude <= NOISE * abs(midpoint) else value  # what is left is rounding

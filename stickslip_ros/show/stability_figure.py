@@ -312,13 +312,13 @@ def branches_figure(
     rests = np.concatenate([branch.least for branch in found.equilibria])
     for point in found.hopf_points:
         rest = np.interp(point.belt_speed, speeds, rests)
-        label = f"Hopf point {units.text(point.belt_speed, 'm/s')}"
+        label = f"critical feed speed (Hopf) {units.text(point.belt_speed, 'm/s')}"
         handles += axes.plot(point.belt_speed / speed, rest / length, **_POINT, label=label)
     onset, own = found.sticking_onset, found.drive.belt_speed
     for fold in found.folds:
         name = "fold"
         if onset is not None and isclose(fold, onset, rel_tol=_SAME_MARK_DISTANCE):
-            name, onset = "fold, onset of sticking", None
+            name, onset = "fold, stick-slip onset speed", None
         for branch in found.cycles:
             for end in (0, -1):
                 if branch.belt_speeds[end] == fold:
@@ -326,7 +326,7 @@ def branches_figure(
                     axes.plot([fold / speed] * 2, ends, **_FOLD)
         handles.append(Line2D([], [], **_FOLD, label=f"{name} {units.text(fold, 'm/s')}"))
     if onset is not None:
-        label = f"onset of sticking {units.text(onset, 'm/s')}"
+        label = f"stick-slip onset speed {units.text(onset, 'm/s')}"
         handles.append(axes.axvline(onset / speed, **_ONSET, label=label))
     if own != 0.0:
         label = f"belt speed of the drive {units.text(own, 'm/s')}"

@@ -43,7 +43,12 @@ from stickslip_ros.studies.basin import POSITION, VELOCITY, Attractor, Basins
 from stickslip_ros.studies.columns import Columns
 from stickslip_ros.studies.plan import Axis, Continuation, Grid
 from stickslip_ros.studies.study import Study
-from stickslip_ros.studies.transitions import TransitionMap, transition_map, transitions
+from stickslip_ros.studies.transitions import (
+    TransitionMap,
+    transition_label,
+    transition_map,
+    transitions,
+)
 from stickslip_ros.text import shown
 
 _FULL: Any = {"mew": 0.0}
@@ -79,7 +84,7 @@ def sweep_figure(
     colours = ("regime", *_MEASURES)
     if colour not in colours:
         raise InvalidInputError(
-            f"colour = {shown(colour)} is refused: must be one of {', '.join(colours)}"
+            f"colour = {shown(colour)} is invalid: must be one of {', '.join(colours)}"
         )
     if len(_grid(study).axes) == 2:
         return map_figure(columns, study, colour, style=style)
@@ -334,7 +339,8 @@ def _mark_transitions(
         more = [] if len(values) <= _MOST_SHOWN else ["..."]
         shown = ", ".join([f"{value:.5g}" for value in values[:_MOST_SHOWN]] + more)
         unit = units.of_unit(axis.unit)
-        handles.append(Line2D([], [], **look, label=f"{name} {shown} {unit}".rstrip()))
+        label = transition_label(name, axis.parameter)
+        handles.append(Line2D([], [], **look, label=f"{label} {shown} {unit}".rstrip()))
     return handles
 
 
@@ -363,7 +369,7 @@ def _curves(found: TransitionMap) -> Iterator[tuple[str, npt.NDArray[Any], str]]
     """Yield the transitions within the map: name, margins by row, and dashes."""
     for (name, margins), dashes in zip(found.margins.items(), cycle(DASHES)):
         if np.nanmin(margins) < 0.0 < np.nanmax(margins):
-            yield name, np.ma.masked_invalid(margins.T), dashes
+            yield transition_label(name), np.ma.masked_invalid(margins.T), dashes
 
 
 def _are(regimes: npt.NDArray[np.object_], regime: Regime | None) -> npt.NDArray[np.bool_]:

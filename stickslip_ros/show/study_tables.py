@@ -4,6 +4,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict
 from itertools import groupby, islice
+from math import log10
 from typing import Any, cast
 
 from stickslip_ros.physics.measures.cycle_measures import Regime, Trend
@@ -32,10 +33,12 @@ CONTROLLER = {
     "start_after": ("start after", "s"),
 }
 MARGINS = {
-    "gain_down": ("unstable below this share of the linear gain", ""),
-    "gain_up": ("unstable above this multiple of it", ""),
+    "gain_down": ("lower gain margin", ""),
+    "gain_up": ("upper gain margin", ""),
     "delay": ("delay margin", "s"),
 }
+_GAIN_MARGINS = "gain_down", "gain_up"
+"""Ratios of the linear gain at the limit of stability and the proposed one."""
 WORST = {
     "predicted_settling_time": ("1 % settling time, predicted", "s"),
     "settling_time": ("simulated", "s"),
@@ -54,11 +57,11 @@ _LOOP = {
     "equilibrium_position": ("equilibrium position", "m"),
     "eigenvalues": ("eigenvalues", "1/s"),
     "stable": ("stable", ""),
-    "hopf_speeds": ("Hopf speeds", "m/s"),
+    "hopf_speeds": ("critical feed speeds (Hopf)", "m/s"),
 }
 
 _HOPF_POINTS = {
-    "crossing_speeds": ("crossing speed of the eigenvalues", "1/m"),
+    "crossing_speeds": ("dRe(lambda)/dv there", "1/m"),
     "first_lyapunov_coefficients": ("first Lyapunov coefficient", ""),
 }
 
@@ -67,8 +70,8 @@ _SECTIONS: dict[str, _Labels] = {
     | {"hopf_angular_frequencies": ("angular frequency there", "rad/s")}
     | _HOPF_POINTS,
     "sticking": {
-        "onset_speed_approximate": ("onset of sticking, by averaging", "m/s"),
-        "onset_speed": ("onset of sticking, exactly", "m/s"),
+        "onset_speed_approximate": ("stick-slip onset speed, by averaging", "m/s"),
+        "onset_speed": ("stick-slip onset speed, exactly", "m/s"),
         "speed_ranges": ("belt speeds that stick", "m/s"),
     },
     "closed_loop": _LOOP
@@ -203,6 +206,9 @@ def _one_below_another(
     title: str, heading: str, labels: _Labels, values: Mapping[str, Any], units: Units
 ) -> TextTable:
     rows = [[label, units.text(values[name], unit)] for name, (label, unit) in labels.items()]
+    for row, name in zip(rows, labels, strict=True):
+        if name in _GAIN_MARGINS and values[name] is not None:
+            row[1] += f" ({20.0 * log10(values[name]):.1f} dB)"
     return TextTable(title, [heading, ""], rows)
 
 

@@ -188,7 +188,7 @@ def style_named(name: str) -> FigureStyle:
     """Return a style by its name; raises InvalidInputError for an unknown one."""
     if name not in STYLES:
         raise InvalidInputError(
-            f"style = {shown(name)} is refused: must be one of {', '.join(STYLES)}"
+            f"style = {shown(name)} is invalid: must be one of {', '.join(STYLES)}"
         )
     return STYLES[name]
 

@@ -84,7 +84,7 @@ class Task:
             )
         if not isinstance(law, Washout):
             raise InvalidInputError(
-                f"control law = {law.name} is refused: must be {Washout.name}, "
+                f"control law = {law.name} is invalid: must be {Washout.name}, "
                 "whose gains a design proposes"
             )
         if belt_speeds is None:

@@ -120,7 +120,7 @@ def unit_period(drive: Drive, duration: float) -> float:
         return drive.natural_period
     if not 0.0 < duration < inf:
         raise InvalidInputError(
-            f"plant.duration = {duration:g} s is refused: must be finite and above 0 s with "
+            f"plant.duration = {duration:g} s is invalid: must be finite and above 0 s with "
             "plant.stiffness = 0 N/m, because a drive without a spring has no natural period"
         )
     return duration / DEFAULT_PERIODS

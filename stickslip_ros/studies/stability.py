@@ -252,7 +252,7 @@ def _closed_loop(drive: Drive, law: ControlLaw | None, plant: PlantParameters) -
     if len(cycles) > 1 and isclose(cycles[0].position, cycles[1].position, rel_tol=1e-6):
         cycles.pop()
     if not cycles and reason is None:
-        started = " or from the Hopf point at the critical linear gain" if gains_of(law) else ""
+        started = " or from the bifurcation at the critical linear gain" if gains_of(law) else ""
         reason = (
             f"none found from rest at zero displacement{started}; there is no search for others, "
             "and none in a very stiff loop"
@@ -417,7 +417,7 @@ def bifurcation_branches(scenario: Scenario) -> BifurcationBranches:
 
 
 def hopf_ratio(drive: Drive) -> float | None:
-    """Return the belt speed over the nearest Hopf speed; None without one or at zero speed.
+    """Return the belt speed over the nearest critical speed; None without one or at zero speed.
 
     A drive that the theory does not cover has none.
     """
@@ -432,16 +432,16 @@ def hopf_ratio(drive: Drive) -> float | None:
 
 
 def hopf_distance(drive: Drive) -> str:
-    """Return a clause on the belt speed and the nearest Hopf speed, which reveals a wrong unit.
+    """Return a clause on the belt speed and the nearest critical speed, which reveals a wrong unit.
 
-    It is empty without a Hopf speed.
+    It is empty without a critical speed.
     """
     ratio = hopf_ratio(drive)
     if ratio is None:
         return ""
     speed = abs(drive.belt_speed)
     own, nearest = (number_text(drive, each, "m/s") for each in (speed, speed / ratio))
-    clause = f"{own} is {ratio:.4g} times the Hopf speed of {nearest}"
+    clause = f"{own} is {ratio:.4g} times the critical speed of {nearest}"
     return clause if drive.is_dimensionless else f"{clause} (belt speeds are in m/s)"
 
 

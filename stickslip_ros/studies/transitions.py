@@ -1,4 +1,4 @@
-"""Hopf bifurcations and limits of sticking by theory, over any parameter."""
+"""Hopf bifurcations and stick-slip onsets by theory, over any parameter."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -28,6 +28,11 @@ STABILITY_LIMIT = "limit of stability"
 STICKING_LIMIT = "limit of sticking"
 """An end of a range in which a slide sticks again after release; there may be several ranges."""
 
+_LABELS = {
+    HOPF_POINT: ("Hopf bifurcation", "critical feed speed (Hopf)"),
+    STICKING_LIMIT: ("stick-slip onset", "stick-slip onset speed"),
+}
+
 _MAP_POINTS = 50
 """Number of values of each axis of a map."""
 
@@ -42,6 +47,12 @@ class TransitionMap:
     """Values of the second parameter, shape (m,)."""
     margins: Mapping[str, FloatArray]
     """Margin by name of the transition, zero at it, NaN without a theory; shape (n, m)."""
+
+
+def transition_label(name: str, parameter: str = "") -> str:
+    """Return the display text of a transition, which over the belt speed is a speed."""
+    label, speed = _LABELS.get(name, (name, name))
+    return speed if parameter == "plant.belt_speed" else label
 
 
 def hopf_margin(case: ControlledDrive, *, coarse: bool = False) -> float:

@@ -206,7 +206,7 @@ class ClosedLoop:
         """
         nodes = self._open_nodes()
         if not 0.0 < duration < float("inf"):
-            raise InvalidInputError(f"duration = {duration} s is refused: must be above 0, finite")
+            raise InvalidInputError(f"duration = {duration} s is invalid: must be above 0, finite")
         nodes.set_parameters(nodes.plant, {"duration": float(duration)})
         nodes.plant.elapsed = 0.0
         try:
@@ -440,7 +440,7 @@ def _check_controller(controller: object) -> None:
         if command and all(isinstance(argument, str) for argument in command):
             return
     raise InvalidInputError(
-        f"controller = {controller!r} is refused: must be a class or function that makes an rclpy "
+        f"controller = {controller!r} is invalid: must be a class or function that makes an rclpy "
         "node, a command as a list of strings, the name of a control law "
         f"({', '.join(CONTROLLER_PARAMETERS)}), 'scenario', 'external' or None"
     )
@@ -454,7 +454,7 @@ def _checked_namespace(namespace: str) -> str:
         raise InvalidInputError(f"namespace = {namespace!r} is refused: {reason}") from None
     if len(namespace) > LONGEST_NAMESPACE:
         raise InvalidInputError(
-            f"namespace = {shown(namespace)} is refused: must have at most {LONGEST_NAMESPACE} "
+            f"namespace = {shown(namespace)} is invalid: must have at most {LONGEST_NAMESPACE} "
             "characters"
         )
     return namespace

@@ -71,7 +71,7 @@ def test_refusals_are_one_sentence() -> None:
         ("static", 0.1, "did you mean friction_static?"),
         ("friction__static", 0.1, "did you mean friction_static?"),
         ("autostart", True, "write plant.autostart or washout_controller.autostart or analyzer."),
-        ("belt_speed", "fast", "belt_speed = 'fast' is refused: must be a finite number"),
+        ("belt_speed", "fast", "belt_speed = 'fast' is invalid: must be a finite number"),
         ("belt_speed", (1, 2), "must be a finite number"),
     ]
     for keyword, value, meant in refused:

@@ -87,7 +87,7 @@ def test_what_cannot_be_simulated_is_refused(feed_run: ss.Run) -> None:
             ss.simulate("paper", duration=duration)
     with pytest.raises(InvalidInputError, match=r"plant\.force_delay"):
         ss.simulate(ss.scenario("paper", force_delay=0.1), 1.0, continuous=True)
-    with pytest.raises(InvalidInputError, match="style = 'poster' is refused: must be one of scr"):
+    with pytest.raises(InvalidInputError, match="style = 'poster' is invalid: must be one of scr"):
         feed_run.plot(style="poster")
 
 

@@ -126,11 +126,11 @@ def test_refusals() -> None:
         ({"belt_sped": (0.1, 0.2, 3)}, {}, "did you mean belt_speed?"),
         ({"belt_speed": (0.1, 0.2)}, {}, "(first, last, count) or (first, last, count, 'log')"),
         ({"belt_speed": (0.1, 0.2, 3, "lin")}, {}, "must be (first, last, count)"),
-        ({"belt_speed": 0.1}, {}, "belt_speed = 0.1 is refused"),
-        ({"belt_speed": "abc"}, {}, "belt_speed = 'abc' is refused"),
+        ({"belt_speed": 0.1}, {}, "belt_speed = 0.1 is invalid"),
+        ({"belt_speed": "abc"}, {}, "belt_speed = 'abc' is invalid"),
         ({"belt_speed": (0.1, 0.2, 2.5)}, {}, "must be (first, last, count)"),
         ({"window": (1, 3, 3)}, {}, "analyzer"),
-        ({"belt_speed": (0.1, 0.2, 3)}, {"carry": "left"}, "carry = 'left' is refused"),
+        ({"belt_speed": (0.1, 0.2, 3)}, {"carry": "left"}, "carry = 'left' is invalid"),
         ({"belt_speed": (0.1, 0.2, 3)}, {"workers": 0}, "0 workers"),
         ({"autostart": (0, 1, 2)}, {}, "several nodes"),
     ]
@@ -142,9 +142,9 @@ def test_refusals() -> None:
         assert meant in str(refusal.value)
         assert "\n" not in str(refusal.value)
     starts: list[tuple[dict[str, Any], str]] = [
-        ({"position": (0.0, 1.0)}, "position = (0.0, 1.0) is refused"),
-        ({"velocity": 1.0}, "velocity = 1.0 is refused"),
-        ({"velocity": 1.0, "sample": 3}, "velocity = 1.0 is refused"),
+        ({"position": (0.0, 1.0)}, "position = (0.0, 1.0) is invalid"),
+        ({"velocity": 1.0}, "velocity = 1.0 is invalid"),
+        ({"velocity": 1.0, "sample": 3}, "velocity = 1.0 is invalid"),
         ({"sample": 3, "seed": -1}, "seed -1"),
     ]
     for options, meant in starts:

@@ -18,7 +18,7 @@ def test_stability_is_that_of_the_command() -> None:
     ours = ss.stability("paper")
     assert {**vars(ours), "scenario": None} == {**found, "notes": notes, "scenario": None}
     assert repr(ours).splitlines()[0] == "paper, by theory"
-    assert "Hopf speeds" in repr(ours)
+    assert "critical feed speeds (Hopf)" in repr(ours)
     assert ours._repr_html_().count("<table>") == 2  # pyright: ignore
     assert isinstance(ours.plot(), Figure)
 
@@ -94,7 +94,7 @@ def test_what_cannot_be_drawn_or_designed_is_refused() -> None:
     scenario = load_scenario("feed_drive", controller="velocity_feedback")
     with pytest.raises(InvalidInputError, match="nothing to draw: this exists for the washout law"):
         ss.stability(scenario).plot()
-    with pytest.raises(InvalidInputError, match="control law = velocity_feedback is refused"):
+    with pytest.raises(InvalidInputError, match="control law = velocity_feedback is invalid"):
         ss.design(scenario, force_limit=200.0)
     for speed in ("fast", (0.01, 0.02, 0.03), (0.05, 0.01), -0.04, ("a", "b")):
         with pytest.raises(InvalidInputError, match=r"belt.speeds? .*must be"):

@@ -34,7 +34,7 @@ REFUSED: Mapping[str, Mapping[str, str]] = {
         # No option: a negative number.
         "paper --duration -.5": "'-.5' is not a time in seconds, 0 or more",
         "paper --durations=3": "--durations=3; did you mean --duration?",
-        "paper --controller damper.py": "--controller: damper.py is refused: must be the name of a",
+        "paper --controller damper.py": "--controller: damper.py is invalid: must be the name of a",
         "paper --duration 1e9 --plot run.jpg": "--plot run.jpg: must end in one of .png",
         "paper --size 6x4": "--size 6x4: needs --plot FILE, which is not given",
         "paper --out run.txt": "--out run.txt: must end in .csv",
@@ -43,11 +43,11 @@ REFUSED: Mapping[str, Mapping[str, str]] = {
         "feed_drive --out run.csv --every 0.0015": (
             "--every 0.0015: must be a multiple of the sample period, 0.001 s"
         ),
-        f"{LOOSE}": "plant.duration = inf s is refused: must be finite and above 0 s",
+        f"{LOOSE}": "plant.duration = inf s is invalid: must be finite and above 0 s",
         "paper --continuous-control -p plant.force_delay=0.1": (
             "--continuous-control ... plant.force_delay ... 0.1"
         ),
-        f"{LAW}lugre -p plant.friction.curve=dahl": "'dahl' is refused: law dahl has a memory",
+        f"{LAW}lugre -p plant.friction.curve=dahl": "'dahl' is invalid: law dahl has a memory",
         f"{LAW}lugre -p plant.friction.curve=linear": "must be at least 1e-12 at every speed",
         f"{LAW}elasto_plastic -p plant.friction.break_away=1": "at least 0 and below 1",
         f"{LAW}maxwell_slip -p plant.friction.elements=30": "at least 1 and at most 20",
@@ -89,7 +89,7 @@ REFUSED: Mapping[str, Mapping[str, str]] = {
         "bag --from 50": "bag holds no samples from 50 s on",
         "bag --columns time=t,position=x": "a bag has no columns",
         "bag --stick-speed -1": "is not a speed in m/s, 0 or more",
-        "bag --slips 1e-4 --slip-time 0": "within = 0.0 is refused: must be above 0 (s)",
+        "bag --slips 1e-4 --slip-time 0": "within = 0.0 is invalid: must be above 0 (s)",
         "log.csv --columns time=time,time=t": "each quantity once",
         "a b c d e f g --plot out.png": "draws at most 6 bags, and 7 were given",
         "bag --plot out.gif": "must end in one of .png",
@@ -242,7 +242,7 @@ def test_an_impossible_domain_is_refused(
         process_environment["ROS_DOMAIN_ID"] = given
         done = stickslip(*command.split())
         assert done.returncode == 2
-        refusal = f"ROS_DOMAIN_ID = {shown} is refused: must be an integer from 0 to 232"
+        refusal = f"ROS_DOMAIN_ID = {shown} is invalid: must be an integer from 0 to 232"
         assert refusal in done.stderr.splitlines()[-1]
         assert "Traceback" not in done.stderr
 

@@ -39,7 +39,7 @@ def test_a_law_is_simulated_and_its_stability_computed(stickslip: Run, law: str)
     assert stability["sampled_loop"]["stable"] is True
     assert len(stability["open_loop"]["limit_cycles"]) == (law != "dahl")
     notes = stability["notes"]
-    onset = "the onset of sticking needs a friction law without memory"
+    onset = "the stick-slip onset speed needs a friction law without memory"
     assert notes["sticking"].startswith(onset)
     nonsmooth = "the friction law elasto_plastic has no second derivative there"
     assert any(nonsmooth in note for note in notes.values()) == (law == "elasto_plastic")

@@ -173,7 +173,7 @@ def test_its_theory_is_that_of_the_law(with_packages: Run) -> None:
 def test_its_constants_are_checked(with_packages: Run, stickslip: Run) -> None:
     for override, refusal in (
         ("reverse.static=0.05", "kinetic = 0.1 must not exceed friction.reverse.static = 0.05"),
-        ("decay_speed=0.0", "decay_speed = 0.0 is refused: must be a finite number"),
+        ("decay_speed=0.0", "decay_speed = 0.0 is invalid: must be a finite number"),
     ):
         done = with_packages("simulate", LUBRICATED, "-p", f"plant.friction.{override}")
         assert (done.returncode, done.stdout) == (2, "")
@@ -181,4 +181,4 @@ def test_its_constants_are_checked(with_packages: Run, stickslip: Run) -> None:
         assert done.stderr.count("\n") == 1
     done = stickslip("simulate", LUBRICATED)  # without the package
     assert (done.returncode, done.stdout) == (2, "")
-    assert "friction.law = 'hess_soom' is refused: must be one of" in done.stderr
+    assert "friction.law = 'hess_soom' is invalid: must be one of" in done.stderr

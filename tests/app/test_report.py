@@ -49,7 +49,8 @@ def test_a_regime_of_late_forces_is_doubtful(stickslip: Run, tmp_path: Path) -> 
     record(tmp_path / "old")
     late, old = (stickslip("report", bag, "--plot", "run.svg").stdout for bag in ("late", "old"))
     rows = dict(line.split("  ", 1) for line in late.splitlines() if "  " in line)
-    assert rows["regime"].strip().startswith("pure slip, not steady: drifting")
+    drifting = "pure slip (vibration without sticking), not steady: drifting"
+    assert rows["regime"].strip().startswith(drifting)
     assert rows["regime"].endswith(", doubtful: late forces")
     assert (rows["late forces"].strip(), rows["missed deadlines"].strip()) == ("617", "0")
     assert late.splitlines()[-1].startswith("the regime is doubtful: 62 % of the forces came late")

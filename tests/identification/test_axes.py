@@ -89,16 +89,16 @@ def test_the_controller_is_found_from_the_record_if_the_forces_are_its_own() -> 
 def test_what_is_refused() -> None:
     own = record("coulomb")
     refused: list[tuple[list[Record], str, dict[str, float], str]] = [
-        ([own], "stribek", {}, "law stribek is refused: did you mean stribeck"),
+        ([own], "stribek", {}, "law stribek is invalid: did you mean stribeck"),
         ([own], "dahl", {}, "law dahl is refused for a drive without a spring"),
         ([own], "coulomb", {"friction.static": 3.0}, "plant.friction.static cannot be fixed"),
-        ([own], "auto", {"mass": -1.0}, "plant.mass = -1.0 is refused: must be a number above 0"),
-        ([own], "auto", {"damping": -1.0}, "plant.damping = -1.0 is refused: must be a number of"),
-        ([own], "auto", {"bias_force": np.inf}, "plant.bias_force = inf is refused: must be a fin"),
+        ([own], "auto", {"mass": -1.0}, "plant.mass = -1.0 is invalid: must be a number above 0"),
+        ([own], "auto", {"damping": -1.0}, "plant.damping = -1.0 is invalid: must be a number of"),
+        ([own], "auto", {"bias_force": np.inf}, "plant.bias_force = inf is invalid: must be a fin"),
         ([own], "auto", {"force_delay": 1.0}, r"from -0.001 s to 0.02 s, -1 to 20 periods"),
-        ([own], "auto", {"force_delay": -0.5}, "plant.force_delay = -0.5 is refused"),
-        ([own], "auto", {"mas": 1.0}, r"plant.mas is refused: did you mean plant.mass\? must be "),
-        ([own], "auto", {"xyz": 1.0}, "plant.xyz is refused: must be one of plant.mass, "),
+        ([own], "auto", {"force_delay": -0.5}, "plant.force_delay = -0.5 is invalid"),
+        ([own], "auto", {"mas": 1.0}, r"plant.mas is invalid: did you mean plant.mass\? must be "),
+        ([own], "auto", {"xyz": 1.0}, "plant.xyz is invalid: must be one of plant.mass, "),
         ([replace(own, force=None)], "auto", {}, r"no force is recorded.* name its column"),
         ([replace(own, force=0.0 * own.force)], "auto", {}, r"recorded force is always 0[^;]*$"),
         ([replace(own, force=-own.force)], "coulomb", {}, r"the mass comes out as 0.* sign"),

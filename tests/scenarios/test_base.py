@@ -52,10 +52,10 @@ def test_a_bad_base_is_refused(tmp_path: Path) -> None:
     for parameters, fragment in (
         ("{base: feed_driv}", "base: unknown scenario 'feed_driv'; did you mean feed_drive?"),
         ("{base: nowhere.yaml}", "base: no scenario file nowhere.yaml"),
-        ("{base: 5}", "{'base': 5} is refused: must be base, the name or the path of a scenario"),
-        ('{base: ""}', "{'base': ''} is refused"),
-        ("{}", "{} is refused"),
-        ("{basis: paper}", "{'basis': 'paper'} is refused: must be base"),
+        ("{base: 5}", "{'base': 5} is invalid: must be base, the name or the path of a scenario"),
+        ('{base: ""}', "{'base': ''} is invalid"),
+        ("{}", "{} is invalid"),
+        ("{basis: paper}", "{'basis': 'paper'} is invalid: must be base"),
     ):
         path = scenario_file(tmp_path, section("/**/scenario", parameters) + PLANT)
         message = refusal(path)

@@ -110,7 +110,7 @@ def test_a_law_of_another_package_is_found_with_its_constants(install: Install) 
     for name, value, reason in (
         ("fall", 11, "fall = 11.0 must not exceed 10 friction.static = 10.0"),
         ("reverse.fall", 11, "reverse.fall = 11.0 must not exceed 10 friction.static = 10.0"),
-        ("reverse.fall", -1.0, "reverse.fall = -1.0 is refused: must"),
+        ("reverse.fall", -1.0, "reverse.fall = -1.0 is invalid: must"),
     ):
         with pytest.raises(InvalidInputError) as refused:
             plant.changed(given | {f"friction.{name}": value}, "test")
@@ -150,8 +150,8 @@ def test_whole_numbers_and_tuples_are_constants(install: Install) -> None:
     assert moved[0] == pytest.approx(moved[1], rel=1e-9)
     for value, reason in (
         (3, "friction.terms = 3 must not exceed 2"),
-        (0, "friction.terms = 0 is refused: must be a whole number at least 1"),
-        (1.5, "friction.terms = 1.5 is refused: must be a whole number at least 1"),
+        (0, "friction.terms = 0 is invalid: must be a whole number at least 1"),
+        (1.5, "friction.terms = 1.5 is invalid: must be a whole number at least 1"),
     ):
         with pytest.raises(InvalidInputError) as refused:
             plant.changed(given | {"friction.terms": value}, "test")
@@ -232,7 +232,7 @@ def test_what_is_refused_is_told_to_who_names_it(install: Install) -> None:
     with pytest.raises(InvalidInputError) as refused:
         plant.changed({"friction.law": "falling"}, "test")
     whole = "foreign:Falling of package foreign-laws is no class derived from FrictionLaw"
-    assert str(refused.value).startswith(f"test: friction.law = 'falling' is refused: {whole}")
+    assert str(refused.value).startswith(f"test: friction.law = 'falling' is invalid: {whole}")
 
 
 RESULT = "-self.static * sign + self.fall * relative_speed"

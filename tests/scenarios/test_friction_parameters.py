@@ -54,7 +54,7 @@ def test_constants_for_backward_slip_make_a_law_of_two_directions() -> None:
 
 
 def test_a_refusal_names_the_parameter() -> None:
-    finite = "is refused: must be a finite number at least"
+    finite = "is invalid: must be a finite number at least"
     for name, value, message in (
         ("reverse.static", 0.2, "minimum = 0.25 must not exceed friction.reverse.static = 0.2"),
         ("reverse.minimum", 0.45, "reverse.minimum = 0.45 must not exceed friction.static = 0.4"),
@@ -162,7 +162,7 @@ def test_a_file_that_makes_no_table_is_refused(curve: Path) -> None:
 
 
 def test_a_file_that_cannot_be_read_is_refused(curve: Path, tmp_path: Path) -> None:
-    assert "friction.file = '' is refused: must be the path of a CSV file for law table" in (
+    assert "friction.file = '' is invalid: must be the path of a CSV file for law table" in (
         refusal("paper", "plant.friction.law=table")
     )
     assert refused(tmp_path / "none.csv").endswith(

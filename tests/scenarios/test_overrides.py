@@ -44,7 +44,7 @@ def test_an_override_does_not_mend_a_bad_file(tmp_path: Path) -> None:
     path = scenario_file(tmp_path, section("/**/plant", "{mass: -1}"))
     message = refusal(path, "plant.mass=1")
     assert "-p" not in message
-    assert f"{path}, plant: mass = -1 is refused" in message
+    assert f"{path}, plant: mass = -1 is invalid" in message
 
 
 def test_an_override_has_a_form() -> None:

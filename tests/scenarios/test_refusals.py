@@ -72,7 +72,7 @@ def test_a_value_that_is_not_allowed(tmp_path: Path) -> None:
     ):
         path = scenario_file(tmp_path, section(f"/**/{node}", f"{{{name}: {value}}}"))
         message = refusal(path)
-        assert message.startswith(f"{path}, {node}: {name} = {shown} is refused: must be ")
+        assert message.startswith(f"{path}, {node}: {name} = {shown} is invalid: must be ")
         assert allowed in message
 
 

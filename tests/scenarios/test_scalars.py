@@ -53,7 +53,7 @@ def test_a_scenario_reads_them_so(tmp_path: Path) -> None:
         assert same(load_scenario(path).as_dict()[node][name], given), text
     for text, value in NOT_FINITE.items():
         path = scenario_file(tmp_path, section("/**/plant", f"{{mass: {text}}}"))
-        assert f"mass = {value!r} is refused" in refusal(path)
+        assert f"mass = {value!r} is invalid" in refusal(path)
     for text in (".inf", "inf"):
         path = scenario_file(tmp_path, section("/**/plant", f"{{duration: {text}}}"))
         assert not isfinite(load_scenario(path).plant.duration)

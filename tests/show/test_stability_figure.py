@@ -185,7 +185,8 @@ def test_a_supercritical_diagram(supercritical: BifurcationBranches, style: str)
     assert figure.get_suptitle() == "Bifurcation diagram"
     assert legend_texts(figure) == [
         "equilibrium, unstable", "equilibrium, stable", "stick-slip, stable", "pure slip, stable",
-        "Hopf point 48.88 mm/s", "onset of sticking 43.95 mm/s", "belt speed of the drive 40 mm/s",
+        "critical feed speed (Hopf) 48.88 mm/s", "stick-slip onset speed 43.95 mm/s",
+        "belt speed of the drive 40 mm/s",
     ]  # fmt: skip
     (axes,) = figure.axes
     assert axes.get_xlabel() == "belt speed $v$ (mm/s)"
@@ -211,7 +212,7 @@ def test_of_a_subcritical_diagram_the_unstable_is_dashed(
     assert faults(figure) == []
     names = legend_texts(figure)
     assert {
-        "pure slip, unstable", "stick-slip, stable", "fold, onset of sticking 1.504"
+        "pure slip, unstable", "stick-slip, stable", "fold, stick-slip onset speed 1.504"
     } <= set(names)  # fmt: skip
     (axes,) = figure.axes
     assert [text.get_text() for text in axes.texts] == ["stick-slip", "stick-slip or rest", "rest"]

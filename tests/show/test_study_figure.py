@@ -89,7 +89,7 @@ def test_a_diagram_names_axes_regimes_and_transitions() -> None:
     assert "no control" in figure.get_suptitle()
     assert legend_texts(figure) == [
         "stick-slip", "pure slip", "equilibrium", "not steady yet",
-        "Hopf point 0.48876", "limit of sticking 0.43947",
+        "critical feed speed (Hopf) 0.48876", "stick-slip onset speed 0.43947",
     ]  # fmt: skip
     shown = {line.get_color(): line.get_marker() for line in section.lines if len(line.get_xdata())}
     assert {shown[ORANGE], shown[BLUE], shown[GREEN]} == {"o", "^", "s"}
@@ -100,7 +100,8 @@ def test_where_up_and_down_differ_a_diagram_is_shaded() -> None:
     both_ways = swept(over, overrides=HYSTERESIS, carry=Continuation.BOTH)
     figure = diagram_figure(*both_ways, style=STYLES["paper-double"])
     assert faults(figure) == []
-    assert {"carried up", "carried down", SHADED, "Hopf point 1.1513"} <= set(legend_texts(figure))
+    legend = legend_texts(figure)
+    assert {"carried up", "carried down", SHADED, "critical feed speed (Hopf) 1.1513"} <= {*legend}
     for axes in figure.axes:
         (shaded,) = axes.collections
         corners = np.concatenate([path.vertices for path in shaded.get_paths()])
@@ -123,7 +124,7 @@ def test_points_without_turning_points_are_not_left_out() -> None:
 def test_an_axis_may_be_logarithmic_below_zero() -> None:
     overrides = (FREE, "plant.belt_speed=0.3", "plant.damping=0.03")
     figure = diagram_figure(*swept("plant.belt_speed=-0.01:-1.0:7:log", overrides=overrides))
-    assert "Hopf point -0.48305" in legend_texts(figure)
+    assert "critical feed speed (Hopf) -0.48305" in legend_texts(figure)
     # What varies is not in the title.
     title = "Bifurcation diagram, paper plant.damping=0.03, no control"
     assert figure.get_suptitle() == title
@@ -138,7 +139,7 @@ def test_a_map_has_each_regime_where_it_is(over_two: Swept, style: str) -> None:
     assert axes.get_xlabel() == r"static friction coefficient $\mu_s$"
     assert axes.get_xlim() == pytest.approx((0.1, 0.6))
     assert axes.get_ylim() == pytest.approx((0.1, 0.7))
-    assert {"stick-slip", "no result", "Hopf point", "limit of sticking"} <= set(
+    assert {"stick-slip", "no result", "Hopf bifurcation", "stick-slip onset"} <= set(
         legend_texts(figure)
     )
     found = cells(axes)
@@ -154,7 +155,7 @@ def test_the_map_of_a_measure_has_a_colour_bar(over_two: Swept, style: str) -> N
     assert faults(figure) == []
     _, bar = figure.axes
     assert bar.get_ylabel() == "amplitude (dimensionless)"
-    assert set(legend_texts(figure)) == {"no result", "Hopf point", "limit of sticking"}
+    assert set(legend_texts(figure)) == {"no result", "Hopf bifurcation", "stick-slip onset"}
 
 
 def test_a_map_ends_where_the_sweep_does_and_a_stick_fraction_has_no_prefix() -> None:

@@ -91,7 +91,7 @@ def test_a_design_refuses_another_law_by_name(damped: Scenario) -> None:
     with pytest.raises(InvalidInputError) as refused:
         Task.from_scenario(damped)
     assert str(refused.value) == (
-        "control law = velocity_feedback is refused: must be washout, whose gains a design proposes"
+        "control law = velocity_feedback is invalid: must be washout, whose gains a design proposes"
     )
 
 
@@ -133,9 +133,9 @@ def test_the_distance_from_the_hopf_speed() -> None:
         drive = replace(FEED_DRIVE, belt_speed=speed)
         assert hopf_ratio(drive) == pytest.approx(40.0 / 0.048876, rel=1e-4)
         assert hopf_distance(drive) == (
-            "40 m/s is 818.4 times the Hopf speed of 0.04888 m/s (belt speeds are in m/s)"
+            "40 m/s is 818.4 times the critical speed of 0.04888 m/s (belt speeds are in m/s)"
         )
-    assert hopf_distance(PAPER) == "0.4 is 0.8184 times the Hopf speed of 0.4888"
+    assert hopf_distance(PAPER) == "0.4 is 0.8184 times the critical speed of 0.4888"
     for drive in (
         replace(FEED_DRIVE, friction=Coulomb(0.4)),
         replace(FEED_DRIVE, belt_speed=0.0),

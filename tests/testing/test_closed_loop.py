@@ -323,8 +323,8 @@ def test_a_controller_that_is_not_found_is_explained(
 
 def test_invalid_input_is_refused() -> None:
     refusals: list[tuple[dict[str, Any], str]] = [
-        ({"controller": "python my.py"}, "controller = 'python my.py' is refused: must be a class"),
-        ({"controller": []}, r"controller = \[\] is refused"),
+        ({"controller": "python my.py"}, "controller = 'python my.py' is invalid: must be a class"),
+        ({"controller": []}, r"controller = \[\] is invalid"),
         ({"controller": ["no_such_command"]}, "no command 'no_such_command'"),
         ({"controller": lambda: 5}, "made 5, not an rclpy node"),
         ({"controller": controllers.Refusing}, "refusing could not be configured: failure"),
@@ -344,7 +344,7 @@ def test_a_loop_has_to_be_open_and_to_run_for_some_time(tmp_path: Path) -> None:
         _ = loop.environment
     with loop:
         for duration in (0.0, -1.0, float("inf"), float("nan")):
-            with pytest.raises(InvalidInputError, match=f"duration = {duration} s is refused"):
+            with pytest.raises(InvalidInputError, match=f"duration = {duration} s is invalid"):
                 loop.run(duration)
     with pytest.raises(BagError, match="exists already"):
         ClosedLoop("paper", bag=tmp_path)

@@ -86,7 +86,7 @@ def domain_of_environment() -> int:
         return int(text)
     shown = text if _DECIMAL.fullmatch(text) else repr(text)
     raise InvalidInputError(
-        f"{_DOMAIN} = {shown:.40} is refused: must be an integer from 0 to {_LARGEST_DOMAIN}, "
+        f"{_DOMAIN} = {shown:.40} is invalid: must be an integer from 0 to {_LARGEST_DOMAIN}, "
         "the last domain that has ports"
     )
 

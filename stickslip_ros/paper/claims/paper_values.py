@@ -148,12 +148,12 @@ def onset(damping: float = DAMPING, stiffness: float = 1.0) -> StickingOnset:
 
 
 def exact_onset(damping: float = DAMPING, stiffness: float = 1.0) -> float:
-    """Return the onset of sticking of the motion itself."""
+    """Return the stick-slip onset speed of the motion itself."""
     return known(onset(damping, stiffness).exact)
 
 
 def approximate_onset(damping: float = DAMPING) -> float:
-    """Return the onset of sticking by averaging."""
+    """Return the stick-slip onset speed by averaging."""
     return known(onset(damping).approximate)
 
 

@@ -118,7 +118,7 @@ class Drift:
     resolution = 0.0
     """Step of the sensor, m: a smaller change of position does not matter."""
     judged = True
-    """Whether a trend is a drift; not where a course or a reference varies."""
+    """Whether a trend is a drift; not where a time profile or a reference varies."""
 
     def __init__(self) -> None:
         self.position, self.force = TrendMeter(), TrendMeter()

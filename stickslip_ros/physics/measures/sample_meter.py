@@ -88,7 +88,7 @@ def reading_of(
 
 
 def varies(parameters: Mapping[str, Any]) -> bool:
-    """Return whether a course or a reference among the parameters of a node keeps changing."""
+    """Return whether a profile or a reference among the parameters of a node keeps changing."""
     return any(
         name.endswith(".kind") and str(value) in _CHANGING_KINDS
         for name, value in parameters.items()
@@ -159,7 +159,7 @@ class SampleMeter:
         speed = reading.stick_speed
         if speed is not None and not 0.0 <= speed < inf:
             raise InvalidInputError(
-                f"stick_speed = {speed} is refused: must be finite and at least 0 (m/s)"
+                f"stick_speed = {speed} is invalid: must be finite and at least 0 (m/s)"
             )
         self.reading = reading
         self.origin = 0

@@ -73,7 +73,7 @@ class SlipThreshold:
     def __post_init__(self) -> None:
         for name, value, unit in (("drop", self.drop, "m"), ("within", self.within, "s")):
             if not 0.0 < value < float("inf"):
-                raise InvalidInputError(f"{name} = {value} is refused: must be above 0 ({unit})")
+                raise InvalidInputError(f"{name} = {value} is invalid: must be above 0 ({unit})")
 
 
 class SlipMeter:

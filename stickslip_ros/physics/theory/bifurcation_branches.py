@@ -36,7 +36,7 @@ _NEAR_HOPF = (1.5, 0.8, 0.4, 0.15, 0.03)
 """Distances from a Hopf point, in steps of the belt speed there: a cycle grows as their root."""
 
 _BELOW_ONSET = 1e-6
-"""Relative distance from the onset of sticking at which the slide sticks for a telling time."""
+"""Relative distance from the stick-slip onset speed at which the slide sticks long enough."""
 
 _HALVINGS = 5
 """How often the interval is halved in which two cycles meet."""
@@ -132,7 +132,7 @@ class BifurcationBranches:
         Returns
         -------
         BifurcationBranches
-            Branches, Hopf points and onset of sticking.
+            Branches, Hopf points and stick-slip onset speed.
 
         Raises
         ------
@@ -166,7 +166,7 @@ class BifurcationBranches:
     def around(cls, drive: Drive, points: int = 40) -> Self:
         """Return the branches over the belt speeds that tell most about a drive.
 
-        The range goes from near zero to beyond Hopf points, onset of sticking, the drive's own belt
+        The range goes from near zero to beyond Hopf points, stick-slip onset, the drive's own belt
         speed, and the cycles. It has the direction of the drive's belt.
 
         Parameters
@@ -179,7 +179,7 @@ class BifurcationBranches:
         Returns
         -------
         BifurcationBranches
-            Branches, Hopf points and onset of sticking.
+            Branches, Hopf points and stick-slip onset speed.
 
         Raises
         ------

@@ -67,7 +67,7 @@ class StickingOnset:
 
 
 def sticking_onset(drive: Drive) -> StickingOnset:
-    """Return the onset of sticking over the belt speed.
+    """Return the stick-slip onset speed over the belt speed.
 
     The search for the exact onset goes up to four times the approximate one or, without that, up to
     four times the belt speed of the drive.
@@ -103,7 +103,7 @@ def sticking_onset(drive: Drive) -> StickingOnset:
     >>> round(onset.approximate, 6), round(onset.exact, 6)
     (0.437163, 0.439472)
     """
-    require("the onset of sticking", drive, SPRING, AUTONOMOUS, STATIC, SYMMETRIC)
+    require("the stick-slip onset speed", drive, SPRING, AUTONOMOUS, STATIC, SYMMETRIC)
     approximate, no_approximate = _averaged(drive)
     reference = approximate or abs(drive.belt_speed) or drive.speed_scale
     speeds = (reference * _FOLLOWED_SPEEDS).tolist()

@@ -110,7 +110,7 @@ def test_a_value_is_taken_or_refused_with_the_reason_of_the_node(
     assert not outcome(graph, observer.set_parameter("plant", "belt_speed", 0.3))
     graph.wait_until(lambda: observer.parameters["plant"]["belt_speed"] == 0.3, "the new value")
     refusal = outcome(graph, observer.set_parameter("washout_controller", "corner_frequency", -1.0))
-    assert "corner_frequency = -1.0 is refused: must be a finite number above 0" in refusal
+    assert "corner_frequency = -1.0 is invalid: must be a finite number above 0" in refusal
     assert observer.parameters["washout_controller"]["corner_frequency"] == 2.0
     assert "rate cannot be changed" in outcome(graph, observer.set_parameter("plant", "rate", 1.0))
     plant.set_parameters([Parameter("damping", value=0.5)])  # by others

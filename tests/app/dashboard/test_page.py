@@ -162,7 +162,7 @@ def test_a_limit_cycle_is_seen_stopped_and_changed(
     corner = page.get_by_label("cutoff frequency, value")
     corner.fill("-3")
     corner.press("Enter")
-    refusal = "corner_frequency = -3.0 is refused: must be a finite number above 0"
+    refusal = "corner_frequency = -3.0 is invalid: must be a finite number above 0"
     expect(page.get_by_role("alert").get_by_text(re.compile(re.escape(refusal)))).to_be_visible()
     expect(events(page).get_by_text("washout_controller refused")).to_be_visible()
     expect(corner).to_have_value("20")
@@ -173,7 +173,7 @@ def test_a_limit_cycle_is_seen_stopped_and_changed(
     value = page.get_by_label("value", exact=True)
     value.fill("fast")
     value.press("Enter")
-    expect(page.get_by_text("'fast' is refused: must be a number in N s/m")).to_be_visible()
+    expect(page.get_by_text("'fast' is invalid: must be a number in N s/m")).to_be_visible()
     value.fill("0.25 kN s/m")
     value.press("Enter")
     expect(page.get_by_text("Now 250 N s/m.")).to_be_visible()

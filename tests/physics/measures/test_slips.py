@@ -88,7 +88,7 @@ def test_an_oscillation_is_no_stick_slip() -> None:
 
 @pytest.mark.parametrize("threshold", [(0.0, 0.1), (1e-6, 0.0), (float("nan"), 0.1)])
 def test_a_threshold_that_is_none_is_refused(threshold: tuple[float, float]) -> None:
-    with pytest.raises(InvalidInputError, match=r"is refused: must be above 0"):
+    with pytest.raises(InvalidInputError, match=r"is invalid: must be above 0"):
         SlipThreshold(*threshold)
 
 

@@ -124,7 +124,7 @@ def test_an_unstable_cycle_separates_stick_slip_from_running_away() -> None:
 
 @pytest.mark.parametrize("below", [1e-2, 1e-4])
 def test_two_cycles_close_together_are_both_found(below: float) -> None:
-    """Just below the onset of sticking the unstable cycle and the one that sticks nearly touch."""
+    """Just below the onset speed the unstable cycle and the one that sticks nearly touch."""
     onset = sticking_onset(SUDDEN).exact
     unstable, stable = limit_cycles(replace(SUDDEN, belt_speed=onset * (1.0 - below)))
     assert not unstable.stable

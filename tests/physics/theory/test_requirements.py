@@ -65,7 +65,7 @@ WITHOUT_MEMORY: list[tuple[str, Theory]] = [
     ("averaging", lambda drive: averaged_growth(drive, 0.4, 0.1)),
     ("the energy of a cycle", least_cycle),
     ("the energy of a cycle", largest_cycle),
-    ("the onset of sticking", sticking_onset),
+    ("the stick-slip onset speed", sticking_onset),
 ]
 SYMMETRIC: list[tuple[str, Theory]] = [
     *WITHOUT_MEMORY,

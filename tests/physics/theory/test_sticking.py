@@ -1,4 +1,4 @@
-"""The onset of sticking, by averaging and in the motion."""
+"""The stick-slip onset speed, by averaging and in the motion."""
 
 from dataclasses import replace
 from math import sqrt
