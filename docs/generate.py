@@ -96,7 +96,7 @@ def _command(name: str, line: str, example: str) -> Iterator[str]:
         names = [f"`{option}{values}`" for option in action.option_strings] or [f"`{value}`"]
         if action.required and action.option_strings:
             positional.append(f"{action.option_strings[0]}{values}")
-        if action.dest != "help":
+        if action.dest not in ("help", "quiet"):
             rows.append([", ".join(names), formatter._expand_help(action).replace("|", "\\|")])
     yield f"### {name}\n"
     usage = ["stickslip", name, *positional, *(["[OPTION ...]"] if rows else [])]

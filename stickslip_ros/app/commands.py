@@ -3,6 +3,10 @@
 import argparse
 from importlib import import_module
 
+from typing_extensions import override
+
+from stickslip_ros.app.output import coloured
+
 COMMANDS: dict[str, tuple[str, str]] = {
     "run": ("Run", "run a scenario as ROS 2 nodes, record it and report the results"),
     "dashboard": ("Run", "show a running loop on a web page and control it there"),
@@ -68,16 +72,23 @@ def overview() -> str:
         *("\n".join([f"{group}:", *lines]) for group, lines in groups.items()),
         "A first example: stickslip simulate feed_drive",
     ]
-    return "\n\n".join(parts)
+    return coloured("\n\n".join(parts))
+
+
+class _Parser(argparse.ArgumentParser):
+    @override
+    def format_help(self) -> str:
+        return coloured(super().format_help())
 
 
 def command_parser(name: str) -> argparse.ArgumentParser:
     """Return the parser of a command; only the module of this one is imported."""
     command = import_module(f"stickslip_ros.app.{name}")
     example = f"example: {EXAMPLES[name]}" if name in EXAMPLES else None
-    parser = argparse.ArgumentParser(
-        prog=f"stickslip {name}", description=COMMANDS[name][1], epilog=example
-    )
+    parser = _Parser(prog=f"stickslip {name}", description=COMMANDS[name][1], epilog=example)
     command.add_arguments(parser)
+    parser.add_argument(
+        "--quiet", action="store_true", help="print results and errors only: no progress, no notes"
+    )
     parser.set_defaults(command=name, run=command.run)
     return parser

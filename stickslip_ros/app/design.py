@@ -74,7 +74,7 @@ def run(arguments: argparse.Namespace) -> None:
     if arguments.out is not None:
         check_new("--out", arguments.out)
     check_results(arguments)
-    with progress_bar(f"designing for {scenario.name}", 1.0) as progress:
+    with progress_bar(f"designing for {scenario.name}", 1.0, lines=True) as progress:
         found = design(task, progress)
     proposal = Proposal(found)
     print_result(arguments, proposal)

@@ -94,7 +94,7 @@ def run(arguments: argparse.Namespace) -> None:
             check_new("--out", path)
     check_results(arguments)
     fixed = fixed_of(arguments.fix)
-    with progress_bar("identifying", None) as progress:
+    with progress_bar("identifying", None, lines=True) as progress:
         model = identify(
             *arguments.recordings,
             columns=columns,

@@ -6,6 +6,7 @@ import os
 import re
 import sys
 from collections.abc import Sequence
+from contextlib import nullcontext, redirect_stderr
 from typing import NoReturn
 
 from stickslip_ros.app import INTERRUPTED
@@ -41,7 +42,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         chosen, unknown = parser.parse_known_args(_with_negative_values(given[1:]), known)
         if unknown:
             parser.error(_unrecognized(unknown, parser.format_usage()))
-        status: int = chosen.run(chosen) or 0
+        with redirect_stderr(nowhere()) if chosen.quiet else nullcontext():
+            status: int = chosen.run(chosen) or 0
         sys.stdout.flush()
     except StickslipError as error:
         print(f"stickslip {command}: {error}", file=sys.stderr)
@@ -92,10 +94,12 @@ def _command_of(given: Sequence[str]) -> str:
         prog="stickslip", usage="%(prog)s [-h] [--version] COMMAND ...", add_help=False
     )
     parser.add_argument("--version", action=_ShowVersions, nargs=0)
-    parser.add_argument("command", metavar="COMMAND")
-    name: str = parser.parse_args(given[:1]).command
+    parser.add_argument("command", metavar="COMMAND", nargs="?")
+    name: str = parser.parse_known_args(given[:1])[0].command or given[0]
     if name not in COMMANDS:
-        parser.error(f"unknown command {name!r:.80}; {did_you_mean(name, COMMANDS)}")
+        known = f"known are {', '.join(sorted(COMMANDS))}"
+        meant = did_you_mean(name, [*COMMANDS, "--version", "--help"], known)
+        parser.error(f"unknown command {name!r:.80}; {meant}")
     return name
 
 

@@ -1,10 +1,12 @@
 """How values are printed: tables on standard output, in SI units with suitable prefixes."""
 
 import json
+import os
 import re
 import sys
 from collections.abc import Generator, Iterable, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, nullcontext, suppress
+from threading import Event, Thread
 from time import monotonic
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -21,6 +23,8 @@ _ALL_SI: Mapping[str, "Units"] = {}
 
 _JUDGING_TIME, _LONG_TIME = 3.0, 60.0
 """Time after which the length of a work is judged, and the length of a long one, s."""
+_LINE_INTERVAL = 10.0
+"""Time between two lines of progress, s."""
 
 _FRAME = 3
 """Characters that the frame of a column takes, beside one for the whole table."""
@@ -38,6 +42,18 @@ def tell(sentence: str) -> None:
     """Tell a person, if there still is one: a terminal that was closed does not end a command."""
     with suppress(OSError):
         print(printable(sentence), file=sys.stderr)
+
+
+def coloured(help_text: str) -> str:
+    """Return a help with headings, names and options in colour, if it is read on a terminal.
+
+    With the environment variable NO_COLOR it stays as it is.
+    """
+    if not sys.stdout.isatty() or os.environ.get("NO_COLOR") or os.environ.get("TERM") == "dumb":
+        return help_text
+    text = re.sub(r"(?m)^(usage:|example:|[\w ]+:$)", "\033[1;34m\\1\033[0m", help_text)
+    text = re.sub(r"(?<![\w-])--?[a-z][\w-]*", "\033[36m\\g<0>\033[0m", text)
+    return re.sub(r"(?m)^  ([A-Za-z]+)(?=\s)", "  \033[32m\\1\033[0m", text)
 
 
 def print_json(values: Mapping[str, Any]) -> None:
@@ -71,8 +87,10 @@ def print_table(title: str, headings: Sequence[str], rows: Iterable[Sequence[str
 
 
 @contextmanager
-def progress_bar(label: str, total: float | None, advice: str = "") -> Generator[Progress]:
-    """Show progress towards `total` on standard error if that is a terminal.
+def progress_bar(
+    label: str, total: float | None, advice: str = "", *, lines: bool = False
+) -> Generator[Progress]:
+    """Show progress towards `total` on standard error, if that is a terminal, or in `lines`.
 
     A sentence says how long it will take if that is long, with `advice` on what would be quicker.
     """
@@ -90,7 +108,13 @@ def progress_bar(label: str, total: float | None, advice: str = "") -> Generator
             tell(f"{label}: about {left / 60.0:.0f} min more{advice}")
 
     if not sys.stderr.isatty():
-        yield lambda done, label=None: estimate(done)
+        with _told(label) if lines else nullcontext([label]) as said:
+
+            def follow(done: float, label: str | None = None) -> None:
+                estimate(done)
+                said[0] = label or said[0]
+
+            yield follow
         return
     from rich.console import Console
     from rich.progress import (
@@ -112,6 +136,22 @@ def progress_bar(label: str, total: float | None, advice: str = "") -> Generator
             bar.update(task, completed=done, description=described)
 
         yield update
+
+
+@contextmanager
+def _told(label: str) -> Generator[list[str]]:
+    """Tell every ten seconds what is done, and for how long; provide the place of its label."""
+    said, begin, ended = [label], monotonic(), Event()
+
+    def follow() -> None:
+        while not ended.wait(_LINE_INTERVAL):
+            tell(f"{said[0]}, {monotonic() - begin:.0f} s")
+
+    Thread(target=follow, daemon=True).start()
+    try:
+        yield said
+    finally:
+        ended.set()
 
 
 def _print_framed(

@@ -176,7 +176,9 @@ REFUSED: Mapping[str, Mapping[str, str]] = {
     },
     "dashboard": {"--port 0": "'0' is not a port, 1 to 65535"},
     "simulat": {"": "'simulat'; did you mean simulate?"},
-    "--simulate": {"": "the following arguments are required: COMMAND"},
+    "version": {"": "'version'; did you mean --version?"},
+    "--verson": {"": "'--verson'; did you mean --version?"},
+    "--simulate": {"": "'--simulate'; did you mean simulate?"},
 }
 """Message of each refused call; ` ... ` stands for any text."""
 

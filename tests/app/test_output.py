@@ -14,7 +14,7 @@ import pytest
 
 from stickslip_ros.app import output
 from stickslip_ros.app.output import print_table, print_values, progress_bar
-from tests.nodes.graph import PATIENCE
+from tests.nodes.graph import PATIENCE, wait_for
 
 REFERENCE = Path(__file__).parents[2] / "bags" / "reference"
 REPORT = [sys.executable, "-m", "stickslip_ros.app.main", "report"]
@@ -134,6 +134,18 @@ def test_a_progress_bar_says_what_is_done_next(
         progress(0.0)
         progress(0.0, "identifying: stribeck")
     assert "identifying: stribeck" in capsys.readouterr().err
+
+
+def test_a_long_work_writes_lines_into_a_pipe(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    told: list[str] = []
+    monkeypatch.setattr(output, "tell", told.append)
+    monkeypatch.setattr(output, "_LINE_INTERVAL", 1e-3)
+    with progress_bar("identifying", None, lines=True) as progress:
+        wait_for(lambda: told and re.fullmatch(r"identifying, \d+ s", told[-1]), "a line")
+        progress(0.0, "identifying: stribeck")
+        wait_for(lambda: re.fullmatch(r"identifying: stribeck, \d+ s", told[-1]), "the next law")
 
 
 @pytest.mark.parametrize("on_a_terminal", [True, False])
