@@ -19,8 +19,9 @@ from stickslip_ros.physics.measures.sample_meter import SampleAssumptions, readi
 from stickslip_ros.physics.model.actuator import IDEAL_ACTUATOR, Actuator
 from stickslip_ros.physics.model.constants import (
     SMALLEST,
-    Changes,
     Parameter,
+    at_build,
+    at_rest,
     constant,
     constants_of,
     parameters_of,
@@ -62,13 +63,9 @@ class Initial(ParameterGroup):
 class NodeParameters(ParameterGroup):
     """Parameters that every node has."""
 
-    autostart: bool = constant(
-        True, "Configure and activate the node at start.", changes=Changes.AT_REST
-    )
-    wait_for: list[str] = constant(
-        [],
-        "Nodes that must subscribe to this node's topics before it activates.",
-        changes=Changes.AT_REST,
+    autostart: bool = at_rest(True, "Configure and activate the node at start.")
+    wait_for: list[str] = at_rest(
+        [], "Nodes that must subscribe to this node's topics before it activates."
     )
     use_sim_time: bool = constant(False, "Take ROS time from /clock.")
 
@@ -88,87 +85,52 @@ class PlantParameters(DriveConstants, NodeParameters):
 
     friction: Friction = field(default_factory=Friction)
     initial: Initial = field(default_factory=Initial)
-    rate: float = constant(
-        100.0, "Samples per second.", "Hz", changes=Changes.AT_REST, at_least=1e-6, at_most=1e9
-    )
-    pace: Pace = constant(
+    rate: float = at_rest(100.0, "Samples per second.", "Hz", at_least=1e-6, at_most=1e9)
+    pace: Pace = at_rest(
         Pace.LOCKSTEP,
         "Pace of the samples: by the clock (realtime), or after each answer (lockstep).",
-        changes=Changes.AT_REST,
     )
-    real_time_factor: float = constant(
-        1.0,
-        "Simulated time divided by wall time (realtime).",
-        changes=Changes.AT_REST,
-        positive=True,
+    real_time_factor: float = at_rest(
+        1.0, "Simulated time divided by wall time (realtime).", positive=True
     )
-    force_delay: float = constant(
-        0.0,
-        "Delay from a sample to the start of its force.",
-        "s",
-        changes=Changes.AT_REST,
-        at_least=0.0,
+    force_delay: float = at_rest(
+        0.0, "Delay from a sample to the start of its force.", "s", at_least=0.0
     )
-    force_jitter: float = constant(
-        0.0,
-        "Largest random addition to the delay of a force.",
-        "s",
-        changes=Changes.AT_REST,
-        at_least=0.0,
+    force_jitter: float = at_rest(
+        0.0, "Largest random addition to the delay of a force.", "s", at_least=0.0
     )
-    force_jitter_seed: int = constant(
-        0,
-        "Seed of the random delays.",
-        whole=True,
-        changes=Changes.AT_REST,
-        at_least=0,
-        at_most=1_000_000_000,
+    force_jitter_seed: int = at_rest(
+        0, "Seed of the random delays.", whole=True, at_least=0, at_most=1_000_000_000
     )
-    force_timeout: float = constant(
-        0.1,
-        "Age up to which the last force is held (realtime).",
-        "s",
-        changes=Changes.AT_REST,
-        at_least=0.0,
+    force_timeout: float = at_rest(
+        0.1, "Age up to which the last force is held (realtime).", "s", at_least=0.0
     )
-    reply_timeout: float = constant(
+    reply_timeout: float = at_rest(
         10.0,
         "Longest wall time to wait for a force or the recorder (lockstep).",
         "s",
-        changes=Changes.AT_REST,
         at_least=_SHORTEST_TIME,
     )
-    expects_control: bool = constant(
-        True, "Whether the plant expects forces from a controller.", changes=Changes.AT_REST
-    )
-    flow_window: int = constant(
+    expects_control: bool = at_rest(True, "Whether the plant expects forces from a controller.")
+    flow_window: int = at_rest(
         1000,
         "Largest lead of the plant over the recorder (lockstep).",
         "samples",
         whole=True,
-        changes=Changes.AT_REST,
         at_least=200,
         at_most=4_000,
     )
-    duration: float = constant(
-        inf,
-        "Simulated time after which the plant pauses.",
-        "s",
-        changes=Changes.AT_REST,
-        at_least=0.0,
+    duration: float = at_rest(
+        inf, "Simulated time after which the plant pauses.", "s", at_least=0.0
     )
-    publish_clock: bool = constant(
-        False, "Publish simulated time on /clock.", changes=Changes.AT_BUILD
-    )
+    publish_clock: bool = at_build(False, "Publish simulated time on /clock.")
     load: LoadParameters = field(default_factory=LoadParameters)
     belt: BeltParameters = field(default_factory=BeltParameters)
     disturbance: DisturbanceParameters = field(default_factory=DisturbanceParameters)
     sensor: Sensor = EXACT_SENSOR
     actuator: Actuator = IDEAL_ACTUATOR
-    publish_truth: bool = constant(
-        False,
-        "Publish the true state and the force of the actuator, too.",
-        changes=Changes.AT_BUILD,
+    publish_truth: bool = at_build(
+        False, "Publish the true state and the force of the actuator, too."
     )
 
     @override
@@ -274,7 +236,7 @@ DEFAULT_LAW = next(iter(CONTROL_LAWS))
 class ControllerChoice(NodeParameters):
     """Parameters of a controller node before its law is known."""
 
-    law: str = constant(DEFAULT_LAW, "Control law.", changes=Changes.AT_BUILD, choices=CONTROL_LAWS)
+    law: str = at_build(DEFAULT_LAW, "Control law.", choices=CONTROL_LAWS)
 
 
 @dataclass(frozen=True)
@@ -358,50 +320,37 @@ def _parameters_of_law(law: type[ControlLaw]) -> Mapping[str, Parameter]:
 class AnalyzerParameters(NodeParameters):
     """Parameters of the analyzer node."""
 
-    bag: str = constant("", "Directory to record to; empty: no recording.", changes=Changes.AT_REST)
-    window: int = constant(
-        20,
-        "Number of cycles to average.",
-        "cycles",
-        whole=True,
-        changes=Changes.AT_REST,
-        at_least=1,
-        at_most=100_000,
+    bag: str = at_rest("", "Directory to record to; empty: no recording.")
+    window: int = at_rest(
+        20, "Number of cycles to average.", "cycles", whole=True, at_least=1, at_most=100_000
     )
-    stick_speed: float = constant(
+    stick_speed: float = at_rest(
         -1.0,
         "Largest relative speed of a slide that sticks; below 0: automatic, that is 0, with "
         "friction with a memory a hundredth of the belt speed, and found by fits under noise.",
         "m/s",
-        changes=Changes.AT_REST,
         at_least=-1.0,
     )
-    flush_period: float = constant(
-        1.0,
-        "Longest wall time until a recorded message is on disk.",
-        "s",
-        changes=Changes.AT_BUILD,
-        at_least=_SHORTEST_TIME,
+    flush_period: float = at_build(
+        1.0, "Longest wall time until a recorded message is on disk.", "s", at_least=_SHORTEST_TIME
     )
-    max_bag_size: int = constant(
+    max_bag_size: int = at_rest(
         0,
         "Size at which the bag continues in a new file; 0: no limit.",
         "bytes",
         whole=True,
-        changes=Changes.AT_REST,
         at_least=0,
         at_most=2**62,
     )
-    max_bag_duration: float = constant(
+    max_bag_duration: float = at_rest(
         0.0,
         "Recorded time at which the bag continues in a new file; 0: no limit.",
         "s",
-        changes=Changes.AT_REST,
         at_least=0.0,
         at_most=1e9,
     )
-    compression: Literal["lz4", "zstd", "none"] = constant(
-        "lz4", "Compression of the bag.", changes=Changes.AT_REST, choices=("lz4", "zstd", "none")
+    compression: Literal["lz4", "zstd", "none"] = at_rest(
+        "lz4", "Compression of the bag.", choices=("lz4", "zstd", "none")
     )
 
     @property
@@ -418,32 +367,19 @@ class AnalyzerParameters(NodeParameters):
 class ReplayParameters(NodeParameters):
     """Parameters of the replay node, which scenarios do not contain."""
 
-    bag: str = constant(
-        "", "Bag to replay: its directory or one of its files.", changes=Changes.AT_BUILD
-    )
-    rate: float = constant(
-        1.0, "Recorded time divided by wall time.", changes=Changes.AT_REST, positive=True
-    )
-    loop: bool = constant(False, "Start again at the end of the bag.", changes=Changes.AT_REST)
-    start: float = constant(
+    bag: str = at_build("", "Bag to replay: its directory or one of its files.")
+    rate: float = at_rest(1.0, "Recorded time divided by wall time.", positive=True)
+    loop: bool = at_rest(False, "Start again at the end of the bag.")
+    start: float = at_build(
         0.0,
         "Recorded time to start at, from the bag's first message.",
         "s",
-        changes=Changes.AT_BUILD,
         at_least=0.0,
         at_most=1e10,
     )
-    duration: float = constant(
-        inf,
-        "Recorded time to replay.",
-        "s",
-        changes=Changes.AT_BUILD,
-        positive=True,
-    )
-    topics: list[str] = constant(
-        [], "Topics to replay; empty: all topics of the bag.", changes=Changes.AT_BUILD
-    )
-    clock: bool = constant(False, "Publish recorded time on /clock.", changes=Changes.AT_BUILD)
+    duration: float = at_build(inf, "Recorded time to replay.", "s", positive=True)
+    topics: list[str] = at_build([], "Topics to replay; empty: all topics of the bag.")
+    clock: bool = at_build(False, "Publish recorded time on /clock.")
 
 
 CONTROLLER_PARAMETERS: dict[str, ControllerParameters] = {

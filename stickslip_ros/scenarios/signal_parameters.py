@@ -10,7 +10,7 @@ from typing import Any, Self
 from typing_extensions import override
 
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.model.constants import Changes, constant
+from stickslip_ros.physics.model.constants import Changes, at_build, constant
 from stickslip_ros.physics.model.signals import NO_SIGNAL, SIGNALS, Signal, table
 from stickslip_ros.scenarios.curve_file import Pairs, read_curve
 from stickslip_ros.scenarios.validation import ParameterGroup
@@ -130,10 +130,9 @@ class DisturbanceParameters(SignalParameters):
 class ReferenceParameters(_TimeProfile):
     """Reference that the controller follows."""
 
-    kind: str = constant(
+    kind: str = at_build(
         "none",
         "Source: none, the topic `reference`, or a time profile (step, ramp, sine, trapezoid).",
-        changes=Changes.AT_BUILD,
         choices=("none", "topic", *(kind for kind in SIGNALS if kind not in ("impulse", "table"))),
     )
     amplitude: float = constant(0.0, "Largest displacement of the profile.", "m")

@@ -4,7 +4,7 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from enum import StrEnum
-from functools import cache
+from functools import cache, partial
 from math import ceil, inf, isinf, isnan, nextafter
 from typing import Any, TypeVar
 
@@ -288,6 +288,12 @@ def constant(
     if isinstance(default, list):
         return field(default_factory=default.copy, metadata=metadata)
     return field(default=default, metadata=metadata)
+
+
+at_rest = partial(constant, changes=Changes.AT_REST)
+"""Describe an option of a node that can be changed while it is inactive; see `constant`."""
+at_build = partial(constant, changes=Changes.AT_BUILD)
+"""Describe an option of a node that can be changed before it is configured; see `constant`."""
 
 
 def described_by(parameter: Parameter) -> Any:

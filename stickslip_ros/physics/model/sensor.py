@@ -9,7 +9,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from stickslip_ros.physics.model.constants import Changes, constant, constants_of
+from stickslip_ros.physics.model.constants import at_rest, constants_of
 
 Measure = Callable[[int, float, float], tuple[float, float]]
 """Returns the measured position (m) and velocity (m/s) for the number of a sample, and its true
@@ -53,41 +53,26 @@ class Sensor:
     [0.0, 0.02, 0.02]
     """
 
-    position_resolution: float = constant(
-        0.0,
-        "Step of the measured position; 0 for none.",
-        "m",
-        at_least=0.0,
-        changes=Changes.AT_REST,
+    position_resolution: float = at_rest(
+        0.0, "Step of the measured position; 0 for none.", "m", at_least=0.0
     )
-    position_noise: float = constant(
-        0.0,
-        "Standard deviation of the noise of the position.",
-        "m",
-        at_least=0.0,
-        changes=Changes.AT_REST,
+    position_noise: float = at_rest(
+        0.0, "Standard deviation of the noise of the position.", "m", at_least=0.0
     )
-    velocity: MeasuredVelocity = constant(
-        MeasuredVelocity.EXACT,
-        "Velocity: the true one, or the difference of measured positions.",
-        changes=Changes.AT_REST,
+    velocity: MeasuredVelocity = at_rest(
+        MeasuredVelocity.EXACT, "Velocity: the true one, or the difference of measured positions."
     )
-    difference_samples: int = constant(
+    difference_samples: int = at_rest(
         1,
         "Number of samples that a difference spans.",
         at_least=1,
         at_most=LONGEST_DIFFERENCE,
         whole=True,
-        changes=Changes.AT_REST,
     )
-    velocity_noise: float = constant(
-        0.0,
-        "Standard deviation of the noise of an exact velocity.",
-        "m/s",
-        at_least=0.0,
-        changes=Changes.AT_REST,
+    velocity_noise: float = at_rest(
+        0.0, "Standard deviation of the noise of an exact velocity.", "m/s", at_least=0.0
     )
-    seed: int = constant(0, "Seed of the noise.", at_least=0, whole=True, changes=Changes.AT_REST)
+    seed: int = at_rest(0, "Seed of the noise.", at_least=0, whole=True)
 
     @property
     def exact(self) -> bool:
