@@ -1,6 +1,6 @@
 """How much longer than bare heyoka does a bifurcation diagram of 1,000 points take?
 
-Ours: `bifurcation_diagram` for the drives of the paper's figures 2 and 3, including compilation,
+Ours: `settled_from_rest` for the drives of the paper's figures 2 and 3, including compilation,
 transients, turning points and measures. Peer: heyoka's integrators of slip and stick with their
 terminal events, compiled beforehand, and the loop over these phases, for the same motions from
 rest over the same number of periods.
@@ -10,20 +10,25 @@ import time
 
 from benchmarks.bare import BareMotion
 from benchmarks.slices import Row, by_turns, compare_times, show
-from stickslip_ros.paper.figures import bifurcation_drives
-from stickslip_ros.studies.settling import DIAGRAM_OPTIONS, bifurcation_diagram
+from stickslip_ros.paper.figures import (
+    SETTLING,
+    bifurcation_drives,
+    bifurcation_values,
+    settled_from_rest,
+)
 
 POINTS, ROUNDS = 1000, 3
-PERIODS = DIAGRAM_OPTIONS.transient + DIAGRAM_OPTIONS.cycles + 2
+PERIODS = SETTLING.transient + SETTLING.cycles + 2
 
 
 def row(number: int) -> Row:
-    _, drives = bifurcation_drives(number, POINTS)
+    drives = bifurcation_drives(number, bifurcation_values(number, POINTS))
     bare = BareMotion()
 
     def ours() -> float:
         start = time.perf_counter()
-        bifurcation_diagram(drives)
+        for drive in drives:
+            settled_from_rest(drive)
         return time.perf_counter() - start
 
     def peer() -> float:

@@ -15,7 +15,8 @@ from stickslip_ros.app.arguments import length, seconds, velocity
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.identification.identify import fixed_of
 from stickslip_ros.quantities import number_of
-from stickslip_ros.scenarios.files import load_scenario, parse_override
+from stickslip_ros.scenarios.files import load_scenario
+from stickslip_ros.scenarios.keywords import parse_override
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
 from stickslip_ros.studies.plan import Axis
 

@@ -294,7 +294,8 @@ def with_law(
 
     If no controller is `needed`, one of several that the file has a section for will do.
     """
-    from stickslip_ros.scenarios.files import SeveralControllersError, known_law
+    from stickslip_ros.scenarios.files import SeveralControllersError
+    from stickslip_ros.scenarios.parameters import known_law
 
     if controller is not None:
         with naming("--controller:"):

@@ -29,7 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> None:
     """Run the command."""
-    from stickslip_ros.scenarios.files import parse_override
+    from stickslip_ros.scenarios.keywords import parse_override
     from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
 
     namespace = namespace_of(arguments.namespace)

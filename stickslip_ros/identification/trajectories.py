@@ -13,8 +13,8 @@ from stickslip_ros.errors import InvalidInputError, RunError
 from stickslip_ros.identification.laws import DELAY, IdentifiedLaw
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.trajectory import Predictor, Segment, steady_memory
+from stickslip_ros.physics.model.dimensionless_drive import MEMORY
 from stickslip_ros.physics.model.drive import Drive, in_units_of
-from stickslip_ros.physics.model.drive_system import MEMORY
 from stickslip_ros.physics.model.plain_drive import drive_system
 
 _STEP = 1e-4

@@ -8,8 +8,8 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.identification.record import Record
+from stickslip_ros.physics.model.dimensionless_drive import POSITION, SPEED
 from stickslip_ros.physics.model.drive import Drive, in_units_of
-from stickslip_ros.physics.model.drive_system import POSITION, SPEED
 from stickslip_ros.physics.model.signals import table
 from stickslip_ros.physics.motion.motion import Motion
 from stickslip_ros.physics.motion.variational import VariationalMotion

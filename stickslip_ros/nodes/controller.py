@@ -18,13 +18,13 @@ from stickslip_ros.nodes.base.parameters import first_line
 from stickslip_ros.nodes.base.process import run_node
 from stickslip_ros.physics.loop.controller import ReferenceSource
 from stickslip_ros.samples import LARGEST, NO_REFERENCE, Reference, Sample
-from stickslip_ros.scenarios.files import known_law
 from stickslip_ros.scenarios.parameters import (
     CONTROLLER_PARAMETERS,
     DEFAULT_LAW,
     ControllerChoice,
     ControllerParameters,
     controller_node,
+    known_law,
 )
 
 

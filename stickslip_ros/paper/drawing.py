@@ -80,16 +80,17 @@ def _bifurcation(figure: BifurcationFigure, *, style: FigureStyle) -> Figure:
     drawn = style.figure(8.0, 5.5, narrow=1.25)
     style.set_title(drawn, *figure.title.split(": "))
     above, below = drawn.subplots(2, 1, sharex=True, height_ratios=(3.0, 1.0))
-    diagram = figure.diagram
     handles: list[Artist] = []
-    regimes = [measures.regime for measures in diagram.measures]
     for regime, look in REGIMES.items():
-        of_regime = np.array([found is regime for found in regimes])
-        rows = of_regime[diagram.row]
-        if rows.any():
-            values = figure.values[diagram.row[rows]]
+        points = [
+            (value, position)
+            for value, motion in zip(figure.values, figure.settled, strict=True)
+            if motion.measures.regime is regime
+            for position in motion.turning_points
+        ]
+        if points:
             marker: Any = {"marker": look.marker, "color": look.colour, "ls": "", "mew": 0.0}
-            above.plot(values, diagram.position[rows], **marker, ms=1.8)
+            above.plot(*zip(*points, strict=True), **marker, ms=1.8)
             handles.append(Line2D([], [], **marker, ms=5.0, label=look.label))
     unstable = unstable_equilibria(figure)
     if np.isfinite(unstable).any():
@@ -97,7 +98,7 @@ def _bifurcation(figure: BifurcationFigure, *, style: FigureStyle) -> Figure:
         above.plot(figure.values, unstable, **dashed)
         handles.append(Line2D([], [], **dashed, label="unstable equilibrium"))
     above.set_ylabel(_UNITS.named("turning points"))
-    stick = [np.nan if m.stick_fraction is None else m.stick_fraction for m in diagram.measures]
+    stick = [np.nan if m.stick_fraction is None else m.stick_fraction for m in figure.measures]
     below.plot(figure.values, stick, color=ORANGE, lw=1.5)
     below.set_ylabel("stick fraction")
     below.set_ylim(0.0, max(1.05 * float(np.nanmax(stick, initial=0.0)), _LEAST_STICK_FRACTION))

@@ -7,7 +7,7 @@ that its text describes.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -19,11 +19,8 @@ from stickslip_ros.physics.model.control import Washout
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import Coulomb, FrictionLaw, Linear, Stribeck
 from stickslip_ros.physics.motion import RecordedMotion
-from stickslip_ros.studies.settling import (
-    BifurcationDiagram,
-    ControlledDrive,
-    bifurcation_diagram,
-)
+from stickslip_ros.studies.options import SettlingOptions
+from stickslip_ros.studies.settling import ControlledDrive, MotionState, Settled, settle
 from stickslip_ros.studies.transitions import (
     HOPF_POINT,
     STICKING_LIMIT,
@@ -55,6 +52,9 @@ SETTLED = 0.01
 
 POINTS = 1000
 """Number of drives in a bifurcation diagram."""
+
+SETTLING = SettlingOptions(transient=300.0, cycles=6)
+"""Settling of the motions of a bifurcation diagram."""
 
 
 def unit_drive(
@@ -137,8 +137,15 @@ class BifurcationFigure:
     parameter: str
     """Name and symbol of the varied parameter."""
     values: FloatArray
-    """Its value for each row of the diagram."""
-    diagram: BifurcationDiagram
+    """Its value for each drive."""
+    drives: tuple[Drive, ...]
+    settled: tuple[Settled, ...]
+    """The motion that each drive settles on from rest at X = 0."""
+
+    @cached_property
+    def measures(self) -> list[Measures]:
+        """The measures of each motion."""
+        return [motion.measures for motion in self.settled]
 
 
 @dataclass(frozen=True)
@@ -173,25 +180,33 @@ def compute_figure(number: int, *, points: int = POINTS) -> PaperFigure:
     `points` is the number of drives in a bifurcation diagram.
     """
     if number in _BIFURCATIONS:
-        plan = _BIFURCATIONS[number]
-        values, drives = bifurcation_drives(number, points)
-        diagram = bifurcation_diagram(drives)
-        return BifurcationFigure(number, plan.title, plan.parameter, values, diagram)
+        return bifurcation_figure(number, bifurcation_values(number, points))
     title, panels = _PORTRAITS[number]
     computed = (Panel(name, tuple(map(portrait_of, cases))) for name, cases in panels.items())
     return PortraitFigure(number, title, tuple(computed))
 
 
-def bifurcation_drives(number: int, points: int = POINTS) -> tuple[FloatArray, list[Drive]]:
-    """Return the parameter values of bifurcation diagram `number`, and a drive for each."""
+def bifurcation_values(number: int, points: int = POINTS) -> FloatArray:
+    """Return the values of the parameter of bifurcation diagram `number`."""
     plan = _BIFURCATIONS[number]
-    values = np.linspace(plan.start, plan.end, points)
-    return values, [bifurcation_drive(number, value) for value in values.tolist()]
+    return np.linspace(plan.start, plan.end, points)
 
 
-def bifurcation_drive(number: int, value: float) -> Drive:
-    """Return the drive of bifurcation diagram `number` for one value of its parameter."""
-    return _BIFURCATIONS[number].drive(value)
+def bifurcation_figure(number: int, values: FloatArray) -> BifurcationFigure:
+    """Return bifurcation diagram `number` for some values of its parameter."""
+    plan, drives = _BIFURCATIONS[number], bifurcation_drives(number, values)
+    settled = tuple(map(settled_from_rest, drives))
+    return BifurcationFigure(number, plan.title, plan.parameter, values, tuple(drives), settled)
+
+
+def bifurcation_drives(number: int, values: FloatArray) -> list[Drive]:
+    """Return the drive of bifurcation diagram `number` for each value of its parameter."""
+    return [_BIFURCATIONS[number].drive(value) for value in values.tolist()]
+
+
+def settled_from_rest(drive: Drive) -> Settled:
+    """Return the motion that a drive settles on from rest at X = 0."""
+    return settle(ControlledDrive(drive), MotionState(0.0, 0.0), SETTLING)
 
 
 def portrait_of(case: PortraitCase) -> Portrait:
@@ -240,18 +255,11 @@ def _first_rise(trajectory: Breakpoints) -> float:
 
 def transition_marks(figure: BifurcationFigure) -> dict[str, float]:
     """Return the values of the parameter at the transitions that the diagram shows, by name."""
-
-    def case(value: float) -> ControlledDrive:
-        return ControlledDrive(bifurcation_drive(figure.number, value))
-
-    margins: dict[str, Callable[[float], float]] = {
-        HOPF_POINT: lambda value: hopf_margin(case(value)),
-        STICKING_LIMIT: lambda value: stick_margin(case(value)),
-    }
+    drive, values = _BIFURCATIONS[figure.number].drive, figure.values.tolist()
     found: dict[str, float] = {}
-    for name, margin in margins.items():
-        if values := list(sign_changes(margin, figure.values.tolist())):
-            found[name] = values[-1]
+    for name, margin in ((HOPF_POINT, hopf_margin), (STICKING_LIMIT, stick_margin)):
+        if places := [*sign_changes(lambda x, of=margin: of(ControlledDrive(drive(x))), values)]:
+            found[name] = places[-1]
     return found
 
 
@@ -260,7 +268,7 @@ def unstable_equilibria(figure: BifurcationFigure) -> FloatArray:
     return np.array(
         [
             drive.equilibrium_position if hopf_margin(ControlledDrive(drive)) < 0.0 else np.nan
-            for drive in figure.diagram.drives
+            for drive in figure.drives
         ]
     )
 
@@ -272,11 +280,6 @@ class _Bifurcation:
     start: float
     end: float
     drive: Callable[[float], Drive]
-
-
-class _Portraits(NamedTuple):
-    title: str
-    panels: Mapping[str, Sequence[PortraitCase]]
 
 
 def _cases(
@@ -353,20 +356,20 @@ _BIFURCATIONS = {
     ),
 }
 
-_PORTRAITS = {
-    6: _Portraits(
+_PORTRAITS: dict[int, tuple[str, Mapping[str, Sequence[PortraitCase]]]] = {
+    6: (
         f"Phase portraits at several belt speeds, {_DRIVE}",
         {"β = 0.01": _cases("v0 =", (0.2, 0.3, 0.42, 0.45, 0.48, 0.495, 0.6), unit_drive)},
     ),
-    7: _Portraits(
+    7: (
         f"Phase portraits with several dampings, {_DRIVE}",
         {"v0 = 0.4": _dampings((0.01, 0.03, 0.045, 0.06, 0.09), 0.4)},
     ),
-    8: _Portraits(
+    8: (
         f"Phase portraits with several dampings and Coulomb friction, {_DRIVE}",
         {"v0 = 0.2": _dampings((0.0, 0.01, 0.05, 0.1), 0.2, Coulomb(STRIBECK.static))},
     ),
-    9: _Portraits(
+    9: (
         f"Phase portraits with friction that falls linearly with speed, {_DRIVE}",
         {
             f"v0 = 0.2, slope {TANGENT_SLOPE:g}: that of the Stribeck law at zero speed": (
@@ -380,7 +383,7 @@ _PORTRAITS = {
             ),
         },
     ),
-    10: _Portraits(
+    10: (
         f"Phase portraits with several stiffnesses, {_DRIVE}",
         {
             "v0 = 0.2, β = 0.01": _stiffnesses((0.5, 1.0, 2.0, 4.0, 10.0, 50.0), 0.2),
@@ -388,7 +391,7 @@ _PORTRAITS = {
             "v0 = 0.439, β = 0.01": _stiffnesses((1.0, 2.0), 0.439),
         },
     ),
-    11: _Portraits(
+    11: (
         f"Phase portraits with several smallest kinetic coefficients, {_DRIVE}",
         {
             "v0 = 0.4, β = 0.01, μs = 0.4": _cases(
@@ -398,7 +401,7 @@ _PORTRAITS = {
             )
         },
     ),
-    12: _Portraits(
+    12: (
         f"Phase portraits near the Hopf speed, sooner and later, {_DRIVE}",
         {
             f"2β = {damping:g}, up to τ = {duration:g}": (
@@ -408,7 +411,7 @@ _PORTRAITS = {
             for duration in (300.0, _LONG_DURATION)
         },
     ),
-    13: _Portraits(
+    13: (
         "Phase portraits, drive of the paper, washout control",
         {
             "v0 = 0.4, d = 2: linear gain": _gains(

@@ -8,8 +8,7 @@ from itertools import groupby
 from typing import Any
 
 from stickslip_ros.paper.claims import CHAPTERS, Finding, Verdict
-from stickslip_ros.paper.figures import BifurcationFigure, PaperFigure
-from stickslip_ros.studies.settling import DIAGRAM_OPTIONS
+from stickslip_ros.paper.figures import SETTLING, BifurcationFigure, PaperFigure
 
 Report = Mapping[str, Any]
 """The report as in JSON: `claims` and `figures`, each a list of objects."""
@@ -122,7 +121,7 @@ def _caption(figure: PaperFigure) -> str:
         start, end = figure.values[[0, -1]]
         return (
             f"{figure.title}. Turning points of the motion from rest after "
-            f"{DIAGRAM_OPTIONS.transient:g} natural periods, for {len(figure.values)} values of "
+            f"{SETTLING.transient:g} natural periods, for {len(figure.values)} values of "
             f"the {figure.parameter} from {start:g} to {end:g}."
         )
     return f"{figure.title}."

@@ -1,4 +1,4 @@
-"""Parameters by keyword: `friction_static` for plant.friction.static."""
+"""Parameters by keyword, `friction_static`, and by text, plant.friction.static=0.4."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -72,6 +72,29 @@ def override(parameter: str, value: Any) -> str:
     except InvalidInputError:
         quoted = True
     return f"{parameter}={json.dumps(text) if quoted else text}"
+
+
+def parse_override(text: str) -> tuple[str, str, Any]:
+    """Return node, parameter and value of a text NODE.PARAMETER=VALUE.
+
+    The value is not checked. Raises InvalidInputError for an unknown node or parameter.
+    """
+    target, equals, written = text.partition("=")
+    node, _, parameter = target.partition(".")
+    known = [f"{node}.{name}" for node, model in NODE_PARAMETERS.items() for name in model.known]
+    given = f"{text:.80}"
+    if equals and target in known:
+        value = ros_yaml.parse(written, f"{given}: the value")
+        return node, parameter, in_own_unit(target, value)
+    if not equals or not parameter:
+        meant = did_you_mean(target, known, "as in plant.belt_speed=0.2")
+        raise InvalidInputError(f"{given}: must be NODE.PARAMETER=VALUE; {meant}")
+    if node not in NODE_PARAMETERS:
+        meant = did_you_mean(node, NODE_PARAMETERS)
+        raise InvalidInputError(f"{given}: unknown node {node:.80}; {meant}")
+    every = f"{node} has {', '.join(sorted(NODE_PARAMETERS[node].known))}"
+    meant = did_you_mean(target, known, every)
+    raise InvalidInputError(f"{given}: unknown parameter {parameter:.80}; {meant}")
 
 
 def in_own_unit(parameter: str, value: Any) -> Any:

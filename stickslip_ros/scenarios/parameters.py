@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal, Self
 
 from typing_extensions import override
 
+from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.loop.controller import Controller
 from stickslip_ros.physics.loop.sampled_loop import LOCKSTEP_START, SampledLoop
 from stickslip_ros.physics.measures.sample_meter import SampleAssumptions, reading_of
@@ -40,7 +41,7 @@ from stickslip_ros.scenarios.signal_parameters import (
     ReferenceParameters,
 )
 from stickslip_ros.scenarios.validation import ParameterGroup
-from stickslip_ros.text import shown
+from stickslip_ros.text import did_you_mean, shown
 
 if TYPE_CHECKING:
     from stickslip_ros.physics.motion.motion import Motion
@@ -393,3 +394,15 @@ NODE_PARAMETERS: dict[str, NodeParameters] = {
     "analyzer": AnalyzerParameters(),
 }
 """The parameters of each node at their defaults, by node name; a run has one of the controllers."""
+
+
+def known_law(name: str) -> str:
+    """Return the name of a control law; raises InvalidInputError if there is none of that name."""
+    if name in CONTROLLER_PARAMETERS:
+        return name
+    if name in CONTROLLERS.refused:
+        raise InvalidInputError(f"control law {name} is refused: {CONTROLLERS.refused[name]}")
+    every = f"the known names are {', '.join(CONTROLLER_PARAMETERS)}"
+    raise InvalidInputError(
+        f"unknown control law {name:.80}; {did_you_mean(name, CONTROLLER_PARAMETERS, every)}"
+    )

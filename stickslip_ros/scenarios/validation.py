@@ -7,6 +7,7 @@ from enum import StrEnum
 from functools import cache
 from math import inf, isfinite, isnan
 from operator import attrgetter
+from pathlib import Path
 from typing import Any, Self
 
 from stickslip_ros.errors import InvalidInputError
@@ -74,6 +75,11 @@ class ParameterGroup:
         if name not in self.known:
             raise InvalidInputError(f"unknown parameter {name:.80}")
         checked(self.known[name], value)
+
+    def absolute(self, name: str, value: Any, folder: Path) -> Any:
+        """Return a value; a path that is relative to a folder as an absolute one."""
+        is_path = name in self.known and self.known[name].file and value and isinstance(value, str)
+        return str((folder / value).absolute()) if is_path else value
 
     def replaced(self, values: Mapping[str, Any]) -> Self:
         """Return the group with other values of its own fields, by name."""

@@ -6,8 +6,8 @@ from contextlib import suppress
 
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.model.constants import Parameter
-from stickslip_ros.scenarios.files import DEFAULT, Scenario
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, NodeParameters
+from stickslip_ros.scenarios.scenario import DEFAULT, Scenario
 from stickslip_ros.scenarios.template import own_first
 from stickslip_ros.show.quantities import Units
 from stickslip_ros.tables import TextTable

@@ -13,8 +13,8 @@ from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.model.constants import LARGEST, SMALLEST
 from stickslip_ros.physics.model.control import Washout
+from stickslip_ros.physics.model.dimensionless_drive import SPEED
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.drive_system import SPEED
 from stickslip_ros.physics.model.functions import zero_between
 from stickslip_ros.physics.model.sensor import EXACT_SENSOR, Sensor
 from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop, why_no_linear_loop

@@ -6,7 +6,6 @@ from math import inf
 from typing import Any, NamedTuple, Self
 
 import numpy as np
-import numpy.typing as npt
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import InvalidInputError
@@ -30,13 +29,9 @@ from stickslip_ros.physics.model.control import ContinuousControl, ControlLaw
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.motion import RecordedMotion
 from stickslip_ros.physics.theory.cycle_bounds import loading_time, release_position
-from stickslip_ros.progress import Progress
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.scenarios.parameters import PlantParameters
 from stickslip_ros.studies.options import DEFAULT_PERIODS, LONGEST, SettlingOptions
-
-DIAGRAM_OPTIONS = SettlingOptions(transient=300.0, cycles=6)
-"""Default settling of a bifurcation diagram."""
 
 CYCLES = (Regime.STICK_SLIP, Regime.PURE_SLIP)
 """Regimes of a limit cycle, which has an amplitude."""
@@ -314,36 +309,3 @@ class _Section:
         elif measures.regime in (Regime.EQUILIBRIUM, Regime.HELD):
             section = np.array([measures.midpoint])
         return Settled(measures, section, end)
-
-
-@dataclass(frozen=True)
-class BifurcationDiagram:
-    """The settled motions of a sequence of drives, one row each."""
-
-    drives: tuple[Drive, ...]
-    """The drive of each row."""
-    measures: tuple[Measures, ...]
-    """The measures of each row."""
-    row: npt.NDArray[np.intp]
-    """Row that each turning point belongs to, ascending. A motion that diverges has none."""
-    position: FloatArray
-    """Displacement of each turning point, m: the Poincare section X' = 0."""
-
-
-def bifurcation_diagram(
-    drives: Sequence[Drive],
-    progress: Progress = lambda _: None,
-    course: SettlingOptions = DIAGRAM_OPTIONS,
-) -> BifurcationDiagram:
-    """Return the motion that each drive settles on from rest at X = 0."""
-    settled: list[Settled] = []
-    for drive in drives:
-        settled.append(settle(ControlledDrive(drive), MotionState(0.0, 0.0), course))
-        progress(len(settled) / len(drives))
-    counts = [len(motion.turning_points) for motion in settled]
-    return BifurcationDiagram(
-        drives=tuple(drives),
-        measures=tuple(motion.measures for motion in settled),
-        row=np.repeat(np.arange(len(settled)), counts),
-        position=np.concatenate([np.empty(0), *(motion.turning_points for motion in settled)]),
-    )

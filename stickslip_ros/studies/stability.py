@@ -10,8 +10,8 @@ import numpy as np
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.model.actuator import IDEAL_ACTUATOR
 from stickslip_ros.physics.model.control import ControlLaw
+from stickslip_ros.physics.model.dimensionless_drive import POSITION, SPEED
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.drive_system import POSITION, SPEED
 from stickslip_ros.physics.theory.bifurcation_branches import BifurcationBranches
 from stickslip_ros.physics.theory.closed_forms import CubicLoop
 from stickslip_ros.physics.theory.critical_gains import (

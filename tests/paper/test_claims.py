@@ -1,7 +1,6 @@
 """The paper's claims: that all are there, and that the verdicts follow from the computation."""
 
 import re
-from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import cache
@@ -28,19 +27,17 @@ from stickslip_ros.paper.figures import (
     NUMBERS,
     PRINTED_SLOPE,
     STRIBECK,
-    BifurcationFigure,
     Panel,
     PaperFigure,
     PortraitCase,
     PortraitFigure,
-    bifurcation_drive,
+    bifurcation_figure,
     portrait_of,
     unit_drive,
 )
 from stickslip_ros.physics.measures.cycle_measures import Regime
 from stickslip_ros.physics.model.friction import Linear
 from stickslip_ros.physics.theory.hopf import first_lyapunov_coefficient
-from stickslip_ros.studies.settling import bifurcation_diagram
 
 HOLDS, CORRECTED, FAILS = Verdict.HOLDS, Verdict.CORRECTED, Verdict.FAILS
 
@@ -268,17 +265,12 @@ def test_under_the_printed_slope_the_stick_fraction_rises_with_the_damping_and_f
     assert [len(arrivals(drive)) for drive in drives] == [2, 2, 2, 1, 1, 1]
 
 
-def _diagram(number: int, values: Sequence[float]) -> BifurcationFigure:
-    drives = [bifurcation_drive(number, value) for value in values]
-    return BifurcationFigure(number, "", "", np.array(values), bifurcation_diagram(drives))
-
-
 @pytest.mark.long
 def test_verdicts_survive_ten_times_the_range() -> None:
-    speeds = _diagram(2, [0.02, 0.05, 0.2, 0.34, 0.6, 1.0, 3.0, 10.0])
+    speeds = bifurcation_figure(2, np.array([0.02, 0.05, 0.2, 0.34, 0.6, 1.0, 3.0, 10.0]))
     assert verdict("rest-at-high-speed", speeds).verdict is HOLDS
     assert verdict("eq-3-range", speeds).verdict is CORRECTED
-    stiffnesses = _diagram(4, [0.02, 0.2, 1.0, 5.0, 50.0])
+    stiffnesses = bifurcation_figure(4, np.array([0.02, 0.2, 1.0, 5.0, 50.0]))
     assert verdict("fig-4-influence", stiffnesses).verdict is CORRECTED
     minima = (0.001, 0.01, 0.1, 0.25, 0.37, 0.39, 0.399)
     drives = [unit_drive(0.4, friction=replace(STRIBECK, minimum=m)) for m in minima]
@@ -287,8 +279,8 @@ def test_verdicts_survive_ten_times_the_range() -> None:
     assert verdict("fig-11-amplitude", figure).verdict is HOLDS
     wide = {
         2: speeds,
-        3: _diagram(3, [0.0, 0.01, 0.05, 0.5]),
-        5: _diagram(5, [1.0, 1.1, 2.0, 11.0]),
+        3: bifurcation_figure(3, np.array([0.0, 0.01, 0.05, 0.5])),
+        5: bifurcation_figure(5, np.array([1.0, 1.1, 2.0, 11.0])),
     }
     (claim,) = (claim for claim in CLAIMS if claim.identifier == "what-inhibits")
     assert claim.check(Evidence(wide.__getitem__)).verdict is HOLDS

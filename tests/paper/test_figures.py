@@ -16,6 +16,7 @@ from stickslip_ros.paper.figures import (
     Portrait,
     PortraitCase,
     bifurcation_drives,
+    bifurcation_values,
     compute_figure,
     portrait_of,
     transition_marks,
@@ -48,7 +49,7 @@ def portraits(number: int) -> list[list[Portrait]]:
 
 
 def regimes(figure: BifurcationFigure) -> list[Regime | None]:
-    return [measures.regime for measures in figure.diagram.measures]
+    return [measures.regime for measures in figure.measures]
 
 
 def stick_fractions(panel: list[Portrait]) -> list[float]:
@@ -61,7 +62,8 @@ def falls(values: list[float]) -> bool:
 
 def test_the_parameter_of_a_bifurcation_diagram_is_all_that_varies() -> None:
     for number in (2, 3, 4, 5):
-        values, drives = bifurcation_drives(number, 5)
+        values = bifurcation_values(number, 5)
+        drives = bifurcation_drives(number, values)
         varied = {
             2: [drive.belt_speed for drive in drives],
             3: [drive.damping / 2.0 for drive in drives],

@@ -35,7 +35,7 @@ _SETTLED_SHARE = 0.98
 
 
 def _rows(figure: BifurcationFigure, chosen: Callable[[float, Regime | None], bool]) -> list[int]:
-    measures = figure.diagram.measures
+    measures = figure.measures
     return [
         row
         for row, (value, measure) in enumerate(zip(figure.values.tolist(), measures, strict=True))
@@ -45,7 +45,7 @@ def _rows(figure: BifurcationFigure, chosen: Callable[[float, Regime | None], bo
 
 def _turning_points(figure: BifurcationFigure, row: int) -> int:
     """Return the number of different turning points in a row of the diagram."""
-    found = np.sort(figure.diagram.position[figure.diagram.row == row])
+    found = np.sort(figure.settled[row].turning_points)
     return 1 + int(np.sum(np.diff(found) > 1e-6))  # closer ones count as one
 
 
@@ -89,7 +89,7 @@ def _(evidence: Evidence) -> Number:
     figure = evidence.bifurcation(2)
     end = _SETTLED_SHARE * hopf_point().belt_speed
     rows = _rows(figure, lambda value, regime: regime is Regime.PURE_SLIP and value < end)
-    amplitudes = [figure.diagram.measures[row].velocity_amplitude or 0.0 for row in rows]
+    amplitudes = [figure.measures[row].velocity_amplitude or 0.0 for row in rows]
     # By averaging r^2 = 4 (v_b1^2 - v0^2) near the Hopf point; higher orders bend the line.
     quadratic = np.polyfit(np.square(amplitudes), figure.values[rows] ** 2, 2)
     return Number(
@@ -132,7 +132,7 @@ def _(evidence: Evidence) -> Observation:
     figure, speed = evidence.bifurcation(2), hopf_point().belt_speed
     below = _rows(figure, lambda v, _: 0.0 < v < _SETTLED_SHARE * speed)
     above = _rows(figure, lambda v, _: v > speed / _SETTLED_SHARE)
-    measures = figure.diagram.measures
+    measures = figure.measures
     agree = [measures[row].regime in VIBRATING for row in below]
     agree += [measures[row].regime is Regime.EQUILIBRIUM for row in above]
     return Observation(
@@ -143,8 +143,8 @@ def _(evidence: Evidence) -> Observation:
 @computes("fig-3-region")
 def _(evidence: Evidence) -> Observation:
     figure = evidence.bifurcation(3)
-    critical = critical_beta(figure.diagram.drives[0].belt_speed)
-    vibrating = [measure.regime in VIBRATING for measure in figure.diagram.measures]
+    critical = critical_beta(figure.drives[0].belt_speed)
+    vibrating = [measure.regime in VIBRATING for measure in figure.measures]
     edges = sum(a != b for a, b in pairwise(vibrating))
     return Observation(
         vibrating[0] and not vibrating[-1] and edges == 1,
@@ -156,7 +156,7 @@ def _(evidence: Evidence) -> Observation:
 
 @computes("fig-3-end")
 def _(evidence: Evidence) -> Number:
-    belt_speed = evidence.bifurcation(3).diagram.drives[0].belt_speed
+    belt_speed = evidence.bifurcation(3).drives[0].belt_speed
     # At v0 = 0.4, as in the other figures, and with v0 chosen to give the printed beta.
     fitting = zero_between(lambda v: critical_beta(v) - 0.02, 0.1, 0.499)
     return Number(
@@ -169,14 +169,14 @@ def _(evidence: Evidence) -> Number:
 @computes("fig-3-quasi-periodic")
 def _(evidence: Evidence) -> Observation:
     figure = evidence.bifurcation(3)
-    return _periodicity(figure, 0.9 * critical_beta(figure.diagram.drives[0].belt_speed))
+    return _periodicity(figure, 0.9 * critical_beta(figure.drives[0].belt_speed))
 
 
 @computes("fig-4-influence")
 def _(evidence: Evidence) -> Observation:
     figure = evidence.bifurcation(4)
     displacement, speed, stuck = (
-        [getattr(measure, name) for measure in figure.diagram.measures]
+        [getattr(measure, name) for measure in figure.measures]
         for name in ("amplitude", "velocity_amplitude", "stick_fraction")
     )
     ratios = [max(values) / min(values) for values in (displacement, speed, stuck)]
@@ -198,19 +198,19 @@ def _(evidence: Evidence) -> Observation:
 @computes("fig-4-no-cure")
 def _(evidence: Evidence) -> Observation:
     figure = evidence.bifurcation(4)
-    vibrating = [measure.regime in VIBRATING for measure in figure.diagram.measures]
+    vibrating = [measure.regime in VIBRATING for measure in figure.measures]
     return Observation(all(vibrating), count=sum(vibrating), total=len(vibrating))
 
 
 @computes("fig-5-ratio")
 def _(evidence: Evidence) -> Observation:
     figure = evidence.bifurcation(5)
-    vibrating = [measure.regime in VIBRATING for measure in figure.diagram.measures]
+    vibrating = [measure.regime in VIBRATING for measure in figure.measures]
     edges = sum(a != b for a, b in pairwise(vibrating))
 
     def p(ratio: float) -> float:
         law = replace(STRIBECK, minimum=STRIBECK.static / ratio)
-        return trace_of(replace(figure.diagram.drives[0], friction=law))
+        return trace_of(replace(figure.drives[0], friction=law))
 
     critical = zero_between(p, float(figure.values[0]), float(figure.values[-1]))
     slippery = unit_drive(0.4, friction=replace(STRIBECK, minimum=STRIBECK.static / 1000.0))

@@ -30,7 +30,7 @@ from stickslip_ros.paper.claims.paper_values import (
     number_for_both,
 )
 from stickslip_ros.paper.claims.verdict import Computations, Evidence, Formula, Number, Observation
-from stickslip_ros.physics.model.drive_system import SPEED
+from stickslip_ros.physics.model.dimensionless_drive import SPEED
 from stickslip_ros.physics.theory.hopf import first_lyapunov_coefficient
 from stickslip_ros.physics.theory.linear import Expansion
 

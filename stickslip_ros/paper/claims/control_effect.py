@@ -323,7 +323,7 @@ def _(evidence: Evidence) -> Observation:
     agree = [
         (measures.regime in VIBRATING) == (p > 0.0)
         for figure in figures
-        for measures, drive in zip(figure.diagram.measures, figure.diagram.drives, strict=True)
+        for measures, drive in zip(figure.measures, figure.drives, strict=True)
         if drive.belt_speed > 0.0 and abs(p := trace_of(drive)) > _SETTLING_TRACE
     ]
     return Observation(
@@ -378,7 +378,7 @@ def _(_: Evidence) -> Observation:
 
 @computes("what-inhibits")
 def _(evidence: Evidence) -> Observation:
-    ends = [evidence.bifurcation(number).diagram for number in (2, 3, 5)]
+    ends = [evidence.bifurcation(number) for number in (2, 3, 5)]
     slow = int(np.searchsorted(evidence.bifurcation(2).values, 1.0 / 3.0))
     quiet = [ends[0].measures[-1], ends[1].measures[-1], ends[2].measures[0]]
     loud = [ends[0].measures[slow], ends[1].measures[0], ends[2].measures[-1]]

@@ -201,7 +201,7 @@ def _(evidence: Evidence) -> Observation:
     figure = evidence.bifurcation(2)
     fast = [
         (measures, drive)
-        for measures, drive in zip(figure.diagram.measures, figure.diagram.drives, strict=True)
+        for measures, drive in zip(figure.measures, figure.drives, strict=True)
         if drive.belt_speed > 1.05 * hopf_point().belt_speed
     ]
     resting = [measures.regime is Regime.EQUILIBRIUM for measures, _ in fast]

@@ -306,7 +306,7 @@ def _(evidence: Evidence) -> Observation:
 
 @computes("two-kinds")
 def _(evidence: Evidence) -> Observation:
-    measures = evidence.bifurcation(2).diagram.measures
+    measures = evidence.bifurcation(2).measures
     speeds = evidence.bifurcation(2).values
     kinds = {
         regime: [float(v) for v, m in zip(speeds, measures, strict=True) if m.regime is regime]

@@ -9,8 +9,9 @@ import heyoka as hy
 import numpy as np
 
 from stickslip_ros.physics.model.control import ContinuousControl
+from stickslip_ros.physics.model.dimensionless_drive import SPEED
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.drive_system import SLIP, SPEED, UNSEEN, DriveSystem
+from stickslip_ros.physics.model.drive_system import SLIP, UNSEEN, DriveSystem
 from stickslip_ros.physics.model.hybrid import Flow, Guard, Instant, Mode
 
 CREEP = "creep"
@@ -64,7 +65,7 @@ class CreepingDrive(DriveSystem):
         steepest = [
             each if each < inf else 0.0 for each in (drive.belt.steepest, drive.load.steepest)
         ]
-        self._loading = self._stiffness * drive.fastest_belt + drive.damping * steepest[0]
+        self._loading = drive.stiffness * drive.fastest_belt + drive.damping * steepest[0]
         self._loading += float(law.static) * steepest[1]
 
     def named_constants(self) -> Iterator[tuple[str, float]]:

@@ -2,14 +2,9 @@
 
 from stickslip_ros.physics.model.control import ContinuousControl
 from stickslip_ros.physics.model.creeping_drive import CreepingDrive
+from stickslip_ros.physics.model.dimensionless_drive import POSITION, SPEED
 from stickslip_ros.physics.model.drive import Drive, ScaledDrive
-from stickslip_ros.physics.model.drive_system import (
-    POSITION,
-    SLIP,
-    SPEED,
-    STICK,
-    DriveSystem,
-)
+from stickslip_ros.physics.model.drive_system import SLIP, STICK, DriveSystem
 from stickslip_ros.physics.model.hybrid import Instant, Mode
 
 _STUCK, _FORWARD, _BACKWARD = Mode(STICK, (0.0,)), Mode(SLIP, (1.0,)), Mode(SLIP, (-1.0,))

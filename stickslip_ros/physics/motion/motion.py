@@ -10,15 +10,9 @@ from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import RunError
 from stickslip_ros.physics.measures.breakpoints import STICK_SHARE, Breakpoints
 from stickslip_ros.physics.model.control import ContinuousControl
+from stickslip_ros.physics.model.dimensionless_drive import MEMORY, POSITION, SPEED
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.drive_system import (
-    MEMORY,
-    POSITION,
-    SPEED,
-    STICK,
-    TIME_ROUNDING,
-    DriveSystem,
-)
+from stickslip_ros.physics.model.drive_system import STICK, TIME_ROUNDING, DriveSystem
 from stickslip_ros.physics.model.hybrid import HybridSystem, Mode
 from stickslip_ros.physics.model.plain_drive import drive_system
 from stickslip_ros.physics.motion.compiled_flow import Detail

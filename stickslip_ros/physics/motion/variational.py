@@ -11,8 +11,9 @@ from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import RunError
 from stickslip_ros.physics.model.actuator import IDEAL_ACTUATOR
 from stickslip_ros.physics.model.control import ContinuousControl
+from stickslip_ros.physics.model.dimensionless_drive import MEMORY, SPEED
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.drive_system import MEMORY, SLIP, SPEED, STICK
+from stickslip_ros.physics.model.drive_system import SLIP, STICK
 from stickslip_ros.physics.model.hybrid import Mode
 from stickslip_ros.physics.motion.compiled_flow import (
     CompiledFlow,

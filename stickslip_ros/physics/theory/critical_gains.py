@@ -8,8 +8,8 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.physics.model.control import ContinuousControl, Washout
+from stickslip_ros.physics.model.dimensionless_drive import MEMORY, POSITION, SPEED
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.drive_system import MEMORY, POSITION, SPEED
 from stickslip_ros.physics.model.functions import zero_between
 from stickslip_ros.physics.theory.gain_intervals import (
     GainInterval,

@@ -14,7 +14,7 @@ from stickslip_ros.physics.model.control import (
     LinearFeedback,
     Washout,
 )
-from stickslip_ros.physics.model.drive_system import POSITION, SPEED
+from stickslip_ros.physics.model.dimensionless_drive import POSITION, SPEED
 
 _ROUNDING = 1e-14
 """Relative error of a multiplier."""

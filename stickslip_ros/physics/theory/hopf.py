@@ -9,8 +9,8 @@ import numpy.typing as npt
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.physics.model.control import ContinuousControl
+from stickslip_ros.physics.model.dimensionless_drive import SPEED
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.drive_system import SPEED
 from stickslip_ros.physics.model.functions import zero_between
 from stickslip_ros.physics.theory.linear import Expansion, expand, hurwitz_determinants, jacobians
 from stickslip_ros.physics.theory.requirements import (

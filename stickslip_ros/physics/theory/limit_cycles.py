@@ -17,8 +17,9 @@ from stickslip_ros.arrays import FloatArray
 from stickslip_ros.physics.measures.breakpoints import Breakpoints
 from stickslip_ros.physics.measures.cycle_measures import EQUILIBRIUM_SPEED, CycleMeter, Measures
 from stickslip_ros.physics.model.control import ContinuousControl
+from stickslip_ros.physics.model.dimensionless_drive import POSITION, SPEED
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.drive_system import POSITION, SPEED, UNBOUNDED_SPEED
+from stickslip_ros.physics.model.drive_system import UNBOUNDED_SPEED
 from stickslip_ros.physics.model.functions import zero_between
 from stickslip_ros.physics.model.hybrid import Mode
 from stickslip_ros.physics.motion.variational import ShootingMotion, TooStiffError

@@ -19,8 +19,9 @@ from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import RunError
 from stickslip_ros.physics.model.actuator import IDEAL_ACTUATOR
 from stickslip_ros.physics.model.control import ContinuousControl
+from stickslip_ros.physics.model.dimensionless_drive import MEMORY, SPEED
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.drive_system import MEMORY, SLIP, SPEED, DriveSystem
+from stickslip_ros.physics.model.drive_system import SLIP, DriveSystem
 from stickslip_ros.physics.model.plain_drive import drive_system
 from stickslip_ros.physics.motion.compiled_flow import evaluated, flow_rates
 from stickslip_ros.physics.theory.requirements import AUTONOMOUS, SPRING, require

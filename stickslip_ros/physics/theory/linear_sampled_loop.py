@@ -18,8 +18,8 @@ from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.loop.sampled_loop import whole_and_rest
 from stickslip_ros.physics.model.constants import scaled
 from stickslip_ros.physics.model.control import ControlLaw, LinearFeedback
+from stickslip_ros.physics.model.dimensionless_drive import POSITION, SPEED
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.drive_system import POSITION, SPEED
 from stickslip_ros.physics.model.sensor import EXACT_SENSOR, Sensor
 from stickslip_ros.physics.theory.gain_intervals import (
     GainBoundary,

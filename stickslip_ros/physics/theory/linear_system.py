@@ -8,8 +8,8 @@ import numpy.typing as npt
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.physics.model.actuator import IDEAL_ACTUATOR
 from stickslip_ros.physics.model.control import ContinuousControl, ControlLaw
+from stickslip_ros.physics.model.dimensionless_drive import POSITION, SPEED
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.drive_system import POSITION, SPEED
 from stickslip_ros.physics.model.plain_drive import drive_system
 from stickslip_ros.physics.theory.linear import expand
 from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop

@@ -8,8 +8,9 @@ import pytest
 
 from stickslip_ros.physics.measures import CycleMeter
 from stickslip_ros.physics.model.control import Washout
+from stickslip_ros.physics.model.dimensionless_drive import POSITION, SPEED
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.drive_system import POSITION, SLIP, SPEED
+from stickslip_ros.physics.model.drive_system import SLIP
 from stickslip_ros.physics.model.friction import (
     Dahl,
     ElastoPlastic,

@@ -1,0 +1,261 @@
+"""A drive and its control, dimensionless: states, constants and forces, also as expressions."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+from itertools import accumulate, pairwise
+from math import inf
+from typing import Any, NamedTuple
+
+import heyoka as hy
+
+from stickslip_ros.physics.model import equations
+from stickslip_ros.physics.model.constants import constants_of, numbers, structure, with_symbols
+from stickslip_ros.physics.model.control import ContinuousControl
+from stickslip_ros.physics.model.drive import Drive, DriveConstants, ScaledDrive
+from stickslip_ros.physics.model.friction import FrictionLaw
+from stickslip_ros.physics.model.hybrid import HybridSystem, Instant, Mode, structure_number
+
+POSITION, SPEED, MEMORY = 0, 1, 2
+"""Indices of X and Y in a state, and of the first state of the law's memory."""
+
+LIFT_ROUNDING = 2.0**-40
+"""Normal force, in that of the drive, that is rounding where a load takes all of it away."""
+
+_CHANGE_IN_A_STEP = 8.0
+"""Change of the speed in a step, in the characteristic one, for a law with a memory.
+
+An exponential that is below rounding at the start of a step is then hardly above it at the end.
+"""
+
+
+class Parts(NamedTuple):
+    """What each part of a drive that has switches has of something."""
+
+    law: Any
+    belt: Any
+    load: Any
+
+
+@dataclass(frozen=True)
+class Expressions:
+    """A drive as expressions."""
+
+    drive: Drive
+    switches: Parts
+    """Switches of each part."""
+    sign: Any
+    speed: Any
+    memory: Sequence[Any]
+    belt_speed: Any
+    belt_acceleration: Any
+    normal: Any
+    reaction: Callable[[Any], Any]
+    """Reaction at a speed of the slide."""
+    part_rates: Callable[[Any], tuple[Any, ...]]
+    """Rates of control and actuator at a speed of the slide."""
+
+    @property
+    def law(self) -> FrictionLaw:
+        """The friction law."""
+        return self.drive.friction
+
+
+class DimensionlessDrive(HybridSystem):
+    """Drive, dimensionless (see `Drive`), with a held force or with continuous control.
+
+    The states are X, Y = X', the memory of the friction law, the states of the controller and those
+    of the actuator.
+
+    Drive and control are in SI units. Continuous control, eq. 19, acts without the actuator;
+    without it the force is the input `force`. An actuator with states receives that input, and the
+    input `disturbance` is added to its force. Of a `ScaledDrive` also mass, stiffness and bias are
+    constants.
+    """
+
+    def __init__(self, drive: Drive, control: ContinuousControl | None = None) -> None:
+        self.drive = drive.dimensionless
+        self.control = None if control is None else control.scaled(drive)
+        law, actuator = self.drive.friction, self.drive.actuator
+        signals = self.drive.belt, self.drive.load
+        control_states = () if self.control is None else self.control.states
+        self.states = (
+            "x",
+            "y",
+            *(f"friction.{name}" for name in law.states),
+            *control_states,
+            *(f"actuator.{name}" for name in actuator.states),
+        )
+        first = MEMORY + len(law.states)
+        self.control_states = slice(first, first + len(control_states))
+        """The states of the controller, in a state."""
+        self.actuator_states = slice(self.control_states.stop, len(self.states))
+        """The states of the actuator, in a state."""
+        self.has_actuator = len(actuator.states) > 0
+        self.inputs = ("force", "disturbance") if self.has_actuator else ("force",)
+        of_parts = Parts(law.switches, *(each.switches for each in signals))
+        named = (f"{part}.{name}" for part, own in of_parts._asdict().items() for name in own)
+        self.switches = ("sign", *named)
+        ends = pairwise(accumulate(map(len, of_parts), initial=1))
+        self._parts = Parts(*(slice(*each) for each in ends))
+        """The switches of each part, in those of the system."""
+        self.has_parts = len(law.switches) > 0
+        # Whether the normal force may fall below zero: then a guard ends the motion.
+        self._may_lift = 1.0 + self.drive.load.bounds[0] < -LIFT_ROUNDING
+        self._steady, self._loaded = not self.drive.belt.pieces, bool(self.drive.load.pieces)
+        self.sticks = law.sticks
+        self.many_steps = not law.sticks or self.has_actuator
+        self.limits_steps = law.characteristic_speed != inf and law.sticks
+        self._limits_by_series = law.characteristic_speed != inf and not law.sticks
+        if isinstance(drive, ScaledDrive):
+            of_law = (name for name, _ in numbers(law, "friction"))
+            self.free_constants = ("mass", "damping", "stiffness", "bias_force", *of_law)
+        self.structure = structure_number(
+            (
+                *(type(self), self.states, self._may_lift, drive.has_spring, self._has_bias),
+                *((each.switches, each.has_sine) for each in signals),
+                *map(structure, (law, actuator, self.control)),
+                self.free_constants,
+            )
+        )
+        self._reaction, self._friction = partial(equations.reaction, self.drive), law.friction
+
+    def named_constants(self) -> Iterator[tuple[str, float]]:
+        """Yield name and value of each constant."""
+        drive, law = self.drive, self.drive.friction
+        own = ["damping", "belt_speed", *(["bias_force"] if self._has_bias else [])]
+        yield from ((name, getattr(drive, name)) for name in own)
+        yield from numbers(law, "friction")
+        yield from numbers(drive.actuator, "actuator")
+        if self.control is not None:
+            yield from numbers(self.control, "control")
+        if not law.sticks:
+            # Of a slide with a memory that counts as sticking; it has no part in the motion.
+            yield "stick_speed", 0.0
+        if self._limits_by_series:
+            yield "step_limiter", 1.0 / (_CHANGE_IN_A_STEP * law.characteristic_speed)
+        free = [name for name in self.free_constants if name in constants_of(DriveConstants)]
+        yield from ((name, getattr(drive, name)) for name in free if name not in own)
+
+    @property
+    def _has_bias(self) -> bool:
+        return self.drive.bias_force != 0.0
+
+    @cached_property
+    def autonomous(self) -> bool:
+        """Whether belt speed and load are constant."""
+        return self._steady and not self._loaded
+
+    def initial_state(self, position: float, velocity: float) -> list[float]:
+        """Return the state at the start: the memory is that of the law, the controller at rest.
+
+        The actuator gives no force.
+        """
+        law, control = self.drive.friction, self.control
+        memory = law.initial_memory(velocity - self.drive.belt_speed)
+        own = control.rest(position, velocity) if control is not None else ()
+        without = (0.0,) * len(self.drive.actuator.states)
+        return [position, velocity, *map(float, memory), *own, *without]
+
+    def belt_speed(self, mode: Mode, time: float) -> float:
+        """Return the speed of the belt."""
+        return float(equations.belt_speed(self.drive, time, mode.switches[self._parts.belt]))
+
+    def normal_force(self, mode: Mode, time: float) -> float:
+        """Return the normal force."""
+        return float(equations.normal_force(self.drive, time, mode.switches[self._parts.load]))
+
+    def control_force(self, instant: Instant) -> float:
+        """Return the force on the slide: held, with the actuator, or continuous control."""
+        state, inputs = instant.state, instant.inputs
+        if self.control is not None:
+            own = state[self.control_states]
+            return self.control.control_force(state[POSITION], state[SPEED], own)
+        if self.has_actuator:
+            lagging = state[self.actuator_states].tolist()
+            return float(self.drive.actuator.force(inputs[0], lagging)) + inputs[1]
+        return inputs[0]
+
+    def reaction(self, instant: Instant) -> float:
+        """Return h = X + 2 beta X' - U - bias."""
+        state = instant.state
+        return self._reaction(state[POSITION], state[SPEED], self.control_force(instant))
+
+    def held_force(self, mode: Mode, instant: Instant) -> float:
+        """Return the friction force that a slide needs to move with the belt."""
+        if self._steady:
+            return self.reaction(instant)
+        tiny = 1e-30j  # imaginary, so that nothing cancels
+        switches = mode.switches[self._parts.belt]
+        speed: Any = equations.belt_speed(self.drive, instant.time + tiny, switches)
+        return self.reaction(instant) + self.drive.mass * (speed.imag / tiny.imag)
+
+    def friction_force(self, mode: Mode, instant: Instant) -> float:
+        """Return the friction force on the slide."""
+        sign = mode.switches[0]
+        if sign == 0.0:
+            return self.held_force(mode, instant)
+        relative_speed = instant.state[SPEED] - self.belt_speed(mode, instant.time)
+        memory, own = self._memory(instant), mode.switches[self._parts.law]
+        coefficient = self._friction(relative_speed, sign, memory, own)
+        return self.normal_force(mode, instant.time) * float(coefficient)
+
+    @cached_property
+    def _expressions(self) -> Expressions:
+        state, constants, inputs, switches, time = self.symbols
+        drive, control = self.drive, self.control
+        of_drive = constants_of(DriveConstants).keys() & constants
+        drive = replace(
+            drive,
+            **{name: constants[name] for name in of_drive},
+            friction=with_symbols(drive.friction, "friction", constants),
+            actuator=with_symbols(drive.actuator, "actuator", constants),
+        )
+        if control is not None:
+            control = with_symbols(control, "control", constants)
+        own, lagging = state[self.control_states], state[self.actuator_states]
+        x = state[POSITION]
+
+        def force(speed: Any) -> Any:
+            if control is not None:
+                return control.control_force(x, speed, own)
+            if self.has_actuator:
+                return drive.actuator.force(inputs[0], lagging) + inputs[1]
+            return inputs[0]
+
+        def part_rates(speed: Any) -> tuple[Any, ...]:
+            of_control = () if control is None else control.state_rates(x, speed, own)
+            of_actuator = ()
+            if self.has_actuator:
+                of_actuator = drive.actuator.state_rates(inputs[0], lagging)
+            return (*of_control, *of_actuator)
+
+        parts = self._by_part(switches)
+        return Expressions(
+            drive=drive,
+            switches=parts,
+            sign=switches[0],
+            speed=state[SPEED],
+            memory=state[MEMORY : self.control_states.start],
+            belt_speed=equations.belt_speed(drive, time, parts.belt),
+            belt_acceleration=_by_time(drive, time, parts.belt, 0.0 * state[SPEED]),
+            normal=equations.normal_force(drive, time, parts.load),
+            reaction=lambda speed: equations.reaction(drive, x, speed, force(speed)),
+            part_rates=part_rates,
+        )
+
+    def _memory(self, instant: Instant) -> Sequence[float]:
+        return () if self.sticks else instant.state[MEMORY : self.control_states.start].tolist()
+
+    def _by_part(self, switches: Sequence[Any]) -> Parts:
+        law, belt, load = self._parts
+        return Parts(switches[law], switches[belt], switches[load])
+
+
+def _by_time(drive: Drive, time: Any, switches: Sequence[Any], zero: Any) -> Any:
+    """Return the acceleration of the belt as an expression; `zero` if its speed is constant."""
+    instant = hy.expression("time_of_signal")
+    speed = drive.belt.value(instant, switches)
+    if not isinstance(speed, hy.expression):
+        return zero
+    return zero + hy.subs(hy.diff(speed, instant), {instant: time})
