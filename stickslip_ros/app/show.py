@@ -58,8 +58,8 @@ def run(arguments: argparse.Namespace) -> None:
 
 
 def _parameters(scenario: "Scenario", node: str) -> dict[str, dict[str, Any]]:
-    from stickslip_ros.scenarios.scenario import DEFAULT
     from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
+    from stickslip_ros.scenarios.scenario import DEFAULT
     from stickslip_ros.scenarios.template import own_first
 
     values = scenario.as_dict()[node]

@@ -162,8 +162,7 @@ class Trajectories:
 
         def of_system(other: Drive) -> FloatArray:
             system = drive_system(in_units_of(drive, other))
-            named = dict(system.named_constants())
-            return np.array([named[name] for name in system.free_constants])
+            return np.array([system.constants[name] for name in system.free_constants])
 
         of_constants = by_coordinates(of_system) if moved else None
         parts = iter(self.parts)

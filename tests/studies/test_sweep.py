@@ -1,19 +1,13 @@
 """The kinds of sweeps."""
 
-from dataclasses import replace
-
-import numpy as np
 import pytest
 
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.measures.cycle_measures import Regime
-from stickslip_ros.physics.model.friction import Linear
 from stickslip_ros.physics.theory.critical_gains import critical_gains
 from stickslip_ros.studies.plan import Axis
 from stickslip_ros.studies.runner import compute_columns
-from stickslip_ros.studies.settling import bifurcation_diagram
 from stickslip_ros.studies.study import sweep_study
-from tests.physics.drives import FEED_DRIVE, LIMIT_CYCLES, PAPER
 from tests.studies.studies import free, paper
 
 SPEED = Axis("plant.belt_speed", 0.2, 0.4, 3)
@@ -69,33 +63,3 @@ def test_values_that_change_something_at_some_point_are_taken() -> None:
     seeds = Axis("plant.force_jitter_seed", 0, 4, 2)
     assert sweep_study(paper(), [seeds, Axis("plant.force_jitter", 0.0, 1e-3, 2)]).plan.size == 4
     assert sweep_study(paper(), [Axis("plant.rate", 50.0, 100.0, 2)]).plan.size == 2
-
-
-def test_a_bifurcation_diagram_has_the_turning_points_of_each_drive() -> None:
-    """Of a motion that diverges there are none, and other rows do not depend on it."""
-    runs_away = replace(PAPER, belt_speed=0.2, friction=Linear(0.4, 0.9))
-    resting_belt = replace(PAPER, belt_speed=0.0)
-    at_rest = replace(PAPER, belt_speed=0.6)
-    cycle = next(cycle for cycle in LIMIT_CYCLES if cycle.belt_speed == 0.4)
-    shares: list[float] = []
-    drives = [PAPER, runs_away, PAPER, resting_belt, at_rest, FEED_DRIVE]
-    found = bifurcation_diagram(drives, shares.append)
-    first, away, again, held, rest, feed = (found.position[found.row == n] for n in range(6))
-    assert len(first) >= 10
-    assert np.abs(first - cycle.midpoint) == pytest.approx(cycle.amplitude, abs=1e-8)
-    assert np.diff(np.sign(np.diff(first))).all()
-    assert again.tolist() == first.tolist()
-    assert len(away) == 0
-    assert set(held.tolist()) == {0.0}
-    assert rest == pytest.approx([0.4 - 0.45 * 0.6 + 0.6 * 0.6**3])
-    assert feed.max() == pytest.approx(1e-3 * first.max())  # in metres
-    assert [measures.regime for measures in found.measures[:5]] == [
-        Regime.PURE_SLIP if cycle.stick_fraction == 0.0 else Regime.STICK_SLIP,
-        Regime.UNBOUNDED,
-        found.measures[0].regime,
-        Regime.STUCK,
-        Regime.EQUILIBRIUM,
-    ]
-    assert shares == [number / 6 for number in range(1, 7)]
-    nothing = bifurcation_diagram([])
-    assert (nothing.measures, len(nothing.row), len(nothing.position)) == ((), 0, 0)

@@ -1,6 +1,5 @@
 """A drive whose slide never sticks but creeps: without inertia while it is slow."""
 
-from collections.abc import Iterator
 from functools import cached_property
 from math import copysign, inf, ulp
 from typing import Any, NamedTuple
@@ -60,6 +59,7 @@ class CreepingDrive(DriveSystem):
         rounding = ulp(max(self.drive.fastest_belt, 1.0))
         self._limit = max(_INERTIA * sensitivity * sensitivity / change, 1e6 * rounding)
         self._least = max(_PASSED_OVER * self._limit, 1e3 * rounding)
+        self.constants |= {"creep.limit": self._limit, "creep.least": self._least}
         self.limits_steps = True
         law, drive = self.drive.friction, self.drive
         steepest = [
@@ -67,12 +67,6 @@ class CreepingDrive(DriveSystem):
         ]
         self._loading = drive.stiffness * drive.fastest_belt + drive.damping * steepest[0]
         self._loading += float(law.static) * steepest[1]
-
-    def named_constants(self) -> Iterator[tuple[str, float]]:
-        """Yield name and value of each constant."""
-        yield from super().named_constants()
-        yield "creep.limit", self._limit
-        yield "creep.least", self._least
 
     def flow(self, name: str) -> Flow:
         """Return the flow `SLIP` or `CREEP`; in slip the last guards lead to creep, or past it."""
@@ -243,7 +237,7 @@ class CreepingDrive(DriveSystem):
     def _compiled(self, mode: Mode, instant: Instant) -> tuple[float, float]:
         """Return the relative speed of creep, and its measure of viscosity."""
         function = self.shared("creep", self._function)
-        values = [*self.constants, *instant.inputs, *mode.switches, instant.time]
+        values = [*self.constants.values(), *instant.inputs, *mode.switches, instant.time]
         options = {"time": 0.0} if function.is_time_dependent else {}
         found = function(
             np.array(instant.state), pars=np.array(values[: function.nparams]), **options

@@ -118,10 +118,10 @@ class DimensionlessDrive(HybridSystem):
                 self.free_constants,
             )
         )
+        self.constants = dict(self._named_constants())
         self._reaction, self._friction = partial(equations.reaction, self.drive), law.friction
 
-    def named_constants(self) -> Iterator[tuple[str, float]]:
-        """Yield name and value of each constant."""
+    def _named_constants(self) -> Iterator[tuple[str, float]]:
         drive, law = self.drive, self.drive.friction
         own = ["damping", "belt_speed", *(["bias_force"] if self._has_bias else [])]
         yield from ((name, getattr(drive, name)) for name in own)

@@ -5,8 +5,7 @@ variational equations and the jumps of the derivatives at a guard.
 """
 
 from abc import ABC, abstractmethod
-from array import array
-from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import inf
@@ -110,15 +109,8 @@ class HybridSystem(ABC):
     """Names of values that are set from outside and held."""
     switches: tuple[str, ...]
     """Names of values that are constant in each mode."""
-
-    @abstractmethod
-    def named_constants(self) -> Iterator[tuple[str, float]]:
-        """Yield name and value of each constant, in an order that the structure gives."""
-
-    @cached_property
-    def constants(self) -> "array[float]":
-        """Values of the constants, the first of `index`; a motion may set one."""
-        return array("d", [value for _, value in self.named_constants()])
+    constants: dict[str, float]
+    """The constants by name, in an order that the structure gives; a motion may set one."""
 
     @abstractmethod
     def flow(self, name: str) -> Flow:
@@ -214,8 +206,7 @@ class HybridSystem(ABC):
         return self.shared("index", self._numbered)
 
     def _numbered(self) -> Mapping[str, int]:
-        own = [name for name, _ in self.named_constants()]
-        names = (*own, *self.inputs, *self.switches, "epoch")
+        names = (*self.constants, *self.inputs, *self.switches, "epoch")
         return {name: number for number, name in enumerate(names)}
 
     @cached_property
@@ -224,7 +215,7 @@ class HybridSystem(ABC):
         par = {name: hy.par[number] for name, number in self.index.items()}
         return Symbols(
             self.variables,
-            {name: par[name] for name, _ in self.named_constants()},
+            {name: par[name] for name in self.constants},
             tuple(par[name] for name in self.inputs),
             tuple(par[name] for name in self.switches),
             par["epoch"] + hy.time,

@@ -80,10 +80,10 @@ class CompiledFlow:
         self.epoch = index["epoch"] if index["epoch"] < used else None
         """Index of the time at the start of the integration."""
 
-    def load(self, constants: "array[float]") -> None:
-        """Set the constants of a system of this structure."""
-        used = min(len(self.parameters), len(constants))
-        self.parameters[:used] = memoryview(constants)[:used]
+    def load(self, system: HybridSystem) -> None:
+        """Set the constants to those of a system of this structure."""
+        used = array("d", list(system.constants.values())[: len(self.parameters)])
+        self.parameters[: len(used)] = used
         self.mode = None
 
     def another(self, system: HybridSystem) -> "CompiledFlow":
@@ -206,7 +206,7 @@ def parameter_values(
     system: HybridSystem, mode: Mode, inputs: Sequence[float], time: float = 0.0
 ) -> FloatArray:
     """Return the values of a system's parameters in a mode, in the order of its expressions."""
-    return np.array([*system.constants, *inputs, *mode.switches, time])
+    return np.array([*system.constants.values(), *inputs, *mode.switches, time])
 
 
 def evaluated(compiled: Any, state: FloatArray, parameters: FloatArray) -> FloatArray:

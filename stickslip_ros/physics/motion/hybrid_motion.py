@@ -66,10 +66,9 @@ class HybridMotion:
 
     def _set_constant(self, name: str, value: float) -> None:
         """Set a constant of the system."""
-        constants, index = self._system.constants, self._system.index[name]
-        if constants[index] == value:
+        if self._system.constants[name] == value:
             return
-        constants[index] = value
+        self._system.constants[name], index = value, self._system.index[name]
         for prepared in self._prepared_by_detail.values():
             for flow, _ in prepared.values():
                 if flow is not None and index < len(flow.parameters):
@@ -115,7 +114,7 @@ class HybridMotion:
         name, system, flow = mode.flow, self._system, None
         if Detail.DERIVATIVES in self._detail or not system.has_closed_form(mode):
             flow = self._integrators.flow(system, name, self._detail)
-            flow.load(system.constants)
+            flow.load(system)
         prepared = self._prepared[name] = flow, system.shared_flow(name).transitions
         return prepared
 

@@ -182,7 +182,7 @@ def _at_equilibrium(
     """Return the equilibria at m belt speeds of one sign, (n, m), and the derivatives there."""
     system = drive_system(replace(drive, actuator=IDEAL_ACTUATOR), control)
     values = np.zeros((len(system.index), len(belt_speeds)))
-    values[: len(system.constants)] = np.array(system.constants)[:, np.newaxis]
+    values[: len(system.constants)] = np.array([*system.constants.values()])[:, np.newaxis]
     values[system.index["belt_speed"]] = belt_speeds
     sign = -copysign(1.0, belt_speeds[0])
     values[system.index["sign"]] = sign
