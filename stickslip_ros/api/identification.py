@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from typing_extensions import override
 
 from stickslip_ros.api.results import Parts, Result, Summary
+from stickslip_ros.bags.motion_reader import BagLayout
 from stickslip_ros.bags.text_table import TableFormat
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.identification.findings import Findings, notes_on
@@ -203,6 +204,12 @@ def identify(
     end: float = float("inf"),
     namespace: str | None = None,
     belt_speed: float | None = None,
+    joint: str | None = None,
+    belt_joint: str | None = None,
+    states_topic: str | None = None,
+    force_topic: str | None = None,
+    time: str = "header",
+    force: str = "topic",
     decimal: str | None = None,
     skip: int | None = None,
     encoding: str | None = None,
@@ -227,6 +234,8 @@ def identify(
         ROS namespace of the drive, where a bag holds several.
     belt_speed : float, optional
         Belt speed, m/s, in place of what the recordings have.
+    joint, belt_joint, states_topic, force_topic, time, force : optional
+        Where bags of another machine have motion and force, as for `read_bag`.
     decimal, skip, encoding : optional
         Form of the tables, as for `read_table`.
     check : sequence of Path or str, optional
@@ -268,6 +277,7 @@ def identify(
         namespace=namespace,
         belt_speed=belt_speed,
         form=TableFormat(decimal, skip, encoding),
+        layout=BagLayout(joint, belt_joint, states_topic, force_topic, time, force),
     )
     found = identify_recordings([read[path] for path in fitted], law, dict(fixed or {}), progress)
     predicted = {

@@ -11,6 +11,7 @@ from typing_extensions import override
 
 from stickslip_ros.api.results import Parts, Quantity, Result, Summary, Table, TabularResult
 from stickslip_ros.arrays import FloatArray
+from stickslip_ros.bags.motion_reader import BagLayout
 from stickslip_ros.bags.reader import Recording
 from stickslip_ros.bags.report import report_of_recording
 from stickslip_ros.bags.table_file import is_table
@@ -172,6 +173,12 @@ def read_bag(
     end: float = float("inf"),
     namespace: str | None = None,
     belt_speed: float | None = None,
+    joint: str | None = None,
+    belt_joint: str | None = None,
+    states_topic: str | None = None,
+    force_topic: str | None = None,
+    time: str = "header",
+    force: str = "topic",
     slips: SlipThreshold | None = None,
 ) -> RecordedRun:
     """Read a recorded run, and measure it.
@@ -185,7 +192,18 @@ def read_bag(
     namespace : str, optional
         ROS namespace of the drive, such as `/feed_drive`, where a bag holds several.
     belt_speed : float, optional
-        Belt speed, m/s, of a bag whose joint states have a single joint.
+        Belt speed, m/s, of a bag whose joint states have no belt.
+    joint, belt_joint : str, optional
+        Joints of the joint states that are the slide and the belt. By default these are `slide` and
+        `belt`, or the only joint is the slide.
+    states_topic, force_topic : str, optional
+        Topics of joint states and of forces: wrenches, numbers, arrays or joint commands.
+        `/commands[2]` is the second number of an array, `/joint_states[2]` the second of two
+        sources that take turns.
+    time : str, optional
+        `"header"`, the stamps in the messages, or `"log"`, the times of the recorder.
+    force : str, optional
+        `"topic"`, or `"effort"`: the force is the effort of the joint.
     slips : SlipThreshold, optional
         What counts as a slip; by default slips are not looked for.
 
@@ -215,6 +233,7 @@ def read_bag(
         end=end,
         namespace=namespace,
         belt_speed=belt_speed,
+        layout=BagLayout(joint, belt_joint, states_topic, force_topic, time, force),
         slips=slips,
     )
 

@@ -4,6 +4,7 @@ import argparse
 import os
 from collections.abc import Callable, Collection, Generator
 from contextlib import contextmanager
+from dataclasses import fields
 from functools import partial
 from math import inf, isfinite, nan, ulp
 from pathlib import Path
@@ -18,6 +19,7 @@ from stickslip_ros.scenarios import DEFAULT_NAMESPACE, LONGEST_NAMESPACE
 from stickslip_ros.text import shown
 
 if TYPE_CHECKING:
+    from stickslip_ros.bags.motion_reader import BagLayout
     from stickslip_ros.bags.text_table import TableFormat
     from stickslip_ros.scenarios.files import Scenario
 
@@ -119,6 +121,56 @@ def form_of(arguments: argparse.Namespace) -> "TableFormat":
     return TableFormat(arguments.decimal, arguments.skip, arguments.encoding)
 
 
+def add_bag_layout(parser: argparse.ArgumentParser) -> None:
+    """Add the options that say where recordings of other machines have motion and force."""
+    parser.add_argument(
+        "--joint",
+        metavar="NAME",
+        help="joint that is the slide (default: slide of slide and belt, or the only one)",
+    )
+    parser.add_argument("--belt-joint", metavar="NAME", help="joint that is the belt")
+    parser.add_argument(
+        "--belt-speed",
+        type=velocity,
+        metavar="V",
+        help="belt speed, m/s, for a table, in place of its belt velocity, and for a bag whose "
+        "joint states have no belt (default: a belt that is not recorded is at rest)",
+    )
+    parser.add_argument(
+        "--states-topic",
+        metavar="TOPIC",
+        help="full name of the topic of joint states (default: joint_states of the namespace); "
+        "with [2] behind it, of two sources that take turns the second",
+    )
+    parser.add_argument(
+        "--force-topic",
+        metavar="TOPIC",
+        help="full name of the topic of forces: wrenches, numbers, arrays, or joint commands with "
+        "efforts (default: control_force of the namespace); with [2] behind it, the second number "
+        "of an array",
+    )
+    parser.add_argument(
+        "--time",
+        choices=("header", "log"),
+        default="header",
+        help="time by the stamps in the messages, or by the log of the recorder (default: header)",
+    )
+    parser.add_argument(
+        "--force",
+        choices=("topic", "effort"),
+        default="topic",
+        help="force from a topic, or the effort of the joint, which in our bags is friction "
+        "(default: topic)",
+    )
+
+
+def layout_of(arguments: argparse.Namespace) -> "BagLayout":
+    """Return what the options say of bags of other machines."""
+    from stickslip_ros.bags.motion_reader import BagLayout
+
+    return BagLayout(**{each.name: getattr(arguments, each.name) for each in fields(BagLayout)})
+
+
 def columns_of(text: str | None) -> dict[str, str] | None:
     """Return the columns that --columns names, by quantity."""
     from stickslip_ros.bags.expressions import parts_of
@@ -139,13 +191,6 @@ def columns_of(text: str | None) -> dict[str, str] | None:
 
 def add_part(parser: argparse.ArgumentParser) -> None:
     """Add the options that say which part of a recording is used, and of which drive."""
-    parser.add_argument(
-        "--belt-speed",
-        type=velocity,
-        metavar="V",
-        help="belt speed, m/s, for a table, in place of its belt velocity, and for a bag whose "
-        "joint states have a single joint, whatever its name",
-    )
     parser.add_argument(
         "--from",
         dest="start",

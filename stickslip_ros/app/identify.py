@@ -6,12 +6,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from stickslip_ros.app.arguments import (
+    add_bag_layout,
     add_columns,
     add_json,
     add_part,
     check_new,
     columns_of,
     form_of,
+    layout_of,
     writing,
 )
 from stickslip_ros.app.output import progress_bar, tell
@@ -69,6 +71,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="predict a recording that is not fitted; can be repeated",
     )
     add_part(parser)
+    add_bag_layout(parser)
     parser.add_argument(
         "--out",
         type=Path,
@@ -105,6 +108,7 @@ def run(arguments: argparse.Namespace) -> None:
             namespace=arguments.namespace,
             belt_speed=arguments.belt_speed,
             **vars(form_of(arguments)),
+            **vars(layout_of(arguments)),
             check=arguments.check,
             progress=lambda law: progress(0.0, f"identifying: {law}"),
         )

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from stickslip_ros.app import INTERRUPTED
-from stickslip_ros.app.arguments import add_network, seconds
+from stickslip_ros.app.arguments import add_bag_layout, add_network, seconds
 from stickslip_ros.app.optional_dependencies import loading_ros
 from stickslip_ros.app.output import progress_bar, tell
 
@@ -13,7 +13,8 @@ DESCRIPTION = (
     "Publish the messages of a bag again, unchanged, under their recorded names and with their "
     "recorded spacing. The replay starts when one of the topics has a reader and no other reader "
     "has appeared for half a second. It ends with the bag, or at Ctrl-C. The stamps in the "
-    "messages are not changed."
+    "messages are not changed. With options that say where a bag of another machine has motion and "
+    "force, these are published as joint_states and control_force of our plant."
 )
 
 
@@ -67,6 +68,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="NODE",
         help="start when these nodes read the topics (default: when any node does)",
     )
+    add_bag_layout(parser)
     add_network(parser, "let other machines see the topics (default: loopback only)")
 
 
@@ -83,7 +85,11 @@ def run(arguments: argparse.Namespace) -> int:
         tell(f"{arguments.bag}: {', '.join(topics)}, {reach}, waiting {wait}")
 
     names = ("rate", "loop", "start", "duration", "topics", "clock", "wait_for")
-    parameters = {name: getattr(arguments, name) for name in names} | {"bag": str(arguments.bag)}
+    machine = ("joint", "belt_joint", "belt_speed", "states_topic", "force_topic", "time", "force")
+    given = {name: getattr(arguments, name) for name in (*names, *machine)} | {
+        "bag": str(arguments.bag)
+    }
+    parameters = {name: value for name, value in given.items() if value is not None}
     with progress_bar(f"replaying {arguments.bag}", None if arguments.loop else 1.0) as progress:
         interrupted = replay_bag(parameters, offering, progress)
     return INTERRUPTED if interrupted else 0

@@ -4,11 +4,13 @@ import argparse
 from pathlib import Path
 
 from stickslip_ros.app.arguments import (
+    add_bag_layout,
     add_columns,
     add_json,
     add_part,
     columns_of,
     form_of,
+    layout_of,
     length,
     seconds,
     speed,
@@ -60,6 +62,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="longest time in which a slip drops by as much, s (default: 0.1)",
     )
     add_part(parser)
+    add_bag_layout(parser)
     add_plot(
         parser,
         "motion, force, cycles and friction law of a bag; of several bags motion and force side by "
@@ -96,6 +99,7 @@ def run(arguments: argparse.Namespace) -> None:
             stick_speed=arguments.stick_speed,
             belt_speed=arguments.belt_speed,
             form=form_of(arguments),
+            layout=layout_of(arguments),
             slips=slips,
             kept=False,
             drawn=is_drawn(arguments),

@@ -6,7 +6,6 @@ import tempfile
 from collections import Counter, deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, closing
-from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple, Self, TypeVar
@@ -18,12 +17,14 @@ from stickslip_ros.bags.chunk import MessageBlock
 from stickslip_ros.bags.compression import unpack_file
 from stickslip_ros.bags.mcap_file import McapFile
 from stickslip_ros.bags.metadata import metadata_faults
+from stickslip_ros.bags.motion_reader import ANY_LAYOUT, BagLayout, MotionReader, NumberedTopic
 from stickslip_ros.errors import BagError
-from stickslip_ros.messages.cdr import Refused
+from stickslip_ros.messages.cdr import Refused, decode
 from stickslip_ros.messages.codec import (
+    FORCE_TYPES,
+    force_layouts,
     joint_states_in,
     references_in,
-    single_joint_states_in,
     wrenches_in,
 )
 from stickslip_ros.messages.topics import (
@@ -39,11 +40,14 @@ from stickslip_ros.messages.topics import (
 )
 from stickslip_ros.samples import ForceColumns, ReferenceColumns, SampleColumns
 from stickslip_ros.stamps import NANOSECONDS
-from stickslip_ros.text import printable
+from stickslip_ros.text import printable, quantity, shown
 
 _PACKED_SUFFIX = ".mcap.zstd"
 """Suffix of the files that rosbag2 compressed as a whole."""
 
+
+_NO_STATES = SampleColumns(np.empty(0, np.int64), *[np.empty(0)] * 5)
+_NO_FORCES = ForceColumns(np.empty(0, np.int64), np.empty(0))
 
 ColumnsT = TypeVar("ColumnsT", SampleColumns, ForceColumns, ReferenceColumns)
 _Decode = Callable[[bytes, IntArray, IntArray], tuple[ColumnsT, Refused]]
@@ -84,8 +88,9 @@ class Recording:
         ROS namespace of the drive whose columns are read, such as `/feed_drive`; None if the bag
         holds only one drive.
     belt_speed : float or None
-        Belt speed, m/s, for joint states of a single joint, the slide. By default joint states must
-        have the belt, too.
+        Belt speed, m/s, where the joint states have no belt; None: the belt counts as at rest.
+    layout : BagLayout, optional
+        Where a bag of another machine has motion and force; by default it is found.
 
     Raises
     ------
@@ -105,12 +110,18 @@ class Recording:
     """
 
     def __init__(
-        self, path: Path | str, namespace: str | None = None, *, belt_speed: float | None = None
+        self,
+        path: Path | str,
+        namespace: str | None = None,
+        *,
+        belt_speed: float | None = None,
+        layout: BagLayout = ANY_LAYOUT,
     ) -> None:
         self.path = Path(path)
-        self._belt_speed = belt_speed
-        self._slide = _SlideStates(belt_speed)
+        self._belt_speed, self._layout = belt_speed, layout
         self._namespace = namespace
+        self._motion: MotionReader | None = None
+        self._timed_by_log = ""
         self._unreadable: list[str] = []
         self._refused: Counter[str] = Counter()
         self._reasons: dict[str, str] = {}
@@ -129,8 +140,15 @@ class Recording:
         }
         """Types by name, such as `sensor_msgs/msg/JointState` by `/feed_drive/joint_states`."""
 
-    notes = ()
-    """Sentences on what other recordings, such as tables, do not have."""
+    @property
+    def notes(self) -> Sequence[str]:
+        """Sentences on how the motion of another machine was read so far, and what it lacks."""
+        notes = [] if self._motion is None else self._motion.notes
+        if self._timed_by_log:
+            notes.append(
+                f"the forces on {self._timed_by_log} have no stamps: their log times count"
+            )
+        return notes
 
     @property
     def complete(self) -> bool:
@@ -157,8 +175,7 @@ class Recording:
     @cached_property
     def joint_states(self) -> SampleColumns:
         """All joint states; raises BagError as `blocks` does."""
-        self._slide = _SlideStates(self._belt_speed)
-        return self._slide.completed(self._whole(JOINT_STATES, self._slide.decode))
+        return self._states_and_efforts[0]
 
     @cached_property
     def true_joint_states(self) -> SampleColumns:
@@ -176,7 +193,12 @@ class Recording:
     @cached_property
     def control_forces(self) -> ForceColumns:
         """All control forces that were sent; raises BagError as `blocks` does."""
-        return self._whole(CONTROL_FORCE, wrenches_in)
+        if self._layout.force == "effort":
+            return self._states_and_efforts[1]
+        name = self._topic(CONTROL_FORCE)
+        blocks = [self._forces(name, block, ids) for block, ids in self._blocks(name)]
+        self._check_clocks()
+        return _NO_FORCES.followed_by(*blocks)
 
     @cached_property
     def applied_disturbances(self) -> ForceColumns:
@@ -204,6 +226,13 @@ class Recording:
         """
         return self._topic(DROPPED_FORCE) != ""
 
+    def name_of(self, topic: Topic[Any]) -> str:
+        """Return the full name that a topic of the drive has, whether the bag has it or not.
+
+        Raises BagError if the bag holds several drives and no namespace was given.
+        """
+        return self._prefix + topic.name
+
     def blocks(self, least: int = 1) -> Iterator[RunBlock]:
         """Yield joint states, control forces and dropped forces in file order, chunk by chunk.
 
@@ -227,13 +256,17 @@ class Recording:
             fails to read it.
         """
         states, forces, dropped = map(self._topic, (JOINT_STATES, CONTROL_FORCE, DROPPED_FORCE))
-        self._slide = slide = _SlideStates(self._belt_speed)
+        by_effort = self._layout.force == "effort"
+        if by_effort:
+            forces = ""
+        self._motion = motion = self._motion_reader(states)
         gathered: list[RunBlock] = []
         count = 0
         for messages, channels in self._blocks(states, forces, dropped):
+            samples, efforts = self._states(motion, states, messages, channels)
             block = RunBlock(
-                slide.completed(self._decoded(states, messages, channels, slide.decode)),
-                self._decoded(forces, messages, channels, wrenches_in),
+                samples,
+                efforts if by_effort else self._forces(forces, messages, channels),
                 self._decoded(dropped, messages, channels, wrenches_in),
             )
             gathered.append(block)
@@ -241,6 +274,7 @@ class Recording:
             if count >= least:
                 yield _joined_blocks(gathered)
                 gathered, count = [], 0
+        self._check_clocks()
         if gathered:
             yield _joined_blocks(gathered)
 
@@ -351,6 +385,8 @@ class Recording:
     @cached_property
     def _prefix(self) -> str:
         """Prefix of the names of the drive's topics; BagError if there are several drives."""
+        if self._layout.states_topic is not None:
+            return NumberedTopic.of(self._layout.states_topic).name.rpartition("/")[0] + "/"
         if self._namespace is not None:
             return f"/{self._namespace.strip('/')}/".replace("//", "/")
         for topic in RECORDED_TOPICS:
@@ -370,9 +406,26 @@ class Recording:
         return "/"
 
     def _topic(self, topic: Topic[Any]) -> str:
-        """Return the name of a topic of the drive, "" if the bag has none."""
-        name = self._prefix + topic.name
-        return name if self.topics.get(name) == topic.type_name else ""
+        """Return the name of a topic of the drive, "" if the bag has none.
+
+        Raises BagError if the topic that was chosen is not there, or of another type.
+        """
+        chosen = {JOINT_STATES: "states_topic", CONTROL_FORCE: "force_topic"}.get(topic, "")
+        given = getattr(self._layout, chosen, None)
+        types = FORCE_TYPES if topic == CONTROL_FORCE else (topic.type_name,)
+        if given is None:
+            name = self._prefix + topic.name
+            return name if self.topics.get(name) in types else ""
+        name = NumberedTopic.of(given).name
+        if self.topics.get(name) not in types:
+            allowed = [each for each, kind in self.topics.items() if kind in types]
+            raise BagError(
+                printable(
+                    f"{chosen} = {shown(name)} is refused: topics of the bag {self.path} that are "
+                    f"{', '.join(types)} are {', '.join(sorted(allowed)) or 'none'}"
+                )
+            )
+        return name
 
     def _blocks(self, *topics: str) -> Iterator[tuple[MessageBlock, dict[str, list[int]]]]:
         """Yield the messages of these topics chunk by chunk, and the channels of each topic."""
@@ -387,7 +440,66 @@ class Recording:
     @property
     def velocity_estimated(self) -> bool:
         """Whether velocities that are not recorded were estimated from the positions so far."""
-        return self._slide.estimated
+        return self._motion is not None and self._motion.estimated
+
+    def _motion_reader(self, topic: str) -> MotionReader:
+        return MotionReader(topic, self._layout, self._belt_speed, str(self.path))
+
+    @cached_property
+    def _states_and_efforts(self) -> tuple[SampleColumns, ForceColumns]:
+        """All joint states, and their efforts if these are the forces."""
+        name = self._topic(JOINT_STATES)
+        self._motion = motion = self._motion_reader(name)
+        read = [self._states(motion, name, block, ids) for block, ids in self._blocks(name)]
+        states, efforts = zip(*read, strict=True) if read else ((), ())
+        return _NO_STATES.followed_by(*states), _NO_FORCES.followed_by(*efforts)
+
+    def _states(
+        self, motion: MotionReader, topic: str, block: MessageBlock, channels: dict[str, list[int]]
+    ) -> tuple[SampleColumns, ForceColumns]:
+        messages = block.on(channels.get(topic, []))
+        states, efforts, refused = motion.read(
+            messages.data, messages.begin, messages.end, messages.log_time
+        )
+        self._note(topic, refused)
+        return states, efforts
+
+    def _forces(
+        self, topic: str, block: MessageBlock, channels: dict[str, list[int]]
+    ) -> ForceColumns:
+        messages, layout = block.on(channels.get(topic, [])), self._layout
+        number = NumberedTopic.of(layout.force_topic or "").number
+        kind = self.topics.get(topic, CONTROL_FORCE.type_name)
+        layout_of = force_layouts(layout.joint, number)[kind]
+        rows, stamp, values, refused = decode(
+            messages.data, messages.begin, messages.end, layout_of, 1
+        )
+        self._note(topic, refused)
+        force, log_time = values[0], messages.log_time[rows]
+        if layout.time == "log":
+            stamp = log_time
+        elif layout.force_topic or kind != CONTROL_FORCE.type_name:
+            if (unstamped := stamp == 0).any():
+                self._timed_by_log = topic
+                stamp = np.where(unstamped, log_time, stamp)
+            known = np.isfinite(force)  # commands of other joints tell nothing
+            stamp, force = stamp[known], force[known]
+        return ForceColumns(stamp, force)
+
+    def _check_clocks(self) -> None:
+        """Refuse log times of forces beside stamps of another clock."""
+        apart = self._motion and self._motion.clock_offset
+        if self._timed_by_log and apart and abs(apart) > NANOSECONDS:
+            raise BagError(
+                f"the forces on {self._timed_by_log} have no stamps, and those of the joint states "
+                f"are {quantity(abs(apart) / NANOSECONDS, 's')} from their log times: --time log "
+                "takes the log times of both"
+            )
+
+    def _note(self, topic: str, refused: Refused) -> None:
+        if refused.number > 0:
+            self._refused[topic] += refused.number
+            self._reasons.setdefault(topic, refused.reason)
 
     def _decoded(
         self,
@@ -398,9 +510,7 @@ class Recording:
     ) -> ColumnsT:
         messages = block.on(channels.get(topic, []))
         columns, refused = decode(messages.data, messages.begin, messages.end)
-        if refused.number > 0:
-            self._refused[topic] += refused.number
-            self._reasons.setdefault(topic, refused.reason)
+        self._note(topic, refused)
         return columns
 
     def _whole(self, topic: Topic[Any], decode: _Decode[ColumnsT]) -> ColumnsT:
@@ -411,38 +521,6 @@ class Recording:
             nothing = np.empty(0, np.int64)
             blocks = [decode(b"", nothing, nothing)[0]]
         return blocks[0].followed_by(*blocks[1:])
-
-
-class _SlideStates:
-    """Decodes joint states, and completes those of a slide alone, block by block."""
-
-    def __init__(self, belt_speed: float | None) -> None:
-        """Take the belt speed (m/s) of a slide alone; None where the belt is a joint, too."""
-        self.decode = joint_states_in if belt_speed is None else single_joint_states_in
-        self._belt_speed = belt_speed
-        self._last: SampleColumns | None = None
-        self.estimated = False
-
-    def completed(self, samples: SampleColumns) -> SampleColumns:
-        """Return the samples with the velocity of the belt, and velocities from the positions.
-
-        A velocity that is not recorded is the difference to the position before it.
-        """
-        if self._belt_speed is None or len(samples) == 0:
-            return samples
-        unknown = np.isnan(samples.velocity)
-        velocity, belt = samples.velocity.copy(), samples.belt_velocity.copy()
-        belt[np.isnan(belt)] = self._belt_speed
-        if unknown.any():
-            self.estimated = True
-            whole = samples if self._last is None else self._last.followed_by(samples)
-            with np.errstate(divide="ignore", invalid="ignore"):
-                steps = np.diff(whole.position) / (np.diff(whole.stamp) / NANOSECONDS)
-            if self._last is None:
-                steps = np.append(steps[:1] if len(steps) else [0.0], steps)
-            velocity[unknown] = steps[unknown]
-        self._last = samples[-1:]
-        return replace(samples, velocity=velocity, belt_velocity=belt)
 
 
 def _joined_blocks(blocks: Sequence[RunBlock]) -> RunBlock:

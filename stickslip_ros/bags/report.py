@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from stickslip_ros.arrays import BoolArray, IntArray
+from stickslip_ros.bags.motion_reader import ANY_LAYOUT, BagLayout
 from stickslip_ros.bags.reader import Recording
 from stickslip_ros.bags.table_file import LONGEST, TableRecording, is_table, read_table
 from stickslip_ros.bags.text_table import ANY_FORM, TableFormat
@@ -41,6 +42,7 @@ def report_of_recording(
     stick_speed: float | None = None,
     belt_speed: float | None = None,
     form: TableFormat = ANY_FORM,
+    layout: BagLayout = ANY_LAYOUT,
     slips: SlipThreshold | None = None,
     observer: RunObserver | None = None,
     take: Callable[[SampleColumns | ForceColumns], None] = lambda _: None,
@@ -69,10 +71,12 @@ def report_of_recording(
     stick_speed : float or None
         Largest relative speed of a slide that sticks, m/s; None: as the analyzer used.
     belt_speed : float or None
-        Belt speed, m/s, of a bag whose joint states have a single joint, or in place of a column
-        of a table.
+        Belt speed, m/s, of a bag whose joint states have no belt, or in place of a column of a
+        table.
     form : TableFormat, optional
         What is known of the form of a table; the rest is found.
+    layout : BagLayout, optional
+        Where a bag of another machine has motion and force; the rest is found.
     slips : SlipThreshold or None
         What counts as a slip; None: slips are not looked for.
     observer : RunObserver or None
@@ -109,7 +113,9 @@ def report_of_recording(
         recording = (
             read_table(path, columns, belt_speed, form)
             if (is_table(path) if table is None else table)
-            else opened.enter_context(Recording(path, namespace, belt_speed=belt_speed))
+            else opened.enter_context(
+                Recording(path, namespace, belt_speed=belt_speed, layout=layout)
+            )
         )
         meter = RunMeter(
             window or _window_at_recording(recording),
@@ -133,8 +139,8 @@ def report_of_recording(
             raise BagError(
                 f"the bag {path} holds no {JOINT_STATES.name} and no {CONTROL_FORCE.name}"
                 + (f" in {namespace}" if namespace else "")
-                + f" that can be read; its topics are: {topics or 'none'}"
-                + "".join(f"; {sentence}" for sentence in missing)
+                + f" that can be read; its topics are: {topics or 'none'}: --states-topic and "
+                "--force-topic choose others" + "".join(f"; {sentence}" for sentence in missing)
             )
     report = run.report(path)
     notes = [*recording.notes, *report["notes"]]

@@ -53,7 +53,8 @@ class AxisTask:
     def __init__(self, records: Sequence[Record], fixed: Mapping[str, float]) -> None:
         if all(not record.held_force.any() for record in records):
             given = any(record.force is not None for record in records)
-            hint = "" if given else "; name its column, as in --columns force=u"
+            hint = "" if given else "; name its column, as in --columns force=u, or of a "
+            "bag its --force-topic, or --force effort"
             raise InvalidInputError(
                 f"{'the recorded force is always 0' if given else 'no force is recorded'}: without "
                 f"a force neither mass nor friction of an axis is identifiable{hint}"

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray, IntArray
+from stickslip_ros.bags.motion_reader import ANY_LAYOUT, BagLayout
 from stickslip_ros.bags.reader import Recording
 from stickslip_ros.bags.table_file import (
     Table,
@@ -82,6 +83,7 @@ def read_records(
     namespace: str | None = None,
     belt_speed: float | None = None,
     form: TableFormat = ANY_FORM,
+    layout: BagLayout = ANY_LAYOUT,
     table: Table | None = None,
 ) -> ReadRecords:
     """Return what a bag, or a CSV or MAT file, has for identification.
@@ -89,7 +91,8 @@ def read_records(
     The part that is used is from `start` to `end`, s from the first sample. Each part without a
     longer gap is a record. `columns` and `form` are those for `read_table`, `table` is what was
     opened already. `namespace` is that of the drive, if a bag holds several. `belt_speed`, m/s,
-    is in place of the column of a table, and of a bag whose joint states have a single joint.
+    is in place of the column of a table, and of a bag whose joint states have no belt; `layout`
+    says where a bag of another machine has motion and force.
     Raises BagError if the recording cannot be read, and InvalidInputError if it lacks what
     identification needs.
     """
@@ -100,7 +103,7 @@ def read_records(
         stamp, found, notes = _of_table(table, columns, belt_speed)
         known: Mapping[str, float] = {}
     else:
-        stamp, found, known = _of_bag(path, namespace, belt_speed)
+        stamp, found, known, notes = _of_bag(path, namespace, belt_speed, layout)
     since = (stamp - stamp[0]) / NANOSECONDS
     part = (since >= start) & (since < end)
     if not part.any():
@@ -132,15 +135,16 @@ def _of_table(
 
 
 def _of_bag(
-    path: Path, namespace: str | None, belt_speed: float | None
-) -> tuple[IntArray, dict[str, FloatArray], dict[str, float]]:
-    with Recording(path, namespace, belt_speed=belt_speed) as recording:
+    path: Path, namespace: str | None, belt_speed: float | None, layout: BagLayout
+) -> tuple[IntArray, dict[str, FloatArray], dict[str, float], Sequence[str]]:
+    with Recording(path, namespace, belt_speed=belt_speed, layout=layout) as recording:
         states = recording.joint_states
         states = states[states.is_valid]
         if len(states) == 0:
             raise BagError(f"the bag {path} holds no joint states: the motion is unknown")
         forces, disturbances = recording.control_forces, recording.applied_disturbances
         references = recording.references
+        notes = recording.notes
         texts = recording.metadata("stickslip_ros/plant") or {}
     plant: dict[str, Any] = {}
     for name, text in texts.items():
@@ -157,7 +161,7 @@ def _of_bag(
         found["reference"] = _since(stamp, references.stamp, references.position, before=nan)
     delay = plant.get("force_delay", 0.0)
     known = {DELAY: float(delay)} if isinstance(delay, int | float) and delay > 0.0 else {}
-    return stamp, found, known
+    return stamp, found, known, notes
 
 
 def _held(forces: ForceColumns, stamp: IntArray, plant: Mapping[str, Any]) -> FloatArray:

@@ -101,15 +101,21 @@ class Decoder:
 class Layout:
     """The places of the values in one message, and in all messages of the same structure."""
 
-    def __init__(self, message: Decoder, stamp: int, values: Sequence[int | None]) -> None:
-        """Take the places of the stamp and of the values, None for a missing value."""
+    def __init__(self, message: Decoder, stamp: int | None, values: Sequence[int | None]) -> None:
+        """Take the places of the stamp and of the values, None for what is missing.
+
+        A missing stamp is 0.
+        """
         order = message.byte_order
         places = {str(name): place for name, place in enumerate(values) if place is not None}
+        self._stamped = stamp is not None
+        stamps = () if stamp is None else (("sec", "i4", stamp), ("nanosec", "u4", stamp + 4))
         self._table = np.dtype(
             {
-                "names": ["sec", "nanosec", *places],
-                "formats": [f"{order}i4", f"{order}u4", *[f"{order}f8"] * len(places)],
-                "offsets": [stamp, stamp + 4, *places.values()],
+                "names": [*(name for name, _, _ in stamps), *places],
+                "formats": [f"{order}{each}" for _, each, _ in stamps]
+                + [f"{order}f8"] * len(places),
+                "offsets": [*(place for _, _, place in stamps), *places.values()],
                 "itemsize": len(message.data),
             }
         )
@@ -137,6 +143,8 @@ class Layout:
         for row, name in zip(values, self._values, strict=True):
             if name is not None:
                 row[:] = table[name]
+        if not self._stamped:
+            return np.zeros(len(table), np.int64), values
         return table["sec"].astype(np.int64) * NANOSECONDS + table["nanosec"], values
 
     def read(self, message: bytes) -> tuple[int, list[float]]:
@@ -151,8 +159,8 @@ def decode(
     end: IntArray,
     layout_of: Callable[[bytes], Layout],
     value_count: int,
-) -> tuple[IntArray, FloatArray, Refused]:
-    """Return stamps and values of the readable messages, in order, and the refused ones."""
+) -> tuple[IntArray, IntArray, FloatArray, Refused]:
+    """Return which messages are readable, in order, their stamps and values, and the refused."""
     parts = [(np.empty(0, np.intp), np.empty(0, np.int64), np.empty((value_count, 0)))]
     refused = Refused(0, "")
     left = np.arange(len(begin))
@@ -176,7 +184,9 @@ def decode(
         parts.append((compared[taken], *layout.table(messages if fits.all() else messages[fits])))
         left = compared[~taken] if attempt < _STRUCTURES else left[1:]
     if len(parts) == 2:
-        return *parts[1][1:], refused
+        return *parts[1], refused
     places, stamps, values = zip(*parts, strict=True)
-    order = np.argsort(np.concatenate(places))
-    return np.concatenate(stamps)[order], np.concatenate(values, axis=1)[:, order], refused
+    rows = np.concatenate(places)
+    order = np.argsort(rows)
+    values = np.concatenate(values, axis=1)[:, order]
+    return rows[order], np.concatenate(stamps)[order], values, refused

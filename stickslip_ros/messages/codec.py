@@ -7,17 +7,26 @@ field.
 
 import reprlib
 import struct
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from math import isnan
 
 from stickslip_ros.arrays import IntArray
-from stickslip_ros.errors import MessageError
+from stickslip_ros.errors import BagError, MessageError
 from stickslip_ros.messages.cdr import LITTLE_ENDIAN, Decoder, Layout, Refused, decode, joined
 from stickslip_ros.samples import ForceColumns, Reference, ReferenceColumns, Sample, SampleColumns
 from stickslip_ros.stamps import NANOSECONDS
 
 SLIDE = "slide"
 BELT = "belt"
+
+FORCE_TYPES = (
+    "geometry_msgs/msg/WrenchStamped",
+    "std_msgs/msg/Float64",
+    "std_msgs/msg/Float64MultiArray",
+    "sensor_msgs/msg/JointState",
+)
+"""Types of messages that may hold a force."""
 
 _MOST_JOINTS = 1000
 """Messages with more joints are refused: decoding might take longer than a sample."""
@@ -140,7 +149,7 @@ def unpack_joint_state(data: bytes) -> Sample:
         if constants == _JOINT_STATE_CONSTANTS:
             stamp = sec * NANOSECONDS + nanosec
             return Sample(stamp, position, velocity, effort, belt_position, belt_velocity)
-    stamp, values = _joint_state_layout(data).read(data)
+    stamp, values = joint_state_layout(data).read(data)
     return Sample(stamp, *values)
 
 
@@ -187,18 +196,7 @@ def joint_state_columns(messages: Sequence[bytes]) -> tuple[SampleColumns, Refus
 
 def joint_states_in(data: bytes, begin: IntArray, end: IntArray) -> tuple[SampleColumns, Refused]:
     """Decode the serialized joint states `data[begin[i] : end[i]]`, as `joint_state_columns`."""
-    stamp, values, refused = decode(data, begin, end, _joint_state_layout, 5)
-    return SampleColumns(stamp, *values), refused
-
-
-def single_joint_states_in(
-    data: bytes, begin: IntArray, end: IntArray
-) -> tuple[SampleColumns, Refused]:
-    """Decode joint states as `joint_states_in`, also those of a single joint, which is the slide.
-
-    A single joint may lack its velocity. What a message lacks is NaN.
-    """
-    stamp, values, refused = decode(data, begin, end, _single_joint_layout, 5)
+    _, stamp, values, refused = decode(data, begin, end, joint_state_layout, 5)
     return SampleColumns(stamp, *values), refused
 
 
@@ -209,13 +207,29 @@ def wrench_columns(messages: Sequence[bytes]) -> tuple[ForceColumns, Refused]:
 
 def wrenches_in(data: bytes, begin: IntArray, end: IntArray) -> tuple[ForceColumns, Refused]:
     """Decode the serialized wrenches `data[begin[i] : end[i]]`, as `wrench_columns`."""
-    stamp, values, refused = decode(data, begin, end, _wrench_layout, 1)
+    _, stamp, values, refused = decode(data, begin, end, _wrench_layout, 1)
     return ForceColumns(stamp, *values), refused
+
+
+def force_layouts(joint: str | None, number: int | None) -> dict[str, Callable[[bytes], Layout]]:
+    """Return what finds the force in messages of each type, by the name of the type.
+
+    `joint` is the one whose effort is taken of joint commands, by default the slide or the only
+    one, and `number` the place in an array, from 1. A layout raises MessageError for a message that
+    has no force, and BagError if the joint or the number must be given.
+    """
+    layouts = (
+        _wrench_layout,
+        _number_layout,
+        partial(_array_layout, number=number),
+        partial(_command_layout, joint=joint),
+    )
+    return dict(zip(FORCE_TYPES, layouts, strict=True))
 
 
 def references_in(data: bytes, begin: IntArray, end: IntArray) -> tuple[ReferenceColumns, Refused]:
     """Decode the serialized references `data[begin[i] : end[i]]`; also return what is refused."""
-    stamp, values, refused = decode(data, begin, end, _reference_layout, 2)
+    _, stamp, values, refused = decode(data, begin, end, _reference_layout, 2)
     return ReferenceColumns(stamp, *values), refused
 
 
@@ -226,7 +240,8 @@ def _unpackable(kind: str, stamp: int, error: struct.error) -> MessageError:
     )
 
 
-def _joint_state_layout(data: bytes) -> Layout:
+def joint_state_layout(data: bytes) -> Layout:
+    """Return where a joint state has what `unpack_joint_state` reads; raises MessageError."""
     message = Decoder(data, "joint state")
     stamp = message.header_stamp()
     names = _joints(message, "joint state")
@@ -237,8 +252,7 @@ def _joint_state_layout(data: bytes) -> Layout:
     missing = [joint for joint in (SLIDE, BELT) if joint not in names]
     if missing:
         raise MessageError(
-            f"a joint state names the joints {shown}; {' and '.join(missing)} must be among them, "
-            "or the belt speed must be given for a single joint"
+            f"a joint state names the joints {shown}; {' and '.join(missing)} must be among them"
         )
     if (positions, velocities, efforts or len(names)) != (len(names),) * 3:
         raise MessageError(
@@ -259,22 +273,35 @@ def _joint_state_layout(data: bytes) -> Layout:
     )
 
 
-def _single_joint_layout(data: bytes) -> Layout:
+def joint_names(data: bytes) -> list[str]:
+    """Return the names of the joints in a serialized joint state; raises MessageError."""
+    message = Decoder(data, "joint state")
+    message.header_stamp()
+    return _joints(message, "joint state")
+
+
+def joint_layout(data: bytes, joint: str, belt: str | None) -> Layout:
+    """Return where a joint state has position, velocity and effort of a joint, and those of a belt.
+
+    What a message lacks is missing: each sequence may be empty, and a joint not among the names.
+    """
     message = Decoder(data, "joint state")
     stamp = message.header_stamp()
     names = _joints(message, "joint state")
-    if SLIDE in names and BELT in names:
-        return _joint_state_layout(data)
-    places = [message.doubles(message.count()) for _ in range(3)]
-    counts = [count for _, count in places]
-    if len(names) != 1 or counts[0] != 1 or not {*counts[1:]} <= {0, 1}:
+    sequences = [message.doubles(message.count()) for _ in range(3)]
+    counts = [count for _, count in sequences]
+    if not {*counts} <= {0, len(names)}:
         raise MessageError(
             f"a joint state of the joints {reprlib.repr(names)} has {counts[0]} positions, "
-            f"{counts[1]} velocities and {counts[2]} efforts; must be of {SLIDE} and {BELT}, or of "
-            "a single joint with one position, and one or no velocity and effort"
+            f"{counts[1]} velocities and {counts[2]} efforts; must be one for each joint, or none"
         )
-    values = [place if count else None for place, count in places]
-    return Layout(message, stamp, [*values, None, None])
+
+    def place(sequence: tuple[int, int], name: str | None) -> int | None:
+        start, count = sequence
+        return start + 8 * names.index(name) if count and name in names else None
+
+    own = [place(each, joint) for each in sequences]
+    return Layout(message, stamp, [*own, *(place(each, belt) for each in sequences[:2])])
 
 
 def _reference_layout(data: bytes) -> Layout:
@@ -309,6 +336,48 @@ def _wrench_layout(data: bytes) -> Layout:
     stamp = message.header_stamp()
     force, _ = message.doubles(6)
     return Layout(message, stamp, [force])
+
+
+def _number_layout(data: bytes) -> Layout:
+    message = Decoder(data, "number")
+    return Layout(message, None, [message.doubles(1)[0]])
+
+
+def _array_layout(data: bytes, number: int | None) -> Layout:
+    message = Decoder(data, "array")
+    for _ in range(message.count()):  # the dimensions: label, size and stride of each
+        message.string()
+        message.count()
+        message.count()
+    message.count()
+    start, count = message.doubles(message.count())
+    if number is None and count > 1:
+        raise BagError(
+            f"an array of forces has {count} numbers: --force-topic 'NAME[1]' takes the first"
+        )
+    if (number or 1) > count:
+        raise MessageError(f"an array of forces has {count} numbers, and no number {number or 1}")
+    return Layout(message, None, [start + 8 * ((number or 1) - 1)])
+
+
+def _command_layout(data: bytes, joint: str | None) -> Layout:
+    message = Decoder(data, "joint command")
+    stamp = message.header_stamp()
+    names = _joints(message, "joint command")
+    _, _, (start, efforts) = [message.doubles(message.count()) for _ in range(3)]
+    name = joint or (SLIDE if SLIDE in names or len(names) != 1 else names[0])
+    if joint is None and efforts == len(names) and name not in names:
+        raise BagError(
+            f"joint commands have efforts of {reprlib.repr(names)}: --joint must choose one"
+        )
+    if efforts == len(names):
+        return Layout(message, stamp, [start + 8 * names.index(name) if name in names else None])
+    if efforts == 1:  # joints without an effort interface have none
+        return Layout(message, stamp, [start])
+    raise MessageError(
+        f"a joint command of the joints {reprlib.repr(names)} has {efforts} efforts; must be one, "
+        "or one for each joint"
+    )
 
 
 def _header_layout(data: bytes) -> Layout:

@@ -365,7 +365,18 @@ class AnalyzerParameters(NodeParameters):
 
 
 @dataclass(frozen=True)
-class ReplayParameters(NodeParameters):
+class MachineParameters(NodeParameters):
+    """Parameters that say where joint states of other machines have the motion."""
+
+    joint: str = at_build(
+        "", "Joint that is the slide; empty: `slide` beside `belt`, or the only joint."
+    )
+    belt_joint: str = at_build("", "Joint that is the belt; empty: `belt`, if there is one.")
+    belt_speed: float = at_build(0.0, "Belt speed, where the joint states have no belt.", "m/s")
+
+
+@dataclass(frozen=True)
+class ReplayParameters(MachineParameters):
     """Parameters of the replay node, which scenarios do not contain."""
 
     bag: str = at_build("", "Bag to replay: its directory or one of its files.")
@@ -381,6 +392,18 @@ class ReplayParameters(NodeParameters):
     duration: float = at_build(inf, "Recorded time to replay.", "s", positive=True)
     topics: list[str] = at_build([], "Topics to replay; empty: all topics of the bag.")
     clock: bool = at_build(False, "Publish recorded time on /clock.")
+    states_topic: str = at_build("", "Topic of joint states of another machine; empty: found.")
+    force_topic: str = at_build("", "Topic of forces of another machine; empty: found.")
+    time: Literal["header", "log"] = at_build(
+        "header",
+        "Time of a bag of another machine: the stamps, or the log of the recorder.",
+        choices=("header", "log"),
+    )
+    force: Literal["topic", "effort"] = at_build(
+        "topic",
+        "Force of another machine: of a topic, or the effort of the joint.",
+        choices=("topic", "effort"),
+    )
 
 
 CONTROLLER_PARAMETERS: dict[str, ControllerParameters] = {

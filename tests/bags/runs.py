@@ -35,8 +35,18 @@ STAMPS = [5 * SECOND + n * SECOND // 100 for n in range(1000)]
 _TYPES = {topic.name: topic.type_name for topic in TOPICS}
 
 
-def write_bag(directory, messages, *, topics=(), tables=MappingProxyType({}), flush_every=0):
+def write_bag(
+    directory,
+    messages,
+    *,
+    topics=(),
+    tables=MappingProxyType({}),
+    types=MappingProxyType({}),
+    flush_every=0,
+):
     """Record messages: topic, stamp (ns) and data of each. A topic of no name of ours is a number.
+
+    `types` has the types of other topics.
 
     The `topics` are in the bag even if they have no message, and the `tables` of metadata by name.
     """
@@ -46,6 +56,7 @@ def write_bag(directory, messages, *, topics=(), tables=MappingProxyType({}), fl
         def channel(topic):
             if topic not in channels:
                 kind = _TYPES.get(topic.rpartition("/")[2], "std_msgs/msg/Float64")
+                kind = types.get(topic, kind)
                 channels[topic] = recorder.add_topic(topic, kind, 10)
             return channels[topic]
 

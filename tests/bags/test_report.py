@@ -114,13 +114,6 @@ def test_a_bag_of_nothing_of_ours_is_refused_with_its_topics(tmp_path):
         report_of_recording(tmp_path / "bag", namespace="/b")
 
 
-def test_joint_states_of_a_robot_without_slide_are_refused_with_the_reason(tmp_path):
-    elbow = serialize_message(JointState(name=["elbow"], position=[1.0], velocity=[0.0]))
-    write_bag(tmp_path / "bag", [(STATES, stamp, elbow) for stamp in range(5)])
-    with pytest.raises(BagError, match=r"5 messages .*joints \['elbow'\]; slide and belt must be"):
-        report_of_recording(tmp_path / "bag")
-
-
 def test_other_recorders_layouts_and_messages_give_the_same_report(tmp_path):
     """Joints in another order and among others, no efforts, late log times, other topics."""
     record(tmp_path / "bag", forces=[])

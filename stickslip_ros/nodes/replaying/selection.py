@@ -1,7 +1,9 @@
 """The part of a bag to replay: topics, how they are published, and messages."""
 
 from collections.abc import Iterator, Mapping
-from math import inf
+from dataclasses import fields
+from math import inf, nan
+from operator import itemgetter
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -19,9 +21,11 @@ from rclpy.validate_full_topic_name import validate_full_topic_name
 
 from stickslip_ros.bags.definitions import message_definition
 from stickslip_ros.bags.metadata import offered_profiles
+from stickslip_ros.bags.motion_reader import ANY_LAYOUT, BagLayout
 from stickslip_ros.bags.reader import Recording
 from stickslip_ros.errors import BagError, InvalidInputError
-from stickslip_ros.messages.topics import CLOCK, DEEP, JOINT_STATES, RECORDED
+from stickslip_ros.messages.codec import pack_joint_state, pack_wrench
+from stickslip_ros.messages.topics import CLOCK, CONTROL_FORCE, DEEP, JOINT_STATES, RECORDED
 from stickslip_ros.nodes.base.ros_topics import message_class
 from stickslip_ros.nodes.replaying.player import JITTER, Message, Timeline
 from stickslip_ros.scenarios.parameters import ReplayParameters
@@ -38,6 +42,9 @@ class Selection:
     the bag. A message that was logged earlier than the messages before it belongs to its own log
     time, or to the start of the bag. If log times go back by more than JITTER, recorded time
     continues from there. Without start and duration, the part is the whole bag.
+
+    Where parameters say where a bag of another machine has motion and force, these are replayed as
+    those of our plant, by their stamps.
     """
 
     def __init__(self, parameters: ReplayParameters, source: str) -> None:
@@ -56,8 +63,17 @@ class Selection:
         self._parameters = parameters
         if not parameters.bag:
             raise self._refused("bag = ''", "must be the path of a bag")
-        with Recording(Path(parameters.bag)) as recording:
-            first = next(recording.messages(*recording.topics), None)
+        given = {each.name: getattr(parameters, each.name) for each in fields(BagLayout)}
+        self._layout = BagLayout(**{name: value for name, value in given.items() if value})
+        self._converted = self._layout != ANY_LAYOUT or parameters.belt_speed != 0.0
+        with self._opened() as recording:
+            self._types = recording.topics
+            if self._converted:
+                self._types = {
+                    recording.name_of(topic): topic.type_name
+                    for topic in (JOINT_STATES, CONTROL_FORCE)
+                }
+            first = next(self._recorded(recording, *self._types), None)
             if first is None:
                 raise BagError(f"the bag {recording.path} holds no messages")
             self.first: int = first[1]
@@ -69,9 +85,37 @@ class Selection:
 
     def messages(self) -> Iterator[Message]:
         """Yield the messages to replay in recorded order; raises BagError if reading fails."""
-        with Recording(Path(self._parameters.bag)) as recording:
+        with self._opened() as recording:
             yield from self._part(recording)
-            self.lacking = recording.missing
+            self.lacking = [*recording.missing, *recording.notes]
+
+    def _opened(self) -> Recording:
+        own = self._parameters
+        return Recording(Path(own.bag), belt_speed=own.belt_speed, layout=self._layout)
+
+    def _recorded(self, recording: Recording, *topics: str) -> Iterator[Message]:
+        """Yield the messages of the bag, or its motion and forces as those of our plant."""
+        if not self._converted:
+            yield from recording.messages(*topics)
+            return
+        states, forces = self._types
+        for block in recording.blocks():
+            motion, control = (
+                [column.tolist() for column in vars(table).values()]
+                for table in (block.joint_states, block.control_forces)
+            )
+            messages: list[Message] = []
+            if states in topics:
+                messages += [
+                    (states, stamp, pack_joint_state(stamp, (x, belt), (v, belt_v), (nan, nan)))
+                    for stamp, x, v, _, belt, belt_v in zip(*motion, strict=True)
+                ]
+            if forces in topics:
+                messages += [
+                    (forces, stamp, pack_wrench(stamp, force))
+                    for stamp, force in zip(*control, strict=True)
+                ]
+            yield from sorted(messages, key=itemgetter(1))
 
     def _part(self, recording: Recording) -> Iterator[Message]:
         begin = round(self._parameters.start * NANOSECONDS)
@@ -87,22 +131,22 @@ class Selection:
         """Yield each message with its recorded time, ns, and the newest time so far."""
         timeline = Timeline()
         timeline.go_to(self.first)
-        for message in recording.messages(*topics):
+        for message in self._recorded(recording, *topics):
             timeline.go_to(message[1])
             elapsed = max(timeline.elapsed_at(message[1]), 0)
             yield message, elapsed, timeline.elapsed_at(timeline.now)
 
     def _find_topics(self, recording: Recording) -> None:
         asked = self._parameters.topics
-        if any(topic not in recording.topics for topic in asked):
-            known = ", ".join(sorted(recording.topics))
+        if any(topic not in self._types for topic in asked):
+            known = ", ".join(sorted(self._types))
             raise self._refused(
                 f"topics = {asked}", f"the topics of the bag {recording.path} are {known}"
             )
-        for topic in asked or self._worth_replaying(recording):
+        for topic in asked or self._worth_replaying():
             try:
                 validate_full_topic_name(topic)
-                kind = installed_message_class(recording.topics[topic])
+                kind = installed_message_class(self._types[topic])
             except (BagError, InvalidTopicNameException) as error:
                 reason = str(error).splitlines()[0]
                 self.left_out.append(printable(f"{topic} is omitted: {reason}"))
@@ -112,18 +156,18 @@ class Selection:
             reasons = "; ".join(self.left_out)
             raise BagError(f"no topic of the bag {recording.path} can be replayed: {reasons}")
 
-    def _worth_replaying(self, recording: Recording) -> list[str]:
+    def _worth_replaying(self) -> list[str]:
         """Omit what a recorder sent to its plant, and a second clock."""
-        states = [topic for topic in recording.topics if topic.endswith(f"/{JOINT_STATES.name}")]
+        states = [topic for topic in self._types if topic.endswith(f"/{JOINT_STATES.name}")]
         live = {topic.removesuffix(JOINT_STATES.name) + RECORDED.name for topic in states}
         if self._parameters.clock:
             live.add(CLOCK.name)
-        return [topic for topic in recording.topics if topic not in live]
+        return [topic for topic in self._types if topic not in live]
 
     def _check_part(self, recording: Recording) -> None:
         if next(self._part(recording), None) is not None:
             return
-        length = max(elapsed for _, elapsed, _ in self._timed(recording, *recording.topics))
+        length = max(elapsed for _, elapsed, _ in self._timed(recording, *self._types))
         raise self._refused(
             f"start = {self._parameters.start} s, duration = {self._parameters.duration} s",
             f"nothing was recorded then on {', '.join(self.topics)}; "
@@ -132,6 +176,8 @@ class Selection:
 
     def _known_length(self, recording: Recording) -> float:
         accounts = [file.statistics for file in recording.files]
+        if self._converted:  # its time is that of the stamps
+            return self._parameters.duration
         known = [account for account in accounts if account is not None and account.message_count]
         rest = inf
         if known and None not in accounts:

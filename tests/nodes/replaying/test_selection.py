@@ -11,11 +11,13 @@ from rclpy.qos import (
     QoSProfile,
     ReliabilityPolicy,
 )
+from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64
 
 from stickslip_ros.bags.recorder import offered_qos
 from stickslip_ros.errors import BagError, InvalidInputError
-from stickslip_ros.messages.codec import pack_header
+from stickslip_ros.messages.codec import pack_header, unpack_joint_state, unpack_wrench
 from stickslip_ros.messages.topics import DEEP, JOINT_STATES
 from stickslip_ros.nodes.base.ros_topics import qos_profile
 from stickslip_ros.nodes.replaying.player import JITTER
@@ -127,6 +129,26 @@ def test_topics_of_live_nodes_only_are_omitted_unless_requested(tmp_path: Path) 
     assert set(selection(bag).topics) == set(TOPICS) - {RECORDED}
     assert set(selection(bag, clock=True).topics) == set(TOPICS) - {RECORDED, "/clock"}
     assert set(selection(bag, topics=[RECORDED]).topics) == {RECORDED}
+
+
+def test_the_motion_of_another_machine_is_that_of_our_plant(tmp_path: Path) -> None:
+    messages: list[tuple[str, int, bytes]] = []
+    for number in range(3):
+        state = JointState(name=["arm", "axis"], position=[9.0, 1.0 * number], velocity=[0.0, 2.0])
+        state.header.stamp.sec = 10 + number
+        command = serialize_message(Float64(data=5.0 + number))
+        messages += [("/m/joint_states", (10 + number) * SECOND, serialize_message(state))]
+        messages += [("/m/command", (10 + number) * SECOND, command)]
+    write_bag(tmp_path / "bag", messages)
+    machine = {"joint": "axis", "belt_speed": 0.04, "force_topic": "/m/command"}
+    part = selection(str(tmp_path / "bag"), start=1.0, **machine)
+    assert set(part.topics) == {"/m/joint_states", "/m/control_force"}
+    sent = [(topic, data) for topic, _, data in part.messages()]
+    samples = [unpack_joint_state(data) for topic, data in sent if topic == "/m/joint_states"]
+    forces = [unpack_wrench(data) for topic, data in sent if topic == "/m/control_force"]
+    assert [sample[:3] for sample in samples] == [(11 * SECOND, 1.0, 2.0), (12 * SECOND, 2.0, 2.0)]
+    assert samples[0].belt_velocity == 0.04
+    assert forces == [(11 * SECOND, 6.0), (12 * SECOND, 7.0)]
 
 
 def foreign_bag(file: Path, types: dict[str, str]) -> str:
