@@ -32,6 +32,7 @@ from stickslip_ros.app.output import print_json, print_values, progress_bar, tel
 from stickslip_ros.errors import BagError, InvalidInputError, RunError
 from stickslip_ros.installed_packages import find_executable
 from stickslip_ros.nodes.base.machine import NamespaceInUseError
+from stickslip_ros.physics.measures.timing import Timing
 from stickslip_ros.scenarios import DEFAULT_NAMESPACE, Pace
 from stickslip_ros.text import number_in
 
@@ -131,7 +132,7 @@ def run(arguments: argparse.Namespace) -> int:
     else:
         report, drive = results["report"], scenario.plant.as_drive()
         print_values(scenario.name, {"": {**report, **results}}, {"": Units.for_drive(drive)})
-        for sentence in report_sentences(report, drive):
+        for sentence in [*report_sentences(report, drive), *_limit_of_machine(scenario, results)]:
             print(sentence)
     if not results["report"]["complete"]:
         raise RunError(f"the bag {bag} could not be written to its end")
@@ -139,6 +140,21 @@ def run(arguments: argparse.Namespace) -> int:
         tell(f"stickslip run: interrupted: the bag {bag} is closed; the nodes have ended")
         return INTERRUPTED
     return 0
+
+
+def _limit_of_machine(scenario: "Scenario", results: Mapping[str, Any]) -> list[str]:
+    """Return, after a run that was not in time, what a loop that only sleeps misses here."""
+    from stickslip_ros.nodes.base.scheduling import share_missed
+
+    plant = scenario.plant
+    timing = Timing(*(results[name] for name in Timing._fields))
+    if plant.pace is Pace.LOCKSTEP or not timing.warning():
+        return []
+    share = share_missed(plant.period / plant.real_time_factor)
+    return [
+        f"a loop that only sleeps until each sample missed {100.0 * share:.2g} % of its deadlines "
+        "on this machine just now"
+    ]
 
 
 def _announcement(scenario: "Scenario", bag: Path, *, composed: bool) -> str:

@@ -302,7 +302,7 @@ CONTROLLERS = LawFamily(
     CONTROL_LAWS,
     reserved={
         "law", "node", "reference", "control_law", "as_controller",
-        "autostart", "wait_for", "use_sim_time",
+        "autostart", "wait_for", "use_sim_time", "thread_priority", "cpu_affinity", "lock_memory",
         *dir(ParameterGroup),
     },
     one_namespace=False,

@@ -69,6 +69,27 @@ class NodeParameters(ParameterGroup):
         [], "Nodes that must subscribe to this node's topics before it activates."
     )
     use_sim_time: bool = constant(False, "Take ROS time from /clock.")
+    thread_priority: int = constant(
+        0,
+        "Priority (SCHED_FIFO) of the threads of the node's process; 0: ordinary scheduling.",
+        whole=True,
+        changes=Changes.AT_REST,
+        at_least=0,
+        at_most=99,
+    )
+    cpu_affinity: int = constant(
+        -1,
+        "Processor on which the node's process runs; -1: any.",
+        whole=True,
+        changes=Changes.AT_REST,
+        at_least=-1,
+        at_most=4095,
+    )
+    lock_memory: bool = constant(
+        False,
+        "Keep the memory of the node's process from being paged out.",
+        changes=Changes.AT_REST,
+    )
 
     @override
     def completed(self, prefix: str, curves: dict[str, Pairs]) -> Self:

@@ -9,13 +9,13 @@ import stickslip_ros as ss
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.scenarios.keywords import keyword_of, parameter_of
-from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
+from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, NodeParameters
 from stickslip_ros.studies.study import COLUMNS
 
 EVERY = [f"{node}.{name}" for node, model in NODE_PARAMETERS.items() for name in model.known]
 OF_PAPER = load_scenario("paper").nodes
 SHIPPED = Path(__file__).parents[2] / "config"
-SHARED = {"autostart", "wait_for", "use_sim_time"}
+SHARED = set(NodeParameters().known)
 
 
 def test_a_keyword_is_the_text_that_it_stands_for() -> None:

@@ -28,6 +28,7 @@ from stickslip_ros.nodes.base.ros_topics import (
     message_class,
     qos_profile,
 )
+from stickslip_ros.nodes.base.scheduling import schedule_process
 from stickslip_ros.nodes.base.spinner import steady_clock
 
 MessageT = TypeVar("MessageT")
@@ -264,6 +265,8 @@ class ManagedNode(PollingNode, ParameterNode[ParametersT], ABC):
             return TransitionCallbackReturn.FAILURE
         self._waiting = False
         self.dropped = DroppedMessages(self.get_logger())
+        for refusal in schedule_process(self.parameters):
+            self.get_logger().warning(refusal)
         result = self._transition(self.start, "active")
         self.active = result is TransitionCallbackReturn.SUCCESS
         return result
