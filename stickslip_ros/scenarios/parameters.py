@@ -69,26 +69,23 @@ class NodeParameters(ParameterGroup):
         [], "Nodes that must subscribe to this node's topics before it activates."
     )
     use_sim_time: bool = constant(False, "Take ROS time from /clock.")
-    thread_priority: int = constant(
+    thread_priority: int = at_rest(
         0,
         "Priority (SCHED_FIFO) of the threads of the node's process; 0: ordinary scheduling.",
         whole=True,
-        changes=Changes.AT_REST,
         at_least=0,
         at_most=99,
     )
-    cpu_affinity: int = constant(
+    cpu_affinity: int = at_rest(
         -1,
         "Processor on which the node's process runs; -1: any.",
         whole=True,
-        changes=Changes.AT_REST,
         at_least=-1,
         at_most=4095,
     )
-    lock_memory: bool = constant(
+    lock_memory: bool = at_rest(
         False,
         "Keep the memory of the node's process from being paged out.",
-        changes=Changes.AT_REST,
     )
 
     @override
