@@ -4,7 +4,7 @@ import re
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from math import inf, nan
+from math import nan
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -12,14 +12,15 @@ import numpy as np
 
 from stickslip_ros.arrays import BoolArray, FloatArray, IntArray
 from stickslip_ros.bags.expressions import Expression, listed
+from stickslip_ros.bags.faults import dropouts, velocity_fault, wrap_of
 from stickslip_ros.bags.mat_file import is_mat, vectors_of
 from stickslip_ros.bags.reader import RunBlock
+from stickslip_ros.bags.table_clock import even_times, stamps_of
 from stickslip_ros.bags.text_table import ANY_FORM, NO_UNITS, TableFormat, TextTable, unit_factor
 from stickslip_ros.errors import BagError, InvalidInputError
 from stickslip_ros.files import open_regular
 from stickslip_ros.samples import LARGEST, ForceColumns, SampleColumns
-from stickslip_ros.stamps import NANOSECONDS
-from stickslip_ros.text import must_be_one_of, quantity
+from stickslip_ros.text import must_be_one_of
 
 TABLE_SUFFIXES = (".csv", ".mat", ".txt", ".dat", ".tsv", ".log", ".asc")
 """Ends of the names of files that are tables, whatever they hold."""
@@ -38,9 +39,6 @@ QUANTITIES = (
     "reference",
 )
 """Quantities of a run that a table may have; time and position it must have."""
-
-LONGEST = 9e9
-"""Longest time, s, that stamps can express."""
 
 _OWN_COLUMNS = {
     "time": ("time",),
@@ -63,11 +61,8 @@ _FORCES = ("force", "disturbance", "friction_force")
 _MERGED_SHARE, _BETWEEN_SHARE = 0.3, 0.05
 """Share of the rows with a position that lack another quantity, from which it was recorded between
 them; fewest of its values, as a share of the positions."""
-_STEM = re.compile(r"[^\W\d_]+")
-"""What the names of columns of times have in common: Time_1 and Time_2."""
-_EVEN_ROWS, _CLOCK_ROWS, _COARSE_SHARE, _COMMON_SHARE = 10, 100_000, 0.02, 0.02
-"""Fewest and most rows in which times are seen to be rounded; least step of that, as a share of the
-period; share of the steps of time from which one is usual."""
+_NUMBER = re.compile(r"_?\d*$")
+"""What the names of several columns of times differ by: Time_1 and Time_2."""
 
 
 @dataclass(frozen=True)
@@ -234,9 +229,59 @@ def quantities_of(
     times of the positions: forces hold, other values are interpolated. Raises BagError if the file
     cannot be read, and InvalidInputError if it has not what is asked for, or no sample.
     """
+    asked = _asked(table, columns, belt_speed)
+    clocks = {name: _clocks(table, asked["time"].places, each) for name, each in asked.items()}
+    cells = _cells(table, asked, clocks)
+    notes = [*table.notes(), *_lost_cells(table, cells, asked)]
+    factors: dict[str, float] = {}
+    for name, each in asked.items():
+        factors[name], note = _factor(table, name, each)
+        notes += note
+    absolute = {
+        places: _times(asked["time"], [cells[place] for place in places])
+        for places in dict.fromkeys(clocks.values())
+    }
+    main = absolute[asked["time"].places]
+    rows = np.flatnonzero(np.isfinite(main))
+    if not len(rows):
+        raise InvalidInputError(f"{table.path}: no time is a finite number")
+    times = {
+        places: np.asarray((each - main[rows[0]]) * factors["time"], float)
+        for places, each in absolute.items()
+    }
+    time = times[asked["time"].places][rows]
+    _check_order(table, time, rows)
+    values: dict[str, FloatArray] = {}
+    for name, each in asked.items():
+        if name == "time":
+            continue
+        value = each.value([np.asarray(cells[place], float) for place in each.places])
+        value = _measurable(value * factors[name])
+        if np.array_equal(times[clocks[name]], times[asked["time"].places], equal_nan=True):
+            values[name] = np.broadcast_to(value, main.shape)[rows]
+        else:
+            values[name] = _at(time, times[clocks[name]], value, hold=name in _FORCES)
+            notes.append(f"{name} has times of its own, those of column #{clocks[name][0] + 1}")
+    present = np.isfinite(values["position"])
+    if not present.any():
+        text = asked["position"].text
+        raise InvalidInputError(f"{table.path}: no row has a time and a position, {text}")
+    for name in values.keys() - {"position", "velocity"}:
+        values[name], note = _merged(name, time, values[name], present)
+        notes += note
+    time, note = even_times(time)
+    values["time"] = time
+    notes += note
+    notes += _without_faults(table, asked, values, rows, factors["position"])
+    return Quantities(values, notes)
+
+
+def _asked(
+    table: Table, columns: Mapping[str, str] | None, belt_speed: float | None
+) -> dict[str, Expression]:
+    """Return the expression of each quantity; refuse what is no quantity, or not enough."""
     path = table.path
-    if columns is None:
-        columns = own_columns(path, table.columns)
+    columns = own_columns(path, table.columns) if columns is None else columns
     if belt_speed is not None:
         columns = {**columns, "belt_velocity": repr(float(belt_speed))}
     for name in columns:
@@ -246,73 +291,30 @@ def quantities_of(
     if lacking:
         raise InvalidInputError(f"{path}: no column is given for {' and '.join(lacking)}")
     asked = {name: Expression.read(path, text, table.columns) for name, text in columns.items()}
-    clock = asked["time"]
-    if not clock.places:
+    if not asked["time"].places:
         raise InvalidInputError(f"{path}: time = {columns['time']} must be a column")
-    main = clock.places[0]
-    own_clocks = {} if clock.places[1:] else _own_clocks(table, main)
-    used = dict.fromkeys(place for each in asked.values() for place in each.places)
-    with _reading(path):
-        places = sorted({*used, *(own_clocks.get(place, main) for place in used)})
-        raw = dict(zip(places, table.read(places), strict=True))
-    rows = max(len(raw[place]) for place in clock.places)
+    return asked
+
+
+def _cells(
+    table: Table, asked: Mapping[str, Expression], clocks: Mapping[str, tuple[int, ...]]
+) -> dict[int, Any]:
+    """Return the columns of expressions and their times, by place; refuse different lengths."""
+    used = sorted(
+        {place for each in asked.values() for place in each.places}.union(*clocks.values())
+    )
+    with _reading(table.path):
+        cells = dict(zip(used, table.read(used), strict=True))
+    rows = max(len(cells[place]) for place in asked["time"].places)
     if not rows:
-        raise BagError(f"{path}: the file cannot be read: it has no rows")
-    for place in used:
-        if len(raw[place]) not in (1, rows):
+        raise BagError(f"{table.path}: the file cannot be read: it has no rows")
+    for place, column in cells.items():
+        if len(column) not in (1, rows):
             raise InvalidInputError(
-                f"{path}: {_name(table, place)} has {len(raw[place])} numbers and the time "
-                f"{columns['time']} {rows}: columns must have the same length"
+                f"{table.path}: {_name(table, place)} has {len(column)} numbers and the time "
+                f"{asked['time'].text} {rows}: columns must have the same length"
             )
-    notes = [*table.notes(), *_remarks(table, raw, [*used])]
-    factors: dict[str, float] = {}
-    for name, each in asked.items():
-        if each.bare:
-            factors[name], note = _factor(table, name, each.places[0])
-            notes += note
-    counts = len(clock.places) > 1 or raw[main].dtype.kind == "i"
-    exact = np.longdouble if counts else float  # a float has no digits for ns since 1970
-    stamped = clock.value([np.asarray(raw[place], exact) for place in clock.places])
-    known = np.isfinite(stamped)
-    if not known.any():
-        raise InvalidInputError(f"{path}: no time is a finite number")
-    stamped = stamped if known.all() else stamped[known]
-    time = np.asarray((stamped - stamped[0]) * factors.get("time", 1.0), float)
-    if len(back := np.flatnonzero(np.diff(time) < 0.0)):
-        line = table.line(int(np.flatnonzero(known)[back[0] + 1]))
-        raise InvalidInputError(
-            f"{path}: the time goes back {len(back)} times, the first time at {line}: rows must be "
-            "in the order of time; a counter that wraps is time=unwrap(column, turn)"
-        )
-    values: dict[str, FloatArray] = {}
-    for name, each in asked.items():
-        if name == "time":
-            continue
-        cells: list[FloatArray] = []
-        for place in each.places:
-            own = own_clocks.get(place, main)
-            column = np.asarray(raw[place], float)
-            if own != main and not np.array_equal(raw[own], raw[main], equal_nan=True):
-                column = _at(raw[main], raw[own], column, hold=name in _FORCES)
-                notes.append(f"{name} has times of its own, those of column #{own + 1}")
-            cells.append(column if len(column) == rows else column[0])
-        value = np.broadcast_to(each.value(cells), known.shape)
-        value = value if known.all() else value[known]
-        if factors.get(name, 1.0) != 1.0:
-            value = value * factors[name]
-        size = np.abs(value)
-        small = (size < 1.0 / LARGEST) & (size > 0.0)
-        if small.any() or not np.all(size <= LARGEST):
-            value = np.where(size <= LARGEST, np.where(small, 0.0, value), nan)
-        values[name] = value
-    present = np.isfinite(values["position"])
-    if not present.any():
-        raise InvalidInputError(f"{path}: no row has a time and a position, {columns['position']}")
-    for name, value in values.items():
-        if name not in ("position", "velocity"):
-            values[name] = _between(name, time, value, present, notes)
-    even, note = _unrounded(time)
-    return Quantities({"time": even, **values}, [*notes, *note])
+    return cells
 
 
 def _name(table: Table, place: int) -> str:
@@ -320,42 +322,64 @@ def _name(table: Table, place: int) -> str:
     return f"column {next(names, f'#{place + 1}')}"
 
 
-def _own_clocks(table: Table, clock: int) -> dict[int, int]:
-    """Return the times of each column by their places, if several are named like those of `clock`.
+def _clocks(table: Table, clock: tuple[int, ...], asked: Expression) -> tuple[int, ...]:
+    """Return the columns of the times of an expression.
 
-    They are the last ones before the column.
+    They are those of the time or, if this is one column, the last one before a column that is named
+    like it, such as Time_2 after Time_1.
     """
-    stems = [(_STEM.match(name) or [""])[0].lower() for name in table.names]
-    alike = [place for place, stem in enumerate(stems) if stem and stem == stems[clock]]
-    if len(alike) < 2 or clock != alike[0]:
-        return {}
-    return {
-        place: max(each for each in alike if each < place)
-        for place in range(clock + 1, len(stems))
-        if place not in alike
+    stems, first = [_NUMBER.sub("", name) for name in table.names], clock[0]
+    if len(clock) > 1 or not stems[first]:
+        return clock
+    alike = [place for place, stem in enumerate(stems) if stem == stems[first]]
+    own = {
+        max((each for each in alike if each < place and place not in alike), default=first)
+        for place in asked.places
     }
+    return tuple(own) if len(own) == 1 and alike[0] == first else clock
 
 
-def _remarks(table: Table, raw: Mapping[int, FloatArray], places: Sequence[int]) -> Iterator[str]:
+def _times(clock: Expression, cells: Sequence[Any]) -> Any:
+    """Return the times that a table has, in its unit."""
+    counts = len(cells) > 1 or cells[0].dtype.kind == "i"
+    exact = np.longdouble if counts else float  # a float has no digits for ns since 1970
+    return clock.value([np.asarray(each, exact) for each in cells])
+
+
+def _check_order(table: Table, time: FloatArray, rows: IntArray) -> None:
+    """Refuse times that go back."""
+    back = np.flatnonzero(np.diff(time) < 0.0)
+    if len(back):
+        raise InvalidInputError(
+            f"{table.path}: the time goes back {len(back)} times, the first time at "
+            f"{table.line(int(rows[back[0] + 1]))}: rows must be in the order of time; a counter "
+            "that wraps is time=unwrap(column, turn)"
+        )
+
+
+def _lost_cells(
+    table: Table, cells: Mapping[int, Any], asked: Mapping[str, Expression]
+) -> Iterator[str]:
     """Yield sentences on cells that are left out."""
-    for place in places:
-        if raw[place].min() >= -LARGEST and raw[place].max() <= LARGEST:
+    for place in dict.fromkeys(place for each in asked.values() for place in each.places):
+        column = cells[place]
+        if column.min() >= -LARGEST and column.max() <= LARGEST:
             continue
-        bad = np.flatnonzero(~(np.abs(raw[place]) <= LARGEST))
-        value = raw[place][bad[0]]
+        bad = np.flatnonzero(~(np.abs(column) <= LARGEST))
+        value = column[bad[0]]
         yield (
-            f"{_name(table, place)} has no number in {len(bad)} of {len(raw[place])} rows"
+            f"{_name(table, place)} has no number in {len(bad)} of {len(column)} rows"
             f"{f', or one as large as {value:.3g}' if np.isfinite(value) else ''}; the first "
             f"is {table.line(int(bad[0]))}"
         )
 
 
-def _factor(table: Table, kind: str, place: int) -> tuple[float, list[str]]:
-    """Return what converts a column to SI units, and sentences that say so."""
-    given, unit = table.units[place], _UNITS.get(kind, "N")
-    name = f"{kind}, {_name(table, place)},"
-    if given.lower() in NO_UNITS:
+def _factor(table: Table, kind: str, asked: Expression) -> tuple[float, list[str]]:
+    """Return what converts a column by itself to SI units, and sentences that say so."""
+    if not asked.bare or table.units[asked.places[0]].lower() in NO_UNITS:
         return 1.0, []
+    given, unit = table.units[asked.places[0]], _UNITS.get(kind, "N")
+    name = f"{kind}, {_name(table, asked.places[0])},"
     factor = unit_factor(given, unit)
     if factor is not None:
         return factor, [] if factor == 1.0 else [f"{name} is in {given}, and converted to {unit}"]
@@ -364,6 +388,69 @@ def _factor(table: Table, kind: str, place: int) -> tuple[float, list[str]]:
     if factor is not None:
         return factor, [f"{name} is in {given}: what is in {unit} is in {rotary}"]
     return 1.0, [f"{name} is in {given}, which is no unit of {kind}: it is taken as {unit}"]
+
+
+def _measurable(values: FloatArray) -> FloatArray:
+    """Return values with NaN for those above 1e100, and zero for those below 1e-100."""
+    size = np.abs(values)
+    small = (size < 1.0 / LARGEST) & (size > 0.0)
+    if small.any() or not np.all(size <= LARGEST):
+        return np.where(size <= LARGEST, np.where(small, 0.0, values), nan)
+    return values
+
+
+def _without_faults(
+    table: Table,
+    asked: Mapping[str, Expression],
+    values: dict[str, FloatArray],
+    rows: IntArray,
+    factor: float,
+) -> Iterator[str]:
+    """Leave out positions that no motion makes, and velocities that contradict the others."""
+
+    def line(found: IntArray) -> str:
+        return table.line(int(rows[found[0]]))
+
+    position = values["position"]
+    present = np.flatnonzero(np.isfinite(position))
+    wrap = wrap_of(position[present])
+    if wrap is not None:
+        turn = f"{wrap.turn / factor:.10g}"
+        text = f"unwrap({asked['position'].text}, {turn})"
+        raise InvalidInputError(
+            f"{table.path}: the position jumps {len(wrap.rows)} times by {turn}, the "
+            f" first time at {line(present[wrap.rows])}, as of a counter that wraps: position="
+            f"{text}{'' if factor == 1.0 else f'*{factor:g}'}"
+        )
+    lost = dropouts(position[present])
+    if lost.any():
+        values["position"] = position = position.copy()
+        position[present[lost]] = nan
+        yield (
+            f"the position jumps away and back, as no motion does, in {np.count_nonzero(lost)} "
+            f"rows, the first is {table.line(int(rows[present[lost][0]]))}: they are left out"
+        )
+    if "velocity" not in values:
+        return
+    time, velocity = values["time"], values["velocity"]
+    both = np.flatnonzero(np.isfinite(position) & np.isfinite(velocity))
+    time, position, own = time[both], position[both], velocity[both]
+    spikes = dropouts(own)
+    if spikes.any():
+        between = np.interp(time, time[~spikes], own[~spikes])
+        by_position = differences(time, position)
+        spikes &= np.abs(own - by_position) > np.abs(between - by_position)
+    fault = velocity_fault(time[~spikes], position[~spikes], own[~spikes])
+    if fault is not None:
+        values["velocity"] = np.full(len(rows), nan)
+        yield f"the velocity {fault}: it is left out"
+    elif spikes.any():
+        values["velocity"] = velocity = velocity.copy()
+        velocity[both[spikes]] = nan
+        yield (
+            "the velocity jumps away and back, as the positions do not, in "
+            f"{np.count_nonzero(spikes)} rows, the first is {line(both[spikes])}: they are left out"
+        )
 
 
 def _at(at: FloatArray, time: FloatArray, values: FloatArray, *, hold: bool) -> FloatArray:
@@ -378,64 +465,19 @@ def _at(at: FloatArray, time: FloatArray, values: FloatArray, *, hold: bool) -> 
     return np.where(last >= 0, values[last], nan)
 
 
-def _between(
-    name: str, time: FloatArray, values: FloatArray, present: BoolArray, notes: list[str]
-) -> FloatArray:
-    """Return a quantity at the rows with a position, if most of them lack it."""
+def _merged(
+    name: str, time: FloatArray, values: FloatArray, present: BoolArray
+) -> tuple[FloatArray, list[str]]:
+    """Return a quantity at the rows with a position also where most of these lack it."""
     known = np.isfinite(values)
     lacking = 1.0 - np.mean(known[present])
-    if lacking <= _MERGED_SHARE or np.count_nonzero(known) < _BETWEEN_SHARE * np.count_nonzero(
-        present
-    ):
-        return values
-    how = "held" if name in _FORCES else "interpolated"
-    notes.append(f"{lacking:.0%} of the rows with a position have no {name}: it is {how}")
-    return np.where(known, values, _at(time, time, values, hold=name in _FORCES))
-
-
-def _unrounded(time: FloatArray) -> tuple[FloatArray, list[str]]:
-    """Return even times for times that are even up to a rounding, and a sentence that says so.
-
-    Between gaps of more than two steps of the rounding, they must be on a line to within a step.
-    """
-    steps = np.diff(time)
-    if len(time) < _EVEN_ROWS or time[-1] > LONGEST or np.ptp(steps) < 0.5 / NANOSECONDS:
-        return time, []
-    sizes, counts = np.unique(np.rint(steps[:_CLOCK_ROWS] * NANOSECONDS), return_counts=True)
-    sizes = sizes[counts >= _COMMON_SHARE * counts.sum()]  # others are gaps and lost rows
-    step = float(np.diff(sizes).min(initial=inf)) / NANOSECONDS
-    usual = float(np.median(steps))
-    usual = float(np.mean(steps[steps <= usual + 1.5 * step]))
-    stand = int(np.count_nonzero(steps == 0.0))
-    if _COARSE_SHARE * usual <= step < inf:
-        found, period = time.copy(), usual
-        for rows in np.split(np.arange(len(time)), np.flatnonzero(steps > usual + 2.0 * step) + 1):
-            if len(rows) < _EVEN_ROWS:
-                continue
-            own = time[rows]
-            number = np.arange(len(rows)) - (len(rows) - 1) / 2.0
-            period = float(number @ (own - own.mean()) / (number @ number))
-            short = (float(f"{period:.{digits}g}") for digits in range(1, 12))
-            period = next((p for p in short if abs(p - period) * len(rows) < 0.05 * step), period)
-            apart = own - period * np.arange(len(rows))
-            if np.ptp(apart) > 1.05 * step:
-                break
-            found[rows] = float(apart.min() + apart.max()) / 2.0 + period * np.arange(len(rows))
-        else:
-            return found - found[0], [
-                f"the times are rounded to {quantity(step, 's')}: the rows are taken as evenly "
-                f"spaced, {quantity(period, 's')} apart"
-            ]
-    if stand:
-        return time, [f"{stand} of {len(time)} rows have the time of the row before"]
-    return time, []
-
-
-def stamps_of(path: Path, time: FloatArray) -> IntArray:
-    """Return times, s, as stamps, ns, from the first one; InvalidInputError if they are too far."""
-    if np.abs(time).max() > LONGEST:
-        raise InvalidInputError(f"{path}: the times differ by more than {LONGEST:g} s")
-    return np.rint(time * NANOSECONDS).astype(np.int64)
+    few = np.count_nonzero(known) < _BETWEEN_SHARE * np.count_nonzero(present)
+    if lacking <= _MERGED_SHARE or few:
+        return values, []
+    hold = name in _FORCES
+    note = f"{lacking:.0%} of the rows with a position have no {name}: it is "
+    note += "held" if hold else "interpolated"
+    return np.where(known, values, _at(time, time, values, hold=hold)), [note]
 
 
 def _recording(path: Path, found: Quantities) -> TableRecording:
@@ -455,12 +497,12 @@ def _recording(path: Path, found: Quantities) -> TableRecording:
         )
     if "belt_velocity" not in values:
         notes.append("the belt velocity is not recorded: the belt counts as at rest")
-    differences = unknown.copy()
-    differences[present] = _differences(time[present], position[present])
+    by_position = unknown.copy()
+    by_position[present] = differences(time[present], position[present])
     samples = SampleColumns(
         stamp,
         position,
-        np.where(lacking, differences, velocity),
+        np.where(lacking, by_position, velocity),
         values.get("friction_force", unknown),
         unknown,
         values.get("belt_velocity", rest),
@@ -472,7 +514,7 @@ def _recording(path: Path, found: Quantities) -> TableRecording:
     return TableRecording(samples, forces, bool(estimated), tuple(notes))
 
 
-def _differences(time: FloatArray, position: FloatArray) -> FloatArray:
+def differences(time: FloatArray, position: FloatArray) -> FloatArray:
     """Return the velocity at each time, by the positions on both sides; NaN where time stands."""
     if len(time) < 2:
         return np.zeros(len(time))

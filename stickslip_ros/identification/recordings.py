@@ -12,12 +12,12 @@ import numpy as np
 from stickslip_ros.arrays import FloatArray, IntArray
 from stickslip_ros.bags.motion_reader import ANY_LAYOUT, BagLayout
 from stickslip_ros.bags.reader import Recording
+from stickslip_ros.bags.table_clock import stamps_of
 from stickslip_ros.bags.table_file import (
     Table,
     is_table,
     own_columns,
     quantities_of,
-    stamps_of,
     table_of,
 )
 from stickslip_ros.bags.text_table import ANY_FORM, TableFormat

@@ -1,0 +1,77 @@
+"""The times of a table: whether they are rounded, what they were before, and their stamps."""
+
+from pathlib import Path
+
+import numpy as np
+
+from stickslip_ros.arrays import FloatArray, IntArray
+from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.stamps import NANOSECONDS
+from stickslip_ros.text import quantity
+
+LONGEST = 9e9
+"""Longest time, s, that stamps can express."""
+_FEWEST, _MOST = 10, 100_000
+"""Fewest rows of a part that is evenly spaced; rows in which a rounding is looked for."""
+_COARSE_SHARE, _COMMON_SHARE = 0.02, 0.02
+"""Least step of a rounding, as a share of the period; share of the steps of time from which one is
+usual: others are gaps and lost rows."""
+
+
+def even_times(time: FloatArray) -> tuple[FloatArray, list[str]]:
+    """Return even times, s, for times that are even up to a rounding, and sentences on them.
+
+    Between gaps of more than two steps of the rounding, they must be on a line to within a step.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from stickslip_ros.bags.table_clock import even_times
+    >>> time, notes = even_times(np.round(np.arange(100) * 4e-4, 3))
+    >>> round(float(time[1]), 9), notes[0][:33]
+    (0.0004, 'the times are rounded to 1 ms: th')
+    """
+    steps = np.diff(time)
+    if len(time) < _FEWEST or time[-1] > LONGEST or np.ptp(steps) < 0.5 / NANOSECONDS:
+        return time, []
+    rounding = _rounding(steps)
+    if rounding:
+        gaps = np.flatnonzero(steps > np.median(steps) + 2.5 * rounding) + 1
+        parts = [_even(part, rounding) for part in np.split(time, gaps)]
+        found = np.concatenate([time[:0], *(part for part in parts if part is not None)])
+        if len(found) == len(time):
+            period = quantity(float(np.median(np.diff(found))), "s")
+            return found - found[0], [
+                f"the times are rounded to {quantity(rounding, 's')}: the rows are taken as evenly "
+                f"spaced, {period} apart"
+            ]
+    stand = np.count_nonzero(steps == 0.0)
+    return time, [f"{stand} of {len(time)} rows have the time of the row before"] if stand else []
+
+
+def stamps_of(path: Path, time: FloatArray) -> IntArray:
+    """Return times, s, as stamps, ns, from the first one; InvalidInputError if they are too far."""
+    if np.abs(time).max() > LONGEST:
+        raise InvalidInputError(f"{path}: the times differ by more than {LONGEST:g} s")
+    return np.rint(time * NANOSECONDS).astype(np.int64)
+
+
+def _rounding(steps: FloatArray) -> float:
+    """Return the least difference of usual steps, s; 0 if it is a small share of them."""
+    sizes, counts = np.unique(np.rint(steps[:_MOST] * NANOSECONDS), return_counts=True)
+    sizes = sizes[counts >= _COMMON_SHARE * counts.sum()] / NANOSECONDS
+    step = float(np.diff(sizes).min(initial=np.inf))
+    return step if _COARSE_SHARE * float(np.median(steps)) <= step < np.inf else 0.0
+
+
+def _even(time: FloatArray, rounding: float) -> FloatArray | None:
+    """Return the times of a part on a line, those of a short one as they are; None without one."""
+    if len(time) < _FEWEST:
+        return time
+    rows = np.arange(len(time), dtype=np.float64)
+    period = float(np.polyfit(rows, time - time[0], 1)[0])
+    for line in (rows * float(f"{period:.4g}"), rows * period):
+        apart = time - line
+        if np.ptp(apart) <= 1.05 * rounding:
+            return line + float(apart.min() + apart.max()) / 2.0
+    return None
