@@ -81,6 +81,17 @@ def test_measures_are_means_over_the_last_cycles_of_the_window() -> None:
     assert measures.regime is Regime.STICK_SLIP
 
 
+def test_the_error_of_a_mean_follows_from_the_scatter_of_the_cycles() -> None:
+    meter = CycleMeter(window=4)
+    cycles = meter.feed(recorded(ABOVE_HOPF, 0.1, 0.0, 60.0), 0.6)  # they decay
+    errors = meter.measures().errors
+    assert errors is not None
+    for name in ("amplitude", "midpoint"):
+        scatter = np.std([getattr(cycle, name) for cycle in cycles[-4:]], ddof=1)
+        assert scatter > 1e-5
+        assert errors[name] == pytest.approx(scatter / 2.0, rel=1e-9)
+
+
 @pytest.mark.parametrize(
     ("speed", "regime"), [(0.9e-3, Regime.EQUILIBRIUM), (1.1e-3, Regime.PURE_SLIP)]
 )
