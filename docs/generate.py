@@ -6,7 +6,7 @@ this file.
 
 import json
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from math import isinf
 from pathlib import Path
 from typing import Any
@@ -156,7 +156,7 @@ def numbers() -> Iterator[str]:
         "limit cycle: amplitude, period": (cycle["amplitude"], cycle["period"]),
         "its stick fraction, and Floquet multiplier": (
             cycle["stick_fraction"],
-            cycle["multipliers"][0][0],
+            cycle["multipliers"][0].real,
         ),
         "eigenvalues with control, eq. 20": _complex(closed["eigenvalues"]),
         "critical linear gain $k_1^{\\ast}$, eq. 21": closed["critical_linear_gain"],
@@ -168,12 +168,12 @@ def numbers() -> Iterator[str]:
     yield table(["quantity", "value"], [[name, _values(value)] for name, value in rows.items()])
 
 
-def _complex(pairs: Sequence[Sequence[float]]) -> str:
+def _complex(values: Iterable[complex]) -> str:
     """Return eigenvalues, of a conjugate pair one."""
     return ", ".join(
-        f"{real:.5g}{f' ± {imaginary:.5g} i' if imaginary else ''}"
-        for real, imaginary in pairs
-        if imaginary >= 0.0
+        f"{value.real:.5g}{f' ± {value.imag:.5g} i' if value.imag else ''}"
+        for value in values
+        if value.imag >= 0.0
     )
 
 

@@ -59,7 +59,14 @@ def prefix_for(largest: float) -> tuple[float, str]:
 
 
 def finite(value: Any) -> Any:
-    """Return a value for JSON: null for what is infinite or not a number, which JSON lacks."""
+    """Return a value for JSON: null for what is infinite or not a number, which JSON lacks.
+
+    A complex number becomes [real, imaginary], and an array a list.
+    """
+    if hasattr(value, "tolist"):
+        value = value.tolist()
+    if isinstance(value, complex):
+        value = [value.real, value.imag]
     if isinstance(value, Mapping):
         return {str(key): finite(item) for key, item in value.items()}
     if isinstance(value, Sequence) and not isinstance(value, str):

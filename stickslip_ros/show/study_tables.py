@@ -245,21 +245,21 @@ def stability_tables(scenario: Scenario, found: Section, notes: Notes) -> Iterat
 
 
 def _shown(name: str, value: Any, unit: str, units: Units) -> str:
-    if value is None or not isinstance(value, list):
+    if name == "eigenvalues" and value is not None:
+        return _complex(value, units.of_unit(unit))
+    if not isinstance(value, list):
         return units.texts([value], unit, digits=8 if name == "spectral_radius" else 4)[0]
     items = cast(list[Any], value)
-    if name == "eigenvalues":
-        return _complex(items, units.of_unit(unit))
     if name in ("stable_linear_gains", "speed_ranges"):
         return "; ".join(" to ".join(units.texts(ends, unit)) for ends in items) or "-"
     return ", ".join(units.texts(items, unit)) or "-"
 
 
-def _complex(pairs: list[list[float]], unit: str) -> str:
-    """Return complex numbers given as [real, imaginary], of a conjugate pair once."""
+def _complex(values: Iterable[complex], unit: str) -> str:
+    """Return the text of complex numbers, of a conjugate pair once."""
     texts = [
-        f"{real:.4g} ± {imaginary:.4g}j" if imaginary else f"{real:.4g}"
-        for real, imaginary in pairs
-        if imaginary >= 0.0
+        f"{value.real:.4g} ± {value.imag:.4g}j" if value.imag else f"{value.real:.4g}"
+        for value in values
+        if value.imag >= 0.0
     ]
     return f"{', '.join(texts)} {unit}".rstrip()

@@ -162,7 +162,7 @@ def _eigenvalues(drive: Drive, expansion: Expansion | None, reason: str | None) 
     neutral = "it is neutral: a small deviation neither decays nor grows"
     return {
         "equilibrium_position": float(expansion.equilibrium[POSITION]) * drive.length_scale,
-        "eigenvalues": [[float(value.real), float(value.imag)] for value in values],
+        "eigenvalues": values.astype(complex),
         "stable": _Noted(stable, neutral if stable is None else None),
     }
 
@@ -367,7 +367,7 @@ def _cycle(cycle: LimitCycle) -> Section:
     return {
         "position": cycle.position,
         "stable": cycle.stable,
-        "multipliers": [[value.real, value.imag] for value in cycle.multipliers],
+        "multipliers": np.array(cycle.multipliers),
         **cycle.measures.as_dict(),
         "period": cycle.period,  # the measures of the smallest cycles have none
         "frequency": 1.0 / cycle.period,
