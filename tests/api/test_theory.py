@@ -103,7 +103,6 @@ def test_what_cannot_be_drawn_or_designed_is_refused() -> None:
             ss.design("feed_drive", belt_speed=speed)  # pyright: ignore
 
 
-@pytest.mark.long
 def test_a_design_runs_and_keeps_to_its_limit() -> None:
     one = ss.design(ss.scenario("feed_drive", force_jitter=1e-4), belt_speed=0.04, force_limit=200)
     assert one.design.task.belt_speeds == (0.04, 0.04)

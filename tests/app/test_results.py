@@ -12,6 +12,7 @@ import pytest
 import stickslip_ros as ss
 from stickslip_ros.api.recordings import Comparison
 from stickslip_ros.api.results import Result
+from stickslip_ros.errors import RunError
 from stickslip_ros.scenarios.files import load_scenario
 from tests.app.conftest import REFERENCE, Run
 
@@ -180,6 +181,29 @@ def test_each_has_its_verdict_and_its_tables(
     found = page(stickslip, tmp_path, *arguments)
     assert all(text in found.text for text in texts)
     assert found.tags.count("svg") == 2
+
+
+@pytest.mark.parametrize(
+    ("name", "verdict"),
+    [
+        ("basin", "stick-slip 100.0%"),
+        ("stability", "without control: unstable; sampled loop: stable"),
+        ("report, of two", f"{REFERENCE}: stick-slip, not steady: decaying"),
+    ],
+)
+def test_python_writes_a_page_of_any_result(
+    name: str, verdict: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def draw(*_: Any, **__: Any) -> Any:
+        raise RunError("it takes too long")
+
+    result = cases(tmp_path)[name][1]()
+    monkeypatch.setattr(type(result), "draw", draw)
+    result.to_html(tmp_path / "page.html")
+    found = Page(tmp_path / "page.html")
+    assert verdict in found.text
+    assert "There is none: it takes too long" in found.text
+    assert "table" in found.tags
 
 
 def test_without_a_figure_a_page_says_why(stickslip: Run, tmp_path: Path) -> None:

@@ -11,12 +11,21 @@ from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from mcap.opcode import Opcode
 from zstandard import ZstdCompressor
 
 from stickslip_ros.bags import Recording
-from stickslip_ros.bags.compression import unpack_file
+from stickslip_ros.bags.chunk import DamageError, MessageBlock, records_in
+from stickslip_ros.bags.compression import (
+    LARGEST,
+    ZSTD_MAGIC,
+    unpack,
+    unpack_file,
+    unpack_message,
+)
+from stickslip_ros.bags.metadata import offered_profiles
 from stickslip_ros.bags.repair import repair
 from stickslip_ros.bags.report import report_of_recording
 from stickslip_ros.errors import BagError
@@ -321,3 +330,16 @@ def test_names_cannot_steer_a_terminal(tmp_path: Path) -> None:
             pass
         assert all(sentence.isprintable() for sentence in recording.missing)
         assert any(shown in sentence for sentence in recording.missing)
+
+
+def test_what_is_damaged_or_of_a_false_size_is_not_unpacked() -> None:
+    damaged = ZSTD_MAGIC + b"\xff" * 20
+    assert unpack_message(damaged) == damaged
+    for compression, size in (("snappy", 3), ("", 4), ("", LARGEST + 1)):
+        assert unpack(compression, b"abc", size) is None
+    for data in (b"\x05", head(Opcode.MESSAGE, 1), bytes(9)):
+        with pytest.raises(DamageError):
+            list(records_in(data))
+    with pytest.raises(DamageError):
+        MessageBlock(bytes(20), np.array([0]))
+    assert offered_profiles("&a [*a]") == offered_profiles("a: [") == []

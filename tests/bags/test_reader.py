@@ -71,6 +71,17 @@ def test_messages_metadata_attachments_and_qos_come_as_they_were_written(bag):
             assert recording.offered_qos("/other") == ""
 
 
+def test_what_is_true_is_recorded_under_names_of_its_own(tmp_path):
+    truth = "/feed_drive/true_joint_states", "/feed_drive/applied_force"
+    messages = [(JOINT_STATES, 1, state(1)), (truth[0], 1, state(2))]
+    write_bag(tmp_path / "bag", [*messages, (truth[1], 1, pack_wrench(1, -3.0))])
+    with Recording(tmp_path / "bag") as recording:
+        assert recording.joint_states.position.tolist() == [1.0]
+        assert recording.true_joint_states.position.tolist() == [2.0]
+        assert recording.applied_forces.force.tolist() == [-3.0]
+        assert recording.control_forces.force.tolist() == []
+
+
 def test_columns_are_those_of_the_messages_chunk_by_chunk_and_as_a_whole(tmp_path):
     """Forces come late and in bursts, so that chunks hold different numbers of either."""
     messages = []

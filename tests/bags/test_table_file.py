@@ -96,6 +96,20 @@ def test_cells_and_times_that_are_no_numbers_are_left_out(tmp_path: Path) -> Non
     assert recording.samples.is_valid.tolist()[1:3] == [False, False]
 
 
+def test_times_that_repeat_and_velocities_that_are_missing_are_noted(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    time = (np.arange(40.0) + 0.3 * np.sin(np.arange(40.0))).tolist()
+    lines = [f"{t},{10 * t},{10 if number % 4 else ''}" for number, t in enumerate(time)]
+    path.write_text("\n".join(["t,x,v", *lines, lines[-1]]) + "\n")
+    recording = read_table(path, {"time": "t", "position": "x", "velocity": "v"})
+    assert recording.samples.velocity == pytest.approx(np.full(41, 10.0))
+    for note in (
+        "1 of 41 rows have the time of the row before",
+        "10 rows have a position and no velocity: it is the difference of the positions",
+    ):
+        assert note in recording.notes
+
+
 def test_only_tables_are_tables() -> None:
     names = ("a/log.CSV", "log.mat", "log.txt", "bags/reference", "reference_0.mcap", "log")
     assert [is_table(Path(name)) for name in names] == [True, True, True, False, False, False]
@@ -132,18 +146,26 @@ def test_columns_that_make_no_recording_are_refused(tmp_path: Path) -> None:
         assert "\n" not in str(refused.value)
 
 
-@pytest.mark.process
-def test_a_file_that_is_no_table_is_refused(tmp_path: Path) -> None:
-    for suffix, *contents in (
-        (".csv", b"", b"t\n1\n", b"t,x\n", b"t,x\n1,2,3\n1,2,3\n", b"\xff\xfe\0t,x"),
-        (".mat", b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM" + bytes(400)),
-    ):
-        path = tmp_path / f"log{suffix}"
-        with pytest.raises(BagError, match="No such file"):
-            read_table(path)
-        for content in contents:
-            path.write_bytes(content)
-            with pytest.raises(BagError) as refused:
-                read_table(path, {"time": "t", "position": "x"})
-            assert str(path) in str(refused.value)
-            assert "\n" not in str(refused.value)
+@pytest.mark.parametrize(
+    ("suffix", "contents"),
+    [
+        (".csv", [b"", b"t\n1\n", b"t,x\n", b"t,x\n1,2,3\n1,2,3\n", b"\xff\xfe\0t,x"]),
+        pytest.param(
+            ".mat",
+            [b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM" + bytes(400)],
+            marks=pytest.mark.process,
+        ),
+    ],
+)
+def test_a_file_that_is_no_table_is_refused(
+    tmp_path: Path, suffix: str, contents: list[bytes]
+) -> None:
+    path = tmp_path / f"log{suffix}"
+    with pytest.raises(BagError, match="No such file"):
+        read_table(path)
+    for content in contents:
+        path.write_bytes(content)
+        with pytest.raises(BagError) as refused:
+            read_table(path, {"time": "t", "position": "x"})
+        assert str(path) in str(refused.value)
+        assert "\n" not in str(refused.value)

@@ -40,6 +40,7 @@ def read(
         ("t,x\n" + rows(",", quote='"'), "t", "x"),
         ("t,x\n" + rows(";", True, '"').replace(";", ","), "t", "x"),
         ("t;x;\n" + rows(";", last=";"), "t", "x"),
+        ("t;x\n" + rows(";", last=";"), "t", "x"),
         ("t, x\n" + rows(", "), "t", "x"),
         ("# t x\n" + rows(" "), "t", "x"),
         (rows(), "#1", "#2"),
@@ -159,6 +160,18 @@ def test_rows_between_those_of_the_positions_count(tmp_path: Path) -> None:
     valid = found.samples[found.samples.is_valid]
     assert valid.velocity == pytest.approx(np.full(50, 1000.0))
     assert found.forces.force[1::2].tolist() == [-2.0 * n for n in range(50)]
+    belt = read_table(path, {"time": "t", "position": "x", "belt_velocity": "u"}).samples
+    assert belt.belt_velocity[1:98:2] == pytest.approx(-np.arange(1.0, 98.0, 2.0))
+
+
+def test_a_table_is_longer_than_what_is_looked_at_first(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("stickslip_ros.bags.text_table._HEAD", 500)
+    assert len(read(tmp_path, "t,x\n" + rows(), "t", "x").samples) == 200
+    monkeypatch.setattr("stickslip_ros.bags.text_table._LARGEST", 600)
+    with pytest.raises(BagError, match="it has more than 600 bytes"):
+        read(tmp_path, "t,x\n" + rows(), "t", "x")
 
 
 def test_what_is_left_out_is_counted_and_its_first_line_named(tmp_path: Path) -> None:
@@ -175,6 +188,7 @@ def test_what_is_left_out_is_counted_and_its_first_line_named(tmp_path: Path) ->
         ("a;b\n0;1.000\n1;2.000\n", TableFormat(decimal=","), [1000.0, 2000.0]),
         ('a,b\n0,"1,000"\n1,"2,000"\n', TableFormat(decimal="."), [1000.0, 2000.0]),
         ('a,b\n0,"1,000.5"\n1,"2"\n', TableFormat(), [1000.5, 2.0]),
+        ("a;b\n0;1.000,5\n1;2,0\n", TableFormat(), [1000.5, 2.0]),
         ("0;0\n1;1\na;b\n0;5\n1;6\n", TableFormat(skip=2), [5.0, 6.0]),
         ("a;b\n0;5\n1;6\n".encode("cp037"), TableFormat(encoding="cp037"), [5.0, 6.0]),
     ],

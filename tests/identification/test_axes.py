@@ -120,6 +120,16 @@ def test_the_constants_of_other_laws_of_an_axis() -> None:
     assert found.fitted["friction.viscous"].standard_error > 0.0
 
 
+def test_friction_that_follows_the_curve_over_a_path_is_fitted() -> None:
+    found = identify([record("saturating", 3.0)], "lugre", {"force_delay": 0.0})
+    assert found.fitted["mass"].value == pytest.approx(95.0, rel=0.03)
+    for direction in (found.drive.friction.forward, found.drive.friction.reverse):
+        assert direction.bristle_stiffness > 1e4
+    curve = found.friction(0)
+    true = -np.array([float(SATURATING.coefficient(w, 1.0)) for w in curve.speed.tolist()])
+    assert curve.force[1:] == pytest.approx(true[1:], rel=0.03)
+
+
 def test_pulses_of_a_checked_record(coulomb: Findings) -> None:
     """They are a known disturbance, or were added to the command of the controller."""
     pulses = np.zeros(len(record("coulomb", 4.0).position))

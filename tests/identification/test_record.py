@@ -7,10 +7,13 @@ import pytest
 
 from stickslip_ros.bags.table_file import Table
 from stickslip_ros.bags.text_table import TableFormat
-from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.errors import BagError, InvalidInputError
 from stickslip_ros.identification import recordings as module
 from stickslip_ros.identification.record import Record, evenly_spaced
 from stickslip_ros.identification.recordings import read_all, read_records
+from stickslip_ros.messages.codec import pack_joint_state, pack_reference, pack_wrench
+from stickslip_ros.samples import Reference
+from tests.bags.runs import FORCES, STATES, write_bag
 
 
 def _columns(time: np.ndarray) -> dict[str, np.ndarray]:
@@ -212,3 +215,46 @@ def test_a_wild_cell_is_not_used(tables: list[Path], cell: str) -> None:
     for values in (record.position, record.force, record.disturbance):
         assert values is not None
         assert np.abs(values).max() < 1.1
+
+
+def test_forces_of_a_bag_are_those_that_the_actuator_applies(tmp_path: Path) -> None:
+    """Limited to 2 N, rounded to 0.5 N and lagging by a sampling period."""
+    start, period = 10**9, 1_000_000
+    messages: list[tuple[str, int, bytes]] = []
+    for number in range(600):
+        stamp = start + number * period
+        messages.append(
+            (STATES, stamp, pack_joint_state(stamp, (1e-6 * number, 0.0), (0.0,) * 2, (0.0,) * 2))
+        )
+        force = {0: 0.9, 300: 5.0}.get(number)
+        if force is not None:
+            messages.append((FORCES, stamp, pack_wrench(stamp, force)))
+    messages.append(
+        (
+            "/feed_drive/applied_disturbance",
+            start + 100 * period,
+            pack_wrench(start + 100 * period, 7.0),
+        )
+    )
+    messages.append(("/feed_drive/reference", start, pack_reference(start, Reference(0.25, None))))
+    actuator = {"limit": "2.0", "resolution": "0.5", "time_constant": "0.001"}
+    plant = {f"actuator.{name}": value for name, value in actuator.items()} | {
+        "force_delay": "0.002"
+    }
+    write_bag(tmp_path / "bag", messages, tables={"stickslip_ros/plant": plant})
+    found = read_records(tmp_path / "bag", {})
+    (record,) = found.records
+    assert found.known == {"force_delay": 0.002}
+    held = np.where(np.arange(600) < 300, 1.0, 2.0)
+    settled = np.abs(np.arange(600) % 300) > 40
+    assert record.force[settled] == pytest.approx(held[settled], rel=1e-12)
+    # The mean over a period of a lag of one period, from rest: 1 - (1 - exp(-1)).
+    assert record.force[[0, 300]] == pytest.approx([np.exp(-1.0), 1.0 + np.exp(-1.0)])
+    assert record.disturbance.tolist() == [0.0] * 100 + [7.0] * 500
+    assert set(record.reference) == {0.25}
+
+
+def test_a_bag_without_a_motion_is_refused(tmp_path: Path) -> None:
+    write_bag(tmp_path / "bag", [(FORCES, 1, pack_wrench(1, 0.0))])
+    with pytest.raises(BagError, match="holds no joint states"):
+        read_records(tmp_path / "bag", {})

@@ -255,7 +255,6 @@ def test_enough_stiffness_ends_the_sticking(without_figures: dict[str, Finding])
     assert [end.measures.regime for end in ends] == [Regime.STICK_SLIP] * 3 + [Regime.PURE_SLIP]
 
 
-@pytest.mark.long
 def test_under_the_printed_slope_the_stick_fraction_rises_with_the_damping_and_falls() -> None:
     law = Linear(STRIBECK.static, PRINTED_SLOPE)
     betas = (0.12, 0.15, 0.17, 0.18, 0.2, 0.3)
@@ -265,7 +264,6 @@ def test_under_the_printed_slope_the_stick_fraction_rises_with_the_damping_and_f
     assert [len(arrivals(drive)) for drive in drives] == [2, 2, 2, 1, 1, 1]
 
 
-@pytest.mark.long
 def test_verdicts_survive_ten_times_the_range() -> None:
     speeds = bifurcation_figure(2, np.array([0.02, 0.05, 0.2, 0.34, 0.6, 1.0, 3.0, 10.0]))
     assert verdict("rest-at-high-speed", speeds).verdict is HOLDS

@@ -53,14 +53,6 @@ def regimes(figure: BifurcationFigure) -> list[Regime | None]:
     return [measures.regime for measures in figure.measures]
 
 
-def stick_fractions(panel: list[Portrait]) -> list[float]:
-    return [portrait.measures.stick_fraction or 0.0 for portrait in panel]
-
-
-def falls(values: list[float]) -> bool:
-    return bool(np.all(np.diff(values) < 0.0))
-
-
 def test_the_parameter_of_a_bifurcation_diagram_is_all_that_varies() -> None:
     for number in (2, 3, 4, 5):
         values = bifurcation_values(number, 5)
@@ -141,7 +133,6 @@ def test_over_the_friction_ratio_vibration_and_sticking_begin() -> None:
     assert regimes(compute_figure(5, points=3)) == [Regime.EQUILIBRIUM, *[Regime.STICK_SLIP] * 2]
 
 
-@pytest.mark.long
 def test_near_the_hopf_speed_amplitudes_follow_the_averaged_ones() -> None:
     for damping, panel in zip((0.01, 0.02), portraits(12)[1::2], strict=True):
         hopf_squared = (0.45 - damping) / 1.8
@@ -150,34 +141,6 @@ def test_near_the_hopf_speed_amplitudes_follow_the_averaged_ones() -> None:
             square = hopf_squared - portrait.drive.belt_speed**2
             averaged = 2.0 * sqrt(max(square, 0.0))
             assert portrait.measures.velocity_amplitude == pytest.approx(averaged, abs=0.005)
-
-
-@pytest.mark.long
-def test_what_the_other_portraits_show() -> None:
-    (speeds,) = portraits(6)
-    assert [p.measures.regime for p in speeds[3:]] == [Regime.PURE_SLIP] * 2 + [
-        Regime.EQUILIBRIUM
-    ] * 2
-    assert falls(stick_fractions(speeds[:4]))
-    (dampings,) = portraits(7)
-    assert falls(stick_fractions(dampings[:4]))
-    (coulomb,) = portraits(8)
-    assert all(p.measures.regime is Regime.EQUILIBRIUM for p in coulomb[1:])
-    assert falls([p.settling_time or 0.0 for p in coulomb[1:]])
-    tangent, printed, printed_slow = portraits(9)
-    assert falls(stick_fractions(tangent))
-    assert printed[0].runs_away
-    assert falls(stick_fractions(printed_slow))
-    stiffnesses, stiffer, faster = portraits(10)
-    assert falls([p.measures.amplitude or 0.0 for p in [*stiffnesses, *stiffer]])
-    assert all(fraction > 0.0 for fraction in stick_fractions([*stiffnesses, *stiffer[:-1]]))
-    assert stiffer[-1].measures.regime is Regime.PURE_SLIP
-    assert [p.measures.regime for p in faster] == [Regime.STICK_SLIP, Regime.PURE_SLIP]
-    linear, cubic, low_corner = portraits(13)
-    assert all(p.case.gains is not None for p in [*linear, *cubic, *low_corner])
-    assert linear[0].measures.amplitude == pytest.approx(0.434086183, rel=1e-8)
-    assert falls([p.measures.amplitude or 0.0 for p in cubic])
-    assert low_corner[-1].measures.regime is Regime.EQUILIBRIUM
 
 
 def test_settling_time_of_a_decaying_vibration() -> None:

@@ -87,7 +87,6 @@ def test_a_proposal_brings_the_drive_to_rest_about_as_predicted() -> None:
     assert "margin" not in (found.remark or "")
 
 
-@pytest.mark.long
 def test_late_and_over_a_wide_range_too_it_brings_the_drive_to_rest() -> None:
     check_from_its_own_limit_cycle(replace(FEED, force_delay=0.005, force_limit=150.0))
     check_from_its_own_limit_cycle(replace(FEED, belt_speeds=(0.008, 0.04), force_limit=300.0))
@@ -113,7 +112,6 @@ def test_margins_lead_to_the_edge_of_stability() -> None:
     assert late.spectral_radius(gains) == pytest.approx(1.0, abs=1e-9)
 
 
-@pytest.mark.long
 def test_margins_are_the_tightest_of_the_range() -> None:
     """The highest speed is stable without control, the lowest is the worst."""
     task = replace(FEED, belt_speeds=(0.001, 0.06))
@@ -147,7 +145,6 @@ def test_a_tighter_limit_is_slower_and_in_the_end_there_is_nothing() -> None:
     assert "force limit of 30 N is too small" in (found.remark or "")
 
 
-@pytest.mark.long
 def test_the_cubic_gain_is_within_what_the_friction_law_bears() -> None:
     """The law's own, (mu_s - mu_m) N / (2 v_m^3), is 6e5 N s^3/m^3."""
     controller = proposal(designed(replace(FEED, force_limit=100.0)))
@@ -161,7 +158,6 @@ def test_the_cubic_gain_is_within_what_the_friction_law_bears() -> None:
         assert measures.regime is Regime.EQUILIBRIUM
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("friction", [Coulomb(0.4), Exponential(0.4, 0.25, 0.1, 0.0)])
 def test_a_law_that_does_not_grow_with_speed_gets_no_cubic_gain(friction: FrictionLaw) -> None:
     drive = replace(FEED_DRIVE, friction=friction, damping=100.0)
@@ -237,7 +233,20 @@ def test_what_a_limited_force_cannot_do_is_said() -> None:
     assert "needs more force than the limit" in (found.remark or "")
 
 
-@pytest.mark.long
+def test_with_noise_it_says_what_is_left_at_rest() -> None:
+    def noisy(noise: float) -> Design:
+        scenario = load_scenario("feed_drive", [f"plant.sensor.velocity_noise={noise}"])
+        return design(Task.from_scenario(scenario, (0.04, 0.04)))
+
+    (little,), (more,) = (noisy(noise).checks for noise in (1e-7, 1e-6))
+    for left in ("amplitude", "peak_force", "rms_force"):
+        ratio = getattr(more.rest, left) / getattr(little.rest, left)
+        assert ratio == pytest.approx(10.0, rel=0.01), left
+    much = noisy(1e-2)
+    assert much.controller is None
+    assert "does not decay to 1 % with the noise and rounding" in (much.remark or "")
+
+
 def test_it_is_the_same_every_time_and_progress_reaches_the_end() -> None:
     shares: list[float] = []
     first = design(replace(FEED, force_limit=200.0), shares.append)

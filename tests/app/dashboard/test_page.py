@@ -56,10 +56,14 @@ class Served:
 
     @property
     def url(self) -> str:
-        def found() -> list[str]:
-            return re.findall(r"http://127\.0\.0\.1:\d+", "".join(self.said))
+        """Wait for its address for as long as the process lives and the test may last."""
 
-        wait_for(found, f"the address of the page; said {self.said}")
+        def found() -> list[str]:
+            addresses = re.findall(r"http://127\.0\.0\.1:\d+", "".join(self.said))
+            assert addresses or self.process.poll() is None, f"it ended and said {self.said}"
+            return addresses
+
+        wait_for(found, "the address of the page", patience=math.inf)
         return found()[0]
 
     def end(self) -> int:
