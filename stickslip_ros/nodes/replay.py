@@ -140,6 +140,8 @@ class ReplayNode(ManagedNode[ReplayParameters]):
             self.get_logger().warning(player.complaint)
         if self.active:
             self.trigger_deactivate()
+        if self.parameters.on_end == "exit":
+            self.end_process(None if player is None else player.failure)
 
     def missing_peers(self) -> str:
         """Return what is missing of the named readers or, if none are named, of any."""

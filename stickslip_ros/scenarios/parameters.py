@@ -400,6 +400,11 @@ class ReplayParameters(MachineParameters):
     bag: str = at_build("", "Bag to replay: its directory or one of its files.")
     rate: float = at_rest(1.0, "Recorded time divided by wall time.", positive=True)
     loop: bool = at_rest(False, "Start again at the end of the bag.")
+    on_end: Literal["pause", "exit"] = at_rest(
+        "pause",
+        "At the end of the bag the node becomes inactive, and with exit its process ends.",
+        choices=("pause", "exit"),
+    )
     start: float = at_build(
         0.0,
         "Recorded time to start at, from the bag's first message.",

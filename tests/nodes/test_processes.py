@@ -57,6 +57,16 @@ def test_nodes_started_singly_close_the_loop_and_the_bag(
     assert states.belt_velocity.tolist() == [1.0] * count
 
 
+def test_a_parameter_file_without_a_section_for_the_node_is_named(
+    processes: Processes, tmp_path: Path
+) -> None:
+    file = tmp_path / "parameters.yaml"
+    file.write_text("/axis/plant: {ros__parameters: {belt_speed: 1.0}}\n")
+    plant = processes.piped("plant", "-r", "__ns:=/test", "--params-file", str(file))
+    assert plant.stderr is not None
+    assert f"{file} has no section for /test/plant; it has /axis/plant" in plant.stderr.readline()
+
+
 @pytest.mark.parametrize(
     ("node", "arguments", "named"),
     [

@@ -25,14 +25,16 @@ def stamps(messages: list[bytes]) -> list[int]:
     return [unpack_header(message) for message in messages]
 
 
-def test_every_message_comes_as_it_was_recorded_and_then_the_node_pauses(
-    graph: Graph, tmp_path: Path
+@pytest.mark.parametrize("on_end", ["pause", "exit"])
+def test_every_message_comes_as_it_was_recorded_and_then_the_node_pauses_or_ends(
+    graph: Graph, tmp_path: Path, on_end: str
 ) -> None:
     bag = record_states(tmp_path / "bag", 300)
     states, forces = graph.listen(JOINT_STATES, raw=True), graph.listen(CONTROL_FORCE, raw=True)
-    node = graph.add(ReplayNode, bag=bag, rate=FAST)
+    node = graph.add(ReplayNode, bag=bag, rate=FAST, on_end=on_end)
     graph.wait_until(lambda: len(states) == 300 and len(forces) == 300, "all is heard")
     graph.wait_until(lambda: not node.active, "the node pauses")
+    assert node.stopped.done() == (on_end == "exit")
     assert {STATES: states, FORCES: forces} == payloads(bag)
     node.trigger_activate()
     graph.wait_until(lambda: len(states) == 600 and not node.active, "it plays again")

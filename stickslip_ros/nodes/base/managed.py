@@ -219,6 +219,7 @@ class ManagedNode(PollingNode, ParameterNode[ParametersT], ABC):
         status = DiagnosticStatus(
             level=level,
             name=self.get_fully_qualified_name(),
+            hardware_id=self.get_namespace().strip("/"),
             message=message or self.lifecycle_state,
             values=[
                 KeyValue(key=key, value=str(value))

@@ -52,10 +52,12 @@ class ParameterNode(LifecycleNode, Generic[ParametersT]):
         context: Context | None = None,
         namespace: str | None = None,
         overrides: Mapping[str, Any] | None = None,
+        cli_args: list[str] | None = None,
+        use_global_arguments: bool = True,
     ) -> None:
         """Declare the parameters: values of the command line, then `overrides` by flat name.
 
-        Others are at their `defaults`.
+        Others are at their `defaults`. The other arguments are those of `rclpy.node.Node`.
 
         Raises InvalidInputError for a parameter that is refused.
         """
@@ -65,6 +67,8 @@ class ParameterNode(LifecycleNode, Generic[ParametersT]):
                 name,
                 context=context,
                 namespace=namespace,
+                cli_args=cli_args,
+                use_global_arguments=use_global_arguments,
                 parameter_overrides=given,
                 automatically_declare_parameters_from_overrides=True,
             )

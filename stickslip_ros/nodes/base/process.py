@@ -3,8 +3,10 @@
 import argparse
 import sys
 from collections.abc import Callable, Generator, Mapping, Sequence
-from contextlib import ExitStack, closing, contextmanager
+from contextlib import ExitStack, closing, contextmanager, suppress
 from functools import cache
+from itertools import pairwise
+from pathlib import Path
 from threading import Lock
 from typing import Any
 
@@ -36,6 +38,7 @@ from stickslip_ros.nodes.base.parameters import first_line
 from stickslip_ros.nodes.base.spinner import Spinner, spin, stop_on_signals
 from stickslip_ros.physics.model.constants import Changes
 from stickslip_ros.scenarios.parameters import NodeParameters
+from stickslip_ros.scenarios.sections import read_file, section_matches
 from stickslip_ros.standard_streams import open_closed_streams
 
 ROS_ARGUMENTS = ["--ros-args", "--log-level", "warn", "--disable-external-lib-logs"]
@@ -119,7 +122,9 @@ def run_node(make: Callable[[], ManagedNode[Any]], parameters: NodeParameters) -
         return 2
     try:
         with ros_session(sys.argv) as spinner:
-            run_until_stopped(spinner, make())
+            node = make()
+            _warn_of_unread_files(node)
+            run_until_stopped(spinner, node)
         return 0
     except StickslipError as error:
         print(f"{parser.prog}: {error}", file=sys.stderr)
@@ -136,6 +141,23 @@ def run_until_stopped(spinner: Spinner, node: ManagedNode[Any]) -> None:
     reason = node.stopped.result()
     if reason is not None:
         raise reason
+
+
+def _warn_of_unread_files(node: ManagedNode[Any]) -> None:
+    """Log each parameter file of the command line that has no section for the node.
+
+    ROS, which has read them, is silent about that.
+    """
+    name = node.get_fully_qualified_name()
+    for option, path in pairwise(sys.argv):
+        if option != "--params-file":
+            continue
+        with suppress(InvalidInputError):  # ROS accepts what a scenario file may not have
+            sections = [pattern for pattern, _ in read_file(Path(path), "/").sections]
+            if not any(section_matches(pattern, name) for pattern in sections):
+                node.get_logger().warning(
+                    f"{path} has no section for {name}; it has {', '.join(sections)}"
+                )
 
 
 @cache
