@@ -22,7 +22,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "design": ("Design", "propose controller gains that suppress the vibration"),
     "list": ("Scenarios", "list the scenarios, friction laws and control laws"),
     "show": ("Scenarios", "show every parameter of a scenario and where its value comes from"),
-    "new": ("Scenarios", "write a complete, commented scenario file to edit"),
+    "new": ("Scenarios", "write a commented scenario file to edit"),
     "schema": ("Scenarios", "print the JSON schema of scenario files, for editors"),
     "paper": ("Paper", "reproduce the figures and the claims of the paper"),
     "completion": ("Shell", "print the completion script for bash or zsh"),

@@ -1,6 +1,7 @@
-"""`stickslip new`: a complete scenario file to edit."""
+"""`stickslip new`: a scenario file to edit."""
 
 import argparse
+import os
 import shlex
 from functools import partial
 from pathlib import Path
@@ -17,9 +18,10 @@ _SOURCE = "feed_drive"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of the command."""
     parser.description = (
-        "Write a scenario file with every parameter of every node. Comments give meaning, unit and "
-        "bounds of each. Edit the file, then give it to any command in place of a scenario's name. "
-        "It is a ROS parameter file: nodes read it by --params-file, too."
+        "Write a scenario file with the parameters of a drive and its controller. Comments give "
+        "meaning, unit and bounds of each. Edit the file, then give it to any command in place of "
+        "a scenario's name. It is a ROS parameter file: a complete one is read by nodes with "
+        "--params-file, too."
     )
     parser.add_argument(
         "file", metavar="FILE", type=Path, help="file to write, .yaml; must not exist"
@@ -31,13 +33,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="SCENARIO",
         help="scenario whose values the file starts with, by name or path (default: %(default)s)",
     )
+    parser.add_argument(
+        "--complete", action="store_true", help="write every parameter of every node"
+    )
     add_law(parser)
 
 
 def run(arguments: argparse.Namespace) -> None:
     """Run the command."""
     from stickslip_ros.scenarios.files import load_scenario
-    from stickslip_ros.scenarios.template import commented_file
+    from stickslip_ros.scenarios.template import commented_file, short_file
 
     path: Path = arguments.file
     if path.suffix not in _ENDINGS:
@@ -46,6 +51,12 @@ def run(arguments: argparse.Namespace) -> None:
     scenario = with_law(partial(load_scenario, arguments.source), arguments.controller)
     command = printable(shlex.join(["stickslip", "simulate", str(path)]))
     title = f"{path.stem}: a drive with the values of {scenario.name}, to be edited."
+    heading = f"{printable(title)}\n{command}"
+    text = commented_file(scenario, heading)
+    if not arguments.complete:
+        named = arguments.source == scenario.name
+        base = scenario.name if named else os.path.relpath(scenario.path, path.parent)
+        text = short_file(scenario, heading, base)
     with writing("FILE", path), written(path) as file:
-        file.write(commented_file(scenario, f"{printable(title)}\n{command}"))
+        file.write(text)
     print(f"{printable(str(path))} is written: `{command}` simulates it")

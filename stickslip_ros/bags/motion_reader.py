@@ -63,7 +63,7 @@ class BagLayout:
         for name, value, allowed in (("time", self.time, TIMES), ("force", self.force, FORCES)):
             if value not in allowed:
                 raise InvalidInputError(
-                    f"{name} = {shown(value)} is refused: {must_be_one_of(str(value), allowed)}"
+                    f"{name} = {shown(value)} is invalid: {must_be_one_of(str(value), allowed)}"
                 )
 
 

@@ -117,9 +117,9 @@ class Scenario:
     @property
     def left_to_defaults(self) -> list[str]:
         """Parameters of drive, rate and controller left at their defaults, as NODE.PARAMETER."""
-        return [name for name in self._names_of_drive() if name not in self.sources]
+        return [name for name in self.names_of_drive() if name not in self.sources]
 
-    def _names_of_drive(self) -> list[str]:
+    def names_of_drive(self) -> list[str]:
         """Return the parameters of drive, rate and controller, as NODE.PARAMETER."""
         names = [f"plant.{name}" for name in (*self.plant.drive_names(), "rate")]
         if self.plant.expects_control:
@@ -290,7 +290,7 @@ class Scenario:
 
     def _table(self) -> TextTable:
         """Return the parameters of the drive and its controller, and others that are given."""
-        shown, values = self._names_of_drive(), self.as_dict()
+        shown, values = self.names_of_drive(), self.as_dict()
         shown += sorted(self.given.difference(shown))
         dimensionless = self.plant.as_drive().is_dimensionless
         rows: list[list[str]] = []

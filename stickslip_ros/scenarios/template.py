@@ -1,5 +1,6 @@
 """For users who write a scenario file: a complete one with comments, and a schema for editors."""
 
+import json
 from collections.abc import Iterator, Mapping
 from math import isfinite
 from textwrap import wrap
@@ -14,6 +15,25 @@ from stickslip_ros.scenarios.sections import BASE_SECTION
 
 _WIDTH = 100
 _TYPES = {bool: "boolean", int: "integer", float: "number", str: "string"}
+
+
+def short_file(scenario: Scenario, heading: str, base: str) -> str:
+    """Return the text of a scenario file with the drive, its rate and its controller.
+
+    All else is left to the `base`. A comment beside each parameter gives its meaning and what is
+    allowed. `heading` is the comment at the top, line by line.
+    """
+    lines = [f"# {line}" for line in heading.splitlines()]
+    lines += ["", f"/**/{BASE_SECTION}:", f"  {PARAMETERS_KEY}:"]
+    lines += [f"    base: {json.dumps(base)}  # gives what this file omits"]
+    shown, values = scenario.names_of_drive(), scenario.as_dict()
+    for node, own in values.items():
+        names = [name for name in own if f"{node}.{name}" in shown]
+        lines += ["", f"/**/{node}:", f"  {PARAMETERS_KEY}:"] if names else []
+        for name in names:
+            text = ros_yaml.dump({name: own[name]}).replace('"', "", 2).rstrip()
+            lines.append(f"    {text}  # {_explained(NODE_PARAMETERS[node].known[name])}")
+    return "\n".join(lines) + "\n"
 
 
 def commented_file(scenario: Scenario, heading: str) -> str:

@@ -2,6 +2,7 @@
 
 import json
 import re
+from contextlib import chdir
 from pathlib import Path
 from typing import Any
 
@@ -70,7 +71,7 @@ def test_show_tells_of_sections_for_other_nodes(stickslip: Run, tmp_path: Path) 
 def test_new_writes_a_file_that_is_the_scenario(
     stickslip: Run, tmp_path: Path, source: str
 ) -> None:
-    done = stickslip("new", "mine.yaml", "--from", source)
+    done = stickslip("new", "mine.yaml", "--from", source, "--complete")
     assert (done.returncode, done.stderr) == (0, "")
     assert "`stickslip simulate mine.yaml`" in done.stdout
     title, command, empty, *_ = (tmp_path / "mine.yaml").read_text().splitlines()
@@ -88,12 +89,31 @@ def test_new_writes_a_file_that_is_the_scenario(
     assert stickslip("simulate", "mine.yaml", "--duration", "1", "--json").returncode == 0
 
 
+@pytest.mark.parametrize("source", ["feed_drive", "axis", "elsewhere/other.yaml"])
+def test_new_writes_the_drive_and_its_controller(
+    stickslip: Run, tmp_path: Path, source: str
+) -> None:
+    (tmp_path / "elsewhere").mkdir()
+    stickslip("new", "elsewhere/other.yaml", "--from", "vibrating_load", "--complete")
+    done = stickslip("new", "mine.yaml", "--from", source)
+    assert (done.returncode, done.stderr) == (0, "")
+    text = (tmp_path / "mine.yaml").read_text()
+    assert len(text.splitlines()) < 30
+    assert "    mass: 95.154  # Mass of the slide. [kg, above 0]\n" in text or source != "axis"
+    with chdir(tmp_path):
+        mine, whole = load_scenario("mine.yaml"), load_scenario(source)
+    assert mine.as_dict() == whole.as_dict()
+    assert {"plant.mass", "plant.rate"} <= mine.sources.keys()
+    assert mine.sources["plant.mass"] == "file"
+    assert mine.sources["plant.pace"] == "base"
+
+
 def test_new_keeps_lists_and_texts(stickslip: Run, tmp_path: Path) -> None:
     (tmp_path / "other.yaml").write_text(
         '/**/plant: {ros__parameters: {wait_for: [analyzer, "b"]}}\n'
         '/**/analyzer: {ros__parameters: {bag: "a: \\"b\\" #"}}\n'
     )
-    stickslip("new", "mine.yml", "--from", "./other.yaml")
+    stickslip("new", "mine.yml", "--from", "./other.yaml", "--complete")
     mine = load_scenario(str(tmp_path / "mine.yml"))
     assert mine.plant.wait_for == ["analyzer", "b"]
     assert mine.analyzer.bag == 'a: "b" #'
@@ -111,7 +131,8 @@ def test_the_schema_accepts_what_ships_and_what_new_writes(
 ) -> None:
     for name, shipped in shipped_scenarios().items():
         stickslip("new", f"{name}.yaml", "--from", name)
-        for path in (shipped, tmp_path / f"{name}.yaml"):
+        stickslip("new", f"all_{name}.yaml", "--from", name, "--complete")
+        for path in (shipped, tmp_path / f"{name}.yaml", tmp_path / f"all_{name}.yaml"):
             assert list(schema.iter_errors(yaml.safe_load(path.read_text()))) == [], path
 
 
