@@ -52,7 +52,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--slips",
         type=length,
         metavar="M",
-        help="also find slips: drops of the position by more than this, m, one by one",
+        help="also find slips: drops of the position (or rises, if there are none) by more than "
+        "this, m, one by one",
     )
     parser.add_argument(
         "--slip-time",

@@ -17,6 +17,7 @@ from stickslip_ros.bags.table_file import TableRecording, is_table, read_table
 from stickslip_ros.bags.text_table import ANY_FORM, TableFormat
 from stickslip_ros.errors import BagError, InvalidInputError
 from stickslip_ros.messages.topics import CONTROL_FORCE, JOINT_STATES
+from stickslip_ros.physics.measures.feed import relative_to_feed
 from stickslip_ros.physics.measures.run_meter import RunAnalysis, RunMeter, RunObserver
 from stickslip_ros.physics.measures.sample_meter import SampleAssumptions, reading_of
 from stickslip_ros.physics.measures.slips import SlipMeter, SlipThreshold
@@ -125,7 +126,8 @@ def report_of_recording(
             reading=reading_at_recording(recording, stick_speed),
         )
         meter.timing = _timing_of_recording(recording)
-        run = _RunReader(meter, start, end, observer, take, slips)
+        whole = isinstance(recording, TableRecording)
+        run = _RunReader(meter, start, end, observer, take, slips, whole=whole)
         # Measuring each chunk by itself would take twice as long.
         for block in recording.blocks(least=20_000):
             if recording.velocity_estimated and meter.motion.reading.noisy is None:
@@ -161,10 +163,14 @@ class _RunReader:
         observer: RunObserver | None,
         take: Callable[[SampleColumns | ForceColumns], None],
         slips: SlipThreshold | None,
+        *,
+        whole: bool,
     ) -> None:
         self.meter = meter
+        self._whole = whole  # the run is fed in one block
+        self._feed = 0.0
         self._ends = f"from {start:g} s on" + ("" if end == inf else f" and before {end:g} s")
-        self._slips = None if slips is None else SlipMeter(slips)
+        self._slips = None if slips is None else (SlipMeter(slips), SlipMeter(slips))
         self._last_stamp = -1
         self._belt_speed = 0.0
         self._observer, self._take = observer, take
@@ -184,9 +190,11 @@ class _RunReader:
             first = self._begin(int(states.stamp[0])) if self.first is None else self.first
             part = states[self._part(states.stamp, first)]
             self._measured += len(part)
-            self.meter.motion.feed(part)
             self._find_slips(part)
             self._take(part)
+            if self._whole:
+                part, self._feed = relative_to_feed(part)
+            self.meter.motion.feed(part)
             if self._observer is not None:
                 time = (part.stamp - first) / NANOSECONDS
                 self._observer.take_friction(time, part.friction_force)
@@ -208,9 +216,20 @@ class _RunReader:
             raise InvalidInputError(f"{path} holds no samples {self._ends}")
         report, slips = self.meter.report(), None
         notes = report["notes"]
+        if self._feed:
+            advance = quantity(abs(self._feed) * (report["period"] or 0.0), "m")
+            notes = [
+                *notes,
+                f"the slide advances at {quantity(self._feed, 'm/s')} on a guide at rest: the "
+                f"measures are those of its position less this feed, {advance} in a cycle",
+            ]
         if self._slips is not None:
-            slips = self._slips.report(self._belt_speed)
-            noise, least = report["position_noise"], self._slips.threshold.drop
+            drops, rises = self._slips
+            rising = not drops.count and rises.count > 0
+            slips = (rises if rising else drops).report(self._belt_speed)
+            if rising:
+                notes = [*notes, "the slips are rises of the position: drops there are none"]
+            noise, least = report["position_noise"], drops.threshold.drop
             if noise is not None and least < _NOISES * noise:
                 notes = [
                     *notes,
@@ -231,7 +250,9 @@ class _RunReader:
         forward = np.diff(part.stamp, prepend=self._last_stamp) > 0
         part = part[forward]
         sign = -1.0 if self._belt_speed < 0.0 else 1.0
-        self._slips.feed((part.stamp - (self.first or 0)) / NANOSECONDS, sign * part.position)
+        time = (part.stamp - (self.first or 0)) / NANOSECONDS
+        for direction, meter in zip((sign, -sign), self._slips, strict=True):
+            meter.feed(time, direction * part.position)
         if len(part):
             self._last_stamp = int(part.stamp[-1])
 

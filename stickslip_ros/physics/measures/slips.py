@@ -162,11 +162,15 @@ class SlipMeter:
             start = begin + int(np.argmax(low))
             fall = smooth[start:]
             lowest = np.minimum.accumulate(fall)
-            last = np.maximum.accumulate(np.where(fall <= lowest, np.arange(len(fall)), 0))
-            over = (fall > lowest + drop / 2.0) | (np.arange(len(fall)) - last > span)
+            rows = np.arange(len(fall))
+            last = np.maximum.accumulate(np.where(fall <= lowest, rows, 0))
+            first = np.maximum.accumulate(np.where(np.diff(lowest, prepend=np.inf) < 0.0, rows, 0))
+            rests = last - first > span  # a slide on a guide at rest does not move at all
+            over = rests | (fall > lowest + drop / 2.0) | (rows - last > span)
             if not over.any():
                 break
-            bottom = start + int(last[int(np.argmax(over))])
+            end = int(np.argmax(over))
+            bottom = start + int(first[end] if rests[end] else last[end])
             top = max(start - span, begin)
             top += int(np.argmax(smooth[top : start + 1]))
             found.append(self._slip(smooth, top, bottom))
