@@ -21,7 +21,7 @@ from stickslip_ros.physics.theory.critical_gains import (
 )
 from stickslip_ros.physics.theory.gain_intervals import gains_of, why_no_gains
 from stickslip_ros.physics.theory.hopf import HopfPoint, hopf_points
-from stickslip_ros.physics.theory.limit_cycles import LimitCycle, limit_cycle_of_run, limit_cycles
+from stickslip_ros.physics.theory.limit_cycles import limit_cycle_of_run, limit_cycles
 from stickslip_ros.physics.theory.linear import Expansion, expand
 from stickslip_ros.physics.theory.linear_sampled_loop import (
     LONGEST_DELAY,
@@ -40,6 +40,7 @@ from stickslip_ros.physics.theory.requirements import (
     NotCoveredError,
     require,
 )
+from stickslip_ros.physics.theory.shooting import LimitCycle
 from stickslip_ros.physics.theory.stability_map import CriticalGainCurves, StabilityMap
 from stickslip_ros.physics.theory.sticking import sticking_onset
 from stickslip_ros.scenarios.files import Scenario
@@ -120,7 +121,7 @@ def _held(drive: Drive) -> str | None:
     )
 
 
-def _kinked(drive: Drive) -> str | None:
+def _nonsmooth(drive: Drive) -> str | None:
     """Return why a drive has no first Lyapunov coefficient; None if it may have one."""
     kink = SMOOTH.lack(drive)
     return kink and f"the first Lyapunov coefficient needs {SMOOTH.need}: {kink}"
@@ -174,7 +175,7 @@ def _open_loop(drive: Drive, expansion: Expansion | None) -> Section:
         reason = "no periodic motion was found, or the drive is too stiff to integrate"
     return {
         **_eigenvalues(drive, expansion, _held(drive)),
-        **_hopf_points(points, None if points else _why_no_hopf_speed(drive), _kinked(drive)),
+        **_hopf_points(points, None if points else _why_no_hopf_speed(drive), _nonsmooth(drive)),
         "limit_cycles": _Noted([_cycle(cycle) for cycle in cycles or ()], reason),
     }
 
@@ -191,14 +192,14 @@ def _why_no_hopf_speed(drive: Drive) -> str:
 
 
 def _hopf_points(
-    points: list[HopfPoint], reason: str | None = None, kinked: str | None = None
+    points: list[HopfPoint], reason: str | None = None, nonsmooth: str | None = None
 ) -> Section:
     sigmas = [_known(point.first_lyapunov_coefficient) for point in points]
     return {
         "hopf_speeds": _Noted([point.belt_speed for point in points], reason),
         "hopf_angular_frequencies": [point.angular_frequency for point in points],
         "crossing_speeds": [point.crossing_speed for point in points],
-        "first_lyapunov_coefficients": _Noted(sigmas, kinked),
+        "first_lyapunov_coefficients": _Noted(sigmas, nonsmooth),
     }
 
 
@@ -262,7 +263,7 @@ def _closed_loop(drive: Drive, law: ControlLaw | None, plant: PlantParameters) -
         {
             **_eigenvalues(drive, expand(drive, control), _held(drive)),
             **_critical_gains(drive, law),
-            **_hopf_points(points, None if points else no_hopf_speed, _kinked(drive)),
+            **_hopf_points(points, None if points else no_hopf_speed, _nonsmooth(drive)),
             "limit_cycles": _Noted([_cycle(cycle) for cycle in cycles], reason),
         },
         None if ideal else "sensor and actuator are omitted: control is continuous here",
@@ -270,11 +271,11 @@ def _closed_loop(drive: Drive, law: ControlLaw | None, plant: PlantParameters) -
 
 
 def _critical_gains(drive: Drive, law: ControlLaw) -> Section:
-    gains, kinked = gains_of(law), _kinked(drive)
+    gains, nonsmooth = gains_of(law), _nonsmooth(drive)
     critical = None if gains is None else critical_gains(drive, gains)
     if critical is not None:
         sigma = _known(critical.first_lyapunov_coefficient)
-        values = critical.linear, _Noted(sigma, kinked), _Noted(critical.cubic, kinked)
+        values = critical.linear, _Noted(sigma, nonsmooth), _Noted(critical.cubic, nonsmooth)
         return dict(zip(_GAINS, values, strict=True))
     reason = why_no_gains(law) if gains is None else why_no_linear_gain(drive, gains)
     return dict.fromkeys(_GAINS, _Noted(None, reason or _held(drive)))

@@ -28,8 +28,9 @@ from stickslip_ros.physics.motion.compiled_flow import flow_rates, parameter_val
 from stickslip_ros.physics.theory.critical_gains import CriticalGains, critical_gains
 from stickslip_ros.physics.theory.cycle_bounds import follow, release_position
 from stickslip_ros.physics.theory.hopf import HopfPoint, hopf_points
-from stickslip_ros.physics.theory.limit_cycles import LimitCycle, limit_cycle_of_run, limit_cycles
+from stickslip_ros.physics.theory.limit_cycles import limit_cycle_of_run, limit_cycles
 from stickslip_ros.physics.theory.linear import Expansion, expand
+from stickslip_ros.physics.theory.shooting import LimitCycle
 from stickslip_ros.physics.theory.sticking import StickingOnset, sticking_onset
 
 _T = TypeVar("_T")

@@ -1,6 +1,5 @@
 """The stick-slip motion of a drive under a held force or continuous control, recorded or not."""
 
-from array import array
 from collections.abc import Sequence
 from typing import ClassVar
 
@@ -227,13 +226,14 @@ class Motion(HybridMotion):
 
     @control_state.setter
     def control_state(self, control_state: Sequence[float]) -> None:
-        self._instant.state[self._system.control_states] = array(
-            "d",
-            [
-                each / scale
-                for each, scale in zip(control_state, self._control_scales(), strict=True)
-            ],
-        )
+        self._put_control_state(self._instant.state, control_state)
+
+    def _put_control_state(
+        self, state: "list[float] | memoryview[float]", control_state: Sequence[float]
+    ) -> None:
+        scaled = zip(control_state, self._control_scales(), strict=True)
+        for index, (each, scale) in enumerate(scaled, self._system.control_states.start):
+            state[index] = each / scale
 
     def _control_scales(self) -> Sequence[float]:
         return () if self._control is None else self._control.state_scales(self._drive)
@@ -316,21 +316,18 @@ class Motion(HybridMotion):
         x, y, *_ = self._instant.state.tolist()
         memory, law, old_law = self.memory, drive.friction, old.friction
         self._drive, self._control = drive, control
-        system = drive_system(drive, control)
+        self._use(drive_system(drive, control))
+        system = self._system
         if drive.speed_scale != old.speed_scale or drive.length_scale != old.length_scale:
             x, y = position / drive.length_scale, velocity / drive.speed_scale
         state = system.initial_state(x, y)
         if (law.name, law.states) == (old_law.name, old_law.states):
             self._put_memory(state, memory)
         if control is not None:
-            state[system.control_states] = [
-                each / scale
-                for each, scale in zip(control_state, control.state_scales(drive), strict=True)
-            ]
+            self._put_control_state(state, control_state)
         if drive.actuator.states == old.actuator.states:
             ratio = old.normal_force / drive.normal_force
             state[system.actuator_states] = [each * ratio for each in lagging]
-        self._use(system)
         self._set_clock()
         self._instant.inputs = [0.0] * len(system.inputs)
         self.set_forces(force, disturbance)

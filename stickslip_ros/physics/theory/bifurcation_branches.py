@@ -18,7 +18,7 @@ from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.measures.cycle_measures import Regime
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.theory.hopf import HopfPoint, hopf_points
-from stickslip_ros.physics.theory.limit_cycles import LimitCycle, limit_cycles
+from stickslip_ros.physics.theory.limit_cycles import limit_cycles
 from stickslip_ros.physics.theory.linear import hurwitz_determinants, jacobians
 from stickslip_ros.physics.theory.requirements import (
     AUTONOMOUS,
@@ -27,6 +27,7 @@ from stickslip_ros.physics.theory.requirements import (
     SYMMETRIC,
     require,
 )
+from stickslip_ros.physics.theory.shooting import LimitCycle
 from stickslip_ros.physics.theory.sticking import StickingOnset, sticking_onset
 
 _CURVE = 400

@@ -17,9 +17,9 @@ from stickslip_ros.physics.theory.gain_intervals import (
     nearest_to_zero,
 )
 from stickslip_ros.physics.theory.hopf import ComplexPair, first_lyapunov_coefficient
-from stickslip_ros.physics.theory.limit_cycles import LimitCycle, shoot
 from stickslip_ros.physics.theory.linear import expand, hurwitz_determinants
 from stickslip_ros.physics.theory.requirements import AUTONOMOUS, SMOOTH, SPRING, STATIC, require
+from stickslip_ros.physics.theory.shooting import LimitCycle, shoot
 
 _ROUNDING = 1e-9
 """Relative change of a determinant with the gain below which it is treated as zero."""

@@ -46,7 +46,7 @@ def _memory(drive: Drive) -> str | None:
     return f"the friction law {law.name} has a memory ({states})" if states else None
 
 
-def _kinks(drive: Drive) -> str | None:
+def _no_second_derivative(drive: Drive) -> str | None:
     law = drive.friction
     return f"the friction law {law.name} has no second derivative there" if law.nonsmooth else None
 
@@ -71,7 +71,7 @@ AUTONOMOUS = Requirement("a constant belt speed and a constant normal force", _s
 STATIC = Requirement("a friction law without memory", _memory)
 """Friction depends on the relative speed only: without control the motion is planar."""
 
-SMOOTH = Requirement("friction that is smooth in steady slip", _kinks)
+SMOOTH = Requirement("friction that is smooth in steady slip", _no_second_derivative)
 """Friction in steady slip has derivatives of the first three orders."""
 
 SYMMETRIC = Requirement("friction that is the same in both directions", _asymmetry)

@@ -11,10 +11,7 @@ from stickslip_ros.physics.motion.variational import ShootingMotion
 from stickslip_ros.physics.theory.critical_gains import critical_gains, limit_cycle_from_hopf
 from stickslip_ros.physics.theory.cycle_bounds import least_cycle
 from stickslip_ros.physics.theory.hopf import HopfPoint, hopf_points
-from stickslip_ros.physics.theory.limit_cycles import (
-    limit_cycle_of_run,
-    limit_cycles,
-)
+from stickslip_ros.physics.theory.limit_cycles import limit_cycle_of_run, limit_cycles
 from stickslip_ros.physics.theory.linear import expand, jacobians
 from tests.physics.drives import FEED_DRIVE, PAPER
 from tests.physics.parts import TwoLags

@@ -16,13 +16,9 @@ from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import Coulomb, Exponential, FrictionLaw, Linear, Stribeck
 from stickslip_ros.physics.motion import Motion, RecordedMotion
 from stickslip_ros.physics.theory.cycle_bounds import largest_cycle, least_cycle
-from stickslip_ros.physics.theory.limit_cycles import (
-    LimitCycle,
-    limit_cycle_of_run,
-    limit_cycles,
-    shoot,
-)
+from stickslip_ros.physics.theory.limit_cycles import limit_cycle_of_run, limit_cycles
 from stickslip_ros.physics.theory.linear import expand
+from stickslip_ros.physics.theory.shooting import LimitCycle, shoot
 from stickslip_ros.physics.theory.sticking import sticking_onset
 from tests.physics import drives
 from tests.physics.drives import FEED_DRIVE, LIMIT_CYCLES, PAPER, settled

@@ -26,8 +26,9 @@ from stickslip_ros.physics.motion import RecordedMotion
 from stickslip_ros.physics.motion.compiled_flow import parameter_values
 from stickslip_ros.physics.theory.critical_gains import critical_gains, limit_cycle_from_hopf
 from stickslip_ros.physics.theory.hopf import hopf_points
-from stickslip_ros.physics.theory.limit_cycles import LimitCycle, limit_cycles, shoot
+from stickslip_ros.physics.theory.limit_cycles import limit_cycles
 from stickslip_ros.physics.theory.linear import equilibria, expand
+from stickslip_ros.physics.theory.shooting import LimitCycle, shoot
 
 CURVE = Exponential(static=0.4, kinetic=0.25, decay_speed=0.02)
 FEED = Drive(100.0, 200.0, 1e6, 1000.0, 0.04, LuGre(CURVE, 1e5, 100.0))

@@ -23,9 +23,10 @@ from stickslip_ros.physics.theory.cycle_bounds import (
     release_position,
 )
 from stickslip_ros.physics.theory.hopf import hopf_points
-from stickslip_ros.physics.theory.limit_cycles import limit_cycle_of_run, limit_cycles, shoot
+from stickslip_ros.physics.theory.limit_cycles import limit_cycle_of_run, limit_cycles
 from stickslip_ros.physics.theory.linear import expand
 from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop
+from stickslip_ros.physics.theory.shooting import shoot
 from stickslip_ros.physics.theory.sticking import sticking_onset
 from tests.physics.drives import PAPER
 from tests.physics.parts import OneSided
