@@ -135,3 +135,9 @@ class ForceColumns(Table):
     """Stamps, ns."""
     force: FloatArray
     """Force on the slide, N."""
+
+
+NO_SAMPLES = SampleColumns(np.empty(0, np.int64), *[np.empty(0)] * 5)
+"""No samples."""
+NO_FORCES = ForceColumns(np.empty(0, np.int64), np.empty(0))
+"""No forces."""

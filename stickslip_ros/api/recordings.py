@@ -21,7 +21,7 @@ from stickslip_ros.physics.loop.trajectory import QUANTITIES
 from stickslip_ros.physics.measures.cycle_measures import Measures, measures_of
 from stickslip_ros.physics.measures.slips import SlipThreshold
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.samples import ForceColumns, SampleColumns
+from stickslip_ros.samples import NO_FORCES, NO_SAMPLES, ForceColumns, SampleColumns
 from stickslip_ros.scenarios.curve_file import CURVES, as_pairs
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, PlantParameters
 from stickslip_ros.show.measure_table import doubt, report_tables
@@ -341,12 +341,10 @@ def recorded_run(
         path, table=table, namespace=namespace, observer=observer, **taking, **options
     )
     drive = None if table else recorded_drive(path, namespace)
-    nothing = np.empty(0)
-    stamps = np.empty(0, dtype=np.int64)
     return RecordedRun(
         path,
-        SampleColumns(stamps, *[nothing] * 5).followed_by(*samples),
-        ForceColumns(stamps, nothing).followed_by(*forces),
+        NO_SAMPLES.followed_by(*samples),
+        NO_FORCES.followed_by(*forces),
         report,
         drive,
         history,

@@ -12,7 +12,7 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray, IntArray
 from stickslip_ros.errors import BagError, InvalidInputError, MessageError
-from stickslip_ros.messages.cdr import Layout, Refused, decode
+from stickslip_ros.messages.cdr import Layout, Messages, Refused, decode
 from stickslip_ros.messages.codec import (
     BELT,
     SLIDE,
@@ -84,6 +84,25 @@ class NumberedTopic(NamedTuple):
         return cls(found[1], int(found[2])) if found else cls(text, None)
 
 
+def read_forces(
+    layout_of: Callable[[bytes], Layout],
+    messages: Messages,
+    log_time: IntArray,
+    *,
+    by_log: bool = False,
+) -> tuple[ForceColumns, bool, Refused]:
+    """Return forces, whether one has no stamp, and what was refused.
+
+    Without a stamp a force has its log time; `by_log` all have.
+    """
+    rows, stamp, values, refused = decode(*messages, layout_of, 1)
+    known = np.isfinite(values[0])  # commands of other joints tell nothing
+    stamp, log_time = stamp[known], log_time[rows][known]
+    unstamped = (stamp == 0) | by_log
+    forces = ForceColumns(np.where(unstamped, log_time, stamp), values[0, known])
+    return forces, bool(unstamped.any()) and not by_log, refused
+
+
 class MotionReader:
     """Reads the joint states of a drive, block by block.
 
@@ -140,18 +159,17 @@ class MotionReader:
         return [printable(each) for each in notes]
 
     def read(
-        self, data: bytes, begin: IntArray, end: IntArray, log_time: IntArray | None = None
+        self, messages: Messages, log_time: IntArray | None = None
     ) -> tuple[SampleColumns, ForceColumns, Refused]:
-        """Read the messages `data[begin[i] : end[i]]`; also return efforts that are forces.
+        """Read messages; also return efforts that are forces.
 
         Raises BagError if the joint must be chosen, or is not there, if the stamps tell no times,
         or if two sources take turns.
         """
         if self._layout_of is None:
-            self._choose(data, begin, end)
-        rows, stamp, values, refused = decode(
-            data, begin, end, self._layout_of or joint_state_layout, 5
-        )
+            self._choose(messages)
+        layout_of = self._layout_of or joint_state_layout
+        rows, stamp, values, refused = decode(*messages, layout_of, 5)
         if log_time is not None:
             if len(rows) and self.clock_offset is None:
                 self.clock_offset = int(log_time[rows[0]] - stamp[0])
@@ -168,13 +186,13 @@ class MotionReader:
             forces = ForceColumns(samples.stamp, samples.friction_force)
         return self._completed(samples), forces, refused
 
-    def _choose(self, data: bytes, begin: IntArray, end: IntArray) -> None:
+    def _choose(self, messages: Messages) -> None:
         """Find the joint by the names in the first messages."""
         known: dict[str, None] = {}
         joint, belt, own = self._layout.joint, self._layout.belt_joint, False
-        for first, last in zip(begin[:_SEEN].tolist(), end[:_SEEN].tolist(), strict=True):
+        for begin, end in zip(messages.begin[:_SEEN], messages.end[:_SEEN], strict=True):
             try:
-                names = joint_names(data[first:last])
+                names = joint_names(messages.data[begin:end])
             except MessageError:
                 continue
             own |= SLIDE in names and BELT in names

@@ -17,9 +17,15 @@ from stickslip_ros.bags.chunk import MessageBlock
 from stickslip_ros.bags.compression import unpack_file
 from stickslip_ros.bags.mcap_file import McapFile
 from stickslip_ros.bags.metadata import metadata_faults
-from stickslip_ros.bags.motion_reader import ANY_LAYOUT, BagLayout, MotionReader, NumberedTopic
+from stickslip_ros.bags.motion_reader import (
+    ANY_LAYOUT,
+    BagLayout,
+    MotionReader,
+    NumberedTopic,
+    read_forces,
+)
 from stickslip_ros.errors import BagError
-from stickslip_ros.messages.cdr import Refused, decode
+from stickslip_ros.messages.cdr import Messages, Refused
 from stickslip_ros.messages.codec import (
     FORCE_TYPES,
     force_layouts,
@@ -38,16 +44,19 @@ from stickslip_ros.messages.topics import (
     TRUE_JOINT_STATES,
     Topic,
 )
-from stickslip_ros.samples import ForceColumns, ReferenceColumns, SampleColumns
+from stickslip_ros.samples import (
+    NO_FORCES,
+    NO_SAMPLES,
+    ForceColumns,
+    ReferenceColumns,
+    SampleColumns,
+)
 from stickslip_ros.stamps import NANOSECONDS
-from stickslip_ros.text import printable, quantity, shown
+from stickslip_ros.text import number_in, printable, quantity, shown
 
 _PACKED_SUFFIX = ".mcap.zstd"
 """Suffix of the files that rosbag2 compressed as a whole."""
 
-
-_NO_STATES = SampleColumns(np.empty(0, np.int64), *[np.empty(0)] * 5)
-_NO_FORCES = ForceColumns(np.empty(0, np.int64), np.empty(0))
 
 ColumnsT = TypeVar("ColumnsT", SampleColumns, ForceColumns, ReferenceColumns)
 _Decode = Callable[[bytes, IntArray, IntArray], tuple[ColumnsT, Refused]]
@@ -118,7 +127,7 @@ class Recording:
         layout: BagLayout = ANY_LAYOUT,
     ) -> None:
         self.path = Path(path)
-        self._belt_speed, self._layout = belt_speed, layout
+        self._belt_speed, self._given_layout = belt_speed, layout
         self._namespace = namespace
         self._motion: MotionReader | None = None
         self._timed_by_log = ""
@@ -198,7 +207,7 @@ class Recording:
         name = self._topic(CONTROL_FORCE)
         blocks = [self._forces(name, block, ids) for block, ids in self._blocks(name)]
         self._check_clocks()
-        return _NO_FORCES.followed_by(*blocks)
+        return NO_FORCES.followed_by(*blocks)
 
     @cached_property
     def applied_disturbances(self) -> ForceColumns:
@@ -383,6 +392,21 @@ class Recording:
         self._unreadable = [str(error) for error in errors]
 
     @cached_property
+    def _layout(self) -> BagLayout:
+        """The layout that was given or, without one, that the analyzer used."""
+        if self._given_layout != ANY_LAYOUT:
+            return self._given_layout
+        kept = {name: text.strip('"') for name, text in self._of_the_analyzer.items()}
+        joint, belt = (kept.get(name) or None for name in ("joint", "belt_joint"))
+        force = "effort" if kept.get("force_type") == "effort" else "topic"
+        return BagLayout(joint, belt, force=force)
+
+    @cached_property
+    def _of_the_analyzer(self) -> dict[str, str]:
+        """The parameters of the analyzer, as texts."""
+        return self.metadata("stickslip_ros/analyzer") or {}
+
+    @cached_property
     def _prefix(self) -> str:
         """Prefix of the names of the drive's topics; BagError if there are several drives."""
         if self._layout.states_topic is not None:
@@ -443,7 +467,10 @@ class Recording:
         return self._motion is not None and self._motion.estimated
 
     def _motion_reader(self, topic: str) -> MotionReader:
-        return MotionReader(topic, self._layout, self._belt_speed, str(self.path))
+        belt_speed = self._belt_speed
+        if belt_speed is None:
+            belt_speed = number_in(self._of_the_analyzer.get("belt_speed", "")) or None
+        return MotionReader(topic, self._layout, belt_speed, str(self.path))
 
     @cached_property
     def _states_and_efforts(self) -> tuple[SampleColumns, ForceColumns]:
@@ -452,39 +479,35 @@ class Recording:
         self._motion = motion = self._motion_reader(name)
         read = [self._states(motion, name, block, ids) for block, ids in self._blocks(name)]
         states, efforts = zip(*read, strict=True) if read else ((), ())
-        return _NO_STATES.followed_by(*states), _NO_FORCES.followed_by(*efforts)
+        return NO_SAMPLES.followed_by(*states), NO_FORCES.followed_by(*efforts)
 
     def _states(
         self, motion: MotionReader, topic: str, block: MessageBlock, channels: dict[str, list[int]]
     ) -> tuple[SampleColumns, ForceColumns]:
         messages = block.on(channels.get(topic, []))
-        states, efforts, refused = motion.read(
-            messages.data, messages.begin, messages.end, messages.log_time
-        )
+        states, efforts, refused = motion.read(_content(messages), messages.log_time)
         self._note(topic, refused)
         return states, efforts
 
     def _forces(
         self, topic: str, block: MessageBlock, channels: dict[str, list[int]]
     ) -> ForceColumns:
-        messages, layout = block.on(channels.get(topic, [])), self._layout
+        layout, kind = self._layout, self.topics.get(topic, CONTROL_FORCE.type_name)
+        by_log = layout.time == "log"
+        if kind == CONTROL_FORCE.type_name and not (layout.force_topic or by_log):
+            return self._decoded(topic, block, channels, wrenches_in)
         number = NumberedTopic.of(layout.force_topic or "").number
-        kind = self.topics.get(topic, CONTROL_FORCE.type_name)
-        layout_of = force_layouts(layout.joint, number)[kind]
-        rows, stamp, values, refused = decode(
-            messages.data, messages.begin, messages.end, layout_of, 1
+        messages = block.on(channels.get(topic, []))
+        forces, unstamped, refused = read_forces(
+            force_layouts(layout.joint, number)[kind],
+            _content(messages),
+            messages.log_time,
+            by_log=by_log,
         )
+        if unstamped:
+            self._timed_by_log = topic
         self._note(topic, refused)
-        force, log_time = values[0], messages.log_time[rows]
-        if layout.time == "log":
-            stamp = log_time
-        elif layout.force_topic or kind != CONTROL_FORCE.type_name:
-            if (unstamped := stamp == 0).any():
-                self._timed_by_log = topic
-                stamp = np.where(unstamped, log_time, stamp)
-            known = np.isfinite(force)  # commands of other joints tell nothing
-            stamp, force = stamp[known], force[known]
-        return ForceColumns(stamp, force)
+        return forces
 
     def _check_clocks(self) -> None:
         """Refuse log times of forces beside stamps of another clock."""
@@ -509,7 +532,7 @@ class Recording:
         decode: _Decode[ColumnsT],
     ) -> ColumnsT:
         messages = block.on(channels.get(topic, []))
-        columns, refused = decode(messages.data, messages.begin, messages.end)
+        columns, refused = decode(*_content(messages))
         self._note(topic, refused)
         return columns
 
@@ -521,6 +544,10 @@ class Recording:
             nothing = np.empty(0, np.int64)
             blocks = [decode(b"", nothing, nothing)[0]]
         return blocks[0].followed_by(*blocks[1:])
+
+
+def _content(block: MessageBlock) -> Messages:
+    return Messages(block.data, block.begin, block.end)
 
 
 def _joined_blocks(blocks: Sequence[RunBlock]) -> RunBlock:

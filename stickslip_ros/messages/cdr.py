@@ -36,11 +36,19 @@ class Refused(NamedTuple):
     """Why the first one could not be read; empty if there is none."""
 
 
-def joined(messages: Sequence[bytes]) -> tuple[bytes, IntArray, IntArray]:
-    """Return the messages joined together, and where each one begins and ends in the result."""
+class Messages(NamedTuple):
+    """Serialized messages: `data[begin[i] : end[i]]`."""
+
+    data: bytes
+    begin: IntArray
+    end: IntArray
+
+
+def joined(messages: Sequence[bytes]) -> Messages:
+    """Return single messages joined together."""
     size = np.array([len(message) for message in messages], np.int64)
     end = np.cumsum(size)
-    return b"".join(messages), end - size, end
+    return Messages(b"".join(messages), end - size, end)
 
 
 class Decoder:

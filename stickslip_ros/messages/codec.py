@@ -27,6 +27,8 @@ FORCE_TYPES = (
     "sensor_msgs/msg/JointState",
 )
 """Types of messages that may hold a force."""
+UNSTAMPED = FORCE_TYPES[1:3]
+"""Those that have no stamp."""
 
 _MOST_JOINTS = 1000
 """Messages with more joints are refused: decoding might take longer than a sample."""

@@ -7,6 +7,7 @@ import sys
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from functools import partial
 from itertools import islice
 from math import inf
@@ -14,14 +15,18 @@ from operator import attrgetter
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
+import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.qos import ReliabilityPolicy
 from std_msgs.msg import Float64
 
+from stickslip_ros.bags.motion_reader import BagLayout, MotionReader, read_forces
 from stickslip_ros.bags.recorder import Recorder, check_new_bag
 from stickslip_ros.errors import BagError, InvalidInputError, MessageError
-from stickslip_ros.messages.cdr import Refused
+from stickslip_ros.messages.cdr import Refused, joined
 from stickslip_ros.messages.codec import (
-    joint_state_columns,
+    UNSTAMPED,
+    force_layouts,
     pack_header,
     unpack_header,
     wrench_columns,
@@ -57,10 +62,12 @@ from stickslip_ros.nodes.base.managed import (
     diagnosis,
 )
 from stickslip_ros.nodes.base.process import run_node
-from stickslip_ros.nodes.base.ros_topics import qos_profile, waiting_messages
+from stickslip_ros.nodes.base.ros_topics import qos_profile, timed_messages
 from stickslip_ros.physics.measures.cycle_measures import trend_text
 from stickslip_ros.physics.measures.run_meter import RunMeter
+from stickslip_ros.physics.measures.sample_meter import SampleAssumptions
 from stickslip_ros.physics.measures.timing import Timing
+from stickslip_ros.samples import NO_FORCES, NO_SAMPLES, ForceColumns, SampleColumns
 from stickslip_ros.scenarios.curve_file import CURVES, Pairs, read_pairs
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, AnalyzerParameters
 from stickslip_ros.stamps import END_OF_TIME, NANOSECONDS
@@ -105,7 +112,19 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
 
     def start(self) -> None:
         """Open a bag, start to measure, and subscribe last, so that no message is lost."""
-        self._meter = RunMeter(self.parameters.window, reading=self.parameters.reading_of({}))
+        own = self.parameters
+        by_effort = own.force_type == "effort"
+        kind = CONTROL_FORCE.type_name if by_effort else own.force_type
+        self._force = replace(CONTROL_FORCE, type_name=kind)
+        self._topics = [
+            self._force if topic == CONTROL_FORCE else topic for topic in RECORDED_TOPICS
+        ]
+        self._force_layout = force_layouts(own.joint or None, None)[kind]
+        layout = BagLayout(
+            own.joint or None, own.belt_joint or None, force="effort" if by_effort else "topic"
+        )
+        self._motion = MotionReader(JOINT_STATES.name, layout, own.belt_speed)
+        self._meter = RunMeter(own.window, reading=own.reading_of({}))
         self._cycles = self._newest = self._newest_recorded = 0
         self._heard_at = inf
         self._timings: dict[str, Timing] = {}
@@ -120,14 +139,14 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         self._recorded = self.advertise(RECORDED)
         self._parameter_calls: dict[str, ServiceCall] = {}
         self._ask_for_parameters("plant")
-        self._to_measure: dict[Topic[Any], list[bytes]] = {
+        self._to_measure: dict[Topic[Any], list[_Message]] = {
             JOINT_STATES: [],
-            CONTROL_FORCE: [],
+            self._force: [],
             DROPPED_FORCE: [],
         }
         self._listening = {
             topic: self.keep(self.create_polled_subscription(topic, qos_profile(topic)))
-            for topic in reversed(RECORDED_TOPICS)  # joint states last, see `missing_peers`
+            for topic in reversed(self._topics)  # joint states last, see `missing_peers`
         }
         self._look_for_controllers()
         self._periodic = [
@@ -178,7 +197,7 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         values = {**counts, **self.dropped.values, **notes, **bag}
         if self._bag_failure:
             return ERROR, self._bag_failure, values
-        complaints = [self.dropped.complaint, *self.duplicate_publishers(*RECORDED_TOPICS)]
+        complaints = [self.dropped.complaint, *self.duplicate_publishers(*self._topics)]
         if report["lost_samples"]:
             complaints.append("samples were lost")
         return diagnosis(complaints, values)
@@ -190,7 +209,7 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
 
     def _take_in(self) -> None:
         """Record the messages received since the last call, and keep them for the measures."""
-        taken = {topic: self._take(topic) for topic in RECORDED_TOPICS}
+        taken = {topic: self._take(topic) for topic in self._topics}
         for topic in RECORDED_IF_PUBLISHED:
             if topic.name not in self._published and (
                 taken[topic] or self._listening[topic].get_publisher_count() > 0
@@ -200,7 +219,6 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         # Without this topic drops are unknown.
         self._meter.dropped_known = DROPPED_FORCE.name in self._published
         if taken[JOINT_STATES]:
-            self._newest = taken[JOINT_STATES][-1].stamp
             self._heard_at = min(self._heard_at, time.monotonic())
         if self._newest != self._newest_recorded and self._parameters_known():
             self._newest_recorded = self._newest
@@ -217,18 +235,23 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         """Take the waiting messages of a topic; drop those without a valid stamp."""
         taken: list[_Message] = []
         # A publisher that sends faster than this must not block all other work.
-        for data in islice(waiting_messages(self._listening[topic]), DEEP):
+        for data, sent in islice(timed_messages(self._listening[topic]), DEEP):
             try:
-                stamp = unpack_header(data)
+                stamp = 0 if topic.type_name in UNSTAMPED else unpack_header(data)
             except MessageError as error:
                 self.dropped.add(f"{topic.name}: {error}")
                 continue
+            if stamp == 0 and topic is self._force and topic != CONTROL_FORCE:
+                simulated = self._newest and abs(sent - self._newest) > NANOSECONDS
+                stamp = self._newest if simulated else sent
             if topic is not REFERENCE and not 0 < stamp < END_OF_TIME:
                 self.dropped.add(f"{topic.name}: a message with the stamp {stamp} ns")
                 continue
             taken.append(_Message(topic, stamp, data))
+        if topic is JOINT_STATES and taken:
+            self._newest = taken[-1].stamp
         if topic in self._to_measure:
-            self._to_measure[topic] += [message.data for message in taken]
+            self._to_measure[topic] += taken
         return taken
 
     def _within_the_run(self, message: _Message) -> _Message:
@@ -287,7 +310,7 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
             self._keep("stickslip_ros/timing", self._meter.timing._asdict())
 
     def _measure(self) -> None:
-        states = self._columns(JOINT_STATES, joint_state_columns)
+        states, efforts = self._states()
         windows = self._cycles // self.parameters.window
         for cycle in self._meter.motion.feed(states):
             values = (cycle.amplitude, cycle.stick_fraction, cycle.frequency)
@@ -296,9 +319,9 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
             self._cycles += 1
         if self._cycles // self.parameters.window > windows:
             self._log_measures()
-        forces = self._columns(CONTROL_FORCE, wrench_columns)
         dropped = self._columns(DROPPED_FORCE, wrench_columns)
-        self._meter.feed_forces(forces, dropped)
+        self._meter.feed_forces(efforts if len(efforts) else self._forces(), dropped)
+        self._match_publishers()
         self._look_for_controllers()
         for call in self._parameter_calls.values():
             call.pursue()
@@ -318,15 +341,60 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
             self._logged = text
             self.get_logger().info(text)
 
+    def _states(self) -> tuple[SampleColumns, ForceColumns]:
+        """Return the joint states to measure, and efforts that are forces."""
+        messages, self._to_measure[JOINT_STATES] = self._to_measure[JOINT_STATES], []
+        try:
+            states, efforts, refused = self._motion.read(joined([each.data for each in messages]))
+        except BagError as error:
+            self.dropped.add(str(error), len(messages))
+            return NO_SAMPLES, NO_FORCES
+        self._drop(JOINT_STATES, refused)
+        if self._motion.estimated and self._meter.motion.reading.noisy is None:
+            self._meter.motion.reading = SampleAssumptions(noisy=True)
+        return states, efforts
+
+    def _forces(self) -> ForceColumns:
+        """Return the control forces to measure."""
+        if self._force == CONTROL_FORCE:
+            return self._columns(CONTROL_FORCE, wrench_columns)
+        messages, self._to_measure[self._force] = self._to_measure[self._force], []
+        stamps = np.array([each.stamp for each in messages], np.int64)
+        try:
+            forces, _, refused = read_forces(
+                self._force_layout, joined([each.data for each in messages]), stamps, by_log=True
+            )
+        except BagError as error:
+            self.dropped.add(str(error), len(messages))
+            return NO_FORCES
+        self._drop(self._force, refused)
+        return forces
+
     def _columns(
         self, topic: Topic[Any], decode: Callable[[Sequence[bytes]], tuple[ColumnsT, Refused]]
     ) -> ColumnsT:
         """Return the values of a topic to measure; drop unreadable messages."""
         messages, self._to_measure[topic] = self._to_measure[topic], []
-        columns, refused = decode(messages)
+        columns, refused = decode([each.data for each in messages])
+        self._drop(topic, refused)
+        return columns
+
+    def _drop(self, topic: Topic[Any], refused: Refused) -> None:
         if refused.number > 0:
             self.dropped.add(f"{topic.name}: {refused.reason}", refused.number)
-        return columns
+
+    def _match_publishers(self) -> None:
+        """Hear best-effort publishers of other machines, too, which no reliable reader matches."""
+        for topic in (JOINT_STATES, self._force):
+            listening = self._listening[topic]
+            best_effort = any(
+                each.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT
+                for each in self.get_publishers_info_by_topic(listening.topic_name)
+            )
+            if best_effort and listening.qos_profile.reliability == ReliabilityPolicy.RELIABLE:
+                self.release(listening)
+                qos = qos_profile(topic, reliability=ReliabilityPolicy.BEST_EFFORT)
+                self._listening[topic] = self.keep(self.create_polled_subscription(topic, qos))
 
     def _next_bag(self) -> Path:
         suffix = f"_{self._bags_opened + 1}" if self._bags_opened else ""
@@ -340,7 +408,7 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
             max_bag_duration=self.parameters.max_bag_duration,
         )
         try:
-            for topic in RECORDED_TOPICS:
+            for topic in self._topics:
                 if topic not in RECORDED_IF_PUBLISHED:
                     self._add_topic(recorder, topic)
         except BagError:  # on a full disk; another attempt may follow immediately

@@ -13,9 +13,14 @@ from stickslip_ros.scenarios import ros_yaml
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
 from stickslip_ros.text import did_you_mean
 
+_NAMED_WITH_NODE = "analyzer.belt_speed"
+"""Parameter whose keyword has its node: `belt_speed` is that of the plant."""
+
 
 def keyword_of(parameter: str) -> str:
     """Return the keyword for NODE.PARAMETER: its flat name with underscores for dots."""
+    if parameter == _NAMED_WITH_NODE:
+        return parameter.replace(".", "_")
     return parameter.partition(".")[2].replace(".", "_")
 
 
@@ -87,7 +92,8 @@ def parse_override(text: str) -> tuple[str, str, Any]:
         value = ros_yaml.parse(written, f"{given}: the value")
         return node, parameter, in_own_unit(target, value)
     if not equals or not parameter:
-        meant = did_you_mean(target, known, "as in plant.belt_speed=0.2")
+        usual = [each for each in known if each != _NAMED_WITH_NODE]
+        meant = did_you_mean(target, usual, "as in plant.belt_speed=0.2")
         raise InvalidInputError(f"{given}: must be NODE.PARAMETER=VALUE; {meant}")
     if node not in NODE_PARAMETERS:
         meant = did_you_mean(node, NODE_PARAMETERS)

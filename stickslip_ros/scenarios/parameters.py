@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Literal, Self
 from typing_extensions import override
 
 from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.messages.codec import FORCE_TYPES
 from stickslip_ros.physics.loop.controller import Controller
 from stickslip_ros.physics.loop.sampled_loop import LOCKSTEP_START, SampledLoop
 from stickslip_ros.physics.measures.sample_meter import SampleAssumptions, reading_of
@@ -336,7 +337,18 @@ def _parameters_of_law(law: type[ControlLaw]) -> Mapping[str, Parameter]:
 
 
 @dataclass(frozen=True)
-class AnalyzerParameters(NodeParameters):
+class MachineParameters(NodeParameters):
+    """Parameters that say where joint states of other machines have the motion."""
+
+    joint: str = at_build(
+        "", "Joint that is the slide; empty: `slide` beside `belt`, or the only joint."
+    )
+    belt_joint: str = at_build("", "Joint that is the belt; empty: `belt`, if there is one.")
+    belt_speed: float = at_build(0.0, "Belt speed, where the joint states have no belt.", "m/s")
+
+
+@dataclass(frozen=True)
+class AnalyzerParameters(MachineParameters):
     """Parameters of the analyzer node."""
 
     bag: str = at_rest("", "Directory to record to; empty: no recording.")
@@ -371,6 +383,11 @@ class AnalyzerParameters(NodeParameters):
     compression: Literal["lz4", "zstd", "none"] = at_rest(
         "lz4", "Compression of the bag.", choices=("lz4", "zstd", "none")
     )
+    force_type: str = at_build(
+        FORCE_TYPES[0],
+        "Type of the messages on `control_force`; `effort`: the force is the effort of the joint.",
+        choices=(*FORCE_TYPES, "effort"),
+    )
 
     @property
     def given_stick_speed(self) -> float | None:
@@ -380,17 +397,6 @@ class AnalyzerParameters(NodeParameters):
     def reading_of(self, plant: Mapping[str, Any], fastest_belt: float = 0.0) -> SampleAssumptions:
         """Return how samples of a plant are to be read."""
         return reading_of(plant, fastest_belt, given=self.given_stick_speed)
-
-
-@dataclass(frozen=True)
-class MachineParameters(NodeParameters):
-    """Parameters that say where joint states of other machines have the motion."""
-
-    joint: str = at_build(
-        "", "Joint that is the slide; empty: `slide` beside `belt`, or the only joint."
-    )
-    belt_joint: str = at_build("", "Joint that is the belt; empty: `belt`, if there is one.")
-    belt_speed: float = at_build(0.0, "Belt speed, where the joint states have no belt.", "m/s")
 
 
 @dataclass(frozen=True)

@@ -3,13 +3,17 @@
 import json
 import re
 from itertools import pairwise
+from math import cos, sin
 from pathlib import Path
 
 import pytest
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.duration import Duration
+from rclpy.qos import ReliabilityPolicy
 from rclpy.topic_endpoint_info import TopicEndpointInfo
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64
 
 from stickslip_ros.api.recordings import recorded_drive
 from stickslip_ros.bags.reader import Recording
@@ -26,6 +30,7 @@ from stickslip_ros.messages.topics import (
 )
 from stickslip_ros.nodes.analyzer import AnalyzerNode
 from stickslip_ros.nodes.base.managed import ERROR
+from stickslip_ros.nodes.base.ros_topics import qos_profile
 from stickslip_ros.nodes.plant import PlantNode
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
 from stickslip_ros.stamps import NANOSECONDS
@@ -82,6 +87,55 @@ def test_it_records_the_bytes_it_hears_measures_them_and_logs_each_figure_once(
     assert lines[-1].startswith("stick_slip: amplitude 318.6 mm, ")
     assert all(re.fullmatch(_FIGURES, line) for line in lines)
     assert all(one != next_one for one, next_one in pairwise(lines))
+
+
+@pytest.mark.parametrize("effort", [False, True])
+def test_it_measures_a_joint_of_another_machine(graph: Graph, tmp_path: Path, effort: bool) -> None:
+    """Best effort, several joints, numbers or efforts as forces; its bag needs no options."""
+    kind = "effort" if effort else "std_msgs/msg/Float64"
+    machine = {"joint": "axis", "belt_speed": 0.5, "force_type": kind}
+    analyzer = graph.add(AnalyzerNode, bag=str(tmp_path / "bag"), **machine)
+    graph.wait_until(lambda: analyzer.active, "analyzer active")
+    best_effort = qos_profile(JOINT_STATES, reliability=ReliabilityPolicy.BEST_EFFORT)
+    states = graph.observer.create_publisher(JointState, "joint_states", best_effort)
+    topic = "other" if effort else "control_force"
+    forces = graph.observer.create_publisher(Float64, topic, best_effort)
+    wanted = [states] if effort else [states, forces]
+    graph.wait_until(lambda: all(each.get_subscription_count() for each in wanted), "it reads")
+    for number in range(200):
+        x, v = sin(0.1 * number), cos(0.1 * number)
+        state = JointState(
+            name=["wrist", "axis"], position=[9.0, x], velocity=[0.0, v], effort=[0.0, -3.0]
+        )
+        state.header.stamp.sec, state.header.stamp.nanosec = divmod(
+            NANOSECONDS + number * NANOSECONDS // 10, NANOSECONDS
+        )
+        states.publish(state)
+        forces.publish(Float64(data=-3.0))
+    graph.wait_until(
+        lambda: (
+            analyzer._meter.motion.samples == 200
+            and (analyzer._meter.force.peak_force or 0.0) == 3.0
+        ),
+        "all is measured",
+    )
+    graph.deactivate("analyzer")
+    report = report_of_recording(tmp_path / "bag")
+    assert (report["samples"], report["peak_force"], report["missing"]) == (200, 3.0, [])
+    assert report["amplitude"] == pytest.approx(1.0, rel=1e-3)
+    with Recording(tmp_path / "bag") as recording:
+        assert recording.joint_states.belt_velocity[0] == 0.5
+
+
+def test_it_says_that_a_joint_must_be_chosen(graph: Graph) -> None:
+    analyzer = graph.add(AnalyzerNode)
+    graph.wait_until(lambda: analyzer.active, "analyzer active")
+    states = graph.publisher(JOINT_STATES, 1)
+    state = JointState(name=["wrist", "axis"], position=[9.0, 1.0])
+    state.header.stamp.sec = 5
+    states.publish(state)
+    graph.wait_until(lambda: analyzer.dropped.complaint, "it complains")
+    assert "of the joints wrist, axis: --joint NAME must choose one" in analyzer.dropped.complaint
 
 
 def test_it_keeps_the_counts_of_late_forces_of_each_activation_of_the_plant(

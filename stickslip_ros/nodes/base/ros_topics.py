@@ -21,10 +21,14 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo
 from stickslip_ros.messages.topics import Topic
 
 
-def qos_profile(topic: Topic[Any], depth: int | None = None) -> QoSProfile:
+def qos_profile(
+    topic: Topic[Any],
+    depth: int | None = None,
+    reliability: ReliabilityPolicy = ReliabilityPolicy.RELIABLE,
+) -> QoSProfile:
     """Return the quality of service of a topic, with a history of `depth` messages."""
     return QoSProfile(
-        reliability=ReliabilityPolicy.RELIABLE,
+        reliability=reliability,
         history=HistoryPolicy.KEEP_LAST,
         depth=topic.depth if depth is None else depth,
     )
@@ -101,9 +105,14 @@ class PollingNode(Node):
 
 def waiting_messages(subscription: Subscription) -> Iterator[bytes]:
     """Take the waiting serialized messages and yield them in order."""
+    return (data for data, _ in timed_messages(subscription))
+
+
+def timed_messages(subscription: Subscription) -> Iterator[tuple[bytes, int]]:
+    """Take the waiting serialized messages and yield each, and when it was sent, ns."""
     with subscription.handle:
         while taken := subscription.handle.take_message(subscription.msg_type, True):
-            yield taken[0]
+            yield taken[0], taken[1]["source_timestamp"]
 
 
 def _never_called(_: bytes) -> None: ...
