@@ -67,6 +67,7 @@ setup(
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
         (f"share/{NAME}/config", sorted(glob("config/*"))),
+        (f"share/{NAME}/hook", ["resource/path.dsv"]),  # `stickslip` in a sourced workspace
     ],
     entry_points={
         "console_scripts": [f"{name} = {function}" for name, function in EXECUTABLES.items()],

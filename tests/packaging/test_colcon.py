@@ -1,3 +1,4 @@
+import shutil
 import subprocess
 import sys
 
@@ -26,6 +27,12 @@ def sourced(workspace, environment):
 
 def test_sourcing_puts_the_prefix_on_the_ament_prefix_path(workspace, sourced):
     assert sourced["AMENT_PREFIX_PATH"] == str(workspace)
+
+
+def test_sourcing_puts_the_command_on_the_path(workspace, sourced):
+    found = shutil.which("stickslip", path=sourced["PATH"])
+    assert found == str(workspace / "lib" / workspace.name / "stickslip")
+    assert "usage: stickslip" in subprocess.check_output([found, "--help"], env=sourced, text=True)
 
 
 def test_manifest_and_configuration_are_installed(workspace, checkout):
