@@ -1,11 +1,11 @@
-"""Numbers with units, as users write them: `30mm/s`."""
+"""Quantities: what they are called and their units; and numbers with units as users write them."""
 
 import re
 from contextlib import suppress
 from fractions import Fraction
 from functools import cache
 from sys import float_info
-from typing import Any
+from typing import Any, NamedTuple, get_type_hints
 
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.text import shown
@@ -19,6 +19,23 @@ QUANTITY = re.compile(
     rf"\s*((?:1?/ ?)?{_GROUP}(?:{_JOIN}{_GROUP})*)\s*"
 )
 """A number and its unit."""
+
+
+class Quantity(NamedTuple):
+    """What a value is, in tables, figures and on pages."""
+
+    label: str
+    unit: str = ""
+    """SI unit; empty: none."""
+    missing: str = ""
+    """When the value does not exist."""
+
+
+def quantities_of(kind: type) -> dict[str, Quantity]:
+    """Return the quantities that the fields of a class are annotated with, by name."""
+    hints = get_type_hints(kind, include_extras=True)
+    annotated = {name: getattr(hint, "__metadata__", ()) for name, hint in hints.items()}
+    return {name: found[0] for name, found in annotated.items() if found}
 
 
 def number_of(name: str, given: Any, unit: str | None) -> float:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from typing_extensions import override
 
-from stickslip_ros.api.results import Parts, Quantity, Result, Summary, Table, TabularResult
+from stickslip_ros.api.results import Parts, Result, Summary, Table, TabularResult
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.bags.motion_reader import BagLayout
 from stickslip_ros.bags.reader import Recording
@@ -17,10 +17,11 @@ from stickslip_ros.bags.report import report_of_recording
 from stickslip_ros.bags.table_file import is_table
 from stickslip_ros.bags.text_table import TableFormat
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.loop.trajectory import QUANTITIES
+from stickslip_ros.physics.loop.trajectory import Trajectory
 from stickslip_ros.physics.measures.cycle_measures import Measures, measures_of
 from stickslip_ros.physics.measures.slips import SlipThreshold
 from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.quantities import Quantity, quantities_of
 from stickslip_ros.samples import NO_FORCES, NO_SAMPLES, ForceColumns, SampleColumns
 from stickslip_ros.scenarios.curve_file import CURVES, as_pairs
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, PlantParameters
@@ -37,10 +38,7 @@ if TYPE_CHECKING:
     from stickslip_ros.show.run_figure import DrawnRun
     from stickslip_ros.show.style import FigureStyle
 
-_COLUMNS = {name: Quantity(*labelled) for name, labelled in QUANTITIES.items()} | {
-    "stamp": Quantity("stamp", "ns")
-}
-
+_COLUMNS = quantities_of(Trajectory) | {"stamp": Quantity("stamp", "ns")}
 
 Part = SampleColumns | ForceColumns
 """Consecutive joint states or control forces."""

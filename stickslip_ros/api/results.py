@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TextIO
 import numpy as np
 
 from stickslip_ros.errors import RunError
+from stickslip_ros.quantities import Quantity
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.show.quantities import Units
 from stickslip_ros.tables import TextTable
@@ -182,13 +183,6 @@ class Result(ABC):
             f"<p>{escape(printable(part))}</p>" if isinstance(part, str) else part.html()
             for part in self.parts()
         )
-
-
-class Quantity(NamedTuple):
-    """Label and SI unit of a column."""
-
-    label: str
-    unit: str = ""
 
 
 class Table(NamedTuple):

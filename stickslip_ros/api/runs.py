@@ -7,18 +7,17 @@ from typing import TYPE_CHECKING, Any
 
 from typing_extensions import override
 
-from stickslip_ros.api.results import Parts, Quantity, Summary, Table, TabularResult, attributes
+from stickslip_ros.api.results import Parts, Summary, Table, TabularResult, attributes
 from stickslip_ros.api.scenarios import ScenarioLike, as_scenario
 from stickslip_ros.physics.loop.trajectory import (
-    MEASURED,
-    QUANTITIES,
+    MeasuredTrajectory,
     SampleRecorder,
     Trajectory,
     TrajectoryRecorder,
 )
 from stickslip_ros.physics.measures.cycle_measures import Measures
 from stickslip_ros.progress import Progress
-from stickslip_ros.quantities import number_of
+from stickslip_ros.quantities import number_of, quantities_of
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.show.measure_table import simulation_tables
 from stickslip_ros.show.parameter_tables import scenario_tables
@@ -30,8 +29,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from stickslip_ros.show.style import FigureStyle
-
-_COLUMNS = {name: Quantity(*labelled) for name, labelled in {**QUANTITIES, **MEASURED}.items()}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -72,7 +69,8 @@ class Run(TabularResult):
     def _table(self) -> Table:
         columns = vars(self.trajectory)
         time = {"time": self.trajectory.time}
-        return Table(columns, _COLUMNS, self._units, time, attributes(self.scenario), "time")
+        quantities, source = quantities_of(MeasuredTrajectory), attributes(self.scenario)
+        return Table(columns, quantities, self._units, time, source, "time")
 
     @property
     def _units(self) -> Units:

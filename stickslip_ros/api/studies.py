@@ -13,16 +13,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from typing_extensions import override
 
-from stickslip_ros.api.results import Parts, Quantity, Summary, Table, TabularResult, attributes
+from stickslip_ros.api.results import Parts, Summary, Table, TabularResult, attributes
 from stickslip_ros.api.scenarios import ScenarioLike, as_scenario
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.measures.cycle_measures import Regime
-from stickslip_ros.quantities import number_of
+from stickslip_ros.quantities import Quantity, number_of
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.scenarios.keywords import described, keyword_of, parameter_of
-from stickslip_ros.show.measure_table import LABELS
 from stickslip_ros.show.parameter_tables import scenario_tables
+from stickslip_ros.show.quantities import STUDY
 from stickslip_ros.show.study_tables import attractor_name, basin_table, sweep_table, units_of
 from stickslip_ros.studies import transitions as theory
 from stickslip_ros.studies.basin import (
@@ -38,7 +38,7 @@ from stickslip_ros.studies.options import BASIN_COUNT, BASIN_OPTIONS
 from stickslip_ros.studies.plan import Axis, Continuation, Grid, ListedAxis, RandomSample
 from stickslip_ros.studies.runner import CountPoints, compute_columns
 from stickslip_ros.studies.settling import SettlingOptions
-from stickslip_ros.studies.study import COLUMNS, MEASURES, Study, sweep_study
+from stickslip_ros.studies.study import COLUMNS, Study, sweep_study
 from stickslip_ros.text import shown
 
 if TYPE_CHECKING:
@@ -91,15 +91,12 @@ class Points(TabularResult):
             if plan.continuation:
                 ways = [str(direction) for direction in plan.directions]
                 found["direction"] = np.repeat(ways, plan.size // len(ways)).astype(object)
-                quantities["direction"] = Quantity("direction in which it is carried on")
+                quantities["direction"] = STUDY["direction"]
                 dimensions = {"direction": ways, **dimensions}
         found |= {name: getattr(columns, name) for name in COLUMNS} | {
             "regime": np.array([regime and str(regime) for regime in columns.regime], dtype=object)
         }
-        quantities |= {name: _of_measure(name) for name in MEASURES}
-        quantities["steady"] = Quantity("whether the motion has settled")
-        quantities["turning_points"] = Quantity("displacement where the velocity is zero", "m")
-        quantities["reason"] = Quantity("why there is no cycle")
+        quantities |= {name: STUDY[name] for name in COLUMNS}
         units = units_of(self.study)
         return Table(found, quantities, units, dimensions, attributes(self.scenario))
 
@@ -237,7 +234,7 @@ class Basin(Points):
             columns={**table.columns, "attractor": self.basins.places},
             quantities={
                 **table.quantities,
-                "attractor": Quantity("place in the attractors, from 0"),
+                "attractor": STUDY["attractor"],
             },
         )
 
@@ -437,10 +434,6 @@ def _course(
         transient=course.transient if transient is None else transient,
         cycles=course.cycles if cycles is None else cycles,
     )
-
-
-def _of_measure(name: str) -> Quantity:
-    return Quantity(*LABELS.get(name, (name.replace("_", " "), "")))
 
 
 def _of_parameter(parameter: str) -> Quantity:

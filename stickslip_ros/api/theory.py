@@ -10,7 +10,6 @@ from typing_extensions import override
 
 from stickslip_ros.api.results import (
     Parts,
-    Quantity,
     Result,
     Summary,
     Table,
@@ -26,15 +25,8 @@ from stickslip_ros.progress import Progress
 from stickslip_ros.quantities import number_of
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.show.parameter_tables import scenario_tables
-from stickslip_ros.show.quantities import Units
-from stickslip_ros.show.study_tables import (
-    CHECKS,
-    CONTROLLER,
-    MARGINS,
-    WORST,
-    design_tables,
-    stability_tables,
-)
+from stickslip_ros.show.quantities import CHECKS, CONTROLLER, MARGINS, WORST, Units
+from stickslip_ros.show.study_tables import design_tables, stability_tables
 from stickslip_ros.studies import design as designing
 from stickslip_ros.studies import stability as stabilities
 from stickslip_ros.text import shown
@@ -236,10 +228,9 @@ class Proposal(TabularResult):
             for check in self.checks
         ]
         columns = {name: np.array([check[name] for check in checks]) for name in CHECKS}
-        quantities = {name: Quantity(*labelled) for name, labelled in CHECKS.items()}
         speeds = {"belt_speed": columns["belt_speed"]}
         source = attributes(task.scenario) if task.scenario else {}
-        return Table(columns, quantities, Units.for_drive(task.drive), speeds, source)
+        return Table(columns, CHECKS, Units.for_drive(task.drive), speeds, source)
 
     @override
     def _entries(self) -> dict[str, Any]:
@@ -269,7 +260,7 @@ class Proposal(TabularResult):
         controller = {} if self.controller is None else asdict(self.controller)
         gains = [
             f"{label} {units.text(controller[name], unit)}"
-            for name, (label, unit) in CONTROLLER.items()
+            for name, (label, unit, _) in CONTROLLER.items()
             if name in controller
         ]
         return Summary(

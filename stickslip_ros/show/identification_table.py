@@ -9,16 +9,9 @@ import numpy as np
 from stickslip_ros.identification.findings import Findings
 from stickslip_ros.identification.fit import QUANTILE, Candidate, Estimate
 from stickslip_ros.scenarios.parameters import PlantParameters
-from stickslip_ros.show.quantities import SI
+from stickslip_ros.show.quantities import PREDICTIONS, SI
 from stickslip_ros.tables import TextTable
 
-_PREDICTIONS = {
-    "force_error": "force error",
-    "free_run_error": "simulation error",
-    "segment_error": "multi-step prediction error",
-    "position_error": "closed loop, position error",
-    "closed_loop_force_error": "closed loop, force error",
-}
 _DIGITS = 2, 10
 """Digits of a value, at least and at most."""
 
@@ -60,7 +53,7 @@ def identification_tables(
     shown = [("fitted to, in-sample", own), *((each["recording"], each) for each in checks)]
     yield TextTable(
         "predictions",
-        ["recording", *_PREDICTIONS.values()],
+        ["recording", *(quantity.label for quantity in PREDICTIONS.values())],
         [[name, *_predicted(values)] for name, values in shown],
     )
     yield from notes
@@ -113,14 +106,10 @@ def _verdict(found: Findings, candidate: Candidate) -> str:
 
 
 def _predicted(values: Mapping[str, Any]) -> list[str]:
-    cells: list[str] = []
-    for name in _PREDICTIONS:
-        value = values[name]
-        if name in ("free_run_error", "segment_error") and value is not None:
-            cells.append(SI.text(value, "m"))
-        else:
-            cells.append("-" if value is None else _percent(value))
-    return cells
+    return [
+        SI.text(value, unit) if unit or value is None else _percent(value)
+        for value, unit in ((values[name], unit) for name, (_, unit, _) in PREDICTIONS.items())
+    ]
 
 
 def _percent(share: float) -> str:

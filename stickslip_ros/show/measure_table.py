@@ -7,34 +7,8 @@ from typing import Any
 from stickslip_ros.physics.measures.cycle_measures import Measures, Regime, trend_text
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.scenarios.files import Scenario
-from stickslip_ros.show.quantities import NOISE, SI, Units
+from stickslip_ros.show.quantities import MEASURES, NOISE, SI, SLIPS, Units
 from stickslip_ros.tables import TextTable
-
-LABELS: dict[str, tuple[str, str]] = {
-    "regime": ("regime", ""),
-    "amplitude": ("amplitude", "m"),
-    "velocity_amplitude": ("velocity amplitude", "m/s"),
-    "midpoint": ("midpoint", "m"),
-    "period": ("period", "s"),
-    "frequency": ("frequency", "Hz"),
-    "stick_fraction": ("stick fraction", ""),
-    "cycles": ("cycles measured", ""),
-    "multipliers": ("Floquet multipliers", ""),
-    "peak_force": ("peak control force", "N"),
-    "peak_applied_force": ("peak control force acting", "N"),
-    "resting_force": ("final control force", "N"),
-    "resting_applied_force": ("final control force acting", "N"),
-    "samples": ("samples", ""),
-    "lost_samples": ("lost samples", ""),
-    "late_forces": ("late forces", ""),
-    "dropped_forces": ("dropped forces", ""),
-    "missed_deadlines": ("missed deadlines", ""),
-    "steps_per_second": ("steps per second", ""),
-    "duration": ("duration", "s"),
-    "complete": ("bag complete", ""),
-    "bag": ("bag", ""),
-}
-"""Label and unit of each measure and count, by its name in JSON."""
 
 _SENT = {
     "peak_force": ("peak_applied_force", "peak control force sent"),
@@ -57,14 +31,6 @@ _SAME_SCALE = {
 """The quantity with which a value is compared to see whether it is rounding error."""
 
 _ALL_SI: Mapping[str, Units] = {}
-
-_SLIPS = {
-    "stick_time": ("time of sticking", "s"),
-    "drop": ("drop", "m"),
-    "slip_time": ("time of slipping", "s"),
-    "stick_velocity": ("velocity while sticking", "m/s"),
-}
-"""Label and unit of each measure of slips."""
 
 _DISTRIBUTION = ("mean", "standard_error", "q05", "median", "q95")
 
@@ -129,7 +95,7 @@ def measure_table(
     """
     rows = {
         name: [label, *_row(name, unit, columns, units)]
-        for name, (label, unit) in LABELS.items()
+        for name, (label, unit, _) in MEASURES.items()
         if any(name in values for values in columns.values())
     }
     _tell_apart(rows, columns)
@@ -193,7 +159,7 @@ def slip_table(slips: Mapping[str, Any], units: Units) -> TextTable:
     title = f"{slips['count']} slips of more than {units.text(slips['least_drop'], 'm')}: {regime}"
     rows = [
         [label, *(units.text(slips[name][column], unit) for column in _DISTRIBUTION)]
-        for name, (label, unit) in _SLIPS.items()
+        for name, (label, unit, _) in SLIPS.items()
         if slips[name] is not None
     ]
     if slips["belt_speed"]:

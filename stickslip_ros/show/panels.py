@@ -17,8 +17,8 @@ from stickslip_ros.physics.measures.cycle_fit import MeanCycle
 from stickslip_ros.physics.measures.cycle_measures import Measures, trend_text
 from stickslip_ros.physics.measures.run_meter import RunAnalysis
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.show.measure_table import LABELS
-from stickslip_ros.show.quantities import Units
+from stickslip_ros.quantities import Quantity
+from stickslip_ros.show.quantities import MEASURES, SLIPS, Units
 from stickslip_ros.show.run_history import DrawnMotion, RunHistory, intervals, peaks
 from stickslip_ros.show.style import BLUE, GREEN, GREY, LIGHT_GREY, ORANGE, REGIMES
 
@@ -72,7 +72,7 @@ def measures_text(measures: Measures, units: Units) -> str:
     trend = trend_text(vars(measures), units.text)
     found = [f"{REGIMES[measures.regime].label}{trend and f', not steady: {trend}'}"]
     for name in ("amplitude", "frequency", "stick_fraction"):
-        value, (label, unit) = getattr(measures, name), LABELS[name]
+        value, (label, unit, _) = getattr(measures, name), MEASURES[name]
         if value is not None and measures.period is not None:
             found.append(f"{label} {units.text(value, unit)}")
     return ", ".join(found)
@@ -118,14 +118,15 @@ def draw_cycles(
     The markers of `looks` are on at most about `most` cycles of a run.
     """
     cycles = [history.cycles for history in histories]
-    scale, label = units.axis("amplitude", "m", *(each[1] for each in cycles))
+    (amplitude, metre, _), fraction = MEASURES["amplitude"], MEASURES["stick_fraction"].label
+    scale, label = units.axis(amplitude, metre, *(each[1] for each in cycles))
     if not any(len(time) for time, *_ in cycles):
         say(panels[0], "no cycle was completed")
     positions = [history.motion.position for history in histories]
     farthest = max(float(np.abs(each).max(initial=0.0)) for each in positions) / scale
     for axes, column, of_panel, size, least in (
         (panels[0], 1, label, scale, LEAST_SPAN * farthest),
-        (panels[1], 2, "stick fraction", 1.0, 0.0),
+        (panels[1], 2, fraction, 1.0, 0.0),
     ):
         for each, look in zip(cycles, looks, strict=False):
             rows = _cycle_rows(*each)
@@ -243,15 +244,9 @@ def draw_analysis(
     """
     if found.slips is not None:  # they were asked for
         each = found.slips["each"]
-        for column, (name, title, unit) in enumerate(
-            (
-                ("stick_time", "time of sticking", "s"),
-                ("drop", "drop of a slip", "m"),
-                ("slip_time", "time of slipping", "s"),
-            )
-        ):
+        for column, name in enumerate(("stick_time", "drop", "slip_time")):
             values = np.array([value for value in each[name] if value is not None])
-            _distribution(figure.add_subplot(part[column]), values, title, unit, units)
+            _distribution(figure.add_subplot(part[column]), values, SLIPS[name], units)
     elif found.mean_cycle is not None:
         _cycle(figure.add_subplot(part[0:2]), found.mean_cycle, units, short=short)
         _residual(figure.add_subplot(part[2]), found.mean_cycle, units)
@@ -291,8 +286,8 @@ def _residual(axes: Axes, mean: MeanCycle, units: Units) -> None:
     axes.set_title(f"noise {units.text(mean.noise, 'm')}")
 
 
-def _distribution(axes: Axes, values: np.ndarray, title: str, unit: str, units: Units) -> None:
-    scale, label = units.axis(title, unit, values)
+def _distribution(axes: Axes, values: FloatArray, quantity: Quantity, units: Units) -> None:
+    scale, label = units.axis(quantity.label, quantity.unit, values)
     if len(values):
         shown = values / scale
         low, high = shown.min(), shown.max()
@@ -303,4 +298,4 @@ def _distribution(axes: Axes, values: np.ndarray, title: str, unit: str, units: 
         axes.legend(fontsize="small")
     axes.set_xlabel(label)
     axes.set_ylabel("slips")
-    axes.set_title(f"{title}, {len(values)} slips")
+    axes.set_title(f"{quantity.label}, {len(values)} slips")

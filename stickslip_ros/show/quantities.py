@@ -1,7 +1,7 @@
-"""Display of quantities: in SI units with a prefix, or without units for a unit drive."""
+"""Quantities by name in JSON, and their display: with SI units and a prefix, or without units."""
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import isfinite, isinf
 from typing import Any, Self
@@ -9,8 +9,124 @@ from typing import Any, Self
 import numpy as np
 import numpy.typing as npt
 
+from stickslip_ros.physics.measures.cycle_measures import Measures
 from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.quantities import Quantity, quantities_of
 from stickslip_ros.text import prefix_for
+
+_OF_CYCLES = quantities_of(Measures)
+
+MEASURES = {
+    "regime": _OF_CYCLES["regime"],
+    **_OF_CYCLES,
+    "multipliers": Quantity("Floquet multipliers"),
+    "peak_force": Quantity("peak control force", "N"),
+    "peak_applied_force": Quantity("peak control force acting", "N"),
+    "resting_force": Quantity("final control force", "N"),
+    "resting_applied_force": Quantity("final control force acting", "N"),
+    "samples": Quantity("samples"),
+    "lost_samples": Quantity("lost samples"),
+    "late_forces": Quantity("late forces"),
+    "dropped_forces": Quantity("dropped forces"),
+    "missed_deadlines": Quantity("missed deadlines"),
+    "steps_per_second": Quantity("steps per second"),
+    "duration": Quantity("duration", "s"),
+    "complete": Quantity("bag complete"),
+    "bag": Quantity("bag"),
+}
+"""Measures and counts of a run, in the order of its table."""
+
+SLIPS = {
+    "stick_time": Quantity("time of sticking", "s"),
+    "drop": Quantity("drop", "m"),
+    "slip_time": Quantity("time of slipping", "s"),
+    "stick_velocity": Quantity("velocity while sticking", "m/s"),
+}
+
+STUDY = _OF_CYCLES | {
+    "steady": Quantity("whether the motion has settled"),
+    "turning_points": Quantity("displacement where the velocity is zero", "m"),
+    "reason": Quantity("why there is no cycle"),
+    "direction": Quantity("direction in which it is carried on"),
+    "attractor": Quantity("place in the attractors, from 0"),
+}
+"""Columns of a study, in addition to the values of the parameters."""
+
+CONTROLLER = {
+    "corner_frequency": Quantity("cutoff frequency", "rad/s"),
+    "linear_gain": Quantity("linear gain", "N s/m"),
+    "cubic_gain": Quantity("cubic gain", "N s^3/m^3"),
+    "force_limit": Quantity("force limit", "N"),
+    "start_after": Quantity("start after", "s"),
+}
+MARGINS = {
+    "gain_down": Quantity("lower gain margin"),
+    "gain_up": Quantity("upper gain margin"),
+    "delay": Quantity("delay margin", "s"),
+}
+WORST = {
+    "predicted_settling_time": Quantity("1 % settling time, predicted", "s"),
+    "settling_time": Quantity("simulated", "s"),
+    "predicted_peak_force": Quantity("peak force, predicted", "N"),
+    "peak_force": Quantity("simulated", "N"),
+}
+CHECKS = {"belt_speed": Quantity("belt speed", "m/s"), "vibrates": Quantity("vibrates")} | WORST
+AT_REST = {
+    "belt_speed": CHECKS["belt_speed"],
+    "amplitude": _OF_CYCLES["amplitude"],
+    "peak_force": Quantity("peak force", "N"),
+    "rms_force": Quantity("rms force", "N"),
+}
+"""Values of a design: the proposal, its margins, its checks, and of these at rest."""
+
+_LOOP = {
+    "equilibrium_position": Quantity("equilibrium position", "m"),
+    "eigenvalues": Quantity("eigenvalues", "1/s"),
+    "stable": Quantity("stable"),
+    "hopf_speeds": Quantity("critical feed speeds (Hopf)", "m/s"),
+}
+_HOPF_POINTS = {
+    "crossing_speeds": Quantity("dRe(lambda)/dv there", "1/m"),
+    "first_lyapunov_coefficients": Quantity("first Lyapunov coefficient"),
+}
+_CRITICAL_GAIN = {"critical_linear_gain": Quantity("critical linear gain", "N s/m")}
+THEORY: Mapping[str, Mapping[str, Quantity]] = {
+    "open_loop": {
+        **_LOOP,
+        "hopf_angular_frequencies": Quantity("angular frequency there", "rad/s"),
+        **_HOPF_POINTS,
+    },
+    "sticking": {
+        "onset_speed_approximate": Quantity("stick-slip onset speed, by averaging", "m/s"),
+        "onset_speed": Quantity("stick-slip onset speed, exactly", "m/s"),
+        "speed_ranges": Quantity("belt speeds that stick", "m/s"),
+    },
+    "closed_loop": {
+        **_LOOP,
+        **_HOPF_POINTS,
+        **_CRITICAL_GAIN,
+        "first_lyapunov_coefficient": Quantity("first Lyapunov coefficient there"),
+        "critical_cubic_gain": Quantity("critical cubic gain", "N s^3/m^3"),
+    },
+    "sampled_loop": {
+        "spectral_radius": Quantity("spectral radius"),
+        "stable": _LOOP["stable"],
+        "decay_rate": Quantity("decay rate", "1/s"),
+        "settling_time": Quantity("1 % settling time", "s"),
+        **_CRITICAL_GAIN,
+        "stable_linear_gains": Quantity("stable linear gains", "N s/m"),
+    },
+}
+"""Values of each section of `stability`."""
+
+PREDICTIONS = {
+    "force_error": Quantity("force error"),
+    "free_run_error": Quantity("simulation error", "m"),
+    "segment_error": Quantity("multi-step prediction error", "m"),
+    "position_error": Quantity("closed loop, position error"),
+    "closed_loop_force_error": Quantity("closed loop, force error"),
+}
+"""What a model predicts of a recording; without a unit it is a share."""
 
 NOISE = 1e-9
 """Share of the largest value below which a value is rounding error and shown as 0."""

@@ -18,8 +18,7 @@ from matplotlib.path import Path
 from stickslip_ros.arrays import BoolArray, FloatArray
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.measures.cycle_measures import Regime
-from stickslip_ros.show.measure_table import LABELS
-from stickslip_ros.show.quantities import Units
+from stickslip_ros.show.quantities import MEASURES, Units
 from stickslip_ros.show.study_tables import attractor_name
 from stickslip_ros.show.style import (
     AMBER,
@@ -66,8 +65,8 @@ _HATCH: Any = {"facecolor": "white", "edgecolor": GREY, "hatch": "////"}
 _AWAY = REGIMES[Regime.UNBOUNDED]._replace(colour=LIGHT_GREY, hatch="...")
 """Look of diverging motions next to a colour bar, which starts with a near black."""
 
-_MEASURES = {name: LABELS[name] for name in ("amplitude", "stick_fraction")}
-"""Measures that are drawn in addition to the regimes: label and unit."""
+_MEASURES = {name: MEASURES[name] for name in ("amplitude", "stick_fraction")}
+"""Measures that are drawn in addition to the regimes."""
 
 
 Colour = Literal["regime", "amplitude", "stick_fraction"]
@@ -115,8 +114,8 @@ def diagram_figure(columns: Columns, study: Study, *, style: FigureStyle = SCREE
     length, label = terse.axis(terse.named("turning points"), "m", every)
     section.set_ylabel(label)
     scaled = {
-        name: terse.axis(title, unit, getattr(columns, name))
-        for name, (title, unit) in _MEASURES.items()
+        name: terse.axis(label, unit, getattr(columns, name))
+        for name, (label, unit, _) in _MEASURES.items()
     }
     # Wide markers are drawn below the narrow ones.
     for rows, direction in reversed(list(_passes(grid))):
@@ -170,7 +169,7 @@ def map_figure(
     count = len(grid.directions)
     units = Units.for_drive(study.scenario.plant.as_drive(), grid.parameters)
     figure = style.figure(1.0 + 6.0 * count, 6.2, narrow=0.3 + 0.9 * count)
-    name = "regime" if colour == "regime" else _MEASURES[colour][0]
+    name = "regime" if colour == "regime" else _MEASURES[colour].label
     what = f"Map of the {name} of settled motions"
     style.set_title(figure, title_of(what, study.scenario, grid.parameters))
     shape = (count, 1) if style.narrow else (1, count)
@@ -179,7 +178,7 @@ def map_figure(
     mesh: Any = None
     scale, bar = 1.0, ""
     if colour != "regime":
-        scale, bar = units.axis(*_MEASURES[colour], getattr(columns, colour))
+        scale, bar = units.axis(*_MEASURES[colour][:2], getattr(columns, colour))
     for axes, (rows, direction) in zip(panels, _passes(grid), strict=True):
         axes.set_xscale(**_scale(first))
         axes.set_yscale(**_scale(second))

@@ -8,9 +8,10 @@ from math import log10
 from typing import Any, cast
 
 from stickslip_ros.physics.measures.cycle_measures import Regime, Trend
+from stickslip_ros.quantities import Quantity
 from stickslip_ros.scenarios.files import Scenario
-from stickslip_ros.show.measure_table import LABELS, measure_table
-from stickslip_ros.show.quantities import Units
+from stickslip_ros.show.measure_table import measure_table
+from stickslip_ros.show.quantities import AT_REST, CHECKS, CONTROLLER, MARGINS, THEORY, Units
 from stickslip_ros.studies.basin import Attractor, Basins
 from stickslip_ros.studies.columns import Columns
 from stickslip_ros.studies.design import Design
@@ -22,75 +23,10 @@ from stickslip_ros.tables import TextTable
 _MOST_RANGES = 60
 """Rows of the table of a sweep; where there are more, only their regimes are counted."""
 
-_Labels = Mapping[str, tuple[str, str]]
-
-# Label and unit of each value of a design, by its name in JSON.
-CONTROLLER = {
-    "corner_frequency": ("cutoff frequency", "rad/s"),
-    "linear_gain": ("linear gain", "N s/m"),
-    "cubic_gain": ("cubic gain", "N s^3/m^3"),
-    "force_limit": ("force limit", "N"),
-    "start_after": ("start after", "s"),
-}
-MARGINS = {
-    "gain_down": ("lower gain margin", ""),
-    "gain_up": ("upper gain margin", ""),
-    "delay": ("delay margin", "s"),
-}
 _GAIN_MARGINS = "gain_down", "gain_up"
 """Ratios of the linear gain at the limit of stability and the proposed one."""
-WORST = {
-    "predicted_settling_time": ("1 % settling time, predicted", "s"),
-    "settling_time": ("simulated", "s"),
-    "predicted_peak_force": ("peak force, predicted", "N"),
-    "peak_force": ("simulated", "N"),
-}
-CHECKS = {"belt_speed": ("belt speed", "m/s"), "vibrates": ("vibrates", "")} | WORST
-_REST = {
-    "belt_speed": ("belt speed", "m/s"),
-    "amplitude": LABELS["amplitude"],
-    "peak_force": ("peak force", "N"),
-    "rms_force": ("rms force", "N"),
-}
 
-_LOOP = {
-    "equilibrium_position": ("equilibrium position", "m"),
-    "eigenvalues": ("eigenvalues", "1/s"),
-    "stable": ("stable", ""),
-    "hopf_speeds": ("critical feed speeds (Hopf)", "m/s"),
-}
-
-_HOPF_POINTS = {
-    "crossing_speeds": ("dRe(lambda)/dv there", "1/m"),
-    "first_lyapunov_coefficients": ("first Lyapunov coefficient", ""),
-}
-
-_SECTIONS: dict[str, _Labels] = {
-    "open_loop": _LOOP
-    | {"hopf_angular_frequencies": ("angular frequency there", "rad/s")}
-    | _HOPF_POINTS,
-    "sticking": {
-        "onset_speed_approximate": ("stick-slip onset speed, by averaging", "m/s"),
-        "onset_speed": ("stick-slip onset speed, exactly", "m/s"),
-        "speed_ranges": ("belt speeds that stick", "m/s"),
-    },
-    "closed_loop": _LOOP
-    | _HOPF_POINTS
-    | {
-        "critical_linear_gain": ("critical linear gain", "N s/m"),
-        "first_lyapunov_coefficient": ("first Lyapunov coefficient there", ""),
-        "critical_cubic_gain": ("critical cubic gain", "N s^3/m^3"),
-    },
-    "sampled_loop": {
-        "spectral_radius": ("spectral radius", ""),
-        "stable": ("stable", ""),
-        "decay_rate": ("decay rate", "1/s"),
-        "settling_time": ("1 % settling time", "s"),
-        "critical_linear_gain": ("critical linear gain", "N s/m"),
-        "stable_linear_gains": ("stable linear gains", "N s/m"),
-    },
-}
-"""Label and unit of the values of each section of `stability`."""
+_Quantities = Mapping[str, Quantity]
 
 
 def _direction_and_regime(point: Point, plan: Grid) -> str:
@@ -188,25 +124,27 @@ def design_tables(name: str, found: Design) -> Iterator[TextTable | str]:
         yield _side_by_side("verification", CHECKS, checks, units)
         at_rest = [each | each["rest"] for each in checks if each["rest"] is not None]
         if at_rest:
-            yield _side_by_side("at rest, by noise and rounding", _REST, at_rest, units)
+            yield _side_by_side("at rest, by noise and rounding", AT_REST, at_rest, units)
     if found.remark is not None:
         yield found.remark
 
 
 def _side_by_side(
-    title: str, labels: _Labels, rows: Sequence[Mapping[str, Any]], units: Units
+    title: str, shown: _Quantities, rows: Sequence[Mapping[str, Any]], units: Units
 ) -> TextTable:
-    """Return a table with a column for each of `labels`, all its values with one prefix."""
-    columns = [units.texts([row[name] for row in rows], unit) for name, (_, unit) in labels.items()]
-    headings = [label for label, _ in labels.values()]
+    """Return a table with a column for each of `shown`, all its values with one prefix."""
+    columns = [
+        units.texts([row[name] for row in rows], unit) for name, (_, unit, _) in shown.items()
+    ]
+    headings = [quantity.label for quantity in shown.values()]
     return TextTable(title, headings, list(zip(*columns, strict=True)))
 
 
 def _one_below_another(
-    title: str, heading: str, labels: _Labels, values: Mapping[str, Any], units: Units
+    title: str, heading: str, shown: _Quantities, values: Mapping[str, Any], units: Units
 ) -> TextTable:
-    rows = [[label, units.text(values[name], unit)] for name, (label, unit) in labels.items()]
-    for row, name in zip(rows, labels, strict=True):
+    rows = [[label, units.text(values[name], unit)] for name, (label, unit, _) in shown.items()]
+    for row, name in zip(rows, shown, strict=True):
         if name in _GAIN_MARGINS and values[name] is not None:
             row[1] += f" ({20.0 * log10(values[name]):.1f} dB)"
     return TextTable(title, [heading, ""], rows)
@@ -216,10 +154,10 @@ def stability_tables(scenario: Scenario, found: Section, notes: Notes) -> Iterat
     """Yield the tables of what `stability` has found, and its notes."""
     units = Units.for_drive(scenario.plant.as_drive())
     rows: list[list[str]] = []
-    for section, labels in _SECTIONS.items():
+    for section, quantities in THEORY.items():
         values = found[section]
         rows.append([section.replace("_", " "), ""])
-        for name, (label, unit) in labels.items():
+        for name, (label, unit, _) in quantities.items():
             value = values[name]
             if name == "decay_rate" and value is not None and value < 0.0:
                 label, value = "growth rate", -value

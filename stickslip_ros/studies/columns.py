@@ -10,12 +10,14 @@ import numpy as np
 import numpy.typing as npt
 
 from stickslip_ros.arrays import FloatArray
+from stickslip_ros.physics.measures.cycle_measures import CycleMeasures
+from stickslip_ros.quantities import quantities_of
 from stickslip_ros.studies.plan import Grid, Plan
 from stickslip_ros.studies.study import COLUMNS, Point, Study
 
 
 @dataclass(frozen=True)
-class Columns:
+class Columns(CycleMeasures[FloatArray]):
     """The results of the n points of a study, in the order of its plan; SI units.
 
     All arrays have shape (n,); the turning points are a list. NaN or None marks a value that does
@@ -26,18 +28,6 @@ class Columns:
     """The points of the study."""
     done: npt.NDArray[np.bool_]
     """Whether the point is computed."""
-    amplitude: FloatArray
-    """Amplitude of the displacement, m."""
-    velocity_amplitude: FloatArray
-    """Amplitude of the velocity, m/s."""
-    midpoint: FloatArray
-    """Midpoint of the displacement, m."""
-    period: FloatArray
-    """Period of the limit cycle, s."""
-    frequency: FloatArray
-    """Frequency of the limit cycle, Hz."""
-    stick_fraction: FloatArray
-    """Share of the time in which the slide sticks, 0 to 1."""
     cycles: npt.NDArray[np.intp]
     """Number of cycles that the measures are means of."""
     regime: npt.NDArray[np.object_]
@@ -65,9 +55,9 @@ class Columns:
         """
         size = plan.size
         return cls(
-            plan,
-            np.zeros(size, dtype=bool),
-            *(np.full(size, np.nan) for _ in range(6)),
+            *(np.full(size, np.nan) for _ in quantities_of(CycleMeasures)),
+            plan=plan,
+            done=np.zeros(size, dtype=bool),
             cycles=np.zeros(size, dtype=np.intp),
             regime=np.full(size, None, dtype=object),
             steady=np.zeros(size, dtype=bool),

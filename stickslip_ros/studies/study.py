@@ -1,5 +1,6 @@
 """A study: many points of one scenario, each simulated until its motion has settled."""
 
+from collections import namedtuple
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
@@ -7,7 +8,13 @@ from hashlib import sha256
 from typing import Any, NamedTuple, Self
 
 from stickslip_ros.errors import InvalidInputError, StickslipError
-from stickslip_ros.physics.measures.cycle_measures import EQUILIBRIUM_SPEED, Regime, trend_text
+from stickslip_ros.physics.measures.cycle_measures import (
+    EQUILIBRIUM_SPEED,
+    Measures,
+    Regime,
+    trend_text,
+)
+from stickslip_ros.quantities import quantities_of
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.studies.plan import Axis, Continuation, Grid, Plan
 from stickslip_ros.studies.settling import (
@@ -22,22 +29,25 @@ _NUDGE = EQUILIBRIUM_SPEED / 2.0
 would leave an unstable equilibrium very late or never."""
 
 
-class Point(NamedTuple):
-    """The result of one point: a row of the columns (see `Columns`), and of a journal in JSON."""
+MEASURES = (*quantities_of(Measures),)
+"""Columns of a table that are measures of the motion."""
 
-    number: int
-    """Index in the plan, from 0."""
-    amplitude: float | None = None
-    velocity_amplitude: float | None = None
-    midpoint: float | None = None
-    period: float | None = None
-    frequency: float | None = None
-    stick_fraction: float | None = None
-    cycles: int = 0
-    regime: Regime | None = None
-    steady: bool = False
-    turning_points: tuple[float, ...] = ()
-    reason: str | None = None
+_OTHERS: dict[str, Any] = {"cycles": 0, "steady": False, "turning_points": (), "reason": None}
+"""What a point without a result has, where that is not None."""
+
+COLUMNS = (*MEASURES, "steady", "turning_points", "reason")
+"""Columns of a table, in addition to the values of the parameters."""
+
+_Row: Any = namedtuple(  # pyright: ignore[reportUntypedNamedTuple]
+    "_Row", ["number", *COLUMNS], defaults=[_OTHERS.get(name) for name in COLUMNS]
+)
+
+
+class Point(_Row):
+    """The result of one point: its number in the plan, from 0, and a cell for each of `COLUMNS`.
+
+    It is a row of the columns (see `Columns`), and of a journal in JSON.
+    """
 
     @classmethod
     def from_json(cls, values: Sequence[Any]) -> Self:
@@ -46,13 +56,6 @@ class Point(NamedTuple):
         regime = None if regime is None else Regime(regime)
         cells = [number, *measures, regime, steady, tuple(turning_points), reason]
         return cls._make(cells)
-
-
-COLUMNS = Point._fields[1:]
-"""Columns of a table, in addition to the values of the parameters."""
-
-MEASURES = COLUMNS[: COLUMNS.index("steady")]
-"""Those columns that are measures of the motion."""
 
 
 class Piece(NamedTuple):

@@ -44,7 +44,7 @@ def sections() -> dict[str, list[list[str]]]:
     for part in page.split("\n## ")[1:]:
         heading, _, text = part.partition("\n")
         if HEAD in text:
-            rows = text.split(HEAD)[1].strip().splitlines()[1:]
+            rows = re.findall(r"^\|.*", text.split(HEAD)[1], re.MULTILINE)[1:]
             found[heading] = [[cell.strip() for cell in row.split("|")[1:-1]] for row in rows]
     return found
 

@@ -13,8 +13,8 @@ from stickslip_ros.bags.report import report_of_recording
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.files import open_regular
 from stickslip_ros.scenarios.files import shipped_scenarios
-from stickslip_ros.show.measure_table import LABELS, measure_table
-from stickslip_ros.show.quantities import Units
+from stickslip_ros.show.measure_table import measure_table
+from stickslip_ros.show.quantities import MEASURES, Units
 from stickslip_ros.text import printable
 
 _LARGEST_BAG = 200_000_000
@@ -81,7 +81,7 @@ class EndedRun:
         if bag and bag == self._bag:
             if self._report:
                 table = measure_table("", {"": self._report}, {"": units})
-                shown = [LABELS[name][0] for name in _MEASURES]
+                shown = [MEASURES[name].label for name in _MEASURES]
                 with ui.row().classes("gap-x-6 gap-y-1"):
                     for label, text in table.rows:
                         if label in shown:

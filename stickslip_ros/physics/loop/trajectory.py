@@ -4,11 +4,12 @@ from abc import ABC, abstractmethod
 from array import array
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray, Table
+from stickslip_ros.quantities import Quantity, quantities_of
 from stickslip_ros.samples import Sample
 
 if TYPE_CHECKING:
@@ -25,19 +26,19 @@ class Trajectory(Table):
     `len(trajectory)` is the number of samples, `trajectory[rows]` has some of them.
     """
 
-    time: FloatArray
+    time: Annotated[FloatArray, Quantity("time", "s")]
     """Time since the start of the run, s."""
-    position: FloatArray
+    position: Annotated[FloatArray, Quantity("displacement", "m")]
     """Displacement of the slide, m."""
-    velocity: FloatArray
+    velocity: Annotated[FloatArray, Quantity("velocity", "m/s")]
     """Velocity of the slide, m/s."""
-    friction_force: FloatArray
+    friction_force: Annotated[FloatArray, Quantity("friction force", "N")]
     """Friction force on the slide, N, under the force held up to the sample."""
-    control_force: FloatArray
+    control_force: Annotated[FloatArray, Quantity("control force", "N")]
     """Answer of the controller to the sample, N; 0 without a controller."""
-    belt_position: FloatArray
+    belt_position: Annotated[FloatArray, Quantity("belt displacement", "m")]
     """Displacement of the belt, m."""
-    belt_velocity: FloatArray
+    belt_velocity: Annotated[FloatArray, Quantity("belt velocity", "m/s")]
     """Velocity of the belt, m/s."""
 
 
@@ -45,28 +46,10 @@ class Trajectory(Table):
 class MeasuredTrajectory(Trajectory):
     """A trajectory with what a sensor tells of it."""
 
-    measured_position: FloatArray
+    measured_position: Annotated[FloatArray, Quantity("measured displacement", "m")]
     """Measured displacement of the slide, m."""
-    measured_velocity: FloatArray
+    measured_velocity: Annotated[FloatArray, Quantity("measured velocity", "m/s")]
     """Measured velocity of the slide, m/s."""
-
-
-QUANTITIES = {
-    "time": ("time", "s"),
-    "position": ("displacement", "m"),
-    "velocity": ("velocity", "m/s"),
-    "friction_force": ("friction force", "N"),
-    "control_force": ("control force", "N"),
-    "belt_position": ("belt displacement", "m"),
-    "belt_velocity": ("belt velocity", "m/s"),
-}
-"""Label and unit of each column of a trajectory."""
-
-MEASURED = {
-    "measured_position": ("measured displacement", "m"),
-    "measured_velocity": ("measured velocity", "m/s"),
-}
-"""The same of the columns that a sensor adds."""
 
 
 class SampleRecorder(ABC):
@@ -84,12 +67,16 @@ class SampleRecorder(ABC):
 
     @abstractmethod
     def keep(self, row: tuple[float, ...]) -> None:
-        """Keep the values of one sample, in the order of `QUANTITIES` and of `MEASURED`."""
+        """Keep the values of one sample, in the order of `quantities`."""
 
     @property
-    def quantities(self) -> Mapping[str, tuple[str, str]]:
+    def quantities(self) -> Mapping[str, Quantity]:
         """Label and unit of each column."""
-        return {**QUANTITIES, **MEASURED} if self._measured else QUANTITIES
+        return quantities_of(self._kind)
+
+    @property
+    def _kind(self) -> type[Trajectory]:
+        return MeasuredTrajectory if self._measured else Trajectory
 
     def take(self, sample: Sample, control_force: float, measured: Sample | None = None) -> None:
         """Receive the next sample, and the control force (N) that answers it.
@@ -152,5 +139,4 @@ class TrajectoryRecorder(SampleRecorder):
 
     def trajectory(self) -> Trajectory:
         """Return the samples so far."""
-        columns = np.array(self._values).reshape(-1, len(self.quantities)).T.copy()
-        return MeasuredTrajectory(*columns) if self._measured else Trajectory(*columns)
+        return self._kind(*np.array(self._values).reshape(-1, len(self.quantities)).T.copy())

@@ -114,7 +114,7 @@ def fit_mean_cycle(
     if spread > _UNLIKE_NOISE * noise + _UNLIKE_AMPLITUDE * cycle.amplitude:
         return None
     return MeanCycle(
-        cycle=cycle._replace(midpoint=sign * cycle.midpoint),
+        cycle=replace(cycle, midpoint=sign * cycle.midpoint),
         errors=errors,
         sticks=stick is not None,
         amplitudes=cycle.amplitude * fold.relative_amplitudes(shape, residual),

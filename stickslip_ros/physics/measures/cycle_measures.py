@@ -6,13 +6,14 @@ from dataclasses import asdict, dataclass, fields, replace
 from enum import StrEnum
 from functools import reduce
 from itertools import pairwise
-from typing import Any, NamedTuple, Self
+from typing import Annotated, Any, Generic, NamedTuple, Self, TypeVar
 
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.physics.measures.breakpoints import Breakpoints
 from stickslip_ros.physics.measures.drift import Drift
+from stickslip_ros.quantities import Quantity
 from stickslip_ros.text import quantity
 
 EQUILIBRIUM_SPEED = 1e-3
@@ -117,46 +118,48 @@ def trend_text(values: Mapping[str, Any], show: Callable[[float, str], str] = qu
     return ", ".join([trend, *rates])
 
 
-class Cycle(NamedTuple):
-    """One cycle, from one upward zero crossing of the velocity to the next; SI units."""
+_Value = TypeVar("_Value")
 
-    amplitude: float
-    """Half the peak-to-peak displacement, m."""
-    velocity_amplitude: float
-    """Half the peak-to-peak velocity, m/s."""
-    midpoint: float
-    """Middle of the displacement, m."""
-    period: float
-    """Period, s."""
-    frequency: float
-    """Frequency, Hz."""
-    stick_fraction: float
-    """Stick time divided by the period."""
+_NO_CYCLE = "before the first cycle"
+_NO_PERIOD = "without cycles: at rest, unbounded and undersampled"
 
 
 @dataclass(frozen=True)
-class Measures:
+class CycleMeasures(Generic[_Value]):
+    """Measures of a cycle: of one, of means over some, or of many as columns; SI units."""
+
+    amplitude: Annotated[_Value, Quantity("amplitude", "m", _NO_CYCLE)]
+    """Half of the peak-to-peak displacement, m."""
+    velocity_amplitude: Annotated[
+        _Value, Quantity("velocity amplitude", "m/s", f"{_NO_CYCLE}, and at rest under noise")
+    ]
+    """Half of the peak-to-peak velocity, m/s."""
+    midpoint: Annotated[_Value, Quantity("midpoint", "m", _NO_CYCLE)]
+    """Middle of the displacement, m."""
+    period: Annotated[_Value, Quantity("period", "s", _NO_PERIOD)]
+    """Duration of a cycle, s."""
+    frequency: Annotated[_Value, Quantity("frequency", "Hz", _NO_PERIOD)]
+    """Cycles per second, Hz."""
+    stick_fraction: Annotated[_Value, Quantity("stick fraction", "", _NO_CYCLE)]
+    """Share of the time in which the slide sticks to the belt, 0 to 1."""
+
+
+@dataclass(frozen=True)
+class Cycle(CycleMeasures[float]):
+    """One cycle, from one upward zero crossing of the velocity to the next."""
+
+
+@dataclass(frozen=True)
+class Measures(CycleMeasures[float | None]):
     """Means over the last whole cycles; None is what does not exist.
 
     Period and frequency are None in equilibrium, stuck and unbounded. The regime is None while no
     cycle has been completed and the slide has not settled at rest.
     """
 
-    amplitude: float | None
-    """Half the peak-to-peak displacement, m."""
-    velocity_amplitude: float | None
-    """Half the peak-to-peak velocity, m/s."""
-    midpoint: float | None
-    """Middle of the displacement, m."""
-    period: float | None
-    """Period, s."""
-    frequency: float | None
-    """Frequency, Hz."""
-    stick_fraction: float | None
-    """Stick time divided by the time."""
-    cycles: int
+    cycles: Annotated[int, Quantity("cycles measured")]
     """Number of cycles in the means."""
-    regime: Regime | None
+    regime: Annotated[Regime | None, Quantity("regime", "", _NO_CYCLE)]
     """Kind of motion."""
     steady: bool | None = None
     """Whether the motion has settled; None if there is too little data.
@@ -204,9 +207,10 @@ class CycleMeans:
         The error of a mean is the standard deviation of the cycles over the root of their number;
         below three it is not known.
         """
-        mean, errors = Cycle(*np.mean(cycles, axis=0).tolist()), None
+        values = np.array([[*vars(cycle).values()] for cycle in cycles])
+        mean, errors = Cycle(*values.mean(axis=0).tolist()), None
         if len(cycles) >= LEAST_CYCLES:
-            scatter = np.std(cycles, axis=0, ddof=1) / len(cycles) ** 0.5
+            scatter = values.std(axis=0, ddof=1) / len(cycles) ** 0.5
             errors = Cycle(*scatter.tolist())
         sticks = sum(cycle.stick_fraction > 0.0 for cycle in cycles) > share * len(cycles)
         return cls(mean, errors, sticks, np.array([cycle.amplitude for cycle in cycles]))
@@ -218,12 +222,12 @@ class CycleMeans:
             regime = Regime.EQUILIBRIUM
             return without_cycles(self.cycle, regime, count, steady=steady, trend=trend)
         return Measures(
-            **self.cycle._asdict(),
+            **vars(self.cycle),
             cycles=count,
             regime=Regime.STICK_SLIP if self.sticks else Regime.PURE_SLIP,
             steady=steady,
             trend=trend,
-            errors=None if self.errors is None else self.errors._asdict(),
+            errors=None if self.errors is None else {**vars(self.errors)},
         )
 
 
@@ -448,10 +452,11 @@ class CycleMeter:
         motions += [] if recent is None else [recent]
         if not motions or (not self._cycles and motions[0].stick_fraction > 0.0):
             return None
-        size, fastest, middle = np.array([motion[:3] for motion in motions]).T
-        highest, lowest = float((middle + size).max()), float((middle - size).min())
+        highest = max(motion.midpoint + motion.amplitude for motion in motions)
+        lowest = min(motion.midpoint - motion.amplitude for motion in motions)
         middle, half = (highest + lowest) / 2.0, (highest - lowest) / 2.0
-        held = Cycle(half, float(fastest.max()), middle, 0.0, 0.0, 0.0)
+        fastest = max(motion.velocity_amplitude for motion in motions)
+        held = Cycle(half, fastest, middle, 0.0, 0.0, 0.0)
         return held if highest - lowest <= self.within else None
 
     def _lasts(self, rest: float) -> bool:
@@ -545,6 +550,7 @@ def without_cycles(
     trend: Trend | None = None,
 ) -> Measures:
     """Return the measures of a motion that has no period."""
-    means = dict.fromkeys(Cycle._fields) if motion is None else motion._asdict()
+    means: dict[str, Any] = dict.fromkeys(each.name for each in fields(Cycle))
+    means |= {} if motion is None else vars(motion)
     means |= {"period": None, "frequency": None}
     return Measures(**means, cycles=cycles, regime=regime, steady=steady, trend=trend)
