@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, fields, is_dataclass, replace
 from enum import StrEnum
 from functools import cache, partial
 from math import ceil, inf, isinf, isnan, nextafter
-from typing import Any, TypeVar
+from typing import Any, TypedDict, TypeVar, Unpack
 
 _Part = TypeVar("_Part")
 
@@ -62,9 +62,15 @@ class Parameter:
     positive: bool = False
     """Whether the value must be above zero."""
     whole: bool = False
-    """Whether it is a whole number; one that makes the equations, such as a number of elements."""
+    """Whether it is a whole number; one that makes the equations, such as a number of elements.
+
+    It stays a number in the symbolic equations.
+    """
     simplifies: bool = False
-    """Whether whole values stay numbers in the equations, such as an exponent of 1."""
+    """Whether whole values simplify the equations, such as a factor of 0 or an exponent of 1 or 2.
+
+    They stay numbers in the symbolic equations.
+    """
     changes: Changes = Changes.LIVE
     """When it can be changed."""
     choices: tuple[str, ...] = ()
@@ -190,22 +196,28 @@ class Parameter:
         )
 
 
+class _Attributes(TypedDict, total=False):
+    """Attributes of `Parameter` that few constants have."""
+
+    at_least: float
+    at_most: float
+    below: float
+    positive: bool
+    whole: bool
+    simplifies: bool
+    changes: Changes
+    refused: Mapping[str, str]
+    unset: str
+    file: bool
+
+
 def constant(
     default: Any,
     meaning: str,
     unit: str | None = None,
     *,
-    at_least: float = -inf,
-    at_most: float = inf,
-    below: float = inf,
-    positive: bool = False,
-    whole: bool = False,
-    simplifies: bool = False,
-    changes: Changes = Changes.LIVE,
     choices: Iterable[str] = (),
-    refused: Mapping[str, str] | None = None,
-    unset: str = "",
-    file: bool = False,
+    **attributes: Unpack[_Attributes],
 ) -> Any:
     """Describe a constant, or an option of a node, as the default of a dataclass field.
 
@@ -218,28 +230,10 @@ def constant(
     unit : str, optional
         Unit of m, s, N, kg, Hz and rad, such as "N s/m" or "N/(m s)"; the scaling derives from it.
         By default the constant is a pure number.
-    at_least, at_most : float, optional
-        Smallest and largest allowed value.
-    below : float, optional
-        Value that it must be below.
-    positive : bool, optional
-        Whether the value must be above zero.
-    whole : bool, optional
-        Whether it is a whole number that makes the equations, such as a number of elements. It
-        stays a number in the symbolic equations.
-    simplifies : bool, optional
-        Whether whole values simplify the equations, such as a factor of 0 or an exponent of 1 or 2.
-        They stay numbers in the symbolic equations.
-    changes : Changes, optional
-        When the value can be changed; by default at any time.
     choices : iterable of str, optional
         Allowed values of a text; those of an enumeration are known.
-    refused : mapping of str to str, optional
-        Reasons against some other values of a text.
-    unset : str, optional
-        Meaning of nan, in words; by default nan is refused.
-    file : bool, optional
-        Whether it is the path of a file, or empty.
+    **attributes
+        Bounds, and what else there is to say: further attributes of `Parameter`, by name.
 
     Returns
     -------
@@ -265,25 +259,10 @@ def constant(
     known = default
     if isinstance(default, StrEnum):
         choices, known = list(type(default)), str(default)
-    elif type(default) is int and not whole and abs(default) <= LARGEST:
+    elif type(default) is int and not attributes.get("whole") and abs(default) <= LARGEST:
         known = float(default)
-    described = Parameter(
-        name="",
-        default=known,
-        meaning=meaning,
-        unit=unit,
-        at_least=at_least,
-        at_most=at_most,
-        below=below,
-        positive=positive,
-        whole=whole,
-        simplifies=simplifies,
-        changes=changes,
-        choices=tuple(choices),
-        refused=refused or {},
-        unset=unset,
-        file=file,
-    )
+    choices = tuple(choices)
+    described = Parameter("", known, meaning, unit, choices=choices, **attributes)
     metadata = {_KEY: described}
     if isinstance(default, list):
         return field(default_factory=default.copy, metadata=metadata)

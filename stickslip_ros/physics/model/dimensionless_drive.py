@@ -1,7 +1,7 @@
 """A drive and its control, dimensionless: states, constants and forces, also as expressions."""
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from functools import cached_property, partial
 from itertools import accumulate, pairwise
 from math import inf
@@ -13,7 +13,6 @@ from stickslip_ros.physics.model import equations
 from stickslip_ros.physics.model.constants import constants_of, numbers, structure, with_symbols
 from stickslip_ros.physics.model.control import ContinuousControl
 from stickslip_ros.physics.model.drive import Drive, DriveConstants, ScaledDrive
-from stickslip_ros.physics.model.friction import FrictionLaw
 from stickslip_ros.physics.model.hybrid import HybridSystem, Instant, Mode, structure_number
 
 POSITION, SPEED, MEMORY = 0, 1, 2
@@ -37,28 +36,48 @@ class Parts(NamedTuple):
     load: Any
 
 
-@dataclass(frozen=True)
 class Expressions:
-    """A drive as expressions."""
+    """A dimensionless drive as expressions, in its symbols."""
 
-    drive: Drive
-    switches: Parts
-    """Switches of each part."""
-    sign: Any
-    speed: Any
-    memory: Sequence[Any]
-    belt_speed: Any
-    belt_acceleration: Any
-    normal: Any
-    reaction: Callable[[Any], Any]
-    """Reaction at a speed of the slide."""
-    part_rates: Callable[[Any], tuple[Any, ...]]
-    """Rates of control and actuator at a speed of the slide."""
+    def __init__(self, system: "DimensionlessDrive") -> None:
+        state, constants, inputs, switches, time = system.symbols
+        drive, control = system.drive, system.control
+        of_drive = constants_of(DriveConstants).keys() & constants
+        self.drive = drive = replace(
+            drive,
+            **{name: constants[name] for name in of_drive},
+            friction=with_symbols(drive.friction, "friction", constants),
+            actuator=with_symbols(drive.actuator, "actuator", constants),
+        )
+        self.law = drive.friction
+        self.switches = own = system.by_part(switches)
+        self.sign, self.speed = switches[0], state[SPEED]
+        self.memory = state[MEMORY : system.control_states.start]
+        self.belt_speed = equations.belt_speed(drive, time, own.belt)
+        self.belt_acceleration = _by_time(drive, time, own.belt, 0.0 * self.speed)
+        self.normal = equations.normal_force(drive, time, own.load)
+        self._position, self._inputs = state[POSITION], inputs
+        self._control = None if control is None else with_symbols(control, "control", constants)
+        self._of_control = state[system.control_states]
+        self._lagging = state[system.actuator_states]
 
-    @property
-    def law(self) -> FrictionLaw:
-        """The friction law."""
-        return self.drive.friction
+    def reaction(self, speed: Any) -> Any:
+        """Return the reaction at a speed of the slide."""
+        force = self._inputs[0]
+        if self._control is not None:
+            force = self._control.control_force(self._position, speed, self._of_control)
+        elif self._lagging:
+            force = self.drive.actuator.force(force, self._lagging) + self._inputs[1]
+        return equations.reaction(self.drive, self._position, speed, force)
+
+    def part_rates(self, speed: Any) -> tuple[Any, ...]:
+        """Return the rates of control and actuator at a speed of the slide."""
+        rates: list[Any] = []
+        if self._control is not None:
+            rates += self._control.state_rates(self._position, speed, self._of_control)
+        if self._lagging:
+            rates += self.drive.actuator.state_rates(self._inputs[0], self._lagging)
+        return tuple(rates)
 
 
 class DimensionlessDrive(HybridSystem):
@@ -202,52 +221,13 @@ class DimensionlessDrive(HybridSystem):
 
     @cached_property
     def _expressions(self) -> Expressions:
-        state, constants, inputs, switches, time = self.symbols
-        drive, control = self.drive, self.control
-        of_drive = constants_of(DriveConstants).keys() & constants
-        drive = replace(
-            drive,
-            **{name: constants[name] for name in of_drive},
-            friction=with_symbols(drive.friction, "friction", constants),
-            actuator=with_symbols(drive.actuator, "actuator", constants),
-        )
-        if control is not None:
-            control = with_symbols(control, "control", constants)
-        own, lagging = state[self.control_states], state[self.actuator_states]
-        x = state[POSITION]
-
-        def force(speed: Any) -> Any:
-            if control is not None:
-                return control.control_force(x, speed, own)
-            if self.has_actuator:
-                return drive.actuator.force(inputs[0], lagging) + inputs[1]
-            return inputs[0]
-
-        def part_rates(speed: Any) -> tuple[Any, ...]:
-            of_control = () if control is None else control.state_rates(x, speed, own)
-            of_actuator = ()
-            if self.has_actuator:
-                of_actuator = drive.actuator.state_rates(inputs[0], lagging)
-            return (*of_control, *of_actuator)
-
-        parts = self._by_part(switches)
-        return Expressions(
-            drive=drive,
-            switches=parts,
-            sign=switches[0],
-            speed=state[SPEED],
-            memory=state[MEMORY : self.control_states.start],
-            belt_speed=equations.belt_speed(drive, time, parts.belt),
-            belt_acceleration=_by_time(drive, time, parts.belt, 0.0 * state[SPEED]),
-            normal=equations.normal_force(drive, time, parts.load),
-            reaction=lambda speed: equations.reaction(drive, x, speed, force(speed)),
-            part_rates=part_rates,
-        )
+        return Expressions(self)
 
     def _memory(self, instant: Instant) -> Sequence[float]:
         return () if self.sticks else instant.state[MEMORY : self.control_states.start].tolist()
 
-    def _by_part(self, switches: Sequence[Any]) -> Parts:
+    def by_part(self, switches: Sequence[Any]) -> Parts:
+        """Return the switches of each part."""
         law, belt, load = self._parts
         return Parts(switches[law], switches[belt], switches[load])
 

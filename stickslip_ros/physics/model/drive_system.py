@@ -188,14 +188,14 @@ class DriveSystem(DimensionlessDrive):
 
     def next_switch_time(self, mode: Mode) -> float:
         """Return the time of the next corner of the signals."""
-        own = self._by_part(mode.switches)
+        own = self.by_part(mode.switches)
         return min(
             self.drive.belt.next_switch_time(own.belt), self.drive.load.next_switch_time(own.load)
         )
 
     def switch_inputs(self, mode: Mode, instant: Instant) -> Mode:
         """Return the mode after the corners and steps of the signals up to an instant."""
-        time, own = instant.time, self._by_part(mode.switches)
+        time, own = instant.time, self.by_part(mode.switches)
         before = self.belt_speed(mode, time)
         belt = _after(self.drive.belt, own.belt, time)
         load = _after(self.drive.load, own.load, time)
@@ -329,7 +329,7 @@ class DriveSystem(DimensionlessDrive):
         if law.switches:
             relative_speed = state[SPEED] - self.belt_speed(mode, instant.time)
             switches = law.switches_at(relative_speed, sign, self._memory(instant))
-        own = self._by_part(mode.switches)
+        own = self.by_part(mode.switches)
         return Mode(SLIP, (sign, *switches, *own.belt, *own.load))
 
     def _resting(self, mode: Mode, instant: Instant) -> Mode:

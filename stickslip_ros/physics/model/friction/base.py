@@ -11,6 +11,12 @@ import numpy as np
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.model.constants import Scales, constant, scaled
 
+Values = Sequence[Any]
+"""Values of several states or switches: numbers or expressions."""
+
+Numbers = Sequence[float]
+"""The same, numbers only."""
+
 _SPEEDS = np.concatenate([[0.0], np.geomspace(1e-6, 1e6, 4001)])
 """Speeds, in the characteristic one, at which the size of a law is asked for."""
 
@@ -103,9 +109,7 @@ class FrictionMemory(SteadyFriction):
         """Whether the slide can stick to the belt: only without a memory."""
         return not self.states
 
-    def friction(
-        self, relative_speed: Any, sign: Any, memory: Sequence[Any], switches: Sequence[Any]
-    ) -> Any:
+    def friction(self, relative_speed: Any, sign: Any, memory: Values, switches: Values) -> Any:
         """Return the friction coefficient during slip, steady or not; by default `coefficient`.
 
         Parameters
@@ -123,8 +127,8 @@ class FrictionMemory(SteadyFriction):
         return self.coefficient(relative_speed, sign)
 
     def memory_rates(
-        self, relative_speed: Any, sign: Any, memory: Sequence[Any], switches: Sequence[Any]
-    ) -> Sequence[Any]:
+        self, relative_speed: Any, sign: Any, memory: Values, switches: Values
+    ) -> Values:
         """Return the derivatives of the memory by time.
 
         Parameters
@@ -139,7 +143,7 @@ class FrictionMemory(SteadyFriction):
         """
         return ()
 
-    def initial_memory(self, relative_speed: float) -> Sequence[float]:
+    def initial_memory(self, relative_speed: float) -> Numbers:
         """Return the memory at the start of a motion; by default 0.
 
         Parameters
@@ -149,7 +153,7 @@ class FrictionMemory(SteadyFriction):
         """
         return (0.0,) * len(self.states)
 
-    def memory_at(self, relative_speed: float, sign: float) -> Sequence[float]:
+    def memory_at(self, relative_speed: float, sign: float) -> Numbers:
         """Return the memory in steady slip: the start of the search for an equilibrium.
 
         By default it is 0. A law whose elements stick and slip must define it, so that
@@ -163,12 +167,8 @@ class FrictionMemory(SteadyFriction):
         return (0.0,) * len(self.states)
 
     def memory_after(
-        self,
-        relative_speed: float,
-        memory: Sequence[float],
-        switches: Sequence[float],
-        duration: float,
-    ) -> Sequence[float]:
+        self, relative_speed: float, memory: Numbers, switches: Numbers, duration: float
+    ) -> Numbers:
         """Return the memory after a duration at a constant relative speed.
 
         With it a sampled controller follows the memory; see `FrictionObserver`.
@@ -194,9 +194,7 @@ class FrictionMemory(SteadyFriction):
             )
         return ()
 
-    def margins(
-        self, relative_speed: Any, sign: Any, memory: Sequence[Any], switches: Sequence[Any]
-    ) -> Sequence[Any]:
+    def margins(self, relative_speed: Any, sign: Any, memory: Values, switches: Values) -> Values:
         """Return what is above zero in a mode; where one falls to zero the mode ends.
 
         The sign of v_r need not be among them: the drive follows it.
@@ -214,9 +212,7 @@ class FrictionMemory(SteadyFriction):
         """
         return ()
 
-    def switches_at(
-        self, relative_speed: float, sign: float, memory: Sequence[float]
-    ) -> Sequence[float]:
+    def switches_at(self, relative_speed: float, sign: float, memory: Numbers) -> Numbers:
         """Return the switches of the mode that starts in a state.
 
         It is called at the start of a motion, and when the relative speed changes its sign.
@@ -228,9 +224,7 @@ class FrictionMemory(SteadyFriction):
         """
         return ()
 
-    def switches_after(
-        self, margin: int, sign: float, switches: Sequence[float]
-    ) -> Sequence[float]:
+    def switches_after(self, margin: int, sign: float, switches: Numbers) -> Numbers:
         """Return the switches of the mode that follows where a margin has fallen to zero.
 
         Parameters
@@ -243,12 +237,8 @@ class FrictionMemory(SteadyFriction):
         return switches
 
     def switches_following(
-        self,
-        switches: Sequence[float],
-        relative_speed: float,
-        sign: float,
-        memory: Sequence[float],
-    ) -> Sequence[float]:
+        self, switches: Numbers, relative_speed: float, sign: float, memory: Numbers
+    ) -> Numbers:
         """Return the switches of a state that follows others, in the same direction of slip.
 
         By default they are those of the state, as `switches_at` gives them.
@@ -277,7 +267,7 @@ class FrictionCreep(FrictionMemory):
         """
         return 0.0
 
-    def creep_speed(self, coefficient: Any, sign: Any, memory: Sequence[Any]) -> Any:
+    def creep_speed(self, coefficient: Any, sign: Any, memory: Values) -> Any:
         """Return the relative speed at which friction has a coefficient: the inverse of `friction`.
 
         Parameters
@@ -294,7 +284,7 @@ class FrictionCreep(FrictionMemory):
         """
         raise NotImplementedError
 
-    def creep_limit(self, relative_speed: Any, sign: Any, memory: Sequence[Any]) -> Any:
+    def creep_limit(self, relative_speed: Any, sign: Any, memory: Values) -> Any:
         """Return `rate_sensitivity` divided by the viscosity -d mu/d v_r.
 
         Parameters

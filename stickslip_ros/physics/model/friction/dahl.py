@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from stickslip_ros.physics.model.friction.base import FrictionLaw
+from stickslip_ros.physics.model.friction.base import FrictionLaw, Numbers, Values
 from stickslip_ros.physics.model.friction.lugre import (
     LEAST_SIZE,
     bristle_stiffness,
@@ -46,30 +46,24 @@ class Dahl(FrictionLaw):
         """The static coefficient, twice."""
         return self.static, self.static
 
-    def friction(
-        self, relative_speed: Any, sign: Any, memory: Sequence[Any], switches: Sequence[Any]
-    ) -> Any:
+    def friction(self, relative_speed: Any, sign: Any, memory: Values, switches: Values) -> Any:
         """Return -S z; see `FrictionMemory.friction`."""
         return -self.bristle_stiffness * memory[0]
 
     def memory_rates(
-        self, relative_speed: Any, sign: Any, memory: Sequence[Any], switches: Sequence[Any]
-    ) -> Sequence[Any]:
+        self, relative_speed: Any, sign: Any, memory: Values, switches: Values
+    ) -> Values:
         """Return z'; see `FrictionMemory.memory_rates`."""
         share = self.bristle_stiffness * memory[0] / self.static
         return (relative_speed - sign * relative_speed * share,)
 
-    def memory_at(self, relative_speed: float, sign: float) -> Sequence[float]:
+    def memory_at(self, relative_speed: float, sign: float) -> Numbers:
         """Return s mu_s / S; see `FrictionMemory.memory_at`."""
         return (sign * self.static / self.bristle_stiffness,)
 
     def memory_after(
-        self,
-        relative_speed: float,
-        memory: Sequence[float],
-        switches: Sequence[float],
-        duration: float,
-    ) -> Sequence[float]:
+        self, relative_speed: float, memory: Numbers, switches: Numbers, duration: float
+    ) -> Numbers:
         """Return z, which approaches that of steady slip; see `FrictionMemory.memory_after`."""
         return (deflection_after(self, relative_speed, memory[0], duration),)
 

@@ -6,6 +6,7 @@ from math import pi
 from typing import Any, ClassVar
 
 from stickslip_ros.physics.model.constants import constant
+from stickslip_ros.physics.model.friction.base import Numbers, Values
 from stickslip_ros.physics.model.friction.lugre import LuGre
 from stickslip_ros.physics.model.functions import sin
 
@@ -48,8 +49,8 @@ class ElastoPlastic(LuGre):
     )
 
     def memory_rates(
-        self, relative_speed: Any, sign: Any, memory: Sequence[Any], switches: Sequence[Any]
-    ) -> Sequence[Any]:
+        self, relative_speed: Any, sign: Any, memory: Values, switches: Values
+    ) -> Values:
         """Return z'; see `FrictionMemory.memory_rates`."""
         elastic, plastic, limit, *_ = switches
         size = self.size(relative_speed, sign, switches)
@@ -58,9 +59,7 @@ class ElastoPlastic(LuGre):
         yields = plastic + (1.0 - elastic - plastic) * (0.5 + 0.5 * sin(angle))
         return (relative_speed * (1.0 - yields * force / size),)
 
-    def margins(
-        self, relative_speed: Any, sign: Any, memory: Sequence[Any], switches: Sequence[Any]
-    ) -> Sequence[Any]:
+    def margins(self, relative_speed: Any, sign: Any, memory: Values, switches: Values) -> Values:
         """Return the distances to the ends of a changing alpha; see `FrictionMemory.margins`."""
         elastic, plastic, limit, *_ = switches
         size = self.size(relative_speed, sign, switches)
@@ -71,9 +70,7 @@ class ElastoPlastic(LuGre):
             *super().margins(relative_speed, sign, memory, switches),
         )
 
-    def switches_at(
-        self, relative_speed: float, sign: float, memory: Sequence[float]
-    ) -> Sequence[float]:
+    def switches_at(self, relative_speed: float, sign: float, memory: Numbers) -> Numbers:
         """Return if it is elastic, if plastic, and S z_b; see `FrictionMemory.switches_at`."""
         of_curve = super().switches_at(relative_speed, sign, memory)
         size = float(self.size(relative_speed, sign, (0.0, 0.0, 0.0, *of_curve)))
@@ -81,9 +78,7 @@ class ElastoPlastic(LuGre):
         force = sign * self.bristle_stiffness * memory[0]
         return (float(force <= limit), float(force >= size), limit, *of_curve)
 
-    def switches_after(
-        self, margin: int, sign: float, switches: Sequence[float]
-    ) -> Sequence[float]:
+    def switches_after(self, margin: int, sign: float, switches: Numbers) -> Numbers:
         """Return the switches on the other side of an end; see `FrictionMemory.switches_after`."""
         elastic, plastic, *others = switches
         if margin > 1:
@@ -91,12 +86,8 @@ class ElastoPlastic(LuGre):
         return (1.0 - elastic, 0.0, *others) if margin == 0 else (0.0, 1.0 - plastic, *others)
 
     def memory_after(
-        self,
-        relative_speed: float,
-        memory: Sequence[float],
-        switches: Sequence[float],
-        duration: float,
-    ) -> Sequence[float]:
+        self, relative_speed: float, memory: Numbers, switches: Numbers, duration: float
+    ) -> Numbers:
         """Return z by Runge-Kutta steps along the path; see `FrictionMemory.memory_after`."""
         if relative_speed == 0.0 or duration == 0.0:
             return memory

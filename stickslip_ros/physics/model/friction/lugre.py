@@ -7,7 +7,7 @@ from math import exp
 from typing import Any, ClassVar, Self
 
 from stickslip_ros.physics.model.constants import constant
-from stickslip_ros.physics.model.friction.base import FrictionLaw
+from stickslip_ros.physics.model.friction.base import FrictionLaw, Numbers, Values
 from stickslip_ros.physics.model.friction.exponential import Exponential
 
 LEAST_SIZE = 1e-12
@@ -81,7 +81,7 @@ class CurveFollower(SteadyPart):
     def __post_init__(self) -> None:
         object.__setattr__(self, "switches", (*self.own_switches, *self.curve.switches))
 
-    def size(self, relative_speed: Any, sign: Any, switches: Sequence[Any]) -> Any:
+    def size(self, relative_speed: Any, sign: Any, switches: Values) -> Any:
         """Return g(v_r), dimensionless.
 
         Parameters
@@ -106,22 +106,16 @@ class CurveFollower(SteadyPart):
         """Increase of the coefficient with speed that acts immediately, s/m."""
         return getattr(self.curve, "viscous", 0.0)
 
-    def margins(
-        self, relative_speed: Any, sign: Any, memory: Sequence[Any], switches: Sequence[Any]
-    ) -> Sequence[Any]:
+    def margins(self, relative_speed: Any, sign: Any, memory: Values, switches: Values) -> Values:
         """Return those of the curve, with the switches of all; see `FrictionMemory.margins`."""
         own = len(self.own_switches)
         return self._dry.margins(relative_speed, sign, (), switches[own:])
 
-    def switches_at(
-        self, relative_speed: float, sign: float, memory: Sequence[float]
-    ) -> Sequence[float]:
+    def switches_at(self, relative_speed: float, sign: float, memory: Numbers) -> Numbers:
         """Return those of the curve only; see `FrictionMemory.switches_at`."""
         return self.curve.switches_at(relative_speed, sign, ())
 
-    def switches_after(
-        self, margin: int, sign: float, switches: Sequence[float]
-    ) -> Sequence[float]:
+    def switches_after(self, margin: int, sign: float, switches: Numbers) -> Numbers:
         """Return all switches after a margin of the curve; see `FrictionMemory.switches_after`."""
         own = len(self.own_switches)
         return (*switches[:own], *self.curve.switches_after(margin, sign, switches[own:]))
@@ -175,34 +169,28 @@ class LuGre(CurveFollower):
         30.0, "Damping D of the contact, per unit of normal force.", "s/m", at_least=0.0
     )
 
-    def friction(
-        self, relative_speed: Any, sign: Any, memory: Sequence[Any], switches: Sequence[Any]
-    ) -> Any:
+    def friction(self, relative_speed: Any, sign: Any, memory: Values, switches: Values) -> Any:
         """Return -(S z + D z' + mu_v v_r); see `FrictionMemory.friction`."""
         (rate,) = self.memory_rates(relative_speed, sign, memory, switches)
         elastic = self.bristle_stiffness * memory[0] + self.bristle_damping * rate
         return -(elastic + self.viscous_part * relative_speed)
 
     def memory_rates(
-        self, relative_speed: Any, sign: Any, memory: Sequence[Any], switches: Sequence[Any]
-    ) -> Sequence[Any]:
+        self, relative_speed: Any, sign: Any, memory: Values, switches: Values
+    ) -> Values:
         """Return z'; see `FrictionMemory.memory_rates`."""
         size = self.size(relative_speed, sign, switches)
         share = self.bristle_stiffness * memory[0] / size
         return (relative_speed - sign * relative_speed * share,)
 
-    def memory_at(self, relative_speed: float, sign: float) -> Sequence[float]:
+    def memory_at(self, relative_speed: float, sign: float) -> Numbers:
         """Return s g / S; see `FrictionMemory.memory_at`."""
         steady = self._dry.coefficient(relative_speed, sign)
         return (-float(steady) / self.bristle_stiffness,)
 
     def memory_after(
-        self,
-        relative_speed: float,
-        memory: Sequence[float],
-        switches: Sequence[float],
-        duration: float,
-    ) -> Sequence[float]:
+        self, relative_speed: float, memory: Numbers, switches: Numbers, duration: float
+    ) -> Numbers:
         """Return z, which approaches that of steady slip; see `FrictionMemory.memory_after`."""
         return (deflection_after(self, relative_speed, memory[0], duration),)
 

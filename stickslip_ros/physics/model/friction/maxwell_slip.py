@@ -1,11 +1,12 @@
 """The generalised Maxwell-slip law."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from math import exp
 from typing import Any, ClassVar
 
 from stickslip_ros.physics.model.constants import constant
+from stickslip_ros.physics.model.friction.base import Numbers, Values
 from stickslip_ros.physics.model.friction.lugre import CurveFollower
 
 _AT_LIMIT = 1.0 - 2.0**-40
@@ -50,22 +51,20 @@ class MaxwellSlip(CurveFollower):
         super().__post_init__()
 
     @property
-    def stiffnesses(self) -> Sequence[Any]:
+    def stiffnesses(self) -> Values:
         """S_i of each element, 1/m."""
         numbers = range(1, self.elements + 1)
         total = sum(1.0 / number for number in numbers)
         return [self.bristle_stiffness * (1.0 / (number * total)) for number in numbers]
 
-    def friction(
-        self, relative_speed: Any, sign: Any, memory: Sequence[Any], switches: Sequence[Any]
-    ) -> Any:
+    def friction(self, relative_speed: Any, sign: Any, memory: Values, switches: Values) -> Any:
         """Return -(sum S_i z_i + mu_v v_r); see `FrictionMemory.friction`."""
         forces = [s * z for s, z in zip(self.stiffnesses, memory, strict=True)]
         return -(sum(forces[1:], forces[0]) + self.viscous_part * relative_speed)
 
     def memory_rates(
-        self, relative_speed: Any, sign: Any, memory: Sequence[Any], switches: Sequence[Any]
-    ) -> Sequence[Any]:
+        self, relative_speed: Any, sign: Any, memory: Values, switches: Values
+    ) -> Values:
         """Return z_i'; see `FrictionMemory.memory_rates`."""
         size, weight = self.size(relative_speed, sign, switches), 1.0 / self.elements
         return [
@@ -74,9 +73,7 @@ class MaxwellSlip(CurveFollower):
             for stiffness, z, slips in zip(self.stiffnesses, memory, switches, strict=False)
         ]
 
-    def margins(
-        self, relative_speed: Any, sign: Any, memory: Sequence[Any], switches: Sequence[Any]
-    ) -> Sequence[Any]:
+    def margins(self, relative_speed: Any, sign: Any, memory: Values, switches: Values) -> Values:
         """Return those of the elements from their limits; see `FrictionMemory.margins`."""
         size = self.size(relative_speed, sign, switches)
         own = [
@@ -85,46 +82,34 @@ class MaxwellSlip(CurveFollower):
         ]
         return (*own, *super().margins(relative_speed, sign, memory, switches))
 
-    def switches_at(
-        self, relative_speed: float, sign: float, memory: Sequence[float]
-    ) -> Sequence[float]:
+    def switches_at(self, relative_speed: float, sign: float, memory: Numbers) -> Numbers:
         """Return which elements are at their limit; see `FrictionMemory.switches_at`."""
         of_curve = super().switches_at(relative_speed, sign, memory)
         size = float(self.size(relative_speed, sign, (*[0.0] * self.elements, *of_curve)))
         own = [float(sign * force >= _AT_LIMIT * size) for force in self._forces(memory)]
         return (*own, *of_curve)
 
-    def switches_after(
-        self, margin: int, sign: float, switches: Sequence[float]
-    ) -> Sequence[float]:
+    def switches_after(self, margin: int, sign: float, switches: Numbers) -> Numbers:
         """Return those with one more element that slips; see `FrictionMemory.switches_after`."""
         if margin >= self.elements:
             return super().switches_after(margin - self.elements, sign, switches)
         return (*switches[:margin], 1.0, *switches[margin + 1 :])
 
-    def memory_at(self, relative_speed: float, sign: float) -> Sequence[float]:
+    def memory_at(self, relative_speed: float, sign: float) -> Numbers:
         """Return s g / (n S_i); see `FrictionMemory.memory_at`."""
         steady = -float(self._dry.coefficient(relative_speed, sign)) / self.elements
         return [steady / stiffness for stiffness in self.stiffnesses]
 
     def switches_following(
-        self,
-        switches: Sequence[float],
-        relative_speed: float,
-        sign: float,
-        memory: Sequence[float],
-    ) -> Sequence[float]:
+        self, switches: Numbers, relative_speed: float, sign: float, memory: Numbers
+    ) -> Numbers:
         """Keep the elements that slip; see `FrictionMemory.switches_following`."""
         reached, count = self.switches_at(relative_speed, sign, memory), self.elements
         return (*map(max, switches[:count], reached[:count]), *reached[count:])
 
     def memory_after(
-        self,
-        relative_speed: float,
-        memory: Sequence[float],
-        switches: Sequence[float],
-        duration: float,
-    ) -> Sequence[float]:
+        self, relative_speed: float, memory: Numbers, switches: Numbers, duration: float
+    ) -> Numbers:
         """Return z_i, each as it sticks and then slips; see `FrictionMemory.memory_after`."""
         sign = 1.0 if relative_speed > 0.0 else -1.0
         size = abs(float(self._dry.coefficient(relative_speed, sign)))
@@ -140,7 +125,7 @@ class MaxwellSlip(CurveFollower):
             after.append(limit + (start - limit) * exp(-self.attraction * slipping / size))
         return after
 
-    def _forces(self, memory: Sequence[Any]) -> Sequence[Any]:
+    def _forces(self, memory: Values) -> Values:
         """Return the force of each element in shares of its weight."""
         return [
             self.elements * stiffness * z

@@ -1,8 +1,6 @@
 """The memory of a friction law, followed from sample to sample."""
 
-from collections.abc import Sequence
-
-from stickslip_ros.physics.model.friction.base import FrictionLaw
+from stickslip_ros.physics.model.friction.base import FrictionLaw, Numbers
 
 
 class FrictionObserver:
@@ -23,7 +21,7 @@ class FrictionObserver:
     -0.0885
     """
 
-    def __init__(self, law: FrictionLaw, memory: Sequence[float] | None = None) -> None:
+    def __init__(self, law: FrictionLaw, memory: Numbers | None = None) -> None:
         self.law = law
         """Law that is followed."""
         self.memory = tuple(law.initial_memory(0.0) if memory is None else memory)

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from stickslip_ros.physics.model.constants import constant
-from stickslip_ros.physics.model.friction.base import FrictionLaw
+from stickslip_ros.physics.model.friction.base import FrictionLaw, Numbers, Values
 from stickslip_ros.physics.model.functions import exp, log, sqrt
 
 _LARGEST_RATIOS = {"kinetic": 200.0, "evolution_effect": 10.0}
@@ -75,49 +75,43 @@ class RateState(FrictionLaw):
         speed = np.maximum(relative_speed * sign / self.reference_speed, _SMALLEST_SPEED)
         return self.friction(relative_speed, sign, (-log(speed),), ())
 
-    def friction(
-        self, relative_speed: Any, sign: Any, memory: Sequence[Any], switches: Sequence[Any]
-    ) -> Any:
+    def friction(self, relative_speed: Any, sign: Any, memory: Values, switches: Values) -> Any:
         """Return mu; see `FrictionMemory.friction`."""
         strength, limit = self._strength(memory), self.creep_limit(relative_speed, sign, memory)
         speed = (sign * relative_speed + limit) / (2.0 * self.reference_speed)
         return -sign * self.direct_effect * (strength + log(speed))
 
     def memory_rates(
-        self, relative_speed: Any, sign: Any, memory: Sequence[Any], switches: Sequence[Any]
-    ) -> Sequence[Any]:
+        self, relative_speed: Any, sign: Any, memory: Values, switches: Values
+    ) -> Values:
         """Return the rate of ln(v_0 th/L); see `FrictionMemory.memory_rates`."""
         ageing = self.reference_speed * exp(-memory[0])
         return ((ageing - sign * relative_speed) / self.slip_distance,)
 
-    def memory_at(self, relative_speed: float, sign: float) -> Sequence[float]:
+    def memory_at(self, relative_speed: float, sign: float) -> Numbers:
         """Return ln(v_0/|v_r|); see `FrictionMemory.memory_at`."""
         speed = max(abs(relative_speed) / self.reference_speed, _SMALLEST_SPEED)
         return (-float_log(speed),)
 
-    def initial_memory(self, relative_speed: float) -> Sequence[float]:
+    def initial_memory(self, relative_speed: float) -> Numbers:
         """Return the memory of the age L/max(|v_r|, v_0); see `FrictionMemory.initial_memory`."""
         return (-float_log(max(abs(relative_speed) / self.reference_speed, 1.0)),)
 
     def memory_after(
-        self,
-        relative_speed: float,
-        memory: Sequence[float],
-        switches: Sequence[float],
-        duration: float,
-    ) -> Sequence[float]:
+        self, relative_speed: float, memory: Numbers, switches: Numbers, duration: float
+    ) -> Numbers:
         """Return the memory of the age then; see `FrictionMemory.memory_after`."""
         path = abs(relative_speed) * duration / self.slip_distance
         grown = -expm1(-path) / path if path > 0.0 else 1.0
         age = exp(memory[0] - path) + self.reference_speed * duration / self.slip_distance * grown
         return (float_log(age),)
 
-    def creep_speed(self, coefficient: Any, sign: Any, memory: Sequence[Any]) -> Any:
+    def creep_speed(self, coefficient: Any, sign: Any, memory: Values) -> Any:
         """Return v_r = -2 v_0 sinh(mu/a) exp(-strength); see `FrictionCreep.creep_speed`."""
         strength, load = self._strength(memory), coefficient / self.direct_effect
         return self.reference_speed * (exp(-load - strength) - exp(load - strength))
 
-    def creep_limit(self, relative_speed: Any, sign: Any, memory: Sequence[Any]) -> Any:
+    def creep_limit(self, relative_speed: Any, sign: Any, memory: Values) -> Any:
         """Return a divided by the viscosity; see `FrictionCreep.creep_limit`."""
         least = 2.0 * self.reference_speed * exp(-self._strength(memory))
         return sqrt(relative_speed * relative_speed + least * least)
@@ -133,6 +127,6 @@ class RateState(FrictionLaw):
                 )
         return None
 
-    def _strength(self, memory: Sequence[Any]) -> Any:
+    def _strength(self, memory: Values) -> Any:
         """Return (f_0 + b ln(v_0 th/L))/a."""
         return (self.kinetic + self.evolution_effect * memory[0]) / self.direct_effect

@@ -11,7 +11,7 @@ import numpy as np
 from typing_extensions import override
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.physics.model.friction.base import FrictionLaw
+from stickslip_ros.physics.model.friction.base import FrictionLaw, Numbers, Values
 
 
 @dataclass(frozen=True)
@@ -52,17 +52,13 @@ class Table(FrictionLaw):
             relative_speed, sign, (), tuple(np.moveaxis(self._pieces[piece], -1, 0))
         )
 
-    def friction(
-        self, relative_speed: Any, sign: Any, memory: Sequence[Any], switches: Sequence[Any]
-    ) -> Any:
+    def friction(self, relative_speed: Any, sign: Any, memory: Values, switches: Values) -> Any:
         """Return the coefficient in a piece; see `FrictionMemory.friction`."""
         lower, _, _, _, c0, c1, c2, c3 = switches
         speed = relative_speed * sign - lower
         return -sign * (c0 + speed * (c1 + speed * (c2 + speed * c3)))
 
-    def margins(
-        self, relative_speed: Any, sign: Any, memory: Sequence[Any], switches: Sequence[Any]
-    ) -> Sequence[Any]:
+    def margins(self, relative_speed: Any, sign: Any, memory: Values, switches: Values) -> Values:
         """Return the distances to the ends, 1 for no end; see `FrictionMemory.margins`."""
         lower, upper, first, last, *_ = switches
         speed = relative_speed * sign
@@ -71,15 +67,11 @@ class Table(FrictionLaw):
             last + (1.0 - last) * (upper - speed),
         )
 
-    def switches_at(
-        self, relative_speed: float, sign: float, memory: Sequence[float]
-    ) -> Sequence[float]:
+    def switches_at(self, relative_speed: float, sign: float, memory: Numbers) -> Numbers:
         """Return the piece at a speed; see `FrictionMemory.switches_at`."""
         return self._piece(relative_speed * sign)
 
-    def switches_after(
-        self, margin: int, sign: float, switches: Sequence[float]
-    ) -> Sequence[float]:
+    def switches_after(self, margin: int, sign: float, switches: Numbers) -> Numbers:
         """Return the piece below (margin 0) or above (1); see `FrictionMemory.switches_after`."""
         lower, upper, *_ = switches
         return self._piece(upper) if margin else self._piece(nextafter(lower, 0.0))
@@ -131,6 +123,6 @@ class Table(FrictionLaw):
         pieces[:-1, 4:] = cubics[::-1, :-1].T
         return pieces
 
-    def _piece(self, speed: float) -> Sequence[float]:
+    def _piece(self, speed: float) -> Numbers:
         number = max(bisect_right(self._speeds, speed) - 1, 0)
         return tuple(self._pieces[number].tolist())
