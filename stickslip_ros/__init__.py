@@ -16,6 +16,7 @@ if is_run(__name__, "stickslip", *NODE_SCRIPTS):
 from typing import TYPE_CHECKING, Any  # what takes time comes second
 
 if TYPE_CHECKING:
+    from stickslip_ros.api.friction_map import FrictionMap, friction_map
     from stickslip_ros.api.identification import Model, identify
     from stickslip_ros.api.recordings import RecordedRun, read_bag, read_table
     from stickslip_ros.api.runs import Run, simulate
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Basin",
+    "FrictionMap",
     "Model",
     "Proposal",
     "RecordedRun",
@@ -42,6 +44,7 @@ __all__ = [
     "__version__",
     "basin",
     "design",
+    "friction_map",
     "identify",
     "read_bag",
     "read_table",
@@ -52,6 +55,7 @@ __all__ = [
 ]
 
 _HOMES = {
+    "api.friction_map": ("FrictionMap", "friction_map"),
     "api.identification": ("Model", "identify"),
     "api.recordings": ("RecordedRun", "read_bag", "read_table"),
     "api.runs": ("Run", "simulate"),

@@ -151,14 +151,7 @@ class Model(Result):
             )
         return {
             "law": found.law,
-            "parameters": {
-                name: {
-                    "value": estimate.value,
-                    "standard_error": estimate.standard_error,
-                    "interval": list(estimate.interval),
-                }
-                for name, estimate in self.parameters.items()
-            },
+            "parameters": {name: each.as_dict() for name, each in self.parameters.items()},
             "correlations": [
                 {"parameters": [f"plant.{first}", f"plant.{second}"], "correlation": value}
                 for first, second, value in found.correlations

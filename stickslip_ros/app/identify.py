@@ -2,6 +2,7 @@
 
 import argparse
 import shlex
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -47,6 +48,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "together",
     )
     add_columns(parser)
+    parser.add_argument(
+        "--map",
+        action="store_true",
+        help="the tables have pairs of velocity and force, of tests at constant speeds: fit "
+        "friction alone, by the law coulomb or exponential",
+    )
     parser.add_argument(
         "--law",
         default="auto",
@@ -96,6 +103,9 @@ def run(arguments: argparse.Namespace) -> None:
         for path in (arguments.out, *curve_files(arguments.out)):
             check_new("--out", path)
     check_results(arguments)
+    if arguments.map:
+        _fit_map(arguments, columns)
+        return
     fixed = fixed_of(arguments.fix)
     with progress_bar("identifying", None, lines=True) as progress:
         model = identify(
@@ -118,6 +128,19 @@ def run(arguments: argparse.Namespace) -> None:
     write_results(arguments, model)
     if arguments.out is not None:
         _write(arguments.out, model.findings)
+
+
+def _fit_map(arguments: argparse.Namespace, columns: Mapping[str, str] | None) -> None:
+    """Fit friction to pairs of velocity and force; refuse what a map has not."""
+    from stickslip_ros.api.friction_map import friction_map
+
+    for option in ("out", "fix", "check"):
+        if getattr(arguments, option):
+            raise InvalidInputError(f"--{option}: a map has friction only, and no drive")
+    form = vars(form_of(arguments))
+    found = friction_map(*arguments.recordings, columns=columns or {}, law=arguments.law, **form)
+    print_result(arguments, found)
+    write_results(arguments, found)
 
 
 def _write(path: Path, found: "Findings") -> None:

@@ -229,9 +229,14 @@ def quantities_of(
     times of the positions: forces hold, other values are interpolated. Raises BagError if the file
     cannot be read, and InvalidInputError if it has not what is asked for, or no sample.
     """
-    asked = _asked(table, columns, belt_speed)
+    columns = own_columns(table.path, table.columns) if columns is None else columns
+    if belt_speed is not None:
+        columns = {**columns, "belt_velocity": repr(float(belt_speed))}
+    asked = _asked(table, columns, ("time", "position"))
+    if not asked["time"].places:
+        raise InvalidInputError(f"{table.path}: time = {columns['time']} must be a column")
     clocks = {name: _clocks(table, asked["time"].places, each) for name, each in asked.items()}
-    cells = _cells(table, asked, clocks)
+    cells = _cells(table, asked, asked["time"].places, *clocks.values())
     notes = [*table.notes(), *_lost_cells(table, cells, asked)]
     factors: dict[str, float] = {}
     for name, each in asked.items():
@@ -276,43 +281,62 @@ def quantities_of(
     return Quantities(values, notes)
 
 
+def speed_and_force(table: Table, columns: Mapping[str, str]) -> Quantities:
+    """Return the quantities of a table of tests at constant speeds: pairs of velocity and force.
+
+    `columns` has both, and errors are those of `quantities_of`.
+    """
+    asked = _asked(table, columns, ("velocity", "force"))
+    cells = _cells(table, asked, asked["velocity"].places)
+    notes = [*table.notes(), *_lost_cells(table, cells, asked)]
+    values: dict[str, FloatArray] = {}
+    for name, each in asked.items():
+        factor, note = _factor(table, name, each)
+        value = each.value([np.asarray(cells[place], float) for place in each.places])
+        values[name] = _measurable(np.atleast_1d(value) * factor)
+        notes += note
+    return Quantities(values, notes)
+
+
 def _asked(
-    table: Table, columns: Mapping[str, str] | None, belt_speed: float | None
+    table: Table, columns: Mapping[str, str], needed: Sequence[str]
 ) -> dict[str, Expression]:
     """Return the expression of each quantity; refuse what is no quantity, or not enough."""
-    path = table.path
-    columns = own_columns(path, table.columns) if columns is None else columns
-    if belt_speed is not None:
-        columns = {**columns, "belt_velocity": repr(float(belt_speed))}
     for name in columns:
         if name not in QUANTITIES:
-            raise InvalidInputError(f"column {name} is invalid: {must_be_one_of(name, QUANTITIES)}")
-    lacking = [name for name in ("time", "position") if name not in columns]
+            raise InvalidInputError(f"column {name} is refused: {must_be_one_of(name, QUANTITIES)}")
+    lacking = [name for name in needed if name not in columns]
     if lacking:
-        raise InvalidInputError(f"{path}: no column is given for {' and '.join(lacking)}")
-    asked = {name: Expression.read(path, text, table.columns) for name, text in columns.items()}
-    if not asked["time"].places:
-        raise InvalidInputError(f"{path}: time = {columns['time']} must be a column")
-    return asked
+        pairs = "; pairs of velocity and force are read by identify --map" * (
+            {"velocity", "force"} == {*columns}
+        )
+        raise InvalidInputError(
+            f"{table.path}: no column is given for {' and '.join(lacking)}{pairs}"
+        )
+    return {
+        name: Expression.read(table.path, text, table.columns) for name, text in columns.items()
+    }
 
 
 def _cells(
-    table: Table, asked: Mapping[str, Expression], clocks: Mapping[str, tuple[int, ...]]
+    table: Table, asked: Mapping[str, Expression], leading: Sequence[int], *others: Sequence[int]
 ) -> dict[int, Any]:
-    """Return the columns of expressions and their times, by place; refuse different lengths."""
-    used = sorted(
-        {place for each in asked.values() for place in each.places}.union(*clocks.values())
-    )
+    """Return the columns of expressions, and other ones, by place.
+
+    The length of the table is that of the leading ones; others of another length are refused.
+    """
+    places = [each.places for each in asked.values()]
+    used = sorted({place for each in (*places, *others) for place in each})
     with _reading(table.path):
         cells = dict(zip(used, table.read(used), strict=True))
-    rows = max(len(cells[place]) for place in asked["time"].places)
+    rows = max((len(cells[place]) for place in leading), default=0)
     if not rows:
         raise BagError(f"{table.path}: the file cannot be read: it has no rows")
     for place, column in cells.items():
         if len(column) not in (1, rows):
             raise InvalidInputError(
-                f"{table.path}: {_name(table, place)} has {len(column)} numbers and the time "
-                f"{asked['time'].text} {rows}: columns must have the same length"
+                f"{table.path}: {_name(table, place)} has {len(column)} numbers and "
+                f"{_name(table, leading[0])} {rows}: columns must have the same length"
             )
     return cells
 

@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import copysign, inf, sqrt
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -49,6 +49,11 @@ class Estimate:
         """The 95 % interval."""
         half = QUANTILE * self.standard_error
         return self.value - half, self.value + half
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return value, `standard_error` and `interval` by name, for JSON."""
+        own = {"value": self.value, "standard_error": self.standard_error}
+        return {**own, "interval": [*self.interval]}
 
 
 @dataclass(frozen=True, eq=False)

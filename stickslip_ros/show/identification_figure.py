@@ -1,5 +1,6 @@
 """The figure of an identification: the friction curve, and residuals by speed, position, time."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ from matplotlib.figure import Figure
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.identification.findings import Findings
 from stickslip_ros.identification.fit import QUANTILE
+from stickslip_ros.physics.model.friction import FrictionLaw
 from stickslip_ros.show.quantities import SI
 from stickslip_ros.show.style import BLUE, GREEN, ORANGE, SCREEN, FigureStyle, finish, styled
 
@@ -18,6 +20,7 @@ _SHOWN_SHARE = 0.995
 """Share of the dots that the vertical axis shows at least."""
 _LARGEST_BAND = 100.0
 """Largest band that is drawn, in largest forces."""
+_CURVE_POINTS = 400
 _NAMES = {1.0: "forward slip", -1.0: "backward slip"}
 
 
@@ -55,6 +58,35 @@ def identification_figure(found: Findings, *, style: FigureStyle = SCREEN) -> Fi
     error = f"{100.0 * found.chosen.error:.4g} %"
     title = f"Identified drive, {names}: law {found.chosen.label}, validation error {error}"
     style.set_title(figure, title)
+    finish(figure)
+    return figure
+
+
+@styled
+def map_figure(
+    names: str,
+    velocity: FloatArray,
+    force: FloatArray,
+    laws: Sequence[FrictionLaw],
+    *,
+    style: FigureStyle = SCREEN,
+) -> Figure:
+    """Return the figure of tests at constant speeds, and the law of each direction, or of both."""
+    figure = style.figure(8.0, 5.0)
+    axes = figure.add_subplot()
+    scale, label = SI.axis("velocity", "m/s", velocity)
+    force_scale, force_label = SI.axis("force", "N", force)
+    axes.plot(velocity / scale, force / force_scale, ".", color=BLUE, label="measured")
+    for sign, law in ((1.0, laws[0]), (-1.0, laws[-1])):
+        size = float(np.max(sign * velocity, initial=0.0))
+        speed = np.linspace(0.0, size, _CURVE_POINTS) if size else np.empty(0)
+        driving = -np.array([law.coefficient(sign * each, sign) for each in speed.tolist()])
+        named = f"law {law.name}" if sign > 0.0 else None
+        axes.plot(sign * speed / scale, driving / force_scale, color=ORANGE, label=named)
+    axes.set_xlabel(label)
+    axes.set_ylabel(force_label)
+    axes.legend(loc="best")
+    style.set_title(figure, f"Friction map, {names}")
     finish(figure)
     return figure
 

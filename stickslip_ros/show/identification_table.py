@@ -27,19 +27,9 @@ def identification_tables(
     `own` is what the model predicts of the first recording that it was fitted to, `checks` of
     others; `notes` are sentences on both.
     """
-    units = {each.name: each.unit or "" for each in PlantParameters().known.values()}
-    rows = [
-        [
-            f"plant.{name}",
-            SI.texts([each.value], units[name], _digits(each))[0],
-            SI.text(each.standard_error, units[name], largest=abs(each.value)),
-            _interval(each, units[name]),
-        ]
-        for name, each in found.fitted.items()
-    ]
     names = ", ".join(dict.fromkeys(record.name for record in found.records))
-    headings = ["parameter", "value", "standard error", "95 % interval"]
-    yield TextTable(f"{names}: law {found.law}", headings, rows)
+    constants = {f"plant.{name}": each for name, each in found.fitted.items()}
+    yield constants_table(f"{names}: law {found.law}", constants)
     if found.law == "table" or (found.law == "lugre" and not found.has_spring):
         yield _curve(found)
     yield TextTable(
@@ -61,6 +51,21 @@ def identification_tables(
         yield f"plant.{first} and plant.{second} are correlated, {share:.3f}"
     for name, why in found.unidentified.items():
         yield f"plant.{name} is not identifiable: {why}"
+
+
+def constants_table(title: str, constants: Mapping[str, Estimate]) -> TextTable:
+    """Return the table of constants by parameter, such as `plant.mass`, with intervals."""
+    units = {f"plant.{each.name}": each.unit or "" for each in PlantParameters().known.values()}
+    rows = [
+        [
+            name,
+            SI.texts([each.value], units[name], _digits(each))[0],
+            SI.text(each.standard_error, units[name], largest=abs(each.value)),
+            _interval(each, units[name]),
+        ]
+        for name, each in constants.items()
+    ]
+    return TextTable(title, ["parameter", "value", "standard error", "95 % interval"], rows)
 
 
 def _digits(estimate: Estimate) -> int:
