@@ -9,7 +9,6 @@ import signal
 import sys
 from collections.abc import Iterator
 from multiprocessing.process import BaseProcess
-from pathlib import Path
 
 import pytest
 from hypothesis import settings
@@ -34,8 +33,6 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 
 STARTING_FIXTURES = {"cluster", "processes", "recorded", "start", "start_stickslip"}
 
-MIDDLEWARE = {Path(__file__).parent / floor for floor in ("nodes", "bags")}
-
 _STARTS = {"os.fork", "os.forkpty", "os.posix_spawn", "os.system", "subprocess.Popen"}
 _FOUND_BY_LIBRARIES = {"fc-list", "ldconfig", "/sbin/ldconfig"}
 """Programs that libraries ask about the machine, once."""
@@ -58,8 +55,6 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if STARTING_FIXTURES.intersection(getattr(item, "fixturenames", ())):
             item.add_marker("process")
-        if MIDDLEWARE.intersection(item.path.parents):
-            item.add_marker("middleware")
         if function_of(item.nodeid) in slow:
             item.add_marker("slow")
 

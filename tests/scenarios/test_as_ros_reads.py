@@ -30,7 +30,7 @@ def taken(path: str) -> dict[str, dict[str, Any]]:
 
 
 @given(seed=st.integers(0, 2**32))
-@examples(quick=60, thorough=1000, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@examples(quick=60, thorough=300, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_every_value_is_that_of_ros(tmp_path: Path, read_by_ros: ReadByRos, seed: int) -> None:
     path = scenario_file(tmp_path, text := fuzzed(Random(seed)))
     try:

@@ -415,7 +415,7 @@ def test_no_words_in_the_charts_overlap_in_a_narrow_window(
     processes.node("analyzer")
     processes.node("plant", pace="realtime", expects_control="false", **drive)
     page.wait_for_function(ENOUGH)
-    for width in (390, *range(800, 1601, 100)):
+    for width in (390, *range(800, 1601, 200)):
         page.set_viewport_size({"width": width, "height": 900})
         page.wait_for_function("width => window.innerWidth === width", arg=width)
         # A page that was not answered for seconds, on a busy machine, loads itself again.
