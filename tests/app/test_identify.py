@@ -100,35 +100,6 @@ def test_a_bag_of_a_loop_is_identified(stickslip: Run) -> None:
 
 
 @pytest.mark.long
-def test_a_bag_of_a_controlled_loop_with_a_lagging_actuator(stickslip: Run) -> None:
-    given = {
-        "plant.actuator.time_constant": "0.003",
-        "plant.sensor.position_resolution": "1e-6",
-        "plant.sensor.velocity": "difference",
-        "plant.disturbance.kind": "sine",
-        "plant.disturbance.amplitude": "100",
-        "plant.disturbance.frequency": "7",
-        "plant.disturbance.duration": "9",
-        "washout_controller.start_after": "0.5",
-    }
-    options = [f"-p={name}={value}" for name, value in given.items()]
-    loop = ("run", "feed_drive", "--composed", "--pace", "lockstep", "--duration", "2")
-    assert stickslip(*loop, "--bag", "loop", *options).returncode == 0
-    known = ("--fix", "plant.normal_force=1000", "--fix", "plant.damping=200")
-    found = stickslip.json("identify", "loop", "--law", "stribeck", *known)
-    for name, value in {
-        "plant.mass": 100.0,
-        "plant.stiffness": 1e6,
-        "plant.friction.static": 0.4,
-        "plant.friction.minimum": 0.25,
-        "plant.friction.minimum_speed": 0.05,
-    }.items():
-        each = found["parameters"][name]
-        assert each["value"] == pytest.approx(value, rel=2e-3), name
-    assert found["segment_error"] < 5e-7
-
-
-@pytest.mark.long
 def test_a_memory_in_both_directions_becomes_a_scenario(stickslip: Run, log: Path) -> None:
     given = ("--columns", _COLUMNS, "--law", "lugre", "--out", "found.yaml")
     found = stickslip.json("identify", "axis.csv", *given)

@@ -57,7 +57,6 @@ def test_stability_has_lag_and_difference_and_says_what_it_omits() -> None:
     assert slow.notes["closed_loop"].startswith("sensor and actuator are omitted")
 
 
-@pytest.mark.long
 def test_a_design_is_tried_with_them_and_tells_what_they_leave() -> None:
     """It stays within the limit of the actuator, even if the controller has none."""
     encoder = {"sensor_position_resolution": 1e-6, "sensor_velocity": "difference"}

@@ -52,7 +52,7 @@ def test_what_is_known_is_not_fitted(coulomb: Findings) -> None:
 
 @pytest.mark.long
 def test_the_law_is_chosen_by_held_out_parts() -> None:
-    found = identify([record("saturating", duration=7.0)])
+    found = identify([record("saturating", duration=5.0)])
     assert found.law == "table"
     errors = {each.law: each.error for each in found.candidates}
     assert errors["table"] < 0.7 * errors["coulomb"]
@@ -163,7 +163,7 @@ def test_a_controller_is_found_beside_forces_that_are_added_to_it() -> None:
 @pytest.mark.long
 def test_a_curve_does_not_rise_far_below_the_slowest_speed() -> None:
     """A rise there is one with the force at rest: neither would be told."""
-    found = identify([record("coulomb")], "table", {"force_delay": 0.0})
+    found = identify([record("coulomb", duration=6.0)], "table", {"force_delay": 0.0})
     fit = found.chosen.fit
     curve = SaturatingAdapter(fit.rows.curve_speeds)
     saturating = regress(fit.rows, curve, fit.free, fit.fixed)

@@ -233,20 +233,6 @@ def test_what_a_limited_force_cannot_do_is_said() -> None:
     assert "needs more force than the limit" in (found.remark or "")
 
 
-def test_with_noise_it_says_what_is_left_at_rest() -> None:
-    def noisy(noise: float) -> Design:
-        scenario = load_scenario("feed_drive", [f"plant.sensor.velocity_noise={noise}"])
-        return design(Task.from_scenario(scenario, (0.04, 0.04)))
-
-    (little,), (more,) = (noisy(noise).checks for noise in (1e-7, 1e-6))
-    for left in ("amplitude", "peak_force", "rms_force"):
-        ratio = getattr(more.rest, left) / getattr(little.rest, left)
-        assert ratio == pytest.approx(10.0, rel=0.01), left
-    much = noisy(1e-2)
-    assert much.controller is None
-    assert "does not decay to 1 % with the noise and rounding" in (much.remark or "")
-
-
 def test_it_is_the_same_every_time_and_progress_reaches_the_end() -> None:
     shares: list[float] = []
     first = design(replace(FEED, force_limit=200.0), shares.append)

@@ -78,6 +78,7 @@ def test_friction_is_that_under_the_force_held_up_to_the_sample() -> None:
     loop = SampledLoop(Motion(PAPER, 0.0, 0.4), 10.0, SECOND)
     loop.offer(loop.sample.stamp, 0.1)
     assert loop.advance().friction_force == pytest.approx(0.04 + 0.02 * 0.4 - 0.1)
+    assert loop.applied_force == 0.1
     loop.offer(loop.sample.stamp, -0.2)
     assert loop.sample.friction_force == pytest.approx(0.04 + 0.02 * 0.4 - 0.1)
     assert loop.advance().friction_force == pytest.approx(0.08 + 0.02 * 0.4 + 0.2)
