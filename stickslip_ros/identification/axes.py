@@ -7,6 +7,7 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray, rms
 from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.identification.filtered import filtered
 from stickslip_ros.identification.fit import Candidate
 from stickslip_ros.identification.laws import (
     DELAY,
@@ -17,11 +18,9 @@ from stickslip_ros.identification.laws import (
 )
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.regression import (
-    DECIMATION,
     LINEAR,
     Regression,
     Rows,
-    filtered,
     regress,
     solve,
 )
@@ -31,6 +30,8 @@ _RESOLVED_ERROR_RATIO = 0.9
 """Share of the error to which a delay or a memory must lower it to be believed."""
 _DELAYS = np.arange(-1.0, 4.01, 0.25)
 """Delays that are tried, periods."""
+_DELAY_STEPS = 0.05 * np.arange(-5.0, 6.0)
+"""Changes of the best one that are tried, periods."""
 _KNOTS = 9
 _DEFLECTIONS = (1e-5, 1e-4, 1e-3)
 """Deflections that are tried first, shares of the range of the positions."""
@@ -41,6 +42,8 @@ _FREE_RUN_STEPS = 3
 """Steps in which forces and free runs are fitted together."""
 _FREE_WEIGHT = 1.4
 """Weight of the free run beside that of the forces."""
+_LEAST_MASS_SHARE = 0.1
+"""Smallest mass that is tried there, as a share of that by the forces."""
 _STEP = 1e-4
 """Step of differences, as a share of the value."""
 AXIS_LAWS = ("coulomb", "stribeck", "exponential", "table", "lugre")
@@ -64,9 +67,11 @@ class AxisTask:
         self.fixed = {**dict.fromkeys(LINEAR[1:], 0.0), **own}
         self.free = [name for name in LINEAR if name not in self.fixed]
         self.delay: float | None = fixed.get(DELAY)
-        self._filtered = [filtered(each, decimated=True) for each in records]
-        self._by_delay: dict[float, Rows] = {}
-        self.rows = self._rows(self.delay)
+        # Where the slide never rests it is as in the published method: the force is that at the
+        # instant of a sample. Otherwise it is held until the next one.
+        self.rows = Rows.of([filtered(each, decimated=True) for each in records], None)
+        if self.delay is not None or self.rows.resting:
+            self.rows = self._rows(self.delay or 0.0)
 
     def candidates(
         self, law: str, laws: Sequence[IdentifiedLaw], progress: Callable[[str], None]
@@ -102,17 +107,15 @@ class AxisTask:
         found = Candidate(plain, plain.held_out)
         if self.delay is not None:
             return found
-        period = self.records[0].period
-        tried: Sequence[float] = _DELAYS.tolist()
-        for step in (0.25, 0.05):
-            if fit.delay is not None:
-                tried = (fit.delay / period + step * np.arange(-5.0, 6.0)).tolist()
-            errors = [
-                _loss(replace(fit, rows=self._rows(each * period)).refitted()) for each in tried
-            ]
-            fit = regress(
-                self._rows(tried[int(np.argmin(errors))] * period), law, self.free, self.fixed
-            )
+        period, tried = self.records[0].period, _DELAYS
+        for _ in range(2):
+            design, wanted = fit.system
+            changes = [self._forces(each * period) - fit.rows.force for each in tried.tolist()]
+            wanted = wanted[:, None] + np.column_stack(changes)
+            left = wanted - design @ np.linalg.lstsq(design, wanted, rcond=None)[0]
+            best = float(tried[np.argmin(np.sum(left * left, axis=0))])
+            fit = regress(self._rows(best * period), law, self.free, self.fixed)
+            tried = best + _DELAY_STEPS
         other = Candidate(fit, fit.held_out)
         return other if other.error < _RESOLVED_ERROR_RATIO * found.error else found
 
@@ -144,17 +147,13 @@ class AxisTask:
         remark = f"predicts better by less than {share}: not resolved by filtered rows"
         return replace(found, remark=remark)
 
-    def _rows(self, delay: float | None) -> Rows:
-        if delay is None:
-            return Rows.of(self._filtered, None)
-        if delay not in self._by_delay:
-            pairs = zip(self._filtered, self.records, strict=True)
-            rows = Rows.of([columns.with_delay(record, delay) for columns, record in pairs], delay)
-            # Delays that are tried for each curve: their rows are kept.
-            if delay not in [each * self.records[0].period for each in _DELAYS.tolist()]:
-                return rows
-            self._by_delay[delay] = rows
-        return self._by_delay[delay]
+    def _rows(self, delay: float) -> Rows:
+        """Return the rows with another delay of the force, s."""
+        return replace(self.rows, force=self._forces(delay), delay=delay)
+
+    def _forces(self, delay: float) -> FloatArray:
+        pairs = zip(self.rows.parts, self.records, strict=True)
+        return np.concatenate([part.rows(part.delayed(record, delay)) for part, record in pairs])
 
 
 def _loss(fit: Regression) -> float:
@@ -165,14 +164,16 @@ def adjusted(fit: Regression, records: Sequence[Record]) -> Regression:
     """Return a regression whose forces fit, and whose free run through each record, too.
 
     The sum of both mean squares is least, each in units of what the regression leaves. `records`
-    are those that it was fitted to.
+    are those that it was fitted to. Forces that leave a free run unbounded stay as they are.
     """
     from scipy.optimize import least_squares
 
     task = _FreeRuns(fit, records)
-    start = task.linear()
+    if not task.bounded:
+        return fit
+    start = task.begun() if fit.rows.resting else task.linear()
     slowest = np.full(len(fit.shapes), fit.rows.least_shape(fit.curve))
-    least = np.array([*fit.least, *slowest, *[-np.inf] * len(records)])
+    least = np.array([*task.least, *slowest, *[-np.inf] * len(records)])
     solved = least_squares(
         task.residual,
         np.maximum(start, least + 1e-9),
@@ -198,6 +199,7 @@ class _FreeRuns:
         self._measured = np.concatenate([record.position for record in records])
         self._records = records
         left = np.concatenate([run for _, run in self._runs(fit)]) - self._measured
+        self.bounded = bool(np.isfinite(left).all())
         count = len(fit.residual)
         self._weights = (
             1.0 / (rms(fit.residual) * np.sqrt(count)),
@@ -205,6 +207,15 @@ class _FreeRuns:
         )
         # The same weight for a run that is sampled as the rows are.
         self._row_weight = _FREE_WEIGHT / (rms(left) * np.sqrt(count))
+
+    @property
+    def least(self) -> FloatArray:
+        """Smallest value of each of the unknowns; a mass of 0 has no motion."""
+        least = self._fit.least
+        if "mass" in self._fit.free:
+            place = [*self._fit.free].index("mass")
+            least[place] = _LEAST_MASS_SHARE * self._fit.unknowns[place]
+        return least
 
     def residual(self, point: FloatArray) -> FloatArray:
         """Return the errors of the forces and of the simulated free runs, weighted."""
@@ -218,6 +229,10 @@ class _FreeRuns:
         errors = np.concatenate(positions) - self._measured
         errors = np.nan_to_num(errors, nan=_UNBOUNDED_ERROR / self._weights[1])
         return np.concatenate([own.residual * self._weights[0], errors * self._weights[1]])
+
+    def begun(self) -> FloatArray:
+        """Return the point of the regression with the velocities of the best free runs."""
+        return np.concatenate([self._fit.point, [speed for speed, _ in self._runs(self._fit)]])
 
     def linear(self) -> FloatArray:
         """Return the point at which the residual is least if errors of force move the mass alone.
@@ -233,7 +248,7 @@ class _FreeRuns:
         speed, typical = fit.rows.speeds, rms(fit.rows.speeds)
         rate = max(_slope(fit, typical, float(speed[-1])) / mass, 1e-3)
         lengths = [len(part.rows(part.time)) for part in parts]
-        steps = [float(part.time[1] - part.time[0]) * DECIMATION for part in parts]
+        steps = [float(part.time[1] - part.time[0]) * part.decimation for part in parts]
         place = np.split(np.arange(sum(lengths)), np.cumsum(lengths)[:-1])
 
         def positions(columns: FloatArray) -> FloatArray:
@@ -258,7 +273,7 @@ class _FreeRuns:
             target = np.concatenate(
                 [wanted * self._weights[0], positions(wanted) * self._row_weight]
             )
-            least = np.array([*fit.least, *[-np.inf] * len(parts)])
+            least = np.array([*self.least, *[-np.inf] * len(parts)])
             values = solve(matrix, target, least)
             return values, target - matrix @ values
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray, rms
 from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.identification.filtered import filtered
 from stickslip_ros.identification.fit import Candidate
 from stickslip_ros.identification.laws import (
     DAHL,
@@ -21,7 +22,7 @@ from stickslip_ros.identification.laws import (
 )
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.refinement import Refinement, refine, restarted
-from stickslip_ros.identification.regression import LINEAR, Regression, Rows, filtered, regress
+from stickslip_ros.identification.regression import LINEAR, Regression, Rows, regress
 from stickslip_ros.identification.trajectories import Trajectories, segments_of
 from stickslip_ros.identification.trajectory import Predictor
 

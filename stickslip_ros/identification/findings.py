@@ -10,6 +10,7 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray, rms
 from stickslip_ros.identification.drives import POOR_ERROR
+from stickslip_ros.identification.filtered import START, Filtered, filtered
 from stickslip_ros.identification.fit import (
     Candidate,
     Estimate,
@@ -19,7 +20,6 @@ from stickslip_ros.identification.fit import (
     better_by,
 )
 from stickslip_ros.identification.record import FEWEST, Record
-from stickslip_ros.identification.regression import START, Filtered, filtered
 from stickslip_ros.identification.servo import Servo, closed_loop
 from stickslip_ros.physics.model.drive import Drive
 

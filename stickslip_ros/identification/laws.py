@@ -238,12 +238,13 @@ class DahlAdapter(CoulombAdapter):
     """Dahl's law: Coulomb friction that bristles follow, without viscous friction."""
 
     name = "dahl"
+    least = (0.0,)
     coordinates: Sequence[str] = ("static", "bristle_stiffness")
     memory: Sequence[str] = ("bristle_stiffness",)
 
     @override
-    def coordinates_of(self, forces: Sequence[float], shape: float) -> dict[str, float]:
-        return {"static": forces[0]}
+    def terms(self, speed: FloatArray, shape: float) -> FloatArray:
+        return np.ones((len(speed), 1))
 
     @override
     def starts(self, values: Values, fastest: float) -> Sequence[Values]:

@@ -8,6 +8,7 @@ import numpy as np
 from typing_extensions import override
 
 from stickslip_ros.arrays import BoolArray, FloatArray
+from stickslip_ros.identification.filtered import filtered
 from stickslip_ros.identification.fit import (
     CURVE_POINTS,
     Fit,
@@ -17,7 +18,6 @@ from stickslip_ros.identification.fit import (
 )
 from stickslip_ros.identification.laws import DELAY, IdentifiedLaw
 from stickslip_ros.identification.record import Record
-from stickslip_ros.identification.regression import filtered
 from stickslip_ros.identification.trajectories import Trajectories, segments_of
 from stickslip_ros.identification.trajectory import Predictor
 

@@ -6,8 +6,8 @@ from math import inf
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray
+from stickslip_ros.identification.filtered import START
 from stickslip_ros.identification.record import FEWEST, Record
-from stickslip_ros.identification.regression import START
 from stickslip_ros.identification.trajectory import Predictor
 from stickslip_ros.physics.loop.sampled_loop import LOCKSTEP_START, SampledLoop
 from stickslip_ros.physics.model.drive import Drive

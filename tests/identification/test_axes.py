@@ -13,7 +13,7 @@ from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.regression import regress
 from stickslip_ros.identification.servo import closed_loop, servo_of
 from stickslip_ros.identification.trajectory import Predictor, free_run
-from stickslip_ros.physics.model.friction import Coulomb
+from stickslip_ros.physics.model.friction import Coulomb, Directional
 from tests.identification.axis_record import COULOMB, SATURATING, SERVO, axis, record
 
 
@@ -37,6 +37,30 @@ def test_the_constants_of_coulomb_friction_by_direction(coulomb: Findings) -> No
         assert coulomb.fitted[name].value == pytest.approx(value, rel=0.02), name
     assert coulomb.force_error(coulomb.records[0]) < 0.02
     assert {"damping", "bias_force", "normal_force"} <= coulomb.unidentified.keys()
+
+
+@pytest.mark.parametrize(("rate", "rest"), [(250, 0.0), (500, 0.5), (1000, 0.8)])
+def test_an_axis_that_sticks_has_no_delay(rate: int, rest: float) -> None:
+    """Rows at rest tell nothing of slip; a force is held from its sample to the next."""
+    time, random = np.arange(6000) / rate, np.random.default_rng(rate)
+    frequencies, moving = np.array([0.2, 0.37, 0.61, 0.97, 1.6, 2.7]), time % 2.0 >= 2.0 * rest
+    sines = np.sin(2.0 * np.pi * np.cumsum(moving)[:, None] / rate * frequencies + np.arange(6.0))
+    reference = (sines - sines[0]) @ (0.007 / frequencies)
+    drive = replace(axis(Directional(Coulomb(17.0, 140.0), Coulomb(21.0, 180.0))), mass=38.0)
+    still, servo = np.zeros(len(time)), replace(SERVO, position_gain=1.5e5, velocity_gain=3.3e3)
+    start = Record("axis", 1.0 / rate, still, still, reference=reference)
+    position, force = closed_loop(start, drive, servo, 0.0)
+    own = replace(
+        start,
+        position=np.rint(position / 2e-6) * 2e-6,
+        force=force + 0.5 * random.standard_normal(len(time)),
+    )
+    found = identify([own], "coulomb")
+    assert found.delay == 0.0
+    for name, value in (("mass", 38.0), ("friction.static", 17.0), ("friction.viscous", 140.0)):
+        estimate = found.fitted[name]
+        assert abs(estimate.value - value) < 4.0 * estimate.standard_error, name
+        assert estimate.standard_error < 0.02 * value, name
 
 
 def test_what_is_known_is_not_fitted(coulomb: Findings) -> None:
@@ -108,6 +132,17 @@ def test_what_is_refused() -> None:
     for records, law, fixed, message in refused:
         with pytest.raises(InvalidInputError, match=message):
             identify(records, law, fixed)
+
+
+def test_an_encoder_that_drops_out_leaves_no_traceback() -> None:
+    """No mass explains the jumps; the run of nearly none is unbounded."""
+    own, random = record("coulomb", 4.0), np.random.default_rng(1)
+    position = own.position.copy()
+    for place in random.integers(100, len(position) - 100, 12).tolist():
+        position[place : place + int(random.integers(1, 6))] = 0.0
+    found = identify([replace(own, position=position)], "table", {"force_delay": 0.0})
+    assert any("does not describe the recordings" in note for note in found.notes)
+    assert found.check(own)["force_error"] > 0.1
 
 
 def test_the_constants_of_other_laws_of_an_axis() -> None:

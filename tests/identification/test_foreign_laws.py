@@ -12,7 +12,7 @@ from benchmarks import identification as study
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.identification.foreign_laws import GROUP, foreign_adapter, try_adapter
 from stickslip_ros.identification.identify import identify
-from stickslip_ros.identification.laws import DAHL, KNOWN_LAWS
+from stickslip_ros.identification.laws import KNOWN_LAWS
 from stickslip_ros.physics.model.friction import LAWS
 from stickslip_ros.scenarios.foreign_laws import add_laws_of_other_packages
 from tests.scenarios.foreign_laws import write_example, write_package
@@ -47,9 +47,8 @@ def packages(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
         sys.modules.pop(name, None)
 
 
-@pytest.mark.parametrize("name", sorted({*KNOWN_LAWS} - {DAHL.name}))
+@pytest.mark.parametrize("name", sorted(KNOWN_LAWS))
 def test_the_adapters_of_this_package_pass_their_trial(name: str) -> None:
-    """That of Dahl's law has viscous friction in its terms, which the law has not."""
     try_adapter(KNOWN_LAWS[name])
 
 

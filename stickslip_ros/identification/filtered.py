@@ -1,0 +1,208 @@
+"""Records that are filtered, all columns alike: position, velocity, acceleration, and force."""
+
+from dataclasses import dataclass
+from functools import cache, cached_property
+from math import sqrt
+from typing import Any
+
+import numpy as np
+
+from stickslip_ros.arrays import BoolArray, FloatArray
+from stickslip_ros.identification.record import Record
+from stickslip_ros.physics.measures.noise import white_noise
+
+_CUTOFF = 100.0
+"""Cutoff frequency of the low-pass, Hz; at most a tenth of the sample rate."""
+_ORDER, _PAD = 4, 12
+_DECIMATION, _ROW_RATE = 10, 100.0
+"""Of a record that is decimated one of at least so many rows is kept; rows per second at most."""
+START, END = 49, 50
+"""Samples at both ends that the filter spoils."""
+_LEAST_REST = 5
+"""Samples from which the slide rests; without sticking it passes zero speed faster."""
+_REST_NOISE, _REST_SHARE = 0.8, 1e-3
+"""Speed below which the slide may rest: in errors of position per period, and as a share of the
+fastest one."""
+_REST_ERRORS, _REST_DRIFT = 12.0, 10.0
+"""Range of positions of a slide that rests: in errors of position, and in periods at that speed, as
+the filter blurs both ends."""
+_REVERSAL_SAMPLES = 3
+"""Samples on both sides of a reversal within which a slide that rests may stick unseen."""
+_REACH, _TAPER = 5, 10
+"""Samples that are left out beside a rest, and those over which the weight rises from there."""
+_LEAST_WEIGHT = 0.5
+"""Weight of the samples of a row from which on it is used."""
+
+
+@dataclass(frozen=True, eq=False)
+class Filtered:
+    """The filtered columns of a record, arrays of shape (samples,); SI units.
+
+    A. Janot, M. Gautier, M. Brunot, Data set and reference models of EMPS, 2019: a Butterworth
+    low-pass of order 4 forwards and backwards, then central differences. For slow motions every
+    column of the equation is decimated by ten behind a Chebyshev low-pass.
+    """
+
+    time: FloatArray
+    """Time from the first sample, s."""
+    position: FloatArray
+    """Displacement, m."""
+    velocity: FloatArray
+    """Velocity, m/s."""
+    acceleration: FloatArray
+    """Acceleration, m/s^2."""
+    relative_speed: FloatArray
+    """Velocity less that of the belt, m/s."""
+    force: FloatArray
+    """Known forces, N."""
+    decimated: bool
+    """Whether rows are decimated; otherwise they are those where the slide clearly slips."""
+    weight: FloatArray | None
+    """Weight of each sample in decimated rows, 0 where the slide rests; None: it never does."""
+    slipping: BoolArray
+    """Whether the slide clearly slips, in one direction, for half of the length of the filter on
+    both sides: such rows are to start a search."""
+    settled: BoolArray
+    """The same for twice its length: the filter has forgotten where the slide stuck."""
+
+    def rows(self, values: FloatArray) -> FloatArray:
+        """Return the rows of the regression that columns of shape (samples, ...) give."""
+        if not self.decimated:
+            return values[self.slipping]
+        if self.weight is None:
+            return self._decimated(values)
+        # Samples are the last axis of the transpose.
+        found = self._decimated((values.T * self.weight).T)
+        used = self._row_weight > _LEAST_WEIGHT
+        return (found[used].T / self._row_weight[used]).T
+
+    @property
+    def decimation(self) -> int:
+        """Number of samples of a decimated row."""
+        return max(round(1.0 / _ROW_RATE / float(self.time[1] - self.time[0])), _DECIMATION)
+
+    @cached_property
+    def _row_weight(self) -> FloatArray:
+        assert self.weight is not None
+        return self._decimated(self.weight)
+
+    def _decimated(self, values: FloatArray) -> FloatArray:
+        from scipy.signal import sosfiltfilt  # takes long to import
+
+        low_pass = _chebyshev(self.decimation)
+        found: FloatArray = np.asarray(sosfiltfilt(low_pass, values, axis=0))
+        return found[:: self.decimation]
+
+    def delayed(self, record: Record, delay: float) -> FloatArray:
+        """Return the forces of the same record, decimated, with another delay, s."""
+        return _shifted(record.held_force, delay / record.period)[START:-END]
+
+
+@cache
+def _chebyshev(decimation: int) -> FloatArray:
+    """Return the low-pass of rows of so many samples, in second-order sections."""
+    from scipy.signal import cheby1  # takes long to import
+
+    return np.asarray(cheby1(8, 0.05, 0.8 / decimation, output="sos"))
+
+
+def filtered(record: Record, *, decimated: bool, delay: float | None = None) -> Filtered:
+    """Return the filtered columns of a record, without both ends.
+
+    Rows are decimated for motions whose friction changes slowly. `delay` is the time from a sample
+    until its force acts, s; by default the force at a sample is the one that answers it.
+    """
+    from scipy.signal import butter, filtfilt  # takes long to import
+
+    rate = 1.0 / record.period
+    cutoff = min(_CUTOFF, 0.1 * rate)
+    low_pass: Any = butter(_ORDER, cutoff / (0.5 * rate))
+
+    def smooth(values: FloatArray) -> FloatArray:
+        return np.asarray(filtfilt(low_pass[0], low_pass[1], values, padlen=_PAD))
+
+    position = smooth(record.position)
+    velocity: FloatArray = np.asarray(np.gradient(position, record.period))
+    # The force that acts from one sample to the next changes the second difference exactly.
+    acceleration = np.zeros_like(position)
+    acceleration[1:-1] = np.diff(position, 2) / record.period**2
+    relative = velocity - smooth(record.belt_velocity)
+    held = record.held_force
+    force = held if delay is None else _shifted(held, delay / record.period)
+    if not decimated:
+        force = smooth(force)  # all that enters the equation passes the same filter
+    time: FloatArray = record.period * np.arange(len(position), dtype=float)
+    inside = slice(START, -END)
+    return Filtered(
+        time[inside],
+        position[inside],
+        velocity[inside],
+        acceleration[inside],
+        relative[inside],
+        force[inside],
+        decimated,
+        _moving_weight(record, relative, acceleration) if decimated else None,
+        _slipping(relative[inside], 0.5 * rate / cutoff),
+        _slipping(relative[inside], 2.0 * rate / cutoff),
+    )
+
+
+def _shifted(held: FloatArray, periods: float) -> FloatArray:
+    """Return forces, held from sample to sample, as they are on average around each sample."""
+    at = np.arange(len(held)) - periods
+    edges = np.concatenate([[0.0], np.cumsum(held)])
+    places = np.arange(len(edges))
+    return np.interp(at + 0.5, places, edges) - np.interp(at - 0.5, places, edges)
+
+
+def _slipping(relative: FloatArray, reach: float) -> BoolArray:
+    """Return where the speed stays away from zero for a number of samples on both sides."""
+    from scipy.ndimage import minimum_filter1d
+
+    width = 2 * max(round(reach), 1) + 1
+    least = 0.02 * float(np.abs(relative).max())
+    sides = [minimum_filter1d(sign * relative, width) > least for sign in (1.0, -1.0)]
+    return sides[0] | sides[1]
+
+
+def _moving_weight(
+    record: Record, relative: FloatArray, acceleration: FloatArray
+) -> FloatArray | None:
+    """Return the weight of each sample in rows that tell of slip; None if the slide never rests.
+
+    While it rests, friction is what the other forces ask for, and tells nothing of the law. The
+    weight is zero there, near reversals, where it may stick between samples, and at both ends.
+    """
+    from scipy.ndimage import maximum_filter1d
+
+    left_out = np.zeros(len(relative), bool)
+    for low, high in rests(record, relative):
+        left_out[low:high] = True
+    if not left_out.any():
+        return None
+    reversing = _REVERSAL_SAMPLES * record.period * np.abs(acceleration)
+    left_out |= np.abs(relative) < reversing
+    left_out[:START] = left_out[-END:] = True
+    reach = _REACH + _TAPER // 2
+    away = 1.0 - maximum_filter1d(left_out.astype(float), 2 * reach + 1)
+    taper = np.hanning(_TAPER + 2)
+    weight: FloatArray = np.convolve(away, taper / np.sum(taper), "same")
+    return weight[START:-END]
+
+
+def rests(record: Record, relative: FloatArray) -> list[tuple[int, int]]:
+    """Return first sample and end of each rest of the slide on the belt.
+
+    `relative` is the filtered speed, m/s. It rests where it is slower than the encoder tells, and
+    has not drifted when it goes on: slow slip does.
+    """
+    noise = max(white_noise(record.position), record.resolution / sqrt(12.0))
+    slow = max(_REST_NOISE * noise / record.period, _REST_SHARE * float(np.abs(relative).max()))
+    drift = _REST_ERRORS * noise + _REST_DRIFT * slow * record.period
+    place = record.position - record.period * np.cumsum(record.belt_velocity)
+    edges = np.flatnonzero(np.diff(np.abs(relative) < slow, prepend=False, append=False))
+    return [
+        (low, high)
+        for low, high in edges.reshape(-1, 2).tolist()
+        if high - low >= _LEAST_REST and float(np.ptp(place[low:high])) <= drift
+    ]
