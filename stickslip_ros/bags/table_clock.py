@@ -13,9 +13,9 @@ LONGEST = 9e9
 """Longest time, s, that stamps can express."""
 _FEWEST, _MOST = 10, 100_000
 """Fewest rows of a part that is evenly spaced; rows in which a rounding is looked for."""
-_COARSE_SHARE, _COMMON_SHARE = 0.02, 0.02
+_COARSE_SHARE, _COMMON_SHARE, _MULTIPLE = 0.02, 0.02, 1e-3
 """Least step of a rounding, as a share of the period; share of the steps of time from which one is
-usual: others are gaps and lost rows."""
+usual: others are gaps and lost rows; distance of a multiple, in steps of the rounding."""
 
 
 def even_times(time: FloatArray) -> tuple[FloatArray, list[str]]:
@@ -34,7 +34,7 @@ def even_times(time: FloatArray) -> tuple[FloatArray, list[str]]:
     steps = np.diff(time)
     if len(time) < _FEWEST or time[-1] > LONGEST or np.ptp(steps) < 0.5 / NANOSECONDS:
         return time, []
-    rounding = _rounding(steps)
+    rounding, notes = _rounding(steps), list[str]()
     if rounding:
         gaps = np.flatnonzero(steps > np.median(steps) + 2.5 * rounding) + 1
         parts = [_even(part, rounding) for part in np.split(time, gaps)]
@@ -45,8 +45,17 @@ def even_times(time: FloatArray) -> tuple[FloatArray, list[str]]:
                 f"the times are rounded to {quantity(rounding, 's')}: the rows are taken as evenly "
                 f"spaced, {period} apart"
             ]
-    stand = np.count_nonzero(steps == 0.0)
-    return time, [f"{stand} of {len(time)} rows have the time of the row before"] if stand else []
+        multiples, digits = steps / rounding, np.log10(rounding)
+        whole = np.abs(multiples - np.rint(multiples)) < _MULTIPLE
+        if np.mean(whole) > 1.0 - _COMMON_SHARE and abs(digits - round(digits)) < _MULTIPLE:
+            share = rounding / float(np.median(steps))
+            notes = [
+                f"the times are multiples of {quantity(rounding, 's')}: if they are rounded, "
+                f"velocities err by {share:.0%}"
+            ]
+    if stand := np.count_nonzero(steps == 0.0):
+        notes.append(f"{stand} of {len(time)} rows have the time of the row before")
+    return time, notes
 
 
 def stamps_of(path: Path, time: FloatArray) -> IntArray:

@@ -443,7 +443,7 @@ def _without_faults(
         text = f"unwrap({asked['position'].text}, {turn})"
         raise InvalidInputError(
             f"{table.path}: the position jumps {len(wrap.rows)} times by {turn}, the "
-            f" first time at {line(present[wrap.rows])}, as of a counter that wraps: position="
+            f"first time at {line(present[wrap.rows])}, as of a counter that wraps: position="
             f"{text}{'' if factor == 1.0 else f'*{factor:g}'}"
         )
     lost = dropouts(position[present])
@@ -531,6 +531,12 @@ def _recording(path: Path, found: Quantities) -> TableRecording:
         unknown,
         values.get("belt_velocity", rest),
     )
+    if not samples.is_valid.any():
+        empty = [name for name, value in values.items() if not np.isfinite(value[present]).any()]
+        raise InvalidInputError(
+            f"{path}: no row gives a sample: no position has a number of {' and '.join(empty)} "
+            "beside it"
+        )
     forces = ForceColumns(stamp[:0], rest[:0])
     if "force" in values:
         forces = ForceColumns(stamp, values["force"])

@@ -216,3 +216,49 @@ def test_any_bytes_are_measured_or_refused(
     path.write_bytes(content.encode() if isinstance(content, str) else content)
     with suppress(InvalidInputError):
         report_of_recording(path, {"time": "#1", "position": "#2"})
+
+
+def faulty(chance: random.Random) -> tuple[bytes, dict[str, str]]:
+    """Return a table of a machine with faults of its sensors, and columns."""
+    rng = np.random.default_rng(chance.randrange(2**32))
+    count, rate = chance.choice([1, 2, 9, 40, 700]), chance.choice([7.0, 50.0, 1000.0])
+    time = np.arange(count) / rate
+    motions = [time, np.floor(3.0 * time), np.sin(9.0 * time), np.zeros(count), time % 0.3]
+    position = sum(chance.uniform(-1.0, 1.0) * each for each in chance.sample(motions, 2))
+    velocity = np.gradient(position, time) if count > 1 else time
+    velocity = chance.choice([velocity, 1e3 * velocity, np.roll(velocity, 20), 0.0 * velocity])
+    for each in (position, velocity):
+        for _ in range(chance.choice([0, 0, 1, 5])):
+            start = chance.randrange(count)
+            each[start : start + chance.randrange(1, 30)] = chance.choice([0.0, 5.0, 1e99, np.nan])
+    if chance.random() < 0.3:
+        position = np.mod(position, chance.choice([0.1, 1.0, 2.0**8]))
+    position += chance.choice([0.0, 0.0, 1e-3]) * rng.standard_normal(count)
+    if chance.random() < 0.3:
+        position = np.round(position, chance.randrange(4))
+    if chance.random() < 0.3:
+        time = np.round(time, chance.randrange(4))
+    scale = chance.choice([1.0, 1.0, 1e-150, 1e90])
+    table = np.column_stack([time, scale * position, velocity, rng.standard_normal(count)])
+    lines = ["t,x,v,u", *(",".join(map(repr, row)) for row in table.tolist())]
+    optional = {
+        "velocity": chance.choice(["v", "v*1e-3", "x-v"]),
+        "force": "u",
+        "belt_velocity": chance.choice(["0", "0.1", "v"]),
+    }
+    asked = chance.sample([*optional], chance.randrange(4))
+    columns = {"time": "t", "position": chance.choice(["x", "unwrap(x, 1)", "1e3*x - u"])}
+    return "\n".join(lines).encode(), columns | {name: optional[name] for name in asked}
+
+
+@examples(quick=20, thorough=1000, deadline=None)
+@given(seed=st.integers(0, 2**32))
+def test_a_table_with_faults_is_measured_or_refused(
+    tmp_path_factory: pytest.TempPathFactory, seed: int
+) -> None:
+    path = tmp_path_factory.getbasetemp() / "faulty.csv"
+    content, columns = faulty(random.Random(seed))
+    path.write_bytes(content)
+    with suppress(InvalidInputError):
+        report = report_of_recording(path, columns, slips=SlipThreshold(1e-2))
+        assert report["samples"] <= 700

@@ -143,6 +143,21 @@ def test_gaps_and_lost_rows_are_no_rounding(tmp_path: Path) -> None:
         }
 
 
+def test_rounded_times_of_an_uneven_clock_are_said(tmp_path: Path) -> None:
+    time = np.cumsum(np.random.default_rng(1).uniform(2e-3, 8e-3, 500))
+    for digits, said in ((3, True), (6, False)):
+        lines = [f"{each:.{digits}f},{each}" for each in time.tolist()]
+        notes = read(tmp_path, "t,x\n" + "\n".join(lines), "t", "x").notes
+        assert any("the times are multiples of 1 ms" in note for note in notes) == said
+        assert any("velocities err by 20%" in note for note in notes) == said
+
+
+def test_a_table_that_gives_no_sample_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "log.csv").write_text("t,x,b\n0,1,\n1,2,\n2,,3\n")
+    with pytest.raises(InvalidInputError, match="no position has a number of belt_velocity"):
+        read_table(tmp_path / "log.csv", {"time": "t", "position": "x", "belt_velocity": "b"})
+
+
 def test_a_channel_has_times_of_its_own(tmp_path: Path) -> None:
     lines = [f"{n},{n},{n + 0.5},{10 * n}" for n in range(20)]
     path = tmp_path / "log.csv"
