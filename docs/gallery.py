@@ -1,8 +1,8 @@
-"""Runs the examples, all or those named, and keeps the figure of each for docs/gallery.md."""
+"""Runs the examples, all or those named; keeps their figures, and notebooks with their outputs."""
 
 import subprocess
 import sys
-from base64 import b64decode
+from base64 import b64decode, b64encode
 from io import BytesIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -30,47 +30,56 @@ def notebooks() -> list[Path]:
 
 
 def executed(path: Path) -> nbformat.NotebookNode:
-    """Return a notebook with its outputs."""
+    """Return a notebook with its outputs, the figures in them small."""
     notebook = nbformat.read(path, as_version=4)
     resources = {"metadata": {"path": str(path.parent)}}
-    return NotebookClient(notebook, timeout=300, resources=resources).execute()
+    client = NotebookClient(notebook, timeout=300, resources=resources, record_timing=False)
+    found = client.execute()
+    for data in results_in(found):
+        if "image/png" in data:
+            data["image/png"] = b64encode(small(b64decode(data["image/png"]))).decode()
+    return found
 
 
-def figures_in(notebook: nbformat.NotebookNode) -> list[bytes]:
-    """Return the figures among the outputs of a notebook, as PNG."""
-    outputs = (output for cell in notebook.cells for output in cell.get("outputs", []))
-    found = (output.get("data", {}).get("image/png") for output in outputs)
-    return [b64decode(figure) for figure in found if figure]
+def results_in(notebook: nbformat.NotebookNode) -> list[dict[str, str]]:
+    """Return the results among the outputs of a notebook, each by its media types."""
+    return [output.get("data", {}) for cell in notebook.cells for output in cell.get("outputs", [])]
 
 
-def keep(figure: bytes, name: str) -> None:
-    """Write a figure, no wider than 1000 pixels, with as many colours as fit into its size."""
+def small(figure: bytes) -> bytes:
+    """Return a figure no wider than 1000 pixels, with as many colours as fit into its size."""
     with Image.open(BytesIO(figure)) as image:
-        small = image.convert("RGB")
-    small.thumbnail((1000, 1000), Image.Resampling.LANCZOS)
-    GALLERY.mkdir(exist_ok=True)
-    path = GALLERY / f"{name}.png"
+        shown = image.convert("RGB")
+    shown.thumbnail((1000, 1000), Image.Resampling.LANCZOS)
+    found = figure
     for colours in (256, 128, 64, 48, 32, 24):
+        stream = BytesIO()
         # Without k-means the greys of a figure that has few colours left turn brown.
-        small.quantize(
+        shown.quantize(
             colours, Image.Quantize.MAXCOVERAGE, kmeans=1, dither=Image.Dither.NONE
-        ).save(path, optimize=True)
-        if path.stat().st_size < LARGEST:
+        ).save(stream, "PNG", optimize=True)
+        found = stream.getvalue()
+        if len(found) < LARGEST:
             break
+    return found
 
 
 def main(names: list[str]) -> None:
-    """Run examples, and write their figures."""
+    """Run examples, and write their figures and the notebooks."""
     for path in [*scripts(), *notebooks()]:
         if names and path.stem not in names:
             continue
         print(path.stem, flush=True)
         if path.suffix == ".ipynb":
-            keep(figures_in(executed(path))[-1], path.stem)
+            notebook = executed(path)
+            nbformat.write(notebook, path)
+            figures = [data["image/png"] for data in results_in(notebook) if "image/png" in data]
+            (GALLERY / f"{path.stem}.png").write_bytes(b64decode(figures[-1]))
             continue
         with TemporaryDirectory() as folder:
             subprocess.run([sys.executable, path, folder], check=True)
-            keep(Path(folder, f"{path.stem}.png").read_bytes(), path.stem)
+            figure = Path(folder, f"{path.stem}.png").read_bytes()
+            (GALLERY / f"{path.stem}.png").write_bytes(small(figure))
             for values in Path(folder).glob("*.json"):
                 (GALLERY / values.name).write_bytes(values.read_bytes())
 

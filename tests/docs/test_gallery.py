@@ -5,6 +5,7 @@ import runpy
 import sys
 from pathlib import Path
 
+import nbformat
 import pytest
 
 from tests.docs.page import CHECKOUT
@@ -47,17 +48,25 @@ def test_a_script_writes_its_figure(
 @pytest.mark.long
 @pytest.mark.process
 @pytest.mark.parametrize("name", NOTEBOOKS)
-def test_a_notebook_runs_and_shows_a_figure(name: str) -> None:
+def test_a_notebook_has_the_outputs_of_its_run(name: str) -> None:
     gallery = runpy.run_path(str(CHECKOUT / "docs/gallery.py"))
-    executed = gallery["executed"](EXAMPLES / "notebooks" / f"{name}.ipynb")
-    assert gallery["figures_in"](executed)
+    path = EXAMPLES / "notebooks" / f"{name}.ipynb"
+    kept, now = (
+        [(sorted(data), data.get("text/plain")) for data in gallery["results_in"](notebook)]
+        for notebook in (nbformat.read(path, as_version=4), gallery["executed"](path))
+    )
+    assert kept == now
 
 
-def test_notebooks_are_kept_without_outputs() -> None:
+def test_notebooks_are_kept_with_outputs_and_a_figure() -> None:
     for name in NOTEBOOKS:
-        notebook = json.loads((EXAMPLES / f"notebooks/{name}.ipynb").read_text(encoding="utf-8"))
-        code = [cell for cell in notebook["cells"] if cell["cell_type"] == "code"]
-        assert all(cell["outputs"] == [] and cell["execution_count"] is None for cell in code)
+        path = EXAMPLES / f"notebooks/{name}.ipynb"
+        code = [cell for cell in json.loads(path.read_text())["cells"] if "outputs" in cell]
+        outputs = [output for cell in code for output in cell["outputs"]]
+        assert [cell["execution_count"] for cell in code] == [*range(1, len(code) + 1)]
+        assert "error" not in {output["output_type"] for output in outputs}
+        assert any("image/png" in output.get("data", {}) for output in outputs)
+        assert path.stat().st_size < 300_000
 
 
 def test_examples_are_in_the_gallery_with_a_small_figure() -> None:
