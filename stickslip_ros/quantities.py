@@ -47,6 +47,8 @@ def number_of(name: str, given: Any, unit: str | None) -> float:
         if unit:
             return _converted(found[1], found[2], unit)
     allowed = f" in {unit}, or in a unit that converts to it" if unit else " without a unit"
+    if isinstance(given, str) and "," in given:
+        allowed = f" with a decimal point{allowed}"
     turns = "; Hz and rpm count turns, of 2 pi rad" if unit and "rad" in unit else ""
     raise InvalidInputError(f"{name} = {shown(given)} is invalid: must be a number{allowed}{turns}")
 

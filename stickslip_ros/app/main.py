@@ -23,7 +23,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
     0 done; 1 the run failed; 2 the input is refused; 130 interrupted.
     """
-    given = sys.argv[1:] if arguments is None else list(arguments)
+    given = words = sys.argv[1:] if arguments is None else list(arguments)
     command = " ".join(given[:1])
     further: list[str] = []
     if command == "run" and "--" in given:  # what follows is for the controller
@@ -38,7 +38,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             print(overview(), flush=True)
             sys.exit(0)
         parser = command_parser(_command_of(given))
-        known = argparse.Namespace(further=further)
+        known = argparse.Namespace(words=words, further=further)
         chosen, unknown = parser.parse_known_args(_with_negative_values(given[1:]), known)
         if unknown:
             parser.error(_unrecognized(unknown, parser.format_usage()))

@@ -7,7 +7,7 @@ import sys
 from collections.abc import Generator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext, suppress
 from datetime import UTC, datetime
-from itertools import count
+from itertools import count, pairwise
 from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -122,7 +122,8 @@ def run(arguments: argparse.Namespace) -> int:
 
         reach = keep_on_this_machine(arguments.network)
     tell(f"nodes in {namespace}, {reach}")
-    with _dashboard(namespace, bag, scenario) if arguments.dashboard else nullcontext():
+    again = _again(arguments.words)
+    with _dashboard(namespace, bag, scenario, again) if arguments.dashboard else nullcontext():
         results, interrupted = record(
             scenario, bag, namespace=namespace, composed=arguments.composed, controller=controller
         )
@@ -215,12 +216,19 @@ def record(
         raise RunError(str(error)) from None
 
 
+def _again(words: Sequence[str]) -> str:
+    """Return the command of another such run: of these words, without the bag, which exists."""
+    kept = [w for before, w in pairwise(["", *words]) if "--bag" not in (before, w.split("=")[0])]
+    return shlex.join(["stickslip", *kept])
+
+
 @contextmanager
-def _dashboard(namespace: str, bag: Path, scenario: "Scenario") -> Generator[None]:
+def _dashboard(namespace: str, bag: Path, scenario: "Scenario", again: str) -> Generator[None]:
     """Serve the page in a process of its own, which has no part in whether the run succeeds."""
     from stickslip_ros.nodes.base.child_process import start_child
 
     command = "-m", "stickslip_ros.app.main", "dashboard", "--namespace", namespace
+    command += (f"--command={again}",)
     plant = scenario.plant.flat()
     named = filter(None, (plant[p.name] for p in scenario.plant.known.values() if p.file))
     process = start_child([sys.executable, *command, *(f"--read={p}" for p in (bag, *named))])

@@ -227,16 +227,21 @@ class Units:
         return f"{quantity} {symbol.replace('_', '')}".rstrip()
 
     def axis(self, name: str, unit: str, *values: npt.ArrayLike) -> tuple[float, str]:
-        """Return the divisor of the values (SI) on an axis, and its label.
+        """Return the divisor of the values (SI) on an axis, and its label, see `prefixed`."""
+        scale, unit = self.prefixed(unit, *values)
+        return scale, self.label(name, unit)
+
+    def prefixed(self, unit: str, *values: npt.ArrayLike) -> tuple[float, str]:
+        """Return the divisor of values (SI), and the unit of the quotients.
 
         Times of a second or more have no prefix, and numbers without unit have none.
         """
         arrays = [np.asarray(value, dtype=float) for value in values]
         largest = max((float(np.nanmax(np.abs(a), initial=0.0)) for a in arrays), default=0.0)
         if self.dimensionless or (unit == "s" and largest >= 1.0):
-            return 1.0, self.label(name, unit)
+            return 1.0, unit
         scale, prefix = _prefix_of(unit, largest)
-        return scale, self.label(name, prefix + unit)
+        return scale, prefix + unit
 
     def of_unit(self, unit: str) -> str:
         """Return the unit to show; empty if all is dimensionless."""

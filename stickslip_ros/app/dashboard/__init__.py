@@ -8,6 +8,7 @@ from pathlib import Path
 from stickslip_ros.app.arguments import add_namespace, add_network, namespace_of, whole
 from stickslip_ros.app.optional_dependencies import check_dashboard, load_matplotlib, loading_ros
 from stickslip_ros.nodes.base.child_process import die_with_parent
+from stickslip_ros.text import printable
 
 DEFAULT_PORT = 8642
 """First port that is tried by default."""
@@ -32,6 +33,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="bag of the run, to show and offer at its end, or file that a parameter of the plant "
         "names; of what nodes name, nothing else is read (repeatable)",
     )
+    parser.add_argument(
+        "--command", default="", help="command that started the run, for titles and for its end"
+    )
     add_network(parser, "also listen to nodes on other machines; the page stays loopback only")
 
 
@@ -50,4 +54,4 @@ def run(arguments: argparse.Namespace) -> None:
     from stickslip_ros.app.dashboard.server import serve  # needs NiceGUI and takes seconds
 
     readable = {*arguments.read, *(str(Path(path).resolve()) for path in arguments.read)}
-    serve(namespace, arguments.port, reach, readable)
+    serve(namespace, arguments.port, reach, readable, printable(arguments.command))

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from stickslip_ros.show.style import BLUE, GREEN, GREY, ORANGE
+from stickslip_ros.show.style import BLUE, GREEN, GREY, ORANGE, SKY_BLUE
 
 AXIS: dict[str, Any] = {
     "type": "value",
@@ -27,6 +27,8 @@ TOOLBOX: dict[str, Any] = {
 }
 CURSOR: dict[str, Any] = {"trigger": "axis", "axisPointer": {"type": "cross"}}
 
+LEGEND: dict[str, Any] = {"top": 0, "left": 0, "itemWidth": 16, "itemGap": 7}
+
 _LEFT, _RIGHT = 64, 16
 
 
@@ -44,10 +46,10 @@ def _of(grid: int) -> dict[str, int]:
 TRACE: dict[str, Any] = {
     "animation": False,
     "backgroundColor": "transparent",
-    "legend": {"top": 0, "type": "scroll"},
+    "legend": LEGEND,
     "grid": [
-        {"left": _LEFT, "right": _RIGHT, "top": top, "height": "22%"}
-        for top in ("11%", "40%", "69%")
+        {"left": _LEFT, "right": _RIGHT, "top": top, "height": "20%"}
+        for top in ("15%", "43%", "71%")
     ],
     "xAxis": [
         AXIS | {"gridIndex": 0, "axisLabel": {"show": False}},
@@ -69,6 +71,8 @@ TRACE: dict[str, Any] = {
             "data": [],
             **_of(2),
         },
+        line("A", GREEN, "dotted"),
+        line("B", SKY_BLUE, "dotted"),
     ],
 }
 """Displacement, velocity of slide and belt, and control force over time."""
@@ -76,7 +80,7 @@ TRACE: dict[str, Any] = {
 PORTRAIT: dict[str, Any] = {
     "animation": False,
     "backgroundColor": "transparent",
-    "legend": {"top": 0, "data": ["slide", "equilibrium"]},
+    "legend": LEGEND | {"data": ["slide", "equilibrium"]},
     "grid": {"left": _LEFT, "right": _RIGHT, "top": 56, "bottom": 45},
     "xAxis": AXIS | CENTRED,
     "yAxis": AXIS,
@@ -109,7 +113,7 @@ PORTRAIT: dict[str, Any] = {
 CYCLES: dict[str, Any] = {
     "animation": False,
     "backgroundColor": "transparent",
-    "legend": {"top": 0, "left": 0},
+    "legend": LEGEND,
     "toolbox": TOOLBOX,
     "tooltip": CURSOR,
     "grid": {"left": _LEFT, "right": 56, "top": 56, "bottom": 45},

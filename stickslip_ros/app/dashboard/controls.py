@@ -2,20 +2,23 @@
 
 import asyncio
 from collections.abc import Callable, Generator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
-from math import ceil, floor, log2, log10
+from itertools import islice
+from math import ceil, floor, isfinite, log2, log10
 from typing import Any
 
 from nicegui import ui
 from nicegui.events import GenericEventArguments
 
 from stickslip_ros.app.dashboard.elements import call, named
+from stickslip_ros.app.dashboard.frames import Frames
 from stickslip_ros.app.dashboard.listener import Answer, ListenerNode
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.model.constants import SMALLEST, Changes, Parameter, constants_of
 from stickslip_ros.physics.model.control import CONTROL_LAWS, ControlLaw
+from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.quantities import number_of
 from stickslip_ros.scenarios.keywords import described
 from stickslip_ros.scenarios.parameters import (
@@ -24,6 +27,9 @@ from stickslip_ros.scenarios.parameters import (
     controller_node,
 )
 from stickslip_ros.show.quantities import Units, plain_name
+
+_LARGEST_RATIO = 10.0
+"""Allowed ratio of an input to the scale of the drive, or to the present value."""
 
 
 def main_parameters(law: str) -> list[str]:
@@ -75,12 +81,31 @@ def current(listener: ListenerNode, full_name: str) -> Any:
     return listener.parameters[node].get(name)
 
 
+def scale_of(unit: str, drive: Drive | None) -> float:
+    """Return the scale (SI) of a quantity of a drive; 1 while the drive is not known."""
+    return 1.0 if drive is None else float(f"{1.0 / drive.scales.factor(unit):.9g}")
+
+
+def number_within(name: str, given: Any, unit: str, drive: Drive | None, now: Any = 0.0) -> float:
+    """Return a number, or refuse it, also one of a size that would only end the run."""
+    value = number_of(name, given, unit)
+    limit = _LARGEST_RATIO * max(abs(now or 0.0), scale_of(unit, drive))
+    if drive is not None and unit != "s" and isfinite(value) and abs(value) > limit:
+        shown, most = (Units.for_drive(drive).text(each, unit) for each in (value, limit))
+        raise InvalidInputError(
+            f"{name} = {shown} is invalid: must be at most {most} in size, which is "
+            f"{_LARGEST_RATIO:g} times the scale of this drive, or the present value"
+        )
+    return value
+
+
 class SliderField:
     """Slider and number for a parameter, with its unit, undo and the reason of a refusal."""
 
-    def __init__(self, listener: ListenerNode, full_name: str) -> None:
-        self._listener, self.full_name = listener, full_name
+    def __init__(self, listener: ListenerNode, frames: Frames, full_name: str) -> None:
+        self._listener, self._frames, self.full_name = listener, frames, full_name
         self._parameter = described(full_name)
+        self._scale, self._unit = 1.0, ""
         self._earlier: list[float] = []
         self._shown = ""
         self._held = False
@@ -101,37 +126,39 @@ class SliderField:
             self._refusal = refusal_label()
 
     def refresh(self, units: Units) -> None:
-        """Show the current value, unless the user is about to change it."""
-        value = current(self._listener, self.full_name)
-        unit = units.of_unit(self._parameter.unit or "")
+        """Show the current value, in the unit of the plots, unless the user is changing it."""
+        value, unit = current(self._listener, self.full_name), self._parameter.unit or ""
+        usual = scale_of(unit, self._frames.drive) * (self._parameter.default or 1.0)
+        self._scale, unit = units.prefixed(unit, value or usual)
+        self._unit = units.of_unit(unit)
         named = units.plain(name_of(self.full_name))
-        self._label.set_text(f"{named} ({unit})" if unit else named)
+        self._label.set_text(f"{named} ({self._unit})" if self._unit else named)
         known = isinstance(value, float)
         self._number.set_enabled(known)
         self._undo.set_enabled(known and bool(self._earlier))
-        if known and not self._held and f"{value:.6g}" != self._shown:
-            self._show(value)
-
-    def _show(self, value: float) -> None:
-        self._shown = f"{value:.6g}"
-        low, high, step = slider_range(value, self._parameter)
-        # The value last: a range input keeps it within the limits that it has.
-        self._slider.props.update(min=low, max=high, step=step, value=value)
-        self._number.set_value(self._shown)
+        if known and not self._held and f"{value / self._scale:.6g}" != self._shown:
+            self._shown = f"{value / self._scale:.6g}"
+            ends = slider_range(value or usual, self._parameter)
+            low, high, step, place = (f"{each / self._scale:.9g}" for each in (*ends, value))
+            # The value last: a range input keeps it within the limits that it has.
+            self._slider.props.update(min=low, max=high, step=step, value=place)
+            self._number.set_value(self._shown)
 
     def _hold(self) -> None:
         self._held = True
 
     async def _slide(self, event: GenericEventArguments) -> None:
         self._held = False
-        await self._set(float(f"{float(event.args):.9g}"))
+        await self._set(float(f"{float(event.args) * self._scale:.9g}"))
 
     async def _enter(self) -> None:
-        if self._number.value != self._shown:
+        given, now = str(self._number.value), current(self._listener, self.full_name)
+        if given != self._shown:
+            with suppress(ValueError):  # a number alone is in the unit that is shown
+                given = f"{float(given)!r} {self._unit}".rstrip()
             with refusals_in(self._refusal):
-                value = number_of(self.full_name, self._number.value, self._parameter.unit)
-                self._number.set_value(f"{value:.6g}")
-                await self._set(value)
+                unit, drive = self._parameter.unit or "", self._frames.drive
+                await self._set(number_within(self.full_name, given, unit, drive, now))
 
     async def _go_back(self) -> None:
         if self._earlier:
@@ -142,17 +169,16 @@ class SliderField:
         node, _, name = self.full_name.partition(".")
         answer = await asyncio.wrap_future(self._listener.set_parameter(node, name, value))
         self._refusal.set_text(answer)
-        if answer:
-            self._show(before)
-        elif not again and before is not None and before != value:
+        self._shown = ""  # the value that the node has is shown
+        if not answer and not again and before is not None and before != value:
             self._earlier.append(before)
 
 
 class OtherParameter:
     """Any other parameter: a list with value, unit and meaning, and a field for a new value."""
 
-    def __init__(self, listener: ListenerNode, names: list[str]) -> None:
-        self._listener, self._names = listener, names
+    def __init__(self, listener: ListenerNode, frames: Frames, names: list[str]) -> None:
+        self._listener, self._frames, self._names = listener, frames, names
         self._choice = ui.select(names, label="another parameter", with_input=True)
         self._choice.classes("w-full").props("dense outlined")
         self._meaning = ui.label().classes("text-sm")
@@ -176,11 +202,7 @@ class OtherParameter:
             self._meaning.set_text(f"{described(chosen).meaning} Now {self._value(chosen, units)}.")
 
     def _value(self, full_name: str, units: Units) -> str:
-        value = current(self._listener, full_name)
-        if value is None:
-            return "unknown"
-        number = f"{value:g}" if isinstance(value, float) else str(value)
-        return f"{number} {units.of_unit(described(full_name).unit or '')}".rstrip()
+        return units.text(current(self._listener, full_name), described(full_name).unit or "")
 
     async def _apply(self) -> None:
         chosen = self._choice.value
@@ -189,17 +211,18 @@ class OtherParameter:
             return
         node, _, name = chosen.partition(".")
         with refusals_in(self._refusal):
-            value = number_of(chosen, self._field.value, described(chosen).unit)
+            unit, now = described(chosen).unit or "", current(self._listener, chosen)
+            value = number_within(chosen, self._field.value, unit, self._frames.drive, now)
             await report(self._listener.set_parameter(node, name, value), self._refusal)
 
 
 @dataclass(frozen=True)
 class Setting:
-    """Parameters with a slider, whether control is on, and the measures under them."""
+    """Parameters with a slider, whether control is on, and both and the measures as texts."""
 
     values: dict[str, float]
     active: bool
-    measures: list[str]
+    texts: dict[str, str]
 
 
 class Settings:
@@ -208,12 +231,13 @@ class Settings:
     def __init__(
         self,
         listener: ListenerNode,
+        frames: Frames,
         is_active: Callable[[], bool],
         set_active: Callable[[bool], Any],
         measures: Callable[[], dict[str, str]],
     ) -> None:
-        self._listener, self._is_active, self._set_active = listener, is_active, set_active
-        self._measures = measures
+        self._listener, self._frames, self._measures = listener, frames, measures
+        self._is_active, self._set_active = is_active, set_active
         self._stored: dict[str, Setting] = {}
         self._use: dict[str, ui.button] = {}
         with ui.row().classes("items-center gap-1"):
@@ -236,34 +260,32 @@ class Settings:
 
     def refresh(self) -> None:
         """Show the settings side by side with what is there now."""
-        if not self._stored:
-            return
-        now = self._now()
-        sides = {"A": self._stored.get("A"), "B": self._stored.get("B"), "now": now}
+        sides = {**self._stored, "now": self._now()}
         rows = [
-            {"what": name_of(name)}
-            | {
-                side: f"{s.values[name]:g}" if s and name in s.values else ""
-                for side, s in sides.items()
-            }
-            for name in now.values
+            {"what": what} | {side: setting.texts.get(what, "") for side, setting in sides.items()}
+            for what in sides["now"].texts
         ]
-        rows.append(
-            {"what": "control"}
-            | {k: ("on" if s.active else "off") if s else "" for k, s in sides.items()}
-        )
-        for place, name in enumerate(self._measures()):
-            rows.append(
-                {"what": name} | {k: s.measures[place] if s else "" for k, s in sides.items()}
-            )
-        if rows != self._table.rows:
+        if self._stored and rows != self._table.rows:
             self._table.rows = rows
 
+    def described(self) -> str:
+        """Return the present parameters, and whether control is on, in words."""
+        now = self._now()
+        texts = (f"{what} {text}" for what, text in now.texts.items())
+        return ", ".join(islice(texts, len(now.values) + 1))
+
     def _now(self) -> Setting:
-        names = main_parameters(self._listener.law)
-        known = {name: current(self._listener, name) for name in names}
+        units = Units.for_drive(self._frames.drive)
+        known = {
+            name: current(self._listener, name) for name in main_parameters(self._listener.law)
+        }
         values = {name: value for name, value in known.items() if value is not None}
-        return Setting(values, self._is_active(), list(self._measures().values()))
+        texts = {
+            name_of(name): units.text(value, described(name).unit or "")
+            for name, value in values.items()
+        }
+        texts["control"] = "on" if self._is_active() else "off"
+        return Setting(values, self._is_active(), texts | self._measures())
 
     def _store(self, name: str) -> None:
         self._stored[name] = self._now()

@@ -12,7 +12,6 @@ from stickslip_ros.app.dashboard.listener import ListenerNode
 from stickslip_ros.bags.report import report_of_recording
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.files import open_regular
-from stickslip_ros.scenarios.files import shipped_scenarios
 from stickslip_ros.show.measure_table import measure_table
 from stickslip_ros.show.quantities import MEASURES, Units
 from stickslip_ros.text import printable
@@ -47,14 +46,14 @@ class EndedRun:
         self._reading = asyncio.Lock()
 
     @property
-    def _named(self) -> str:
+    def bag(self) -> str:
         """The bag that the analyzer says it has written; empty if there is none."""
         return self._listener.health["analyzer"].figures.get("bag", "")
 
     async def read(self) -> None:
         """Read the report of the bag, once; concurrent callers wait for it."""
         async with self._reading:
-            named = self._named
+            named = self.bag
             if named != self._bag and named in self._listener.readable:
                 await asyncio.to_thread(self._read, Path(named))
                 self._bag = named
@@ -76,12 +75,15 @@ class EndedRun:
 
     def show(self, units: Units) -> None:
         """Add it to the page."""
-        heading(2, "Run ended").classes("text-lg")
-        bag, commands = self._named, list[str]()
+        plant = self._listener.health["plant"]
+        failure = f": {plant.message}" if plant.level == 2 and plant.message else ""
+        heading(2, f"Run ended{failure}").classes("text-lg")
+        bag, commands = self.bag, list[str]()
         if bag and bag == self._bag:
             if self._report:
                 table = measure_table("", {"": self._report}, {"": units})
-                shown = [MEASURES[name].label for name in _MEASURES]
+                measures = _MEASURES[1:] if failure else _MEASURES  # no regime of what came before
+                shown = [MEASURES[name].label for name in measures]
                 with ui.row().classes("gap-x-6 gap-y-1"):
                     for label, text in table.rows:
                         if label in shown:
@@ -97,8 +99,6 @@ class EndedRun:
             ui.label(f"Recorded in {bag}, as the analyzer says")
         ui.label("In a terminal:")
         namespace = self._listener.get_namespace()
-        scenario = namespace.strip("/")  # by default a drive's namespace is that of its scenario
-        if scenario not in shipped_scenarios():
-            scenario = f"SCENARIO --namespace {namespace}"
-        commands.append(f"stickslip run {scenario} --dashboard")
+        unknown = f"stickslip run SCENARIO --namespace {namespace} --dashboard"
+        commands.append(self._listener.command or unknown)
         show_commands(commands)

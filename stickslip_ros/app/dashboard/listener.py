@@ -39,7 +39,7 @@ from stickslip_ros.messages.topics import (
     Topic,
 )
 from stickslip_ros.nodes.base.clients import ANSWER_TIME, ServiceCall, parameters_call
-from stickslip_ros.nodes.base.managed import STATE
+from stickslip_ros.nodes.base.managed import FIRST_STAMP, STATE
 from stickslip_ros.nodes.base.ros_topics import PollingNode, qos_profile, waiting_messages
 from stickslip_ros.nodes.base.spinner import steady_clock
 from stickslip_ros.running.controller_search import DASHBOARD
@@ -124,6 +124,8 @@ class ListenerNode(PollingNode):
         super().__init__(DASHBOARD, namespace=namespace, context=context)
         self._show = show
         self.readable = readable
+        self.command = ""
+        """Command that started the run; empty if it is not known."""
         self.health: Mapping[str, Health] = {node: Health() for node in ("analyzer", "plant")}
         """Health by the node's name relative to the namespace; controllers once heard."""
         self.law = DEFAULT_LAW
@@ -143,7 +145,8 @@ class ListenerNode(PollingNode):
         self._calls: list[tuple[ServiceCall, float, Callable[[], None]]] = []
         self._asked_parameters: dict[str, ServiceCall] = {}
         self._parameter_writers = 0
-        self._newest = 0
+        self.newest = 0
+        """Stamp of the newest sample, ns; 0 before the first."""
         self._tap_end = 0
         self._tap_timer: Timer | None = None
         self._states = self._listen_loosely(JOINT_STATES)
@@ -175,10 +178,15 @@ class ListenerNode(PollingNode):
         """Name of the controller relative to the namespace."""
         return controller_node(self.law)
 
+    def time_of(self, stamp: int) -> float | None:
+        """Return the simulated time since the plant was activated, s; None if it is not known."""
+        first = number_in(self.health["plant"].figures.get(FIRST_STAMP, ""))
+        return (stamp - first) / NANOSECONDS if 0 < first <= stamp else None
+
     @property
     def ended(self) -> bool:
         """Whether a run was heard whose plant and analyzer have left."""
-        return self._newest > 0 and not any(
+        return self.newest > 0 and not any(
             topic.get_publisher_count() for topic in (self._states, self._amplitudes)
         )
 
@@ -189,7 +197,7 @@ class ListenerNode(PollingNode):
         active = self.health.get(self.controller, Health()).state == "active"
         if not (delay and active) or self._answering_since is None:
             return 0.0
-        return max(delay - (self._newest - self._answering_since) / NANOSECONDS, 0.0)
+        return max(delay - (self.newest - self._answering_since) / NANOSECONDS, 0.0)
 
     @property
     def waits_for_reply(self) -> float:
@@ -260,8 +268,8 @@ class ListenerNode(PollingNode):
                 _settle(answer, f"no node subscribes to {self._disturbance.topic_name}")
                 return
             self._take()
-            self._disturbance.publish(pack_wrench(self._newest, force))
-            self._tap_end = self._newest + round(duration * NANOSECONDS)
+            self._disturbance.publish(pack_wrench(self.newest, force))
+            self._tap_end = self.newest + round(duration * NANOSECONDS)
             self._tell(f"impulse of {force:g} N for {duration:g} s", f"{force:g} N")
             if self._tap_timer is None:
                 self._tap_timer = self._every(0.002, self._take)
@@ -324,15 +332,15 @@ class ListenerNode(PollingNode):
         forces, _ = wrench_columns(list(waiting_messages(self._forces)))
         dropped, _ = wrench_columns(list(waiting_messages(self._dropped_forces)))
         if len(states.stamp):
-            self._newest = int(states.stamp[-1])
+            self.newest = int(states.stamp[-1])
             self.moved_at = time.monotonic()
         if len(states.stamp) or len(forces.stamp) or len(dropped.stamp):
             self._show(states, forces, dropped)
-        if self._tap_timer is not None and self._newest >= self._tap_end:
+        if self._tap_timer is not None and self.newest >= self._tap_end:
             self._end_tap()
 
     def _end_tap(self) -> None:
-        self._disturbance.publish(pack_wrench(self._newest, 0.0))
+        self._disturbance.publish(pack_wrench(self.newest, 0.0))
         self._tell("the impulse has ended")
         if self._tap_timer is not None:
             self.destroy_timer(self._tap_timer)
@@ -382,12 +390,12 @@ class ListenerNode(PollingNode):
             rate, answered = self.parameters["plant"].get("rate"), figures.get("answered")
             self._answering_since = None
             if rate and answered:
-                self._answering_since = self._newest - number_in(answered) / rate * NANOSECONDS
+                self._answering_since = self.newest - number_in(answered) / rate * NANOSECONDS
         if node in NODE_PARAMETERS and (restarted or state != before.state):
             self._ask_parameters(node)  # it may be another node of the same name
 
     def _tell(self, text: str, mark: str = "") -> None:
-        self.events.append(Event(time.time(), text, mark, self._newest))
+        self.events.append(Event(time.time(), text, mark, self.newest))
 
     def _update(self, node: str, health: Health) -> None:
         before = self.health.get(node, Health())

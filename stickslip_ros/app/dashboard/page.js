@@ -11,6 +11,7 @@ const FRAMES_OF_PORTRAIT = 3;
 const CYCLES_INTERVAL = 500;
 const MARGIN = 1.08;
 const MARK_WIDTH = 70; // pixels between the texts of two marks
+const TITLE = 28; // pixels above the charts of a picture
 const page = {};
 window.stickslip = page;
 const limits = {};
@@ -186,7 +187,9 @@ function drawMotion(motion) {
   const speeds = range("velocity", [velocity, belt, ...of("velocity")], spans[1]);
   const positions = range("position", [position, ...of("position")], spans[0]);
   const forces = range("force", [force, dropped, ...of("force")], spans[2]);
+  const layers = layersOf(motion);
   setChanged("trace", {
+    legend: { data: [...new Set(layers.map(({ name }) => name))] },
     xAxis: ["", "", time_label].map((name) => ({ name, min: -width, max: 0 })),
     yAxis: [
       { name: displacement, ...positions },
@@ -196,7 +199,7 @@ function drawMotion(motion) {
   });
   const trace = chartOf("trace");
   const context = canvasOn(trace);
-  layersOf(motion).forEach((layer) => paint(context, scaleOf(trace, layer.grid), layer));
+  layers.forEach((layer) => paint(context, scaleOf(trace, layer.grid), layer));
   drawMarks(context, trace, motion.marks);
   if (page.frames % FRAMES_OF_PORTRAIT === 0) drawPortrait(motion, positions, speeds);
 }
@@ -240,13 +243,22 @@ function drawLoop({ lines }) {
   chart.setOption({ series: [{}, { data }] });
 }
 
-const short = (value) => (value === null ? "" : Number(value).toPrecision(5));
+// Returns the text of a cursor along an axis: values with their units, in the order of the panels.
+const reading = (along, labels) => (items) => {
+  const quantity = (value, label) => `${Number(value).toPrecision(5)} ${/\((.*)\)/.exec(label)?.[1] ?? ""}`;
+  const rows = items
+    .filter(({ value }) => value[1] !== null)
+    .sort((a, b) => a.axisIndex - b.axisIndex || a.seriesIndex - b.seriesIndex)
+    .map(({ marker, seriesName, value, axisIndex }) => `${marker}${seriesName} ${quantity(value[1], labels[axisIndex])}`);
+  return [quantity(items[0].axisValue, along), ...rows].join("<br>");
+};
 
 const points = ({ x, y }) => Array.from(x, (time, i) => [time, Number.isNaN(y[i]) ? null : y[i]]);
 
 // Hands the lines to ECharts, with a cursor and zoom, or takes them back.
 function show(paused) {
-  const cursor = { axisPointer: { type: "cross" }, show: paused, valueFormatter: short };
+  const cursor = { axisPointer: { type: "cross" }, show: paused, trigger: "axis" };
+  const { time_label, labels } = page.motion ?? { labels: [] };
   const layers = paused && page.motion ? layersOf(page.motion) : [];
   const series = layers.map(({ name, grid, line, colour, dash, stepped, dots }) => ({
     type: dots ? "scatter" : "line",
@@ -263,7 +275,7 @@ function show(paused) {
   const options = window.getElement(page.trace).options;
   chartOf("trace").setOption(
     {
-      tooltip: { ...cursor, trigger: "axis" },
+      tooltip: { ...cursor, formatter: reading(time_label, labels) },
       axisPointer: { link: [{ xAxisIndex: "all" }] },
       dataZoom: paused ? [{ type: "inside", xAxisIndex: [0, 1, 2] }] : [],
       series: paused ? series : options.series,
@@ -271,7 +283,7 @@ function show(paused) {
     { replaceMerge: ["dataZoom", "series"] },
   );
   chartOf("portrait").setOption({
-    tooltip: { ...cursor, trigger: "axis" },
+    tooltip: { ...cursor, formatter: reading(labels[0], labels.slice(1)) },
     series: [{}, { data: paused && page.motion ? points(page.motion.lines.orbit) : [] }],
   });
   ["trace", "portrait"].forEach((name) => canvasOn(chartOf(name)));
@@ -374,9 +386,15 @@ page.pause = (paused) => {
   page.paused = paused;
   show(paused);
 };
-page.csv = () => save(page.rows ?? shownRows(), "stickslip.csv");
+page.describe = (run, bag, settings) => {
+  document.title = `${run}, ${settings}`;
+  page.name = `${bag}, ${settings}`;
+};
+const now = () => `${new Date().toISOString().slice(0, 19)}Z`;
+const fileName = (ending) => `${page.name} ${now()}`.replace(/[^\w.+-]+/g, "_") + ending;
+page.csv = () => save(page.rows ?? shownRows(), fileName(".csv"));
 
-// Puts the charts of the motion, as they are shown, into one picture.
+// Puts the charts of the motion, as they are shown, into one picture with a title.
 page.png = () => {
   const canvases = ["trace", "portrait", "cycles"].flatMap((name) => [
     ...chartOf(name).getDom().querySelectorAll("canvas"),
@@ -386,15 +404,18 @@ page.png = () => {
   const ratio = window.devicePixelRatio;
   const picture = document.createElement("canvas");
   picture.width = ratio * (Math.max(...boxes.map((b) => b.right)) - left);
-  picture.height = ratio * (Math.max(...boxes.map((b) => b.bottom)) - top);
+  picture.height = ratio * (Math.max(...boxes.map((b) => b.bottom)) - top + TITLE);
   const context = picture.getContext("2d");
   context.scale(ratio, ratio);
   context.fillStyle = dark.matches ? "#1b1e23" : "#ffffff";
   context.fillRect(0, 0, picture.width, picture.height);
+  context.fillStyle = dark.matches ? "#ffffff" : "#000000";
+  context.font = "13px sans-serif";
+  context.fillText(`${document.title}, ${now()}`, 8, TITLE / 2, picture.width / ratio - 16);
   canvases.forEach((canvas, i) =>
-    context.drawImage(canvas, boxes[i].left - left, boxes[i].top - top, boxes[i].width, boxes[i].height),
+    context.drawImage(canvas, boxes[i].left - left, boxes[i].top - top + TITLE, boxes[i].width, boxes[i].height),
   );
-  save(picture.toDataURL("image/png"), "stickslip.png");
+  save(picture.toDataURL("image/png"), fileName(".png"));
 };
 
 const blobOf = async (url) => {

@@ -5,7 +5,6 @@ import json
 import shlex
 import time
 from contextlib import suppress
-from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -20,6 +19,7 @@ from stickslip_ros.app.dashboard.controls import (
     Settings,
     SliderField,
     main_parameters,
+    number_within,
     other_parameters,
     refusal_label,
     refusals_in,
@@ -131,6 +131,7 @@ class _Page:
         self._listener = listener
         self._frames = frames
         self._ended = ended
+        self._description = "", "", ""
         self._busy = False
         self._newest_event = 0.0
         self._tap_scales: tuple[float, float] | None = None
@@ -156,9 +157,8 @@ class _Page:
                     with card("Parameters"):
                         self._parameters = ui.column().classes("w-full gap-2")
                     with card("Compare two settings"):
-                        self._settings = Settings(
-                            listener, self._is_active, self._pursue_control, self._measured
-                        )
+                        switch = self._is_active, self._pursue_control
+                        self._settings = Settings(listener, frames, *switch, self._measured)
                     self._add_health()
                     with card("Events"):
                         self._events = ui.element("div").classes("events")
@@ -195,9 +195,12 @@ class _Page:
             )
             window.props("no-caps outline")
             self._view = ui.button("Pause view", on_click=self._pause_view).props("outline no-caps")
-            for text, function in (("Fit", "fit"), ("CSV", "csv"), ("PNG", "png")):
-                button = ui.button(text, on_click=partial(call, function))
-                button.props("outline no-caps")
+            texts = "Fit", "CSV", "PNG"
+            fit, csv, png = (ui.button(text).props("outline no-caps") for text in texts)
+            fit.on("click", js_handler="() => stickslip.fit()")  # also after the server has ended
+            csv.on("click", js_handler="() => stickslip.csv()")
+            png.on("click", js_handler="() => stickslip.png()")
+            self._facts = ui.label("").classes("w-full text-sm facts")
 
     def _add_charts(self) -> None:
         self._charts: dict[str, ui.echart] = {}
@@ -226,6 +229,7 @@ class _Page:
                 self._tap_force = ui.input("force (N)").classes("w-24")
                 self._tap_time = ui.input("duration (s)").classes("w-24")
                 ui.button("Impulse", on_click=self._tap).props("outline no-caps")
+            ui.label("at first 1/4 of normal force and natural period").classes("text-sm")
             with ui.row().classes("items-end gap-2"):
                 ui.button("Reset", on_click=self._reset).props("outline no-caps")
                 self._pause = ui.button("Pause motion", on_click=self._pause_motion)
@@ -241,7 +245,6 @@ class _Page:
             self._health = ui.table(columns=columns, rows=[], row_key="node")
             self._health.classes("w-full").props("wrap-cells flat dense hide-bottom")
             self._complaints = ui.label("").classes("text-sm whitespace-pre-line")
-            self._shares = ui.label("").classes("text-sm")
             with ui.expansion("all values").classes("w-full").props("dense"):
                 self._raw = ui.label("").classes("text-xs whitespace-pre-wrap break-all")
 
@@ -258,8 +261,9 @@ class _Page:
         self._switch.text = controller_node(law).replace("_", " ")
         self._parameters.clear()
         with self._parameters:
-            self._fields = [SliderField(self._listener, name) for name in main_parameters(law)]
-            self._fields.append(OtherParameter(self._listener, other_parameters(law)))
+            shared = self._listener, self._frames
+            self._fields = [SliderField(*shared, name) for name in main_parameters(law)]
+            self._fields.append(OtherParameter(*shared, other_parameters(law)))
 
     def _refresh(self) -> None:
         listener, drive = self._listener, self._frames.drive
@@ -277,6 +281,7 @@ class _Page:
         for field in self._fields:
             field.refresh(units)
         self._settings.refresh()
+        self._describe(units)
         there = self._state_of_controller() not in (ABSENT, SILENT)
         self._switch.set_enabled(there and not self._busy)
         if not self._busy:
@@ -288,8 +293,9 @@ class _Page:
         for event in list(listener.events):
             if event.when > self._newest_event:
                 clock = time.strftime("%H:%M:%S", time.localtime(event.when))
+                simulated = units.text(listener.time_of(event.stamp), "s")
                 with self._events:
-                    ui.label(f"{clock} {event.text}").move(target_index=0)
+                    ui.label(f"{clock}, t = {simulated}: {event.text}").move(target_index=0)
                 for old in self._events.default_slot.children[_EVENTS:]:
                     self._events.remove(old)
                 self._newest_event = event.when
@@ -362,20 +368,33 @@ class _Page:
         self._complaints.set_text(
             "\n".join(f"{node}: {each.message}" for node, each in health if each.message)
         )
-        figures = self._listener.health["plant"].figures
-        samples = number_in(figures.get("samples", ""))
-        shares = [
-            f"{name.replace('_', ' ')} {100.0 * number_in(figures[name]) / samples:.2g} %"
-            for name in ("late_forces", "missed_deadlines")
-            if samples and figures.get(name)
-        ]
-        self._shares.set_text(", ".join(shares))
         self._raw.set_text(
             "\n".join(
                 f"{node}: " + ", ".join(f"{k} {v}" for k, v in each.figures.items() if v)
                 for node, each in health
             )
         )
+
+    def _describe(self, units: Units) -> None:
+        """Tell time, lateness, bag and settings of the run; page.js names downloads by them."""
+        listener, figures = self._listener, self._listener.health["plant"].figures
+        samples, bag = number_in(figures.get("samples", "")), Path(self._ended.bag).name
+        facts = [
+            f"{name.replace('_', ' ')} {100.0 * number_in(figures[name]) / samples:.2g} %"
+            for name in ("late_forces", "missed_deadlines")
+            if samples and figures.get(name)
+        ]
+        facts.insert(0, f"t = {units.text(listener.time_of(listener.newest), 's')}")
+        recording = "recording to" if listener.health["analyzer"].state == "active" else "bag"
+        facts += [f"{recording} {bag}" if bag else "not recorded", listener.command]
+        self._facts.set_text(", ".join(filter(None, facts)))
+        namespace, settings = listener.get_namespace(), self._settings.described()
+        description = listener.command or namespace, bag or namespace, settings
+        # A run that ends switches control off, after the motion.
+        ends = self._description[0] and listener.health["plant"].state != "active"
+        if description != self._description and not ends:
+            self._description = description
+            call("describe", *description)
 
     def _follow_end(self) -> None:
         if not self._listener.ended:
@@ -432,7 +451,7 @@ class _Page:
 
     async def _tap(self) -> None:
         with refusals_in(self._act_refusal):
-            force = number_of("force", self._tap_force.value, "N")
+            force = number_within("force", self._tap_force.value, "N", self._frames.drive)
             duration = number_of("duration", self._tap_time.value, "s")
             await report(self._listener.tap(force, duration), self._act_refusal)
 

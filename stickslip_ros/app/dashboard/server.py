@@ -35,11 +35,14 @@ _POLICY = (
 """Sources that the page may load and run; docs/security.md says what NiceGUI needs of them."""
 
 
-def serve(namespace: str, port: int | None, reach: str, readable: Collection[str]) -> None:
+def serve(
+    namespace: str, port: int | None, reach: str, readable: Collection[str], command: str
+) -> None:
     """Serve the page of a namespace until SIGINT or SIGTERM.
 
     `reach` describes which nodes can be heard; of the paths that they name, those that are
-    `readable` are read. Raises InvalidInputError for a port in use.
+    `readable` are read. The `command` that started the run is shown; empty if it is not known.
+    Raises InvalidInputError for a port in use.
     """
     listening = _listen(port)
     signal.signal(signal.SIGTERM, _exit)  # uvicorn passes it on when it ends
@@ -51,6 +54,7 @@ def serve(namespace: str, port: int | None, reach: str, readable: Collection[str
             lambda states, forces, dropped: frames.feed(states, forces, dropped),
             readable,
         )
+        listener.command = command
         frames: Frames = Frames(listener)
         with _running(spinner, listener):
             for name in ("asyncio", "nicegui"):

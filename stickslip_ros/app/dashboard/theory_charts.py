@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from contourpy import contour_generator
 
-from stickslip_ros.app.dashboard.charts import AXIS, CENTRED, TOOLBOX, line
+from stickslip_ros.app.dashboard.charts import AXIS, CENTRED, LEGEND, TOOLBOX, line
 from stickslip_ros.app.dashboard.theory import Decay, FrictionCurve
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.physics.model.control import Washout
@@ -151,12 +151,12 @@ def _options(x: str, y: str, series: Sequence[Options], legend: Sequence[str]) -
     return {
         "animation": False,
         "backgroundColor": "transparent",
-        "legend": {"top": 0, "data": list(legend), "type": "scroll", "left": 0},
-        "grid": {"left": 60, "right": 20, "top": 74, "bottom": 45},
-        "toolbox": TOOLBOX | {"top": 14},  # below the legend, which may need the whole width
+        "legend": LEGEND | {"data": list(legend)},
+        "grid": {"left": 60, "right": 34, "top": 90, "bottom": 45},
+        "toolbox": TOOLBOX | {"orient": "vertical", "top": 84},  # the legend needs the whole width
         "tooltip": {"trigger": "item", "axisPointer": {"type": "cross"}},
         "xAxis": AXIS | CENTRED | {"name": x},
-        "yAxis": AXIS | {"name": y},
+        "yAxis": AXIS | {"name": y, "nameGap": 24},  # above the text of a line
         "series": list(series),
     }
 

@@ -2,6 +2,7 @@
 
 import math
 import re
+import shlex
 import signal
 import socket
 import subprocess
@@ -161,7 +162,7 @@ def test_a_limit_cycle_is_seen_stopped_and_changed(
 
     page.get_by_role("button", name="undo belt speed").click()
     expect(events(page).get_by_text("plant.belt_speed: 0.02 to 0.04")).to_be_visible()
-    expect(speed).to_have_value("0.04")
+    expect(speed).to_have_value("40")  # mm/s, as in the plots
 
     corner = page.get_by_label("cutoff frequency, value")
     corner.fill("-3")
@@ -212,6 +213,10 @@ CROSSED = """() => {
 """Whether the gains lie below the limit in the map, where they suppress a vibration."""
 
 
+LEGEND_HAS_A = """() => window.getElement(stickslip.trace).chart.getOption().legend[0].data
+    .includes("A")"""
+
+
 def accessibility(page: Page) -> list[str]:
     """Return what axe finds against WCAG 2.2 AA and good practice."""
     rules = ["wcag2a", "wcag2aa", "wcag21aa", "wcag22aa", "best-practice"]
@@ -221,14 +226,13 @@ def accessibility(page: Page) -> list[str]:
 
 
 def test_what_an_engineer_does(start_stickslip: Start, page: Page, tmp_path: Path) -> None:
-    served = Served(
-        start_stickslip(
-            *("run", "feed_drive", "--dashboard", "--bag", "bag"),
-            *("-p", "plant.real_time_factor=0.25", "-p", "plant.belt_speed=0.05"),
-            *("-p", "washout_controller.start_after=0"),
-            *("-p", "washout_controller.linear_gain=-1000"),
-        )
+    command = (
+        *("run", "feed_drive", "--dashboard", "--bag", "bag"),
+        *("-p", "plant.real_time_factor=0.25", "-p", "plant.belt_speed=0.05"),
+        *("-p", "washout_controller.start_after=0"),
+        *("-p", "washout_controller.linear_gain=-1000"),
     )
+    served = Served(start_stickslip(*command))
     page.goto(served.url)
     control = page.get_by_role("switch", name="washout controller")
     expect(control).to_be_checked()
@@ -241,16 +245,17 @@ def test_what_an_engineer_does(start_stickslip: Start, page: Page, tmp_path: Pat
     # The belt speed is lowered by its slider until the slide vibrates.
     slider = page.get_by_role("slider", name="belt speed")
     slider.focus()
-    wait_for(lambda: _pressed(slider) <= 0.04, "the slider is moved")
+    wait_for(lambda: _pressed(slider) <= 40.0, "the slider is moved")  # mm/s
     page.get_by_role("button", name="Reset").click()
     expect(page.get_by_text("stick-slip", exact=True).first).to_be_visible()
     wait_for(lambda: page.evaluate(CROSSED) is False, "the gains come to lie on the unstable side")
     assert "plant.belt_speed" in events(page).inner_text()
     wait_for(lambda: swing(page) > 500.0, "the vibration is drawn")
     page.get_by_role("button", name="Store A").click()
+    page.wait_for_function(LEGEND_HAS_A)
 
     gain = page.get_by_label("linear gain, value")
-    gain.fill("-3000")
+    gain.fill("-3")  # kN s/m
     gain.press("Enter")
     wait_for(lambda: page.evaluate(CROSSED) is True, "more gain is on the stable side")
     control.click()
@@ -265,6 +270,9 @@ def test_what_an_engineer_does(start_stickslip: Start, page: Page, tmp_path: Pat
     page.get_by_text("200 periods").click()
     wait_for(lambda: swing(page) > 500.0, "before and after are drawn")
     page.get_by_role("button", name="Pause view").click()
+    time_plots = page.locator(".chart.tall")
+    time_plots.hover()
+    expect(time_plots).to_have_text(re.compile(r"^\S+ s\D.* µm\D.* mm/s\D.* N$"))
     with page.expect_download() as download:
         page.get_by_role("button", name="CSV").click()
     rows = np.genfromtxt(download.value.path(), delimiter=",", names=True)
@@ -272,11 +280,18 @@ def test_what_an_engineer_does(start_stickslip: Start, page: Page, tmp_path: Pat
     with page.expect_download() as picture:
         page.get_by_role("button", name="PNG").click()
     assert picture.value.path().stat().st_size > 10_000
+    named = r"bag_belt_speed_[\d.]+_mm_s_.*_linear_gain_-3_kN_s_m_.*_control_on_20.*Z\."
+    assert re.fullmatch(named + "png", picture.value.suggested_filename)
 
     assert served.end() == 130
     expect(page.get_by_role("heading", name="Run ended")).to_be_visible()
     expect(page.get_by_text(f"Recorded in {tmp_path / 'bag'}", exact=True)).to_be_visible()
-    expect(page.get_by_text("stickslip run feed_drive --dashboard")).to_be_visible()
+    again = shlex.join(["stickslip", *command[:3], *command[5:]])  # into a new bag
+    assert page.title().startswith(f"{again}, belt speed ")
+    assert again in page.locator(".commands:visible").inner_text().splitlines()
+    with page.expect_download() as samples:  # although the server has ended
+        page.get_by_role("button", name="CSV").click()
+    assert re.fullmatch(named + "csv", samples.value.suggested_filename)
     with page.expect_download() as bag:  # although the server has ended
         page.get_by_role("link", name="Download the bag").click()
     written = next((tmp_path / "bag").glob("*.mcap"))
@@ -285,10 +300,65 @@ def test_what_an_engineer_does(start_stickslip: Start, page: Page, tmp_path: Pat
     assert "Traceback" not in "".join(served.said)
 
 
+def test_what_is_mistyped_is_refused_and_a_run_that_diverges_says_so(
+    start_stickslip: Start, page: Page, tmp_path: Path
+) -> None:
+    served = Served(
+        start_stickslip(
+            *("run", "feed_drive", "--dashboard", "--bag", "bag"),
+            *("-p", "plant.real_time_factor=0.25", "-p", "washout_controller.start_after=0"),
+        )
+    )
+    page.goto(served.url)
+    control = page.get_by_role("switch", name="washout controller")
+    control.click()
+    page.get_by_role("button", name="Reset").click()
+    header = page.get_by_text(re.compile(r"^t = .* s, late forces .* %, missed deadlines .* %, "))
+    expect(header).to_contain_text("recording to bag, stickslip run feed_drive --dashboard")
+    speed = page.get_by_label("belt speed, value")
+    expect(speed).to_have_value("40")
+    alerts = page.get_by_role("alert").filter(visible=True)
+    for mistyped, answer in {
+        "0,02": "'0,02' is invalid: must be a number with a decimal point in m/s",
+        "-5e9": "-5 Mm/s is invalid: must be at most 1 m/s in size",
+        "2000": "2 m/s is invalid",
+        "fast": "'fast' is invalid",
+        "1e400": "is invalid: must be a number in m/s",
+        "nan": "is invalid: must be a number in m/s",
+        "": "'' is invalid: must be a number in m/s",
+    }.items():
+        speed.fill(mistyped)
+        speed.press("Enter")
+        expect(alerts.filter(has_text=answer)).to_be_visible()
+    for field in (speed, page.get_by_role("slider", name="belt speed")):
+        field.hover()
+        field.focus()
+        page.mouse.wheel(0, 500)
+    page.get_by_label("another parameter").click()
+    page.get_by_role("option", name="plant.bias_force = 0 N").click()
+    page.get_by_label("value", exact=True).fill("-5e9")
+    page.get_by_role("button", name="Set", exact=True).click()
+    expect(
+        alerts.filter(has_text="-5 GN is invalid: must be at most 10 kN in size")
+    ).to_be_visible()
+    # What was refused, or scrolled over, has changed nothing: the gain is the only change.
+    gain = page.get_by_label("cubic gain, value")
+    gain.fill("9")  # MN s^3/m^3: the force grows faster than what damps the slide
+    gain.press("Enter")
+    expect(events(page).get_by_text(re.compile(r"t = .* s: \w+\.\w+: \S+ to "))).to_have_text(
+        [re.compile("washout_controller.cubic_gain: 0 to 9e\\+06$")]
+    )
+    wait_for(lambda: swing(page) > 800.0, "the limit cycle is drawn")  # µm
+    control.click()
+    expect(page.get_by_role("heading", name="Run ended: the motion diverges")).to_be_visible()
+    expect(page.get_by_text("regime:")).to_have_count(0)
+    served.process.wait(PATIENCE)
+
+
 def _pressed(slider: Locator) -> float:
     """Press the key that lowers a slider; return the value that it had."""
     value = float(slider.input_value())
-    if value > 0.04:
+    if value > 40.0:
         slider.press("ArrowLeft")
     return value
 
@@ -359,17 +429,9 @@ OVERLAPS = """
   const { chart } = window.getElement(stickslip[name]);
   const words = chart.getZr().storage.getDisplayList()
     .filter((part) => !part.ignore && (part.__title || part.type === "tspan" && part.style.text))
-    .filter((part) => part.style.text !== "1/1")  // of a legend without further pages: hidden
     .map((part) => {
       const box = part.getBoundingRect().clone();
       if (part.transform) box.applyTransform(part.transform);
-      for (const clip of part.__clipPaths ?? []) {  // of a legend with pages
-        const shown = clip.getBoundingRect().clone();
-        if (clip.transform) shown.applyTransform(clip.transform);
-        const end = Math.min(box.x + box.width, shown.x + shown.width);
-        box.x = Math.max(box.x, shown.x);
-        box.width = Math.max(end - box.x, 0);
-      }
       return { text: part.__title ? `tool ${part.__title}` : part.style.text, box };
     })
     .filter(({ box }) => box.width > 1);

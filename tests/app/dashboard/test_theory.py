@@ -12,6 +12,7 @@ import pytest
 from stickslip_ros.app.dashboard import theory as module
 from stickslip_ros.app.dashboard.controls import (
     main_parameters,
+    number_within,
     other_parameters,
     slider_range,
 )
@@ -217,6 +218,25 @@ def test_a_slider_has_room_on_both_sides_of_any_value() -> None:
         low, high, step = slider_range(value, described("plant.belt_speed"))
         assert low < high
         assert step > 0.0
+
+
+def test_a_number_far_from_the_scale_of_the_drive_is_refused_with_the_bound() -> None:
+    drive = SCENARIO.plant.as_drive()
+    for text, now, allowed in (
+        ("-5e9", 0.04, "at most 1 m/s in size"),
+        ("1.01", 0.0, "at most 1 m/s in size"),
+        ("60", 5.0, "at most 50 m/s in size"),
+        ("0,02", 0.04, "a number with a decimal point in m/s"),
+    ):
+        with pytest.raises(
+            InvalidInputError, match=f"belt_speed = .* is invalid: must be {allowed}"
+        ):
+            number_within("belt_speed", text, "m/s", drive, now)
+    assert number_within("belt_speed", "-1", "m/s", drive, 0.04) == -1.0
+    assert number_within("belt_speed", "40 m/s", "m/s", drive, 5.0) == 40.0
+    assert number_within("start_after", "1e6", "s", drive) == 1e6
+    assert number_within("force_limit", "inf", "N", drive) == float("inf")
+    assert number_within("belt_speed", "1e9", "m/s", None) == 1e9  # a drive that is not known
 
 
 def test_a_slider_for_each_own_constant_of_a_law() -> None:
