@@ -6,6 +6,7 @@ import tempfile
 from collections import Counter, deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, closing
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple, Self, TypeVar
@@ -238,7 +239,20 @@ class Recording:
     def name_of(self, topic: Topic[Any]) -> str:
         """Return the full name that a topic of the drive has, whether the bag has it or not.
 
-        Raises BagError if the bag holds several drives and no namespace was given.
+        Parameters
+        ----------
+        topic : Topic
+            A topic of `messages.topics`.
+
+        Returns
+        -------
+        str
+            Its name in the namespace of the drive.
+
+        Raises
+        ------
+        BagError
+            If the bag holds several drives and no namespace was given.
         """
         return self._prefix + topic.name
 
@@ -487,7 +501,14 @@ class Recording:
         messages = block.on(channels.get(topic, []))
         states, efforts, refused = motion.read(_content(messages), messages.log_time)
         self._note(topic, refused)
+        if self._effort_is_of_actuator:
+            states = replace(states, friction_force=np.full(len(states), np.nan))
         return states, efforts
+
+    @cached_property
+    def _effort_is_of_actuator(self) -> bool:
+        """Whether our plant recorded the force of its actuator in place of the friction."""
+        return (self.metadata("stickslip_ros/plant") or {}).get("effort") == '"actuator"'
 
     def _forces(
         self, topic: str, block: MessageBlock, channels: dict[str, list[int]]

@@ -65,12 +65,33 @@ def pack_joint_state(
     Stamp in ns, positions in m, velocities in m/s, efforts in N. Raises MessageError for a stamp
     outside ROS time (32-bit seconds).
     """
+    return _pack_joint_state(_JOINT_STATE, _JOINTS, stamp, position, velocity, effort)
+
+
+def joint_state_packer(slide: str, belt: str) -> Callable[..., bytes]:
+    """Return `pack_joint_state` for other names of the joints."""
+    joints = b""
+    for part in (_name(""), struct.pack("<I", 2), _name(slide), _name(belt), b""):
+        joints += bytes(-len(joints) % 4) + part
+    padding = (4 - len(joints)) % 8
+    layout = struct.Struct(f"<4s iI {len(joints)}s I{padding}x2d I4x2d I4x2d")
+    return partial(_pack_joint_state, layout, (joints,))
+
+
+def _pack_joint_state(
+    layout: struct.Struct,
+    joints: tuple[bytes, ...],
+    stamp: int,
+    position: tuple[float, float],
+    velocity: tuple[float, float],
+    effort: tuple[float, float],
+) -> bytes:
     try:
-        return _JOINT_STATE.pack(
+        return layout.pack(
             LITTLE_ENDIAN,
             stamp // NANOSECONDS,
             stamp % NANOSECONDS,
-            *_JOINTS,
+            *joints,
             2,
             *position,
             2,
@@ -177,6 +198,17 @@ def unpack_wrench(data: bytes) -> tuple[int, float]:
         if (encapsulation, frame) == _WRENCH_CONSTANTS:
             return sec * NANOSECONDS + nanosec, force
     stamp, (force,) = _wrench_layout(data).read(data)
+    return stamp, force
+
+
+def unpack_command(data: bytes, joint: str) -> tuple[int, float]:
+    """Read stamp (ns) and effort (N) of a joint from a serialized command, a JointState.
+
+    There must be one effort for each joint, or a single one. Raises MessageError for other bytes.
+    """
+    stamp, (force,) = _command_layout(data, joint).read(data)
+    if isnan(force):
+        raise MessageError(f"a joint command has no number as effort of {joint}")
     return stamp, force
 
 

@@ -59,6 +59,13 @@ CONTROL_FORCE = Topic(
     "answers.",
     decode=unpack_wrench,
 )
+JOINT_COMMANDS: Topic[Any] = Topic(
+    "joint_commands",
+    "sensor_msgs/msg/JointState",
+    DEEP,
+    meaning="Control force on the slide as ros2_control sends it: `effort` N of the joint `slide`, "
+    "or the only one.",
+)
 REFERENCE = Topic(
     "reference",
     "sensor_msgs/msg/JointState",
@@ -137,6 +144,7 @@ TOPICS = (
     JOINT_STATES,
     TRUE_JOINT_STATES,
     CONTROL_FORCE,
+    JOINT_COMMANDS,
     APPLIED_FORCE,
     DISTURBANCE_FORCE,
     APPLIED_DISTURBANCE,

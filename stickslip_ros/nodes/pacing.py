@@ -9,8 +9,10 @@ from collections.abc import Callable
 from threading import TIMEOUT_MAX, Event, Lock, Thread
 from typing import Any
 
+from typing_extensions import override
+
 from stickslip_ros.errors import StickslipError
-from stickslip_ros.messages.topics import RECORDED
+from stickslip_ros.messages.topics import CONTROL_FORCE, JOINT_COMMANDS, RECORDED
 from stickslip_ros.nodes.base.managed import ManagedNode
 from stickslip_ros.physics.loop.sampled_loop import SampledLoop
 from stickslip_ros.physics.measures.timing import Timing
@@ -131,6 +133,11 @@ class Pacer:
         self._end()
 
     @property
+    def instant(self) -> float | None:
+        """The present instant, in periods from the present sample; None where no clock paces."""
+        return None
+
+    @property
     def steps_per_second(self) -> float:
         """Samples per second of wall time since the start."""
         until = time.monotonic() if self._running else self._stopped
@@ -158,7 +165,10 @@ class LockstepPacer(Pacer):
     ) -> None:
         super().__init__(loop, publish, end)
         self._node = node
-        self._reply_timeout = node.parameters.reply_timeout
+        own = node.parameters
+        self._reply_timeout = own.reply_timeout
+        self._holds = own.command_rule == "newest"
+        self._silence = own.command_timeout if self._holds else own.reply_timeout
         recorded = node.resolve_topic_name(RECORDED.name)
         self._flow = FlowWindow(
             node.parameters.flow_window, lambda: node.count_publishers(recorded) > 0
@@ -166,7 +176,8 @@ class LockstepPacer(Pacer):
         self._scheduled = False
         self._seen = -1
         self._seen_at = 0.0
-        self._watchdog = node.every(min(0.1, self._reply_timeout / 10.0), self._watch)
+        shortest = min(self._silence, self._reply_timeout)
+        self._watchdog = node.every(min(0.1, shortest / 10.0), self._watch)
 
     def start(self, last: int) -> None:
         """Publish sample 0 and, once the node is active, continue when it is answered."""
@@ -236,13 +247,22 @@ class LockstepPacer(Pacer):
             self._seen, self._seen_at = self._loop.sample_number, now
             return
         patience_ends = now - self._seen_at >= self._reply_timeout
+        silent = self._awaits_force and now - self._seen_at >= self._silence
         if self._flow.full and (silence := self._flow.give_up(patience_ends)):
             self.complaint = silence
             self._node.get_logger().warning(silence)
-        elif self._awaits_force and patience_ends:
+        elif silent and self._holds and self._commander_exists():
+            self._loop.hold()
+        elif silent and patience_ends:
             self._loop.controller_present = False
             self._node.get_logger().warning(NO_FORCE)
         self._proceed()
+
+    def _commander_exists(self) -> bool:
+        return any(
+            self._node.count_publishers(self._node.resolve_topic_name(topic.name))
+            for topic in (JOINT_COMMANDS, CONTROL_FORCE)
+        )
 
 
 class RealtimePacer(Pacer):
@@ -278,6 +298,11 @@ class RealtimePacer(Pacer):
         super().stop()
         self._sleeper.wake()
         self._thread.join()
+
+    @property
+    @override
+    def instant(self) -> float | None:
+        return (time.monotonic() - self.deadline(self._loop.sample_number)) / self._interval
 
     def deadline(self, number: int) -> float:
         """Return when a sample is due, s of the monotonic clock."""

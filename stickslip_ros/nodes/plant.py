@@ -3,6 +3,8 @@
 import sys
 import threading
 import time
+from collections.abc import Callable
+from functools import partial
 from math import isfinite, nan
 from typing import Any
 
@@ -10,7 +12,12 @@ from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 
 from stickslip_ros.errors import InvalidInputError, MessageError
-from stickslip_ros.messages.codec import pack_joint_state, pack_wrench, unpack_wrench
+from stickslip_ros.messages.codec import (
+    joint_state_packer,
+    pack_wrench,
+    unpack_command,
+    unpack_wrench,
+)
 from stickslip_ros.messages.topics import (
     APPLIED_DISTURBANCE,
     APPLIED_FORCE,
@@ -18,6 +25,7 @@ from stickslip_ros.messages.topics import (
     CONTROL_FORCE,
     DISTURBANCE_FORCE,
     DROPPED_FORCE,
+    JOINT_COMMANDS,
     JOINT_STATES,
     RECORDED,
     TRUE_JOINT_STATES,
@@ -72,7 +80,10 @@ class PlantNode(ManagedNode[PlantParameters]):
         self._answerable = 0
         """Stamp of the sample that may still be answered while the plant pauses, ns."""
         self._clock_time = self.advertise(CLOCK) if self.parameters.publish_clock else None
-        self.subscribe_serialized(CONTROL_FORCE, self._on_force)
+        self._pack = joint_state_packer(self.parameters.slide_name, self.parameters.belt_name)
+        self.subscribe_serialized(CONTROL_FORCE, partial(self._on_force, unpack_wrench))
+        unpack = partial(unpack_command, joint=self.parameters.slide_name)
+        self.subscribe_serialized(JOINT_COMMANDS, partial(self._on_force, unpack))
         self.subscribe(DISTURBANCE_FORCE, self._on_disturbance, while_active=False)
         self.subscribe(RECORDED, lambda stamp: self._pacer.recorder_came_to(stamp))
         self.keep(self.create_service(Trigger, "~/reset", self._on_reset))
@@ -80,6 +91,7 @@ class PlantNode(ManagedNode[PlantParameters]):
     def start(self) -> None:
         """Start a segment: sample 0 now, the following ones as the pacer advances."""
         self._timing = TimingMonitor()
+        self._superseded = 0
         if self._disturbance:  # the recorder of the new segment has not received it
             self._disturbance = nan
         parameters = self.parameters
@@ -159,6 +171,8 @@ class PlantNode(ManagedNode[PlantParameters]):
             "missed_deadlines": pacer.missed_deadlines,
             "largest_lateness": round(pacer.largest_lateness, 6),
             "steps_per_second": round(pacer.steps_per_second, 1),
+            "silent_samples": loop.silent_samples,
+            "superseded": self._superseded,
             **self.dropped.values,
             **{f"dropped: {reason}": count for reason, count in loop.dropped.items()},
         }
@@ -183,9 +197,9 @@ class PlantNode(ManagedNode[PlantParameters]):
         return diagnosis(complaints, values)
 
     def _publish(self, sample: Sample) -> None:
-        self._state.publish(_packed(sample))
+        self._state.publish(self._packed(sample))
         if self._truth is not None and self._applied_force is not None:
-            self._truth.publish(_packed(self._loop.true_sample))
+            self._truth.publish(self._packed(self._loop.true_sample))
             self._applied_force.publish(pack_wrench(sample.stamp, self._loop.applied_force))
         if self._loop.disturbance != self._disturbance:
             self._disturbance = self._loop.disturbance
@@ -194,6 +208,16 @@ class PlantNode(ManagedNode[PlantParameters]):
             clock = Clock()
             clock.clock.sec, clock.clock.nanosec = divmod(sample.stamp, NANOSECONDS)
             self._clock_time.publish(clock)
+
+    def _packed(self, sample: Sample) -> bytes:
+        friction = sample.friction_force
+        by_actuator = self.parameters.effort == "actuator"
+        return self._pack(
+            sample.stamp,
+            (sample.position, sample.belt_position),
+            (sample.velocity, sample.belt_velocity),
+            (self._loop.applied_force if by_actuator else friction, -friction),
+        )
 
     def _end(self) -> None:
         """Pause: the last sample was reached, or the motion cannot continue."""
@@ -208,22 +232,28 @@ class PlantNode(ManagedNode[PlantParameters]):
         if self.active:
             self.trigger_deactivate()
 
-    def _on_force(self, message: bytes) -> None:
+    def _on_force(self, unpack: Callable[[bytes], tuple[int, float]], message: bytes) -> None:
         try:
-            stamp, force = unpack_wrench(message)
+            stamp, force = unpack(message)
         except MessageError as error:
             if self.active:
                 self.dropped.add(f"control force: {error}")
             return
+        wrench = message if unpack is unpack_wrench else pack_wrench(stamp, force)
         if not self.active:
             if stamp != self._answerable:
-                self._dropped_force.publish(message)
+                self._dropped_force.publish(wrench)
             return
         with self._lock:
-            verdict = self._loop.offer(stamp, force)
-        if verdict is not Verdict.ACCEPTED:
+            if self.parameters.command_rule == "newest":
+                verdict = self._loop.command(force, self._pacer.instant)
+            else:
+                verdict = self._loop.offer(stamp, force)
+        if verdict is Verdict.SUPERSEDED:
+            self._superseded += 1
+        elif verdict is not Verdict.ACCEPTED:
             self.dropped.add(f"control force {force} N stamped {stamp} ns: {verdict}")
-            self._dropped_force.publish(message)
+            self._dropped_force.publish(wrench)
         self._pacer.force_came()
 
     def _on_disturbance(self, stamped_force: tuple[int, float]) -> None:
@@ -244,16 +274,6 @@ class PlantNode(ManagedNode[PlantParameters]):
             self._motion.restart(initial.position, initial.velocity)
         response.success = True
         return response
-
-
-def _packed(sample: Sample) -> bytes:
-    friction = sample.friction_force
-    return pack_joint_state(
-        sample.stamp,
-        (sample.position, sample.belt_position),
-        (sample.velocity, sample.belt_velocity),
-        (friction, -friction),
-    )
 
 
 def main() -> None:

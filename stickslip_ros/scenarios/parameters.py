@@ -131,6 +131,25 @@ class PlantParameters(DriveConstants, NodeParameters):
         "s",
         at_least=_SHORTEST_TIME,
     )
+    command_rule: Literal["answer", "newest"] = at_rest(
+        "answer",
+        "Which force acts: that with the stamp of the sample (answer), or the newest, whatever its "
+        "stamp; in lockstep the first one after each sample, in real time each from its arrival.",
+        choices=("answer", "newest"),
+    )
+    command_timeout: float = at_rest(
+        0.02,
+        "Wall time after which a sample without a command holds the last one (newest, lockstep).",
+        "s",
+        at_least=_SHORTEST_TIME,
+    )
+    effort: Literal["friction", "actuator"] = at_rest(
+        "friction",
+        "What `effort` of the slide is in joint_states: friction, or the force of the actuator.",
+        choices=("friction", "actuator"),
+    )
+    slide_name: str = at_build("slide", "Name of the slide in joint_states and joint_commands.")
+    belt_name: str = at_build("belt", "Name of the belt in joint_states.")
     expects_control: bool = at_rest(True, "Whether the plant expects forces from a controller.")
     flow_window: int = at_rest(
         1000,

@@ -15,9 +15,11 @@ from std_msgs.msg import Header
 from stickslip_ros.errors import MessageError
 from stickslip_ros.messages.codec import (
     joint_state_columns,
+    joint_state_packer,
     pack_header,
     pack_joint_state,
     pack_wrench,
+    unpack_command,
     unpack_header,
     unpack_joint_state,
     unpack_wrench,
@@ -227,6 +229,29 @@ def test_columns_hold_what_the_single_messages_say(states, choices):
     assert str(rows(columns)) == str([tuple(sample) for sample in expected])  # NaN is NaN
     assert columns.stamp.dtype == np.int64
     assert refused == (len(refusals), refusals[0] if refusals else "")
+
+
+@given(stamps, pairs, pairs, pairs, st.text("abc_", max_size=20), st.text("abc_", max_size=20))
+def test_joints_of_other_names_are_packed_as_ros_does(stamp, x, v, u, slide, belt):
+    packed = joint_state_packer(slide, belt)(stamp, x, v, u)
+    message = deserialize_message(packed, JointState)
+    assert list(message.name) == [slide, belt]
+    for values, pair in ((message.position, x), (message.velocity, v), (message.effort, u)):
+        assert list(values) == list(pair)
+    assert joint_state_packer("slide", "belt")(stamp, x, v, u) == pack_joint_state(stamp, x, v, u)
+
+
+@pytest.mark.parametrize(
+    ("effort", "found"), [([1.0, 2.0], 2.0), ([3.0], 3.0), ([], None), ([1.0, math.nan], None)]
+)
+def test_a_command_has_an_effort_of_the_slide_or_one(effort, found):
+    message = JointState(name=["a", "slide"], position=[9.0], effort=effort)
+    message.header.stamp.sec = 4
+    if found is None:
+        with pytest.raises(MessageError, match=r"a joint command .* effort"):
+            unpack_command(serialize_message(message), "slide")
+    else:
+        assert unpack_command(serialize_message(message), "slide") == (4 * 10**9, found)
 
 
 @given(st.lists(st.tuples(stamps, numbers, st.integers(0, 20)), max_size=40))

@@ -36,6 +36,7 @@ class Verdict(StrEnum):
     TOO_LATE = "answers a sample that has passed"
     OVERTAKEN = "overtaken by a newer one"
     """The force was accepted, and a newer one came before it could act."""
+    SUPERSEDED = "came after the command that answers the sample"
 
 
 class SampledLoop:
@@ -52,6 +53,8 @@ class SampledLoop:
     acts, and the older one, which arrives after it, is lost. Without jitter the delay is constant:
     force n acts from n T + delay to (n + 1) T + delay. The actuator of the drive limits a force
     when it arrives.
+
+    A `command` is a force that names no sample, as controllers of other machines send it.
 
     Parameters
     ----------
@@ -127,6 +130,8 @@ class SampledLoop:
         """Number of samples whose force was missing when it was due."""
         self.dropped: Counter[Verdict] = Counter()
         """Number of forces that did not act, by reason."""
+        self.silent_samples = 0
+        """Number of samples for which `hold` took the last command again."""
         self.controller_present = expects_control
         """Whether an answer to the present sample can be expected: one came since the last gap."""
         self._motion = motion
@@ -152,6 +157,7 @@ class SampledLoop:
         self._newest: tuple[int, float] = (-1, 0.0)
         self._sent_number = -1
         self._overtaken = overtaken
+        self._by_arrival = False
         self.follow_disturbance(disturbance)
         self.asked_disturbance = 0.0
         """Disturbance force set by `disturb`, N; acts from the next sample on."""
@@ -237,6 +243,41 @@ class SampledLoop:
             self.controller_present = self._expects_control
         return refusal
 
+    def command(self, force: float, instant: float | None = None) -> Verdict:
+        """Offer a force that names no sample.
+
+        Parameters
+        ----------
+        force : float
+            Control force, N.
+        instant : float, optional
+            When it arrives, periods after the present sample: from then on, plus `force_delay`, it
+            acts until the next command. By default it answers the present sample, if it is the
+            first command that does.
+
+        Returns
+        -------
+        Verdict
+            ACCEPTED, SUPERSEDED for a command after the first one, or NOT_FINITE.
+        """
+        if instant is None:
+            if isfinite(force) and self.answered:
+                return Verdict.SUPERSEDED
+            return self.offer(self.sample.stamp, force)
+        if not isfinite(force):
+            self.dropped[Verdict.NOT_FINITE] += 1
+            return Verdict.NOT_FINITE
+        whole, rest = whole_and_rest(max(instant, 0.0) + self._delay)
+        self._under_way.append((self.sample_number + whole, rest, force, -1))
+        self._by_arrival = True
+        self.controller_present = self._expects_control
+        return Verdict.ACCEPTED
+
+    def hold(self) -> None:
+        """Answer the present sample with the last force: no command comes for it."""
+        self._newest = (self.sample_number, self._newest[1])
+        self.silent_samples += 1
+
     def follow_disturbance(self, signal: Signal) -> None:
         """Take another disturbance of the scenario from the next sample on.
 
@@ -293,17 +334,20 @@ class SampledLoop:
             If the motion is so stiff that it would take too many steps.
         """
         motion, period = self._motion, self.period
-        number, force = self._newest
-        if number != self.sample_number:
-            number, force = self._stand_in()
-        if number > self._sent_number:
-            self._sent_number = number
         now = 0.0
-        if self._immediate:
-            self._acting = force if self._limiter is None else self._limiter(force)
-        else:
-            self._send(number, force)
+        if self._by_arrival:
             now = self._deliver()
+        else:
+            number, force = self._newest
+            if number != self.sample_number:
+                number, force = self._stand_in()
+            if number > self._sent_number:
+                self._sent_number = number
+            if self._immediate:
+                self._acting = force if self._limiter is None else self._limiter(force)
+            else:
+                self._send(number, force)
+                now = self._deliver()
         motion.set_forces(self._acting, self.disturbance)
         self._advance((1.0 - now) * period)
         drive = motion.drive

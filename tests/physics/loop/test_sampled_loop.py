@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from stickslip_ros.physics.loop.controller import Controller
-from stickslip_ros.physics.loop.sampled_loop import SampledLoop
+from stickslip_ros.physics.loop.sampled_loop import SampledLoop, Verdict
 from stickslip_ros.physics.loop.simulation import simulate_sampled
 from stickslip_ros.physics.loop.trajectory import TrajectoryRecorder
 from stickslip_ros.physics.measures import CycleMeter
@@ -313,3 +313,32 @@ def test_a_reset_puts_the_lag_at_rest() -> None:
     loop.offer(loop.sample.stamp, 1.0)
     loop.advance()
     assert motion.applied_force == 0.0
+
+
+def test_the_first_command_answers_a_sample_and_a_silent_one_holds_it() -> None:
+    loop, other = (SampledLoop(Motion(FEED_DRIVE, 0.0, 0.0), 1000.0, SECOND) for _ in range(2))
+    assert loop.command(np.nan) is Verdict.NOT_FINITE
+    assert [loop.command(force) for force in (5.0, 7.0)] == [Verdict.ACCEPTED, Verdict.SUPERSEDED]
+    other.offer(other.sample.stamp, 5.0)
+    assert loop.advance() == other.advance()
+    loop.hold()
+    other.offer(other.sample.stamp, 5.0)
+    assert loop.advance() == other.advance()
+    assert (loop.silent_samples, loop.late_forces, loop.dropped.total()) == (1, 0, 1)
+
+
+def test_a_command_with_an_instant_acts_from_then_until_the_next() -> None:
+    motion = Motion(FEED_DRIVE, 0.0, 0.0)
+    loop = SampledLoop(motion, 1000.0, SECOND, force_delay=0.25e-3)
+    loop.command(50.0, 0.5)
+    loop.command(-20.0, 1.0)
+    samples = [loop.advance() for _ in range(3)]
+    free = Motion(FEED_DRIVE, 0.0, 0.0)
+    expected: list[float] = []
+    for force, duration in ((0.0, 0.75e-3), (50.0, 0.25e-3), (50.0, 0.25e-3), (-20.0, 1.75e-3)):
+        free.set_forces(force, 0.0)
+        free.advance(duration)
+        expected.append(free.position)
+    assert samples[0].position == pytest.approx(expected[1], rel=1e-12)
+    assert samples[2].position == pytest.approx(expected[3], rel=1e-12)
+    assert loop.late_forces == 0
