@@ -20,8 +20,6 @@ from stickslip_ros.physics.model.constants import (
     SMALLEST,
     Parameter,
     constants_of,
-    numbers,
-    with_symbols,
 )
 from stickslip_ros.physics.model.control import CONTROL_LAWS, ControlLaw
 from stickslip_ros.physics.model.drive import Drive
@@ -32,6 +30,7 @@ from stickslip_ros.physics.model.friction import (
     Directional,
     FrictionLaw,
 )
+from stickslip_ros.physics.model.symbols import numbers, with_symbols
 from stickslip_ros.scenarios.validation import ParameterGroup
 
 _Law = TypeVar("_Law", bound=FrictionLaw | ControlLaw)

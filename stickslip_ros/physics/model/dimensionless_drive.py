@@ -10,10 +10,11 @@ from typing import Any, NamedTuple
 import heyoka as hy
 
 from stickslip_ros.physics.model import equations
-from stickslip_ros.physics.model.constants import constants_of, numbers, structure, with_symbols
+from stickslip_ros.physics.model.constants import constants_of
 from stickslip_ros.physics.model.control import ContinuousControl
 from stickslip_ros.physics.model.drive import Drive, DriveConstants, ScaledDrive
 from stickslip_ros.physics.model.hybrid import HybridSystem, Instant, Mode, structure_number
+from stickslip_ros.physics.model.symbols import numbers, structure, with_symbols
 
 POSITION, SPEED, MEMORY = 0, 1, 2
 """Indices of X and Y in a state, and of the first state of the law's memory."""

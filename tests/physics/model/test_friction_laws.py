@@ -15,9 +15,6 @@ from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.model.constants import (
     Parameter,
     constants_of,
-    numbers,
-    structure,
-    with_symbols,
 )
 from stickslip_ros.physics.model.friction import (
     LAWS,
@@ -31,6 +28,7 @@ from stickslip_ros.physics.model.friction import (
     Stribeck,
     Table,
 )
+from stickslip_ros.physics.model.symbols import numbers, structure, with_symbols
 from tests.examples import examples
 from tests.physics import parts
 
