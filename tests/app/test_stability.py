@@ -56,6 +56,7 @@ def test_the_papers_drive(stickslip: Run) -> None:
     "overrides",
     [
         ["plant.friction.law=coulomb"],
+        ["plant.friction.law=coulomb", "plant.damping=0.0"],
         ["plant.belt_speed=0.2", "washout_controller.corner_frequency=3.0"],
         ["plant.belt_speed=0.0", "plant.expects_control=false"],
         ["plant.force_delay=5000.0", "plant.damping=2.0"],

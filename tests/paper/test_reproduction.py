@@ -8,10 +8,11 @@ from typing import Any
 
 import pytest
 
-from stickslip_ros.paper.claims import CLAIMS, Claim, Finding
+from stickslip_ros.paper.claims import CLAIMS, Claim, Finding, Verdict
 from stickslip_ros.paper.figures import NUMBERS
-from stickslip_ros.paper.report import as_markdown
+from stickslip_ros.paper.report import as_markdown, report, verdict_counts
 from tests.paper.test_claims import findings_without_figures
+from tests.paper.test_figures import over_belt_speed
 
 DOCS = Path(__file__).parents[2] / "docs"
 KEPT: Mapping[str, Any] = json.loads((DOCS / "reproduction.json").read_text(encoding="utf-8"))
@@ -59,6 +60,17 @@ def test_the_figures_are_there() -> None:
     assert tuple(figure["number"] for figure in KEPT["figures"]) == NUMBERS
     for figure in KEPT["figures"]:
         assert (DOCS / figure["picture"]).read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_report_has_what_is_kept() -> None:
+    finding = Finding(None, None, Verdict.UNDECIDABLE, "not printed")
+    findings = {claim.identifier: finding for claim in CLAIMS}
+    found = report(findings, {"figure_02.png": over_belt_speed()})
+    for part in ("claims", "figures"):
+        assert {*found[part][0]} == {*KEPT[part][0]}
+    (figure,) = found["figures"]
+    assert figure["caption"].endswith("for 11 values of the belt speed v0 from 0 to 1.")
+    assert verdict_counts(found)[Verdict.UNDECIDABLE] == len(CLAIMS)
 
 
 def test_claims_that_need_no_figure_are_found_as_kept() -> None:

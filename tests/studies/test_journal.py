@@ -313,3 +313,16 @@ def test_a_million_points_need_less_than_two_gigabytes(carry: Continuation | Non
     finally:
         tracemalloc.stop()
     assert held / count < 1_000.0
+
+
+def test_what_is_no_journal_is_refused(path: Path) -> None:
+    """A device, and a line with the checksum of what is nested too deeply."""
+    with pytest.raises(InvalidInputError, match="journal"), Journal(speeds(2), Path(os.devnull)):
+        pass
+    study = speeds(2)
+    interrupted(study, path, 1)
+    begun = path.read_bytes()
+    deep = b"[" * 100_000
+    path.write_bytes(begun + b"%s %08x\n" % (deep, crc32(deep, len(begun))))
+    with pytest.raises(InvalidInputError, match=f"the line at byte {len(begun)} is not as it was"):
+        resumed(study, path)

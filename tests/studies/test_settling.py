@@ -11,6 +11,7 @@ from stickslip_ros.errors import InvalidInputError, RunError
 from stickslip_ros.physics.measures.cycle_measures import Regime
 from stickslip_ros.physics.model.control import Washout
 from stickslip_ros.physics.model.friction import Coulomb, Exponential, Linear, LuGre
+from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.studies import settling
 from stickslip_ros.studies.settling import (
     LONGEST,
@@ -33,6 +34,17 @@ def settle(
     case: ControlledDrive, start: MotionState = REST, course: SettlingOptions | None = None
 ) -> Settled:
     return settling.settle(case, start, course or SettlingOptions(cycles=6))
+
+
+def test_what_no_study_can_take_is_refused() -> None:
+    endless = load_scenario("axis", ["plant.duration=inf"])
+    waiting = paper(f"washout_controller.start_after={10 * LONGEST}")
+    for scenario, sentence in (
+        (endless, "a drive without a spring has no natural period"),
+        (waiting, r"start_after = .* s: in a study it must be at most"),
+    ):
+        with pytest.raises(InvalidInputError, match=sentence):
+            ControlledDrive.from_scenario(scenario)
 
 
 def test_a_motion_begins_with_the_memory_that_another_one_ended_with() -> None:

@@ -194,3 +194,20 @@ def test_what_continuous_control_does_not_have_is_refused_or_a_row_with_the_reas
     one, other = points(sweep_study(paper(), [delay], course=SHORT, continuous=True))
     assert one.reason is None
     assert "plant.force_delay = 0.1 is refused" in (other.reason or "")
+
+
+def test_control_that_starts_late_acts_from_the_second_point_of_a_chain_on() -> None:
+    """After 500 s without control, the vibration decays further from point to point."""
+    washout = ("washout_controller.start_after=500", "washout_controller.linear_gain=-2")
+    late = paper("plant.rate=20", *washout)
+    chain = Grid((Axis("plant.belt_speed", 0.3, 0.31, 2),), Continuation.UP)
+    first, second = compute_columns(Study(late, chain, SettlingOptions(20.0, 2))).points()
+    assert first.amplitude > 0.25
+    assert second.amplitude < 0.8 * first.amplitude
+
+
+def test_where_no_cycle_ends_in_the_measured_time_a_point_says_so() -> None:
+    fast = Grid((Axis("plant.belt_speed", 40.0, 44.0, 2),))
+    for point in compute_columns(Study(free(), fast, SettlingOptions(0.0, 1))).points():
+        assert point.regime is None
+        assert point.reason == "no whole cycle in the measured time"
