@@ -304,7 +304,7 @@ def _asked(
     """Return the expression of each quantity; refuse what is no quantity, or not enough."""
     for name in columns:
         if name not in QUANTITIES:
-            raise InvalidInputError(f"column {name} is refused: {must_be_one_of(name, QUANTITIES)}")
+            raise InvalidInputError(f"column {name} is invalid: {must_be_one_of(name, QUANTITIES)}")
     lacking = [name for name in needed if name not in columns]
     if lacking:
         pairs = "; pairs of velocity and force are read by identify --map" * (

@@ -48,7 +48,7 @@ def fitted_curves(
     InvalidInputError for another law, and for too few pairs.
     """
     if law not in _LAWS:
-        raise InvalidInputError(f"law {law} is refused: {must_be_one_of(law, _LAWS)}")
+        raise InvalidInputError(f"law {law} is invalid: {must_be_one_of(law, _LAWS)}")
     known = np.isfinite(velocity) & np.isfinite(force)
     sides = [side for side in (known & (velocity > 0.0), known & (velocity < 0.0)) if side.any()]
     if not sides or min(map(np.count_nonzero, sides)) < _FEWEST:

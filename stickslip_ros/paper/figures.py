@@ -402,7 +402,7 @@ _PORTRAITS: dict[int, tuple[str, Mapping[str, Sequence[PortraitCase]]]] = {
         },
     ),
     12: (
-        f"Phase portraits near the Hopf speed, sooner and later, {_DRIVE}",
+        f"Phase portraits near the critical feed speed, sooner and later, {_DRIVE}",
         {
             f"2β = {damping:g}, up to τ = {duration:g}": (
                 _cases("v0 =", (0.48, 0.49, 0.492), partial(unit_drive, damping=damping), duration)

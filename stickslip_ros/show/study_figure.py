@@ -143,8 +143,8 @@ def diagram_figure(columns: Columns, study: Study, *, style: FigureStyle = SCREE
     handles += _mark_transitions(panels, study, axis, units)
     for axes in lines:
         axes.set_ylim(bottom=0.0)
-    lines[-1].set_xlabel(units.label(units.named(axis.parameter), axis.unit))
     lines[-1].set_xscale(**_scale(axis))
+    _name_axis(lines[-1].xaxis, axis, units)
     lines[-1].margins(x=0.01)
     style.legend_below(figure, handles, most=3)
     finish(figure)
@@ -196,9 +196,9 @@ def map_figure(
                     colors="black" if black else "white", linewidths=width, linestyles=pattern,
                 )  # fmt: skip
         if axes in (panels[-1], *panels[: 0 if style.narrow else count]):
-            axes.set_xlabel(units.label(units.named(first.parameter), first.unit))
+            _name_axis(axes.xaxis, first, units)
         if axes is panels[0] or style.narrow:
-            axes.set_ylabel(units.label(units.named(second.parameter), second.unit))
+            _name_axis(axes.yaxis, second, units)
         if direction is not None:
             axes.set_title(f"carried {direction} along the {units.named(second.parameter)}")
     if mesh is not None:
@@ -325,6 +325,21 @@ def _shade_hysteresis(panels: Sequence[Axes], columns: Columns, axis: Axis) -> l
     return [Patch(color=_HYSTERESIS, label="up and down differ (hysteresis)")]
 
 
+def _name_axis(drawn: Any, axis: Axis, units: Units) -> None:
+    """Name the axis of a parameter; its numbers get a prefix, but for those of a logarithm."""
+    name = units.named(axis.parameter)
+    divisor, label = units.axis(name, axis.unit, axis.values())
+
+    def shown(value: float, _: int) -> str:
+        return f"{value / divisor:g}"
+
+    if axis.logarithmic:
+        label = units.label(name, axis.unit)
+    elif divisor != 1.0:
+        drawn.set_major_formatter(shown)
+    drawn.set_label_text(label)
+
+
 def _mark_transitions(
     panels: Sequence[Axes], study: Study, axis: Axis, units: Units
 ) -> list[Artist]:
@@ -336,10 +351,9 @@ def _mark_transitions(
             for value in values:
                 axes.axvline(value, **look)
         more = [] if len(values) <= _MOST_SHOWN else ["..."]
-        shown = ", ".join([f"{value:.5g}" for value in values[:_MOST_SHOWN]] + more)
-        unit = units.of_unit(axis.unit)
+        shown = ", ".join(units.texts(values[:_MOST_SHOWN], axis.unit, 5) + more)
         label = transition_label(name, axis.parameter)
-        handles.append(Line2D([], [], **look, label=f"{label} {shown} {unit}".rstrip()))
+        handles.append(Line2D([], [], **look, label=f"{label} {shown}"))
     return handles
 
 

@@ -64,7 +64,7 @@ def test_too_few_pairs_and_other_laws_are_refused() -> None:
         fitted_curves(VELOCITY[13:], forces()[13:])
     with pytest.raises(InvalidInputError, match="there are 0 pairs"):
         fitted_curves(np.zeros(40), forces())
-    with pytest.raises(InvalidInputError, match="law lugre is refused"):
+    with pytest.raises(InvalidInputError, match="law lugre is invalid"):
         fitted_curves(VELOCITY, forces(), "lugre")
 
 
