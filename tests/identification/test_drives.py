@@ -152,7 +152,7 @@ def test_what_is_refused() -> None:
 
 @pytest.mark.long
 def test_friction_without_a_law() -> None:
-    own = study.record("stribeck", "ramp", 3, 2.5)
+    own = study.record("stribeck", "ramp", 3, 1.5)
     found = identify([own], "table", {"normal_force": study.NORMAL_FORCE})
     assert {"mass", "stiffness"} <= found.fitted.keys()
     curve = found.friction()
