@@ -2,11 +2,13 @@
 
 from array import array
 from math import inf
+from typing import Any
 
 import heyoka as hy
 
 from stickslip_ros.physics.model.hybrid import HybridSystem, Instant, Mode, Transition
 from stickslip_ros.physics.motion.compiled_flow import CompiledFlow, Detail, IntegratorPool
+from stickslip_ros.physics.motion.recurrence import Recurrence
 
 STEPS_PER_UNIT = 10_000
 """Integration steps that a motion may take for each unit of time, in the long run."""
@@ -18,6 +20,9 @@ _MOST_STEPS = 1e18
 """Largest number of steps that heyoka accepts."""
 _STEPS_OF_A_PHASE = 10
 """Number of steps that the work around the integration of one phase is worth."""
+
+_LONGEST_STEP = 64.0
+"""Longest step of an integration over a longer time."""
 
 _DIVERGENCE = -1
 """Stands for a guard where the rates exceed any bound."""
@@ -40,8 +45,12 @@ class HybridMotion:
 
     heyoka's adaptive Taylor method integrates the flow of a mode and finds the instant at which the
     margin of a guard falls to zero; the guard then leads to the next mode. A mode with a closed
-    form is not integrated. All values are dimensionless.
+    form is not integrated. A phase of an autonomous system that starts as an earlier one did, to
+    the last bit, is not integrated again. All values are dimensionless.
     """
+
+    recurs = True
+    """Whether phases that are known are not integrated again."""
 
     def __init__(
         self, system: HybridSystem, state: list[float], detail: Detail = Detail.STATES
@@ -53,6 +62,8 @@ class HybridMotion:
         self._detail, self._watched = detail, bool(detail)
         self._integrators = IntegratorPool()
         self._flow: CompiledFlow | None = None
+        self._begun = 0.0
+        """Time of the motion, in the present advance, at which that of the integrator is zero."""
         self._instant = Instant(memoryview(array("d")), [0.0] * len(system.inputs))
         self._use(system)
         self._set_state(state)
@@ -129,9 +140,13 @@ class HybridMotion:
         mode = system.settled(self._mode, instant)
         if mode is not self._mode:
             self._enter(mode)
-        epoch, now = instant.time, 0.0
+        epoch, now, elapsed, self._begun = instant.time, 0.0, 0.0, 0.0
         limits_steps, clocked, has_parts = system.limits_steps, self._clocked, system.has_parts
         slaves = system.slaves
+        is_long = duration > _LONGEST_STEP and not clocked
+        recurrence = None
+        if is_long and self.recurs and Detail.DERIVATIVES not in self._detail:
+            recurrence = Recurrence()
         while now < duration:
             end, corner = duration, self._switch_time - epoch
             if corner < end:
@@ -144,15 +159,22 @@ class HybridMotion:
                 now = end if guard is None else now + elapsed
             else:
                 taylor = flow.taylor
-                taylor.time = now
-                if clocked and flow.epoch is not None:
-                    flow.parameters[flow.epoch] = epoch
+                if clocked:
+                    taylor.time = now
+                    if flow.epoch is not None:
+                        flow.parameters[flow.epoch] = epoch
+                else:  # a phase does not depend on when it starts
+                    self._begun = now
+                    taylor.time = 0.0
+                until = end - self._begun
                 if limits_steps:
-                    longest = system.longest_step(instant)
-                    reached = taylor.propagate_until(end, self._steps_left, longest)
+                    longest = min(system.longest_step(instant), _LONGEST_STEP)
+                    reached = taylor.propagate_until(until, self._steps_left, longest)
+                elif is_long:
+                    reached = taylor.propagate_until(until, self._steps_left, _LONGEST_STEP)
                 else:
-                    reached = taylor.propagate_until(end, self._steps_left)
-                outcome = reached[0].value
+                    reached = taylor.propagate_until(until, self._steps_left)
+                outcome, elapsed = reached[0].value, taylor.time
                 self._steps_left -= reached[3] + _STEPS_OF_A_PHASE
                 if outcome == _NO_EVENT:
                     now = end
@@ -165,9 +187,9 @@ class HybridMotion:
                         flow.take_marks()  # of a phase that is not reported
                         raise TooManyStepsError
                     elif outcome == _STEP_LIMIT:  # the rates leave a step no length
-                        guard, now = _DIVERGENCE, taylor.time
+                        guard, now = _DIVERGENCE, self._begun + elapsed
                     else:
-                        guard, now = -outcome - 1, taylor.time
+                        guard, now = -outcome - 1, self._begun + elapsed
             if slaves:
                 instant.time = epoch + now
                 system.slave(mode, instant)
@@ -197,7 +219,36 @@ class HybridMotion:
                 self.unbounded = True
                 break
             mode = following
-            self._enter(mode)
+            if recurrence is not None and recurrence.is_known(
+                mode, instant.state, elapsed, self._kept()
+            ):
+                now = self._repeat(recurrence, now, duration - _LONGEST_STEP)
+                mode, recurrence = self._mode, None
+            else:
+                self._enter(mode)
+
+    def _repeat(self, recurrence: Recurrence, now: float, latest: float) -> float:
+        """Continue with the known phases that end before `latest`; return the time then.
+
+        Later a step of the integration could be cut short by the end of the advance.
+        """
+        for phase in recurrence.phases():
+            begun, after = now, now + phase.duration
+            if after >= latest:
+                self._instant.state[:] = memoryview(phase.state).cast("d")
+                self._enter(phase.mode)
+                return now
+            now = after
+            if self._watched:
+                self._recall(phase.kept, begun, now)
+        raise AssertionError("the phases have no end")
+
+    def _kept(self) -> Any:
+        """Return what `_recall` needs of the phase that has passed; by default nothing."""
+        return None
+
+    def _recall(self, kept: Any, begun: float, now: float) -> None:
+        """Take note of a phase again, from `begun` to `now`; not called without any detail."""
 
     def _begin(self, now: float, end: float) -> float:
         """Take note of the start of a phase; return its latest end. Not called without detail."""

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from typing import ClassVar
 
 import numpy as np
+from typing_extensions import override
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import RunError
@@ -26,6 +27,10 @@ _LARGEST_FORCE = 1e100
 
 _SLOW_ROUNDING = 1e-9
 """Share of the speed at which a slide becomes slow that is rounding."""
+
+
+_Point = tuple[float | None, float, float, bool]
+"""Breakpoint of a phase: time since its start, None at its end; x, y, and whether it sticks."""
 
 
 class Motion(HybridMotion):
@@ -380,6 +385,7 @@ class RecordedMotion(Motion):
     ) -> None:
         self._recording = Detail.MARKS in self._first_detail
         self._recorded: list[tuple[float, float, float, bool]] = []
+        self._passed: list[_Point] = []
         self._breakpoint_time = 0.0
         self._stick_speed, self._peak, self._was_slow = stick_speed, 0.0, False
         super().__init__(drive, position, velocity, control)
@@ -446,12 +452,24 @@ class RecordedMotion(Motion):
     def _pass(self, mode: Mode, guard: int | None, following: Mode | None, now: float) -> None:
         if not self._recording:
             return
-        state, sticks = self._instant.state, self._system.sticks
-        found = [] if self._flow is None else self._flow.take_marks()
-        found.append((now, state[POSITION], state[SPEED]))
-        for instant, x, y in found:
-            sticking = mode.flow == STICK if sticks else self._stays_slow(mode, instant, y)
-            self._append(instant, x, y, sticking=sticking)
+        state, sticks, begun = self._instant.state, self._system.sticks, self._begun
+        marks = [] if self._flow is None else self._flow.take_marks()
+        self._passed.clear()
+        for instant, x, y in (*marks, (None, state[POSITION], state[SPEED])):
+            time = now if instant is None else begun + instant
+            sticking = mode.flow == STICK if sticks else self._stays_slow(mode, time, y)
+            self._passed.append((instant, x, y, sticking))
+            self._append(time, x, y, sticking=sticking)
+
+    @override
+    def _kept(self) -> tuple[list[_Point], bool]:
+        return self._passed.copy(), self._was_slow
+
+    @override
+    def _recall(self, kept: tuple[list[_Point], bool], begun: float, now: float) -> None:
+        points, self._was_slow = kept
+        for instant, x, y, sticking in points:
+            self._append(now if instant is None else begun + instant, x, y, sticking=sticking)
 
     def _stays_slow(self, mode: Mode, now: float, y: float) -> bool:
         """Return whether the slide has been slow since the last breakpoint.

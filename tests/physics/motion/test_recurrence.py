@@ -1,0 +1,77 @@
+"""A motion with and without its recurrence."""
+
+from collections import Counter
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from stickslip_ros.physics.model.control import Washout
+from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.model.hybrid import Mode
+from stickslip_ros.physics.motion import RecordedMotion
+from tests.examples import examples
+from tests.physics.drives import PAPER
+from tests.physics.motion import random_drives, random_memory_drives
+
+
+def drive_of(law: str, seed: int) -> Drive:
+    """Return a random drive whose belt has a constant speed."""
+    if law in random_drives.LAWS:
+        return random_drives.drive_of_place(seed, law, "step", "disturbance").drive
+    return random_memory_drives.random_memory_drive(law, seed).drive
+
+
+def motion_of(drive: Drive, control: Washout | None, *, recurs: bool) -> RecordedMotion:
+    """Return the motion after long advances, of which two are recorded."""
+    motion = RecordedMotion(drive, 0.0, 0.0, control)
+    motion.recurs, motion.recording = recurs, False
+    period = drive.natural_period
+    motion.advance(60.0 * period)
+    motion.recording = True
+    motion.advance(30.0 * period)
+    motion.advance(13.37 * period)
+    return motion
+
+
+@given(
+    st.sampled_from([*random_drives.LAWS, *random_memory_drives.LAWS]),
+    st.integers(0, 1000),
+    st.none() | st.tuples(st.floats(0.1, 2.0), st.floats(-0.5, 0.2)),
+)
+@examples(quick=30, thorough=300)
+def test_what_recurs_is_equal_to_the_last_bit(
+    law: str, seed: int, gains: tuple[float, float] | None
+) -> None:
+    drive, control = drive_of(law, seed), None
+    if gains is not None:
+        corner, gain = gains
+        scale = drive.normal_force / drive.speed_scale
+        control = Washout(corner * drive.angular_frequency, gain * scale).continuous
+    one, other = (motion_of(drive, control, recurs=recurs) for recurs in (True, False))
+    assert (one.position, one.velocity, one.sticking) == (
+        other.position,
+        other.velocity,
+        other.sticking,
+    )
+    assert (one.memory, one.control_state) == (other.memory, other.control_state)
+    found, known = one.take_breakpoints(), other.take_breakpoints()
+    for name in ("time", "position", "velocity", "sticking"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(known, name))
+
+
+def test_a_settled_cycle_is_not_integrated_again() -> None:
+    motion = RecordedMotion(PAPER, 0.0, 0.0)
+    motion.recording = False
+    motion.advance(100.0)
+    integrated = Counter[bool]()
+    enter = motion._enter
+
+    def counting(mode: Mode) -> None:
+        integrated[motion.recurs] += 1
+        enter(mode)
+
+    motion._enter = counting
+    for motion.recurs in (True, False):
+        motion.advance(1000.0)
+    assert 10 * integrated[True] < 2 * integrated[False]
