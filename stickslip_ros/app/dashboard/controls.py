@@ -248,7 +248,8 @@ class Settings:
                 use = ui.button(f"Use {name}", on_click=partial(self._apply, name))
                 self._use[name] = use.props("outline dense")
                 use.set_enabled(False)
-            ui.checkbox("overlay", value=True, on_change=self._overlay)
+            shown = ui.checkbox("overlay", value=True)
+            shown.on_value_change(lambda event: call("showKept", event.value))
         self._refusal = refusal_label()
         columns = [
             {"name": name, "label": label, "field": name, "align": "left"}
@@ -305,9 +306,6 @@ class Settings:
         if stored.active != self._is_active():
             await self._set_active(stored.active)
         self._refusal.set_text("; ".join(filter(None, refusals)))
-
-    def _overlay(self, event: Any) -> None:
-        call("showKept", bool(event.value))
 
 
 def refusal_label() -> ui.label:

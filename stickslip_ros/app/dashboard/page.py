@@ -48,13 +48,11 @@ _FAREWELL_TIME = 5.0
 _LEAVING_TIME = 0.5
 """Time, s, in which the nodes of a run that ends with the server have left."""
 _MEASURES = (
-    (AMPLITUDE, "amplitude", "m"),
-    (STICK_FRACTION, "stick fraction", ""),
-    (FREQUENCY, "frequency", "Hz"),
+    (AMPLITUDE, "amplitude", "m", 0.0),
+    (STICK_FRACTION, "stick fraction", "", 0.0),
+    (FREQUENCY, "frequency", "Hz", None),
 )
-"""Topic, name and unit of the measures of a cycle."""
-
-_AT_REST = {AMPLITUDE: 0.0, STICK_FRACTION: 0.0, FREQUENCY: None}
+"""Topic, name and unit of the measures of a cycle, and their values at rest."""
 
 _HERE = Path(__file__).parent
 
@@ -191,7 +189,7 @@ class _Page:
             window = ui.toggle(
                 {periods: f"{periods} periods" for periods in PERIODS},
                 value=PERIODS[1],
-                on_change=self._show_window,
+                on_change=lambda event: call("show", event.value),
             )
             window.props("no-caps outline")
             self._view = ui.button("Pause view", on_click=self._pause_view).props("outline no-caps")
@@ -200,7 +198,7 @@ class _Page:
             fit.on("click", js_handler="() => stickslip.fit()")  # also after the server has ended
             csv.on("click", js_handler="() => stickslip.csv()")
             png.on("click", js_handler="() => stickslip.png()")
-            self._facts = ui.label("").classes("w-full text-sm facts")
+            self._facts = ui.label("").classes("w-full text-sm break-words")
 
     def _add_charts(self) -> None:
         self._charts: dict[str, ui.echart] = {}
@@ -215,7 +213,7 @@ class _Page:
                 self._charts["cycles"] = chart(CYCLES, each)
                 with ui.row().classes("w-full gap-4"):
                     self._measures: dict[Any, ui.label] = {}
-                    for topic, name, _ in _MEASURES:
+                    for topic, name, *_ in _MEASURES:
                         with ui.row().classes("gap-1"):
                             ui.label(name).classes("text-sm")
                             self._measures[topic] = ui.label("-").classes("text-sm font-bold")
@@ -293,9 +291,10 @@ class _Page:
         for event in list(listener.events):
             if event.when > self._newest_event:
                 clock = time.strftime("%H:%M:%S", time.localtime(event.when))
-                simulated = units.text(listener.time_of(event.stamp), "s")
+                since = listener.time_of(event.stamp)
+                simulated = "" if since is None else f", t = {units.text(since, 's')}"
                 with self._events:
-                    ui.label(f"{clock}, t = {simulated}: {event.text}").move(target_index=0)
+                    ui.label(f"{clock}{simulated}: {event.text}").move(target_index=0)
                 for old in self._events.default_slot.children[_EVENTS:]:
                     self._events.remove(old)
                 self._newest_event = event.when
@@ -307,10 +306,10 @@ class _Page:
         found: dict[str, str] = {}
         # At rest the last cycles are rounding errors.
         rests = self._listener.health["analyzer"].figures.get("regime") in RESTS
-        for topic, name, unit in _MEASURES:
+        for topic, name, unit, at_rest in _MEASURES:
             values = self._listener.cycles[topic]
             value = values[-1] if values else None
-            found[name] = units.text(_AT_REST[topic] if rests else value, unit)
+            found[name] = units.text(at_rest if rests else value, unit)
         return found | {"regime": self._regime.text}
 
     def _show_waits(self, units: Units) -> None:
@@ -457,9 +456,6 @@ class _Page:
 
     async def _reset(self) -> None:
         await report(self._listener.reset(), self._act_refusal)
-
-    def _show_window(self, event: Any) -> None:
-        call("show", event.value)
 
     def _pause_view(self) -> None:
         paused = self._view.text == "Pause view"
