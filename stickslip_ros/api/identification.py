@@ -14,7 +14,7 @@ from stickslip_ros.bags.text_table import TableFormat
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.identification.findings import Findings, notes_on
 from stickslip_ros.identification.fit import Estimate
-from stickslip_ros.identification.identify import AUTO, identify_recordings
+from stickslip_ros.identification.identify import AUTO, AUTO_TIME, identify_recordings
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.recordings import read_all, read_records
 from stickslip_ros.identification.scenario import written_scenario
@@ -208,6 +208,7 @@ def identify(
     encoding: str | None = None,
     check: Sequence[Path | str] = (),
     progress: Callable[[str], None] = lambda _: None,
+    time_limit: float = AUTO_TIME,
 ) -> Model:
     """Fit a model to recordings of a drive.
 
@@ -235,6 +236,8 @@ def identify(
         Recordings that are not fitted, of which the result says what the model predicts.
     progress : callable, optional
         Receives the name of the friction law that is tried.
+    time_limit : float, optional
+        Processor time for `"auto"`, s, after which the best law so far is taken.
 
     Returns
     -------
@@ -272,7 +275,8 @@ def identify(
         form=TableFormat(decimal, skip, encoding),
         layout=BagLayout(joint, belt_joint, states_topic, force_topic, time, force),
     )
-    found = identify_recordings([read[path] for path in fitted], law, dict(fixed or {}), progress)
+    own = [read[path] for path in fitted]
+    found = identify_recordings(own, law, dict(fixed or {}), progress, time_limit)
     predicted = {
         str(path) if len(read[path].records) == 1 else f"{path}, part {number}": record
         for path in others

@@ -61,6 +61,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="friction law, or auto: the one that predicts best (default: %(default)s)",
     )
     parser.add_argument(
+        "--time-limit",
+        type=float,
+        default=60.0,
+        metavar="S",
+        help="processor time for auto, s; then the best law so far is taken (default: %(default)g)",
+    )
+    parser.add_argument(
         "--fix",
         action="append",
         default=[],
@@ -113,6 +120,7 @@ def run(arguments: argparse.Namespace) -> None:
             columns=columns,
             law=arguments.law,
             fixed=fixed,
+            time_limit=arguments.time_limit,
             start=arguments.start,
             end=arguments.end,
             namespace=arguments.namespace,

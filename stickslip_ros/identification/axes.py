@@ -24,6 +24,7 @@ from stickslip_ros.identification.regression import (
     regress,
     solve,
 )
+from stickslip_ros.identification.time_limit import TimeLimit
 from stickslip_ros.identification.trajectory import Predictor, delayed, free_run
 
 _RESOLVED_ERROR_RATIO = 0.9
@@ -46,6 +47,8 @@ _LEAST_MASS_SHARE = 0.1
 """Smallest mass that is tried there, as a share of that by the forces."""
 _STEP = 1e-4
 """Step of differences, as a share of the value."""
+_CANDIDATES_TIME = 0.6
+"""Share of the time after which no further law is begun."""
 AXIS_LAWS = ("coulomb", "stribeck", "exponential", "table", "lugre")
 """Laws that can be identified for an axis without a spring."""
 
@@ -53,7 +56,9 @@ AXIS_LAWS = ("coulomb", "stribeck", "exponential", "table", "lugre")
 class AxisTask:
     """Records of an axis without a spring, with what is known of it."""
 
-    def __init__(self, records: Sequence[Record], fixed: Mapping[str, float]) -> None:
+    def __init__(
+        self, records: Sequence[Record], fixed: Mapping[str, float], limit: TimeLimit
+    ) -> None:
         if all(not record.held_force.any() for record in records):
             given = any(record.force is not None for record in records)
             hint = "" if given else "; name its column, as in --columns force=u, or of a "
@@ -62,7 +67,8 @@ class AxisTask:
                 f"{'the recorded force is always 0' if given else 'no force is recorded'}: without "
                 f"a force neither mass nor friction of an axis is identifiable{hint}"
             )
-        self.records = records
+        self.records, self.limit = records, limit
+        self.left: list[str] = []
         own = {name: fixed[name] for name in LINEAR if name in fixed}
         self.fixed = {**dict.fromkeys(LINEAR[1:], 0.0), **own}
         self.free = [name for name in LINEAR if name not in self.fixed]
@@ -78,11 +84,18 @@ class AxisTask:
     ) -> list[Candidate]:
         """Return the fits of the laws that compete, or of the one that is asked for."""
         found: list[Candidate] = []
+        self.limit.begin_stage(_CANDIDATES_TIME)
         for each in laws:
-            if not each.memory:
+            if each.memory:
+                continue
+            if found and self.limit.is_over:
+                self.left.append(each.name)
+            else:
                 progress(each.name)
                 found.append(self._with_delay(each))
-        if law in ("auto", "table", "lugre"):
+        if found and self.limit.is_over:
+            self.left += ["table", "lugre"]
+        elif law in ("auto", "table", "lugre"):
             progress("table")
             knots = np.quantile(self.rows.speeds, np.linspace(0.0, 1.0, _KNOTS))
             knots[0] = 0.0

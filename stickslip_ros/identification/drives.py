@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from math import inf, pi, sqrt
+from typing import Any
 
 import numpy as np
 
@@ -23,6 +24,7 @@ from stickslip_ros.identification.laws import (
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.refinement import Refinement, refine, restarted
 from stickslip_ros.identification.regression import LINEAR, Regression, Rows, regress
+from stickslip_ros.identification.time_limit import TimeLimit
 from stickslip_ros.identification.trajectories import Trajectories, segments_of
 from stickslip_ros.identification.trajectory import Predictor
 
@@ -46,6 +48,9 @@ further."""
 _GIVEN_UP_LOSS_RATIO = 100.0
 """A law whose squared error after the first steps is larger than LuGre's by this factor is given
 up."""
+_SEARCH_TIME = 0.7
+"""Share of the time in which laws are searched; in the rest the best ones are fitted further."""
+OUT_OF_TIME = "the time was over before it was fitted to the end"
 _OPTIONAL_GAIN, _OPTIONAL_ERRORS = 0.05, 4.0
 """Share of the squared error, and standard errors, for which one more constant is searched."""
 _ZERO_ERRORS = 3.0
@@ -65,8 +70,11 @@ OPTIONAL = ("damping", "bias_force", DELAY)
 class DriveTask:
     """Records of a drive on a spring, with what is known of it."""
 
-    def __init__(self, records: Sequence[Record], fixed: Mapping[str, float]) -> None:
-        self.records = records
+    def __init__(
+        self, records: Sequence[Record], fixed: Mapping[str, float], limit: TimeLimit
+    ) -> None:
+        self.records, self.limit = records, limit
+        self.left: list[str] = []
         self.normal_force = fixed.get("normal_force", 1.0)
         self.fixed = {name: fixed[name] for name in (*LINEAR, DELAY) if name in fixed}
         self.friction = {
@@ -96,17 +104,23 @@ class DriveTask:
         much worse in the search is not fitted further.
         """
         found: list[Refinement] = []
+
+        def search(own: IdentifiedLaw, name: str, **options: Any) -> None:
+            if found and self.limit.is_over:
+                self.left.append(name)
+                return
+            progress(name)
+            found.append(self.searched(own, **options))
+
+        self.limit.begin_stage(_SEARCH_TIME)
         for each in laws:
             if not each.memory:
-                progress(each.name)
-                found.append(self.searched(each, thorough=not any(map(is_white, found))))
+                search(each, each.name, thorough=not any(map(is_white, found)))
         if law == self.table.name:
-            progress(law)
-            found.append(self.searched(self.table))
+            search(self.table, law)
         if len(self.rows.directions) > 1 and found and not any(map(is_white, found)):
             best = min(found, key=_loss).law
-            progress(f"{best.name} by direction")
-            found.append(self.searched(DirectionalAdapter(best)))
+            search(DirectionalAdapter(best), f"{best.name} by direction")
         # A memory changes the motion near sticking: it does not explain an input that is missing.
         near = not found or (law == AUTO and min(map(_share, found)) < _MISSING_INPUT_ERROR)
         if near and not any(map(is_white, found)):
@@ -114,22 +128,27 @@ class DriveTask:
             for each in laws:
                 if not each.memory:
                     continue
-                progress(each.name)
                 if each is not DAHL and any(map(is_white, found)):
                     break
-                found.append(self.searched(each, like=bristles))
-                if each is LUGRE:
+                search(each, each.name, like=bristles)
+                if found[-1].law is LUGRE:
                     bristles = found[-1]
         if law == AUTO and not any(map(is_white, found)):
-            progress(self.table.name)
-            found.append(self.searched(self.table))
+            search(self.table, self.table.name)
+        return self._finished(found)
+
+    def _finished(self, found: Sequence[Refinement]) -> list[Candidate]:
+        """Return searched models fitted further, the better ones first, as far as time allows."""
         least = min(map(_loss, found))
-        return [
-            self.finished(each)
-            if _loss(each) <= _HOPELESS_LOSS_RATIO * least
-            else Candidate(each, each.losses, "much worse in the search: not fitted further")
+        near = [each for each in found if _loss(each) <= _HOPELESS_LOSS_RATIO * least]
+        candidates = {
+            each: Candidate(each, each.losses, "much worse in the search: not fitted further")
             for each in found
-        ]
+        }
+        for number, each in enumerate(sorted(near, key=_loss)):
+            self.limit.begin_stage(1.0 / (len(near) - number))
+            candidates[each] = self.finished(each)
+        return [*candidates.values()]
 
     def adjusted(self, found: Candidate) -> Candidate:
         """Return what was chosen as it is: its whole motion is fitted already."""
@@ -263,7 +282,11 @@ class DriveTask:
         begun = refine(task, (), near.values)
         fit = self._settled(replace(begun, free=near.free))
         fit = self._with_optional(fit, least_share=0.0)
-        return Candidate(fit, _held_out(fit))
+        held_out = _held_out(fit)
+        if not self.limit.is_over:
+            return Candidate(fit, held_out)
+        self.left.append(fit.law.name)
+        return Candidate(fit, fit.losses, OUT_OF_TIME)
 
     def _regression(self, law: IdentifiedLaw, shape: float | None = None) -> Regression:
         fixed = {name: 0.0 for name in LINEAR if name not in self.free} | {
@@ -274,7 +297,9 @@ class DriveTask:
     def _trajectories(self, law: IdentifiedLaw, length: float) -> Trajectories:
         segments, starts = segments_of(self.records, length)
         directions = self.rows.directions
-        task = Trajectories(law, directions, self.predictors, segments, starts, self.normal_force)
+        task = Trajectories(
+            law, directions, self.predictors, segments, starts, self.normal_force, self.limit
+        )
         # Of the segments of long records one of so many is used.
         stride = -(-sum(len(each.position) for each in self.records) // _MOST_SAMPLES)
         return task.chosen(np.arange(len(segments)) % stride == 0)

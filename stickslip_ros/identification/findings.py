@@ -68,6 +68,8 @@ class Findings:
     """Constants that were given."""
     servo: Servo | None
     """The position controller in the first record that has one."""
+    left: Sequence[str] = ()
+    """Laws that were not fitted to the end, because the time was over."""
     _predicted: dict[tuple[Any, Record], Any] = field(
         default_factory=dict[tuple[Any, Record], Any], init=False, repr=False
     )
@@ -310,6 +312,11 @@ def _notes(found: Findings) -> Sequence[str]:
                 f"{100.0 * own[0].left_out:.2g} % of the samples of {name} are left out: they "
                 f"are in parts of less than {FEWEST} samples between gaps"
             )
+    if found.left:
+        notes.append(
+            f"the time was over before these laws were fitted to the end: {', '.join(found.left)}; "
+            "more time is --time-limit, a single law is --law"
+        )
     if not _SPEEDS_OF_MACHINES[0] <= found.fastest <= _SPEEDS_OF_MACHINES[1]:
         notes.append(
             f"the slide is as fast as {found.fastest:.3g} m/s: check the units of time, position "

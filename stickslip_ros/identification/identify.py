@@ -20,6 +20,7 @@ from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.recordings import ReadRecords
 from stickslip_ros.identification.regression import LINEAR
 from stickslip_ros.identification.servo import servo_of
+from stickslip_ros.identification.time_limit import TimeLimit
 from stickslip_ros.physics.model.constants import constants_of
 from stickslip_ros.physics.model.friction import LAWS
 from stickslip_ros.quantities import number_of
@@ -35,6 +36,10 @@ FIXABLE = (
 """Constants that can be given, by parameter of the plant, of the laws of this package."""
 _CONSTANTS = {name for law in LAWS.values() for name in constants_of(law)}
 """Constants of friction laws, those of other packages among them."""
+AUTO_TIME = 60.0
+"""Processor time that the choice of a law may take by default, s."""
+_FITTING_SHARE = 0.9
+"""Share of the time for fits: a step that has begun ends, and predictions follow."""
 _DELAYS = -1.0, 20.0
 """Delays that can be given, sample periods."""
 _SAME_PERIOD = 0.01
@@ -46,6 +51,7 @@ def identify_recordings(
     law: str,
     fixed: Mapping[str, float | str],
     progress: Callable[[str], None] = lambda _: None,
+    time_limit: float = AUTO_TIME,
 ) -> Findings:
     """Identify a drive from recordings of one machine, as `identify` does from their records.
 
@@ -59,7 +65,8 @@ def identify_recordings(
         known |= each.known
     for target, value in fixed.items():
         known[target.removeprefix("plant.")] = _constant(target, value)
-    return identify([record for each in read for record in each.records], law, known, progress)
+    records = [record for each in read for record in each.records]
+    return identify(records, law, known, progress, time_limit)
 
 
 def fixed_of(texts: Sequence[str]) -> dict[str, float]:
@@ -94,12 +101,14 @@ def identify(
     law: str = AUTO,
     fixed: Mapping[str, float] | None = None,
     progress: Callable[[str], None] = lambda _: None,
+    time_limit: float = AUTO_TIME,
 ) -> Findings:
     """Identify a drive from records of one machine, with a law or with `AUTO`.
 
     A belt that is at rest in all records means an axis that no spring holds, unless a stiffness is
     given: then, and on a belt that moves, the slide is on a spring. `fixed` has the known
-    constants, of `FIXABLE`. `progress` receives the name of each law before it is fitted. Raises
+    constants, of `FIXABLE`. `progress` receives the name of each law before it is fitted. `AUTO`
+    ends after `time_limit`, s, with the best law so far; a single law takes its time. Raises
     InvalidInputError if a name or a value is not allowed, or no model is identifiable.
     """
     fixed = {} if fixed is None else fixed
@@ -118,7 +127,10 @@ def identify(
             f"{', '.join(AXIS_LAWS)}"
         )
     _check_friction(fixed, law, laws, spring=spring)
-    task = (DriveTask if spring else AxisTask)(records, fixed)
+    if not time_limit > 0.0:
+        raise InvalidInputError(f"time limit {time_limit:g} s is invalid: must be above 0 s")
+    limit = TimeLimit(_FITTING_SHARE * time_limit if law == AUTO else inf)
+    task = (DriveTask if spring else AxisTask)(records, fixed, limit)
     candidates = task.candidates(law, laws, progress)
     chosen, as_good = choose(
         [each for each in candidates if law != AUTO or not each.remark] or candidates
@@ -132,6 +144,7 @@ def identify(
         fixed.get("normal_force", 1.0),
         fixed,
         next((servo for servo in servos if servo is not None), None),
+        task.left,
     )
 
 

@@ -18,6 +18,7 @@ from stickslip_ros.identification.fit import (
 )
 from stickslip_ros.identification.laws import DELAY, IdentifiedLaw
 from stickslip_ros.identification.record import Record
+from stickslip_ros.identification.time_limit import OutOfTimeError
 from stickslip_ros.identification.trajectories import Trajectories, segments_of
 from stickslip_ros.identification.trajectory import Predictor
 
@@ -275,7 +276,7 @@ def refine(
     differentiation of pseudo-inverses and nonlinear least squares problems whose variables
     separate, SIAM Journal on Numerical Analysis 10(2), 1973). The search begins at all coordinates
     in `values` and at states of shape (segments, 2), by default the measured ones; it takes `most`
-    steps at most.
+    steps at most, and ends at the best ones so far when the time of the task is over.
     """
     from scipy.optimize import least_squares
 
@@ -287,17 +288,20 @@ def refine(
         least = np.minimum(_BOUND_DISTANCE * np.abs(best), 0.25 * (bounds[1] - bounds[0]))
         inside = least * np.array([[1.0], [-1.0]])
         solve: Any = least_squares  # its types know no function for jac
-        best = solve(
-            fit.residual,
-            np.clip(best, *(bounds + inside)),
-            fit.derivatives,
-            bounds=bounds,
-            x_scale="jac",
-            ftol=1e-7,
-            xtol=1e-8,
-            gtol=1e-12,
-            max_nfev=most,
-        ).x
+        try:
+            best = solve(
+                fit.residual,
+                np.clip(best, *(bounds + inside)),
+                fit.derivatives,
+                bounds=bounds,
+                x_scale="jac",
+                ftol=1e-7,
+                xtol=1e-8,
+                gtol=1e-12,
+                max_nfev=most,
+            ).x
+        except OutOfTimeError:
+            best = fit.best
     return fit.refinement(best, fit.finished(best))
 
 
@@ -329,6 +333,11 @@ class _Projection:
         to_search = task.law.to_search(values, task.fastest) if self._straight else values
         self.first = np.array([to_search[name] for name in free])
         """The point of the coordinates at the start of the search."""
+
+    @property
+    def best(self) -> FloatArray:
+        """The best point so far."""
+        return self.first if self._point is None else self._point
 
     def refinement(self, point: FloatArray, found: _Errors) -> Refinement:
         """Return the errors at a point as a fit."""
@@ -373,6 +382,8 @@ class _Projection:
     def residual(self, point: FloatArray) -> FloatArray:
         """Return the errors at a point, at starts that are best to first order."""
         found = self.at(point)
+        if self._task.limit.is_over:
+            raise OutOfTimeError
         rest = _without_starts(self._task, found.by_start, found.residual[:, None])
         return rest[:, 0] * self._scale
 

@@ -12,6 +12,7 @@ from stickslip_ros.arrays import BoolArray, FloatArray, IntArray
 from stickslip_ros.errors import InvalidInputError, RunError
 from stickslip_ros.identification.laws import DELAY, IdentifiedLaw
 from stickslip_ros.identification.record import Record
+from stickslip_ros.identification.time_limit import TimeLimit
 from stickslip_ros.identification.trajectory import Predictor, Segment, steady_memory
 from stickslip_ros.physics.model.dimensionless_drive import MEMORY
 from stickslip_ros.physics.model.drive import Drive, in_units_of
@@ -48,6 +49,8 @@ class Trajectories:
     starts: FloatArray
     """Measured state at the start of each segment, m and m/s; shape (segments, 2)."""
     normal_force: float
+    limit: TimeLimit
+    """Time after which a search ends."""
 
     @cached_property
     def measured(self) -> FloatArray:

@@ -134,6 +134,14 @@ def test_what_is_refused() -> None:
             identify(records, law, fixed)
 
 
+def test_the_choice_of_a_law_ends_with_the_best_so_far() -> None:
+    found = identify([record("coulomb", 4.0)], time_limit=1e-3)
+    assert found.law == "coulomb"
+    assert any("stribeck, exponential, table, lugre; more time is" in each for each in found.notes)
+    with pytest.raises(InvalidInputError, match="time limit 0 s is invalid: must be above 0 s"):
+        identify([record("coulomb", 4.0)], time_limit=0.0)
+
+
 def test_an_encoder_that_drops_out_leaves_no_traceback() -> None:
     """No mass explains the jumps; the run of nearly none is unbounded."""
     own, random = record("coulomb", 4.0), np.random.default_rng(1)

@@ -14,6 +14,7 @@ import pytest
 import stickslip_ros as ss
 from benchmarks import identification as study
 from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.identification.drives import OUT_OF_TIME
 from stickslip_ros.identification.filtered import filtered
 from stickslip_ros.identification.findings import Findings
 from stickslip_ros.identification.identify import identify
@@ -50,6 +51,16 @@ def test_constants_are_within_their_errors() -> None:
     own = study.record("coulomb", "ramp", seed=7, duration=2.5)
     found = identify([own], "coulomb", {"normal_force": study.NORMAL_FORCE})
     check_constants(found, study.truth("coulomb", "ramp"))
+
+
+def test_a_search_ends_with_the_best_so_far() -> None:
+    """The first law is fitted in any case."""
+    own = study.record("stribeck", "stick", seed=7, duration=2.5)
+    fixed = {"normal_force": study.NORMAL_FORCE, "mass": study.MASS}
+    found = identify([own], fixed=fixed, time_limit=1e-3)
+    assert found.law == "coulomb"
+    assert {"stribeck", "exponential", "lugre", "table", "coulomb"} <= {*found.left}
+    assert found.candidates[0].remark == OUT_OF_TIME
 
 
 def test_rate_and_state_friction_is_recovered() -> None:

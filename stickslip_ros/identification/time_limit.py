@@ -1,0 +1,36 @@
+"""The processor time that the choice of a law may take."""
+
+import time
+from math import inf
+
+
+class OutOfTimeError(Exception):
+    """The time of a stage is over."""
+
+
+class TimeLimit:
+    """Processor time from now on, of this thread, divided into stages.
+
+    Results do not depend on what else the machine does.
+
+    Examples
+    --------
+    >>> from stickslip_ros.identification.time_limit import TimeLimit
+    >>> TimeLimit(60.0).is_over, TimeLimit(0.0).is_over
+    (False, True)
+    """
+
+    def __init__(self, seconds: float = inf) -> None:
+        """Take the time, s; the first stage has all of it."""
+        self.seconds = seconds
+        self._end = self._end_of_stage = time.thread_time() + seconds
+
+    def begin_stage(self, share: float) -> None:
+        """Begin a stage that has a share of what is left."""
+        now = time.thread_time()
+        self._end_of_stage = now + share * max(self._end - now, 0.0)
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the time of the stage is over."""
+        return time.thread_time() >= self._end_of_stage
