@@ -15,7 +15,7 @@ from stickslip_ros.bags.text_table import TableFormat
 from stickslip_ros.identification.fit import Estimate
 from stickslip_ros.identification.friction_map import FittedCurve, fitted_curves
 from stickslip_ros.show.identification_table import constants_table
-from stickslip_ros.show.quantities import SI
+from stickslip_ros.show.quantities import SI, Units
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -37,6 +37,8 @@ class FrictionMap(Result):
     """The law of both directions, or those of forward and of backward motion."""
     notes: Sequence[str]
     """Sentences on how the tables were read."""
+    _units: Units = SI
+    """Units in which it is shown."""
 
     @property
     def law(self) -> str:
@@ -64,8 +66,9 @@ class FrictionMap(Result):
 
     @override
     def parts(self) -> Parts:
-        yield constants_table(f"{self._names}: law {self.law}", self.parameters)
-        yield f"{sum(curve.pairs for curve in self.curves)} pairs, error {SI.text(self.error, 'N')}"
+        yield constants_table(f"{self._names}: law {self.law}", self.parameters, self._units)
+        pairs = sum(curve.pairs for curve in self.curves)
+        yield f"{pairs} pairs, error {self._units.text(self.error, 'N')}"
         yield from self.notes
 
     @override
@@ -73,7 +76,8 @@ class FrictionMap(Result):
         from stickslip_ros.show.identification_figure import map_figure
 
         laws = [curve.law for curve in self.curves]
-        return map_figure(self._names, self.velocity, self.force, laws, style=style)
+        pairs = self.velocity, self.force
+        return map_figure(self._names, *pairs, laws, style=style, units=self._units)
 
     @property
     def _names(self) -> str:
@@ -91,7 +95,7 @@ class FrictionMap(Result):
 
     @override
     def _summary(self) -> Summary:
-        verdict = f"friction law {self.law}, error {SI.text(self.error, 'N')}"
+        verdict = f"friction law {self.law}, error {self._units.text(self.error, 'N')}"
         return Summary("Friction map", self._names, verdict)
 
 
@@ -99,6 +103,7 @@ def friction_map(
     *tables: Path | str,
     columns: Mapping[str, str],
     law: str = "auto",
+    rotary: bool = False,
     decimal: str | None = None,
     skip: int | None = None,
     encoding: str | None = None,
@@ -113,6 +118,8 @@ def friction_map(
         Where they have `velocity` and `force`, as for `read_table`.
     law : {"auto", "coulomb", "exponential"}, optional
         Friction law; by default that with the least information criterion.
+    rotary : bool, optional
+        Whether the velocities are rad/s and the forces N m: they are shown as such.
     decimal, skip, encoding : optional
         Form of the tables, as for `read_table`.
 
@@ -147,4 +154,5 @@ def friction_map(
         np.concatenate([each.values[name] for each in found]) for name in ("velocity", "force")
     )
     notes = dict.fromkeys(note for each in found for note in each.notes)
-    return FrictionMap(paths, velocity, force, fitted_curves(velocity, force, law), [*notes])
+    curves = fitted_curves(velocity, force, law)
+    return FrictionMap(paths, velocity, force, curves, [*notes], Units(rotary=rotary))

@@ -21,6 +21,7 @@ from stickslip_ros.identification.scenario import written_scenario
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.scenarios.files import Scenario, load_scenario
 from stickslip_ros.show.identification_table import identification_tables
+from stickslip_ros.show.quantities import SI, Units
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -36,6 +37,8 @@ class Model(Result):
     """All that was found: candidates, curves, correlations, errors."""
     predicted: Mapping[str, Record] = field(default_factory=dict[str, Record])
     """Recordings that are not fitted, of which the result says what it predicts, by name."""
+    _units: Units = SI
+    """Units in which it is shown."""
 
     @property
     def law(self) -> str:
@@ -118,7 +121,7 @@ class Model(Result):
     def draw(self, style: "FigureStyle") -> "Figure":
         from stickslip_ros.show.identification_figure import identification_figure
 
-        return identification_figure(self.findings, style=style)
+        return identification_figure(self.findings, style=style, units=self._units)
 
     @cached_property
     def predictions(self) -> dict[str, dict[str, float | None]]:
@@ -185,7 +188,8 @@ class Model(Result):
 
     @override
     def parts(self) -> Parts:
-        return identification_tables(self.findings, self.predictions[""], self._checks, self._notes)
+        own = self.predictions[""], self._checks, self._notes
+        return identification_tables(self.findings, *own, self._units)
 
 
 def identify(
@@ -206,6 +210,7 @@ def identify(
     decimal: str | None = None,
     skip: int | None = None,
     encoding: str | None = None,
+    rotary: bool = False,
     check: Sequence[Path | str] = (),
     progress: Callable[[str], None] = lambda _: None,
     time_limit: float = AUTO_TIME,
@@ -232,6 +237,8 @@ def identify(
         Where bags of another machine have motion and force, as for `read_bag`.
     decimal, skip, encoding : optional
         Form of the tables, as for `read_table`.
+    rotary : bool, optional
+        Whether displacements are angles, rad, and forces torques, N m: they are shown as such.
     check : sequence of Path or str, optional
         Recordings that are not fitted, of which the result says what the model predicts.
     progress : callable, optional
@@ -282,4 +289,4 @@ def identify(
         for path in others
         for number, record in enumerate(read[path].records, start=1)
     }
-    return Model(found, predicted)
+    return Model(found, predicted, Units(rotary=rotary))

@@ -64,6 +64,13 @@ class RecordedRun(TabularResult):
     """Whether it is a table, which has no parameters."""
     _namespace: str | None
     """ROS namespace of the drive, where a bag holds several."""
+    _rotary: bool = False
+    """Whether the displacement is an angle."""
+
+    @property
+    def units(self) -> Units:
+        """Units in which the run is shown."""
+        return Units.for_drive(self.drive, rotary=self._rotary)
 
     @property
     def measures(self) -> Measures:
@@ -79,14 +86,15 @@ class RecordedRun(TabularResult):
         """Return what figures draw of the run."""
         from stickslip_ros.show.run_figure import DrawnRun
 
-        return DrawnRun.recorded(self.path, self._history, self.report, self.drive)
+        own = self._history, self.report, self.drive
+        return DrawnRun.recorded(self.path, *own, rotary=self._rotary)
 
     @property
     def verdict(self) -> str:
         """Regime, amplitude, frequency and stick fraction as a line of text."""
         from stickslip_ros.show.panels import measures_text
 
-        return measures_text(self.measures, Units.for_drive(self.drive)) + doubt(self.report)
+        return measures_text(self.measures, self.units) + doubt(self.report)
 
     def settings(self) -> Iterator[TextTable]:
         """Yield the tables of the parameters and versions that were recorded."""
@@ -95,7 +103,7 @@ class RecordedRun(TabularResult):
                 names = [*NODE_PARAMETERS, "versions"]
                 found = {name: recording.metadata(f"stickslip_ros/{name}") for name in names}
             known = {name: texts for name, texts in found.items() if texts}
-            yield from recorded_tables(known, Units.for_drive(self.drive))
+            yield from recorded_tables(known, self.units)
 
     @override
     def _summary(self) -> Summary:
@@ -114,7 +122,7 @@ class RecordedRun(TabularResult):
             "time": time,
             "control_force": _answers(samples, self.forces),
         }
-        units, source = Units.for_drive(self.drive), {"bag": str(self.path)}
+        units, source = self.units, {"bag": str(self.path)}
         return Table(columns, _COLUMNS, units, {"time": time}, source, "time")
 
     @override
@@ -161,6 +169,7 @@ class Comparison(Result):
         return report_tables(
             {path: run.report for path, run in runs.items()},
             {path: run.drive for path, run in runs.items()},
+            {path: run.units for path, run in runs.items()},
         )
 
 
@@ -177,6 +186,7 @@ def read_bag(
     force_topic: str | None = None,
     time: str = "header",
     force: str = "topic",
+    rotary: bool = False,
     slips: SlipThreshold | None = None,
 ) -> RecordedRun:
     """Read a recorded run, and measure it.
@@ -202,6 +212,8 @@ def read_bag(
         `"header"`, the stamps in the messages, or `"log"`, the times of the recorder.
     force : str, optional
         `"topic"`, or `"effort"`: the force is the effort of the joint.
+    rotary : bool, optional
+        Whether displacements are angles, rad, and forces torques, N m: they are shown as such.
     slips : SlipThreshold, optional
         What counts as a slip; by default slips are not looked for.
 
@@ -232,6 +244,7 @@ def read_bag(
         namespace=namespace,
         belt_speed=belt_speed,
         layout=BagLayout(joint, belt_joint, states_topic, force_topic, time, force),
+        rotary=rotary,
         slips=slips,
     )
 
@@ -244,6 +257,7 @@ def read_table(
     end: float = float("inf"),
     stick_speed: float | None = None,
     belt_speed: float | None = None,
+    rotary: bool = False,
     slips: SlipThreshold | None = None,
     decimal: str | None = None,
     skip: int | None = None,
@@ -267,6 +281,8 @@ def read_table(
         the noise is found from the samples.
     belt_speed : float, optional
         Belt velocity, m/s, in place of a column.
+    rotary : bool, optional
+        Whether displacements are angles, rad, and forces torques, N m: they are shown as such.
     slips : SlipThreshold, optional
         What counts as a slip; by default slips are not looked for.
     decimal, skip, encoding : optional
@@ -304,6 +320,7 @@ def read_table(
         end=end,
         stick_speed=stick_speed,
         belt_speed=belt_speed,
+        rotary=rotary,
         slips=slips,
         form=TableFormat(decimal, skip, encoding),
     )
@@ -316,6 +333,7 @@ def recorded_run(
     namespace: str | None = None,
     kept: bool = True,
     drawn: bool = True,
+    rotary: bool = False,
     **options: Any,
 ) -> RecordedRun:
     """Return the run that `report_of_recording` with these options measures.
@@ -336,7 +354,13 @@ def recorded_run(
     observer = history if drawn else None
     table = is_table(path) if table is None else table
     report = report_of_recording(
-        path, table=table, namespace=namespace, observer=observer, **taking, **options
+        path,
+        table=table,
+        namespace=namespace,
+        length="rad" if rotary else "m",
+        observer=observer,
+        **taking,
+        **options,
     )
     drive = None if table else recorded_drive(path, namespace)
     return RecordedRun(
@@ -348,6 +372,7 @@ def recorded_run(
         history,
         table,
         namespace,
+        rotary,
     )
 
 

@@ -112,6 +112,11 @@ def add_columns(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--encoding", metavar="NAME", help="encoding of a table, as utf-16 (default: found)"
     )
+    parser.add_argument(
+        "--rotary",
+        action="store_true",
+        help="show displacements as angles, rad, and forces as torques, N m",
+    )
 
 
 def form_of(arguments: argparse.Namespace) -> "TableFormat":

@@ -127,6 +127,7 @@ def run(arguments: argparse.Namespace) -> None:
             belt_speed=arguments.belt_speed,
             **vars(form_of(arguments)),
             **vars(layout_of(arguments)),
+            rotary=arguments.rotary,
             check=arguments.check,
             progress=lambda law: progress(0.0, f"identifying: {law}"),
         )
@@ -145,8 +146,8 @@ def _fit_map(arguments: argparse.Namespace, columns: Mapping[str, str] | None) -
     for option in ("out", "fix", "check"):
         if getattr(arguments, option):
             raise InvalidInputError(f"--{option}: a map has friction only, and no drive")
-    form = vars(form_of(arguments))
-    found = friction_map(*arguments.recordings, columns=columns or {}, law=arguments.law, **form)
+    options = {"law": arguments.law, "rotary": arguments.rotary, **vars(form_of(arguments))}
+    found = friction_map(*arguments.recordings, columns=columns or {}, **options)
     print_result(arguments, found)
     write_results(arguments, found)
 

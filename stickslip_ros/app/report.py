@@ -102,6 +102,7 @@ def run(arguments: argparse.Namespace) -> None:
             form=form_of(arguments),
             layout=layout_of(arguments),
             slips=slips,
+            rotary=arguments.rotary,
             kept=False,
             drawn=is_drawn(arguments),
         )

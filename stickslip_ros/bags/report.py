@@ -46,6 +46,7 @@ def report_of_recording(
     form: TableFormat = ANY_FORM,
     layout: BagLayout = ANY_LAYOUT,
     slips: SlipThreshold | None = None,
+    length: str = "m",
     observer: RunObserver | None = None,
     take: Callable[[SampleColumns | ForceColumns], None] = lambda _: None,
 ) -> dict[str, Any]:
@@ -81,6 +82,8 @@ def report_of_recording(
         Where a bag of another machine has motion and force; the rest is found.
     slips : SlipThreshold or None
         What counts as a slip; None: slips are not looked for.
+    length : str, optional
+        Unit of the positions in the notes, m or rad.
     observer : RunObserver or None
         Receives the samples and cycles of the whole part, with times as in `start` and `end`.
     take : callable, optional
@@ -145,7 +148,7 @@ def report_of_recording(
                 + f" that can be read; its topics are: {topics or 'none'}: --states-topic and "
                 "--force-topic choose others" + "".join(f"; {sentence}" for sentence in missing)
             )
-    report = run.report(path)
+    report = run.report(path, length)
     notes = [*recording.notes, *report["notes"]]
     if not run.has_states:
         missing.append("the bag holds no joint states: the motion is unknown")
@@ -210,18 +213,19 @@ class _RunReader:
         self._begin_without_states()
         self.meter.finish()
 
-    def report(self, path: Path) -> dict[str, Any]:
+    def report(self, path: Path, length: str) -> dict[str, Any]:
         """Return the measures and counts, and the slips if they were looked for."""
         if self._measured == 0:
             raise InvalidInputError(f"{path} holds no samples {self._ends}")
         report, slips = self.meter.report(), None
         notes = report["notes"]
         if self._feed:
-            advance = quantity(abs(self._feed) * (report["period"] or 0.0), "m")
+            feed = quantity(self._feed, f"{length}/s")
+            advance = quantity(abs(self._feed) * (report["period"] or 0.0), length)
             notes = [
                 *notes,
-                f"the slide advances at {quantity(self._feed, 'm/s')} on a guide at rest: the "
-                f"measures are those of its position less this feed, {advance} in a cycle",
+                f"the slide advances at {feed} on a guide at rest: the measures "
+                f"are those of its position less this feed, {advance} in a cycle",
             ]
         if self._slips is not None:
             drops, rises = self._slips
@@ -233,8 +237,8 @@ class _RunReader:
             if noise is not None and least < _NOISES * noise:
                 notes = [
                     *notes,
-                    f"the least drop of a slip, {quantity(least, 'm')}, is within the noise of the "
-                    f"positions, {quantity(noise, 'm')}: some slips are noise",
+                    f"the least drop of a slip, {quantity(least, length)}, is within the noise of "
+                    f"the positions, {quantity(noise, length)}: some slips are noise",
                 ]
         if self._observer is not None:
             self._observer.take_analysis(RunAnalysis(self.meter.motion.mean_cycle, slips))

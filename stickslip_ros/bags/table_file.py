@@ -410,7 +410,9 @@ def _factor(table: Table, kind: str, asked: Expression) -> tuple[float, list[str
     rotary = _ROTARY.get(unit, unit)
     factor = unit_factor(given, rotary)
     if factor is not None:
-        return factor, [f"{name} is in {given}: what is in {unit} is in {rotary}"]
+        return factor, [
+            f"{name} is in {given}: what is in {unit} is in {rotary}, as --rotary shows"
+        ]
     return 1.0, [f"{name} is in {given}, which is no unit of {kind}: it is taken as {unit}"]
 
 

@@ -12,7 +12,7 @@ from stickslip_ros.arrays import FloatArray
 from stickslip_ros.identification.findings import Findings
 from stickslip_ros.identification.fit import QUANTILE
 from stickslip_ros.physics.model.friction import FrictionLaw
-from stickslip_ros.show.quantities import SI
+from stickslip_ros.show.quantities import SI, Units
 from stickslip_ros.show.style import BLUE, GREEN, ORANGE, SCREEN, FigureStyle, finish, styled
 
 _DOTS: Any = {"marker": ".", "ms": 2.0, "ls": "", "alpha": 0.4, "mew": 0.0, "rasterized": True}
@@ -25,7 +25,9 @@ _NAMES = {1.0: "forward slip", -1.0: "backward slip"}
 
 
 @styled
-def identification_figure(found: Findings, *, style: FigureStyle = SCREEN) -> Figure:
+def identification_figure(
+    found: Findings, *, style: FigureStyle = SCREEN, units: Units = SI
+) -> Figure:
     """Return the figure of what was found.
 
     It has the friction curve with its 95 % band and what was measured; residuals over speed,
@@ -40,7 +42,7 @@ def identification_figure(found: Findings, *, style: FigureStyle = SCREEN) -> Fi
         if narrow
         else [grid[0, :], grid[1, 0], grid[1, 1], grid[2, 0], grid[2, 1]]
     )
-    _friction(figure.add_subplot(first), found)
+    _friction(figure.add_subplot(first), found, units)
     left = found.residuals()
     quantity, error_unit = ("position", "m") if found.has_spring else ("force", "N")
     what = "residual" if style.printed else "measured less fitted"
@@ -52,8 +54,8 @@ def identification_figure(found: Findings, *, style: FigureStyle = SCREEN) -> Fi
         ("m/s", "m", "s"),
         strict=True,
     ):
-        _residuals(figure.add_subplot(place), (values, name, unit), errors)
-    _free_run(figure, last, found)
+        _residuals(figure.add_subplot(place), (values, name, unit), errors, units)
+    _free_run(figure, last, found, units)
     names = ", ".join(dict.fromkeys(Path(record.name).name for record in found.records))
     error = f"{100.0 * found.chosen.error:.4g} %"
     title = f"Identified drive, {names}: law {found.chosen.label}, validation error {error}"
@@ -70,12 +72,13 @@ def map_figure(
     laws: Sequence[FrictionLaw],
     *,
     style: FigureStyle = SCREEN,
+    units: Units = SI,
 ) -> Figure:
     """Return the figure of tests at constant speeds, and the law of each direction, or of both."""
     figure = style.figure(8.0, 5.0)
     axes = figure.add_subplot()
-    scale, label = SI.axis("velocity", "m/s", velocity)
-    force_scale, force_label = SI.axis("force", "N", force)
+    scale, label = units.axis("velocity", "m/s", velocity)
+    force_scale, force_label = units.axis("force", "N", force)
     axes.plot(velocity / scale, force / force_scale, ".", color=BLUE, label="measured")
     for sign, law in ((1.0, laws[0]), (-1.0, laws[-1])):
         size = float(np.max(sign * velocity, initial=0.0))
@@ -91,14 +94,14 @@ def map_figure(
     return figure
 
 
-def _friction(axes: Axes, found: Findings) -> None:
+def _friction(axes: Axes, found: Findings, units: Units) -> None:
     errors = found.errors()
     curves = [found.friction(number) for number in range(len(found.directions))]
     sizes = [np.abs(errors.friction), *(curve.force for curve in curves)]
     top = max(float(np.quantile(each, _SHOWN_SHARE)) for each in sizes if len(each))
-    scale, label = SI.axis("friction force", "N", np.array([top]))
+    scale, label = units.axis("friction force", "N", np.array([top]))
     fastest = max(float(curve.speed[-1]) for curve in curves)
-    speed_scale, speed_label = SI.axis("sliding speed $|v_r|$", "m/s", np.array([fastest]))
+    speed_scale, speed_label = units.axis("sliding speed $|v_r|$", "m/s", np.array([fastest]))
     for curve, direction, colour in zip(curves, found.directions, (BLUE, ORANGE), strict=False):
         own, name = errors.relative_speed * direction > 0.0, _NAMES[direction]
         axes.plot(
@@ -125,11 +128,14 @@ def _friction(axes: Axes, found: Findings) -> None:
 
 
 def _residuals(
-    axes: Axes, over: tuple[FloatArray, str, str], of: tuple[FloatArray, str, str]
+    axes: Axes,
+    over: tuple[FloatArray, str, str],
+    of: tuple[FloatArray, str, str],
+    units: Units,
 ) -> None:
     (values, name, unit), (errors, quantity, error_unit) = over, of
-    scale, label = SI.axis(SI.named(name), unit, values)
-    error_scale, error_label = SI.axis(quantity, error_unit, errors)
+    scale, label = units.axis(units.named(name), unit, values)
+    error_scale, error_label = units.axis(quantity, error_unit, errors)
     axes.plot(values / scale, errors / error_scale, color=BLUE, **_DOTS)
     axes.axhline(0.0, color="black", lw=0.6)
     axes.set_xlabel(label)
@@ -137,21 +143,21 @@ def _residuals(
     axes.set_title(f"residuals over {name}")
 
 
-def _free_run(figure: Figure, place: Any, found: Findings) -> None:
+def _free_run(figure: Figure, place: Any, found: Findings, units: Units) -> None:
     record = found.records[0]
     time = record.period * np.arange(len(record.position))
     run = found.free_run(record)
     below = place.subgridspec(2, 1, height_ratios=(2.0, 1.0))
     upper = figure.add_subplot(below[0])
     lower = figure.add_subplot(below[1], sharex=upper)
-    scale, label = SI.axis(SI.named("displacement"), "m", record.position)
+    scale, label = units.axis(units.named("displacement"), "m", record.position)
     upper.plot(time, record.position / scale, color=BLUE)
     upper.plot(time, run / scale, color=ORANGE, ls="--")
     upper.set_ylabel(label)
     upper.set_title("in-sample: measured, and without feedback (dashed)")
     upper.tick_params(labelbottom=False)
     away = record.position - run
-    scale, label = SI.axis("difference", "m", away)
+    scale, label = units.axis("difference", "m", away)
     lower.plot(time, away / scale, color=GREEN)
     lower.set_xlabel("time (s)")
     lower.set_ylabel(label)

@@ -9,7 +9,7 @@ import numpy as np
 from stickslip_ros.identification.findings import Findings
 from stickslip_ros.identification.fit import QUANTILE, Candidate, Estimate
 from stickslip_ros.scenarios.parameters import PlantParameters
-from stickslip_ros.show.quantities import PREDICTIONS, SI
+from stickslip_ros.show.quantities import PREDICTIONS, SI, Units
 from stickslip_ros.tables import TextTable
 
 _DIGITS = 2, 10
@@ -21,6 +21,7 @@ def identification_tables(
     own: Mapping[str, Any],
     checks: Sequence[Mapping[str, Any]],
     notes: Sequence[str],
+    units: Units = SI,
 ) -> Iterator[TextTable | str]:
     """Yield the tables of what was found.
 
@@ -29,9 +30,9 @@ def identification_tables(
     """
     names = ", ".join(dict.fromkeys(record.name for record in found.records))
     constants = {f"plant.{name}": each for name, each in found.fitted.items()}
-    yield constants_table(f"{names}: law {found.law}", constants)
+    yield constants_table(f"{names}: law {found.law}", constants, units)
     if found.law == "table" or (found.law == "lugre" and not found.has_spring):
-        yield _curve(found)
+        yield _curve(found, units)
     yield TextTable(
         "laws",
         ["law", "constants", "validation error", ""],
@@ -44,7 +45,7 @@ def identification_tables(
     yield TextTable(
         "predictions",
         ["recording", *(quantity.label for quantity in PREDICTIONS.values())],
-        [[name, *_predicted(values)] for name, values in shown],
+        [[name, *_predicted(values, units)] for name, values in shown],
     )
     yield from notes
     for first, second, share in found.correlations:
@@ -53,15 +54,15 @@ def identification_tables(
         yield f"plant.{name} is not identifiable: {why}"
 
 
-def constants_table(title: str, constants: Mapping[str, Estimate]) -> TextTable:
+def constants_table(title: str, constants: Mapping[str, Estimate], units: Units = SI) -> TextTable:
     """Return the table of constants by parameter, such as `plant.mass`, with intervals."""
-    units = {f"plant.{each.name}": each.unit or "" for each in PlantParameters().known.values()}
+    known = {f"plant.{each.name}": each.unit or "" for each in PlantParameters().known.values()}
     rows = [
         [
             name,
-            SI.texts([each.value], units[name], _digits(each))[0],
-            SI.text(each.standard_error, units[name], largest=abs(each.value)),
-            _interval(each, units[name]),
+            units.texts([each.value], known[name], _digits(each))[0],
+            units.text(each.standard_error, known[name], largest=abs(each.value)),
+            _interval(each, known[name], units),
         ]
         for name, each in constants.items()
     ]
@@ -76,13 +77,13 @@ def _digits(estimate: Estimate) -> int:
     return int(np.clip(floor(log10(value)) - floor(log10(error)) + 2, *_DIGITS))
 
 
-def _interval(estimate: Estimate, unit: str) -> str:
+def _interval(estimate: Estimate, unit: str, units: Units) -> str:
     if not isfinite(estimate.standard_error):
         return "unbounded"
-    return " to ".join(SI.texts([*estimate.interval], unit, max(6, _digits(estimate))))
+    return " to ".join(units.texts([*estimate.interval], unit, max(6, _digits(estimate))))
 
 
-def _curve(found: Findings) -> TextTable:
+def _curve(found: Findings, units: Units) -> TextTable:
     rows: list[list[str]] = []
     for number, direction in enumerate(found.directions):
         curve = found.friction(number)
@@ -90,9 +91,9 @@ def _curve(found: Findings) -> TextTable:
         rows += [
             [
                 "forward" if direction > 0.0 else "backward",
-                SI.text(float(curve.speed[place]), "m/s"),
-                SI.text(float(curve.force[place]), "N"),
-                SI.text(QUANTILE * float(curve.standard_error[place]), "N"),
+                units.text(float(curve.speed[place]), "m/s"),
+                units.text(float(curve.force[place]), "N"),
+                units.text(QUANTILE * float(curve.standard_error[place]), "N"),
             ]
             for place in places
         ]
@@ -110,9 +111,9 @@ def _verdict(found: Findings, candidate: Candidate) -> str:
     return f"predicts worse, by {worse:.1f} standard errors" if isfinite(worse) else ""
 
 
-def _predicted(values: Mapping[str, Any]) -> list[str]:
+def _predicted(values: Mapping[str, Any], units: Units) -> list[str]:
     return [
-        SI.text(value, unit) if unit or value is None else _percent(value)
+        units.text(value, unit) if unit or value is None else _percent(value)
         for value, unit in ((values[name], unit) for name, (_, unit, _) in PREDICTIONS.items())
     ]
 

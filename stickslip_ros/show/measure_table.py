@@ -57,13 +57,14 @@ def simulation_tables(
 
 
 def report_tables(
-    reports: Mapping[str, Mapping[str, Any]], drives: Mapping[str, Drive | None]
+    reports: Mapping[str, Mapping[str, Any]],
+    drives: Mapping[str, Drive | None],
+    units: Mapping[str, Units],
 ) -> Iterator[TextTable | str]:
     """Yield the measures of recordings side by side, then slips and sentences of each.
 
-    The reports and the drives that were recorded are by the path of the recording.
+    The reports, the drives that were recorded and the units are by the path of the recording.
     """
-    units = {name: Units.for_drive(drives[name]) for name in reports}
     if len(reports) > 1:
         yield measure_table("", reports, units)
     else:

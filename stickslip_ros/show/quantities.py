@@ -183,6 +183,19 @@ _PARAMETERS = {
 _SCALES = {"plant.mass", "plant.stiffness", "plant.normal_force"}
 
 
+_ROTARY = {
+    "m": "rad",
+    "m/s": "rad/s",
+    "N": "N m",
+    "N/s": "N m/s",
+    "kg": "kg m^2",
+    "N/m": "N m/rad",
+    "N s/m": "N m s/rad",
+    "s/m": "s/rad",
+}
+"""Units of a rotary axis by those of a linear one."""
+
+
 @dataclass(frozen=True)
 class Units:
     """Units of quantities, SI or none, and their labels."""
@@ -190,12 +203,16 @@ class Units:
     dimensionless: bool = False
     terse: bool = False
     """Whether labels omit that a quantity is dimensionless; a capital symbol says it, too."""
+    rotary: bool = False
+    """Whether displacements are angles, and forces torques."""
 
     @classmethod
-    def for_drive(cls, drive: Drive | None, varied: Iterable[str] = ()) -> Self:
+    def for_drive(
+        cls, drive: Drive | None, varied: Iterable[str] = (), *, rotary: bool = False
+    ) -> Self:
         """Return the units of a drive; SI if one of its scales is among the parameters `varied`."""
         unit = drive is not None and drive.is_dimensionless
-        return cls(dimensionless=unit and _SCALES.isdisjoint(varied))
+        return cls(dimensionless=unit and _SCALES.isdisjoint(varied), rotary=rotary)
 
     def shortened(self, *, terse: bool = True) -> Self:
         """Return the same units with terse labels."""
@@ -240,12 +257,15 @@ class Units:
         largest = max((float(np.nanmax(np.abs(a), initial=0.0)) for a in arrays), default=0.0)
         if self.dimensionless or (unit == "s" and largest >= 1.0):
             return 1.0, unit
+        unit = self.of_unit(unit)
         scale, prefix = _prefix_of(unit, largest)
         return scale, prefix + unit
 
     def of_unit(self, unit: str) -> str:
         """Return the unit to show; empty if all is dimensionless."""
-        return "" if self.dimensionless else unit
+        if self.dimensionless:
+            return ""
+        return _ROTARY.get(unit, unit) if self.rotary else unit
 
     def text(self, value: float | None, unit: str, *, largest: float = 0.0) -> str:
         """Return a value (SI) as text with its unit."""

@@ -93,6 +93,8 @@ class DrawnRun(NamedTuple):
     title: str = ""
     disturbed: bool = False
     """Whether a disturbance is added to the control force."""
+    rotary: bool = False
+    """Whether the displacement is an angle."""
 
     @classmethod
     def simulated(cls, scenario: Scenario, history: RunHistory, measures: Measures) -> Self:
@@ -103,11 +105,23 @@ class DrawnRun(NamedTuple):
 
     @classmethod
     def recorded(
-        cls, bag: Path, history: RunHistory, report: Mapping[str, Any], drive: Drive | None
+        cls,
+        bag: Path,
+        history: RunHistory,
+        report: Mapping[str, Any],
+        drive: Drive | None,
+        *,
+        rotary: bool = False,
     ) -> Self:
         """Return a recorded run with the `report` of its bag, and the drive that it holds."""
         notes = [*report["missing"], *report["notes"]]
-        return cls(str(bag), history, measures_of(report), drive, notes, f"Recorded run, {bag}")
+        title, measures = f"Recorded run, {bag}", measures_of(report)
+        return cls(str(bag), history, measures, drive, notes, title, rotary=rotary)
+
+    @property
+    def units(self) -> Units:
+        """Units in which the run is shown."""
+        return Units.for_drive(self.drive, rotary=self.rotary)
 
     @property
     def last_cycles(self) -> DrawnMotion:
@@ -215,7 +229,7 @@ class _Panels:
     """Common part of the panels of a figure: runs and axes."""
 
     def __init__(self, runs: Sequence[DrawnRun], *, narrow: bool, short: bool) -> None:
-        own = {Units.for_drive(run.drive).shortened() for run in runs}
+        own = {run.units.shortened() for run in runs}
         self.units = units = own.pop() if len(own) == 1 else SI
         self.short, self._narrow, self._runs = short, narrow, runs
         self._motions = motions = [run.history.motion for run in runs]

@@ -28,6 +28,7 @@ def test_a_map_gives_friction_alone(table: Path, stickslip: Run, tmp_path: Path)
     assert "law exponential" in done.stdout
     assert "40 pairs" in done.stdout
     assert (tmp_path / "map.png").stat().st_size > 1000
+    assert "s/rad" in stickslip(*arguments, "--rotary").stdout
     model = ss.friction_map(table, columns={"velocity": "v", "force": "f*2"})
     assert stickslip.json(*arguments) == model.to_dict()
     constants = {name: each.value for name, each in model.parameters.items()}

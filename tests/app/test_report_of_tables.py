@@ -1,5 +1,6 @@
 """`stickslip report` of tables: our own CSV files, and those of others."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -46,6 +47,11 @@ def test_any_other_table_is_measured_with_its_columns(stickslip: Run, log: Path)
     assert recorded.measures.regime == "stick_slip"
     assert recorded.forces.force == pytest.approx(-2.0 * recorded.samples.velocity)
     assert len(recorded.to_pandas()) == 2001
+    rotary = stickslip("report", str(log), "--columns", columns, "--rotary").stdout
+    assert "434.1 µrad" in rotary
+    assert not re.search(r"\d [mµn]?(m|m/s|N)$", rotary, re.MULTILINE)
+    angles = ss.read_table(log, dict(part.split("=") for part in columns.split(",")), rotary=True)
+    assert angles.to_pandas().attrs["units"]["position"] == "rad"
     assert recorded.plot() is not None
 
 

@@ -72,3 +72,12 @@ def test_symbols_in_plain_text_become_formulas() -> None:
     assert typeset("k1 = -1, d = 2, μs / μm") == r"$k_1$ = -1, $d$ = 2, $\mu_s$ / $\mu_m$"
     assert typeset("X' has 2β, up to τ = 300") == r"$X'$ has 2$\beta$, up to $\tau$ = 300"
     assert typeset("drive and slide") == "drive and slide"
+
+
+def test_a_rotary_axis_has_angles_and_torques() -> None:
+    units = Units(rotary=True)
+    assert units.texts([0.0025], "m") == ["2.5 mrad"]
+    assert units.texts([0.25], "N") == ["250 mN m"]
+    assert units.texts([20.0], "kg") == ["20 kg m^2"]
+    assert units.texts([4.0], "s") == ["4 s"]
+    assert units.axis("displacement", "m", [0.0025]) == (1e-3, "displacement (mrad)")
