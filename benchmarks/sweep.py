@@ -33,7 +33,7 @@ from stickslip_ros.studies.study import Study, sweep_study
 
 POINTS, SAMPLED_POINTS, ROUNDS = 1000, 3, 5
 MANY_POINTS, MANY_ROUNDS = 20_000, 3
-COURSE = SettlingOptions(transient=100.0)
+SETTLING = SettlingOptions(transient=100.0)
 LOW, HIGH = 0.02, 0.6
 PERIOD = 0.01
 GAINS = (2.0, -1.0, -1.0)
@@ -43,7 +43,7 @@ NO_CONTROL = "plant.expects_control=false"
 def study(points: int, *, control: bool = False, continuous: bool = False) -> Study:
     scenario = load_scenario("paper", [] if control else [NO_CONTROL])
     axes = [Axis("plant.belt_speed", LOW, HIGH, points)]
-    return sweep_study(scenario, axes, course=COURSE, continuous=continuous)
+    return sweep_study(scenario, axes, settling=SETTLING, continuous=continuous)
 
 
 def drives(points: int) -> list[Drive]:
@@ -52,7 +52,7 @@ def drives(points: int) -> list[Drive]:
 
 
 def end(drive: Drive) -> float:
-    return (COURSE.transient + COURSE.cycles + 2) * drive.natural_period
+    return (SETTLING.transient + SETTLING.cycles + 2) * drive.natural_period
 
 
 def ours(asked: Study, workers: int = 1) -> Callable[[], float]:

@@ -327,7 +327,7 @@ def sweep(
             ),
         ],
         continuation=None if carry is None else Continuation(carry),
-        course=_course(SettlingOptions(), transient, cycles),
+        settling=_settling(SettlingOptions(), transient, cycles),
         continuous=continuous,
     )
     columns = compute_columns(
@@ -402,8 +402,8 @@ def basin(
         ends = sample is not None and isinstance(given, tuple) and len(given) == 2
         axes.append(_axis(name, parameter, (*given, 2) if ends else given))
     plan = Grid(tuple(axes)) if sample is None else RandomSample(tuple(axes), sample, seed)
-    course = _course(BASIN_OPTIONS, transient, cycles)
-    study = basin_study(chosen, plan, course=course, continuous=continuous)
+    settling = _settling(BASIN_OPTIONS, transient, cycles)
+    study = basin_study(chosen, plan, settling=settling, continuous=continuous)
     columns = compute_columns(
         study, workers=workers, executor=executor, path=journal, progress=progress
     )
@@ -426,13 +426,13 @@ def _axis(name: str, parameter: str, given: Any, *, listed: bool = False) -> Axi
         ) from None
 
 
-def _course(
-    course: SettlingOptions, transient: float | None, cycles: int | None
+def _settling(
+    settling: SettlingOptions, transient: float | None, cycles: int | None
 ) -> SettlingOptions:
     return replace(
-        course,
-        transient=course.transient if transient is None else transient,
-        cycles=course.cycles if cycles is None else cycles,
+        settling,
+        transient=settling.transient if transient is None else transient,
+        cycles=settling.cycles if cycles is None else cycles,
     )
 
 

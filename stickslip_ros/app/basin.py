@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 from stickslip_ros.app.arguments import add_json, add_scenario, scenario_of
 from stickslip_ros.app.result import add_plot, check_results
-from stickslip_ros.app.study_command import add_running, computed, course_of, finish
+from stickslip_ros.app.study_command import add_running, computed, finish, settling_of
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.studies.options import BASIN_COUNT, BASIN_OPTIONS
 
@@ -55,7 +55,7 @@ def run(arguments: argparse.Namespace) -> None:
     study = basin_study(
         scenario,
         _plan(arguments, scenario),
-        course=course_of(arguments, BASIN_OPTIONS),
+        settling=settling_of(arguments, BASIN_OPTIONS),
         continuous=arguments.continuous_control,
     )
     check_results(arguments)

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 _TABLES = (".csv", ".json")
 
 
-def add_running(parser: argparse.ArgumentParser, course: SettlingOptions) -> None:
-    """Add how each point is followed (default: `course`), where it is computed, and --out."""
+def add_running(parser: argparse.ArgumentParser, settling: SettlingOptions) -> None:
+    """Add how each point is followed (default: `settling`), where it is computed, and --out."""
     parser.add_argument(
         "--continuous-control",
         action="store_true",
@@ -34,14 +34,14 @@ def add_running(parser: argparse.ArgumentParser, course: SettlingOptions) -> Non
     parser.add_argument(
         "--transient",
         type=float,
-        default=course.transient,
+        default=settling.transient,
         metavar="PERIODS",
         help="natural periods that are skipped at each point (default: %(default)g)",
     )
     parser.add_argument(
         "--cycles",
         type=int,
-        default=course.cycles,
+        default=settling.cycles,
         metavar="COUNT",
         help="whole cycles that are measured after them (default: %(default)d)",
     )
@@ -70,7 +70,7 @@ def add_running(parser: argparse.ArgumentParser, course: SettlingOptions) -> Non
     )
 
 
-def course_of(arguments: argparse.Namespace, default: SettlingOptions) -> SettlingOptions:
+def settling_of(arguments: argparse.Namespace, default: SettlingOptions) -> SettlingOptions:
     """Return how each point is followed: as asked for, and otherwise as in `default`."""
     return replace(default, transient=arguments.transient, cycles=arguments.cycles)
 

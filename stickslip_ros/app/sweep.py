@@ -10,7 +10,7 @@ from stickslip_ros.app.arguments import (
     scenario_of,
 )
 from stickslip_ros.app.result import add_html, add_plot, check_results
-from stickslip_ros.app.study_command import add_running, computed, course_of, finish
+from stickslip_ros.app.study_command import add_running, computed, finish, settling_of
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.studies.options import Continuation, SettlingOptions
 
@@ -68,7 +68,7 @@ def run(arguments: argparse.Namespace) -> None:
         scenario,
         axes,
         continuation=None if arguments.carry is None else Continuation(arguments.carry),
-        course=course_of(arguments, SettlingOptions()),
+        settling=settling_of(arguments, SettlingOptions()),
         continuous=arguments.continuous_control,
     )
     check_results(arguments)

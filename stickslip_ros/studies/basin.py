@@ -102,7 +102,7 @@ def basin_study(
     scenario: Scenario,
     plan: Plan,
     *,
-    course: SettlingOptions | None = None,
+    settling: SettlingOptions | None = None,
     continuous: bool = False,
 ) -> Study:
     """Return the study of the starts in a plan.
@@ -115,7 +115,7 @@ def basin_study(
         The scenario; all parameters but the initial state apply.
     plan : Grid or RandomSample
         The starts, over `plant.initial.position` (m) and `plant.initial.velocity` (m/s).
-    course : SettlingOptions, optional
+    settling : SettlingOptions, optional
         How long each motion is followed; by default transients of 50 natural periods, at most 80
         of them.
     continuous : bool
@@ -146,7 +146,7 @@ def basin_study(
         raise InvalidInputError(
             f"a basin is over {POSITION} and {VELOCITY}, not {', '.join(plan.parameters)}"
         )
-    study = Study(scenario, plan, course or BASIN_OPTIONS, continuous)
+    study = Study(scenario, plan, settling or BASIN_OPTIONS, continuous)
     study.check()
     return study
 

@@ -176,7 +176,7 @@ class Settled(NamedTuple):
         return _is_settled(self.measures)
 
 
-def settle(case: ControlledDrive, start: MotionState, course: SettlingOptions) -> Settled:
+def settle(case: ControlledDrive, start: MotionState, settling: SettlingOptions) -> Settled:
     """Simulate the motion from `start` and measure it after the transient.
 
     Raises RunError if the motion is too stiff to integrate.
@@ -190,13 +190,13 @@ def settle(case: ControlledDrive, start: MotionState, course: SettlingOptions) -
     motion.take_breakpoints()  # the start is not part of what is measured
     loads = drive.belt_speed != 0.0 and drive.has_spring
     loading = loading_time(drive) if loads else 0.0
-    transient = course.transient * period
+    transient = settling.transient * period
     controlled = law is not None or case.sampled is not None
     if controlled:  # otherwise one step covers the stick phase on a slow belt
         loading = min(loading, 50.0 * period)
         transient += loading
     # The first and the last cycle are incomplete.
-    cycles = max(course.cycles, LEAST_CYCLES) + 2
+    cycles = max(settling.cycles, LEAST_CYCLES) + 2
     block, longest = cycles * period, cycles * (period + loading)
     if not drive.has_spring:  # forces alone make its cycles
         block = longest = case.duration
@@ -220,7 +220,7 @@ def settle(case: ControlledDrive, start: MotionState, course: SettlingOptions) -
 
     def observe() -> _Section:
         motion.recording = False
-        section = _Section(case.meter(course.cycles), course.cycles, once=not drive.has_spring)
+        section = _Section(case.meter(settling.cycles), settling.cycles, once=not drive.has_spring)
         advance(transient, section)
         if motion.sticking and not controlled and loads:
             left = (release_position(drive) - motion.position) / drive.belt_speed
@@ -237,7 +237,7 @@ def settle(case: ControlledDrive, start: MotionState, course: SettlingOptions) -
         return section
 
     section = observe()
-    for _ in range(course.patience - 1):
+    for _ in range(settling.patience - 1):
         before, section = section.meter.measures(), observe()
         measures = section.meter.measures()
         if _is_settled(measures) and _alike(before, measures, section.meter.drift.resolution):

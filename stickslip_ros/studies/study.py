@@ -79,7 +79,7 @@ class Study:
 
     scenario: Scenario
     plan: Plan
-    course: SettlingOptions = field(default_factory=SettlingOptions)
+    settling: SettlingOptions = field(default_factory=SettlingOptions)
     continuous: bool = False
     """Whether control acts without sampling (eq. 19)."""
 
@@ -132,10 +132,10 @@ class Study:
                 break
         else:
             case = ControlledDrive.from_scenario(self.scenario, continuous=self.continuous)
-        periods = self.course.transient + self.course.cycles + 2
+        periods = self.settling.transient + self.settling.cycles + 2
         if case.sampled is None:
             return periods * 2e-5
-        return self.course.patience * periods * case.period * case.sampled.rate * 1e-5
+        return self.settling.patience * periods * case.period * case.sampled.rate * 1e-5
 
     def as_dict(self) -> dict[str, Any]:
         """Return everything that the result depends on but `contents`, ready for JSON."""
@@ -145,7 +145,7 @@ class Study:
         return {
             "scenario": self.scenario.as_dict(),
             "plan": {"kind": self.plan.kind, **plan},
-            "course": asdict(self.course),
+            "course": asdict(self.settling),
             "continuous_control": self.continuous,
         }
 
@@ -163,7 +163,7 @@ def sweep_study(
     axes: Sequence[Axis],
     *,
     continuation: Continuation | None = None,
-    course: SettlingOptions | None = None,
+    settling: SettlingOptions | None = None,
     continuous: bool = False,
 ) -> Study:
     """Return the study of a scenario over the values of one or two parameters.
@@ -180,7 +180,7 @@ def sweep_study(
     continuation : Continuation, optional
         Direction along the last axis in which each point starts from the end of its neighbour. By
         default every point starts in the scenario's initial state.
-    course : SettlingOptions, optional
+    settling : SettlingOptions, optional
         How long each motion is simulated; by default a transient of 200 natural periods, then 4
         cycles.
     continuous : bool
@@ -210,7 +210,7 @@ def sweep_study(
     if without and not scenario.plant.expects_control:
         raise InvalidInputError(f"{without[0]}: without control there is no controller")
     study = Study(
-        scenario, Grid(tuple(axes), continuation), course or SettlingOptions(), continuous
+        scenario, Grid(tuple(axes), continuation), settling or SettlingOptions(), continuous
     )
     study.check()
     return study
@@ -238,7 +238,7 @@ def _compute_point(
         case, initial = study.case(index)
         if start is not None and case.law is not None:
             case = replace(case, law=replace(case.law, start_after=0.0))
-        settled = settle(case, start or initial, study.course)
+        settled = settle(case, start or initial, study.settling)
     except (StickslipError, ArithmeticError) as error:
         return Point(index, reason=" ".join(str(error).split())), None
     measures, end = settled.measures, settled.end

@@ -25,7 +25,7 @@ def test_a_sweep_is_that_of_the_command() -> None:
     study = sweep_study(
         load_scenario("paper", ["plant.expects_control=false"]),
         [Axis("plant.belt_speed", 0.3, 0.5, 3)],
-        course=SettlingOptions(20.0, cycles=2),
+        settling=SettlingOptions(20.0, cycles=2),
     )
     expected = compute_columns(study)
     for found in (

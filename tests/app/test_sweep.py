@@ -32,7 +32,7 @@ def test_the_table_has_what_the_python_interface_returns(stickslip: Run, tmp_pat
     assert done.returncode == 0, done.stderr
     scenario = load_scenario("paper", ["plant.expects_control=false"])
     study = sweep_study(
-        scenario, [Axis("plant.belt_speed", 0.2, 0.6, 5)], course=SettlingOptions(100.0)
+        scenario, [Axis("plant.belt_speed", 0.2, 0.6, 5)], settling=SettlingOptions(100.0)
     )
     found = compute_columns(study)
     rows = rows_of(tmp_path / "table.csv")

@@ -204,7 +204,7 @@ def test_a_basin_over_anything_else_is_refused() -> None:
 def test_by_default_starts_reach_beyond_the_vibration(overrides: Sequence[str]) -> None:
     scenario = free(*overrides)
     position, velocity = default_axes(scenario, 3)
-    study = basin_study(scenario, Grid((position, velocity)), course=SettlingOptions(100.0))
+    study = basin_study(scenario, Grid((position, velocity)), settling=SettlingOptions(100.0))
     for measures in compute_columns(study).points():
         assert position.first < measures.midpoint - measures.amplitude
         assert position.last > measures.midpoint + measures.amplitude

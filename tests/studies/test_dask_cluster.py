@@ -80,7 +80,9 @@ def cluster(tmp_path: Path) -> Iterator[Cluster]:
 def study(carry: Continuation | None = None) -> Study:
     scenario = load_scenario("paper", ["plant.expects_control=false"])
     axes = [Axis("plant.damping", 0.0, 0.05, 8), Axis("plant.belt_speed", 0.1, 0.6, 40)]
-    return sweep_study(scenario, axes, continuation=carry, course=SettlingOptions(transient=100.0))
+    return sweep_study(
+        scenario, axes, continuation=carry, settling=SettlingOptions(transient=100.0)
+    )
 
 
 @pytest.mark.process  # distributed starts uname

@@ -145,7 +145,7 @@ def test_the_journal_of_another_study_is_refused_with_what_differs(tmp_path: Pat
     for number, (other, difference) in enumerate(
         (
             (replace(study, continuous=True), "continuous_control (True, not False)"),
-            (replace(study, course=SettlingOptions(7.0, 2)), "course.transient (7.0, not 5.0)"),
+            (replace(study, settling=SettlingOptions(7.0, 2)), "course.transient (7.0, not 5.0)"),
             (speeds(6), "plan.axes"),
             (speeds(5, carry=Continuation.UP), "plan.carry ('up', not None)"),
             (replace(study, scenario=free("plant.mass=2.0")), "plant.mass (2.0, not 1.0)"),

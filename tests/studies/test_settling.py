@@ -31,9 +31,9 @@ WEAK = ("washout_controller.linear_gain=-0.05", "washout_controller.cubic_gain=0
 
 
 def settle(
-    case: ControlledDrive, start: MotionState = REST, course: SettlingOptions | None = None
+    case: ControlledDrive, start: MotionState = REST, options: SettlingOptions | None = None
 ) -> Settled:
-    return settling.settle(case, start, course or SettlingOptions(cycles=6))
+    return settling.settle(case, start, options or SettlingOptions(cycles=6))
 
 
 def test_what_no_study_can_take_is_refused() -> None:
@@ -156,7 +156,7 @@ def test_a_loop_settles_on_what_simulate_measures(
     scenario = paper("plant.belt_speed=0.3", "plant.rate=25", "analyzer.window=6", *overrides)
     case = ControlledDrive.from_scenario(scenario, continuous=continuous)
     transient = 100.0 if continuous else 20.0
-    settled = settle(case, course=SettlingOptions(transient, 6)).measures
+    settled = settle(case, options=SettlingOptions(transient, 6)).measures
     duration = (transient + 7.0) * scenario.plant.as_drive().natural_period
     duration += scenario.washout_controller.start_after
     measures = simulate(scenario, duration, continuous=continuous)
@@ -212,7 +212,7 @@ def test_on_a_belt_at_rest_the_slide_sticks_where_friction_holds_it() -> None:
 
 def test_a_motion_may_run_away_after_the_transient() -> None:
     drive = replace(PAPER, belt_speed=0.2, friction=Linear(0.4, 0.9))
-    settled = settle(ControlledDrive(drive), course=SettlingOptions(1.0, 10))
+    settled = settle(ControlledDrive(drive), options=SettlingOptions(1.0, 10))
     assert settled.measures.regime is Regime.UNBOUNDED
     assert len(settled.turning_points) == 0
 
@@ -279,7 +279,7 @@ def test_with_patience_a_start_near_an_unstable_cycle_ends_where_it_belongs(
 
 def test_patience_ends_when_the_motion_is_steady() -> None:
     # Without that it would be followed for a billion periods.
-    settled = settle(ControlledDrive(PAPER), course=SettlingOptions(1000.0, patience=1_000_000))
+    settled = settle(ControlledDrive(PAPER), options=SettlingOptions(1000.0, patience=1_000_000))
     assert settled.steady
 
 

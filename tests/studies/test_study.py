@@ -191,7 +191,7 @@ def test_what_continuous_control_does_not_have_is_refused_or_a_row_with_the_reas
     with pytest.raises(InvalidInputError, match=r"force_delay = 0\.1 is refused: .* must be 0"):
         sweep_study(delayed, [Axis("plant.belt_speed", 0.1, 0.2, 2)], continuous=True)
     delay = Axis("plant.force_delay", 0.0, 0.1, 2)
-    one, other = points(sweep_study(paper(), [delay], course=SHORT, continuous=True))
+    one, other = points(sweep_study(paper(), [delay], settling=SHORT, continuous=True))
     assert one.reason is None
     assert "plant.force_delay = 0.1 is refused" in (other.reason or "")
 

@@ -61,7 +61,7 @@ NOT_JUDGED = "belt, load, disturbance or reference vary: a drift is not judged"
 """Note on measures that do not say whether they drift."""
 
 _CHANGING_KINDS = ("ramp", "sine", "trapezoid", "table", "topic")
-"""Kinds of courses and references that keep changing."""
+"""Kinds of signals and references that keep changing."""
 
 
 def reading_of(

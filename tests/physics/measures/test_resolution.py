@@ -93,11 +93,11 @@ def test_a_few_cycles_within_a_step_that_grow_by_chance_leave_it_steady() -> Non
         "plant.sensor.difference_samples=8",
         "washout_controller.start_after=0",
     ]
-    course = SettlingOptions(transient=60.0)
+    settling = SettlingOptions(transient=60.0)
     for belt in (0.0480, 0.0481818, 0.0484):
         scenario = load_scenario("feed_drive", [*encoder, f"plant.belt_speed={belt}"])
         start = MotionState(scenario.plant.initial.position, scenario.plant.initial.velocity)
-        found = settle(ControlledDrive.from_scenario(scenario), start, course)
+        found = settle(ControlledDrive.from_scenario(scenario), start, settling)
         assert found.measures.regime is Regime.HELD
         assert found.steady
 
