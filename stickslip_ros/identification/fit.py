@@ -274,11 +274,19 @@ def choose(candidates: Sequence[Candidate]) -> tuple[Candidate, Mapping[str, boo
     """Return the simplest model that predicts as well as any, and which others do, by label.
 
     A model is as good as the best one if the difference of their validation errors is within three
-    standard errors, from its scatter over the parts.
+    standard errors, from its scatter over the parts, or if it is simpler and better than such a
+    one. A model with constants that the records do not tell is chosen only if all have some.
     """
     best = min(candidates, key=lambda each: each.error)
-    as_good = [each for each in candidates if each is best or better_by(best, each) < _SIGNIFICANT]
-    chosen = min(as_good, key=lambda each: (each.size, each.error))
+    near = [each for each in candidates if each is best or better_by(best, each) < _SIGNIFICANT]
+    # An error that scatters much is within it, too: what is simpler and better is as good as that.
+    as_good = [
+        each
+        for each in candidates
+        if any(each.size <= other.size and each.error <= other.error for other in near)
+    ]
+    told = [each for each in as_good if np.isfinite(np.diag(each.fit.covariance)).all()]
+    chosen = min(told or as_good, key=lambda each: (each.size, each.error))
     return chosen, {each.label: each in as_good for each in candidates}
 
 

@@ -1,9 +1,12 @@
-"""Covariances of fits: what rows do not tell has no finite error."""
+"""Covariances of fits: what rows do not tell has no finite error; the choice of a law."""
+
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
-from stickslip_ros.identification.fit import block_covariance, propagated
+from stickslip_ros.identification.fit import Candidate, block_covariance, choose, propagated
 
 _ROWS = 2400
 
@@ -36,3 +39,30 @@ def test_what_depends_on_an_untold_constant_has_no_finite_error() -> None:
 
 def test_no_constants_have_no_covariance() -> None:
     assert block_covariance(np.empty((_ROWS, 0)), np.ones(_ROWS)).shape == (0, 0)
+
+
+def candidate(name: str, errors: list[float], variances: list[float]) -> Candidate:
+    """Return a fit with an error in each block, a share, and variances of its constants."""
+    law = SimpleNamespace(name=name, deflection=0.0)
+    fit: Any = SimpleNamespace(
+        law=law, point=variances, covariance=np.diag(variances), has_spring=False, scale=1.0
+    )
+    return Candidate(fit, np.square(errors))
+
+
+def test_the_simplest_within_the_error_is_chosen() -> None:
+    """An error that scatters much is within that of the best one, but no reason for more."""
+    best = candidate("table", [0.050] * 6, [1.0] * 9)
+    plain = candidate("coulomb", [0.056, 0.057, 0.058] * 2, [1.0] * 5)
+    rough = candidate("stribeck", [0.03, 0.08, 0.05] * 2, [1.0] * 7)
+    assert plain.error < rough.error
+    chosen, as_good = choose([rough, plain, best])
+    assert chosen is plain
+    assert as_good == {"stribeck": True, "coulomb": True, "table": True}
+
+
+def test_a_law_with_constants_that_are_not_told_is_not_chosen() -> None:
+    untold = candidate("coulomb", [0.05] * 6, [1.0, np.inf])
+    told = candidate("stribeck", [0.05] * 6, [1.0] * 3)
+    assert choose([untold, told])[0] is told
+    assert choose([untold])[0] is untold
