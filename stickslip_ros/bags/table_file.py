@@ -247,25 +247,30 @@ def quantities_of(
         for places in dict.fromkeys(clocks.values())
     }
     main = absolute[asked["time"].places]
-    rows = np.flatnonzero(np.isfinite(main))
+    known = np.isfinite(main)
+    rows = np.flatnonzero(known)
     if not len(rows):
         raise InvalidInputError(f"{table.path}: no time is a finite number")
     times = {
         places: np.asarray((each - main[rows[0]]) * factors["time"], float)
         for places, each in absolute.items()
     }
-    time = times[asked["time"].places][rows]
+    clock = times[asked["time"].places]
+    time = clock if known.all() else clock[rows]
     _check_order(table, time, rows)
     values: dict[str, FloatArray] = {}
     for name, each in asked.items():
         if name == "time":
             continue
         value = each.value([np.asarray(cells[place], float) for place in each.places])
-        value = _measurable(value * factors[name])
-        if np.array_equal(times[clocks[name]], times[asked["time"].places], equal_nan=True):
-            values[name] = np.broadcast_to(value, main.shape)[rows]
+        value = _measurable(value if factors[name] == 1.0 else value * factors[name])
+        own = times[clocks[name]]
+        if own is clock or np.array_equal(own, clock, equal_nan=True):
+            if np.shape(value) != main.shape:
+                value = np.full(main.shape, value)
+            values[name] = value if known.all() else value[rows]
         else:
-            values[name] = _at(time, times[clocks[name]], value, hold=name in _FORCES)
+            values[name] = _at(time, own, value, hold=name in _FORCES)
             notes.append(f"{name} has times of its own, those of column #{clocks[name][0] + 1}")
     present = np.isfinite(values["position"])
     if not present.any():
@@ -454,7 +459,7 @@ def _without_faults(
         position[present[lost]] = nan
         yield (
             f"the position jumps away and back, as no motion does, in {np.count_nonzero(lost)} "
-            f"rows, the first is {table.line(int(rows[present[lost][0]]))}: they are left out"
+            f"rows, the first is {line(present[lost])}: they are left out"
         )
     if "velocity" not in values:
         return
@@ -523,12 +528,14 @@ def _recording(path: Path, found: Quantities) -> TableRecording:
         )
     if "belt_velocity" not in values:
         notes.append("the belt velocity is not recorded: the belt counts as at rest")
-    by_position = unknown.copy()
-    by_position[present] = differences(time[present], position[present])
+    if lacking.any():
+        by_position = np.full(len(time), nan)
+        by_position[present] = differences(time[present], position[present])
+        velocity = np.where(lacking, by_position, velocity)
     samples = SampleColumns(
         stamp,
         position,
-        np.where(lacking, by_position, velocity),
+        velocity,
         values.get("friction_force", unknown),
         unknown,
         values.get("belt_velocity", rest),
@@ -550,10 +557,12 @@ def differences(time: FloatArray, position: FloatArray) -> FloatArray:
     """Return the velocity at each time, by the positions on both sides; NaN where time stands."""
     if len(time) < 2:
         return np.zeros(len(time))
-    after = np.minimum(np.arange(len(time)) + 1, len(time) - 1)
-    before = np.maximum(np.arange(len(time)) - 1, 0)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        return (position[after] - position[before]) / (time[after] - time[before])
+        moved, lasted = (
+            np.concatenate([each[1:2] - each[:1], each[2:] - each[:-2], each[-1:] - each[-2:-1]])
+            for each in (position, time)
+        )
+        return moved / lasted
 
 
 def own_columns(path: Path, known: Mapping[str, int]) -> dict[str, str]:
