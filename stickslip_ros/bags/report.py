@@ -5,6 +5,7 @@ from collections.abc import Callable, Mapping
 from contextlib import ExitStack, suppress
 from math import inf
 from pathlib import Path
+from sys import float_info
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from stickslip_ros.bags.table_file import TableRecording, is_table, read_table
 from stickslip_ros.bags.text_table import ANY_FORM, TableFormat
 from stickslip_ros.errors import BagError, InvalidInputError
 from stickslip_ros.messages.topics import CONTROL_FORCE, JOINT_STATES
+from stickslip_ros.physics.measures.cycle_measures import Regime
 from stickslip_ros.physics.measures.feed import relative_to_feed
 from stickslip_ros.physics.measures.run_meter import RunAnalysis, RunMeter, RunObserver
 from stickslip_ros.physics.measures.sample_meter import SampleAssumptions, reading_of
@@ -28,6 +30,8 @@ from stickslip_ros.text import quantity
 
 _DEFAULT_WINDOW = 20
 """Cycles to average over for a recording of others."""
+_LEAST_STEPS, _LEAST_SAMPLES = 5.0, 15.0
+"""Steps of the encoder in the amplitude, and samples per cycle, below which a stick may hide."""
 _NOISES = 6.0
 """Least drop of a slip, in standard deviations of the noise, that is not noise."""
 
@@ -227,6 +231,14 @@ class _RunReader:
                 f"the slide advances at {feed} on a guide at rest: the measures "
                 f"are those of its position less this feed, {advance} in a cycle",
             ]
+        if self._whole and report["regime"] == Regime.PURE_SLIP:
+            steps = report["amplitude"] / (self.meter.motion.drift.resolution or float_info.min)
+            each = report["period"] / report["duration"] * report["samples"]
+            few = f"{steps:.2g} steps of the encoder in the amplitude" * (steps < _LEAST_STEPS)
+            few = few or f"{each:.2g} samples per cycle" * (each < _LEAST_SAMPLES)
+            if few:
+                report = {**report, "regime": None, "stick_fraction": None}
+                notes = [*notes, f"the regime is not known: {few} do not tell whether it sticks"]
         if self._slips is not None:
             drops, rises = self._slips
             rising = not drops.count and rises.count > 0

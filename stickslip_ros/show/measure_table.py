@@ -80,7 +80,7 @@ def report_tables(
 def report_sentences(report: Mapping[str, Any], drive: Drive | None) -> list[str]:
     """Return what a recording lacks, what makes its measures doubtful, and why it has no regime."""
     sentences = [*report["missing"], *report["notes"]]
-    if report["samples"] > 0:
+    if report["samples"] > 0 and not report["cycles"]:
         reason = why_no_cycle(report["regime"], report["duration"], drive)
         sentences += [] if reason is None else [reason]
     return sentences

@@ -200,3 +200,23 @@ def test_a_table_on_a_guide_at_rest_has_the_measures_of_its_stick_slip(tmp_path:
     assert any("advances at 10 mm/s on a guide at rest" in note for note in notes)
     assert any("6.677 mm in a cycle" in note for note in notes)
     assert any("the slips are rises" in note for note in notes)
+
+
+@pytest.mark.parametrize(
+    ("rate", "step", "reason"),
+    [
+        (500.0, 1e-3, "2.6 steps of the encoder in the amplitude"),
+        (8.0, 1e-6, "5.4 samples per cycle"),
+    ],
+)
+def test_coarse_data_do_not_tell_whether_it_sticks(
+    tmp_path: Path, rate: float, step: float, reason: str
+) -> None:
+    time, position = stairs(rate, 6.0 if rate > 100.0 else 30.0)
+    rounded = np.round((position if rate < 100.0 else 0.01 * time - position) / step) * step
+    path = csv_of(tmp_path / "log.csv", **lists(t=time, x=rounded))
+    belt = {"belt_velocity": "0.01"} if rate > 100.0 else {}
+    report = report_of_recording(path, {"time": "t", "position": "x", **belt})
+    assert (report["regime"], report["stick_fraction"]) == (None, None)
+    assert report["amplitude"] == pytest.approx(2.5e-3, rel=0.15)
+    assert f"the regime is not known: {reason} do not tell whether it sticks" in report["notes"]
