@@ -53,6 +53,9 @@ _SEARCH_TIME = 0.7
 OUT_OF_TIME = "the time was over before it was fitted to the end"
 _OPTIONAL_GAIN, _OPTIONAL_ERRORS = 0.05, 4.0
 """Share of the squared error, and standard errors, for which one more constant is searched."""
+_CLEAR_GAIN = 0.5
+"""Share of the squared error for which it is searched in any case: where the error is that of what
+is missing, it makes the standard error large."""
 _ZERO_ERRORS = 3.0
 """Standard errors by which such a constant must differ from zero."""
 AUTO = "auto"
@@ -259,7 +262,8 @@ class DriveTask:
             if name in self.fixed or name in fit.free:
                 continue
             errors, share = fit.gain(name)
-            if abs(errors) < _OPTIONAL_ERRORS or share < least_share:
+            unclear = abs(errors) < _OPTIONAL_ERRORS and share < _CLEAR_GAIN
+            if unclear or share < least_share:
                 continue
             more = refine(fit.task, [*fit.free, name], fit.values, fit.starts, most=_STEPS)
             if _loss(more) >= _loss(fit):

@@ -63,6 +63,19 @@ def test_a_search_ends_with_the_best_so_far() -> None:
     assert found.candidates[0].remark == OUT_OF_TIME
 
 
+def test_a_delay_that_is_there_is_found() -> None:
+    """Errors without it scatter so much that hardly any constant seems to be needed."""
+    own = study.record("stribeck", "taps", seed=1, duration=2.5)
+    assert own.force is not None
+    assert own.disturbance is not None
+    late = {"force": np.roll(own.force, -2), "disturbance": np.roll(own.disturbance, -2)}
+    fixed = {"normal_force": study.NORMAL_FORCE}
+    found = identify([replace(own, **late).part(0, len(own.force) - 2)], "stribeck", fixed)
+    assert found.delay == pytest.approx(2e-3, abs=2e-5)
+    mass = found.fitted["mass"]
+    assert abs(mass.value - study.MASS) < _FAR * mass.standard_error < 0.01 * study.MASS
+
+
 def test_rate_and_state_friction_is_recovered() -> None:
     own = study.record("rate_state", "ramp", seed=0, duration=2.5)
     found = identify([own], "rate_state", {"normal_force": study.NORMAL_FORCE})
