@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray, IntArray
+from stickslip_ros.bags.faults import dropouts
 from stickslip_ros.errors import BagError, InvalidInputError, MessageError
 from stickslip_ros.messages.cdr import Layout, Messages, Refused, decode
 from stickslip_ros.messages.codec import (
@@ -30,6 +31,8 @@ _FEWEST = 100
 """Fewest samples that are judged."""
 _STANDING_SHARE = 0.1
 """Share of the stamps that are those of the sample before, from which they are of no use."""
+_ZERO_SHARE = 0.01
+"""Share of stamps of 0, from which they are those of a publisher."""
 _FINEST = 10_000
 """Smallest rounding of stamps, ns, that is one."""
 _JUMP = 10.0
@@ -135,6 +138,7 @@ class MotionReader:
         self._left_out = Counter[str]()
         self._samples = self._standing = self._zero = self._step = 0
         self._last_stamp = -1
+        self._belt = nan
         self._grid: tuple[int, int, int] | None = None
 
     @property
@@ -180,11 +184,12 @@ class MotionReader:
         if self._own:
             self._check_stamps(samples.stamp)
             return samples, forces, refused
-        samples = self._of_the_joint(samples)
-        self._check_stamps(samples.stamp)
-        if self._layout.force == "effort":
-            forces = ForceColumns(samples.stamp, samples.friction_force)
-        return self._completed(samples), forces, refused
+        with np.errstate(all="ignore"):  # values of others may overflow
+            samples = self._of_the_joint(samples)
+            self._check_stamps(samples.stamp)
+            if self._layout.force == "effort":
+                forces = ForceColumns(samples.stamp, samples.friction_force)
+            return self._completed(samples), forces, refused
 
     def _choose(self, messages: Messages) -> None:
         """Find the joint by the names in the first messages."""
@@ -209,12 +214,7 @@ class MotionReader:
             return
         others = [name for name in known if name != belt]
         if joint is None and len(others) != 1:
-            raise BagError(
-                printable(
-                    f"the joint states {self._where} are of the joints {_listed(others)}: "
-                    "--joint NAME must choose one"
-                )
-            )
+            raise self._several(others)
         self._joint = others[0] if joint is None else joint
         for option, name in (("joint", self._joint), ("belt_joint", belt)):
             if name is not None and name not in known:
@@ -230,18 +230,24 @@ class MotionReader:
             self._layout_of = self._only_joint
 
     def _only_joint(self, data: bytes) -> Layout:
-        names = joint_names(data)
-        if self._joint not in names:
-            raise BagError(
-                printable(
-                    f"the joint states {self._where} are of the joints "
-                    f"{_listed([self._joint, *names])}: --joint NAME must choose one"
-                )
+        """Return the layout of the only joint; refuse messages of others."""
+        names, belt = joint_names(data), self._layout.belt_joint
+        if self._joint not in names and belt not in names:
+            raise self._several([self._joint, *names])
+        return joint_layout(data, self._joint, belt)
+
+    def _several(self, names: Iterable[str]) -> BagError:
+        return BagError(
+            printable(
+                f"the joint states {self._where} are of the joints {_listed(names)}: --joint NAME "
+                "must choose one"
             )
-        return joint_layout(data, self._joint, self._layout.belt_joint)
+        )
 
     def _of_the_joint(self, samples: SampleColumns) -> SampleColumns:
         """Return the samples that tell of the joint."""
+        if self._layout.belt_joint is not None:
+            samples = self._with_held_belt(samples)
         position, velocity = np.isfinite(samples.position), np.isfinite(samples.velocity)
         if self._known is None and (position | velocity).any():
             both, positions = map(np.count_nonzero, (position & velocity, position))
@@ -258,6 +264,16 @@ class MotionReader:
                 self._left_out[why] += int(np.count_nonzero(lacking))
                 kept &= ~lacking
         return self._of_one_source(samples if kept.all() else samples[kept])
+
+    def _with_held_belt(self, samples: SampleColumns) -> SampleColumns:
+        """Return the samples with the newest velocity of a belt that has messages of its own."""
+        belt = np.append(self._belt, samples.belt_velocity)
+        newest = np.maximum.accumulate(np.where(np.isfinite(belt), np.arange(len(belt)), 0))
+        if not np.isfinite(self._belt) and np.isfinite(belt).any():
+            newest[newest == 0] = newest[newest > 0][0]
+        belt = belt[newest]
+        self._belt = float(belt[-1])
+        return replace(samples, belt_velocity=belt[1:])
 
     def _check_effort(self, effort: FloatArray) -> None:
         if self._layout.force == "effort" and not np.isfinite(effort).any():
@@ -282,17 +298,25 @@ class MotionReader:
             phase = (stamp - first) % period
             is_second = np.abs(phase - second) < np.minimum(phase, period - phase)
             return samples[is_second if self._source > 1 else ~is_second]
-        steps = np.diff(samples.position)
-        if len(stamp) < _FEWEST or np.mean(steps[1:] * steps[:-1] < 0.0) < 1.0 - _STANDING_SHARE:
+        if len(stamp) < _FEWEST or np.isnan(samples.position).any():
             return samples
-        apart = float(np.median(np.abs(steps)))
-        if apart > _JUMP * np.median(np.abs(steps[1:] + steps[:-1])):
+        steps = np.diff(samples.position)
+        sizes = np.abs(steps)
+        returns = np.minimum(sizes[1:], sizes[:-1]) > _JUMP * np.abs(steps[1:] + steps[:-1])
+        apart = float(np.median(sizes))
+        if np.mean(returns) > 1.0 - _STANDING_SHARE and apart > 0.0:
             raise BagError(
                 f"two sources take turns {self._where}: every other position of "
                 f"{printable(self._joint)} is {apart:.4g} m away; --states-topic "
                 f"'{self._topic}[1]' takes the first, [2] the second"
             )
-        return samples
+        usual = np.quantile(sizes[sizes > 0.0], 0.25) if apart > 0.0 else 0.0
+        strange = dropouts(samples.position)
+        strange[1:-1] |= returns & (sizes[1:] > _JUMP * usual) & (usual > 0.0)
+        if strange.any():
+            why = "jump away from the motion and back, as of another source or a dropout,"
+            self._left_out[why] += int(np.count_nonzero(strange))
+        return samples[~strange]
 
     def _check_stamps(self, stamp: IntArray) -> None:
         """Refuse stamps that stand."""
@@ -304,9 +328,10 @@ class MotionReader:
         self._step = int(np.gcd(self._step, np.gcd.reduce(stamp)))
         self._last_stamp = int(stamp[-1])
         few = _STANDING_SHARE * self._samples
-        if self._samples < _FEWEST or self._standing <= few:
+        unfilled = self._zero > 1 + _ZERO_SHARE * self._samples
+        if self._samples < _FEWEST or not (unfilled or self._standing > few):
             return
-        if self._zero > few:
+        if unfilled:
             what = "0, which nobody filled in"
         elif self._step % NANOSECONDS == 0:
             what = "of whole seconds"
@@ -314,10 +339,11 @@ class MotionReader:
             what = f"rounded to {quantity(self._step / NANOSECONDS, 's')}"
         else:
             return
+        count = self._zero if unfilled else self._standing
         raise BagError(
-            f"the stamps of the joint states {self._where} are {what}: {self._standing} of "
-            f"{self._samples} are those of the sample before; --time log takes the times at which "
-            "the messages were recorded"
+            f"stamps of the joint states {self._where} are {what}: {count} of {self._samples} are "
+            f"{'0' if unfilled else 'those of the sample before'}; --time log takes the times at "
+            "which the messages were recorded"
         )
 
     def _completed(self, samples: SampleColumns) -> SampleColumns:
@@ -342,8 +368,7 @@ class MotionReader:
             samples = replace(samples, position=position)
         if not has_velocity:
             self.estimated = True
-            with np.errstate(divide="ignore", invalid="ignore"):
-                velocity = np.diff(whole.position) / steps
+            velocity = np.diff(whole.position) / steps
             if self._last is None:
                 velocity = np.append(velocity[:1] if len(velocity) else [0.0], velocity)
             samples = replace(samples, velocity=velocity)

@@ -141,6 +141,16 @@ def test_stamps_that_stand_are_refused_and_the_log_has_others(
         assert recording.missing == []
 
 
+def test_stamps_that_one_of_two_sources_lacks_are_refused(tmp_path: Path) -> None:
+    messages = [
+        (STATES, recorded(i), state(recorded(i) if i % 2 else 0, ["axis"], [x], [0.0]))
+        for i, x in enumerate(POSITION.tolist())
+    ]
+    write_bag(tmp_path / "bag", messages)
+    with pytest.raises(BagError, match="0, which nobody filled in: 150 of 300 are 0"):
+        report_of_recording(tmp_path / "bag")
+
+
 def test_of_two_sources_that_take_turns_one_must_be_chosen(tmp_path: Path) -> None:
     messages = []
     for i, x in enumerate(POSITION.tolist()):
@@ -152,6 +162,31 @@ def test_of_two_sources_that_take_turns_one_must_be_chosen(tmp_path: Path) -> No
     for number in (1, 2):
         run = ss.read_bag(tmp_path / "bag", states_topic=f"{STATES}[{number}]")
         assert np.array_equal(run.samples.position, POSITION + (number - 1))
+
+
+@pytest.mark.parametrize("every", [3, 10, 60])
+def test_what_jumps_away_and_back_is_of_another_source(tmp_path: Path, every: int) -> None:
+    messages = []
+    for i, x in enumerate(POSITION.tolist()):
+        messages += [(STATES, recorded(i), state(recorded(i), ["axis"], [x], [0.0]))]
+        if i % every == every // 2:
+            late = recorded(i) + 400_000
+            messages += [(STATES, late, state(late, ["axis"], [5.0], [0.0]))]
+    write_bag(tmp_path / "bag", messages)
+    run = ss.read_bag(tmp_path / "bag")
+    assert np.array_equal(run.samples.position, POSITION)
+    assert f"{300 // every} joint states on {STATES} jump away" in run.report["notes"][0]
+
+
+def test_a_belt_may_have_messages_of_its_own(tmp_path: Path) -> None:
+    messages = []
+    for i in range(6):
+        messages += [(STATES, recorded(i), state(recorded(i), ["axis"], [0.1 * i], [0.0]))]
+        if i in (2, 4):
+            messages += [(STATES, recorded(i), state(recorded(i), ["conveyor"], [], [0.1 * i]))]
+    write_bag(tmp_path / "bag", messages)
+    run = ss.read_bag(tmp_path / "bag", belt_joint="conveyor")
+    assert run.samples.belt_velocity.tolist() == [0.2, 0.2, 0.2, 0.2, 0.2, 0.4]
 
 
 @pytest.mark.parametrize(("every", "left_out"), [(2, 150), (3, 0)])
