@@ -37,6 +37,8 @@ _FRICTION_DIFFERENCE = 0.05
 """Difference of friction at any speed, as a share of the largest, by which two laws differ."""
 _NAMED_CORRELATION = 0.95
 """Correlation from which two constants are named together."""
+_ADDED_SHARE = 0.3
+"""Share of samples with added forces from which another controller may have acted."""
 _BY_DIRECTION = "it merges with friction by direction, and is taken as 0"
 CHECKED = (
     "force_error",
@@ -279,12 +281,20 @@ def _relative(found: FloatArray, measured: FloatArray) -> float:
 
 def notes_on(found: Findings, record: Record) -> Sequence[str]:
     """Return sentences on what cannot be predicted of a record, and why."""
-    if found.servo is None or record.reference is None or record.led is not None:
+    if found.servo is None or record.reference is None or record.force is None:
+        return record.notes
+    led = record.led
+    if led is None:
+        why = f"has no {FEWEST} samples in a row: the closed loop is not predicted"
+        return [*record.notes, f"the reference of {record.name} {why}"]
+    share = float(np.mean(found.servo.added(led) != 0.0))
+    if share < _ADDED_SHARE:
         return record.notes
     return [
         *record.notes,
-        f"the reference of {record.name} has no {FEWEST} samples in a row: the closed loop is "
-        "not predicted",
+        f"the controller that was found does not explain {share:.0%} of the forces of "
+        f"{record.name}: they are taken as forces added to its command; if another controller "
+        "acted, its closed loop is not predicted",
     ]
 
 

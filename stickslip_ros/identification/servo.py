@@ -56,13 +56,12 @@ class Servo:
         """Return what was added to the command of the controller, as taps are; N, zero elsewhere.
 
         It is what the recorded force has beyond the controller's own, where it is clearly more than
-        the controller leaves unexplained; if it is so nearly always, another controller acted.
+        the controller leaves unexplained. Another controller would leave such forces, too.
         """
         assert record.force is not None
         rest = record.force - self.forces(record)
         rest[: self.difference_samples] = 0.0
-        clear = np.abs(rest) > _ADDED_FORCE_RATIO * self.error
-        return np.where(clear & (np.mean(clear) < 1.0 - _INLIER_SHARE), rest, 0.0)
+        return np.where(np.abs(rest) > _ADDED_FORCE_RATIO * self.error, rest, 0.0)
 
 
 def servo_of(record: Record) -> Servo | None:

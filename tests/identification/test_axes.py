@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.identification.findings import Findings
+from stickslip_ros.identification.findings import Findings, notes_on
 from stickslip_ros.identification.identify import identify
 from stickslip_ros.identification.laws import SaturatingAdapter
 from stickslip_ros.identification.record import Record
@@ -173,11 +173,12 @@ def test_friction_that_follows_the_curve_over_a_path_is_fitted() -> None:
     assert curve.force[1:] == pytest.approx(true[1:], rel=0.03)
 
 
-def test_pulses_of_a_checked_record(coulomb: Findings) -> None:
+@pytest.mark.parametrize("length", [40, 500])
+def test_pulses_of_a_checked_record(coulomb: Findings, length: int) -> None:
     """They are a known disturbance, or were added to the command of the controller."""
     pulses = np.zeros(len(record("coulomb", 4.0).position))
     for number in range(400, len(pulses), 700):
-        pulses[number : number + 40] = (-1.0) ** number * 30.0
+        pulses[number : number + length] = (-1.0) ** number * 30.0
     own = replace(record("coulomb", 4.0, seed=3), force=None, disturbance=pulses)
     position, force = closed_loop(own, axis(COULOMB), SERVO, 0.0)
     measured = np.rint(position / 5e-8) * 5e-8
@@ -189,6 +190,9 @@ def test_pulses_of_a_checked_record(coulomb: Findings) -> None:
         assert check["force_error"] < 0.02
         assert check["position_error"] < 1e-4
         assert check["closed_loop_force_error"] < 0.03
+        assert any("does not explain" in note for note in notes_on(coulomb, tapped)) == (
+            length > 40 and tapped.disturbance is None
+        )
 
 
 def test_a_controller_is_found_beside_forces_that_are_added_to_it() -> None:
