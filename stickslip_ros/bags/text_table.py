@@ -182,7 +182,8 @@ class TextTable:
             *([] if self._separator == "," else [f"{_SEPARATORS[self._separator]} as separators"]),
             *([] if self._seen_decimal == "." else ["decimal commas"]),
             *([] if self._encoding.startswith("utf-8") else [f"text in {self._encoding}"]),
-            *([f"{self._skipped} lines on top skipped"] if self._skipped else []),
+            *([f"the first {self._skipped} lines skipped"] if self._skipped > 1 else []),
+            *(["the first line skipped"] if self._skipped == 1 else []),
             *([] if self.named else [f"no names: the columns are #1 to #{self.width}"]),
             *([f"units in line {self._units_line}"] if self._units_line else []),
         ]

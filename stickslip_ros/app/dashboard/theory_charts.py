@@ -47,7 +47,7 @@ def bifurcation_chart(found: BifurcationBranches, drive: Drive) -> Options:
     # Marks may be close to each other: their texts stand on different sides.
     marks = [(each.belt_speed / speed, "Hopf", GREY, _RIGHT_OF_IT) for each in found.hopf_points]
     if found.sticking_onset is not None:
-        marks.append((found.sticking_onset / speed, "sticks below", GREY, _LEFT_OF_IT))
+        marks.append((found.sticking_onset / speed, "stick-slip onset", GREY, _LEFT_OF_IT))
     series.append(_verticals([*marks, (drive.belt_speed / speed, "now", BLUE, _ABOVE_IT)]))
     names = dict.fromkeys(each["name"] for each in series if each.get("name"))
     return _options(speed_label, reach_label, series, legend=list(names))

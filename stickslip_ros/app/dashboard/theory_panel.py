@@ -32,7 +32,7 @@ _CHARTS = (
     ("map", stability_map, "Stability over the gains", "limit of stability over the gains"),
     ("bifurcation", bifurcation, "Bifurcation diagram, no control", "displacement over belt speed"),
     ("friction", friction_curve, "Friction", "friction coefficient over relative speed"),
-    ("decay", decay, "Exponents of the sampled loop", "exponents in the complex plane"),
+    ("decay", decay, "Closed-loop poles", "closed-loop poles in the complex plane"),
 )
 """Name, computation, title, and text for readers of screens."""
 
