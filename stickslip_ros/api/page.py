@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 
 _SVG, _XLINK = "http://www.w3.org/2000/svg", "http://www.w3.org/1999/xlink"
 
+_DOTS_PER_INCH = 200.0
+"""Of the parts of a figure that have too many points for lines."""
+
 _STYLES = {"wide": "paper-double", "narrow": "paper"}
 """Style of the figure by the width of the page: of paper or a screen, and of a telephone."""
 
@@ -71,7 +74,7 @@ def _drawing(draw: "Callable[[FigureStyle], Figure]", style: str, name: str, lab
     from stickslip_ros.show.style import STYLES, rendered
 
     figure = draw(replace(STYLES[style], titled=False))
-    root = ElementTree.fromstring(rendered(figure, "svg", outlines=True))
+    root = ElementTree.fromstring(rendered(figure, "svg", _DOTS_PER_INCH, outlines=True))
     for element in root.iter():
         if element.tag == f"{{{_SVG}}}image":  # equal ones have one, which nothing refers to
             element.attrib.pop("id", None)

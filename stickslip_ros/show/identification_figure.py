@@ -12,10 +12,14 @@ from stickslip_ros.arrays import FloatArray
 from stickslip_ros.identification.findings import Findings
 from stickslip_ros.identification.fit import QUANTILE
 from stickslip_ros.physics.model.friction import FrictionLaw
+from stickslip_ros.show.panels import DOTS
 from stickslip_ros.show.quantities import SI, Units
 from stickslip_ros.show.style import BLUE, GREEN, ORANGE, SCREEN, FigureStyle, finish, styled
 
-_DOTS: Any = {"marker": ".", "ms": 2.0, "ls": "", "alpha": 0.4, "mew": 0.0, "rasterized": True}
+_MEASURED: Any = DOTS | {"ms": 7.0, "alpha": 0.15}
+"""Wider than the curve, which hides what it fits."""
+_LEAST_BAND = 0.005
+"""Width of a band that can be seen, as a share of the axis."""
 _SHOWN_SHARE = 0.995
 """Share of the dots that the vertical axis shows at least."""
 _LARGEST_BAND = 100.0
@@ -109,22 +113,24 @@ def _friction(axes: Axes, found: Findings, units: Units) -> None:
             direction * errors.friction[own] / scale,
             color=colour,
             label=f"{name}, measured",
-            **_DOTS,
+            **_MEASURED,
         )
         speed, force = curve.speed / speed_scale, curve.force / scale
-        axes.plot(speed, force, color=colour, lw=1.5, label="fitted")
+        axes.plot(speed, force, color=colour, lw=1.0, label="fitted")
         band = QUANTILE * curve.standard_error / scale
         # What is not identified has a band that is not finite.
         band = np.minimum(band, _LARGEST_BAND * top / scale)
         limits = force - band, force + band
-        axes.fill_between(speed, *limits, color=colour, alpha=0.3, lw=0.0, label="95 % band")
+        seen = 2.0 * float(band.max()) * scale > _LEAST_BAND * top
+        name = "95 % band" if seen else "95 % band: narrower than the line"
+        axes.fill_between(speed, *limits, color=colour, alpha=0.3, lw=0.0, label=name)
     axes.set_xlabel(speed_label)
     axes.set_ylabel(label)
     axes.set_xlim(0.0, 1.05 * fastest / speed_scale)
     # A band may be many times as large as the friction.
     axes.set_ylim(0.0, 1.15 * top / scale)
     axes.set_title("friction")
-    axes.legend(loc="best", fontsize="small", ncols=len(curves), markerscale=4.0)
+    axes.legend(loc="best", fontsize="small", ncols=len(curves), markerscale=1.5)
 
 
 def _residuals(
@@ -136,7 +142,7 @@ def _residuals(
     (values, name, unit), (errors, quantity, error_unit) = over, of
     scale, label = units.axis(units.named(name), unit, values)
     error_scale, error_label = units.axis(quantity, error_unit, errors)
-    axes.plot(values / scale, errors / error_scale, color=BLUE, **_DOTS)
+    axes.plot(values / scale, errors / error_scale, color=BLUE, **DOTS)
     axes.axhline(0.0, color="black", lw=0.6)
     axes.set_xlabel(label)
     axes.set_ylabel(error_label)

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.axis import XAxis, YAxis
 from matplotlib.colors import LinearSegmentedColormap, to_rgba
 from matplotlib.figure import Figure
 from matplotlib.gridspec import GridSpec, GridSpecFromSubplotSpec
@@ -40,8 +41,11 @@ _SHADE = LinearSegmentedColormap.from_list("stick", [to_rgba(GREY, 0.0), to_rgba
 
 _LAW: Any = {"color": "black", "lw": 0.8, "ls": "-."}
 _REACHED: Any = {"color": LIGHT_GREY, "alpha": 0.4, "lw": 0.0}
-_RAW: Any = {"color": BLUE, "marker": ".", "ms": 2.0, "ls": "", "alpha": 0.5, "mew": 0.0}
+DOTS: Any = {"marker": ".", "ms": 2.0, "ls": "", "alpha": 0.4, "mew": 0.0, "rasterized": True}
+"""Look of samples; as vectors they would make a file of megabytes."""
+_RAW: Any = DOTS | {"color": BLUE}
 _FITTED: Any = {"color": ORANGE, "lw": 1.2}
+_TIME = {False: "time within the cycle", True: "time"}
 _CONFIDENCE = 1.96
 """Half of a 95 % interval, in standard errors."""
 _EQUAL_SPREAD = 1e-9
@@ -158,11 +162,10 @@ def shade(axes: Axes, pane: Pane) -> None:
         axes.set_ylim(bottom, top)
 
 
-def label_time(axes: Axes, time: tuple[float, str]) -> None:
-    """Label a horizontal axis in s with `time`, the divisor and the label of `Units.axis`."""
-    scale, label = time
-    axes.set_xlabel(label)
-    axes.xaxis.set_major_formatter(lambda value, _: f"{value / scale:.10g}")
+def label_axis(axis: XAxis | YAxis, scale: float, label: str) -> None:
+    """Label an axis of values in SI with the divisor and the label of `Units.axis`."""
+    axis.set_label_text(label)
+    axis.set_major_formatter(lambda value, _: f"{value / scale:.10g}")
 
 
 def say(axes: Axes, why: str) -> None:
@@ -189,18 +192,21 @@ def draw_law(
     _law_between(axes, drive, *ends, scale, **_LAW)
     if reached is not None:
         axes.axvspan(least / scale, largest / scale, **_REACHED)
-    curve, followed = "friction law", Line2D([], [], **MOTION | {"lw": 3.0})
-    followed.set_label("range of the last cycles")
+    curve, followed = "friction law", list[Artist]()
     relative = last.velocity - last.belt_velocity
     if drive.friction.states:
-        curve, followed = "in steady slip", Line2D([], [], **MOTION, label="last cycles")
+        curve, followed = "in steady slip", [Line2D([], [], **MOTION, label="last cycles")]
         if len(relative):
             time, force = history.friction.since(float(last.time[0]))
             speed = np.interp(time, last.time, relative / scale)
             axes.plot(speed, force / drive.normal_force, label="loop", **MOTION)
     elif len(relative):
         span = float(relative.min()), float(relative.max())
-        _law_between(axes, drive, *span, scale, **MOTION | {"lw": 3.0})
+        # A slide at rest has a point instead, but one that sticks any force of the stick.
+        if span[1] - span[0] > LEAST_PART * (ends[1] - ends[0]) or span[0] <= 0.0 <= span[1]:
+            look: Any = MOTION | {"lw": 3.0}
+            _law_between(axes, drive, *span, scale, **look)
+            followed.append(Line2D([], [], **look, label="range of the last cycles"))
     if at_rest != 0.0:
         rest = float(drive.friction.at_rest(drive.belt_speed))
         axes.plot(at_rest / scale, rest, zorder=3.0, **POINT)
@@ -208,7 +214,7 @@ def draw_law(
     axes.set_xlim(ends[0] / scale, ends[1] / scale)
     return [
         Line2D([], [], **_LAW, label=curve),
-        followed,
+        *followed,
         Patch(**_REACHED, label="range of the whole run"),
     ]
 
@@ -249,14 +255,15 @@ def draw_analysis(
             _distribution(figure.add_subplot(part[column]), values, SLIPS[name], units)
     elif found.mean_cycle is not None:
         _cycle(figure.add_subplot(part[0:2]), found.mean_cycle, units, short=short)
-        _residual(figure.add_subplot(part[2]), found.mean_cycle, units)
+        _residual(figure.add_subplot(part[2]), found.mean_cycle, units, short=short)
 
 
 def _cycle(axes: Axes, mean: MeanCycle, units: Units, *, short: bool) -> None:
     scale, label = units.axis(units.named("displacement", short=short), "m", mean.position)
-    second, time_label = units.axis("time within the cycle", "s", mean.phase)
+    second, time_label = units.axis(_TIME[short], "s", mean.phase)
     order = np.argsort(mean.phase)
-    axes.plot(mean.phase / second, mean.position / scale, **_RAW, label="measured, all cycles")
+    raw: Any = _RAW | {"ms": 6.0}  # wider than the line
+    axes.plot(mean.phase / second, mean.position / scale, **raw, label="measured, all cycles")
     axes.plot(mean.phase[order] / second, mean.fitted[order] / scale, **_FITTED, label="fitted")
     if mean.edges is not None and mean.edge_errors is not None:
         period = mean.cycle.period
@@ -272,14 +279,14 @@ def _cycle(axes: Axes, mean: MeanCycle, units: Units, *, short: bool) -> None:
             )  # fmt: skip
     axes.set_xlabel(time_label)
     axes.set_ylabel(label)
-    axes.set_title("mean cycle; edges with 95 % intervals")
+    axes.set_title("mean cycle" if short else "mean cycle; edges with 95 % intervals")
     axes.legend(loc="upper right", fontsize="small")
 
 
-def _residual(axes: Axes, mean: MeanCycle, units: Units) -> None:
+def _residual(axes: Axes, mean: MeanCycle, units: Units, *, short: bool) -> None:
     residual = mean.position - mean.fitted
     scale, label = units.axis("residual", "m", residual)
-    second, time_label = units.axis("time within the cycle", "s", mean.phase)
+    second, time_label = units.axis(_TIME[short], "s", mean.phase)
     axes.plot(mean.phase / second, residual / scale, **_RAW)
     axes.set_xlabel(time_label)
     axes.set_ylabel(label)
@@ -298,4 +305,4 @@ def _distribution(axes: Axes, values: FloatArray, quantity: Quantity, units: Uni
         axes.legend(fontsize="small")
     axes.set_xlabel(label)
     axes.set_ylabel("slips")
-    axes.set_title(f"{quantity.label}, {len(values)} slips")
+    axes.set_title(f"{len(values)} slips")

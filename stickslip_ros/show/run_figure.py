@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from math import ceil
 from pathlib import Path
 from typing import Any, NamedTuple, Self
 
@@ -29,7 +30,7 @@ from stickslip_ros.show.panels import (
     draw_cycles,
     draw_law,
     draw_line,
-    label_time,
+    label_axis,
     measures_text,
     say,
     shade,
@@ -165,36 +166,44 @@ def _single(run: DrawnRun, style: FigureStyle) -> Figure:
     rows = 3 if analysis.mean_cycle is not None or analysis.slips is not None else 2
     size = (12.0, 10.0 if rows == 2 else 12.5)
     panels = _OneRun([run], narrow=style.narrow, short=style.crowded(*size))
-    figure = style.figure(*size, wide=1.1 if rows == 2 else 1.4, narrow=3.0 if rows == 2 else 4.0)
+    figure = style.figure(*size, wide=1.1 if rows == 2 else 1.4, narrow=2.5 if rows == 2 else 2.76)
     style.set_title(figure, run.title, measures_text(run.measures, panels.units), *notes)
     ratios = (2.8, 2.4, 1.5) if panels.short else (3.0, 1.9, 1.2)
     if style.narrow:
-        ratios = (5.2, 4.2, 4.0)
+        ratios = (4.4, 3.6, 2.2)
     grid = figure.add_gridspec(rows, 1, height_ratios=ratios[:rows])
     above, below = grid[0], grid[1]
     panels.over_time(figure, above)
+    has_cycles, has_law = len(history.cycles[0]) > 0, drive is not None
     if style.narrow:
-        parts = below.subgridspec(3, 2, height_ratios=(1.5, 1.0, 1.3))
-        left, right, cycles = parts[0, :], parts[2, :], (parts[1, 0], parts[1, 1])
+        lines = below.subgridspec(1 + has_cycles, 1, height_ratios=(1.3, *[1.0] * has_cycles))
+        first, *middle = lines
+        left, *right = first.subgridspec(1, 1 + has_law)
     else:
-        left, middle, right = below.subgridspec(1, 3)
-        cycles = middle.subgridspec(2, 1)
+        left, *others = below.subgridspec(1, 1 + has_cycles + has_law)
+        middle, right = others[:has_cycles], others[has_cycles:]
     if rows == 3:
-        shape = (3, 1) if style.narrow else (1, 3)
-        part = grid[2].subgridspec(*shape)
+        part = grid[2].subgridspec(1, 3)
         draw_analysis(figure, part, analysis, panels.units, short=panels.short)
     panels.portrait(figure.add_subplot(left))
-    first, second = (figure.add_subplot(part) for part in cycles)
-    panels.cycles(first, second)
-    of_law = panels.law(figure.add_subplot(right))
+    for part in middle:
+        cells = part.subgridspec(*((1, 2) if style.narrow else (2, 1)))
+        panels.cycles(*(figure.add_subplot(cell) for cell in cells))
+    of_law = [entry for part in right for entry in panels.law(figure.add_subplot(part))]
     force = "control force and disturbance" if run.disturbed else "control force"
     sticks = "sticks" if panels.short else "sticks (paler: part of the time)"
     handles: list[Any] = [
         Line2D([], [], **MOTION, label="slide"),
         Line2D([], [], **BELT, label="belt speed"),
         Patch(color=GREY, alpha=0.6, lw=0.0, label=sticks),
-        Line2D([], [], **_CONTROL, label=force),
-        Line2D([], [], **_FRICTION, label="friction force"),
+        *(
+            Line2D([], [], **look, label=label)
+            for trace, look, label in (
+                (history.control, _CONTROL, force),
+                (history.friction, _FRICTION, "friction force"),
+            )
+            if len(trace.columns()[0])
+        ),
         Line2D([], [], **_EARLIER | {"lw": 4.0}, label="start of the run"),
     ]
     if drive is not None and drive.has_spring:
@@ -209,14 +218,19 @@ def _single(run: DrawnRun, style: FigureStyle) -> Figure:
 
 def _compared(runs: Sequence[DrawnRun], style: FigureStyle) -> Figure:
     count = len(runs)
-    figure = style.figure(12.0, 9.0, wide=0.95, narrow=0.9 * count + 1.4)
+    rows = ceil(count / _runs_across(count, narrow=style.narrow))
+    figure = style.figure(12.0, 9.0, wide=0.95, narrow=0.8 * rows + 1.2)
     notes = [f"{run.name}: {note}" for run in runs for note in run.notes]
     style.set_title(figure, "Runs compared, " + "; ".join(run.name for run in runs), *notes)
     panels = _SeveralRuns(runs, narrow=style.narrow, short=style.crowded(12.0, 9.0))
-    ratios = (0.9 * count, 1.3) if style.narrow else (1.3, 1.0)
+    ratios = (0.8 * rows, 1.0) if style.narrow else (1.3, 1.0)
     above, below = figure.add_gridspec(2, 1, height_ratios=ratios)
     panels.over_time(figure, above)
-    left, middle, right = below.subgridspec(*((3, 1) if style.narrow else (1, 3)))
+    if style.narrow:
+        parts = below.subgridspec(2, 2, height_ratios=(1.3, 1.0))
+        left, middle, right = parts[0, :], parts[1, 0], parts[1, 1]
+    else:
+        left, middle, right = below.subgridspec(1, 3)
     panels.portrait(figure.add_subplot(left))
     amplitude = figure.add_subplot(middle)
     panels.cycles(amplitude, figure.add_subplot(right, sharex=amplitude))
@@ -266,19 +280,23 @@ class _OneRun(_Panels):
         panes = [self._whole, *self._switch_on(end), end]
         drawn = [whole] * (len(panes) - 1) + [[trace.since(end.start) for trace in traces]]
         newton, label = self.units.axis("force", "N", *(columns[1] for columns in whole))
-        panels = _panels_over_time(figure, part, len(panes), narrow=self._narrow)
+        labels = [self._length[1], self._speed[1], label]
+        if not any(len(columns[0]) for columns in whole):
+            labels.pop()  # nothing tells a force
+        shape = len(labels), len(panes)
+        panels = _panels_over_time(figure, part, *shape, narrow=self._narrow)
         for column, pane, (friction, control, dropped) in zip(panels.T, panes, drawn, strict=True):
-            position, velocity, force = column
+            position, velocity, *forces = column
             title = pane.title.removesuffix(_ENLARGED) if self.short else pane.title
             position.set_title(title)
             self._draw_motion(position, velocity, pane)
-            draw_line(force, pane, friction, newton, history.gap, **_FRICTION)
-            gap = history.control_gap
-            draw_line(force, pane, control, newton, gap, **_CONTROL)
-            self.holds |= _draw_held(force, pane, control, newton, gap, dropped[0])
-            draw_line(force, pane, dropped, newton, gap, **_DROPPED)
-            self._label_time(force, pane)
-        labels = self._length[1], self._speed[1], label
+            for force in forces:
+                draw_line(force, pane, friction, newton, history.gap, **_FRICTION)
+                gap = history.control_gap
+                draw_line(force, pane, control, newton, gap, **_CONTROL)
+                self.holds |= _draw_held(force, pane, control, newton, gap, dropped[0])
+                draw_line(force, pane, dropped, newton, gap, **_DROPPED)
+            self._label_time(column[-1], pane)
         for row, of_row in zip(panels, labels, strict=True):
             row[0].set_ylabel(of_row)
             row[0].set_ylim(widened(*row[0].get_ylim()))
@@ -303,7 +321,7 @@ class _OneRun(_Panels):
         return [Pane(f"{title}{_ENLARGED}", rows, at - before, at + after)]
 
     def _label_time(self, axes: Axes, pane: Pane) -> None:
-        label_time(axes, self.units.axis("time", "s", pane.start, pane.end))
+        label_axis(axes.xaxis, *self.units.axis("time", "s", pane.start, pane.end))
         axes.set_xlim(pane.start, pane.end)
 
     def _draw_motion(self, position: Axes, velocity: Axes, pane: Pane) -> None:
@@ -326,7 +344,9 @@ class _OneRun(_Panels):
         if not len(self._last.time):
             say(axes, "no motion recorded")
             return
-        for rows, look in ((self._history.beginning, _EARLIER), (self._last, MOTION)):
+        # The marker is where it ends, which is all there is of a slide at rest.
+        end: Any = MOTION | {"marker": ".", "markevery": [-1]}
+        for rows, look in ((self._history.beginning, _EARLIER), (self._last, end)):
             time, position, velocity, belt, stick_time = broken(self._history.gap, *rows)
             many = len(time) > MANY
             axes.plot(position / length, velocity / speed, rasterized=many, **look)
@@ -359,10 +379,7 @@ class _OneRun(_Panels):
         """Draw the friction law; return entries for the legend below, if they have no room here."""
         short = self.short
         axes.set_title("friction law" if short else "friction law, with the range of this run")
-        if self._drive is None:
-            say(axes, "the drive is not known")
-            axes.set(xticks=[], yticks=[])
-            return []
+        assert self._drive is not None
         handles = draw_law(axes, self._drive, self._history, self._last, self.units, short=short)
         if short:
             return handles
@@ -377,16 +394,17 @@ class _SeveralRuns(_Panels):
     def over_time(self, figure: Figure, part: SubplotSpec) -> None:
         """Draw displacement and force of each run in its own column."""
         count = len(self._runs)
-        if self._narrow:
-            stacked: Any = part.subgridspec(2 * count, 1).subplots(sharex=True, squeeze=False)
-            panels = stacked.reshape(count, 2).T
-            for first, *others in panels:
-                for axes in others:
-                    axes.sharey(first)
-        else:
-            grid = part.subgridspec(2, count)
-            panels = grid.subplots(sharex=True, sharey="row", squeeze=False)
         forces = [run.history.control.columns() for run in self._runs]
+        rows = 2 if any(len(time) for time, _ in forces) else 1
+        across = _runs_across(count, narrow=self._narrow)
+        panels = np.empty((rows, count), dtype=object)
+        cells = part.subgridspec(ceil(count / across), across)
+        columns = [cells[divmod(run, across)].subgridspec(rows, 1) for run in range(count)]
+        for row in range(rows):
+            for run, column in enumerate(columns):
+                shared: Any = {"sharex": panels[0, 0], "sharey": panels[row, 0]}
+                axes = panels[row, run] = figure.add_subplot(column[row], **shared)
+                axes.tick_params(labelbottom=row == rows - 1, labelleft=run % across == 0)
         newton, force_label = self.units.axis(
             self.units.named("control force", short=self.short), "N", *(f[1] for f in forces)
         )
@@ -395,23 +413,29 @@ class _SeveralRuns(_Panels):
             for run, motion, force in zip(self._runs, self._motions, forces, strict=True)
         ]
         time = self.units.axis("time", "s", *(pane.end for pane in panes))
-        width = 0.9 * figure.get_figwidth() / (1 if self._narrow else count)
-        for (position, force), run, look, pane, trace in zip(
+        width = 0.9 * figure.get_figwidth() / across
+        for (position, *below), run, look, pane, trace in zip(
             panels.T, self._runs, _LOOKS[:count], panes, forces, strict=True
         ):
             solid: Any = {"color": look["color"], "ls": "-", "lw": 1.0}
             motion, history = (pane.rows.time, pane.rows.position), run.history
             draw_line(position, pane, motion, self._length[0], history.gap, **solid)
             solid["drawstyle"] = "steps-post"
-            draw_line(force, pane, trace, newton, history.control_gap, **solid)
+            for force in below:
+                draw_line(force, pane, trace, newton, history.control_gap, **solid)
             lines = pane.title, measures_text(run.measures, self.units)
             title = wrapped(lines, width, "small")
             position.set_title(title, fontsize="small", parse_math=False)
-            label_time(force, time)
-            if not len(pane.rows.time):
-                say(position, "no motion recorded")
-        for row, label in zip(panels, (self._length[1], force_label), strict=True):
-            row[0].set_ylabel(label)
+            label_axis((position, *below)[-1].xaxis, *time)
+            for axes, what, recorded in (
+                (position, "motion", pane.rows.time),
+                *((each, "force", trace[0]) for each in below),
+            ):
+                if not len(recorded):
+                    say(axes, f"no {what} recorded")
+        for row, label in zip(panels, (self._length[1], force_label), strict=False):
+            for axes in row[::across]:
+                axes.set_ylabel(label)
             row[0].set_ylim(widened(*row[0].get_ylim()))
         start, end = min(pane.start for pane in panes), max(pane.end for pane in panes)
         for axes, pane in zip(panels[0], panes, strict=True):
@@ -445,20 +469,27 @@ class _SeveralRuns(_Panels):
         axis = self.units.axis("time", "s", *(motion.time for motion in self._motions))
         for axes, name in zip(panels, ("amplitude", "stick fraction"), strict=True):
             axes.set_title(f"{name} of each cycle")
-            label_time(axes, axis)
+            label_axis(axes.xaxis, *axis)
 
 
-def _panels_over_time(figure: Figure, part: SubplotSpec, panes: int, *, narrow: bool) -> Any:
-    """Return axes for three quantities and a number of panes; the first pane is the widest.
+def _runs_across(count: int, *, narrow: bool) -> int:
+    """Return how many runs are side by side over time."""
+    return (1 if count < 3 else 2) if narrow else count
+
+
+def _panels_over_time(
+    figure: Figure, part: SubplotSpec, quantities: int, panes: int, *, narrow: bool
+) -> Any:
+    """Return axes for so many quantities and panes; the first pane is the widest.
 
     If the figure is narrow, the first pane is above the others.
     """
     if not narrow:
-        grid = part.subgridspec(3, panes, width_ratios=(2.0, *[1.0] * (panes - 1)))
+        grid = part.subgridspec(quantities, panes, width_ratios=(2.0, *[1.0] * (panes - 1)))
         return grid.subplots(sharex="col", sharey="row")
     above, below = part.subgridspec(2, 1)
-    whole: Any = above.subgridspec(3, 1).subplots(sharex=True, squeeze=False)
-    others: Any = below.subgridspec(3, panes - 1).subplots(
+    whole: Any = above.subgridspec(quantities, 1).subplots(sharex=True, squeeze=False)
+    others: Any = below.subgridspec(quantities, panes - 1).subplots(
         sharex="col", sharey="row", squeeze=False
     )
     panels = np.concatenate([whole, others], axis=1)

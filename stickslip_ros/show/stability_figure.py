@@ -115,7 +115,7 @@ def design_figure(found: Design, *, style: FigureStyle = SCREEN) -> Figure:
     figure = style.figure(6.8, 6.2, narrow=1.2)
     what = "Designed gains"
     title = what if scenario is None else title_of(what, scenario, _PROPOSED)
-    _set_title(figure, title, around, style)
+    _set_title(figure, title, around, style, found.task.belt_speeds)
     axes = figure.subplots()
     handles = _draw_map(figure, axes, around)
     forces = found.peak_forces(around)
@@ -135,12 +135,22 @@ _PROPOSED = (
 """Parameters that are not in the title of a design: its results, and what the figure shows."""
 
 
-def _set_title(figure: Figure, title: str, found: StabilityMap, style: FigureStyle) -> None:
+def _set_title(
+    figure: Figure,
+    title: str,
+    found: StabilityMap,
+    style: FigureStyle,
+    belt_speeds: tuple[float, float] = (0.0, 0.0),
+) -> None:
+    """Set the title with the loop of a map, which settles slowest of those at `belt_speeds`."""
     loop = found.loop
     units = Units.for_drive(loop.drive)
     belt, rate = units.text(loop.drive.belt_speed, "m/s"), units.text(loop.rate, "Hz")
     late = units.text(loop.force_delay, "s")
     delay = f", force delay {late}" if loop.force_delay > 0.0 else ""
+    low, high = belt_speeds
+    if low != high:
+        belt += f", the slowest of {' to '.join(units.texts([low, high], 'm/s'))} to settle"
     values = f"belt speed {belt}, sample rate {rate}{delay}"
     style.set_title(figure, *([title] if title else []), values)
 

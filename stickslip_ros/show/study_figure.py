@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.axis import XAxis, YAxis
 from matplotlib.colors import ListedColormap, to_rgb
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -18,6 +19,7 @@ from matplotlib.path import Path
 from stickslip_ros.arrays import BoolArray, FloatArray
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.measures.cycle_measures import Regime
+from stickslip_ros.show.panels import label_axis
 from stickslip_ros.show.quantities import MEASURES, Units
 from stickslip_ros.show.study_tables import attractor_name
 from stickslip_ros.show.style import (
@@ -325,19 +327,13 @@ def _shade_hysteresis(panels: Sequence[Axes], columns: Columns, axis: Axis) -> l
     return [Patch(color=_HYSTERESIS, label="up and down differ (hysteresis)")]
 
 
-def _name_axis(drawn: Any, axis: Axis, units: Units) -> None:
+def _name_axis(drawn: XAxis | YAxis, axis: Axis, units: Units) -> None:
     """Name the axis of a parameter; its numbers get a prefix, but for those of a logarithm."""
     name = units.named(axis.parameter)
-    divisor, label = units.axis(name, axis.unit, axis.values())
-
-    def shown(value: float, _: int) -> str:
-        return f"{value / divisor:g}"
-
     if axis.logarithmic:
-        label = units.label(name, axis.unit)
-    elif divisor != 1.0:
-        drawn.set_major_formatter(shown)
-    drawn.set_label_text(label)
+        drawn.set_label_text(units.label(name, axis.unit))
+    else:
+        label_axis(drawn, *units.axis(name, axis.unit, axis.values()))
 
 
 def _mark_transitions(

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import partial, wraps
 from io import BytesIO
 from itertools import accumulate
+from logging import ERROR, getLogger
 from pathlib import Path
 from textwrap import fill
 from typing import Any, NamedTuple, ParamSpec, TypeVar, cast
@@ -115,6 +116,9 @@ _UNBROKEN = "\u00a0"
 
 _MILLIMETRE = 1.0 / 25.4
 
+_PAGE_HEIGHT = 235.0 * _MILLIMETRE
+"""Largest height of a figure in print, inches: a page of a journal."""
+
 _REPRODUCIBLE = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
 """Metadata to omit by file type, so that the same figure gives the same file."""
 
@@ -152,7 +156,7 @@ class FigureStyle:
         if self.width is None:
             return Figure(figsize=(width, height))
         ratio = (narrow if self.narrow else wide) or height / width
-        return Figure(figsize=(self.width, ratio * self.width))
+        return Figure(figsize=(self.width, min(ratio * self.width, _PAGE_HEIGHT)))
 
     def crowded(self, width: float, height: float) -> bool:
         """Return whether a figure that has this size on a screen, inches, must do with less."""
@@ -225,7 +229,7 @@ def title_of(what: str, scenario: Scenario, varied: Collection[str] = ()) -> str
 
 
 def finish(figure: Figure) -> None:
-    """Make ticks round and labels no longer than their axes, once all is drawn.
+    """Make ticks round, labels and titles no longer than their axes, once all is drawn.
 
     The ticks of linear axes are whole multiples of 1, 2 or 5 times a power of ten. A label that is
     longer than its axis is broken into two lines.
@@ -238,9 +242,10 @@ def finish(figure: Figure) -> None:
     figure.draw_without_rendering()
     for axes in figure.axes:
         room = axes.get_window_extent()
-        across, along = axes.xaxis.label, axes.yaxis.label
-        if across.get_window_extent().width > room.width:
-            across.set_text(_in_two_lines(across.get_text()))
+        along = axes.yaxis.label
+        for across in (axes.xaxis.label, axes.title):
+            if across.get_window_extent().width > room.width:
+                across.set_text(_in_two_lines(across.get_text()))
         if along.get_window_extent().height > room.height:
             along.set_text(_in_two_lines(along.get_text()))
 
@@ -323,6 +328,7 @@ def rendered(
         _use_style(SCREEN)
         if outlines:
             mpl.rcParams["svg.fonttype"] = "path"
+        getLogger("fontTools").setLevel(ERROR)  # of the fonts of matplotlib it tells their dates
         figure.savefig(drawn, format=kind, dpi=dots_per_inch, metadata=_REPRODUCIBLE.get(kind))
     return drawn.getvalue()
 
