@@ -76,7 +76,7 @@ def test_what_is_completed(complete: Complete, shell: str) -> None:
     assert complete("report", "b") == ["bags"]
     assert complete("simulate", "paper", "--plot", "no") == ["notes.txt"]
     # Parameters and their values.
-    assert complete("simulate", "paper", "-p", "plant.belt_") == ["plant.belt_speed="]
+    assert complete("simulate", "paper", "-p", "plant.belt_s") == ["plant.belt_speed="]
     assert complete("sweep", "paper", "--over", "plant.mas") == ["plant.mass="]
     assert complete("set", "washout_controller.lin") == ["washout_controller.linear_gain="]
     if shell == "bash":  # which splits words at "="
