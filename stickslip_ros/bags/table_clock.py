@@ -79,8 +79,10 @@ def _even(time: FloatArray, rounding: float) -> FloatArray | None:
         return time
     rows = np.arange(len(time), dtype=np.float64)
     period = float(np.polyfit(rows, time - time[0], 1)[0])
-    for line in (rows * float(f"{period:.4g}"), rows * period):
-        apart = time - line
-        if np.ptp(apart) <= 1.05 * rounding:
-            return line + float(apart.min() + apart.max()) / 2.0
-    return None
+    short = (float(f"{period:.{digits}g}") for digits in range(1, 10))
+    near = 0.05 * rounding / len(time)
+    line = rows * next((each for each in short if abs(each - period) < near), period)
+    apart = time - line
+    if np.ptp(apart) > 1.05 * rounding:
+        return None
+    return line + float(apart.min() + apart.max()) / 2.0
