@@ -53,7 +53,7 @@ for name, law in laws.items():
     belt_speeds = np.linspace(0.1, 0.6, 21)
     found = [limit_cycles(replace(drive, belt_speed=speed)) for speed in belt_speeds.tolist()]
     stable = [[cycle.measures.amplitude for cycle in each if cycle.stable] for each in found]
-    (line,) = cycles.plot(belt_speeds, [max(each, default=0.0) for each in stable], ".-")
+    (line,) = cycles.plot(belt_speeds, [max(each, default=0.0) for each in stable], ".")
     for point in hopf_points(drive):
         print(f"{name}: critical feed speed (Hopf) {point.belt_speed:.4f}")
         cycles.axvline(point.belt_speed, color=line.get_color(), ls=":")
