@@ -300,7 +300,9 @@ class NoisyCycleMeter:
             if np.abs(steps - np.rint(steps)).max() < _STEP_DEVIATION:
                 self.step = min(self.step or inf, float(levels.min()))
                 # Steps that divide the travel of a sample leave no noise where it is looked for.
-                self.noisy |= self.step > _ROUNDING_SHARE * moved
+                # Equal steps from sample to sample are a uniform motion, as of a slide that sticks.
+                uniform = len(levels) + 1 == len(recent) and steps.max() < 1.5
+                self.noisy |= self.step > _ROUNDING_SHARE * moved and not uniform
         fastest = float(np.abs(recent.velocity).max(initial=0.0))
         of_velocity = white_noise(recent.velocity)
         if of_velocity > max(_ROUNDING_SHARE * fastest, PRECISION * self._fastest_belt):

@@ -21,7 +21,7 @@ from stickslip_ros.physics.motion.motion import Motion
 from stickslip_ros.samples import SampleColumns
 from tests.examples import examples
 from tests.physics.drives import LIMIT_CYCLES, PAPER
-from tests.physics.measures.records import columns, fed, feed
+from tests.physics.measures.records import columns, fed, feed, milliseconds
 
 SECOND = 10**9
 
@@ -414,3 +414,18 @@ def test_whether_a_sensor_errs_that_there_cannot_be_is_found_from_the_samples(
 def test_a_stick_speed_that_is_none_is_refused(stick_speed: float) -> None:
     with pytest.raises(InvalidInputError, match=r"stick_speed = .* must be finite"):
         SampleMeter(20, reading=SampleAssumptions(stick_speed))
+
+
+def test_exact_samples_of_a_slide_that_sticks_are_no_steps_of_an_encoder() -> None:
+    """All positions of the first look are as far apart: the slide moves with the belt."""
+    stick, slip, amplitude = 0.4, 0.2, 2e-3
+    time = 1e-3 * np.arange(3000)
+    phase = (time + 0.1) % (stick + slip)
+    sticks = phase < stick
+    turned = np.pi * (phase - stick) / slip
+    position = np.where(sticks, 0.01 * (phase - 0.2), amplitude * np.cos(turned))
+    velocity = np.where(sticks, 0.01, -amplitude * np.pi / slip * np.sin(turned))
+    meter = RunMeter(20, reading=UNKNOWN)
+    meter.motion.feed(columns(milliseconds(3000), position, velocity, 0.01))
+    assert not meter.motion.noisy
+    assert meter.motion.measures().stick_fraction == pytest.approx(stick / (stick + slip), abs=2e-3)
