@@ -126,6 +126,8 @@ def filtered(record: Record, *, decimated: bool, delay: float | None = None) -> 
     # The force that acts from one sample to the next changes the second difference exactly.
     acceleration = np.zeros_like(position)
     acceleration[1:-1] = np.diff(position, 2) / record.period**2
+    # The velocity is meant over the same time.
+    velocity[1:-1] -= np.diff(velocity, 2) / 12.0
     relative = velocity - smooth(record.belt_velocity)
     held = record.held_force
     force = held if delay is None else _shifted(held, delay / record.period)
