@@ -38,7 +38,7 @@ _CONSTANTS = {name for law in LAWS.values() for name in constants_of(law)}
 """Constants of friction laws, those of other packages among them."""
 AUTO_TIME = 60.0
 """Processor time that the choice of a law may take by default, s."""
-_FITTING_SHARE = 0.9
+_FITTING_SHARE = 0.8
 """Share of the time for fits: a step that has begun ends, and predictions follow."""
 _DELAYS = -1.0, 20.0
 """Delays that can be given, sample periods."""
