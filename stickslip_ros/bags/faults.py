@@ -29,42 +29,6 @@ the two; share of the displacements that a delay makes, from which a velocity is
 them by which the motion between the velocities is unknown."""
 
 
-def dropouts(signal: FloatArray) -> BoolArray:
-    """Return which samples a signal jumps to, and back from, as no motion does.
-
-    They are 1 to 20 samples between two jumps, each ten times as large as most of the steps before,
-    or after, and as the steps of the encoder. None are found where they would be more than a
-    twentieth of the samples: then the motion jumps.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from stickslip_ros.bags.faults import dropouts
-    >>> signal = np.sin(0.01 * np.arange(1000.0))
-    >>> signal[200:203] = -5.0
-    >>> np.flatnonzero(dropouts(signal)).tolist()
-    [200, 201, 202]
-    """
-    found = np.zeros(len(signal), np.bool_)
-    if len(signal) < 2:
-        return found
-    step, rows, before, after = _jumps(signal)
-    first, last = rows[before], rows[after]
-    if not (len(first) and len(last)):
-        return found
-    place = np.searchsorted(last, first, "right")
-    first, place = first[place < len(last)], place[place < len(last)]
-    ended = -1
-    for begin, end in zip(first.tolist(), last[place].tolist(), strict=True):
-        size = min(abs(step[begin]), abs(step[end]))
-        inner = np.abs(step[begin + 1 : end]).max(initial=0.0)
-        returns = abs(signal[end + 1] - signal[begin]) < size / 2.0
-        if begin > ended and end - begin <= _LONGEST and inner < size / 2.0 and returns:
-            found[begin + 1 : end + 1] = True
-            ended = end
-    return found & (np.mean(found) <= _LARGEST_SHARE)
-
-
 @dataclass(frozen=True)
 class Wrap:
     """Jumps of a counter that wraps."""
@@ -75,31 +39,85 @@ class Wrap:
     """Samples after the jumps."""
 
 
-def wrap_of(signal: FloatArray) -> Wrap | None:
-    """Return the jumps of a signal by one turn, all against its motion; None without any.
+class Jumps:
+    """Steps of a signal that are ten times as large as most of those before, or after.
 
-    The turn is known from jumps in both directions, or is that of a counter.
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from stickslip_ros.bags.faults import Jumps
+    >>> signal = np.sin(0.01 * np.arange(1000.0))
+    >>> signal[200:203] = -5.0
+    >>> np.flatnonzero(Jumps(signal).dropouts()).tolist()
+    [200, 201, 202]
     """
-    step, rows, before, after = _jumps(signal)
-    rows = rows[before & after]
-    rows = rows[(rows > 0) & (rows < len(step) - 1)]
-    if not len(rows):
-        return None
-    beside = (step[rows - 1] + step[rows + 1]) / 2.0
-    turns = beside - step[rows]
-    turn = float(np.median(np.abs(turns)))
-    against = np.all(step[rows - 1] * step[rows] < 0.0) and np.all(
-        step[rows + 1] * step[rows] < 0.0
-    )
-    same = np.all(np.abs(np.abs(turns) - turn) <= _SAME_TURN * turn)
-    if not (against and same) or float(np.ptp(signal)) > (1.0 + _SAME_TURN) * turn:
-        return None
-    unit = _unit(step)
-    known = [each * scale for scale in (1.0, unit) for each in _TURNS]
-    nearest = min(known, key=lambda each: abs(each - turn))
-    if abs(nearest - turn) <= _SAME_TURN * turn:
-        return Wrap(nearest, rows + 1)
-    return Wrap(turn, rows + 1) if np.ptp(np.sign(turns)) else None
+
+    def __init__(self, signal: FloatArray) -> None:
+        """Find the jumps of a signal; they are also larger than steps of an encoder."""
+        self._signal, self._step = signal, np.diff(signal)
+        size = np.abs(self._step)
+        part = signal[:: 1 + len(signal) // _MOST_WINDOWS]
+        low, high = np.quantile(part, [0.01, 0.99]) if len(part) else (0.0, 0.0)
+        least = max(_STEEPER * _unit(self._step), _LEAST_SHARE * float(high - low))
+        self._rows = rows = np.flatnonzero(size > least)
+        quiet: list[BoolArray] = []
+        for side in (-1, 1):
+            count = np.zeros(len(rows), np.int64)
+            for distance in range(1, _AROUND + 1):
+                other = rows + side * distance
+                inside = (other >= 0) & (other < len(size))
+                beside = size[np.clip(other, 0, len(size) - 1)]
+                count += inside & (_STEEPER * beside < size[rows])
+            quiet.append(count >= _QUIET)
+        self._after_quiet, self._before_quiet = quiet
+
+    def dropouts(self) -> BoolArray:
+        """Return which samples the signal jumps to, and back from, as no motion does.
+
+        They are 1 to 20 samples between two jumps. None are found where they would be more than a
+        twentieth of the samples: then the motion jumps.
+        """
+        signal, step = self._signal, self._step
+        found = np.zeros(len(signal), np.bool_)
+        first, last = self._rows[self._after_quiet], self._rows[self._before_quiet]
+        place = np.searchsorted(last, first, "right")
+        first, place = first[place < len(last)], place[place < len(last)]
+        ended = -1
+        for begin, end in zip(first.tolist(), last[place].tolist(), strict=True):
+            size = min(abs(step[begin]), abs(step[end]))
+            inner = np.abs(step[begin + 1 : end]).max(initial=0.0)
+            returns = abs(signal[end + 1] - signal[begin]) < size / 2.0
+            if begin > ended and end - begin <= _LONGEST and inner < size / 2.0 and returns:
+                found[begin + 1 : end + 1] = True
+                ended = end
+        if np.count_nonzero(found) > _LARGEST_SHARE * len(signal):
+            found[:] = False
+        return found
+
+    def wrap(self) -> Wrap | None:
+        """Return the jumps by one turn, all against the motion; None without any.
+
+        The turn is known from jumps in both directions, or is that of a counter.
+        """
+        step, rows = self._step, self._rows[self._after_quiet & self._before_quiet]
+        rows = rows[(rows > 0) & (rows < len(step) - 1)]
+        if not len(rows):
+            return None
+        beside = (step[rows - 1] + step[rows + 1]) / 2.0
+        turns = beside - step[rows]
+        turn = float(np.median(np.abs(turns)))
+        against = np.all(step[rows - 1] * step[rows] < 0.0) and np.all(
+            step[rows + 1] * step[rows] < 0.0
+        )
+        same = np.all(np.abs(np.abs(turns) - turn) <= _SAME_TURN * turn)
+        if not (against and same) or float(np.ptp(self._signal)) > (1.0 + _SAME_TURN) * turn:
+            return None
+        unit = _unit(step)
+        known = [each * scale for scale in (1.0, unit) for each in _TURNS]
+        nearest = min(known, key=lambda each: abs(each - turn))
+        if abs(nearest - turn) <= _SAME_TURN * turn:
+            return Wrap(nearest, rows + 1)
+        return Wrap(turn, rows + 1) if np.ptp(np.sign(turns)) else None
 
 
 def velocity_fault(time: FloatArray, position: FloatArray, velocity: FloatArray) -> str | None:
@@ -152,22 +170,3 @@ def _unit(step: FloatArray) -> float:
     """Return the smallest step of a signal; infinite without one."""
     sizes = np.abs(step)
     return float(np.min(sizes, where=sizes > 0.0, initial=np.inf))
-
-
-def _jumps(signal: FloatArray) -> tuple[FloatArray, IntArray, BoolArray, BoolArray]:
-    """Return steps, those that are jumps for steps before or after, and for which of the two."""
-    step = np.diff(signal)
-    size = np.abs(step)
-    low, high = np.quantile(signal, [0.01, 0.99])
-    least = max(_STEEPER * _unit(step), _LEAST_SHARE * float(high - low))
-    rows = np.flatnonzero(size > least)
-    quiet: list[BoolArray] = []
-    for side in (-1, 1):
-        count = np.zeros(len(rows), np.int64)
-        for distance in range(1, _AROUND + 1):
-            other = rows + side * distance
-            inside = (other >= 0) & (other < len(step))
-            beside = size[np.clip(other, 0, len(step) - 1)]
-            count += inside & (_STEEPER * beside < size[rows])
-        quiet.append(count >= _QUIET)
-    return step, rows, quiet[0], quiet[1]

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray, IntArray
-from stickslip_ros.bags.faults import dropouts
+from stickslip_ros.bags.faults import Jumps
 from stickslip_ros.errors import BagError, InvalidInputError, MessageError
 from stickslip_ros.messages.cdr import Layout, Messages, Refused, decode
 from stickslip_ros.messages.codec import (
@@ -311,7 +311,7 @@ class MotionReader:
                 f"'{self._topic}[1]' takes the first, [2] the second"
             )
         usual = np.quantile(sizes[sizes > 0.0], 0.25) if apart > 0.0 else 0.0
-        strange = dropouts(samples.position)
+        strange = Jumps(samples.position).dropouts()
         strange[1:-1] |= returns & (sizes[1:] > _JUMP * usual) & (usual > 0.0)
         if strange.any():
             why = "jump away from the motion and back, as of another source or a dropout,"

@@ -12,7 +12,7 @@ import numpy as np
 
 from stickslip_ros.arrays import BoolArray, FloatArray, IntArray
 from stickslip_ros.bags.expressions import Expression, listed
-from stickslip_ros.bags.faults import dropouts, velocity_fault, wrap_of
+from stickslip_ros.bags.faults import Jumps, velocity_fault
 from stickslip_ros.bags.mat_file import is_mat, vectors_of
 from stickslip_ros.bags.reader import RunBlock
 from stickslip_ros.bags.table_clock import even_times, stamps_of
@@ -444,7 +444,8 @@ def _without_faults(
 
     position = values["position"]
     present = np.flatnonzero(np.isfinite(position))
-    wrap = wrap_of(position[present])
+    jumps = Jumps(position if len(present) == len(position) else position[present])
+    wrap = jumps.wrap()
     if wrap is not None:
         turn = f"{wrap.turn / factor:.10g}"
         text = f"unwrap({asked['position'].text}, {turn})"
@@ -453,7 +454,7 @@ def _without_faults(
             f"first time at {line(present[wrap.rows])}, as of a counter that wraps: position="
             f"{text}{'' if factor == 1.0 else f'*{factor:g}'}"
         )
-    lost = dropouts(position[present])
+    lost = jumps.dropouts()
     if lost.any():
         values["position"] = position = position.copy()
         position[present[lost]] = nan
@@ -466,7 +467,7 @@ def _without_faults(
     time, velocity = values["time"], values["velocity"]
     both = np.flatnonzero(np.isfinite(position) & np.isfinite(velocity))
     time, position, own = time[both], position[both], velocity[both]
-    spikes = dropouts(own)
+    spikes = Jumps(own).dropouts()
     if spikes.any():
         between = np.interp(time, time[~spikes], own[~spikes])
         by_position = differences(time, position)

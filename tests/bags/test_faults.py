@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.bags.faults import dropouts, velocity_fault, wrap_of
+from stickslip_ros.bags.faults import Jumps, velocity_fault
 from stickslip_ros.bags.table_file import read_table
 from stickslip_ros.errors import InvalidInputError
 
@@ -35,7 +35,7 @@ def test_jumps_away_and_back_are_dropouts(position: FloatArray) -> None:
     lost = {700, 1500, 1501, 1502, 1506, 2000, *range(3000, 3020)}
     position = position + 0.2
     position[[*lost]] = 0.0
-    assert set(np.flatnonzero(dropouts(position)).tolist()) == lost
+    assert set(np.flatnonzero(Jumps(position).dropouts()).tolist()) == lost
 
 
 @pytest.mark.parametrize("rate", [1000.0, 100.0, 20.0, 7.0])
@@ -49,15 +49,15 @@ def test_motions_have_no_faults(rate: float, step: float, noise: float) -> None:
     for motion in (sawtooth(rate), hit, moved, np.sin(40.0 * time), np.zeros_like(time)):
         signal = motion + noise * rng.standard_normal(len(motion))
         signal = np.round(signal / step) * step if step else signal
-        assert not dropouts(signal).any()
-        assert wrap_of(signal) is None
+        assert not Jumps(signal).dropouts().any()
+        assert Jumps(signal).wrap() is None
 
 
 def test_jumps_by_a_turn_against_the_motion_are_a_wrap() -> None:
-    wrap = wrap_of((COARSE + 0.02) % 0.03)
+    wrap = Jumps((COARSE + 0.02) % 0.03).wrap()
     assert wrap is not None
     assert wrap.turn == pytest.approx(0.03, rel=1e-6)
-    forward = wrap_of(np.round(3e5 * TIME**2 + 2e5 * TIME) % 65536.0)
+    forward = Jumps(np.round(3e5 * TIME**2 + 2e5 * TIME) % 65536.0).wrap()
     assert forward is not None
     assert forward.turn == 65536.0
     assert len(forward.rows) == 85
