@@ -126,7 +126,8 @@ def measured(stiffness: int, speed: int) -> Features:
     columns = {"time": "t", "position": f"Fnorm*{NORMAL_FORCE / stiffness!r}"}
     path = DATA / f"k{stiffness}Nm_v{speed}.mat"
     found = quantities_of(table_of(path), columns).values
-    return features(found["time"], found["position"], stiffness)
+    known = np.isfinite(found["position"])  # spikes are left out
+    return features(found["time"][known], found["position"][known], stiffness)
 
 
 def simulated(friction: FrictionLaw, stiffness: int, speed: int, period: float) -> Features:

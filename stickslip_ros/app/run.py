@@ -32,7 +32,6 @@ from stickslip_ros.app.output import print_json, print_values, progress_bar, tel
 from stickslip_ros.errors import BagError, InvalidInputError, RunError
 from stickslip_ros.installed_packages import find_executable
 from stickslip_ros.nodes.base.machine import NamespaceInUseError
-from stickslip_ros.physics.measures.timing import Timing
 from stickslip_ros.scenarios import DEFAULT_NAMESPACE, Pace
 from stickslip_ros.text import number_in
 
@@ -146,6 +145,7 @@ def run(arguments: argparse.Namespace) -> int:
 def _limit_of_machine(scenario: "Scenario", results: Mapping[str, Any]) -> list[str]:
     """Return, after a run that was not in time, what a loop that only sleeps misses here."""
     from stickslip_ros.nodes.base.scheduling import share_missed
+    from stickslip_ros.physics.measures.timing import Timing
 
     plant = scenario.plant
     timing = Timing(*(results[name] for name in Timing._fields))

@@ -119,7 +119,7 @@ def design_tables(name: str, found: Design) -> Iterator[TextTable | str]:
         yield _one_below_another(task, "proposal", CONTROLLER, values, units)
         if found.margins is not None:
             title, margins = "margins at the worst of these belt speeds", asdict(found.margins)
-            yield _one_below_another(title, "margin", MARGINS, margins, units)
+            yield _one_below_another(title, "margins", MARGINS, margins, units)
         checks = [asdict(check) for check in found.checks]
         yield _side_by_side("verification", CHECKS, checks, units)
         at_rest = [each | each["rest"] for each in checks if each["rest"] is not None]

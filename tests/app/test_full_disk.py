@@ -13,7 +13,7 @@ _OLD = b"a figure of before"
 @pytest.mark.parametrize(
     "command",
     [
-        "new new.yaml",
+        "new new.yaml --complete",
         "simulate feed_drive --duration 0.2 --out new.csv --plot old.png",
     ],
 )

@@ -63,6 +63,7 @@ def test_holds_what_ros_looks_for(content, stem, checkout, executables):
     configuration = {f"share/{name}/config/{file.name}" for file in checkout.glob("config/*")}
     stubs = {f"lib/{name}/{executable}" for executable in executables}
     index = {f"share/ament_index/resource_index/packages/{name}", f"share/{name}/package.xml"}
+    index |= {f"share/{name}/hook/path.dsv"}
     files = [entry for entry in content.namelist() if entry.startswith(data)]
     assert {file.removeprefix(f"{data}/") for file in files} == configuration | stubs | index
     for stub in stubs:
