@@ -9,11 +9,12 @@ from functools import partial
 from math import inf, isfinite, nan, ulp
 from pathlib import Path
 from tempfile import TemporaryFile
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 from stickslip_ros.app.output import tell
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.files import open_regular
+from stickslip_ros.messages import ForceSource, TimeSource
 from stickslip_ros.quantities import number_of
 from stickslip_ros.scenarios import DEFAULT_NAMESPACE, LONGEST_NAMESPACE
 from stickslip_ros.text import shown
@@ -156,13 +157,13 @@ def add_bag_layout(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--time",
-        choices=("header", "log"),
+        choices=get_args(TimeSource),
         default="header",
         help="time by the stamps in the messages, or by the log of the recorder (default: header)",
     )
     parser.add_argument(
         "--force",
-        choices=("topic", "effort"),
+        choices=get_args(ForceSource),
         default="topic",
         help="force from a topic, or the effort of the joint, which in our bags is friction "
         "(default: topic)",

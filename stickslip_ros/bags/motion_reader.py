@@ -6,13 +6,14 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import partial
 from math import nan
-from typing import NamedTuple
+from typing import NamedTuple, get_args
 
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray, IntArray
 from stickslip_ros.bags.faults import Jumps
 from stickslip_ros.errors import BagError, InvalidInputError, MessageError
+from stickslip_ros.messages import ForceSource, TimeSource
 from stickslip_ros.messages.cdr import Layout, Messages, Refused, decode
 from stickslip_ros.messages.codec import (
     BELT,
@@ -39,7 +40,6 @@ _JUMP = 10.0
 """Ratio of the distance to the next sample and to the one after it, from which two sources take
 turns."""
 _NUMBERED = re.compile(r"(.+)\[(\d+)\]")
-TIMES, FORCES = ("header", "log"), ("topic", "effort")
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,10 @@ class BagLayout:
     """`topic`: the force is that of a topic; `effort`: it is the effort of the joint."""
 
     def __post_init__(self) -> None:
-        for name, value, allowed in (("time", self.time, TIMES), ("force", self.force, FORCES)):
+        for name, value, allowed in (
+            ("time", self.time, get_args(TimeSource)),
+            ("force", self.force, get_args(ForceSource)),
+        ):
             if value not in allowed:
                 raise InvalidInputError(
                     f"{name} = {shown(value)} is invalid: {must_be_one_of(str(value), allowed)}"

@@ -9,11 +9,12 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
 from math import inf, isinf, pi, sqrt
-from typing import TYPE_CHECKING, Any, Literal, Self
+from typing import TYPE_CHECKING, Any, Literal, Self, get_args
 
 from typing_extensions import override
 
 from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.messages import ForceSource, TimeSource
 from stickslip_ros.messages.codec import FORCE_TYPES
 from stickslip_ros.physics.loop.controller import Controller
 from stickslip_ros.physics.loop.sampled_loop import LOCKSTEP_START, SampledLoop
@@ -442,15 +443,15 @@ class ReplayParameters(MachineParameters):
     clock: bool = at_build(False, "Publish recorded time on /clock.")
     states_topic: str = at_build("", "Topic of joint states of another machine; empty: found.")
     force_topic: str = at_build("", "Topic of forces of another machine; empty: found.")
-    time: Literal["header", "log"] = at_build(
+    time: TimeSource = at_build(
         "header",
         "Time of a bag of another machine: the stamps, or the log of the recorder.",
-        choices=("header", "log"),
+        choices=get_args(TimeSource),
     )
-    force: Literal["topic", "effort"] = at_build(
+    force: ForceSource = at_build(
         "topic",
         "Force of another machine: of a topic, or the effort of the joint.",
-        choices=("topic", "effort"),
+        choices=get_args(ForceSource),
     )
 
 

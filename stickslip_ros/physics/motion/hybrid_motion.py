@@ -22,7 +22,7 @@ _STEPS_OF_A_PHASE = 10
 """Number of steps that the work around the integration of one phase is worth."""
 
 _LONGEST_STEP = 64.0
-"""Longest step of an integration over a longer time."""
+"""Longest step: the end of an advance shortens no step that begins earlier before it."""
 
 _DIVERGENCE = -1
 """Stands for a guard where the rates exceed any bound."""
