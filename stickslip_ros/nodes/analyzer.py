@@ -5,6 +5,7 @@ import json
 import shutil
 import sys
 import time
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
@@ -97,7 +98,7 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
 
     def __init__(self, **options: Any) -> None:
         super().__init__("analyzer", AnalyzerParameters(), **options)
-        self._bags_opened = 0
+        self._bags_opened = Counter[str]()
         self._bag: Path | None = None
 
     def connect(self) -> None:
@@ -397,8 +398,8 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
                 self._listening[topic] = self.keep(self.create_polled_subscription(topic, qos))
 
     def _next_bag(self) -> Path:
-        suffix = f"_{self._bags_opened + 1}" if self._bags_opened else ""
-        return Path(self.parameters.bag + suffix)
+        before = self._bags_opened[self.parameters.bag]
+        return Path(self.parameters.bag + (f"_{before + 1}" if before else ""))
 
     def _open_bag(self) -> None:
         recorder = Recorder(
@@ -414,8 +415,9 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         except BagError:  # on a full disk; another attempt may follow immediately
             shutil.rmtree(recorder.directory, ignore_errors=True)
             raise
-        self._bags_opened += 1
+        self._bags_opened[self.parameters.bag] += 1
         self._bag = recorder.directory.resolve()
+        self.get_logger().info(f"recording to {self._bag}")
         self._recorder = recorder
         self._keep("stickslip_ros/versions", versions())
         self._keep("stickslip_ros/analyzer", self.parameters.flat())

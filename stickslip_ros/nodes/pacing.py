@@ -210,11 +210,13 @@ class LockstepPacer(Pacer):
         for _ in range(100):  # more of them after the callbacks that are due by then
             if not self._running:
                 return
-            held_up = self._awaits_force or self._flow.full
-            if loop.unbounded or (loop.sample_number >= self._last and not held_up):
+            if loop.unbounded:
                 self._finish()
                 return
-            if held_up:
+            if self._awaits_force or self._awaits_recorder:
+                return
+            if loop.sample_number >= self._last:
+                self._finish()
                 return
             try:
                 sample = loop.advance()
@@ -237,6 +239,12 @@ class LockstepPacer(Pacer):
         self._proceed()
 
     @property
+    def _awaits_recorder(self) -> bool:
+        """Whether the recorder must progress: by one sample or, at the last, to this one."""
+        at_end = self._loop.sample_number >= self._last
+        return self._flow.under_way > 0 if at_end else self._flow.full
+
+    @property
     def _awaits_force(self) -> bool:
         return self._loop.controller_present and not self._loop.answered
 
@@ -248,7 +256,7 @@ class LockstepPacer(Pacer):
             return
         patience_ends = now - self._seen_at >= self._reply_timeout
         silent = self._awaits_force and now - self._seen_at >= self._silence
-        if self._flow.full and (silence := self._flow.give_up(patience_ends)):
+        if self._awaits_recorder and (silence := self._flow.give_up(patience_ends)):
             self.complaint = silence
             self._node.get_logger().warning(silence)
         elif silent and self._holds and self._commander_exists():

@@ -173,6 +173,7 @@ class PlantNode(ManagedNode[PlantParameters]):
             "steps_per_second": round(pacer.steps_per_second, 1),
             "silent_samples": loop.silent_samples,
             "superseded": self._superseded,
+            "disturbance_force": loop.disturbance,
             **self.dropped.values,
             **{f"dropped: {reason}": count for reason, count in loop.dropped.items()},
         }

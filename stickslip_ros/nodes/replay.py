@@ -1,7 +1,8 @@
 """Replay node: publishes the messages of a bag again, unchanged and with their recorded spacing.
 
-It starts when one of its topics has a reader and no new reader has appeared for half a second. With
-wait_for it starts when the nodes named there read its topics.
+Active, it publishes the first message when one of its topics has a reader and no new reader has
+appeared for half a second. With wait_for it becomes active when the nodes named there read its
+topics.
 """
 
 import sys
@@ -67,7 +68,7 @@ class ReplayNode(ManagedNode[ReplayParameters]):
         self.keep(self.every(0.05, self._look_for_readers))
 
     def start(self) -> None:
-        """Publish the first message now, the others when they are due."""
+        """Publish the first message when the readers are complete, the others when due."""
         self._clock_time: int | None = None
         self._player = Player(
             self._messages,
@@ -83,7 +84,6 @@ class ReplayNode(ManagedNode[ReplayParameters]):
                 for topic, recorded in self._recorders.items()
             },
         )
-        self._player.start()
 
     def stop(self) -> None:
         """Stop once the messages sent have arrived."""
@@ -143,28 +143,23 @@ class ReplayNode(ManagedNode[ReplayParameters]):
         if self.parameters.on_end == "exit":
             self.end_process(None if player is None else player.failure)
 
-    def missing_peers(self) -> str:
-        """Return what is missing of the named readers or, if none are named, of any."""
-        missing = super().missing_peers()
-        if not missing and not any(self._readers):
-            missing = f"no node reads {', '.join(self._writers)}"
-        now = time.monotonic()
-        if missing and missing != self._waiting_for and now - self._connected_at > _SILENCE:
-            self.get_logger().warning(f"waiting: {missing}")
-            self._waiting_for = missing
-        if missing:
-            return missing
-        self._waiting_for = ""
-        return (
-            "new readers are still appearing"
-            if now - self._readers_changed_at < _SETTLING_TIME
-            else ""
-        )
-
     def _look_for_readers(self) -> None:
+        """Start to publish once there are readers, and no further ones appear."""
         readers = [writer.get_subscription_count() for writer in self._writers.values()]
+        now = time.monotonic()
         if readers != self._readers:
-            self._readers, self._readers_changed_at = readers, time.monotonic()
+            self._readers, self._readers_changed_at = readers, now
+        if any(readers):
+            self._waiting_for = ""
+            if (
+                self.active
+                and self._player is not None
+                and now - self._readers_changed_at > _SETTLING_TIME
+            ):
+                self._player.start()
+        elif not self._waiting_for and now - self._connected_at > _SILENCE:
+            self._waiting_for = f"no node reads {', '.join(self._writers)}"
+            self.get_logger().warning(f"waiting: {self._waiting_for}")
 
     def _listen_to_recorder(self, topic: str, writer: Publisher) -> str:
         """Subscribe to a recorder that may read the topic; return the name of its own topic."""

@@ -10,6 +10,7 @@ import pytest
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.duration import Duration
+from rclpy.parameter import Parameter
 from rclpy.qos import ReliabilityPolicy
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 from sensor_msgs.msg import JointState
@@ -252,6 +253,10 @@ def test_activated_again_it_opens_a_further_bag(graph: Graph, tmp_path: Path) ->
         assert analyzer.diagnose()[2] == {"bag": str(tmp_path / name)}
         assert (tmp_path / name / "metadata.yaml").is_file()
         analyzer.trigger_activate()
+    analyzer.trigger_deactivate()
+    analyzer.set_parameters_atomically([Parameter("bag", value=str(tmp_path / "other"))])
+    analyzer.trigger_activate()
+    assert analyzer.diagnose()[2]["bag"] == str(tmp_path / "other")
 
 
 def test_a_bag_that_exists_is_refused_and_left_alone(graph: Graph, tmp_path: Path) -> None:

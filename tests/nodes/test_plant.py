@@ -80,6 +80,20 @@ def test_it_runs_no_further_ahead_of_the_recorder_than_the_window(graph: Graph) 
     graph.wait_until(lambda: len(heard) == 1001, "a recorder that went away is not waited for")
 
 
+def test_in_lockstep_it_ends_once_the_recorder_has_the_last_sample(graph: Graph) -> None:
+    heard = graph.listen(JOINT_STATES, raw=True)
+    recorded = graph.publisher(RECORDED)
+    plant = graph.add(PlantNode, expects_control=False, wait_for=["observer"], duration=0.5)
+    graph.wait_until(lambda: len(heard) == 51, "the last sample")
+    last = SECOND + 50 * SECOND // 100
+    for stamp in (last - SECOND // 100, last):
+        assert plant.active
+        recorded.publish(pack_header(stamp))
+        graph.wait_until(lambda s=stamp: plant._pacer._flow.under_way == (last - s > 0), "noted")
+    graph.wait_until(lambda: not plant.active, "the end")
+    assert plant.diagnose()[2]["finished"]
+
+
 @pytest.mark.parametrize(("pace", "enough"), [("lockstep", 200), ("realtime", 10)])
 def test_a_pause_is_no_end_and_does_not_count_as_duration_and_the_motion_goes_on(
     graph: Graph, pace: str, enough: int

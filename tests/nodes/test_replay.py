@@ -41,6 +41,15 @@ def test_every_message_comes_as_it_was_recorded_and_then_the_node_pauses_or_ends
     assert states[300:] == states[:300]
 
 
+def test_active_without_readers_it_waits_for_the_first_one(graph: Graph, tmp_path: Path) -> None:
+    node = graph.add(ReplayNode, bag=record_states(tmp_path / "bag", 20), rate=FAST)
+    graph.wait_until(lambda: "no node reads /test/joint_states" in node.diagnose()[1], "it waits")
+    assert node.active
+    assert node.diagnose()[2]["messages"] == 0
+    states = graph.listen(JOINT_STATES, raw=True)
+    graph.wait_until(lambda: len(states) == 20 and not node.active, "all is heard")
+
+
 def test_paused_it_is_silent_until_it_is_resumed(graph: Graph, tmp_path: Path) -> None:
     def ask(service: str) -> Trigger.Response:
         return graph.call(Trigger, f"/test/replay/{service}", Trigger.Request())

@@ -58,6 +58,7 @@ class Timeline:
         if self._zero is None:
             self._origin = now
             self._zero = self.now = log_time
+            self._paused_at = now if self.paused else None
         elif self._segment_starts or log_time < self.now - JITTER:
             self._zero = log_time - self.elapsed_at(self.now) - self._interval
             self.now = log_time
@@ -129,8 +130,9 @@ class Player:
         return self._timeline.paused
 
     def start(self) -> None:
-        """Send the first message now."""
-        self._thread.start()
+        """Send the first message now, unless that is done."""
+        if self._thread.ident is None:
+            self._thread.start()
 
     def stop(self) -> None:
         """Send no more messages."""
@@ -138,7 +140,8 @@ class Player:
             self._running = False
             self._changed.notify()
         self._sleeper.wake()
-        self._thread.join()
+        if self._thread.ident is not None:
+            self._thread.join()
 
     def pause(self) -> None:
         """Pause now."""
