@@ -108,6 +108,7 @@ class SliderField:
         self._scale, self._unit = 1.0, ""
         self._earlier: list[float] = []
         self._shown = ""
+        self._outdated = False
         self._held = False
         name = name_of(full_name)
         with ui.element("div").classes("w-full"):
@@ -136,8 +137,9 @@ class SliderField:
         known = isinstance(value, float)
         self._number.set_enabled(known)
         self._undo.set_enabled(known and bool(self._earlier))
-        if known and not self._held and f"{value / self._scale:.6g}" != self._shown:
-            self._shown = f"{value / self._scale:.6g}"
+        shown = f"{value / self._scale:.6g}" if known else ""
+        if known and not self._held and (self._outdated or shown != self._shown):
+            self._shown, self._outdated = shown, False
             ends = slider_range(value or usual, self._parameter)
             low, high, step, place = (f"{each / self._scale:.9g}" for each in (*ends, value))
             # The value last: a range input keeps it within the limits that it has.
@@ -169,7 +171,7 @@ class SliderField:
         node, _, name = self.full_name.partition(".")
         answer = await asyncio.wrap_future(self._listener.set_parameter(node, name, value))
         self._refusal.set_text(answer)
-        self._shown = ""  # the value that the node has is shown
+        self._outdated = True  # what was typed gives way to the value that the node has
         if not answer and not again and before is not None and before != value:
             self._earlier.append(before)
 
