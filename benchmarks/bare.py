@@ -5,8 +5,7 @@ from typing import Any
 
 import heyoka as hy
 
-from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.drive_system import UNBOUNDED_SPEED
+from stickslip_ros.physics.model.drive import UNBOUNDED_SPEED, Drive
 
 
 class BareMotion:

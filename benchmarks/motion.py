@@ -27,8 +27,7 @@ from scipy.integrate import solve_ivp
 
 from benchmarks.slices import Row, by_turns, compare_times, show
 from stickslip_ros.physics.loop.controller import answer
-from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.drive_system import UNBOUNDED_SPEED
+from stickslip_ros.physics.model.drive import UNBOUNDED_SPEED, Drive
 from stickslip_ros.physics.model.friction import Stribeck
 from stickslip_ros.physics.model.signals import Signal, ramp, sine
 from stickslip_ros.physics.motion.motion import Motion

@@ -299,19 +299,17 @@ def reading_at_recording(
     recording: Recording | TableRecording, given: float | None = None
 ) -> SampleAssumptions:
     """Return how the samples of a recording are to be read, with a stick speed that is `given`."""
-    if given is not None:
-        return SampleAssumptions(given)
     analyzer = recording.metadata("stickslip_ros/analyzer") or {}
     plant = recording.metadata("stickslip_ros/plant") or {}
-    with suppress(KeyError, ValueError):
-        given = float(analyzer["stick_speed"])
-        if 0.0 <= given < inf:
-            return SampleAssumptions(given)
+    if given is None:
+        with suppress(KeyError, ValueError):
+            recorded = float(analyzer["stick_speed"])
+            given = recorded if 0.0 <= recorded < inf else None
     known: dict[str, Any] = {}
     for name, text in plant.items():
         with suppress(RecursionError, ValueError):
             known[name] = json.loads(text)
-    return reading_of(known)
+    return reading_of(known, given=given)
 
 
 def _timing_of_recording(recording: Recording | TableRecording) -> Timing | None:

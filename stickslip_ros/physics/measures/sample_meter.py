@@ -28,6 +28,7 @@ from stickslip_ros.physics.measures.drift import Drift
 from stickslip_ros.physics.measures.noise import FEW_SAMPLES, LEAST_SAMPLES
 from stickslip_ros.physics.measures.noisy_meter import NoisyCycleMeter
 from stickslip_ros.physics.measures.sampling_grid import LONGEST_GAP, SamplingGrid
+from stickslip_ros.physics.model.drive import UNBOUNDED_SPEED, Drive
 from stickslip_ros.physics.model.friction import LAWS
 from stickslip_ros.physics.model.sensor import Sensor
 from stickslip_ros.samples import SampleColumns
@@ -49,6 +50,8 @@ class SampleAssumptions(NamedTuple):
     """Step of the actuator over the stiffness, m: the range in which it can hold the slide."""
     varies: bool = False
     """Whether belt, load, disturbance or reference vary: then nothing is a drift."""
+    unbounded_speed: float = inf
+    """Speed of the slide, m/s, at which a plant ends a motion that diverges."""
 
 
 EXACT = SampleAssumptions()
@@ -74,17 +77,17 @@ def reading_of(
     Parameters that no plant can have count as unknown. With a stick speed that is `given`, m/s, the
     samples are read as exact ones.
     """
-    (noisy, within), changing = _resolution(plant), varies(plant)
+    noisy, within = _resolution(plant)
+    changing, unbounded_speed = varies(plant), _unbounded_speed(plant)
     if given is not None:
-        return SampleAssumptions(given, within=within, varies=changing)
-    if not plant:
+        noisy = False
+    elif not plant:
         return UNKNOWN
     law = LAWS.get(str(plant.get("friction.law")))
-    if law is None or not law.states:
-        stick_speed = 0.0
-    else:
+    stick_speed: float | None = 0.0 if given is None else given
+    if given is None and law is not None and law.states:
         stick_speed = STICK_SHARE * fastest_belt if fastest_belt else None
-    return SampleAssumptions(stick_speed, noisy, within, changing)
+    return SampleAssumptions(stick_speed, noisy, within, changing, unbounded_speed)
 
 
 def varies(parameters: Mapping[str, Any]) -> bool:
@@ -110,6 +113,16 @@ def _resolution(plant: Mapping[str, Any]) -> tuple[bool | None, float]:
     except (ArithmeticError, TypeError, ValueError):
         return None, 0.0
     return (not sensor.exact, within) if known else (None, 0.0)
+
+
+def _unbounded_speed(plant: Mapping[str, Any]) -> float:
+    """Return the speed at which a plant ends a motion, m/s; infinite where it is not known."""
+    try:
+        names = "mass", "stiffness", "normal_force"
+        constants: dict[str, Any] = {name: float(plant[name]) for name in names}
+        return UNBOUNDED_SPEED * Drive(damping=0.0, belt_speed=0.0, **constants).speed_scale
+    except (ArithmeticError, InvalidInputError, LookupError, TypeError, ValueError):
+        return inf
 
 
 @dataclass(frozen=True)
@@ -176,7 +189,7 @@ class SampleMeter:
         """Trends of the run; those of the control force are for its user to feed."""
         self._last: SampleColumns | None = None
         self._elapsed = 0
-        self._fastest_belt = self._fastest_slip = 0.0
+        self._fastest_belt = self._fastest_slip = self._fastest = 0.0
         self._belt_varies = False
         self._per_cycle = inf  # samples of the last cycle of exact samples
         # Highest speed above the limit at its sample: a belt that starts to move is slow at first.
@@ -250,7 +263,9 @@ class SampleMeter:
         thousandth of the time and is less accurate.
         """
         limit = UNBOUNDED_BELT_SPEEDS * self._fastest_belt
-        unbounded = self._unbounded_speed > limit
+        # The last sample of a plant whose motion diverges has just that speed.
+        ended = self._fastest >= (1.0 - 1e-9) * self.reading.unbounded_speed
+        unbounded = ended or self._unbounded_speed > limit
         self._meter.unbounded = unbounded
         self._meter.within = self._noisy_meter.within = self.reading.within
         few = not self.noisy and self._per_cycle < FEW_SAMPLES and self._noisy_meter.line
@@ -339,6 +354,7 @@ class SampleMeter:
         np.maximum.accumulate(np.maximum(belt_speed, self._fastest_belt), out=belt_speed)
         self._fastest_belt = float(belt_speed[-1])
         speed = np.abs(samples.velocity)
+        self._fastest = max(self._fastest, float(speed.max()))
         fast = (speed > UNBOUNDED_BELT_SPEEDS * belt_speed) & (belt_speed > 0.0)
         if self.noisy:
             fast &= _lasting(fast, np.sign(samples.velocity))

@@ -13,6 +13,9 @@ from stickslip_ros.physics.model.constants import Scales, constant, scaled
 from stickslip_ros.physics.model.friction import FrictionLaw, Stribeck
 from stickslip_ros.physics.model.signals import NO_SIGNAL, Signal
 
+UNBOUNDED_SPEED = 1e3
+"""Dimensionless speed of the slide above which the motion counts as unbounded, and ends."""
+
 
 @dataclass(frozen=True)
 class DriveConstants:

@@ -16,12 +16,9 @@ from stickslip_ros.physics.model.dimensionless_drive import (
     SPEED,
     DimensionlessDrive,
 )
-from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.model.drive import UNBOUNDED_SPEED, Drive
 from stickslip_ros.physics.model.hybrid import Flow, Guard, Instant, Mode, with_switches
 from stickslip_ros.physics.model.signals import Signal
-
-UNBOUNDED_SPEED = 1e3
-"""Dimensionless speed of the slide above which the motion counts as unbounded."""
 
 SLIP, STICK = "slip", "stick"
 """The flows of a drive. In slip the first switch is sgn(v_r), in stick it is 0."""

@@ -15,8 +15,7 @@ import numpy as np
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.physics.measures.breakpoints import Breakpoints
 from stickslip_ros.physics.model.control import ContinuousControl
-from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.drive_system import UNBOUNDED_SPEED
+from stickslip_ros.physics.model.drive import UNBOUNDED_SPEED, Drive
 from stickslip_ros.physics.model.equations import acceleration, reaction
 from stickslip_ros.physics.model.friction import SteadyPart
 from stickslip_ros.physics.motion.motion import RecordedMotion

@@ -13,8 +13,7 @@ from stickslip_ros.arrays import FloatArray
 from stickslip_ros.physics.measures.cycle_measures import EQUILIBRIUM_SPEED
 from stickslip_ros.physics.model.control import ContinuousControl
 from stickslip_ros.physics.model.dimensionless_drive import POSITION, SPEED
-from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.drive_system import UNBOUNDED_SPEED
+from stickslip_ros.physics.model.drive import UNBOUNDED_SPEED, Drive
 from stickslip_ros.physics.model.functions import zero_between
 from stickslip_ros.physics.motion.variational import ShootingMotion, TooStiffError
 from stickslip_ros.physics.theory.cycle_bounds import (

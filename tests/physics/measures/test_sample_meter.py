@@ -186,6 +186,18 @@ def test_a_thousand_belt_speeds_are_running_away(speed: float, regime: Regime | 
     assert meter.measures().regime is regime
 
 
+def test_a_plant_that_has_ended_a_diverging_motion_is_told_on_a_fast_belt_too() -> None:
+    """On a belt of 5 m/s a thousand belt speeds are more than the plant lets the slide reach."""
+    drive = {"mass": 100.0, "stiffness": 1e6, "normal_force": 1000.0}  # 0.1 m/s is its scale
+    velocity = np.concatenate([np.zeros(20), np.geomspace(0.1, 100.0, 10)])
+    samples = replace(still(stamps(100, 30)), velocity=velocity, belt_velocity=np.full(30, 5.0))
+    meter = SampleMeter(window=20, reading=reading_of(drive))
+    meter.feed(samples)
+    assert meter.measures().regime is Regime.UNBOUNDED
+    assert fed(samples).measures().regime is not Regime.UNBOUNDED
+    assert reading_of(drive | {"mass": -1.0}).unbounded_speed == float("inf")
+
+
 def read_late(samples: SampleColumns, latest: float, seed: int = 1) -> SampleColumns:
     """With stamps of a clock that is read late, by the share `latest` of a period at most."""
     period = int(samples.stamp[1] - samples.stamp[0])
