@@ -237,6 +237,16 @@ class DriveSystem(DimensionlessDrive):
         sign = 1.0 if relative_speed > 0.0 else -1.0
         return mode if mode.switches[0] == sign else self._slip(mode, sign, instant)
 
+    def continued(self, before: Mode, mode: Mode, instant: Instant) -> Mode:
+        """Return the mode of a changed drive that slips on, as `before`, under the same law."""
+        if mode.flow != SLIP or mode.switches[0] != before.switches[0]:
+            return mode
+        own = before.switches[self._parts.law]
+        return self._slip(with_switches(mode, 1, own), mode.switches[0], instant)
+
+    def _relative_speed(self, mode: Mode, instant: Instant) -> float:
+        return instant.state[SPEED] - self.belt_speed(mode, instant.time)
+
     def _check_contact(self, mode: Mode, instant: Instant) -> None:
         if self._may_lift and self.normal_force(mode, instant.time) < -LIFT_ROUNDING:
             self.lift(mode, instant)
@@ -321,12 +331,12 @@ class DriveSystem(DimensionlessDrive):
 
     def _slip(self, mode: Mode, sign: float, instant: Instant) -> Mode:
         """Return slip in a direction; the signals stay in their pieces."""
-        law, state = self.drive.friction, instant.state
+        law, own = self.drive.friction, self.by_part(mode.switches)
         switches: Sequence[float] = ()
         if law.switches:
-            relative_speed = state[SPEED] - self.belt_speed(mode, instant.time)
-            switches = law.switches_at(relative_speed, sign, self._memory(instant))
-        own = self.by_part(mode.switches)
+            state = self._relative_speed(mode, instant), sign, self._memory(instant)
+            same = sign == mode.switches[0]
+            switches = law.switches_following(own.law, *state) if same else law.switches_at(*state)
         return Mode(SLIP, (sign, *switches, *own.belt, *own.load))
 
     def _resting(self, mode: Mode, instant: Instant) -> Mode:

@@ -326,7 +326,8 @@ class Motion(HybridMotion):
         if drive.speed_scale != old.speed_scale or drive.length_scale != old.length_scale:
             x, y = position / drive.length_scale, velocity / drive.speed_scale
         state = system.initial_state(x, y)
-        if (law.name, law.states) == (old_law.name, old_law.states):
+        remembers = bool(law.states) and (law.name, law.states) == (old_law.name, old_law.states)
+        if remembers:
             self._put_memory(state, memory)
         if control is not None:
             self._put_control_state(state, control_state)
@@ -336,7 +337,10 @@ class Motion(HybridMotion):
         self._set_clock()
         self._instant.inputs = [0.0] * len(system.inputs)
         self.set_forces(force, disturbance)
+        before = self._mode
         self._set_state(state)
+        if remembers and law.switches:
+            self._enter(system.continued(before, self._mode, self._instant))
 
 
 class RecordedMotion(Motion):

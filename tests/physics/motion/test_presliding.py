@@ -5,6 +5,7 @@ depend on the rate then has no other path than for a slow force, and the formula
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from math import exp, log
 
 import numpy as np
@@ -22,6 +23,7 @@ from stickslip_ros.physics.model.friction import (
     MaxwellSlip,
     RateState,
 )
+from stickslip_ros.physics.model.signals import NO_SIGNAL, step
 from stickslip_ros.physics.motion import Motion
 
 COEFFICIENT, STIFFNESS, NORMAL = 0.5, 1000.0, 2.0
@@ -112,6 +114,32 @@ def test_a_rate_and_state_contact_creeps_logarithmically(load: float) -> None:
             expected = rate * length / (1.0 - rate) * log(age * reference / length)
         if age > 0.0 and (1.0 - rate) * time > -0.9 * length / reference:
             assert motion.position == pytest.approx(expected, rel=1e-6)
+
+
+@pytest.mark.parametrize("by_signal", [True, False])
+@pytest.mark.parametrize("faster", [0.06, 0.02])
+def test_elements_slip_on_where_the_belt_jumps_without_a_change_of_direction(
+    by_signal: bool, faster: float
+) -> None:
+    """S_i z_i' = C (s/n - S_i z_i/g) from the steady slip of before: friction tends to the new one.
+
+    The slide is so heavy that its speed stays 0; an element put back to sticking would be pulled
+    at S v, from 0.27 to the new limit and beyond within a sample.
+    """
+    curve, rate, weight = Exponential(0.4, 0.25, 0.02), 100.0, 1e9
+    law = MaxwellSlip(curve, 1e5, 4, attraction=rate)
+    jump = step(faster - 0.04, start=0.5) if by_signal else NO_SIGNAL
+    drive = Drive(weight, 0.0, 0.0, 1.0, 0.04, law, belt=jump)
+    motion = Motion(drive, 0.0, 0.0)
+    motion.advance(0.5)
+    before, after = (float(curve.coefficient(-speed, -1.0)) for speed in (0.04, faster))
+    assert motion.friction_force == pytest.approx(before, rel=1e-6)
+    if not by_signal:
+        motion.drive = replace(drive, belt_speed=faster)
+    for number in range(1, 6):
+        motion.advance(1e-3)
+        expected = after + (before - after) * exp(-rate * 1e-3 * number / after)
+        assert motion.friction_force == pytest.approx(expected, rel=1e-6)
 
 
 @pytest.mark.parametrize("name", ["dahl", "lugre", "elasto_plastic", "maxwell_slip"])
