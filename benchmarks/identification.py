@@ -30,6 +30,7 @@ from stickslip_ros.identification.findings import Findings
 from stickslip_ros.identification.fit import QUANTILE
 from stickslip_ros.identification.identify import identify
 from stickslip_ros.identification.record import Record
+from stickslip_ros.physics.model.actuator import Actuator
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import (
     Coulomb,
@@ -80,8 +81,13 @@ def damping(law: str, kind: str) -> float:
     return 200.0 if (law, kind) == ("stribeck", "ramp") else 0.0
 
 
-def record(law: str, kind: str, seed: int, duration: float = DURATION) -> Record:
-    """Return a run as a machine would log it."""
+def record(
+    law: str, kind: str, seed: int, duration: float = DURATION, delay: float = 0.0, lag: float = 0.0
+) -> Record:
+    """Return a run as a machine would log it, whose control force may be late, s.
+
+    Taps are then part of the command.
+    """
     random = np.random.default_rng(seed)
     count = round(duration / PERIOD)
     first, last = np.array(BELTS[kind]) * random.uniform(0.9, 1.1)
@@ -95,6 +101,7 @@ def record(law: str, kind: str, seed: int, duration: float = DURATION) -> Record
         belt_speed=0.0,
         friction=LAWS[law],
         belt=table(list(zip(times, speeds, strict=True))),
+        actuator=Actuator(time_constant=lag),
     )
     belt = np.interp(PERIOD * np.arange(count), times, speeds)
     taps, gain = np.zeros(count), 0.0
@@ -108,6 +115,8 @@ def record(law: str, kind: str, seed: int, duration: float = DURATION) -> Record
     motion = Motion(drive, 2.6e-4 * random.uniform(0.5, 1.0), 0.0)
     position, force = np.empty(count), np.zeros(count)
     slow, before = 0.0, None
+    late, (whole, rest) = delay > 0.0 or lag > 0.0, divmod(round(delay / PERIOD, 9), 1.0)
+    whole = int(whole)
     for number in range(count):
         measured = round(motion.position / RESOLUTION) * RESOLUTION
         position[number] = measured
@@ -115,8 +124,17 @@ def record(law: str, kind: str, seed: int, duration: float = DURATION) -> Record
         before = measured
         force[number] = round(gain * (velocity - slow) / FORCE_STEP) * FORCE_STEP
         slow += 20.0 * PERIOD * (velocity - slow)
-        motion.set_forces(float(force[number]), float(taps[number]))
-        motion.advance(PERIOD)
+        if not late:
+            motion.set_forces(float(force[number]), float(taps[number]))
+            motion.advance(PERIOD)
+            continue
+        force[number] += taps[number]
+        for place, share in ((number - whole - 1, rest), (number - whole, 1.0 - rest)):
+            motion.set_forces(float(force[place]) if place >= 0 else 0.0, 0.0)
+            if share > 0.0:
+                motion.advance(share * PERIOD)
+    if late:
+        taps[:] = 0.0
     return Record(f"{law}, {kind}, seed {seed}", PERIOD, position, belt, force, taps)
 
 

@@ -116,10 +116,13 @@ class AxisTask:
 
     def _with_delay(self, law: IdentifiedLaw) -> Candidate:
         """Return a fit with a delay if the records ask for one."""
-        fit = plain = regress(self.rows, law, self.free, self.fixed)
-        found = Candidate(plain, plain.held_out)
+        fit = self._fitted(law, self.rows)
+        found = Candidate(fit, fit.held_out)
         if self.delay is not None:
             return found
+        if self.rows.resting:
+            read = self._fitted(law, self._rows(None))
+            found = min(found, Candidate(read, read.held_out), key=lambda each: each.error)
         period, tried = self.records[0].period, _DELAYS
         for _ in range(2):
             design, wanted = fit.system
@@ -127,7 +130,7 @@ class AxisTask:
             wanted = wanted[:, None] + np.column_stack(changes)
             left = wanted - design @ np.linalg.lstsq(design, wanted, rcond=None)[0]
             best = float(tried[np.argmin(np.sum(left * left, axis=0))])
-            fit = regress(self._rows(best * period), law, self.free, self.fixed)
+            fit = self._fitted(law, self._rows(best * period))
             tried = best + _DELAY_STEPS
         other = Candidate(fit, fit.held_out)
         return other if other.error < _RESOLVED_ERROR_RATIO * found.error else found
@@ -160,9 +163,13 @@ class AxisTask:
         remark = f"predicts better by less than {share}: not resolved by filtered rows"
         return replace(found, remark=remark)
 
-    def _rows(self, delay: float) -> Rows:
-        """Return the rows with another delay of the force, s."""
-        return replace(self.rows, force=self._forces(delay), delay=delay)
+    def _fitted(self, law: IdentifiedLaw, rows: Rows) -> Regression:
+        return regress(rows, law, self.free, self.fixed)
+
+    def _rows(self, delay: float | None) -> Rows:
+        """Return the rows with another delay of the force, s; None: read when the position is."""
+        shift = -0.5 * self.records[0].period if delay is None else delay
+        return replace(self.rows, force=self._forces(shift), delay=delay)
 
     def _forces(self, delay: float) -> FloatArray:
         pairs = zip(self.rows.parts, self.records, strict=True)

@@ -16,6 +16,7 @@ from stickslip_ros.identification.laws import (
     DAHL,
     DELAY,
     EXPONENTIAL,
+    LAG,
     LUGRE,
     DirectionalAdapter,
     IdentifiedLaw,
@@ -56,6 +57,8 @@ _OPTIONAL_GAIN, _OPTIONAL_ERRORS = 0.05, 4.0
 _CLEAR_GAIN = 0.5
 """Share of the squared error for which it is searched in any case: where the error is that of what
 is missing, it makes the standard error large."""
+_LAG_GAIN = 0.05
+"""The same for a lag beside a delay, which stands for most of it."""
 _ZERO_ERRORS = 3.0
 """Standard errors by which such a constant must differ from zero."""
 AUTO = "auto"
@@ -66,7 +69,7 @@ _POINTS = 8
 """Number of points of friction without a law."""
 _LEAST_SHARE = 1e-9
 """Smallest friction from which a search starts, as a share of the other forces."""
-OPTIONAL = ("damping", "bias_force", DELAY)
+OPTIONAL = ("damping", "bias_force", DELAY, LAG)
 """Constants that are fitted only if the record asks for them."""
 
 
@@ -262,21 +265,24 @@ class DriveTask:
             if name in self.fixed or name in fit.free:
                 continue
             errors, share = fit.gain(name)
-            unclear = abs(errors) < _OPTIONAL_ERRORS and share < _CLEAR_GAIN
+            clear = _LAG_GAIN if name == LAG and DELAY in fit.free else _CLEAR_GAIN
+            unclear = abs(errors) < _OPTIONAL_ERRORS and share < clear
             if unclear or share < least_share:
                 continue
             more = refine(fit.task, [*fit.free, name], fit.values, fit.starts, most=_STEPS)
             if _loss(more) >= _loss(fit):
                 continue
-            place = len(fit.free)
-            error = sqrt(max(more.covariance[place, place], 0.0))
-            if abs(more.values[name]) > _ZERO_ERRORS * error:
+            if _errors_from_zero(more, name) > _ZERO_ERRORS:
                 fit = more
                 continue
             # It was not needed, but may have led the others out of a local minimum.
             without = {**more.values, name: fit.values[name]}
             other = refine(fit.task, fit.free, without, more.starts, most=_STEPS)
             fit = min(fit, other, key=_loss)
+        if {DELAY, LAG} <= {*fit.free} and _errors_from_zero(fit, DELAY) < _ZERO_ERRORS:
+            # It stood for the lag.
+            free = [name for name in fit.free if name != DELAY]
+            fit = refine(fit.task, free, {**fit.values, DELAY: 0.0}, fit.starts, most=_STEPS)
         return fit
 
     def finished(self, near: Refinement) -> Candidate:
@@ -313,12 +319,19 @@ class DriveTask:
             name: value * (1.0 if name in law.unscaled else self.normal_force)
             for name, value in self.friction.items()
         }
-        return {DELAY: 0.0, **values, **own, **self.fixed}
+        return {DELAY: 0.0, LAG: 0.0, **values, **own, **self.fixed}
 
 
 def is_white(fit: Refinement) -> bool:
     """Return whether the errors of a fit are noise, as far as their successive ones tell."""
     return abs(fit.correlation) < _WHITE_CORRELATION
+
+
+def _errors_from_zero(fit: Refinement, name: str) -> float:
+    """Return by how many standard errors a fitted coordinate differs from zero."""
+    place = [*fit.free].index(name)
+    error = sqrt(max(fit.covariance[place, place], 0.0))
+    return abs(fit.values[name]) / error if error > 0.0 else inf
 
 
 def _share(fit: Refinement) -> float:

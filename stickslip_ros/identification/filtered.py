@@ -95,7 +95,7 @@ class Filtered:
 
     def delayed(self, record: Record, delay: float) -> FloatArray:
         """Return the forces of the same record, decimated, with another delay, s."""
-        return _shifted(record.held_force, delay / record.period)[START:-END]
+        return _shifted(record, delay)[START:-END]
 
 
 @cache
@@ -129,8 +129,7 @@ def filtered(record: Record, *, decimated: bool, delay: float | None = None) -> 
     # The velocity is meant over the same time.
     velocity[1:-1] -= np.diff(velocity, 2) / 12.0
     relative = velocity - smooth(record.belt_velocity)
-    held = record.held_force
-    force = held if delay is None else _shifted(held, delay / record.period)
+    force = record.held_force if delay is None else _shifted(record, delay)
     if not decimated:
         force = smooth(force)  # all that enters the equation passes the same filter
     time: FloatArray = record.period * np.arange(len(position), dtype=float)
@@ -149,12 +148,15 @@ def filtered(record: Record, *, decimated: bool, delay: float | None = None) -> 
     )
 
 
-def _shifted(held: FloatArray, periods: float) -> FloatArray:
-    """Return forces, held from sample to sample, as they are on average around each sample."""
-    at = np.arange(len(held)) - periods
-    edges = np.concatenate([[0.0], np.cumsum(held)])
-    places = np.arange(len(edges))
-    return np.interp(at + 0.5, places, edges) - np.interp(at - 0.5, places, edges)
+def _shifted(record: Record, delay: float) -> FloatArray:
+    """Return the known forces, of which one is late, as they are on average around each sample."""
+    found = np.zeros(len(record.position))
+    for held, late in zip(record.held_forces, (delay, 0.0), strict=True):
+        at = np.arange(len(held)) - late / record.period
+        edges = np.concatenate([[0.0], np.cumsum(held)])
+        places = np.arange(len(edges))
+        found += np.interp(at + 0.5, places, edges) - np.interp(at - 0.5, places, edges)
+    return found
 
 
 def _slipping(relative: FloatArray, reach: float) -> BoolArray:

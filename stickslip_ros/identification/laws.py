@@ -52,6 +52,8 @@ vibration whose speed is the fastest one."""
 _REFERENCE_SPEED = float(RateState().reference_speed)
 DELAY = "force_delay"
 """Name of the constant that is not one of the drive: the time until a force acts, s."""
+LAG = "actuator.time_constant"
+"""Name of the time constant of the lag of the force, s."""
 REVERSE = "reverse."
 """Start of the names of coordinates of backward slip where both directions have their own."""
 
@@ -182,9 +184,9 @@ class IdentifiedLaw(ABC):
         static = self.static_force(values)
         if name in ("mass", "stiffness"):
             return values[name] / _SEARCH_FACTOR, values[name] * _SEARCH_FACTOR
-        if name == DELAY:
+        if name in (DELAY, LAG):
             longest = sqrt(values["mass"] / values["stiffness"])
-            return -longest, longest
+            return -longest if name == DELAY else 0.0, longest
         if name == "bias_force":
             return -inf, inf
         if name == "viscous":

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import sqrt
+from math import exp, sqrt
 from typing import Self
 
 import numpy as np
@@ -36,6 +36,8 @@ _MISSING_DISTANCE = 0.75
 _STEP_TOLERANCE, _EVEN_SHARE = 0.25, 0.6
 """Largest difference of a time step from the period, as a share of it; share of the steps, at
 least, that are so near."""
+_JITTER = 0.25
+"""Distance of samples from an even clock, in periods, up to which it jitters."""
 _DITHER_NOISE = 0.5
 """Noise, in steps of the encoder, from which rounding errors are independent; rounding has 0.29."""
 
@@ -82,13 +84,18 @@ class Record:
         return len(self.position) * self.period
 
     @property
+    def held_forces(self) -> tuple[FloatArray, FloatArray]:
+        """The force, which may be late, and the disturbance, N; zero if none is recorded."""
+        none = np.zeros(len(self.position))
+        force, disturbance = (
+            none if each is None else each for each in (self.force, self.disturbance)
+        )
+        return force, disturbance
+
+    @property
     def held_force(self) -> FloatArray:
-        """Total of the known forces, N; zero if none is recorded."""
-        total = np.zeros(len(self.position))
-        for each in (self.force, self.disturbance):
-            if each is not None:
-                total = total + each
-        return total
+        """Total of the known forces, N."""
+        return np.add(*self.held_forces)
 
     @property
     def lost(self) -> BoolArray:
@@ -171,6 +178,12 @@ class Record:
         low, high = max(parts, key=lambda each: each[1] - each[0], default=(0, 0))
         return self.part(low, high) if high - low >= FEWEST else None
 
+    def lagging(self, time_constant: float) -> Self:
+        """Return the record with the force behind a lag of first order, s; see `lagged`."""
+        if self.force is None or not time_constant > 0.0:
+            return self
+        return replace(self, force=lagged(self.force, self.period / time_constant))
+
     def part(self, start: int, end: int) -> Self:
         """Return the samples from `start` to before `end`."""
         optional = {
@@ -186,6 +199,19 @@ class Record:
         )
 
 
+def lagged(command: FloatArray, periods: float) -> FloatArray:
+    """Return the mean force from each sample to the next behind a lag of first order.
+
+    `command` is held from sample to sample; `periods` is their period in time constants. The force
+    is 0 at the start.
+    """
+    from scipy.signal import lfilter  # takes long to import
+
+    kept = exp(-periods)
+    end: FloatArray = np.asarray(lfilter([1.0 - kept], [1.0, -kept], command))
+    return command - (command - np.concatenate([[0.0], end[:-1]])) * (1.0 - kept) / periods
+
+
 def evenly_spaced(
     name: str, stamp: IntArray, columns: dict[str, FloatArray], notes: Sequence[str] = ()
 ) -> list[Record]:
@@ -194,8 +220,9 @@ def evenly_spaced(
     Stamps are in ns, columns and notes are those of `Record`. Samples of which one is not finite
     count as missing; only the reference may be. Velocities are left out if they are differences of
     the positions, or if less than half of them are finite. Each part without a longer gap is a
-    record: positions between samples are interpolated, forces are held. Raises InvalidInputError if
-    no part is long enough, or the clock is not even up to gaps and jitter.
+    record: positions between samples are interpolated, forces are held; where the clock does more
+    than jitter a force is the mean of what is held meanwhile. Raises InvalidInputError if no part
+    is long enough, or the clock is not even up to gaps and jitter.
     """
     columns = dict(columns)
     velocity = columns.get("velocity")
@@ -226,12 +253,16 @@ def evenly_spaced(
         own = time[rows]
         even = own[0] + period * np.arange(round((own[-1] - own[0]) / period) + 1)
         found: dict[str, FloatArray] = {}
+        jitters = float(_distances(own, even).max()) <= _JITTER * period
         as_measured = len(own) == len(even) and np.abs(own - even).max() < 1e-3 * period
         for each, values in columns.items():
             if as_measured:
                 found[each] = values[rows]
+            elif each in ("force", "disturbance") and not jitters:
+                edges = np.append(even, even[-1] + period)
+                found[each] = np.diff(_integral(own, values[rows], edges)) / period
             elif each in ("force", "disturbance"):
-                last = np.searchsorted(own, even + 0.25 * period, "right") - 1
+                last = np.searchsorted(own, even + _JITTER * period, "right") - 1
                 found[each] = values[rows][np.maximum(last, 0)]
             else:
                 found[each] = np.interp(even, own, values[rows])
@@ -247,6 +278,13 @@ def evenly_spaced(
             f"{name} has no {FEWEST} samples without a gap of more than {_LONGEST_GAP:g} periods"
         )
     return records
+
+
+def _integral(time: FloatArray, held: FloatArray, until: FloatArray) -> FloatArray:
+    """Return the integral of values that are held from their times on, from the first one."""
+    total = np.concatenate([[0.0], np.cumsum(held[:-1] * np.diff(time))])
+    last = np.clip(np.searchsorted(time, until, "right") - 1, 0, None)
+    return total[last] + held[last] * (until - time[last])
 
 
 def _check_clock(name: str, stamp: IntArray) -> None:

@@ -3,7 +3,7 @@
 import json
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from math import exp, inf, isfinite, nan
+from math import inf, isfinite, nan
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -23,7 +23,7 @@ from stickslip_ros.bags.table_file import (
 from stickslip_ros.bags.text_table import ANY_FORM, TableFormat
 from stickslip_ros.errors import BagError, InvalidInputError
 from stickslip_ros.identification.laws import DELAY
-from stickslip_ros.identification.record import FEWEST, Record, evenly_spaced
+from stickslip_ros.identification.record import FEWEST, Record, evenly_spaced, lagged
 from stickslip_ros.physics.model.actuator import Actuator
 from stickslip_ros.samples import ForceColumns
 from stickslip_ros.stamps import NANOSECONDS
@@ -179,12 +179,7 @@ def _held(forces: ForceColumns, stamp: IntArray, plant: Mapping[str, Any]) -> Fl
     time_constant = plant.get("actuator.time_constant", 0.0)
     if not isinstance(time_constant, int | float) or not time_constant > 0.0 or len(stamp) < 2:
         return held
-    periods = float(np.median(np.diff(stamp))) / NANOSECONDS / time_constant
-    kept, force, mean = exp(-periods), 0.0, np.empty(len(held))
-    for number, command in enumerate(held.tolist()):
-        mean[number] = command + (force - command) * (1.0 - kept) / periods
-        force = command + (force - command) * kept
-    return mean
+    return lagged(held, float(np.median(np.diff(stamp))) / NANOSECONDS / time_constant)
 
 
 def _since(stamp: IntArray, since: IntArray, values: FloatArray, *, before: float) -> FloatArray:

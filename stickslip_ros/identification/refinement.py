@@ -16,7 +16,7 @@ from stickslip_ros.identification.fit import (
     Residuals,
     block_covariance,
 )
-from stickslip_ros.identification.laws import DELAY, IdentifiedLaw
+from stickslip_ros.identification.laws import DELAY, LAG, IdentifiedLaw
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.time_limit import OutOfTimeError
 from stickslip_ros.identification.trajectories import Trajectories, segments_of
@@ -129,6 +129,7 @@ class Refinement(Fit):
 
     @override
     def errors(self, record: Record) -> ForceErrors:
+        record = record.lagging(self.values.get(LAG, 0.0))
         columns = filtered(record, decimated=False, delay=self.delay)
         time, position, velocity, acceleration, speed, force = (
             each[columns.settled]

@@ -6,7 +6,7 @@ from typing import Any
 
 from stickslip_ros.files import written
 from stickslip_ros.identification.findings import Findings
-from stickslip_ros.identification.laws import by_group, numbers_of
+from stickslip_ros.identification.laws import LAG, by_group, numbers_of
 from stickslip_ros.physics.model.friction import CurveFollower, FrictionLaw, Table
 from stickslip_ros.scenarios.files import Scenario, load_scenario
 from stickslip_ros.scenarios.template import commented_file
@@ -71,6 +71,8 @@ def _scenario(found: Findings, laws: Mapping[str, FrictionLaw], files: dict[str,
     values["plant.force_delay"] = max(found.delay, 0.0)
     values["plant.initial.position"] = float(record.position[0])
     if found.has_spring:
+        if LAG in found.fitted:
+            values[f"plant.{LAG}"] = found.fitted[LAG].value
         values |= {"washout_controller.linear_gain": 0.0, "washout_controller.start_after": 0.0}
         return load_scenario(_BASE).changed(values)
     values["plant.duration"] = 10.0

@@ -10,7 +10,7 @@ import numpy as np
 
 from stickslip_ros.arrays import BoolArray, FloatArray, IntArray
 from stickslip_ros.errors import InvalidInputError, RunError
-from stickslip_ros.identification.laws import DELAY, IdentifiedLaw
+from stickslip_ros.identification.laws import DELAY, LAG, IdentifiedLaw
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.time_limit import TimeLimit
 from stickslip_ros.identification.trajectory import Predictor, Segment, steady_memory
@@ -116,7 +116,7 @@ class Trajectories:
             drive = self._drive(values)
             found = [
                 each
-                for predictor, segments, own in self._by_record(starts)
+                for predictor, segments, own in self._by_record(values, starts)
                 for each in predictor.followed(drive, segments, own, delay)
             ]
         except (InvalidInputError, RunError):
@@ -169,7 +169,7 @@ class Trajectories:
 
         of_constants = by_coordinates(of_system) if moved else None
         parts = iter(self.parts)
-        for predictor, segments, own in self._by_record(starts):
+        for predictor, segments, own in self._by_record(values, starts):
             delay, belt = values.get(DELAY, 0.0), predictor.record.belt_velocity
             runs = predictor.sensitivities(drive, segments, own, delay)
             units = 1.0 / drive.length_scale, 1.0 / drive.speed_scale
@@ -200,10 +200,10 @@ class Trajectories:
 
     def _by_differences(self, names: Sequence[str]) -> Sequence[str]:
         """Return those of these coordinates by which a motion has no derivatives of its own."""
-        return [name for name in names if name in (DELAY, *self.law.by_differences)]
+        return [name for name in names if name in (DELAY, LAG, *self.law.by_differences)]
 
     def _by_record(
-        self, starts: FloatArray
+        self, values: Mapping[str, float], starts: FloatArray
     ) -> Iterator[tuple[Predictor, Sequence[Segment], FloatArray]]:
         """Yield each predictor with the segments of its record, which follow one another."""
         numbers = np.array([segment.record for segment in self.segments])
@@ -211,7 +211,7 @@ class Trajectories:
             own = numbers == number
             if own.any():
                 segments = [each for each in self.segments if each.record == number]
-                yield predictor, segments, starts[own]
+                yield predictor.lagging(values.get(LAG, 0.0)), segments, starts[own]
 
     def _bounded(self, outputs: FloatArray) -> FloatArray:
         span = _UNBOUNDED_ERROR * float(np.ptp(self.measured))
@@ -231,7 +231,7 @@ class Trajectories:
         """Return a size of each coordinate, SI units, from which steps of differences are made."""
         force, fastest = self.law.static_force(values), self.fastest
         found = {"bias_force": force, "damping": force / fastest}
-        found[DELAY] = 100.0 * self.predictors[0].record.period
+        found[DELAY] = found[LAG] = 100.0 * self.predictors[0].record.period
         own = {name: self.law.size(name, values, fastest) for name in self.law.coordinates}
         return found | own
 

@@ -1,13 +1,15 @@
 """The motion that a model predicts for a record: its forces and its belt in, positions out."""
 
 from collections.abc import Iterator, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from math import copysign, isfinite
+from typing import Self
 
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.identification.record import Record
+from stickslip_ros.identification.record import Record, lagged
 from stickslip_ros.physics.model.dimensionless_drive import POSITION, SPEED
 from stickslip_ros.physics.model.drive import Drive, in_units_of
 from stickslip_ros.physics.model.signals import table
@@ -21,6 +23,8 @@ _UNBOUNDED_LOSS = 1e300
 _REACHES, _REACH_RATIO, _END_TOLERANCE = 14, 0.25, 0.05
 """Reaches within which the velocity at the start is sought, at most; ratio of one to the one
 before; share of the squared error by which both ends of the last one may be worse."""
+_LAG_STEPS = 3
+"""Steps of a sample in which a force that lags is held: one alone moves the slide otherwise."""
 _TOLERANCE = 1e-6
 """Largest error of the belt velocity between corners, as a share of its largest value."""
 
@@ -45,8 +49,19 @@ class Predictor:
 
     def __init__(self, record: Record) -> None:
         self.record = record
-        self._force = record.held_force.tolist()
+        self._force, self._disturbance = (each.tolist() for each in record.held_forces)
+        self._steps = 1
         self._corners = _corners(record.belt_velocity)
+
+    def lagging(self, time_constant: float) -> Self:
+        """Return the same with the force behind a lag of first order, s."""
+        if self.record.force is None or not time_constant > 0.0:
+            return self
+        other, fine = copy(self), self.record.period / _LAG_STEPS
+        force, disturbance = (np.repeat(each, _LAG_STEPS) for each in self.record.held_forces)
+        other._force = lagged(force, fine / time_constant).tolist()
+        other._disturbance, other._steps = disturbance.tolist(), _LAG_STEPS
+        return other
 
     def positions(self, drive: Drive, velocity: float) -> FloatArray:
         """Return positions, m, from the measured one at a velocity, m/s; NaN once unbounded."""
@@ -71,7 +86,7 @@ class Predictor:
         Outputs are the positions, m, and then the velocities, m/s, if the record has some with a
         weight. The memory of the friction law is that of steady slip at the start of a segment.
         `delay` is the time from a sample until its force acts, s, from minus one to several
-        periods. Outputs are NaN from where the motion is unbounded.
+        periods; a disturbance is never late. Outputs are NaN from where the motion is unbounded.
         """
         return [found for found, _ in self._followed(Motion, drive, segments, starts, delay)]
 
@@ -135,21 +150,25 @@ class Predictor:
 
     def _samples(self, motion: Motion, start: int, count: int, delay: float) -> Iterator[int]:
         """Yield the number of each sample but the first when the motion has reached it."""
-        period, forces, last = self.record.period, self._force, len(self._force) - 1
+        forces, others = self._force, self._disturbance
+        last, steps = len(forces) - 1, self._steps
+        period, start = self.record.period / steps, start * steps
         whole, rest = divmod(delay / period, 1.0)
         shift, rest = int(whole), rest * period
-        advance, held = motion.advance, forces[min(max(start - 1 - shift, 0), last)]
-        motion.force = held
-        for number in range(1, count):
-            force = forces[min(max(start + number - 1 - shift, 0), last)]
-            if rest > 0.0:
-                advance(rest)
-            if force != held:
-                motion.force = held = force
-            advance(period - rest)
+        advance, late = motion.advance, forces[min(max(start - 1 - shift, 0), last)]
+        motion.force = acting = late + others[start]
+        for number in range(1, (count - 1) * steps + 1):
+            place = start + number - 1
+            before, late = late, forces[min(max(place - shift, 0), last)]
+            for force, duration in ((before, rest), (late, period - rest)):
+                if duration > 0.0:
+                    if force + others[place] != acting:
+                        motion.force = acting = force + others[place]
+                    advance(duration)
             if motion.unbounded:
                 break
-            yield number
+            if number % steps == 0:
+                yield number // steps
 
     def with_belt(self, drive: Drive, start: int, count: int) -> Drive:
         """Return the drive with the belt of a part of the record."""
@@ -170,10 +189,10 @@ def delayed(record: Record, delay: float) -> Record:
     Half as many steps then simulate a delay that is no whole number of periods, to a change of the
     force within a period.
     """
-    held, periods = record.held_force, delay / record.period
+    held, periods = record.held_forces[0], delay / record.period
     total = np.concatenate([[0.0], np.cumsum(held)])
     edges = np.interp(np.arange(len(total)) - periods, np.arange(len(total)), total)
-    return replace(record, force=np.diff(edges), disturbance=None)
+    return replace(record, force=np.diff(edges))
 
 
 def free_run(record: Record, drive: Drive) -> tuple[float, FloatArray]:

@@ -9,7 +9,7 @@ from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.identification.findings import Findings, notes_on
 from stickslip_ros.identification.identify import identify
 from stickslip_ros.identification.laws import SaturatingAdapter
-from stickslip_ros.identification.record import Record
+from stickslip_ros.identification.record import Record, evenly_spaced
 from stickslip_ros.identification.regression import regress
 from stickslip_ros.identification.servo import closed_loop, servo_of
 from stickslip_ros.identification.trajectory import Predictor, free_run
@@ -61,6 +61,26 @@ def test_an_axis_that_sticks_has_no_delay(rate: int, rest: float) -> None:
         estimate = found.fitted[name]
         assert abs(estimate.value - value) < 4.0 * estimate.standard_error, name
         assert estimate.standard_error < 0.02 * value, name
+
+
+def test_a_force_that_is_read_with_the_position_is_not_late() -> None:
+    """Steps of 10 or 12 ms; the slide turns so slowly that it might rest."""
+    random = np.random.default_rng(103)
+    time = np.cumsum(random.choice([0.010, 0.012], p=[0.7, 0.3], size=3500))
+    angles = 2.0 * np.pi * np.array([0.1, 0.23, 0.6]) * time[:, None] + np.array([0.3, 1.1, 2.0])
+    rates, sizes = 2.0 * np.pi * np.array([0.1, 0.23, 0.6]), np.array([0.6, 0.2, 0.06])
+    velocity = np.cos(angles) @ (sizes * rates)
+    force = -4.0 * np.sin(angles) @ (sizes * rates**2) + 11.0 * velocity + 7.0 * np.sign(velocity)
+    columns = {
+        "position": np.round(np.sin(angles) @ sizes, 4),
+        "belt_velocity": 0.0 * time,
+        "force": force + 0.2 * random.standard_normal(len(time)),
+    }
+    found = identify(evenly_spaced("log", np.rint(1e9 * time).astype(np.int64), columns), "coulomb")
+    assert found.delay == 0.0
+    for name, value in (("mass", 4.0), ("friction.static", 7.0), ("friction.viscous", 11.0)):
+        estimate = found.fitted[name]
+        assert abs(estimate.value - value) < 3.0 * estimate.standard_error < 0.02 * value, name
 
 
 def test_what_is_known_is_not_fitted(coulomb: Findings) -> None:

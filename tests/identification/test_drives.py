@@ -18,8 +18,10 @@ from stickslip_ros.identification.drives import OUT_OF_TIME
 from stickslip_ros.identification.filtered import filtered
 from stickslip_ros.identification.findings import Findings
 from stickslip_ros.identification.identify import identify
+from stickslip_ros.identification.laws import LAG
 from stickslip_ros.identification.record import Record, evenly_spaced
 from stickslip_ros.identification.refinement import repetition_of
+from stickslip_ros.identification.trajectory import Predictor, Segment
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import Coulomb, Directional, FrictionLaw, Table
 from stickslip_ros.physics.model.signals import table
@@ -63,17 +65,29 @@ def test_a_search_ends_with_the_best_so_far() -> None:
     assert found.candidates[0].remark == OUT_OF_TIME
 
 
-def test_a_delay_that_is_there_is_found() -> None:
-    """Errors without it scatter so much that hardly any constant seems to be needed."""
-    own = study.record("stribeck", "taps", seed=1, duration=2.5)
-    assert own.force is not None
-    assert own.disturbance is not None
-    late = {"force": np.roll(own.force, -2), "disturbance": np.roll(own.disturbance, -2)}
-    fixed = {"normal_force": study.NORMAL_FORCE}
-    found = identify([replace(own, **late).part(0, len(own.force) - 2)], "stribeck", fixed)
-    assert found.delay == pytest.approx(2e-3, abs=2e-5)
-    mass = found.fitted["mass"]
-    assert abs(mass.value - study.MASS) < _FAR * mass.standard_error < 0.01 * study.MASS
+@pytest.mark.parametrize(("delay", "lag"), [(2e-3, 0.0), (0.0, 3e-3), (1.4e-3, 1e-3)])
+def test_a_force_that_is_late(delay: float, lag: float) -> None:
+    """Errors without that scatter so much that hardly any constant seems to be needed."""
+    own = study.record("stribeck", "taps", 1, 2.5, delay, lag)
+    found = identify([own], "stribeck", {"normal_force": study.NORMAL_FORCE})
+    true = study.truth("stribeck", "taps") | {"force_delay": delay, LAG: lag}
+    for name, each in found.fitted.items():
+        assert abs(each.value - true[name]) < _FAR * each.standard_error, name
+    assert found.fitted["mass"].standard_error < 0.002 * study.MASS
+    assert (found.delay > 0.0) == (delay > 0.0)
+    assert (LAG in found.fitted) == (lag > 0.0)
+
+
+def test_a_disturbance_is_not_late() -> None:
+    own = study.record("coulomb", "taps", 1, 0.5)
+    drive = Drive(study.MASS, 0.0, study.STIFFNESS, 1000.0, 0.0, study.LAWS["coulomb"])
+    shifted = replace(own, force=np.concatenate([np.zeros(2), own.force[:-2]]))
+    late, known = (
+        Predictor(each).followed(drive, [Segment(0, 0, 500)], np.zeros((1, 2)), delay)[0]
+        for each, delay in ((own, 2.0 * study.PERIOD), (shifted, 0.0))
+    )
+    assert np.ptp(known) > 1e-5
+    assert late == pytest.approx(known, abs=1e-12)
 
 
 def test_rate_and_state_friction_is_recovered() -> None:

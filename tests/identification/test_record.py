@@ -36,6 +36,17 @@ def test_even_samples_are_kept_as_they_are() -> None:
     assert record.reference is None
 
 
+def test_on_a_clock_that_wanders_a_force_is_the_mean_of_what_is_held() -> None:
+    steps = np.random.default_rng(3).choice([0.010, 0.012], p=[0.7, 0.3], size=800)
+    time = np.cumsum(steps)
+    (record,) = evenly_spaced("log", _stamps(time), _columns(time) | {"force": time})
+    even = time[0] + record.period * (0.5 + np.arange(len(record.position)))
+    assert record.force is not None
+    late = even - record.force
+    assert late[:-1].min() > 0.0
+    assert late[:-1].mean() == pytest.approx(0.5 * np.mean(steps**2) / np.mean(steps), rel=0.01)
+
+
 def test_jitter_is_interpolated_and_forces_are_held() -> None:
     even = 0.001 * np.arange(800)
     time = even + np.random.default_rng(1).uniform(0.0, 2e-4, len(even))
