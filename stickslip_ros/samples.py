@@ -7,9 +7,23 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from stickslip_ros.arrays import BoolArray, FloatArray, IntArray, Table
+from stickslip_ros.errors import InvalidInputError
 
 LARGEST = 1e100
 """Magnitude up to which positions (m) and speeds (m/s) are measured without overflow."""
+
+
+class MotorSample(NamedTuple):
+    """State of the motor behind the slide at one instant."""
+
+    position: float
+    """Displacement of the motor, m."""
+    velocity: float
+    """Velocity of the motor, m/s."""
+
+
+RESTING_MOTOR = MotorSample(0.0, 0.0)
+"""A motor at the reference."""
 
 
 class Sample(NamedTuple):
@@ -35,6 +49,35 @@ class Sample(NamedTuple):
     """Displacement of the belt, m."""
     belt_velocity: float
     """Velocity of the belt, m/s."""
+    motor: MotorSample | None = None
+    """State of the motor; None if it is ideal."""
+
+    def of(self, body: str) -> "Sample | MotorSample":
+        """Return what has position and velocity of a body.
+
+        Parameters
+        ----------
+        body : str
+            "table", the slide, or "motor".
+
+        Returns
+        -------
+        Sample or MotorSample
+            The sample itself, or its motor.
+
+        Raises
+        ------
+        InvalidInputError
+            If there is no such motor.
+        """
+        if body == "table":
+            return self
+        if self.motor is None:
+            raise InvalidInputError(
+                f"feedback of the {body}: the samples have no motor, as with plant.motor.kind = "
+                "ideal; feedback of the table needs none"
+            )
+        return self.motor
 
 
 class Reference(NamedTuple):
@@ -94,7 +137,7 @@ class SampleColumns(Table):
             Their columns.
         """
         stamp = np.array([sample.stamp for sample in samples], np.int64)
-        others = np.array([sample[1:] for sample in samples]).reshape(-1, len(Sample._fields) - 1)
+        others = np.array([sample[1:6] for sample in samples]).reshape(-1, 5)
         return cls(stamp, *others.T.copy())
 
     @property

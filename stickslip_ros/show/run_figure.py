@@ -331,7 +331,8 @@ class _OneRun(_Panels):
             # On a belt at rest any position within the static friction is an equilibrium.
             belt = np.where(rows.belt_velocity == 0.0, np.nan, rows.belt_velocity)
             by_friction = self._drive.friction.at_rest(belt) * self._drive.length_scale
-            rest = by_friction + self._drive.bias_force / self._drive.stiffness
+            dragged = self._drive.bias_force + self._drive.guide_damping * belt
+            rest = by_friction + dragged / self._drive.stiffness
             draw_line(position, pane, (rows.time, rest), length, gap, **_REST)
         draw_line(position, pane, (rows.time, rows.position), length, gap, **MOTION)
         draw_line(velocity, pane, (rows.time, rows.belt_velocity), speed, gap, **BELT)

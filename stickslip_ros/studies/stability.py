@@ -340,7 +340,7 @@ def _closed_forms(drive: Drive, law: ControlLaw | None) -> Section | _Noted:
 
     forms: Section = {
         "equilibrium_position": copysign(drive.length_scale, drive.belt_speed) * cubic.equilibrium
-        + drive.bias_force / drive.stiffness,
+        + (drive.bias_force + drive.guide_damping * drive.belt_speed) / drive.stiffness,
         "first_lyapunov_coefficient": cubic.first_lyapunov_coefficient,
         "hopf_speed": _scaled(cubic.hopf_speed, speed),
         "crossing_speed": _scaled(cubic.crossing_speed, drive.angular_frequency / speed),

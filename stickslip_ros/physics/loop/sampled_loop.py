@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.sensor import EXACT_SENSOR, Sensor
 from stickslip_ros.physics.model.signals import NO_SIGNAL, Signal
-from stickslip_ros.samples import Sample
+from stickslip_ros.samples import MotorSample, Sample
 from stickslip_ros.stamps import NANOSECONDS
 
 if TYPE_CHECKING:  # a node without a motion needs no heyoka
@@ -81,6 +81,8 @@ class SampledLoop:
         Disturbance force of the scenario. By default there is none.
     sensor : Sensor, optional
         Sensor that measures the samples. By default it is exact.
+    motor_sensor : Sensor, optional
+        Sensor of a motor of finite mass. By default it is exact.
     overtaken : callable, optional
         Called as overtaken(stamp, force) for each force that was accepted and will never act,
         because a newer one came or arrived before it: the stamp (ns) of the sample that it answers,
@@ -121,6 +123,7 @@ class SampledLoop:
         expects_control: bool = True,
         disturbance: Signal = NO_SIGNAL,
         sensor: Sensor = EXACT_SENSOR,
+        motor_sensor: Sensor = EXACT_SENSOR,
         overtaken: Callable[[int, float], None] = lambda stamp, force: None,
         advance: Callable[[float], None] | None = None,
     ) -> None:
@@ -166,8 +169,8 @@ class SampledLoop:
         self._next_drive: Drive | None = None
         self._next_start: tuple[float, float] | None = None
         self._limiter = motion.drive.actuator.limiter
-        self._sensor = sensor
-        self._measure = sensor.start(self.period)
+        self._sensor, self._motor_sensor = sensor, motor_sensor
+        self._start_sensors()
         motion.restart_signals()
         self.sample_number = 0
         """Number of the present sample."""
@@ -177,10 +180,10 @@ class SampledLoop:
     @property
     def true_sample(self) -> Sample:
         """State of slide and belt at the present sample."""
-        if self._measure is None:
+        if self._measure is None and self._measure_motor is None:
             return self.sample
-        position, velocity = self._true
-        return self.sample._replace(position=position, velocity=velocity)
+        position, velocity, motor = self._true
+        return self.sample._replace(position=position, velocity=velocity, motor=motor)
 
     @property
     def answered(self) -> bool:
@@ -406,16 +409,22 @@ class SampledLoop:
         if self._next_start is not None:
             start, self._next_start = self._next_start, None
             motion.restart(*start)
-            self._measure = self._sensor.start(self.period)
+            self._start_sensors()
             friction_force = motion.friction_force
         self.disturbance = self._scenario_disturbance.at(number * self.period)
         self.disturbance += self.asked_disturbance
         stamp, belt_speed = self.stamp(number), motion.belt_speed
-        position, velocity = self._true = motion.position, motion.velocity
+        position, velocity, motor = self._true = motion.position, motion.velocity, motion.motor
         if self._measure is not None:
             position, velocity = self._measure(number, position, velocity)
-        values = stamp, position, velocity, friction_force, belt_position, belt_speed
+        if motor is not None and self._measure_motor is not None:
+            motor = MotorSample(*self._measure_motor(number, *motor))
+        values = stamp, position, velocity, friction_force, belt_position, belt_speed, motor
         return tuple.__new__(Sample, values)  # half as long as the constructor
+
+    def _start_sensors(self) -> None:
+        self._measure = self._sensor.start(self.period)
+        self._measure_motor = self._motor_sensor.start(self.period)
 
     def _stand_in(self) -> tuple[int, float]:
         """Return the replacement for the missing force of the present sample.

@@ -52,15 +52,51 @@ class MeasuredTrajectory(Trajectory):
     """Measured velocity of the slide, m/s."""
 
 
+@dataclass(frozen=True, eq=False)
+class MotorTrajectory(Trajectory):
+    """A trajectory of a drive with a motor of finite mass."""
+
+    motor_position: Annotated[FloatArray, Quantity("motor displacement", "m")]
+    """Displacement of the motor, m."""
+    motor_velocity: Annotated[FloatArray, Quantity("motor velocity", "m/s")]
+    """Velocity of the motor, m/s."""
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredMotorTrajectory(MeasuredTrajectory):
+    """The same with what the sensors of slide and motor tell of it."""
+
+    motor_position: Annotated[FloatArray, Quantity("motor displacement", "m")]
+    """Displacement of the motor, m."""
+    motor_velocity: Annotated[FloatArray, Quantity("motor velocity", "m/s")]
+    """Velocity of the motor, m/s."""
+    measured_motor_position: Annotated[FloatArray, Quantity("measured motor displacement", "m")]
+    """Measured displacement of the motor, m."""
+    measured_motor_velocity: Annotated[FloatArray, Quantity("measured motor velocity", "m/s")]
+    """Measured velocity of the motor, m/s."""
+
+
+_KINDS = {
+    (False, False): Trajectory,
+    (True, False): MeasuredTrajectory,
+    (False, True): MotorTrajectory,
+    (True, True): MeasuredMotorTrajectory,
+}
+"""Trajectories by whether they have what sensors tell, and a motor."""
+
+
 class SampleRecorder(ABC):
     """Receives the samples of a run as they come, and keeps each one or every nth."""
 
-    def __init__(self, rate: float, every: int = 1, *, measured: bool = False) -> None:
+    def __init__(
+        self, rate: float, every: int = 1, *, measured: bool = False, motor: bool = False
+    ) -> None:
         """Keep one in `every` samples; they are taken `rate` (Hz) times per second.
 
-        With `measured` also what a sensor tells.
+        With `measured` also what a sensor tells, and with `motor` also the motion of the motor.
         """
         self._rate, self._every, self._measured = rate, every, measured
+        self._with_motor = motor
         self._number = 0
         """Number of the next sample."""
         self._now = 0.0
@@ -76,7 +112,7 @@ class SampleRecorder(ABC):
 
     @property
     def _kind(self) -> type[Trajectory]:
-        return MeasuredTrajectory if self._measured else Trajectory
+        return _KINDS[self._measured, self._with_motor]
 
     def take(self, sample: Sample, control_force: float, measured: Sample | None = None) -> None:
         """Receive the next sample, and the control force (N) that answers it.
@@ -85,10 +121,13 @@ class SampleRecorder(ABC):
         """
         number = self._number
         if number % self._every == 0:
-            _, position, velocity, friction_force, *belt = sample
-            row = (number / self._rate, position, velocity, friction_force, control_force, *belt)
-            if self._measured:
-                row += (measured or sample)[1:3]
+            _, position, velocity, friction_force, belt, belt_speed, motor = sample
+            told = measured or sample
+            row = number / self._rate, position, velocity, friction_force, control_force, belt
+            row += belt_speed, *(told[1:3] if self._measured else ())
+            if self._with_motor:
+                assert motor is not None
+                row += *motor, *((told.motor or motor) if self._measured else ())
             self.keep(row)
         self._number = number + 1
 
@@ -121,6 +160,7 @@ class SampleRecorder(ABC):
             motion.friction_force,
             drive.belt_speed * number / self._rate + travel,
             motion.belt_speed,
+            motion.motor,
         )
         self.take(sample, motion.applied_force)
 
@@ -128,9 +168,11 @@ class SampleRecorder(ABC):
 class TrajectoryRecorder(SampleRecorder):
     """Keeps the samples of a run in memory."""
 
-    def __init__(self, rate: float, every: int = 1, *, measured: bool = False) -> None:
+    def __init__(
+        self, rate: float, every: int = 1, *, measured: bool = False, motor: bool = False
+    ) -> None:
         """Keep samples as `SampleRecorder` does."""
-        super().__init__(rate, every, measured=measured)
+        super().__init__(rate, every, measured=measured, motor=motor)
         self._values = array("d")
 
     def keep(self, row: tuple[float, ...]) -> None:

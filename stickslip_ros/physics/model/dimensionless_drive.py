@@ -12,8 +12,10 @@ import heyoka as hy
 from stickslip_ros.physics.model import equations
 from stickslip_ros.physics.model.constants import constants_of
 from stickslip_ros.physics.model.control import ContinuousControl
+from stickslip_ros.physics.model.control.base import seen_by
 from stickslip_ros.physics.model.drive import Drive, DriveConstants, ScaledDrive
 from stickslip_ros.physics.model.hybrid import HybridSystem, Instant, Mode, structure_number
+from stickslip_ros.physics.model.motor import Motor
 from stickslip_ros.physics.model.symbols import numbers, structure, with_symbols
 
 POSITION, SPEED, MEMORY = 0, 1, 2
@@ -35,6 +37,7 @@ class Parts(NamedTuple):
     law: Any
     belt: Any
     load: Any
+    motor: Any
 
 
 class Expressions:
@@ -44,12 +47,13 @@ class Expressions:
         state, constants, inputs, switches, time = system.symbols
         drive, control = system.drive, system.control
         of_drive = constants_of(DriveConstants).keys() & constants
-        self.drive = drive = replace(
-            drive,
-            **{name: constants[name] for name in of_drive},
-            friction=with_symbols(drive.friction, "friction", constants),
-            actuator=with_symbols(drive.actuator, "actuator", constants),
-        )
+        parts = {
+            name: with_symbols(getattr(drive, name), name, constants)
+            for name in ("friction", "actuator", "motor")
+            if getattr(drive, name) is not None
+        }
+        own = {name: constants[name] for name in of_drive}
+        self.drive = drive = replace(drive, **own, **parts)
         self.law = drive.friction
         self.switches = own = system.by_part(switches)
         self.sign, self.speed = switches[0], state[SPEED]
@@ -61,42 +65,83 @@ class Expressions:
         self._control = None if control is None else with_symbols(control, "control", constants)
         self._of_control = state[system.control_states]
         self._lagging = state[system.actuator_states]
+        self._of_motor = state[system.motor_states]
+        self._guide_damping = drive.guide_damping if system.has_guide_damping else None
 
     def reaction(self, speed: Any) -> Any:
-        """Return the reaction at a speed of the slide."""
+        """Return the reaction of the slide at a speed of it."""
+        stretch, rate = stretched(self._position, speed, self._of_motor)
+        force = self._inputs[1] if self._of_motor else self._control_force(speed)
+        found = equations.reaction(self.drive, stretch, rate, force)
+        if self._guide_damping is not None:
+            found += self._guide_damping * (speed - self.belt_speed)
+        return found
+
+    def _control_force(self, speed: Any) -> Any:
+        """Return the force on the slide, or on a motor of finite mass."""
         force = self._inputs[0]
         if self._control is not None:
-            force = self._control.control_force(self._position, speed, self._of_control)
+            seen = seen_by(self._control, self._position, speed, self._of_motor)
+            force = self._control.control_force(*seen, self._of_control)
         elif self._lagging:
-            force = self.drive.actuator.force(force, self._lagging) + self._inputs[1]
-        return equations.reaction(self.drive, self._position, speed, force)
+            force = self.drive.actuator.force(force, self._lagging)
+            if not self._of_motor:
+                force += self._inputs[1]
+        return force
+
+    def motor_reaction(self, speed: Any) -> Any:
+        """Return the reaction of the motor at a speed of the slide."""
+        assert self.drive.motor is not None
+        stretch = stretched(self._position, speed, self._of_motor)
+        relative_speed = self._of_motor[1] - self.belt_speed
+        return equations.motor_reaction(
+            self.drive, self.drive.motor, *stretch, relative_speed, self._control_force(speed)
+        )
+
+    def motor_held(self, speed: Any) -> Any:
+        """Return the dry friction that a motor needs to move with the guide."""
+        assert self.drive.motor is not None
+        return self.motor_reaction(speed) + self.drive.motor.mass * self.belt_acceleration
 
     def part_rates(self, speed: Any) -> tuple[Any, ...]:
-        """Return the rates of control and actuator at a speed of the slide."""
+        """Return the rates of control, actuator and motor at a speed of the slide."""
         rates: list[Any] = []
         if self._control is not None:
-            rates += self._control.state_rates(self._position, speed, self._of_control)
+            seen = seen_by(self._control, self._position, speed, self._of_motor)
+            rates += self._control.state_rates(*seen, self._of_control)
         if self._lagging:
             rates += self.drive.actuator.state_rates(self._inputs[0], self._lagging)
+        if self.drive.motor is not None:
+            rates += [self._of_motor[1], self._motor_acceleration(self.drive.motor, speed)]
         return tuple(rates)
+
+    def _motor_acceleration(self, motor: Motor, speed: Any) -> Any:
+        reaction = self.motor_reaction(speed)
+        if not motor.sticks:
+            return -reaction / motor.mass
+        (sign,) = self.switches.motor
+        slips = sign * sign
+        slipping = -(motor.friction * sign + reaction) / motor.mass
+        return slips * slipping + (1.0 - slips) * self.belt_acceleration
 
 
 class DimensionlessDrive(HybridSystem):
     """Drive, dimensionless (see `Drive`), with a held force or with continuous control.
 
-    The states are X, Y = X', the memory of the friction law, the states of the controller and those
-    of the actuator.
+    The states are X, Y = X', the memory of the friction law, the states of the controller, those of
+    the actuator, and position and velocity of a motor of finite mass.
 
     Drive and control are in SI units. Continuous control, eq. 19, acts without the actuator;
     without it the force is the input `force`. An actuator with states receives that input, and the
-    input `disturbance` is added to its force. Of a `ScaledDrive` also mass, stiffness and bias are
+    input `disturbance` is added to its force; with a motor it is the force on the slide. Of a
+    `ScaledDrive` also mass, stiffness and bias are
     constants.
     """
 
     def __init__(self, drive: Drive, control: ContinuousControl | None = None) -> None:
         self.drive = drive.dimensionless
         self.control = None if control is None else control.scaled(drive)
-        law, actuator = self.drive.friction, self.drive.actuator
+        law, actuator, motor = self.drive.friction, self.drive.actuator, self.drive.motor
         signals = self.drive.belt, self.drive.load
         control_states = () if self.control is None else self.control.states
         self.states = (
@@ -105,15 +150,22 @@ class DimensionlessDrive(HybridSystem):
             *(f"friction.{name}" for name in law.states),
             *control_states,
             *(f"actuator.{name}" for name in actuator.states),
+            *(("motor.x", "motor.y") if motor is not None else ()),
         )
         first = MEMORY + len(law.states)
         self.control_states = slice(first, first + len(control_states))
         """The states of the controller, in a state."""
-        self.actuator_states = slice(self.control_states.stop, len(self.states))
+        lagging = self.control_states.stop
+        self.actuator_states = slice(lagging, lagging + len(actuator.states))
         """The states of the actuator, in a state."""
+        self.motor_states = slice(self.actuator_states.stop, len(self.states))
+        """Position and velocity of the motor, in a state."""
         self.has_actuator = len(actuator.states) > 0
-        self.inputs = ("force", "disturbance") if self.has_actuator else ("force",)
-        of_parts = Parts(law.switches, *(each.switches for each in signals))
+        self.has_guide_damping = self.drive.guide_damping != 0.0
+        separate = self.has_actuator or motor is not None
+        self.inputs = ("force", "disturbance") if separate else ("force",)
+        of_motor = ("sign",) if motor is not None and motor.sticks else ()
+        of_parts = Parts(law.switches, signals[0].switches, signals[1].switches, of_motor)
         named = (f"{part}.{name}" for part, own in of_parts._asdict().items() for name in own)
         self.switches = ("sign", *named)
         ends = pairwise(accumulate(map(len, of_parts), initial=1))
@@ -133,8 +185,9 @@ class DimensionlessDrive(HybridSystem):
         self.structure = structure_number(
             (
                 *(type(self), self.states, self._may_lift, drive.has_spring, self._has_bias),
+                self.has_guide_damping,
                 *((each.switches, each.has_sine) for each in signals),
-                *map(structure, (law, actuator, self.control)),
+                *map(structure, (law, actuator, self.control, motor)),
                 self.free_constants,
             )
         )
@@ -146,7 +199,11 @@ class DimensionlessDrive(HybridSystem):
         own = ["damping", "belt_speed", *(["bias_force"] if self._has_bias else [])]
         yield from ((name, getattr(drive, name)) for name in own)
         yield from numbers(law, "friction")
+        if self.has_guide_damping:
+            yield "guide_damping", drive.guide_damping
         yield from numbers(drive.actuator, "actuator")
+        if drive.motor is not None:
+            yield from numbers(drive.motor, "motor")
         if self.control is not None:
             yield from numbers(self.control, "control")
         if not law.sticks:
@@ -169,13 +226,15 @@ class DimensionlessDrive(HybridSystem):
     def initial_state(self, position: float, velocity: float) -> list[float]:
         """Return the state at the start: the memory is that of the law, the controller at rest.
 
-        The actuator gives no force.
+        The actuator gives no force, and the motor rests at the reference.
         """
         law, control = self.drive.friction, self.control
         memory = law.initial_memory(velocity - self.drive.belt_speed)
-        own = control.rest(position, velocity) if control is not None else ()
         without = (0.0,) * len(self.drive.actuator.states)
-        return [position, velocity, *map(float, memory), *own, *without]
+        motor = (0.0,) * (self.motor_states.stop - self.motor_states.start)
+        seen = () if control is None else seen_by(control, position, velocity, motor)
+        own = () if control is None else control.rest(*seen)
+        return [position, velocity, *map(float, memory), *own, *without, *motor]
 
     def belt_speed(self, mode: Mode, time: float) -> float:
         """Return the speed of the belt."""
@@ -186,29 +245,58 @@ class DimensionlessDrive(HybridSystem):
         return float(equations.normal_force(self.drive, time, mode.switches[self._parts.load]))
 
     def control_force(self, instant: Instant) -> float:
-        """Return the force on the slide: held, with the actuator, or continuous control."""
+        """Return the force on the slide: held, with the actuator, or continuous control.
+
+        With a motor of finite mass it is the force on that.
+        """
         state, inputs = instant.state, instant.inputs
         if self.control is not None:
-            own = state[self.control_states]
-            return self.control.control_force(state[POSITION], state[SPEED], own)
+            own, motor = state[self.control_states], state[self.motor_states]
+            seen = seen_by(self.control, state[POSITION], state[SPEED], motor)
+            return self.control.control_force(*seen, own)
         if self.has_actuator:
             lagging = state[self.actuator_states].tolist()
-            return float(self.drive.actuator.force(inputs[0], lagging)) + inputs[1]
+            force = float(self.drive.actuator.force(inputs[0], lagging))
+            return force if self.drive.motor is not None else force + inputs[1]
         return inputs[0]
 
     def reaction(self, instant: Instant) -> float:
-        """Return h = X + 2 beta X' - U - bias."""
+        """Return h = X + 2 beta X' - U - bias, the reaction of the slide at the belt speed."""
         state = instant.state
-        return self._reaction(state[POSITION], state[SPEED], self.control_force(instant))
+        x, y = state[POSITION], state[SPEED]
+        if self.drive.motor is None:
+            return self._reaction(x, y, self.control_force(instant))
+        stretch = stretched(x, y, state[self.motor_states])
+        return self._reaction(*stretch, instant.inputs[1])
 
     def held_force(self, mode: Mode, instant: Instant) -> float:
         """Return the friction force that a slide needs to move with the belt."""
+        held = self.reaction(instant)
+        if self._steady and not self.has_guide_damping:
+            return held
+        if self.has_guide_damping:
+            relative_speed = instant.state[SPEED] - self.belt_speed(mode, instant.time)
+            held += self.drive.guide_damping * relative_speed
+        return held + self.drive.mass * self.belt_acceleration(mode, instant)
+
+    def motor_held(self, mode: Mode, instant: Instant) -> float:
+        """Return the dry friction that a motor needs to move with the guide."""
+        state, motor = instant.state, self.drive.motor
+        assert motor is not None
+        stretch = stretched(state[POSITION], state[SPEED], state[self.motor_states])
+        held = equations.motor_reaction(
+            self.drive, motor, *stretch, 0.0, self.control_force(instant)
+        )
+        return held + motor.mass * self.belt_acceleration(mode, instant)
+
+    def belt_acceleration(self, mode: Mode, instant: Instant) -> float:
+        """Return the acceleration of the belt."""
         if self._steady:
-            return self.reaction(instant)
+            return 0.0
         tiny = 1e-30j  # imaginary, so that nothing cancels
         switches = mode.switches[self._parts.belt]
         speed: Any = equations.belt_speed(self.drive, instant.time + tiny, switches)
-        return self.reaction(instant) + self.drive.mass * (speed.imag / tiny.imag)
+        return speed.imag / tiny.imag
 
     def friction_force(self, mode: Mode, instant: Instant) -> float:
         """Return the friction force on the slide."""
@@ -229,8 +317,13 @@ class DimensionlessDrive(HybridSystem):
 
     def by_part(self, switches: Sequence[Any]) -> Parts:
         """Return the switches of each part."""
-        law, belt, load = self._parts
-        return Parts(switches[law], switches[belt], switches[load])
+        law, belt, load, motor = self._parts
+        return Parts(switches[law], switches[belt], switches[load], switches[motor])
+
+
+def stretched(position: Any, speed: Any, motor: Sequence[Any]) -> tuple[Any, Any]:
+    """Return the stretch of the spring and its rate: those of the slide, or against a motor."""
+    return (position - motor[0], speed - motor[1]) if len(motor) else (position, speed)
 
 
 def _by_time(drive: Drive, time: Any, switches: Sequence[Any], zero: Any) -> Any:

@@ -11,6 +11,7 @@ from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.model.actuator import IDEAL_ACTUATOR, Actuator
 from stickslip_ros.physics.model.constants import Scales, constant, scaled
 from stickslip_ros.physics.model.friction import FrictionLaw, Stribeck
+from stickslip_ros.physics.model.motor import Motor
 from stickslip_ros.physics.model.signals import NO_SIGNAL, Signal
 
 UNBOUNDED_SPEED = 1e3
@@ -45,12 +46,22 @@ class DriveConstants:
         0.0, "Constant force on the slide, such as an offset.", "N", simplifies=True
     )
     """Constant force on the slide, N, such as an offset of the drive or a weight."""
+    guide_damping: float = constant(
+        0.0,
+        "Viscous damping between slide and belt.",
+        "N s/m",
+        at_least=0.0,
+        simplifies=True,
+    )
+    """Viscous damping c_g between slide and belt, N s/m, beside friction of any law."""
 
 
 @dataclass(frozen=True)
 class Drive(DriveConstants):
     """Feed drive in SI units, eq. 1: m x'' + c x' + k x = N mu(x' - v_belt) + u + bias.
 
+    Damping of the guide adds the force -c_g (x' - v_belt). With a `Motor` of finite mass, k and c
+    act between slide and motor, and u on the motor.
     The scales make it dimensionless, eq. 2: X'' + 2 beta X' + X = mu(X' - v0) + U.
     A drive with m = k = N = 1 is the dimensionless system itself. Without a spring, k = 0, the term
     X vanishes, and the unit of speed is 1 m/s.
@@ -77,6 +88,8 @@ class Drive(DriveConstants):
     """Signal added to the normal force, N."""
     actuator: Actuator = IDEAL_ACTUATOR
     """Actuator that exerts the control force."""
+    motor: Motor | None = None
+    """Motor behind the spring; None for an ideal one, which moves exactly at the feed."""
 
     @property
     def has_spring(self) -> bool:
@@ -100,7 +113,12 @@ class Drive(DriveConstants):
 
     @property
     def natural_period(self) -> float:
-        """Period of the undamped free vibration, s; infinite without a spring."""
+        """Period of the undamped free vibration, s; infinite without a spring.
+
+        That of slide and motor against each other, if the motor has a mass.
+        """
+        if self.motor is not None and self.has_spring:
+            return 2.0 * pi / self.motor.natural_frequency(self.mass, self.stiffness)
         return 2.0 * pi / self.angular_frequency if self.has_spring else inf
 
     @cached_property
@@ -134,7 +152,7 @@ class Drive(DriveConstants):
             return self
         return self._scaled(
             mass=1.0,
-            damping=self.damping_coefficient,
+            damping=self._coefficient(self.damping),
             stiffness=1.0 if self.has_spring else 0.0,
             normal_force=1.0,
         )
@@ -150,6 +168,8 @@ class Drive(DriveConstants):
             belt=self.belt.scaled(scales, "m/s"),
             load=self.load.scaled(scales, "N"),
             actuator=scaled(self.actuator, scales),
+            motor=None if self.motor is None else scaled(self.motor, scales),
+            guide_damping=self.guide_damping * scales.factor("N s/m"),
             **own,
         )
 
@@ -157,25 +177,30 @@ class Drive(DriveConstants):
     def equilibrium_position(self) -> float:
         """Displacement of the slide in equilibrium, m, eq. 6.
 
-        With the belt at rest it is one of many possible rest positions. Raises InvalidInputError
-        for a drive without a spring, which has none.
+        With the belt at rest it is one of many possible rest positions. Of a drive with a motor it
+        is that with the motor at the reference. Raises InvalidInputError for a drive without a
+        spring, which has none.
         """
         if not self.has_spring:
             raise InvalidInputError(
                 "stiffness = 0 N/m: without a spring the slide has no equilibrium position"
             )
         by_friction = float(self.friction.at_rest(self.belt_speed)) * self.length_scale
-        return by_friction + self.bias_force / self.stiffness
+        dragged = self.bias_force + self.guide_damping * self.belt_speed
+        return by_friction + dragged / self.stiffness
 
     @property
     def damping_coefficient(self) -> float:
         """Dimensionless damping 2 beta = c / sqrt(k m), the coefficient of X'.
 
-        Without a spring it is c V/N.
+        That of the guide is a part of it. Without a spring it is c V/N.
         """
+        return self._coefficient(self.damping + self.guide_damping)
+
+    def _coefficient(self, damping: float) -> float:
         if not self.has_spring:
-            return self.damping / self.normal_force
-        return self.damping / sqrt(self.stiffness * self.mass)
+            return damping / self.normal_force
+        return damping / sqrt(self.stiffness * self.mass)
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ from stickslip_ros.physics.model.dimensionless_drive import (
     POSITION,
     SPEED,
     DimensionlessDrive,
+    stretched,
 )
 from stickslip_ros.physics.model.drive import UNBOUNDED_SPEED, Drive
 from stickslip_ros.physics.model.hybrid import Flow, Guard, Instant, Mode, with_switches
@@ -30,7 +31,7 @@ The mode that follows then starts before its own guards: heyoka misses an event 
 starts on one. It also keeps rounding from leading back.
 """
 
-_SMALLEST_STEP = 2.0**-35
+SMALLEST_STEP = 2.0**-35
 """Speed below which a change of the belt speed at a corner, or a relative speed, is rounding."""
 
 TIME_ROUNDING = 2.0**-49
@@ -201,11 +202,11 @@ class DriveSystem(DimensionlessDrive):
         belt_speed = self.belt_speed(mode, time)
         self._seen_at, self._seen_belt_speed = time, belt_speed
         relative_speed = instant.state[SPEED] - belt_speed
-        if abs(relative_speed) <= _SMALLEST_STEP:
+        if abs(relative_speed) <= SMALLEST_STEP:
             instant.state[SPEED] = belt_speed
             return self._resting(mode, instant)  # acceleration of the belt, or load, jumps
         sign = copysign(1.0, relative_speed)
-        if sign == mode.switches[0] and abs(belt_speed - before) <= _SMALLEST_STEP:
+        if sign == mode.switches[0] and abs(belt_speed - before) <= SMALLEST_STEP:
             return mode
         return self._slip(mode, sign, instant)
 
@@ -222,7 +223,7 @@ class DriveSystem(DimensionlessDrive):
         elif not sticks:
             # The belt has changed its speed by so much at most.
             change = self._largest_belt_acceleration * (time - self._seen_at)
-            if mode.switches[0] * (state[SPEED] - self._seen_belt_speed) > change + _SMALLEST_STEP:
+            if mode.switches[0] * (state[SPEED] - self._seen_belt_speed) > change + SMALLEST_STEP:
                 return mode
         belt_speed = self.belt_speed(mode, time)
         self._seen_at, self._seen_belt_speed = time, belt_speed
@@ -287,13 +288,15 @@ class DriveSystem(DimensionlessDrive):
             return
         if self.sticks:
             force = self.control_force(instant)
-            held = self._reaction(x, y, force) if self._steady else self.held_force(mode, instant)
+            held = self.reaction(instant) if self._steady else self.held_force(mode, instant)
             backward = sign < 0.0 or (sign == 0.0 and held > 0.0)
             limit = self.backward_limit if backward else self.forward_limit
             if self._loaded:
                 limit *= self.normal_force(mode, instant.time)
             # Without a spring no displacement changes the reaction.
-            margin = self.drive.stiffness * 8.0 * ulp(abs(x) + abs(held) + abs(force) + limit)
+            size = abs(x) + abs(held) + abs(force) + limit
+            size += sum(map(abs, state[self.motor_states]))
+            margin = self.drive.stiffness * 8.0 * ulp(size)
             if sign == 0.0:
                 if abs(held) > limit - margin:
                     state[POSITION] = x - copysign(margin, held)
@@ -309,9 +312,10 @@ class DriveSystem(DimensionlessDrive):
         step from the series at its start. It would miss an exponential that is negligible there and
         rises before the step ends.
         """
-        state, spring = instant.state, self.drive.stiffness * abs(instant.state[POSITION])
+        state = instant.state
+        stretch, _ = stretched(state[POSITION], state[SPEED], state[self.motor_states])
         acceleration = (
-            abs(self.reaction(instant)) + spring + abs(state[SPEED])
+            abs(self.reaction(instant)) + self.drive.stiffness * abs(stretch) + abs(state[SPEED])
             + self._largest_friction + self._largest_belt_acceleration
         )  # fmt: skip
         return self._characteristic_speed / acceleration if acceleration > 0.0 else inf
@@ -327,7 +331,8 @@ class DriveSystem(DimensionlessDrive):
         belt = self.drive.belt.switches_at(instant.time)
         load = self.drive.load.switches_at(instant.time)
         law = (0.0,) * len(self.drive.friction.switches)
-        return Mode(STICK, (0.0, *law, *belt, *load))
+        motor = (0.0,) * len(self.by_part(self.switches).motor)
+        return Mode(STICK, (0.0, *law, *belt, *load, *motor))
 
     def _slip(self, mode: Mode, sign: float, instant: Instant) -> Mode:
         """Return slip in a direction; the signals stay in their pieces."""
@@ -337,7 +342,7 @@ class DriveSystem(DimensionlessDrive):
             state = self._relative_speed(mode, instant), sign, self._memory(instant)
             same = sign == mode.switches[0]
             switches = law.switches_following(own.law, *state) if same else law.switches_at(*state)
-        return Mode(SLIP, (sign, *switches, *own.belt, *own.load))
+        return Mode(SLIP, (sign, *switches, *own.belt, *own.load, *own.motor))
 
     def _resting(self, mode: Mode, instant: Instant) -> Mode:
         """Return the mode of a slide that has the speed of the belt."""

@@ -8,11 +8,23 @@ from collections.abc import Sequence
 from typing import Any
 
 from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.model.motor import Motor
 
 
-def reaction(drive: Drive, position: Any, velocity: Any, force: Any) -> Any:
-    """Return h = k x + c x' - u - bias: friction of this force leaves the slide no acceleration."""
-    return drive.stiffness * position + drive.damping * velocity - force - drive.bias_force
+def reaction(drive: Drive, stretch: Any, stretch_rate: Any, force: Any) -> Any:
+    """Return h = k x + c x' - u - bias: friction of this force leaves the slide no acceleration.
+
+    With a motor of finite mass the stretch of the spring is x - X, and u is the disturbance.
+    """
+    return drive.stiffness * stretch + drive.damping * stretch_rate - force - drive.bias_force
+
+
+def motor_reaction(
+    drive: Drive, motor: Motor, stretch: Any, stretch_rate: Any, relative_speed: Any, force: Any
+) -> Any:
+    """Return -k (x - X) - c (x' - X') + c_m (X' - v_belt) - u, the reaction of the motor."""
+    spring = drive.stiffness * stretch + drive.damping * stretch_rate
+    return motor.damping * relative_speed - spring - force
 
 
 def acceleration(drive: Drive, friction_force: Any, reaction: Any) -> Any:

@@ -6,6 +6,10 @@ from stickslip_ros.physics.model.dimensionless_drive import POSITION, SPEED
 from stickslip_ros.physics.model.drive import Drive, ScaledDrive
 from stickslip_ros.physics.model.drive_system import SLIP, STICK, DriveSystem
 from stickslip_ros.physics.model.hybrid import Instant, Mode
+from stickslip_ros.physics.model.motor_friction import (
+    CreepingMotorFrictionSystem,
+    MotorFrictionSystem,
+)
 
 _STUCK, _FORWARD, _BACKWARD = Mode(STICK, (0.0,)), Mode(SLIP, (1.0,)), Mode(SLIP, (-1.0,))
 """All modes of such a drive."""
@@ -93,8 +97,11 @@ def drive_system(drive: Drive, control: ContinuousControl | None = None) -> Driv
     """Return the dimensionless system of a drive and its continuous control, both in SI units."""
     if isinstance(drive, ScaledDrive):
         return DriveSystem(drive, control)
-    law, moves = drive.friction, drive.belt.pieces or drive.load.pieces
+    law, moves, motor = drive.friction, drive.belt.pieces or drive.load.pieces, drive.motor
+    creeps = bool(law.rate_sensitivity)
+    if motor is not None and motor.sticks:
+        return (CreepingMotorFrictionSystem if creeps else MotorFrictionSystem)(drive, control)
     plain = not moves and not law.states and not law.switches and not drive.actuator.states
-    if plain:
+    if plain and motor is None:
         return PlainDriveSystem(drive, control)
-    return (CreepingDrive if law.rate_sensitivity else DriveSystem)(drive, control)
+    return (CreepingDrive if creeps else DriveSystem)(drive, control)

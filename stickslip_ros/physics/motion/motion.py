@@ -21,6 +21,7 @@ from stickslip_ros.physics.motion.hybrid_motion import (
     HybridMotion,
     TooManyStepsError,
 )
+from stickslip_ros.samples import MotorSample
 
 _LARGEST_FORCE = 1e100
 """Largest dimensionless force; a larger one is clipped to it: both make the motion unbounded."""
@@ -177,7 +178,7 @@ class Motion(HybridMotion):
 
     @property
     def force(self) -> float:
-        """Held force on the slide, N; an actuator with states receives it as its command."""
+        """Held force on slide or motor, N; an actuator with states receives it as its command."""
         return self._instant.inputs[0] * self._drive.normal_force
 
     @force.setter
@@ -194,7 +195,7 @@ class Motion(HybridMotion):
         disturbance : float
             Disturbance force on the slide, N.
         """
-        if self._system.has_actuator:
+        if len(self._instant.inputs) > 1:
             if disturbance != self._instant.inputs[1] * self._drive.normal_force:
                 self._hold(1, disturbance)
         else:
@@ -213,12 +214,12 @@ class Motion(HybridMotion):
 
     @property
     def disturbance(self) -> float:
-        """Held disturbance force, N; 0 without actuator states, where it is a part of `force`."""
+        """Held disturbance force, N; 0 where it is a part of `force`, without actuator or motor."""
         return sum(self._instant.inputs[1:]) * self._drive.normal_force
 
     @property
     def applied_force(self) -> float:
-        """Present force on the slide, N: the held one, or that of the continuous controller."""
+        """Present force on slide or motor, N: the held one, or that of continuous control."""
         return self._system.control_force(self._instant) * self._drive.normal_force
 
     @property
@@ -254,6 +255,18 @@ class Motion(HybridMotion):
         if self._mode.flow == STICK:
             return self.belt_speed
         return self._instant.state[SPEED] * self._drive.speed_scale
+
+    @property
+    def motor(self) -> MotorSample | None:
+        """State of the motor; None if it is ideal."""
+        return None if self._drive.motor is None else self._motor_in(self._instant.state)
+
+    def _motor_in(self, state: "FloatArray | memoryview[float]") -> MotorSample | None:
+        drive = self._drive
+        if drive.motor is None:
+            return None
+        position, speed = state[self._system.motor_states].tolist()
+        return MotorSample(position * drive.length_scale, speed * drive.speed_scale)
 
     @property
     def belt_speed(self) -> float:
@@ -319,6 +332,7 @@ class Motion(HybridMotion):
         control_state = self.control_state
         lagging = self._instant.state[self._system.actuator_states].tolist()
         x, y, *_ = self._instant.state.tolist()
+        motor = self.motor
         memory, law, old_law = self.memory, drive.friction, old.friction
         self._drive, self._control = drive, control
         self._use(drive_system(drive, control))
@@ -334,6 +348,10 @@ class Motion(HybridMotion):
         if drive.actuator.states == old.actuator.states:
             ratio = old.normal_force / drive.normal_force
             state[system.actuator_states] = [each * ratio for each in lagging]
+        if motor is not None and drive.motor is not None:
+            state[system.motor_states] = [
+                motor.position / drive.length_scale, motor.velocity / drive.speed_scale
+            ]  # fmt: skip
         self._set_clock()
         self._instant.inputs = [0.0] * len(system.inputs)
         self.set_forces(force, disturbance)

@@ -22,6 +22,7 @@ from stickslip_ros.physics.motion.compiled_flow import (
     parameter_values,
 )
 from stickslip_ros.physics.motion.motion import RecordedMotion
+from stickslip_ros.samples import RESTING_MOTOR, MotorSample
 
 _GRAZING_RATE = 1e-12
 """Rate of a margin below which a motion grazes a guard: the instant has no derivative there."""
@@ -76,8 +77,11 @@ class VariationalMotion(RecordedMotion):
     def _begin_again(self) -> None:
         order, count = self.order, len(self._system.free_constants)
         self._found, self._holder = np.eye(order, order + count), None
-        if self._mode.flow == STICK:  # it has the speed of the belt
+        # A body that sticks has the speed of the belt.
+        if self._mode.flow == STICK:
             self._found[SPEED] = 0.0
+        if 0.0 in self._system.by_part(self._mode.switches).motor:
+            self._found[self._system.motor_states.stop - 1] = 0.0
 
     @property
     def order(self) -> int:
@@ -187,6 +191,7 @@ class ShootingMotion(VariationalMotion):
         position: float,
         filter_states: float | Sequence[float],
         memory: Sequence[float] | None = None,
+        motor: MotorSample = RESTING_MOTOR,
     ) -> FloatArray:
         """Return the state at rest at a position (m), with these states of the control.
 
@@ -200,7 +205,13 @@ class ShootingMotion(VariationalMotion):
         self._put_memory(found, memory)
         state = np.array(found)
         state[self._system.control_states] = np.asarray(filter_states) / scale
+        if drive.motor is not None:
+            state[self._system.motor_states] = np.array(motor) / (scale, drive.speed_scale)
         return state
+
+    def motor_of(self, state: FloatArray) -> MotorSample | None:
+        """Return the motor's part of a state, SI units; None if it is ideal."""
+        return self._motor_in(state)
 
     def memory_of(self, state: FloatArray) -> tuple[float, ...]:
         """Return the memory of the friction law in a state, SI units."""

@@ -22,6 +22,7 @@ from stickslip_ros.physics.theory.limit_cycles import limit_cycles
 from stickslip_ros.physics.theory.linear import hurwitz_determinants, jacobians
 from stickslip_ros.physics.theory.requirements import (
     AUTONOMOUS,
+    ONE_MASS,
     SPRING,
     STATIC,
     SYMMETRIC,
@@ -114,7 +115,7 @@ class BifurcationBranches:
             If friction differs between the directions, belt or load follow a signal, or the drive
             has no spring.
         """
-        require("the bifurcation diagram", drive, SPRING, AUTONOMOUS, SYMMETRIC)
+        require("the bifurcation diagram", drive, ONE_MASS, SPRING, AUTONOMOUS, SYMMETRIC)
 
     @classmethod
     def over(cls, drive: Drive, belt_speeds: FloatArray) -> Self:

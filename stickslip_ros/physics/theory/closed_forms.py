@@ -11,7 +11,7 @@ from typing import Self
 
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import Stribeck
-from stickslip_ros.physics.theory.requirements import AUTONOMOUS, SPRING, require
+from stickslip_ros.physics.theory.requirements import AUTONOMOUS, ONE_MASS, SPRING, require
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ class CubicLoop:
         InvalidInputError
             If belt or load follow a signal, or the drive has no spring.
         """
-        require("the closed form", drive, SPRING, AUTONOMOUS)
+        require("the closed form", drive, ONE_MASS, SPRING, AUTONOMOUS)
         law = drive.dimensionless.friction
         if not isinstance(law, Stribeck) or drive.belt_speed == 0.0:
             return None

@@ -18,7 +18,14 @@ from stickslip_ros.physics.theory.gain_intervals import (
 )
 from stickslip_ros.physics.theory.hopf import ComplexPair, first_lyapunov_coefficient
 from stickslip_ros.physics.theory.linear import expand, hurwitz_determinants
-from stickslip_ros.physics.theory.requirements import AUTONOMOUS, SMOOTH, SPRING, STATIC, require
+from stickslip_ros.physics.theory.requirements import (
+    AUTONOMOUS,
+    ONE_MASS,
+    SMOOTH,
+    SPRING,
+    STATIC,
+    require,
+)
 from stickslip_ros.physics.theory.shooting import LimitCycle, shoot
 
 _ROUNDING = 1e-9
@@ -75,7 +82,7 @@ def critical_gains(drive: Drive, gains: ContinuousControl) -> CriticalGains | No
     >>> round(critical.linear, 6), round(critical.cubic, 4)
     (-0.935296, 31.468)
     """
-    require("the critical gain", drive, SPRING, AUTONOMOUS)
+    require("the critical gain", drive, ONE_MASS, SPRING, AUTONOMOUS)
     own, unit = gains_of(gains), drive.normal_force / drive.speed_scale
     if own is None:
         return None

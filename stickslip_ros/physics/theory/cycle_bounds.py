@@ -15,12 +15,14 @@ import numpy as np
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.physics.measures.breakpoints import Breakpoints
 from stickslip_ros.physics.model.control import ContinuousControl
+from stickslip_ros.physics.model.control.base import seen_by
 from stickslip_ros.physics.model.drive import UNBOUNDED_SPEED, Drive
 from stickslip_ros.physics.model.equations import acceleration, reaction
 from stickslip_ros.physics.model.friction import SteadyPart
 from stickslip_ros.physics.motion.motion import RecordedMotion
 from stickslip_ros.physics.theory.requirements import (
     AUTONOMOUS,
+    ONE_MASS,
     SPRING,
     STATIC,
     SYMMETRIC,
@@ -42,7 +44,7 @@ def release_position(drive: Drive) -> float:
     There friction is at its limit and the slide is not yet accelerated:
     k x + c v_belt - bias = N mu_s. Raises InvalidInputError without a spring.
     """
-    require("the release by the belt", drive, SPRING)
+    require("the release by the belt", drive, ONE_MASS, SPRING)
     forward, backward = drive.friction.limits
     limit = drive.normal_force * (backward if drive.belt_speed >= 0.0 else -forward)
     return (limit - reaction(drive, 0.0, drive.belt_speed, 0.0)) / drive.stiffness
@@ -54,7 +56,14 @@ def longest_return(drive: Drive, control: ContinuousControl | None = None) -> fl
     It may stick, and creep at a similar speed, as far as static friction can bend the spring.
     Continuous control that pushes a slide at rest softens or stiffens the spring.
     """
-    if control is not None:
+    if control is not None and drive.motor is not None:
+        # The control is a spring behind that of the transmission; both carry slide and motor.
+        own = control.scaled(drive)
+        behind = _static_force(own, 0.0) - _static_force(own, 1.0)
+        left = behind / (1.0 + behind) if behind > 0.0 else 1.0
+        mass = drive.mass + drive.motor.mass
+        drive = replace(drive, mass=mass, stiffness=drive.stiffness * left, motor=None)
+    elif control is not None:
         drive = replace(drive, stiffness=drive.stiffness * _static_stiffness(drive, control))
     return 4.0 * drive.natural_period + 2.0 * loading_time(drive)
 
@@ -62,9 +71,14 @@ def longest_return(drive: Drive, control: ContinuousControl | None = None) -> fl
 def _static_stiffness(drive: Drive, control: ContinuousControl) -> float:
     """Return the share of the stiffness that is left under control at rest; 1 if it is none."""
     own = control.scaled(drive)
-    at_zero, at_one = (float(own.control_force(x, 0.0, own.rest(x, 0.0))) for x in (0.0, 1.0))
-    left = 1.0 - (at_one - at_zero)
+    left = 1.0 - (_static_force(own, 1.0) - _static_force(own, 0.0))
     return left if left > 0.0 else 1.0
+
+
+def _static_force(control: ContinuousControl, position: float) -> float:
+    """Return the force of a control at rest, of slide and motor at one position."""
+    seen = seen_by(control, position, 0.0, (position, 0.0))
+    return float(control.control_force(*seen, control.rest(*seen)))
 
 
 def loading_time(drive: Drive) -> float:
@@ -98,7 +112,7 @@ def least_cycle(drive: Drive, control: ContinuousControl | None = None) -> float
     gain balances the loss, so that there is no cycle up to `UNBOUNDED_SPEED`, unless energy is
     conserved. Raises InvalidInputError for a drive that it does not cover, see `requirements`.
     """
-    require("the energy of a cycle", drive, SPRING, AUTONOMOUS, STATIC, SYMMETRIC)
+    require("the energy of a cycle", drive, ONE_MASS, SPRING, AUTONOMOUS, STATIC, SYMMETRIC)
     speed, force = _net_force(drive)
     if control is not None:
         force = force + control.scaled(drive).bound(speed)
@@ -116,7 +130,7 @@ def largest_cycle(drive: Drive) -> float | None:
     where D = d - 2 n - max(l, p) is at least sqrt(2) v0. The energy then changes by less than
     2 (p + n) v0^2 / D - 2 (u - n) (D - v0^2 / D). None if there is no such u.
     """
-    require("the energy of a cycle", drive, SPRING, AUTONOMOUS, STATIC, SYMMETRIC)
+    require("the energy of a cycle", drive, ONE_MASS, SPRING, AUTONOMOUS, STATIC, SYMMETRIC)
     speed, force = _net_force(drive)
     belt_speed = abs(drive.belt_speed) / drive.speed_scale
     above, below = force[speed > belt_speed], force[speed <= 0.0]
@@ -150,7 +164,8 @@ def _net_force(drive: Drive) -> tuple[FloatArray, FloatArray]:
     speed = relative_speed + belt_speed
     friction: Any = law.coefficient(relative_speed, np.sign(relative_speed))
     at_rest = float(law.at_rest(belt_speed))
-    held = reaction(unit, at_rest + unit.bias_force, speed, 0.0)
+    damped = -unit.guide_damping * speed
+    held = reaction(unit, at_rest + unit.bias_force, speed, damped)
     force = acceleration(unit, friction, held)
     terms = np.abs(friction) + abs(at_rest) + np.abs(held - at_rest)
     return speed, np.where(np.abs(force) < _ROUNDING * terms, 0.0, force)
@@ -167,7 +182,7 @@ def averaged_growth(drive: Drive, belt_speed: Any, amplitude: Any) -> FloatArray
     that has a memory or differs between the directions, for a belt or load with a signal, and
     without a spring.
     """
-    require("averaging", drive, SPRING, AUTONOMOUS, STATIC, SYMMETRIC)
+    require("averaging", drive, ONE_MASS, SPRING, AUTONOMOUS, STATIC, SYMMETRIC)
     law = drive.dimensionless.friction
     belt_speed, amplitude = np.asarray(belt_speed, float), np.asarray(amplitude, float)
     relative_speed = np.multiply.outer(amplitude, np.cos(_PHASES)) - belt_speed[..., np.newaxis]

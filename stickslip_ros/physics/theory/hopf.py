@@ -19,6 +19,7 @@ from stickslip_ros.physics.theory.requirements import (
     SPRING,
     SYMMETRIC,
     require,
+    require_position_loop,
 )
 
 _BELT_SPEEDS = np.geomspace(1e-6, 1e3, 4001)
@@ -118,6 +119,7 @@ def hopf_points(drive: Drive, control: ContinuousControl | None = None) -> list[
     (0.488763, True)
     """
     require("the search for Hopf points", drive, SPRING, AUTONOMOUS)
+    require_position_loop("the search for Hopf points", drive, control)
     smooth = SMOOTH.lack(drive) is None
     mirrored = SYMMETRIC.lack(drive) is None
     belt_speeds = _BELT_SPEEDS if mirrored or drive.belt_speed >= 0.0 else -_BELT_SPEEDS

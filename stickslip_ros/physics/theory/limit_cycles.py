@@ -26,10 +26,12 @@ from stickslip_ros.physics.theory.cycle_bounds import (
 from stickslip_ros.physics.theory.linear import expand
 from stickslip_ros.physics.theory.requirements import (
     AUTONOMOUS,
+    ONE_MASS,
     SPRING,
     STATIC,
     SYMMETRIC,
     require,
+    require_position_loop,
 )
 from stickslip_ros.physics.theory.shooting import AGREEMENT, LimitCycle, next_turn, solve
 
@@ -82,8 +84,9 @@ def limit_cycle_of_run(
         no spring.
     """
     require("the limit cycle of a run", drive, SPRING, AUTONOMOUS, SYMMETRIC)
-    static = STATIC.lack(drive) is None
-    if drive.belt_speed == 0.0 or (static and least_cycle(drive, control) is None):
+    require_position_loop("the limit cycle of a run", drive, control)
+    bounded = STATIC.lack(drive) is None and drive.motor is None
+    if drive.belt_speed == 0.0 or (bounded and least_cycle(drive, control) is None):
         return None
     motion = ShootingMotion(drive, control)
     motion.restart(position, velocity)
@@ -135,7 +138,7 @@ def limit_cycles(drive: Drive) -> list[LimitCycle]:
     >>> round(cycle.measures.amplitude, 6), cycle.stable
     (0.434086, True)
     """
-    require("the search for limit cycles", drive, SPRING, AUTONOMOUS, SYMMETRIC)
+    require("the search for limit cycles", drive, ONE_MASS, SPRING, AUTONOMOUS, SYMMETRIC)
     static = STATIC.lack(drive) is None
     if drive.belt_speed == 0.0 or (static and least_cycle(drive) is None):
         return []

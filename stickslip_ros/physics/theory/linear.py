@@ -2,7 +2,8 @@
 
 heyoka differentiates the equations of the `DriveSystem`, for any smooth friction law. Everything is
 dimensionless (see `Drive`). The n states are X, Y, the memory of the law and, with continuous
-control, its states, such as W of eq. 17. The actuator has no part in it.
+control, its states, such as W of eq. 17. The actuator has no part in it. Displacement and
+velocity of a motor of finite mass are the last two states.
 """
 
 from dataclasses import dataclass, replace
@@ -24,7 +25,12 @@ from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.drive_system import SLIP, DriveSystem
 from stickslip_ros.physics.model.plain_drive import drive_system
 from stickslip_ros.physics.motion.compiled_flow import evaluated, flow_rates
-from stickslip_ros.physics.theory.requirements import AUTONOMOUS, SPRING, require
+from stickslip_ros.physics.theory.requirements import (
+    AUTONOMOUS,
+    SPRING,
+    require,
+    require_position_loop,
+)
 
 _ORDERS = (1, 2, 3)
 """Orders of the derivatives."""
@@ -111,6 +117,7 @@ def expand(drive: Drive, control: ContinuousControl | None = None) -> Expansion 
     0.071
     """
     require("the expansion at the equilibrium", drive, SPRING, AUTONOMOUS)
+    require_position_loop("the expansion at the equilibrium", drive, control)
     if drive.belt_speed == 0.0:
         return None
     states, (first, second, third) = _at_equilibrium(
@@ -131,7 +138,10 @@ def expand(drive: Drive, control: ContinuousControl | None = None) -> Expansion 
 def jacobians(
     drive: Drive, control: ContinuousControl | None, belt_speeds: FloatArray
 ) -> FloatArray:
-    """Return A, shape (m, n, n), at m dimensionless belt speeds of one sign."""
+    """Return A, shape (m, n, n), at m dimensionless belt speeds of one sign.
+
+    Without control a motor is held at rest by a force that balances the others.
+    """
     _, (first, *_) = _at_equilibrium(drive, control, belt_speeds)
     return np.moveaxis(first[:, : len(first)], -1, 0)
 
@@ -185,7 +195,8 @@ def _at_equilibrium(
     values[: len(system.constants)] = np.array([*system.constants.values()])[:, np.newaxis]
     values[system.index["belt_speed"]] = belt_speeds
     sign = -copysign(1.0, belt_speeds[0])
-    values[system.index["sign"]] = sign
+    for name in {"sign", "motor.sign"} & system.index.keys():
+        values[system.index[name]] = sign
     law = system.drive.friction
     for column, speed in enumerate(belt_speeds.tolist() if law.switches else ()):
         switches = law.switches_at(-speed, sign, law.memory_at(-speed, sign))
@@ -231,11 +242,14 @@ def equilibria(system: DriveSystem, parameters: FloatArray) -> FloatArray:
     """Return the equilibria for m columns of parameter values, shape (n, m), dimensionless.
 
     By Newton's method from rest at X = 0 with the law's memory of steady slip; for a static law the
-    first step is exact. The values are in the order of `system.index`. Raises RunError if the
-    iteration does not converge.
+    first step is exact. A motor without control rests there, too. The values are in the order of
+    `system.index`. Raises RunError if the iteration does not converge.
     """
     rates, index, law = flow_rates(system, SLIP), system.index, system.drive.friction
     order = len(system.states)
+    free = np.arange(order)
+    if system.control is None:
+        free = np.delete(free, system.motor_states)
     states = np.zeros((order, parameters.shape[1]))
     if law.states:
         speeds, signs = -parameters[index["belt_speed"]], parameters[index["sign"]]
@@ -245,14 +259,14 @@ def equilibria(system: DriveSystem, parameters: FloatArray) -> FloatArray:
         states[MEMORY : MEMORY + len(law.states)] = np.array(memory).T
     for _ in range(_ITERATIONS):
         rate, gradients = rates.at(states, parameters)
-        jacobians = np.moveaxis(gradients[:order, :order], -1, 0)
+        jacobians = np.moveaxis(gradients[np.ix_(free, free)], -1, 0)
         try:
-            step = np.linalg.solve(jacobians, -rate.T[..., np.newaxis])[..., 0].T
+            step = np.linalg.solve(jacobians, -rate[free].T[..., np.newaxis])[..., 0].T
         except np.linalg.LinAlgError:
             break
-        states += step
+        states[free] += step
         # X' is zero there. Rounding, which differs between processors, would give it a sign.
-        states[SPEED] = 0.0
+        states[[SPEED, *range(order)[system.motor_states][1:]]] = 0.0
         if np.all(np.abs(step) <= _CONVERGED_STEP * np.maximum(1.0, np.abs(states).max(axis=0))):
             return states
     raise RunError(f"the friction law {law.name}: the equilibrium was not found")

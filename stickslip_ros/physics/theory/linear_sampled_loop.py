@@ -27,10 +27,13 @@ from stickslip_ros.physics.theory.gain_intervals import (
     feedback_family,
     nearest_to_zero,
 )
-from stickslip_ros.physics.theory.linear import expand
+from stickslip_ros.physics.theory.linear import jacobians
 from stickslip_ros.physics.theory.requirements import (
     AUTONOMOUS,
+    ONE_MASS,
     SPRING,
+    NotCoveredError,
+    no_position_loop,
     require,
 )
 
@@ -59,7 +62,8 @@ class LinearSampledLoop:
 
     With the period T, force n = C z_n + D (x_n, y_n) of the law (see `LinearFeedback`) is held from
     n T + delay to (n + 1) T + delay. y_n is the velocity, or with m samples of difference
-    (x_n - x_(n-m)) / (m T). The state is X, Y, the memory of the friction law, the states of the
+    (x_n - x_(n-m)) / (m T). The state is X, Y, the memory of the friction law, displacement and
+    velocity of a motor of finite mass, on which the force then acts, the states of the
     actuator, the states z of the control law, the forces under way, the newest first, and the
     earlier positions that a difference needs, the newest first.
 
@@ -119,10 +123,10 @@ class LinearSampledLoop:
             If belt or load follow a signal, or the drive has no spring.
         """
         require("the theory of the sampled loop", drive, SPRING, AUTONOMOUS)
-        expansion = expand(drive)
-        if expansion is None or why_no_linear_loop(drive, rate, force_delay):
+        if why_no_linear_loop(drive, rate, force_delay):
             return None
-        return cls(drive, rate, force_delay, expansion.jacobian, sensor.spans)
+        (jacobian,) = jacobians(drive, None, np.array([drive.belt_speed / drive.speed_scale]))
+        return cls(drive, rate, force_delay, jacobian, sensor.spans)
 
     def transition_matrix(self, law: ControlLaw) -> FloatArray:
         """Return the matrix from the state at one sample to the state at the next.
@@ -147,6 +151,8 @@ class LinearSampledLoop:
         feedback = law.linear_feedback(1.0 / self.rate)
         if feedback is None:
             raise InvalidInputError(f"the theory of the sampled loop: {not_linear(law.name)}")
+        if self.drive.motor is not None and not feedback.holds_position:
+            raise NotCoveredError(no_position_loop("the theory of the sampled loop", law.name))
         return self._transitions(feedback)
 
     def spectral_radius(self, law: ControlLaw) -> float:
@@ -229,6 +235,7 @@ class LinearSampledLoop:
         list of GainInterval
             Stable intervals in ascending order; empty if no gain is stable.
         """
+        require("the search for stable gains", self.drive, ONE_MASS)
         corner = corner_frequency / self.drive.angular_frequency
         boundary = GainBoundary(
             self.plant[0],
@@ -305,10 +312,12 @@ class LinearSampledLoop:
         rest, units = [0.0] * count, np.eye(count).tolist()
         matrix, force = np.zeros((order + count, order + count)), np.zeros(order + count)
         matrix[:order, :order] = self.jacobian
+        motor = self.drive.dimensionless.motor
+        driven, mass = (SPEED, 1.0) if motor is None else (order - 1, motor.mass)
         for column, unit in enumerate(units, order):
-            matrix[SPEED, column] = actuator.force(0.0, unit)
+            matrix[driven, column] = actuator.force(0.0, unit) / mass
             matrix[order:, column] = actuator.state_rates(0.0, unit)
-        force[SPEED] = actuator.force(1.0, rest)
+        force[driven] = actuator.force(1.0, rest) / mass
         force[order:] = actuator.state_rates(1.0, rest)
         return matrix, force
 
@@ -363,12 +372,14 @@ class LinearSampledLoop:
         size = past + spans
         matrix = np.zeros((*stacked, size, size))
         forces = np.zeros((*stacked, 1 + under_way, size))
-        units = np.array([drive.length_scale, drive.speed_scale])
         seen = np.eye(2, size)  # what the controller sees of the state
         if spans:
             seen[SPEED, SPEED] = 0.0
             seen[SPEED, POSITION] = 1.0 / (spans * self.period)
             seen[SPEED, -1] = -seen[SPEED, POSITION]
+        if feedback.direct.shape[-1] > 2:
+            seen = np.vstack([seen, np.eye(2, size, len(self.jacobian) - 2)])
+        units = np.resize([drive.length_scale, drive.speed_scale], len(seen))
         forces[..., 0, :] = (feedback.direct * units / drive.normal_force) @ seen
         forces[..., 0, own] = feedback.output * drive.speed_scale / drive.normal_force
         forces[..., 1:, first:past] = np.eye(under_way)

@@ -65,7 +65,8 @@ def sampled_system(loop: LinearSampledLoop, law: ControlLaw) -> LinearSystem:
     drive, matrix, disturbed = loop.drive, loop.transition_matrix(law), loop.disturbed
     own = len(matrix) - len(disturbed) - loop.under_way - loop.difference_samples
     names = (
-        *drive_system(drive).states,
+        *drive_system(replace(drive, actuator=IDEAL_ACTUATOR)).states,
+        *(f"actuator.{name}" for name in drive.actuator.states),
         *(f"control.{number}" for number in range(1, own + 1)),
         *(f"force.{number}" for number in range(1, loop.under_way + 1)),
         *(f"earlier_x.{number}" for number in range(1, loop.difference_samples + 1)),

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.physics.model.control import ContinuousControl
+from stickslip_ros.physics.model.control.base import seen_by
 from stickslip_ros.physics.model.drive import Drive
 
 
@@ -29,6 +31,36 @@ def require(function: str, drive: Drive, *requirements: Requirement) -> None:
         lack = requirement.lack(drive)
         if lack is not None:
             raise NotCoveredError(f"{function} needs {requirement.need}: {lack}")
+
+
+def require_position_loop(function: str, drive: Drive, control: ContinuousControl | None) -> None:
+    """Raise NotCoveredError, which names the function, where nothing holds a motor at a position.
+
+    A drive with an ideal motor needs no control.
+    """
+    if drive.motor is None or (control is not None and _holds_position(control.scaled(drive))):
+        return
+    raise NotCoveredError(no_position_loop(function, "the control" if control else "no control"))
+
+
+def no_position_loop(function: str, control: str) -> str:
+    """Return a sentence that says why a drive with a motor has no equilibrium under a control."""
+    return (
+        f"{function} needs a law with a position loop, such as cascade: with {control} nothing "
+        "holds the motor at a position, the guide drags it off, and there is no equilibrium"
+    )
+
+
+def _holds_position(control: ContinuousControl) -> bool:
+    """Return whether control feels where slide and motor are together."""
+
+    def response(position: float) -> list[float]:
+        seen = seen_by(control, position, 0.0, (position, 0.0))
+        states = [0.0] * len(control.states)
+        rates = control.state_rates(*seen, states)
+        return [float(each) for each in (control.control_force(*seen, states), *rates)]
+
+    return response(0.0) != response(1.0)
 
 
 def _no_spring(drive: Drive) -> str | None:
@@ -61,6 +93,13 @@ def _asymmetry(drive: Drive) -> str | None:
         return None
     return f"the friction law {law.name} differs between forward and backward slip"
 
+
+def _motor(drive: Drive) -> str | None:
+    return None if drive.motor is None else "the motor of the drive has a mass"
+
+
+ONE_MASS = Requirement("an ideal motor", _motor)
+"""The far end of the spring moves exactly at the feed, and the control force acts on the slide."""
 
 SPRING = Requirement("a spring", _no_spring)
 """The stiffness is above zero: the drive has a natural frequency."""

@@ -22,7 +22,13 @@ from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.hybrid import Mode
 from stickslip_ros.physics.motion.variational import ShootingMotion, TooStiffError
 from stickslip_ros.physics.theory.cycle_bounds import follow, longest_return
-from stickslip_ros.physics.theory.requirements import AUTONOMOUS, SPRING, require
+from stickslip_ros.physics.theory.requirements import (
+    AUTONOMOUS,
+    SPRING,
+    require,
+    require_position_loop,
+)
+from stickslip_ros.samples import RESTING_MOTOR, MotorSample
 
 AGREEMENT = 1e-6
 """Relative tolerance for a turn of a run, or a measured period, to agree with the previous one."""
@@ -44,6 +50,8 @@ class LimitCycle:
     """Measures of one cycle."""
     memory: tuple[float, ...] = ()
     """Memory of the friction law at the turning point, SI units, in the order of its `states`."""
+    motor: MotorSample | None = None
+    """State of the motor at the turning point; None if it is ideal."""
 
     @property
     def filter_state(self) -> float | None:
@@ -64,6 +72,7 @@ def shoot(
     control: ContinuousControl | None = None,
     filter_state: float | Sequence[float] = 0.0,
     memory: Sequence[float] | None = None,
+    motor: MotorSample = RESTING_MOTOR,
 ) -> LimitCycle | None:
     """Return the limit cycle near a guess, by Newton's method.
 
@@ -86,6 +95,8 @@ def shoot(
     memory : sequence of float, optional
         Guess of the memory of the friction law at the turning point, SI units. By default it is
         that of the equilibrium.
+    motor : MotorSample, optional
+        Guess of the state of a motor at the turning point. By default it is at rest at 0.
 
     Returns
     -------
@@ -110,10 +121,11 @@ def shoot(
     6.392424
     """
     require("shooting", drive, SPRING, AUTONOMOUS)
+    require_position_loop("shooting", drive, control)
     if drive.belt_speed == 0.0:
         return None
     motion = ShootingMotion(drive, control)
-    state = motion.state_at(position, filter_state, memory)
+    state = motion.state_at(position, filter_state, memory, motor)
     try:
         return solve(motion, state, period)
     except TooStiffError:
@@ -252,4 +264,5 @@ def _cycle(motion: ShootingMotion, shot: _Shot) -> LimitCycle | None:
         multipliers=shot.multipliers(),
         measures=replace(measures, steady=True, trend=None),
         memory=motion.memory_of(start),
+        motor=motion.motor_of(start),
     )

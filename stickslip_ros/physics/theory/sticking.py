@@ -19,6 +19,7 @@ from stickslip_ros.physics.theory.cycle_bounds import (
 )
 from stickslip_ros.physics.theory.requirements import (
     AUTONOMOUS,
+    ONE_MASS,
     SPRING,
     STATIC,
     SYMMETRIC,
@@ -103,7 +104,7 @@ def sticking_onset(drive: Drive) -> StickingOnset:
     >>> round(onset.approximate, 6), round(onset.exact, 6)
     (0.437163, 0.439472)
     """
-    require("the stick-slip onset speed", drive, SPRING, AUTONOMOUS, STATIC, SYMMETRIC)
+    require("the stick-slip onset speed", drive, ONE_MASS, SPRING, AUTONOMOUS, STATIC, SYMMETRIC)
     approximate, no_approximate = _averaged(drive)
     reference = approximate or abs(drive.belt_speed) or drive.speed_scale
     speeds = (reference * _FOLLOWED_SPEEDS).tolist()

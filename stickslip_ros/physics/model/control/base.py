@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from math import inf
 from typing import Any, ClassVar, NamedTuple, Protocol, Self
 
+import numpy as np
+
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.physics.model.constants import constant, constants_of
 from stickslip_ros.physics.model.drive import Drive
@@ -15,21 +17,72 @@ State = tuple[float, ...]
 """State of a control law between samples."""
 
 
+TABLE, MOTOR = "table", "motor"
+"""The bodies whose motion a law may feed back: the slide of the drive, or its motor."""
+
+
+def body(default: str, of_what: str) -> Any:
+    """Describe the choice of a body, as the default of a field of a control law.
+
+    Parameters
+    ----------
+    default : str
+        `TABLE` or `MOTOR`.
+    of_what : str
+        What of the body is meant, as in "motion is fed back".
+
+    Returns
+    -------
+    dataclasses.Field
+        Field with this description.
+    """
+    return constant(
+        default, f"Body whose {of_what}: the slide (table) or the motor.", choices=(TABLE, MOTOR)
+    )
+
+
 class LinearFeedback(NamedTuple):
     """A sampled control law near the equilibrium: z' = A z + B (x, y), u = C z + D (x, y).
 
     z is the deviation of the law's state from its value at the equilibrium, and x and y those of
-    displacement and velocity; SI units.
+    displacement and velocity of the slide; SI units. Two further columns of B and D are those of
+    the motor.
     """
 
     state: FloatArray
     """A, shape (n, n) for n states."""
     input: FloatArray
-    """B, shape (n, 2)."""
+    """B, shape (n, 2) or (n, 4)."""
     output: FloatArray
     """C, shape (n,)."""
     direct: FloatArray
-    """D, shape (2,)."""
+    """D, shape (2,) or (4,)."""
+
+    def of(self, body: str) -> Self:
+        """Return the same feedback of the motion of another body.
+
+        Parameters
+        ----------
+        body : str
+            `TABLE` or `MOTOR`.
+
+        Returns
+        -------
+        LinearFeedback
+            Feedback with columns of the motor if it is that.
+        """
+        if body == TABLE:
+            return self
+        none = np.zeros_like(self.input), np.zeros_like(self.direct)
+        seen = np.hstack([none[0], self.input]), np.concatenate([none[1], self.direct], axis=-1)
+        return self._replace(input=seen[0], direct=seen[1])
+
+    @property
+    def holds_position(self) -> bool:
+        """Whether the force depends on where slide and motor are together."""
+        return bool(np.any(self.direct[..., ::2].sum(axis=-1))) or bool(
+            np.any(self.input[..., ::2].sum(axis=-1))
+        )
 
 
 class ContinuousControl(Protocol):
@@ -139,6 +192,39 @@ class ContinuousControl(Protocol):
         ...
 
 
+class TwoBodyControl(ContinuousControl):
+    """Control as equations that feeds back slide and motor.
+
+    Positions and speeds that it receives are pairs: those of the slide, and those of the motor,
+    which are the slide's too if the motor is ideal.
+    """
+
+
+def seen_by(
+    control: ContinuousControl, position: Any, speed: Any, motor: Sequence[Any]
+) -> tuple[Any, Any]:
+    """Return the position and the speed that a control receives.
+
+    Parameters
+    ----------
+    control : ContinuousControl
+        Control; one that is no `TwoBodyControl` feeds back the body that its `feedback` names.
+    position, speed : float, array or expression
+        Displacement x and speed y of the slide.
+    motor : sequence
+        Displacement and speed of the motor; empty if it is ideal.
+
+    Returns
+    -------
+    tuple
+        Position and speed, or a pair of each.
+    """
+    far = (motor[0], motor[1]) if len(motor) else (position, speed)
+    if isinstance(control, TwoBodyControl):
+        return (position, far[0]), (speed, far[1])
+    return far if getattr(control, "feedback", TABLE) == MOTOR else (position, speed)
+
+
 @dataclass(frozen=True, kw_only=True)
 class ControlLaw(ABC):
     """Control law: the force that answers a sample of the drive.
@@ -186,7 +272,7 @@ class ControlLaw(ABC):
     @classmethod
     def constants(cls) -> list[str]:
         """Return the names of the constants, the law's own first."""
-        common = constants_of(ControlLaw)
+        common = constants_of(FeedbackLaw)
         return sorted(constants_of(cls), key=lambda name: name in common)
 
     def refusal(self) -> str | None:
@@ -224,7 +310,7 @@ class ControlLaw(ABC):
             Time since the last sample, s; 0 at the first one.
         sample : Sample
             Sample to answer. A law uses stamp, position and velocity, which are what a sensor
-            measures.
+            measures, of the slide, or of the motor behind it: `sample.of(body)`.
         reference : Reference
             Reference at that sample.
 
@@ -255,3 +341,11 @@ class ControlLaw(ABC):
             Law near the equilibrium; None if it is not linear there.
         """
         return None
+
+
+@dataclass(frozen=True, kw_only=True)
+class FeedbackLaw(ControlLaw):
+    """Control law that feeds back the motion of one body, which `feedback` names."""
+
+    feedback: str = body(TABLE, "motion is fed back")
+    """Body whose motion is fed back, `TABLE` or `MOTOR`."""

@@ -9,8 +9,9 @@ from typing_extensions import override
 
 from stickslip_ros.physics.model.constants import constant
 from stickslip_ros.physics.model.control.base import (
+    TABLE,
     ContinuousControl,
-    ControlLaw,
+    FeedbackLaw,
     LinearFeedback,
     State,
 )
@@ -19,7 +20,7 @@ from stickslip_ros.samples import Reference, Sample
 
 
 @dataclass(frozen=True)
-class VelocityFeedback(ControlLaw, ContinuousControl):
+class VelocityFeedback(FeedbackLaw, ContinuousControl):
     """Force proportional to velocity and displacement, u = k0 x + k1 x'.
 
     A negative velocity gain is a damper between the slide and the frame. A position gain moves the
@@ -51,12 +52,14 @@ class VelocityFeedback(ControlLaw, ContinuousControl):
     def respond(
         self, state: State, elapsed: float, sample: Sample, reference: Reference
     ) -> tuple[float, State]:
-        return self.control_force(sample.position, sample.velocity, ()), state
+        seen = sample if self.feedback == TABLE else sample.of(self.feedback)
+        return self.control_force(seen.position, seen.velocity, ()), state
 
     @override
     def linear_feedback(self, period: float) -> LinearFeedback:
         direct = np.array([self.position_gain, self.velocity_gain])
-        return LinearFeedback(np.empty((0, 0)), np.empty((0, 2)), np.empty(0), direct)
+        feedback = LinearFeedback(np.empty((0, 0)), np.empty((0, 2)), np.empty(0), direct)
+        return feedback.of(self.feedback)
 
     @property
     @override

@@ -10,8 +10,9 @@ from typing_extensions import override
 
 from stickslip_ros.physics.model.constants import constant
 from stickslip_ros.physics.model.control.base import (
+    TABLE,
     ContinuousControl,
-    ControlLaw,
+    FeedbackLaw,
     LinearFeedback,
     State,
 )
@@ -20,7 +21,7 @@ from stickslip_ros.samples import Reference, Sample
 
 
 @dataclass(frozen=True)
-class Washout(ControlLaw, ContinuousControl):
+class Washout(FeedbackLaw, ContinuousControl):
     """Washout filter with linear and cubic velocity feedback, eq. 17 and 18.
 
     The filter is w' = y - d w with the output v = y - d w. As `continuous` control its state is w,
@@ -74,14 +75,15 @@ class Washout(ControlLaw, ContinuousControl):
 
     def initial_state(self, sample: Sample, reference: Reference) -> State:
         """Return a filter at rest: z = y, and y, m/s; see `ControlLaw.initial_state`."""
-        return sample.velocity, sample.velocity
+        velocity = sample.of(self.feedback).velocity
+        return velocity, velocity
 
     @override
     def respond(
         self, state: State, elapsed: float, sample: Sample, reference: Reference
     ) -> tuple[float, State]:
         low_passed, held = state
-        velocity = sample.velocity
+        velocity = (sample if self.feedback == TABLE else sample.of(self.feedback)).velocity
         if elapsed > 0.0:
             low_passed -= expm1(-self.corner_frequency * elapsed) * (held - low_passed)
         return self.force(velocity - low_passed), (low_passed, velocity)
@@ -94,7 +96,7 @@ class Washout(ControlLaw, ContinuousControl):
             np.array([[0.0, step]]),
             np.array([-gain]),
             np.array([0.0, gain]),
-        )
+        ).of(self.feedback)
 
     @property
     @override
