@@ -120,11 +120,19 @@ class Scenario:
         return [name for name in self.names_of_drive() if name not in self.sources]
 
     def names_of_drive(self) -> list[str]:
-        """Return the parameters of drive, rate and controller, as NODE.PARAMETER."""
+        """Return the parameters of drive, rate and controller, as NODE.PARAMETER.
+
+        Choices of a controller that are at their defaults are none of them.
+        """
         names = [f"plant.{name}" for name in (*self.plant.drive_names(), "rate")]
         if self.plant.expects_control:
             controller = self.controller
-            names += [f"{controller.node}.{name}" for name in controller.control_law.constants()]
+            law, known = controller.control_law, controller.known
+            names += [
+                f"{controller.node}.{name}"
+                for name in law.constants()
+                if not (known[name].choices and known[name].is_default(getattr(law, name)))
+            ]
         return names
 
     def as_dict(self) -> dict[str, dict[str, Any]]:
