@@ -73,7 +73,7 @@ def test_another_controller_takes_its_values_of_the_file(tmp_path: Path) -> None
 
 
 def test_the_parameters_are_an_attribute_by_the_name_of_the_node() -> None:
-    for law, other in permutations(CONTROLLER_PARAMETERS):
+    for law, other in permutations(CONTROLLER_PARAMETERS, 2):
         scenario = load_scenario("feed_drive", controller=law)
         assert getattr(scenario, f"{law}_controller") is scenario.controller
         assert not hasattr(scenario, f"{other}_controller")
@@ -83,7 +83,7 @@ def test_the_parameters_are_an_attribute_by_the_name_of_the_node() -> None:
 def test_what_is_no_law_or_not_in_use_is_refused() -> None:
     for name, message in (
         ("washuot", "unknown control law washuot; did you mean washout?"),
-        ("pid", "the known names are washout, velocity_feedback"),
+        ("fuzzy", "the known names are washout, velocity_feedback"),
     ):
         with pytest.raises(InvalidInputError, match=message.replace("?", r"\?")):
             load_scenario("feed_drive", controller=name)

@@ -261,6 +261,8 @@ class ControlLaw(ABC):
     """
     state_units: ClassVar[Mapping[str, str | None]] = {}
     """Unit of each state, by name."""
+    tuned: ClassVar[Sequence[str]] = ()
+    """Gains that a design chooses, see `linear_part`; each has the sign of its default."""
 
     force_limit: float = constant(inf, "Largest magnitude of the force.", "N", at_least=0.0)
     """Largest magnitude of the force, N."""
@@ -341,6 +343,42 @@ class ControlLaw(ABC):
             Law near the equilibrium; None if it is not linear there.
         """
         return None
+
+    def linear_part(self, period: float) -> LinearFeedback | None:
+        """Return the linear law that a design tunes; by default it is `linear_feedback`.
+
+        A law that resets or compensates a linear one returns that one.
+
+        Parameters
+        ----------
+        period : float
+            Sample period, s.
+
+        Returns
+        -------
+        LinearFeedback or None
+            Linear part of the law; None if it has none.
+        """
+        return self.linear_feedback(period)
+
+    def for_drive(self, drive: Drive) -> Self:
+        """Return the law with the constants that follow from a drive, such as its mass.
+
+        Parameters
+        ----------
+        drive : Drive
+            Drive that the law is to control.
+
+        Returns
+        -------
+        ControlLaw
+            By default the law itself.
+        """
+        return self
+
+    def limited(self, force: float) -> float:
+        """Return a force (N) within `force_limit`."""
+        return max(-self.force_limit, min(self.force_limit, force))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -37,6 +37,7 @@ class VelocityFeedback(FeedbackLaw, ContinuousControl):
     """
 
     name: ClassVar[str] = "velocity_feedback"
+    tuned: ClassVar[Sequence[str]] = ("velocity_gain",)
     states: ClassVar[Sequence[str]] = ()
 
     velocity_gain: Any = constant(

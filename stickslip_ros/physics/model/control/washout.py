@@ -46,6 +46,7 @@ class Washout(FeedbackLaw, ContinuousControl):
     """
 
     name: ClassVar[str] = "washout"
+    tuned: ClassVar[Sequence[str]] = ("corner_frequency", "linear_gain")
     states: ClassVar[Sequence[str]] = ("w",)
     state_units: ClassVar[Mapping[str, str | None]] = {"low_passed": "m/s", "velocity": "m/s"}
 

@@ -1,4 +1,4 @@
-"""Properties of every control law that ships."""
+"""Properties of every control law that has equations."""
 
 from dataclasses import replace
 
@@ -32,8 +32,9 @@ def at(position: float, velocity: float, stamp: int = 0) -> Sample:
     return Sample(stamp, position, velocity, 0.0, 0.0, 0.0)
 
 
-def test_all_laws_are_tested() -> None:
-    assert [law.name for law in LAWS] == list(CONTROL_LAWS)
+def test_all_laws_with_equations_are_tested() -> None:
+    found = [name for name, law in CONTROL_LAWS.items() if law().continuous is not None]
+    assert [law.name for law in LAWS] == found
 
 
 @laws
@@ -86,7 +87,7 @@ def test_its_bound_is_no_less_than_the_energy_that_it_gives(law: Law) -> None:
     for size in (0.01, 0.1):
         speed, position = size * np.cos(phase), size / omega * np.sin(phase)
         states: list[FloatArray] = []
-        if own.size:  # w' = y - d w, periodic
+        if isinstance(law, Washout):  # w' = y - d w, periodic
             response = size / (law.corner_frequency + 1j * omega)
             states = [np.real(response * np.exp(1j * phase))]
         given_energy = np.mean(law.control_force(position, speed, states) * speed)

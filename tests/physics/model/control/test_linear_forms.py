@@ -1,0 +1,100 @@
+"""The linear form of each law against finite differences: of the law, and of the running loop."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from stickslip_ros.arrays import FloatArray
+from stickslip_ros.physics.loop.controller import Controller, answer
+from stickslip_ros.physics.loop.sampled_loop import SampledLoop
+from stickslip_ros.physics.model.actuator import Actuator
+from stickslip_ros.physics.model.control import (
+    CONTROL_LAWS,
+    NO_REFERENCE,
+    ControlLaw,
+    DisturbanceObserver,
+    FrictionFeedforward,
+    Pid,
+    Reference,
+    SlidingMode,
+    VelocityFeedback,
+    Washout,
+)
+from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.model.friction import Stribeck
+from stickslip_ros.physics.model.sensor import MeasuredVelocity, Sensor
+from stickslip_ros.physics.motion import Motion
+from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop
+from stickslip_ros.samples import Sample
+
+DRIVE = Drive(100.0, 200.0, 1e6, 1000.0, 0.03, Stribeck(0.4, 0.25, 0.05))
+RATE = 1000.0
+PID: dict[str, Any] = {"position_gain": 2e5, "integral_gain": 3e6, "velocity_gain": 4e3}
+LAWS = [
+    Washout(20.0, linear_gain=-3000.0, cubic_gain=0.0),
+    VelocityFeedback(velocity_gain=-3000.0),
+    Pid(**PID),
+    FrictionFeedforward(**PID, kinetic_force=0.0, static_force=0.0),
+    DisturbanceObserver(mass=80.0, bandwidth=50.0, position_gain=1e5, velocity_gain=3e3),
+    SlidingMode(mass=50.0, slope=30.0, switching_force=600.0, boundary_layer=0.1),
+]
+
+
+@pytest.mark.parametrize("law", LAWS[1:], ids=lambda law: law.name)
+def test_the_form_is_the_derivative_of_the_answer(law: ControlLaw) -> None:
+    form, period, step = law.linear_feedback(1e-3), 1e-3, 1e-7
+    assert form is not None
+    states = len(form.state)
+    columns = []
+    for unit in step * np.eye(states + 2):
+        ends = []
+        for sign in (1.0, -1.0):
+            *state, x, y = (sign * unit).tolist()
+            sample = Sample(0, x, y, 0.0, 0.0, 0.0)
+            force, after = law.respond(tuple(state), period, sample, NO_REFERENCE)
+            ends.append(np.array([*after, force]))
+        columns.append((ends[0] - ends[1]) / (2.0 * step))
+    found = np.array(columns).T
+    expected = np.block([[form.state, form.input], [form.output[None], form.direct[None]]])
+    np.testing.assert_allclose(found, expected, rtol=1e-7, atol=1e-7 * np.abs(expected).max())
+
+
+def test_all_laws_with_a_linear_form_are_tested() -> None:
+    defaults = {name: law().linear_feedback(1e-3) for name, law in CONTROL_LAWS.items()}
+    assert {law.name for law in LAWS} == {name for name, form in defaults.items() if form}
+
+
+@pytest.mark.parametrize("law", LAWS, ids=lambda law: law.name)
+@pytest.mark.parametrize("delay", [0.0, 1.3e-3])
+def test_the_loop_is_that_of_the_running_one(law: ControlLaw, delay: float) -> None:
+    """The distance of runs that start beside each other obeys the characteristic polynomial."""
+    sensor = Sensor(velocity=MeasuredVelocity.DIFFERENCE, difference_samples=2)
+    drive = replace(DRIVE, actuator=Actuator(time_constant=5e-4))
+    loop = LinearSampledLoop.from_drive(drive, RATE, delay, sensor)
+    assert loop is not None
+    rest, step, count = drive.equilibrium_position, 1e-7, 60
+
+    def run(start: float) -> FloatArray:
+        motion = Motion(drive, rest + start, 0.0)
+        running = SampledLoop(motion, RATE, 10**9, force_delay=delay, sensor=sensor)
+        controller = Controller(law, lambda time: Reference(rest, 0.0, 0.0))
+        seen: list[float] = []
+        for _ in range(count):
+            seen.append(motion.position - rest)
+            answer(running, controller)
+            running.advance()
+        return np.array(seen)
+
+    distance = (run(step) - run(-step)) / (2.0 * step)
+
+    def residue(matrix: FloatArray) -> float:
+        polynomial = np.poly(matrix)
+        # The difference for the velocity spans fewer samples at the start.
+        found = np.convolve(distance, polynomial, mode="valid")[3:]
+        size = np.abs(polynomial).sum() * np.abs(distance).max()
+        return float(np.abs(found).max() / size)
+
+    assert residue(loop.transition_matrix(law)) < 1e-6
+    assert residue(loop.transition_matrix(replace(law, **{law.tuned[-1]: 1.1}))) > 1e-5
