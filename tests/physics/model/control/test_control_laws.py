@@ -83,7 +83,6 @@ def test_its_bound_is_no_less_than_the_energy_that_it_gives(law: Law) -> None:
     """For a slide that swings about the equilibrium."""
     phase = np.linspace(0.0, 2.0 * np.pi, 4001)[:-1]
     omega = 90.0
-    own: FloatArray = np.zeros(len(law.states))
     for size in (0.01, 0.1):
         speed, position = size * np.cos(phase), size / omega * np.sin(phase)
         states: list[FloatArray] = []

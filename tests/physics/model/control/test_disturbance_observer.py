@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.linalg import expm
@@ -24,7 +26,7 @@ def test_the_estimate_is_the_low_pass_of_the_force_that_is_not_known(
         force = 2e5 * (r - x) + 3e3 * (r1 - y) + m * r2 - (g * m * y - p)
         expected.append(np.clip(force, -limit, limit))
         held = expected[-1] + g * m * y
-    found = answers(LAW.__class__(**{**vars(LAW), "force_limit": limit}), record)
+    found = answers(replace(LAW, force_limit=limit), record)
     assert_same(found, np.array(expected))
 
 
