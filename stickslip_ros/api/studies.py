@@ -33,7 +33,7 @@ from stickslip_ros.studies.basin import (
     basin_study,
     default_axes,
 )
-from stickslip_ros.studies.columns import Columns, Further, json_entries
+from stickslip_ros.studies.columns import Columns, json_entries
 from stickslip_ros.studies.options import BASIN_COUNT, BASIN_OPTIONS
 from stickslip_ros.studies.plan import Axis, Continuation, Grid, ListedAxis, RandomSample
 from stickslip_ros.studies.runner import CountPoints, compute_columns
@@ -44,7 +44,6 @@ from stickslip_ros.text import shown
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from stickslip_ros.show.study_figure import Colour
     from stickslip_ros.show.style import FigureStyle
 
 Values = tuple[float | str, float | str, int] | tuple[float | str, float | str, int, str]
@@ -67,8 +66,8 @@ class Points(TabularResult):
 
     @property
     @abstractmethod
-    def further(self) -> Further:
-        """Further columns of a table: a value for each point, by name."""
+    def further(self) -> Mapping[str, Any]:
+        """Further columns of a table: an array of a value for each point, by name."""
 
     @abstractmethod
     def _found(self) -> dict[str, Any]:
@@ -89,14 +88,10 @@ class Points(TabularResult):
             values = (axis.values() for axis in plan.axes)
             dimensions = dict(zip(names, values, strict=True))
             if plan.continuation:
-                ways = [str(direction) for direction in plan.directions]
-                found["direction"] = np.repeat(ways, plan.size // len(ways)).astype(object)
-                quantities["direction"] = STUDY["direction"]
-                dimensions = {"direction": ways, **dimensions}
-        found |= {name: getattr(columns, name) for name in COLUMNS} | {
-            "regime": np.array([regime and str(regime) for regime in columns.regime], dtype=object)
-        }
-        quantities |= {name: STUDY[name] for name in COLUMNS}
+                dimensions = {"direction": [*map(str, plan.directions)], **dimensions}
+        found |= {**self.further, **{name: getattr(columns, name) for name in COLUMNS}}
+        found["regime"] = np.array([each and str(each) for each in columns.regime], dtype=object)
+        quantities |= {name: STUDY[name] for name in (*self.further, *COLUMNS)}
         units = units_of(self.study)
         return Table(found, quantities, units, dimensions, attributes(self.scenario))
 
@@ -119,13 +114,14 @@ class Sweep(Points):
         assert isinstance(plan, Grid)
         return plan.axes
 
-    def plot(self, colour: "Colour" = "regime", *, style: str = "screen") -> "Figure":
+    def plot(self, colour: str = "regime", *, style: str = "screen") -> "Figure":
         """Return the figure that `stickslip sweep --plot` draws.
 
         Parameters
         ----------
-        colour : {"regime", "amplitude", "stick_fraction"}
-            What the map of a sweep over two parameters shows.
+        colour : str
+            What the map of a sweep over two parameters shows: "regime", or a measure of `columns`,
+            such as "amplitude".
         style : {"screen", "paper", "paper-double"}
             What the figure is for: a screen, or one column or two of a journal.
 
@@ -143,39 +139,21 @@ class Sweep(Points):
 
     @property
     @override
-    def further(self) -> Further:
+    def further(self) -> Mapping[str, Any]:
         """The direction in which each point is carried on, if any."""
         plan = self.study.plan
         assert isinstance(plan, Grid)
         if not plan.continuation:
             return {}
-        return {"direction": [plan.direction(number) for number in range(plan.size)]}
+        ways = np.array([*map(str, plan.directions)], dtype=object)
+        return {"direction": np.repeat(ways, plan.size // len(ways))}
 
     def _found(self) -> dict[str, Any]:
         found = self.transitions.items()
         return {"transitions": {name.lower().replace(" ", "_"): values for name, values in found}}
 
     @override
-    def draw(self, style: "FigureStyle", colour: "Colour" = "regime") -> "Figure":
-        """Return the figure in a style.
-
-        Parameters
-        ----------
-        style : FigureStyle
-            Size, resolution and layout.
-        colour : {"regime", "amplitude", "stick_fraction"}
-            What the map of a sweep over two parameters shows.
-
-        Returns
-        -------
-        matplotlib.figure.Figure
-            The figure.
-
-        Raises
-        ------
-        InvalidInputError
-            If `colour` is unknown, or given for a sweep over one parameter.
-        """
+    def draw(self, style: "FigureStyle", colour: str = "regime") -> "Figure":
         from stickslip_ros.show.study_figure import sweep_figure
 
         return sweep_figure(self.columns, self.study, colour, style=style)
@@ -215,9 +193,9 @@ class Basin(Points):
 
     @property
     @override
-    def further(self) -> Further:
+    def further(self) -> Mapping[str, Any]:
         """The place in the attractors of each start."""
-        return {"attractor": self.basins.places.tolist()}
+        return {"attractor": self.basins.places}
 
     def _found(self) -> dict[str, Any]:
         return {"attractors": [asdict(attractor) for attractor in self.attractors]}
@@ -227,16 +205,6 @@ class Basin(Points):
         from stickslip_ros.show.study_figure import basin_figure
 
         return basin_figure(self.columns, self.basins, self.study, style=style)
-
-    def _table(self) -> Table:
-        table = super()._table()
-        return table._replace(
-            columns={**table.columns, "attractor": self.basins.places},
-            quantities={
-                **table.quantities,
-                "attractor": STUDY["attractor"],
-            },
-        )
 
     @override
     def _summary(self) -> Summary:

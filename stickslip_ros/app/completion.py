@@ -98,6 +98,10 @@ def _completed(action: argparse.Action) -> str:
         return "kind=parameters"
     if action.metavar in ("CONTROLLER", "NAME"):
         return "words=@LAWS@" + (" kind=files" if action.metavar == "CONTROLLER" else "")
+    if action.metavar == "MEASURE":
+        from stickslip_ros.show.quantities import COLOURS
+
+        return f"words={_words(COLOURS)}"
     if action.metavar == "SCENARIO":
         return "kind=scenarios"
     return "kind=files" if action.metavar in _FILES else "kind="

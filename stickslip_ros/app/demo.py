@@ -3,11 +3,12 @@
 import sys
 
 from stickslip_ros.app.optional_dependencies import load_matplotlib, loading_ros
-from stickslip_ros.app.output import print_values
+from stickslip_ros.app.output import print_parts
 from stickslip_ros.app.run import default_bag, record
 from stickslip_ros.bags.report import report_of_recording
 from stickslip_ros.errors import StickslipError
 from stickslip_ros.scenarios.files import load_scenario
+from stickslip_ros.show.measure_table import measure_table
 
 _SCENARIO = "feed_drive"
 _DURATION = 10.0
@@ -58,11 +59,12 @@ def _demonstrate() -> None:
         f"before ({switched_on:g} s)": report_of_recording(bag, end=switched_on),
         f"after ({_DURATION - switched_on:g} s)": report_of_recording(bag, start=switched_on),
     }
-    print_values(
+    title = (
         f"{results['samples']} samples, {results['lost_samples']} lost, "
-        f"{results['steps_per_second']:.0f} steps per second",
-        {title: {name: part[name] for name in _VALUES} for title, part in parts.items()},
+        f"{results['steps_per_second']:.0f} steps per second"
     )
+    chosen = {when: {name: part[name] for name in _VALUES} for when, part in parts.items()}
+    print_parts(measure_table(title, chosen))
     figure = bag.with_suffix(".png")
     history = RunHistory()
     report = report_of_recording(bag, observer=history)

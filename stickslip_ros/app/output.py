@@ -4,7 +4,7 @@ import json
 import os
 import re
 import sys
-from collections.abc import Generator, Iterable, Mapping, Sequence
+from collections.abc import Generator, Mapping
 from contextlib import contextmanager, nullcontext, suppress
 from threading import Event, Thread
 from time import monotonic
@@ -17,9 +17,6 @@ from stickslip_ros.versions import versions
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from stickslip_ros.show.quantities import Units
-
-_ALL_SI: Mapping[str, "Units"] = {}
 
 _JUDGING_TIME, _LONG_TIME = 3.0, 60.0
 """Time after which the length of a work is judged, and the length of a long one, s."""
@@ -62,28 +59,24 @@ def print_json(values: Mapping[str, Any]) -> None:
     print()
 
 
-def print_values(
-    title: str, columns: Mapping[str, Mapping[str, Any]], units: Mapping[str, "Units"] = _ALL_SI
-) -> None:
-    """Print values by name, one column for each of `columns`, as `measure_table` has them."""
-    from stickslip_ros.show.measure_table import measure_table
+def print_parts(*parts: TextTable | str) -> None:
+    """Print tables and sentences, one after the other.
 
-    print_table(*measure_table(title, columns, units))
-
-
-def print_table(title: str, headings: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
-    """Print a table: framed on a terminal, aligned plain text into a pipe or a file.
-
-    In plain text each row is one line whatever its length, the columns two spaces or more apart.
+    Tables are framed on a terminal. In a pipe or a file they are aligned plain text: each row is
+    one line whatever its length, the columns two spaces or more apart.
     """
-    if sys.stdout.isatty():
-        from rich.console import Console
+    for part in parts:
+        if isinstance(part, str):
+            print(printable(part))
+        elif sys.stdout.isatty():
+            from rich.console import Console
 
-        shown = [[printable(cell) for cell in row] for row in (headings, *rows)]
-        _print_framed(Console(), printable(title), shown[0], shown[1:])
-        return
-    for line in TextTable(title, headings, rows).lines():
-        print(line)
+            title, headings, rows = part
+            shown = [[printable(cell) for cell in row] for row in (headings, *rows)]
+            _print_framed(Console(), printable(title), shown[0], shown[1:])
+        else:
+            for line in part.lines():
+                print(line)
 
 
 @contextmanager
@@ -200,12 +193,3 @@ def _styles() -> dict[str, str]:
         Regime.label(Regime.PURE_SLIP): "yellow",
         Regime.label(Regime.UNBOUNDED): "red",
     }
-
-
-def print_parts(parts: Iterable[TextTable | str]) -> None:
-    """Print tables and sentences, one after the other."""
-    for part in parts:
-        if isinstance(part, str):
-            print(printable(part))
-        else:
-            print_table(*part)

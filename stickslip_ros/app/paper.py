@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 
 from stickslip_ros.app.arguments import add_json, check_writable, writing
 from stickslip_ros.app.optional_dependencies import load_matplotlib
-from stickslip_ros.app.output import print_json, print_table, progress_bar
+from stickslip_ros.app.output import print_json, print_parts, progress_bar
 from stickslip_ros.app.result import add_style
 from stickslip_ros.files import written
+from stickslip_ros.tables import TextTable
 
 if TYPE_CHECKING:
     from stickslip_ros.paper.claims import Finding
@@ -53,7 +54,8 @@ def run(arguments: argparse.Namespace) -> None:
         print_json(found)
     else:
         rows = [[verdict, str(count)] for verdict, count in verdict_counts(found).items()]
-        print_table(f"{len(findings)} claims of the paper", ["verdict", "claims"], rows)
+        title = f"{len(findings)} claims of the paper"
+        print_parts(TextTable(title, ["verdict", "claims"], rows))
         print(f"report:   {out / _REPORT}.md, {out / _REPORT}.json\nfigures:  {folder}")
 
 

@@ -4,7 +4,8 @@ import argparse
 from pathlib import Path
 
 from stickslip_ros.app.arguments import add_json
-from stickslip_ros.app.output import print_json, print_table, progress_bar
+from stickslip_ros.app.output import print_json, print_parts, progress_bar
+from stickslip_ros.tables import TextTable
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -39,6 +40,5 @@ def run(arguments: argparse.Namespace) -> None:
         )
         return
     rows = [[topic, str(count)] for topic, count in sorted(repaired.messages.items())]
-    print_table(str(arguments.out), ["topic", "messages"], rows)
-    for sentence in repaired.missing or ["nothing was missing"]:
-        print(sentence)
+    table = TextTable(str(arguments.out), ["topic", "messages"], rows)
+    print_parts(table, *(repaired.missing or ["nothing was missing"]))

@@ -130,7 +130,7 @@ def print_result(arguments: argparse.Namespace, result: "Result") -> None:
     if arguments.json:
         result.write_json(sys.stdout)
     else:
-        print_parts(result.parts())
+        print_parts(*result.parts())
 
 
 def _write_figure(arguments: argparse.Namespace, draw: "Callable[[FigureStyle], Figure]") -> None:

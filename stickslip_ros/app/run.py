@@ -28,7 +28,7 @@ from stickslip_ros.app.arguments import (
     seconds,
 )
 from stickslip_ros.app.optional_dependencies import check_dashboard, loading_ros
-from stickslip_ros.app.output import print_json, print_values, progress_bar, tell
+from stickslip_ros.app.output import print_json, print_parts, progress_bar, tell
 from stickslip_ros.errors import BagError, InvalidInputError, RunError
 from stickslip_ros.installed_packages import find_executable
 from stickslip_ros.nodes.base.machine import NamespaceInUseError
@@ -88,7 +88,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Run the command; return the exit status."""
     from stickslip_ros.bags.recorder import check_new_bag
-    from stickslip_ros.show.measure_table import report_sentences
+    from stickslip_ros.show.measure_table import measure_table, report_sentences
     from stickslip_ros.show.quantities import Units
 
     overrides: list[str] = []
@@ -131,9 +131,12 @@ def run(arguments: argparse.Namespace) -> int:
         print_json({**results, "controller_command": command, **scenario.provenance()})
     else:
         report, drive = results["report"], scenario.plant.as_drive()
-        print_values(scenario.name, {"": {**report, **results}}, {"": Units.for_drive(drive)})
-        for sentence in [*report_sentences(report, drive), *_limit_of_machine(scenario, results)]:
-            print(sentence)
+        values, units = {"": {**report, **results}}, {"": Units.for_drive(drive)}
+        print_parts(
+            measure_table(scenario.name, values, units),
+            *report_sentences(report, drive),
+            *_limit_of_machine(scenario, results),
+        )
     if not results["report"]["complete"]:
         raise RunError(f"the bag {bag} could not be written to its end")
     if interrupted:

@@ -5,7 +5,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from stickslip_ros.app.arguments import add_json, add_law, add_scenario_file, with_law
-from stickslip_ros.app.output import print_json, print_table
+from stickslip_ros.app.output import print_json, print_parts
 from stickslip_ros.text import printable
 
 if TYPE_CHECKING:
@@ -52,7 +52,7 @@ def run(arguments: argparse.Namespace) -> None:
     print(printable(f"{scenario.name}: {', completed by '.join([str(scenario.path), *bases])}"))
     for table in scenario_tables(scenario):
         print()
-        print_table(*table)
+        print_parts(table)
     for section in scenario.other_sections:
         print(printable(f"\nsection {section} is for another node"))
 

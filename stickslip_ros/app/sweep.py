@@ -11,7 +11,6 @@ from stickslip_ros.app.arguments import (
 )
 from stickslip_ros.app.result import add_html, add_plot, check_results
 from stickslip_ros.app.study_command import add_running, computed, finish, settling_of
-from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.studies.options import Continuation, SettlingOptions
 
 _DESCRIPTION = """Measure the settled motion of a scenario over the values of one parameter or two:
@@ -43,9 +42,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_plot(parser, "the bifurcation diagram, or the map")
     parser.add_argument(
         "--colour",
-        choices=("regime", "amplitude", "stick_fraction"),
         default="regime",
-        help="quantity that the map shows (default: %(default)s)",
+        metavar="MEASURE",
+        help="quantity that the map shows: the regime, or a measure of the table of --out, as in "
+        "--colour amplitude (default: %(default)s)",
     )
     add_html(parser)
     add_json(parser)
@@ -54,13 +54,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> None:
     """Run the command."""
     from stickslip_ros.api.studies import Sweep
+    from stickslip_ros.show.quantities import check_colour
     from stickslip_ros.studies.plan import Axis
     from stickslip_ros.studies.study import sweep_study
 
     with naming("--over"):
         axes = [Axis.parse(text) for text in arguments.over]
-    if len(axes) == 1 and arguments.colour != "regime":
-        raise InvalidInputError(f"--colour {arguments.colour}: is for maps, of two parameters")
+    with naming("--colour:"):
+        check_colour(arguments.colour, len(axes))
     scenario = scenario_of(arguments, unused=[axis.parameter for axis in axes])
     belts = [axis for axis in axes if axis.parameter == "plant.belt_speed"]
     check_speeds(arguments, scenario, *(end for axis in belts for end in (axis.first, axis.last)))

@@ -9,10 +9,11 @@ from typing import Any, Self
 import numpy as np
 import numpy.typing as npt
 
-from stickslip_ros.physics.measures.cycle_measures import Measures
+from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.physics.measures.cycle_measures import CycleMeasures, Measures
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.quantities import Quantity, quantities_of
-from stickslip_ros.text import prefix_for
+from stickslip_ros.text import must_be_one_of, prefix_for, shown
 
 _OF_CYCLES = quantities_of(Measures)
 
@@ -51,6 +52,9 @@ STUDY = _OF_CYCLES | {
     "attractor": Quantity("place in the attractors, from 0"),
 }
 """Columns of a study, in addition to the values of the parameters."""
+
+COLOURS = ("regime", *quantities_of(CycleMeasures))
+"""What the map of a sweep can show in colour."""
 
 CONTROLLER = {
     "corner_frequency": Quantity("cutoff frequency", "rad/s"),
@@ -287,6 +291,15 @@ class Units:
         values = [0.0 if isinstance(v, float) and abs(v) < least else v for v in values]
         scale, prefix = _prefix_of(unit, found if found >= least else 0.0)
         return [_text(value, scale, f" {prefix}{unit}".rstrip(), digits) for value in values]
+
+
+def check_colour(colour: str, parameters: int) -> None:
+    """Refuse what the figure of a sweep over so many parameters cannot show in colour."""
+    if colour not in COLOURS:
+        refusal = must_be_one_of(colour, COLOURS)
+        raise InvalidInputError(f"colour = {shown(colour)} is invalid: {refusal}")
+    if colour != "regime" and parameters < 2:
+        raise InvalidInputError(f"colour = {colour}: is for maps, of two parameters")
 
 
 def plain_name(quantity: str) -> str:

@@ -113,9 +113,12 @@ def design_figure(found: Design, *, style: FigureStyle = SCREEN) -> Figure:
     around, scenario = found.map_around(), found.scenario
     assert around is not None
     figure = style.figure(6.8, 6.2, narrow=1.2)
-    what = "Designed gains"
+    what, (low, high) = "Designed gains", found.task.belt_speeds
+    if low != high:
+        ends = Units.for_drive(found.task.drive).texts([low, high], "m/s")
+        what += f" for {' to '.join(ends)}"
     title = what if scenario is None else title_of(what, scenario, _PROPOSED)
-    _set_title(figure, title, around, style, found.task.belt_speeds)
+    _set_title(figure, title, around, style, " (slowest to settle)" * (low != high))
     axes = figure.subplots()
     handles = _draw_map(figure, axes, around)
     forces = found.peak_forces(around)
@@ -140,18 +143,15 @@ def _set_title(
     title: str,
     found: StabilityMap,
     style: FigureStyle,
-    belt_speeds: tuple[float, float] = (0.0, 0.0),
+    which: str = "",
 ) -> None:
-    """Set the title with the loop of a map, which settles slowest of those at `belt_speeds`."""
+    """Set the title with the loop of a map; `which` of several it is."""
     loop = found.loop
     units = Units.for_drive(loop.drive)
     belt, rate = units.text(loop.drive.belt_speed, "m/s"), units.text(loop.rate, "Hz")
     late = units.text(loop.force_delay, "s")
     delay = f", force delay {late}" if loop.force_delay > 0.0 else ""
-    low, high = belt_speeds
-    if low != high:
-        belt += f", the slowest of {' to '.join(units.texts([low, high], 'm/s'))} to settle"
-    values = f"belt speed {belt}, sample rate {rate}{delay}"
+    values = f"belt speed {belt}{which}, sample rate {rate}{delay}"
     style.set_title(figure, *([title] if title else []), values)
 
 

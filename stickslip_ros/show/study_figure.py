@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from itertools import chain, cycle
 from math import prod
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -17,10 +17,9 @@ from matplotlib.patches import Patch, PathPatch
 from matplotlib.path import Path
 
 from stickslip_ros.arrays import BoolArray, FloatArray
-from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.measures.cycle_measures import Regime
 from stickslip_ros.show.panels import label_axis
-from stickslip_ros.show.quantities import MEASURES, Units
+from stickslip_ros.show.quantities import MEASURES, Units, check_colour
 from stickslip_ros.show.study_tables import attractor_name
 from stickslip_ros.show.style import (
     AMBER,
@@ -50,7 +49,6 @@ from stickslip_ros.studies.transitions import (
     transition_map,
     transitions,
 )
-from stickslip_ros.text import shown
 
 _FULL: Any = {"mew": 0.0}
 _HOLLOW: Any = {"mfc": "white", "mew": 0.8}
@@ -68,29 +66,20 @@ _AWAY = REGIMES[Regime.UNBOUNDED]._replace(colour=LIGHT_GREY, hatch="...")
 """Look of diverging motions next to a colour bar, which starts with a near black."""
 
 _MEASURES = {name: MEASURES[name] for name in ("amplitude", "stick_fraction")}
-"""Measures that are drawn in addition to the regimes."""
-
-
-Colour = Literal["regime", "amplitude", "stick_fraction"]
-"""Quantity that a map shows."""
+"""Measures that a diagram shows below the turning points."""
 
 
 def sweep_figure(
-    columns: Columns, study: Study, colour: Colour = "regime", *, style: FigureStyle = SCREEN
+    columns: Columns, study: Study, colour: str = "regime", *, style: FigureStyle = SCREEN
 ) -> Figure:
     """Return the bifurcation diagram of a sweep over one parameter, the map of one over two.
 
     Raises InvalidInputError for an unknown `colour`, and in a diagram for any but the regime.
     """
-    colours = ("regime", *_MEASURES)
-    if colour not in colours:
-        raise InvalidInputError(
-            f"colour = {shown(colour)} is invalid: must be one of {', '.join(colours)}"
-        )
-    if len(_grid(study).axes) == 2:
+    axes = len(_grid(study).axes)
+    check_colour(colour, axes)
+    if axes == 2:
         return map_figure(columns, study, colour, style=style)
-    if colour != "regime":
-        raise InvalidInputError(f"colour = {colour}: is for maps, of two parameters")
     return diagram_figure(columns, study, style=style)
 
 
@@ -157,21 +146,21 @@ def diagram_figure(columns: Columns, study: Study, *, style: FigureStyle = SCREE
 def map_figure(
     columns: Columns,
     study: Study,
-    colour: Colour = "regime",
+    colour: str = "regime",
     *,
     style: FigureStyle = SCREEN,
 ) -> Figure:
     """Return the map of a sweep over two parameters, the first one on the horizontal axis.
 
-    Cells are coloured by regime, amplitude or stick fraction, and hatched without a result. Curves
-    show the transitions by theory. If the sweep is carried both ways, there are two panels.
+    Cells are coloured by regime or by a measure, and hatched without a result. Curves show the
+    transitions by theory. If the sweep is carried both ways, there are two panels.
     """
     grid = _grid(study)
     first, second = grid.axes
     count = len(grid.directions)
     units = Units.for_drive(study.scenario.plant.as_drive(), grid.parameters)
     figure = style.figure(1.0 + 6.0 * count, 6.2, narrow=0.3 + 0.9 * count)
-    name = "regime" if colour == "regime" else _MEASURES[colour].label
+    name, unit, _ = MEASURES[colour]
     what = f"Map of the {name} of settled motions"
     style.set_title(figure, title_of(what, study.scenario, grid.parameters))
     shape = (count, 1) if style.narrow else (1, count)
@@ -180,7 +169,7 @@ def map_figure(
     mesh: Any = None
     scale, bar = 1.0, ""
     if colour != "regime":
-        scale, bar = units.axis(*_MEASURES[colour][:2], getattr(columns, colour))
+        scale, bar = units.axis(name, unit, getattr(columns, colour))
     for axes, (rows, direction) in zip(panels, _passes(grid), strict=True):
         axes.set_xscale(**_scale(first))
         axes.set_yscale(**_scale(second))
@@ -367,11 +356,9 @@ def _draw_values(axes: Axes, columns: Columns, grid: Grid, rows: slice, values: 
     away = _are(columns.regime[rows], Regime.UNBOUNDED).reshape(grid.shape).T
     _draw_cells(axes, x, y, away, _AWAY)
     cells = np.ma.masked_invalid(values[rows].reshape(grid.shape).T)
-    largest = float(np.nanmax(values, initial=0.0)) or 1.0
-    rasterized = cells.size > MANY
-    return axes.pcolormesh(
-        x, y, cells, cmap="viridis", vmin=0.0, vmax=largest, rasterized=rasterized
-    )
+    low, high = (float(end(values, initial=0.0)) for end in (np.nanmin, np.nanmax))
+    look: Any = {"cmap": "viridis", "vmin": low, "vmax": high if high > low else low + 1.0}
+    return axes.pcolormesh(x, y, cells, rasterized=cells.size > MANY, **look)
 
 
 def _curves(found: TransitionMap) -> Iterator[tuple[str, npt.NDArray[Any], str]]:

@@ -116,10 +116,10 @@ def design_tables(name: str, found: Design) -> Iterator[TextTable | str]:
             name: None if value == float("inf") else value
             for name, value in asdict(found.controller).items()
         }
-        yield _one_below_another(task, "proposal", CONTROLLER, values, units)
+        yield _one_below_another(f"{task}: proposal", CONTROLLER, values, units)
         if found.margins is not None:
             title, margins = "margins at the worst of these belt speeds", asdict(found.margins)
-            yield _one_below_another(title, "margins", MARGINS, margins, units)
+            yield _one_below_another(title, MARGINS, margins, units)
         checks = [asdict(check) for check in found.checks]
         yield _side_by_side("verification", CHECKS, checks, units)
         at_rest = [each | each["rest"] for each in checks if each["rest"] is not None]
@@ -141,13 +141,13 @@ def _side_by_side(
 
 
 def _one_below_another(
-    title: str, heading: str, shown: _Quantities, values: Mapping[str, Any], units: Units
+    title: str, shown: _Quantities, values: Mapping[str, Any], units: Units
 ) -> TextTable:
     rows = [[label, units.text(values[name], unit)] for name, (label, unit, _) in shown.items()]
     for row, name in zip(rows, shown, strict=True):
         if name in _GAIN_MARGINS and values[name] is not None:
             row[1] += f" ({20.0 * log10(values[name]):.1f} dB)"
-    return TextTable(title, [heading, ""], rows)
+    return TextTable(title, ["", ""], rows)
 
 
 def stability_tables(scenario: Scenario, found: Section, notes: Notes) -> Iterator[TextTable | str]:

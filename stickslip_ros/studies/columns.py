@@ -1,7 +1,7 @@
 """The points of a study as columns: arrays in memory, or a table in a CSV or JSON file."""
 
 import csv
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Self, TextIO
@@ -103,22 +103,22 @@ class Columns(CycleMeasures[FloatArray]):
         return (Point(number, *cells) for number, (done, *cells) in enumerate(rows) if done)
 
 
-Further = Mapping[str, Sequence[Any]]
-"""Extra columns of a table, before the measures, by name."""
+def write_csv(stream: TextIO, columns: Columns, further: Mapping[str, Any]) -> None:
+    """Write a row for each point, with turning points separated by spaces.
 
-
-def write_csv(stream: TextIO, columns: Columns, further: Further) -> None:
-    """Write a row for each point, with turning points separated by spaces."""
+    Arrays of `further` columns, by name, stand before the measures.
+    """
     plan = columns.plan
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow([*plan.parameters, *further, *COLUMNS])
-    rows = zip(*further.values(), *map(columns.cells, COLUMNS), strict=True)
+    more = (each.tolist() for each in further.values())
+    rows = zip(*more, *map(columns.cells, COLUMNS), strict=True)
     for number, (*cells, turning_points, reason) in enumerate(rows):
         section = " ".join(map(repr, turning_points))
         writer.writerow([*plan.values(number), *cells, section, reason])
 
 
-def json_entries(study: Study, columns: Columns, further: Further) -> dict[str, Any]:
+def json_entries(study: Study, columns: Columns, further: Mapping[str, Any]) -> dict[str, Any]:
     """Return parameters, their values, and the columns for JSON; arrays are iterators.
 
     For a grid, `values` has a list for each axis, and the arrays are row-major over the axes; if
@@ -133,6 +133,6 @@ def json_entries(study: Study, columns: Columns, further: Further) -> dict[str, 
         **{name: found for name, found in study.as_dict().items() if name != "scenario"},
         "parameters": plan.parameters,
         "values": values,
-        **{name: iter(cells) for name, cells in further.items()},
+        **{name: iter(cells.tolist()) for name, cells in further.items()},
         **{name: columns.cells(name) for name in COLUMNS},
     }

@@ -13,7 +13,9 @@ from pathlib import Path
 import pytest
 
 from stickslip_ros.app import output
-from stickslip_ros.app.output import print_table, print_values, progress_bar
+from stickslip_ros.app.output import print_parts, progress_bar
+from stickslip_ros.show.measure_table import measure_table
+from stickslip_ros.tables import TextTable
 from tests.nodes.graph import PATIENCE, wait_for
 
 REFERENCE = Path(__file__).parents[2] / "bags" / "reference"
@@ -72,8 +74,12 @@ def test_nothing_is_lost_on_a_narrow_terminal(columns: int, tmp_path: Path) -> N
 
 
 def test_a_pipe_gets_plain_lines(capsys: pytest.CaptureFixture[str]) -> None:
-    print_table(
-        "drives [bold]", ["", "first", "second"], [["regime", "stick-slip", LONG], ["bag", "-", ""]]
+    print_parts(
+        TextTable(
+            "drives [bold]",
+            ["", "first", "second"],
+            [["regime", "stick-slip", LONG], ["bag", "-", ""]],
+        )
     )
     assert capsys.readouterr().out.splitlines() == [
         "drives [bold]",
@@ -85,13 +91,15 @@ def test_a_pipe_gets_plain_lines(capsys: pytest.CaptureFixture[str]) -> None:
 
 def test_plain_tables(capsys: pytest.CaptureFixture[str]) -> None:
     """One column has no heading; control characters are shown as escapes."""
-    print_values("run", {"": {"amplitude": 434e-6, "bag": "bags/机床"}})
+    print_parts(measure_table("run", {"": {"amplitude": 434e-6, "bag": "bags/机床"}}))
     assert capsys.readouterr().out == "run\namplitude  434 µm\nbag        bags/机床\n"
-    print_values("", {"": {"regime": "stick_slip", "steady": False, "trend": "decaying"}})
+    print_parts(
+        measure_table("", {"": {"regime": "stick_slip", "steady": False, "trend": "decaying"}})
+    )
     assert capsys.readouterr().out == "regime  stick-slip, not steady: decaying\n"
-    print_table("empty", ["topic", "messages"], [])
+    print_parts(TextTable("empty", ["topic", "messages"], []))
     assert capsys.readouterr().out == "empty\ntopic  messages\n"
-    print_table("a\x1b[2J", ["", ""], [["b\n", "\x07"]])
+    print_parts(TextTable("a\x1b[2J", ["", ""], [["b\n", "\x07"]]))
     assert capsys.readouterr().out == "a\\x1b[2J\nb\\n  \\x07\n"
 
 
@@ -116,7 +124,7 @@ def test_rounding_reads_zero(capsys: pytest.CaptureFixture[str]) -> None:
     before = {"regime": "stick_slip", "amplitude": 4e-4, "midpoint": 3e-4, "peak_force": 120.0}
     resting = {"amplitude": 9e-17, "velocity_amplitude": 1e-15, "midpoint": 2.5e-4}
     after = {"regime": "equilibrium", **resting, "peak_force": 7e-15, "resting_force": 7e-15}
-    print_values("", {"before": before, "after": after})
+    print_parts(measure_table("", {"before": before, "after": after}))
     shown = [line.split(maxsplit=1)[-1].strip() for line in capsys.readouterr().out.splitlines()]
     assert re.search(r"400 µm +0 µm", shown[2])
     assert re.search(r"- +0 m/s", shown[3])

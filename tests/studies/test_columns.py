@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from stickslip_ros.physics.measures.cycle_measures import Regime
-from stickslip_ros.studies.columns import Columns, Further, json_entries, write_csv
+from stickslip_ros.studies.columns import Columns, json_entries, write_csv
 from stickslip_ros.studies.plan import Axis, Continuation, Grid, RandomSample
 from stickslip_ros.studies.runner import compute_columns
 from stickslip_ros.studies.settling import SettlingOptions
@@ -94,7 +94,7 @@ def refuse(constant: str) -> None:
 
 
 def as_json(
-    study: Study, columns: Columns, further: Further | None = None, **provenance: Any
+    study: Study, columns: Columns, further: dict[str, Any] | None = None, **provenance: Any
 ) -> dict[str, Any]:
     entries = {**provenance, **json_entries(study, columns, further or {})}
     values = {name: [*v] if isinstance(v, Iterator) else v for name, v in entries.items()}
@@ -103,7 +103,7 @@ def as_json(
 
 def test_a_table_read_back_is_the_columns_to_the_last_bit(study: Study, columns: Columns) -> None:
     plan = study.plan
-    further = {"twice": range(0, 2 * plan.size, 2)}
+    further = {"twice": np.arange(0, 2 * plan.size, 2)}
     write_csv(stream := StringIO(), columns, further)
     lines = csv.DictReader(StringIO(stream.getvalue()))
     rows, read = list(lines), as_json(study, columns, further)

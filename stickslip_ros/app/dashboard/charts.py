@@ -22,7 +22,11 @@ TOOLBOX: dict[str, Any] = {
     "itemSize": 13,
     "feature": {
         "dataZoom": {"title": {"zoom": "zoom", "back": "zoom back"}},
-        "saveAsImage": {"title": "PNG", "pixelRatio": 2},
+        "myPicture": {
+            "title": "PNG",
+            "icon": "path://M5,23L29,45L55,23M5,44L5,58L54,58L54,44M29,45L29,0",
+            ":onclick": "(_, chart) => stickslip.picture(chart)",
+        },
     },
 }
 CURSOR: dict[str, Any] = {"trigger": "axis", "axisPointer": {"type": "cross"}}

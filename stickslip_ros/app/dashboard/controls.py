@@ -13,7 +13,6 @@ from nicegui import ui
 from nicegui.events import GenericEventArguments
 
 from stickslip_ros.app.dashboard.elements import call, named
-from stickslip_ros.app.dashboard.frames import Frames
 from stickslip_ros.app.dashboard.listener import Answer, ListenerNode
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.model.constants import SMALLEST, Changes, Parameter, constants_of
@@ -102,8 +101,8 @@ def number_within(name: str, given: Any, unit: str, drive: Drive | None, now: An
 class SliderField:
     """Slider and number for a parameter, with its unit, undo and the reason of a refusal."""
 
-    def __init__(self, listener: ListenerNode, frames: Frames, full_name: str) -> None:
-        self._listener, self._frames, self.full_name = listener, frames, full_name
+    def __init__(self, listener: ListenerNode, full_name: str) -> None:
+        self._listener, self.full_name = listener, full_name
         self._parameter = described(full_name)
         self._scale, self._unit = 1.0, ""
         self._earlier: list[float] = []
@@ -129,7 +128,7 @@ class SliderField:
     def refresh(self, units: Units) -> None:
         """Show the current value, in the unit of the plots, unless the user is changing it."""
         value, unit = current(self._listener, self.full_name), self._parameter.unit or ""
-        usual = scale_of(unit, self._frames.drive) * (self._parameter.default or 1.0)
+        usual = scale_of(unit, self._listener.drive) * (self._parameter.default or 1.0)
         self._scale, unit = units.prefixed(unit, value or usual)
         self._unit = units.of_unit(unit)
         named = units.plain(name_of(self.full_name))
@@ -159,7 +158,7 @@ class SliderField:
             with suppress(ValueError):  # a number alone is in the unit that is shown
                 given = f"{float(given)!r} {self._unit}".rstrip()
             with refusals_in(self._refusal):
-                unit, drive = self._parameter.unit or "", self._frames.drive
+                unit, drive = self._parameter.unit or "", self._listener.drive
                 await self._set(number_within(self.full_name, given, unit, drive, now))
 
     async def _go_back(self) -> None:
@@ -179,8 +178,8 @@ class SliderField:
 class OtherParameter:
     """Any other parameter: a list with value, unit and meaning, and a field for a new value."""
 
-    def __init__(self, listener: ListenerNode, frames: Frames, names: list[str]) -> None:
-        self._listener, self._frames, self._names = listener, frames, names
+    def __init__(self, listener: ListenerNode, names: list[str]) -> None:
+        self._listener, self._names = listener, names
         self._choice = ui.select(names, label="another parameter", with_input=True)
         self._choice.classes("w-full").props("dense outlined")
         self._meaning = ui.label().classes("text-sm")
@@ -214,7 +213,7 @@ class OtherParameter:
         node, _, name = chosen.partition(".")
         with refusals_in(self._refusal):
             unit, now = described(chosen).unit or "", current(self._listener, chosen)
-            value = number_within(chosen, self._field.value, unit, self._frames.drive, now)
+            value = number_within(chosen, self._field.value, unit, self._listener.drive, now)
             await report(self._listener.set_parameter(node, name, value), self._refusal)
 
 
@@ -233,12 +232,11 @@ class Settings:
     def __init__(
         self,
         listener: ListenerNode,
-        frames: Frames,
         is_active: Callable[[], bool],
         set_active: Callable[[bool], Any],
         measures: Callable[[], dict[str, str]],
     ) -> None:
-        self._listener, self._frames, self._measures = listener, frames, measures
+        self._listener, self._measures = listener, measures
         self._is_active, self._set_active = is_active, set_active
         self._stored: dict[str, Setting] = {}
         self._use: dict[str, ui.button] = {}
@@ -278,7 +276,7 @@ class Settings:
         return ", ".join(islice(texts, len(now.values) + 1))
 
     def _now(self) -> Setting:
-        units = Units.for_drive(self._frames.drive)
+        units = self._listener.units
         known = {
             name: current(self._listener, name) for name in main_parameters(self._listener.law)
         }

@@ -13,7 +13,7 @@ from stickslip_ros.bags.report import report_of_recording
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.files import open_regular
 from stickslip_ros.show.measure_table import measure_table
-from stickslip_ros.show.quantities import MEASURES, Units
+from stickslip_ros.show.quantities import MEASURES
 from stickslip_ros.text import printable
 
 _LARGEST_BAG = 200_000_000
@@ -73,7 +73,7 @@ class EndedRun:
         except InvalidInputError as error:
             self._problem = str(error).replace(str(source), str(bag))
 
-    def show(self, units: Units) -> None:
+    def show(self) -> None:
         """Add it to the page."""
         plant = self._listener.health["plant"]
         failure = f": {plant.message}" if plant.level == 2 and plant.message else ""
@@ -81,7 +81,7 @@ class EndedRun:
         bag, commands = self.bag, list[str]()
         if bag and bag == self._bag:
             if self._report:
-                table = measure_table("", {"": self._report}, {"": units})
+                table = measure_table("", {"": self._report}, {"": self._listener.units})
                 measures = _MEASURES[1:] if failure else _MEASURES  # no regime of what came before
                 shown = [MEASURES[name].label for name in measures]
                 with ui.row().classes("gap-x-6 gap-y-1"):

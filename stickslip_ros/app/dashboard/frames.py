@@ -1,7 +1,6 @@
 """The data of the charts at one instant, in the units of their axes."""
 
 import struct
-from collections.abc import Mapping
 from io import StringIO
 from itertools import zip_longest
 from typing import Any, NamedTuple
@@ -11,11 +10,9 @@ import orjson
 
 from stickslip_ros.app.dashboard.listener import ListenerNode
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.messages.topics import AMPLITUDE, FREQUENCY, STICK_FRACTION
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.samples import ForceColumns, SampleColumns
-from stickslip_ros.scenarios.parameters import PlantParameters
 from stickslip_ros.show.live_trace import Line, LiveTrace
 from stickslip_ros.show.quantities import Units
 from stickslip_ros.stamps import NANOSECONDS
@@ -38,25 +35,13 @@ class Frames:
     def __init__(self, listener: ListenerNode) -> None:
         self._listener = listener
         self._trace = LiveTrace(PERIODS[-1] * _UNKNOWN_PERIOD)
-        self._drive_of: tuple[Mapping[str, Any], Drive | None] = ({}, None)
-
-    @property
-    def drive(self) -> Drive | None:
-        """The drive with its current parameters; None while they are unknown."""
-        values = self._listener.parameters["plant"]
-        if values is not self._drive_of[0]:
-            try:
-                drive = PlantParameters().changed(values, "plant").as_drive() if values else None
-            except InvalidInputError:  # a plant of another version
-                drive = None
-            self._drive_of = values, drive
-        return self._drive_of[1]
 
     @property
     def period(self) -> float:
         """Natural period, s, or the period of the last cycle if there is none, or it is unknown."""
-        if self.drive is not None and self.drive.has_spring:
-            return self.drive.natural_period
+        drive = self._listener.drive
+        if drive is not None and drive.has_spring:
+            return drive.natural_period
         frequencies = list(self._listener.cycles[FREQUENCY])[-1:]
         return next((1.0 / f for f in frequencies if 1e-9 < f < 1e9), _UNKNOWN_PERIOD)
 
@@ -94,7 +79,7 @@ class Frames:
         spaces to a multiple of 4 bytes, and x and y of each line in turn (32-bit floats). The JSON
         contains the number of points of each line.
         """
-        period, drive = self.period, self.drive
+        period, drive = self.period, self._listener.drive
         frame = self._trace.frame(periods * period, 5.0 * period, buckets=400)
         axes = _axes(drive)
         length, speed, force = (axis.scale for axis in axes)

@@ -42,14 +42,17 @@ from stickslip_ros.nodes.base.clients import ANSWER_TIME, ServiceCall, parameter
 from stickslip_ros.nodes.base.managed import FIRST_STAMP, STATE
 from stickslip_ros.nodes.base.ros_topics import PollingNode, qos_profile, waiting_messages
 from stickslip_ros.nodes.base.spinner import steady_clock
+from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.running.controller_search import DASHBOARD
 from stickslip_ros.samples import ForceColumns, SampleColumns
 from stickslip_ros.scenarios.parameters import (
     CONTROLLER_PARAMETERS,
     DEFAULT_LAW,
     NODE_PARAMETERS,
+    PlantParameters,
     controller_node,
 )
+from stickslip_ros.show.quantities import Units
 from stickslip_ros.stamps import NANOSECONDS
 from stickslip_ros.text import number_in
 
@@ -132,6 +135,7 @@ class ListenerNode(PollingNode):
         """Control law of the controller that was heard, the default law until one is heard."""
         self.parameters: Mapping[str, Mapping[str, Any]] = {node: {} for node in NODE_PARAMETERS}
         """Current parameters by node and flat name, as far as they are known and allowed."""
+        self._drive_of: tuple[Mapping[str, Any], Drive | None] = ({}, None)
         self.cycles: dict[Topic[Any], deque[float]] = {}
         """The measures of the last cycles by topic."""
         self.cycle_count = 0
@@ -177,6 +181,23 @@ class ListenerNode(PollingNode):
     def controller(self) -> str:
         """Name of the controller relative to the namespace."""
         return controller_node(self.law)
+
+    @property
+    def drive(self) -> Drive | None:
+        """The drive with its current parameters; None while they are unknown."""
+        values = self.parameters["plant"]
+        if values is not self._drive_of[0]:
+            drive = None
+            if values:
+                with suppress(InvalidInputError):  # a plant of another version
+                    drive = PlantParameters().changed(values, "plant").as_drive()
+            self._drive_of = values, drive
+        return self._drive_of[1]
+
+    @property
+    def units(self) -> Units:
+        """The units in which its values are shown."""
+        return Units.for_drive(self.drive)
 
     def time_of(self, stamp: int) -> float | None:
         """Return the simulated time since the plant was activated, s; None if it is not known."""
@@ -263,19 +284,20 @@ class ListenerNode(PollingNode):
             )
             return answer
 
-        def push() -> None:
+        def begin() -> None:
             if not self._disturbance.get_subscription_count():
                 _settle(answer, f"no node subscribes to {self._disturbance.topic_name}")
                 return
             self._take()
             self._disturbance.publish(pack_wrench(self.newest, force))
             self._tap_end = self.newest + round(duration * NANOSECONDS)
-            self._tell(f"impulse of {force:g} N for {duration:g} s", f"{force:g} N")
+            push, lasting = self.units.text(force, "N"), self.units.text(duration, "s")
+            self._tell(f"impulse of {push} for {lasting}", push)
             if self._tap_timer is None:
                 self._tap_timer = self._every(0.002, self._take)
             _settle(answer, "")
 
-        self._call_soon(push)
+        self._call_soon(begin)
         return answer
 
     def close(self) -> None:
@@ -443,8 +465,8 @@ class ListenerNode(PollingNode):
                 before = self.parameters[node].get(name)
                 # Nodes that end take their parameters back. A NaN differs from itself.
                 if None not in (before, value) and repr(before) != repr(value):
-                    text = f"{value:g}" if isinstance(value, float) else str(value)
-                    old = f"{before:g}" if isinstance(before, float) else str(before)
+                    unit = NODE_PARAMETERS[node].known[name].unit or ""
+                    old, text = (self.units.text(each, unit) for each in (before, value))
                     self._tell(f"{node}.{name}: {old} to {text}", f"{name} {text}")
             if self.parameters[node]:  # otherwise only these would be known
                 self._know(node, values)

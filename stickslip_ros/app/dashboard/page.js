@@ -391,8 +391,14 @@ page.describe = (run, bag, settings) => {
   page.name = `${bag}, ${settings}`;
 };
 const now = () => `${new Date().toISOString().slice(0, 19)}Z`;
-const fileName = (ending) => `${page.name} ${now()}`.replace(/[^\w.+-]+/g, "_") + ending;
+const fileName = (ending, what = "") => `${page.name} ${what} ${now()}`.replace(/[^\w.+-]+/g, "_") + ending;
 page.csv = () => save(page.rows ?? shownRows(), fileName(".csv"));
+
+// Saves one chart as a picture.
+page.picture = (chart) => {
+  const look = { pixelRatio: 2, backgroundColor: dark.matches ? "#1b1e23" : "#ffffff", excludeComponents: ["toolbox"] };
+  save(chart.getDataURL(look), fileName(".png", chart.getDom().getAttribute("aria-label")));
+};
 
 // Puts the charts of the motion, as they are shown, into one picture with a title.
 page.png = () => {

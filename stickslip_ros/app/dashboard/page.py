@@ -36,7 +36,7 @@ from stickslip_ros.physics.measures.cycle_measures import RESTS, Regime
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.quantities import number_of
 from stickslip_ros.scenarios.parameters import controller_node
-from stickslip_ros.show.quantities import Units
+from stickslip_ros.show.quantities import MEASURES, Units
 from stickslip_ros.show.style import BLUE, GREEN, GREY, ORANGE, REGIMES, SKY_BLUE
 from stickslip_ros.text import number_in
 
@@ -48,11 +48,11 @@ _FAREWELL_TIME = 5.0
 _LEAVING_TIME = 0.5
 """Time, s, in which the nodes of a run that ends with the server have left."""
 _MEASURES = (
-    (AMPLITUDE, "amplitude", "m", 0.0),
-    (STICK_FRACTION, "stick fraction", "", 0.0),
-    (FREQUENCY, "frequency", "Hz", None),
+    (AMPLITUDE, MEASURES["amplitude"], 0.0),
+    (STICK_FRACTION, MEASURES["stick_fraction"], 0.0),
+    (FREQUENCY, MEASURES["frequency"], None),
 )
-"""Topic, name and unit of the measures of a cycle, and their values at rest."""
+"""Topic and quantity of the measures of a cycle, and their values at rest."""
 
 _HERE = Path(__file__).parent
 
@@ -101,7 +101,7 @@ class Pages:
         def page() -> None:  # pyright: ignore[reportUnusedFunction]
             ui.add_head_html('<link rel="stylesheet" href="/page.css">')
             ui.add_body_html('<script type="module" src="/page.js"></script>')
-            _Page(listener, frames, self.theory, ended, self._open)
+            _Page(listener, self.theory, ended, self._open)
 
     async def take_leave(self) -> None:
         """Show the end of a run on open pages, with what they need once the server is gone."""
@@ -121,13 +121,11 @@ class _Page:
     def __init__(
         self,
         listener: ListenerNode,
-        frames: Frames,
         theory: Theory,
         ended: EndedRun,
         opened: "set[_Page]",
     ) -> None:
         self._listener = listener
-        self._frames = frames
         self._ended = ended
         self._description = "", "", ""
         self._busy = False
@@ -156,7 +154,7 @@ class _Page:
                         self._parameters = ui.column().classes("w-full gap-2")
                     with card("Compare two settings"):
                         switch = self._is_active, self._pursue_control
-                        self._settings = Settings(listener, frames, *switch, self._measured)
+                        self._settings = Settings(listener, *switch, self._measured)
                     self._add_health()
                     with card("Events"):
                         self._events = ui.element("div").classes("events")
@@ -213,9 +211,9 @@ class _Page:
                 self._charts["cycles"] = chart(CYCLES, each)
                 with ui.row().classes("w-full gap-4"):
                     self._measures: dict[Any, ui.label] = {}
-                    for topic, name, *_ in _MEASURES:
+                    for topic, quantity, _ in _MEASURES:
                         with ui.row().classes("gap-1"):
-                            ui.label(name).classes("text-sm")
+                            ui.label(quantity.label).classes("text-sm")
                             self._measures[topic] = ui.label("-").classes("text-sm font-bold")
 
     def _add_control(self) -> None:
@@ -259,13 +257,11 @@ class _Page:
         self._switch.text = controller_node(law).replace("_", " ")
         self._parameters.clear()
         with self._parameters:
-            shared = self._listener, self._frames
-            self._fields = [SliderField(*shared, name) for name in main_parameters(law)]
-            self._fields.append(OtherParameter(*shared, other_parameters(law)))
+            self._fields = [SliderField(self._listener, name) for name in main_parameters(law)]
+            self._fields.append(OtherParameter(self._listener, other_parameters(law)))
 
     def _refresh(self) -> None:
-        listener, drive = self._listener, self._frames.drive
-        units = Units.for_drive(drive)
+        listener, drive, units = self._listener, self._listener.drive, self._listener.units
         heard = any(health.heard_at for health in listener.health.values())
         self._empty.set_visibility(not heard)
         self._board.set_visibility(heard)
@@ -302,14 +298,14 @@ class _Page:
         self._follow_end()
 
     def _measured(self) -> dict[str, str]:
-        units = Units.for_drive(self._frames.drive)
+        units = self._listener.units
         found: dict[str, str] = {}
         # At rest the last cycles are rounding errors.
         rests = self._listener.health["analyzer"].figures.get("regime") in RESTS
-        for topic, name, unit, at_rest in _MEASURES:
+        for topic, (label, unit, _), at_rest in _MEASURES:
             values = self._listener.cycles[topic]
             value = values[-1] if values else None
-            found[name] = units.text(at_rest if rests else value, unit)
+            found[label] = units.text(at_rest if rests else value, unit)
         return found | {"regime": self._regime.text}
 
     def _show_waits(self, units: Units) -> None:
@@ -415,7 +411,7 @@ class _Page:
             self._end_shown = True
             self._end.clear()
             with self._end:
-                self._ended.show(Units.for_drive(self._frames.drive))
+                self._ended.show()
             self._end.set_visibility(True)
             if last:
                 await ui.run_javascript("stickslip.end()", timeout=_FAREWELL_TIME)
@@ -450,7 +446,7 @@ class _Page:
 
     async def _tap(self) -> None:
         with refusals_in(self._act_refusal):
-            force = number_within("force", self._tap_force.value, "N", self._frames.drive)
+            force = number_within("force", self._tap_force.value, "N", self._listener.drive)
             duration = number_of("duration", self._tap_time.value, "s")
             await report(self._listener.tap(force, duration), self._act_refusal)
 

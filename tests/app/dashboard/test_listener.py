@@ -10,7 +10,6 @@ from rcl_interfaces.msg import ParameterEvent, ParameterValue
 from rclpy.parameter import Parameter
 
 from stickslip_ros.app.dashboard import listener as listener_module
-from stickslip_ros.app.dashboard.frames import Frames
 from stickslip_ros.app.dashboard.listener import ABSENT, SILENT, Answer, Health, ListenerNode
 from stickslip_ros.app.dashboard.theory import Theory
 from stickslip_ros.messages.topics import (
@@ -143,7 +142,7 @@ def test_a_value_that_a_parameter_cannot_have_is_not_known(
     active = Health("active", heard_at=1e9)
     observer.health = dict.fromkeys(("analyzer", "plant", "washout_controller"), active)
     observer._answering_since = 0.0
-    frames, theory = Frames(observer), Theory(observer)
+    theory = Theory(observer)
     for node, name, value in FOREIGN:
         observer.parameters = observer.parameters | sound
         parameters = [Parameter(name, value=value).to_parameter_msg()]
@@ -151,7 +150,7 @@ def test_a_value_that_a_parameter_cannot_have_is_not_known(
         graph.wait_until(
             lambda n=node, p=name: observer.parameters[n][p] is None, f"{name} {value}"
         )
-        assert (frames.drive is None) == (node == "plant")
+        assert (observer.drive is None) == (node == "plant")
         theory.follow()
         assert observer.acts_in >= 0.0
         assert observer.waits_for_reply >= 0.0

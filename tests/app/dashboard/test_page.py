@@ -151,7 +151,7 @@ def test_a_limit_cycle_is_seen_stopped_and_changed(
     speed = page.get_by_label("belt speed, value")
     speed.fill("20mm/s")
     speed.press("Enter")
-    expect(events(page).get_by_text("plant.belt_speed: 0.04 to 0.02")).to_be_visible()
+    expect(events(page).get_by_text("plant.belt_speed: 40 mm/s to 20 mm/s")).to_be_visible()
 
     # All that is shown stays as it is when the system changes to dark.
     wait_for(lambda: page.evaluate(FRICTION) == -20.0, "the new belt speed is in the curve")  # mm/s
@@ -161,7 +161,7 @@ def test_a_limit_cycle_is_seen_stopped_and_changed(
     page.emulate_media(color_scheme="light")
 
     page.get_by_role("button", name="undo belt speed").click()
-    expect(events(page).get_by_text("plant.belt_speed: 0.02 to 0.04")).to_be_visible()
+    expect(events(page).get_by_text("plant.belt_speed: 20 mm/s to 40 mm/s")).to_be_visible()
     expect(speed).to_have_value("40")  # mm/s, as in the plots
 
     corner = page.get_by_label("cutoff frequency, value")
@@ -184,7 +184,7 @@ def test_a_limit_cycle_is_seen_stopped_and_changed(
     expect(page.get_by_text("Now 250 N s/m.")).to_be_visible()
 
     page.get_by_role("button", name="Impulse").click()
-    expect(events(page).get_by_text("impulse of 250 N for 0.016 s")).to_be_visible()
+    expect(events(page).get_by_text("impulse of 250 N for 16 ms")).to_be_visible()
     expect(events(page).get_by_text("the impulse has ended")).to_be_visible()
     wait_for(lambda: swing(page) > 50.0, "the impulse is drawn")
 
@@ -215,6 +215,13 @@ CROSSED = """() => {
 
 LEGEND_HAS_A = """() => window.getElement(stickslip.trace).chart.getOption().legend[0].data
     .includes("A")"""
+
+
+CLICK_ON_PICTURE = """() => {
+    const chart = window.getElement(stickslip.map).chart;
+    chart.getOption().toolbox[0].feature.myPicture.onclick(null, chart);
+}"""
+"""Does what the button in the toolbox of a chart does, which is drawn and no element."""
 
 
 def accessibility(page: Page) -> list[str]:
@@ -282,6 +289,13 @@ def test_what_an_engineer_does(start_stickslip: Start, page: Page, tmp_path: Pat
     assert picture.value.path().stat().st_size > 10_000
     named = r"bag_belt_speed_[\d.]+_mm_s_.*_linear_gain_-3_kN_s_m_.*_control_on_20.*Z\."
     assert re.fullmatch(named + "png", picture.value.suggested_filename)
+
+    with page.expect_download() as picture:
+        page.evaluate(CLICK_ON_PICTURE)
+    assert re.fullmatch(
+        r"bag_belt_speed_.*_limit_of_stability_over_the_gains_20.*Z\.png",
+        picture.value.suggested_filename,
+    )
 
     assert served.end() == 130
     expect(page.get_by_role("heading", name="Run ended")).to_be_visible()
