@@ -1,6 +1,6 @@
 """Array types and tables of arrays."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Self
 
 import numpy as np
@@ -9,6 +9,26 @@ from numpy.typing import NDArray
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
+
+
+_WINDOW = 1 << 16
+"""Rows whose intermediate results stay in the cache of a processor."""
+
+
+def windows(rows: int, overlap: int = 0) -> Iterator[slice]:
+    """Yield consecutive slices of so many rows; each has the last rows of the one before, too.
+
+    Work on a long array in such windows needs no memory for intermediate results, which takes more
+    time than the work.
+
+    Examples
+    --------
+    >>> from stickslip_ros.arrays import windows
+    >>> [*windows(100_000, overlap=1)]
+    [slice(0, 65536, None), slice(65535, 100000, None)]
+    """
+    for begin in range(0, max(rows - overlap, 0), _WINDOW - overlap):
+        yield slice(begin, min(begin + _WINDOW, rows))
 
 
 def rms(values: FloatArray) -> float:

@@ -143,9 +143,9 @@ class SampleColumns(Table):
     @property
     def is_valid(self) -> BoolArray:
         """Boolean mask of the samples that are measured: finite, up to 1e100 m and m/s."""
-        is_valid = np.abs(self.position) <= LARGEST
-        for column in (self.velocity, self.belt_velocity):
-            is_valid &= np.abs(column) <= LARGEST
+        is_valid = np.ones(len(self), np.bool_)
+        for column in (self.position, self.velocity, self.belt_velocity):
+            is_valid &= (column >= -LARGEST) & (column <= LARGEST)
         return is_valid
 
 

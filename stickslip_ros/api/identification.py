@@ -1,7 +1,7 @@
 """Identification: a model of a drive from recordings."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -27,6 +27,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from stickslip_ros.show.style import FigureStyle
+
+
+_FORM, _LAYOUT = ({each.name for each in fields(kind)} for kind in (TableFormat, BagLayout))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -67,6 +70,7 @@ class Model(Result):
         *,
         start: float = 0.0,
         end: float = float("inf"),
+        **options: Any,
     ) -> dict[str, float | None]:
         """Return what the model predicts of a recording.
 
@@ -78,6 +82,9 @@ class Model(Result):
             Columns of a table, as for `read_table`.
         start, end : float, optional
             Part to predict, s from the first sample.
+        **options
+            How it is read: `namespace`, `belt_speed`, and those from `joint` to `encoding` of
+            `identify`.
 
         Returns
         -------
@@ -93,7 +100,10 @@ class Model(Result):
         InvalidInputError
             If it has several parts, or lacks what a prediction needs.
         """
-        records = read_records(Path(recording), columns, start=start, end=end).records
+        form = {name: options.pop(name) for name in _FORM if name in options}
+        layout = {name: options.pop(name) for name in _LAYOUT if name in options}
+        options |= {"form": TableFormat(**form), "layout": BagLayout(**layout)}
+        records = read_records(Path(recording), columns, start=start, end=end, **options).records
         if len(records) > 1:
             raise InvalidInputError(
                 f"{recording} has {len(records)} parts between long gaps: one must be chosen by "

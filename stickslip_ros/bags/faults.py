@@ -5,7 +5,7 @@ from math import pi
 
 import numpy as np
 
-from stickslip_ros.arrays import BoolArray, FloatArray, IntArray, rms
+from stickslip_ros.arrays import BoolArray, FloatArray, IntArray, rms, windows
 from stickslip_ros.physics.measures.noise import white_noise
 from stickslip_ros.text import quantity
 
@@ -15,6 +15,8 @@ _AROUND, _QUIET = 7, 5
 """Steps before and after a jump, and how many of them must be as small."""
 _LONGEST, _LARGEST_SHARE = 20, 0.05
 """Longest dropout, in samples; share of the samples that dropouts are at most."""
+MOST_SHIFTS = 3
+"""Most jumps from which a signal does not come back; more of them are motion."""
 _LEAST_SHARE = 0.01
 """Least jump, as a share of the range of the signal without its extreme hundredths."""
 _TURNS = (1.0, 2.0 * pi, 360.0, *(2.0**bits for bits in range(8, 33)))
@@ -48,76 +50,98 @@ class Jumps:
     >>> from stickslip_ros.bags.faults import Jumps
     >>> signal = np.sin(0.01 * np.arange(1000.0))
     >>> signal[200:203] = -5.0
-    >>> np.flatnonzero(Jumps(signal).dropouts()).tolist()
+    >>> Jumps(signal).dropouts().tolist()
     [200, 201, 202]
     """
 
     def __init__(self, signal: FloatArray) -> None:
         """Find the jumps of a signal; they are also larger than steps of an encoder."""
-        self._signal, self._step = signal, np.diff(signal)
-        size = np.abs(self._step)
+        self._signal, self._unit = signal, _unit(signal)
         part = signal[:: 1 + len(signal) // _MOST_WINDOWS]
         low, high = np.quantile(part, [0.01, 0.99]) if len(part) else (0.0, 0.0)
-        least = max(_STEEPER * _unit(self._step), _LEAST_SHARE * float(high - low))
-        self._rows = rows = np.flatnonzero(size > least)
+        least = max(_STEEPER * self._unit, _LEAST_SHARE * float(high - low))
+        found = [
+            part.start + np.flatnonzero(np.abs(np.diff(signal[part])) > least)
+            for part in windows(len(signal), 1)
+        ]
+        self._rows = rows = np.concatenate([np.empty(0, np.int64), *found])
+        size = np.abs(self._step(rows))
         quiet: list[BoolArray] = []
         for side in (-1, 1):
             count = np.zeros(len(rows), np.int64)
             for distance in range(1, _AROUND + 1):
                 other = rows + side * distance
-                inside = (other >= 0) & (other < len(size))
-                beside = size[np.clip(other, 0, len(size) - 1)]
-                count += inside & (_STEEPER * beside < size[rows])
+                inside = (other >= 0) & (other < len(signal) - 1)
+                beside = np.abs(self._step(np.clip(other, 0, len(signal) - 2)))
+                count += inside & (_STEEPER * beside < size)
             quiet.append(count >= _QUIET)
         self._after_quiet, self._before_quiet = quiet
 
-    def dropouts(self) -> BoolArray:
-        """Return which samples the signal jumps to, and back from, as no motion does.
+    def _step(self, rows: IntArray) -> FloatArray:
+        return self._signal[rows + 1] - self._signal[rows]
+
+    def dropouts(self) -> IntArray:
+        """Return the samples that the signal jumps to, and back from, as no motion does.
 
         They are 1 to 20 samples between two jumps. None are found where they would be more than a
         twentieth of the samples: then the motion jumps.
         """
-        signal, step = self._signal, self._step
-        found = np.zeros(len(signal), np.bool_)
+        signal, found = self._signal, list[int]()
         first, last = self._rows[self._after_quiet], self._rows[self._before_quiet]
         place = np.searchsorted(last, first, "right")
         first, place = first[place < len(last)], place[place < len(last)]
         ended = -1
         for begin, end in zip(first.tolist(), last[place].tolist(), strict=True):
-            size = min(abs(step[begin]), abs(step[end]))
-            inner = np.abs(step[begin + 1 : end]).max(initial=0.0)
-            returns = abs(signal[end + 1] - signal[begin]) < size / 2.0
-            if begin > ended and end - begin <= _LONGEST and inner < size / 2.0 and returns:
-                found[begin + 1 : end + 1] = True
+            if begin <= ended or end - begin > _LONGEST:
+                continue
+            size = np.abs(np.diff(signal[begin : end + 2]))
+            least = min(size[0], size[-1]) / 2.0
+            returns = abs(signal[end + 1] - signal[begin]) < least
+            if returns and size[1:-1].max(initial=0.0) < least:
+                found += range(begin + 1, end + 1)
                 ended = end
-        if np.count_nonzero(found) > _LARGEST_SHARE * len(signal):
-            found[:] = False
-        return found
+        return np.array(found if len(found) <= _LARGEST_SHARE * len(signal) else [], np.int64)
+
+    def shifts(self) -> list[tuple[int, float]]:
+        """Return the samples after jumps from which the signal does not come back, and their sizes.
+
+        None are found if there are more than three: then the motion jumps.
+        """
+        rows = self._rows[self._after_quiet & self._before_quiet]
+        lost = self.dropouts()
+        rows = rows[~np.isin(rows, lost) & ~np.isin(rows + 1, lost)]
+        sizes = self._step(rows).tolist()
+        return [*zip((rows + 1).tolist(), sizes, strict=True)] if len(rows) <= MOST_SHIFTS else []
 
     def wrap(self) -> Wrap | None:
         """Return the jumps by one turn, all against the motion; None without any.
 
         The turn is known from jumps in both directions, or is that of a counter.
         """
-        step, rows = self._step, self._rows[self._after_quiet & self._before_quiet]
-        rows = rows[(rows > 0) & (rows < len(step) - 1)]
+        rows = self._rows[self._after_quiet & self._before_quiet]
+        rows = rows[(rows > 0) & (rows < len(self._signal) - 2)]
         if not len(rows):
             return None
-        beside = (step[rows - 1] + step[rows + 1]) / 2.0
-        turns = beside - step[rows]
+        before, jump, after = (self._step(rows + place) for place in (-1, 0, 1))
+        turns = (before + after) / 2.0 - jump
         turn = float(np.median(np.abs(turns)))
-        against = np.all(step[rows - 1] * step[rows] < 0.0) and np.all(
-            step[rows + 1] * step[rows] < 0.0
-        )
+        against = np.all(before * jump < 0.0) and np.all(after * jump < 0.0)
         same = np.all(np.abs(np.abs(turns) - turn) <= _SAME_TURN * turn)
         if not (against and same) or float(np.ptp(self._signal)) > (1.0 + _SAME_TURN) * turn:
             return None
-        unit = _unit(step)
-        known = [each * scale for scale in (1.0, unit) for each in _TURNS]
+        known = [each * scale for scale in (1.0, self._unit) for each in _TURNS]
         nearest = min(known, key=lambda each: abs(each - turn))
         if abs(nearest - turn) <= _SAME_TURN * turn:
             return Wrap(nearest, rows + 1)
         return Wrap(turn, rows + 1) if np.ptp(np.sign(turns)) else None
+
+
+def shift_note(size: float, place: str) -> str:
+    """Return a sentence on a jump from which the positions do not come back."""
+    return (
+        f"the position jumps by {quantity(float(f'{size:.3g}'), 'm')}, {place}, and does not come "
+        "back, as after a new zero or lost counts: --to or --from takes one side"
+    )
 
 
 def velocity_fault(time: FloatArray, position: FloatArray, velocity: FloatArray) -> str | None:
@@ -143,7 +167,7 @@ def velocity_fault(time: FloatArray, position: FloatArray, velocity: FloatArray)
         return None
     if abs(both) < _CORRELATION * sizes * len(rows):
         part = position[:_MOST_WINDOWS]
-        noise = max(white_noise(part), _unit(np.diff(part)))
+        noise = max(white_noise(part), _unit(part))
         clear = rms(moved - by_velocity) > _STEEPER * noise
         return "does not follow the positions" if clear else None
     ratios = np.array([both / square, float(moved @ moved) / both])
@@ -166,7 +190,10 @@ def _integral(time: FloatArray, velocity: FloatArray, rows: IntArray, stride: in
     return total[(rows + _WINDOW) // stride] - total[rows // stride]
 
 
-def _unit(step: FloatArray) -> float:
+def _unit(signal: FloatArray) -> float:
     """Return the smallest step of a signal; infinite without one."""
-    sizes = np.abs(step)
-    return float(np.min(sizes, where=sizes > 0.0, initial=np.inf))
+    least = np.inf
+    for part in windows(len(signal), 1):
+        sizes = np.abs(np.diff(signal[part]))
+        least = float(np.min(sizes, where=sizes > 0.0, initial=least))
+    return least

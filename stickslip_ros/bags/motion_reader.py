@@ -11,7 +11,7 @@ from typing import NamedTuple, get_args
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray, IntArray
-from stickslip_ros.bags.faults import Jumps
+from stickslip_ros.bags.faults import MOST_SHIFTS, Jumps, shift_note
 from stickslip_ros.errors import BagError, InvalidInputError, MessageError
 from stickslip_ros.messages import ForceSource, TimeSource
 from stickslip_ros.messages.cdr import Layout, Messages, Refused, decode
@@ -126,6 +126,8 @@ class MotionReader:
         source: str = "",
     ) -> None:
         """Take topic and source, for messages to the user, and the belt speed (m/s) of no belt."""
+        self.own = True
+        """Whether the joint states are those of our plant."""
         self.estimated = False
         """Whether velocities are those of the positions."""
         self.clock_offset: int | None = None
@@ -135,11 +137,12 @@ class MotionReader:
         self._source = NumberedTopic.of(layout.states_topic or "").number
         self._joint = ""
         self._layout_of: Callable[[bytes], Layout] | None = None
-        self._own = True
         self._known: tuple[bool, bool] | None = None
         self._last: SampleColumns | None = None
         self._left_out = Counter[str]()
+        self._shifts: list[tuple[int, float]] = []
         self._samples = self._standing = self._zero = self._step = 0
+        self._first_stamp: int | None = None
         self._last_stamp = -1
         self._belt = nan
         self._grid: tuple[int, int, int] | None = None
@@ -147,13 +150,18 @@ class MotionReader:
     @property
     def notes(self) -> list[str]:
         """Sentences on what was left out, and what is assumed."""
-        if self._own or self._known is None:
+        if self.own or self._known is None:
             return []
         has_position, _ = self._known
         notes = [
             f"{number} joint states on {self._topic} {why} and are left out"
             for why, number in self._left_out.items()
         ]
+        if len(self._shifts) <= MOST_SHIFTS:
+            notes += [
+                shift_note(size, f"{since / NANOSECONDS:.6g} s after the first sample")
+                for since, size in self._shifts
+            ]
         if not has_position:
             notes.append("the position is not recorded: it is the integral of the velocity")
         elif self.estimated:
@@ -184,7 +192,7 @@ class MotionReader:
                 stamp = log_time[rows]
         samples = SampleColumns(stamp, *values)
         forces = ForceColumns(stamp[:0], values[0, :0])
-        if self._own:
+        if self.own:
             self._check_stamps(samples.stamp)
             return samples, forces, refused
         with np.errstate(all="ignore"):  # values of others may overflow
@@ -227,7 +235,7 @@ class MotionReader:
                         f"are of the joints {_listed(known)}"
                     )
                 )
-        self._own = False
+        self.own = False
         self._layout_of = partial(joint_layout, joint=self._joint, belt=belt)
         if joint is None:
             self._layout_of = self._only_joint
@@ -314,7 +322,11 @@ class MotionReader:
                 f"'{self._topic}[1]' takes the first, [2] the second"
             )
         usual = np.quantile(sizes[sizes > 0.0], 0.25) if apart > 0.0 else 0.0
-        strange = Jumps(samples.position).dropouts()
+        jumps = Jumps(samples.position)
+        strange = np.zeros(len(stamp), np.bool_)
+        strange[jumps.dropouts()] = True
+        first = int(stamp[0]) if self._first_stamp is None else self._first_stamp
+        self._shifts += [(int(stamp[row]) - first, size) for row, size in jumps.shifts()]
         strange[1:-1] |= returns & (sizes[1:] > _JUMP * usual) & (usual > 0.0)
         if strange.any():
             why = "jump away from the motion and back, as of another source or a dropout,"
@@ -323,6 +335,8 @@ class MotionReader:
 
     def _check_stamps(self, stamp: IntArray) -> None:
         """Refuse stamps that stand."""
+        if self._first_stamp is None and len(stamp):
+            self._first_stamp = int(stamp[0])
         if self._layout.time == "log" or len(stamp) == 0:
             return
         self._samples += len(stamp)

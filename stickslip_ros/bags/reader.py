@@ -1,23 +1,17 @@
-"""Read a bag: a directory of MCAP files in rosbag2's layout, or one such file."""
+"""Read the recorded motion and forces of a drive from a bag."""
 
-import os
-import re
-import tempfile
-from collections import Counter, deque
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, closing
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, NamedTuple, Self, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
 from stickslip_ros.arrays import IntArray
+from stickslip_ros.bags.bag_files import BagFiles
 from stickslip_ros.bags.chunk import MessageBlock
-from stickslip_ros.bags.compression import unpack_file
-from stickslip_ros.bags.mcap_file import McapFile
-from stickslip_ros.bags.metadata import metadata_faults
 from stickslip_ros.bags.motion_reader import (
     ANY_LAYOUT,
     BagLayout,
@@ -55,10 +49,6 @@ from stickslip_ros.samples import (
 from stickslip_ros.stamps import NANOSECONDS
 from stickslip_ros.text import number_in, printable, quantity, shown
 
-_PACKED_SUFFIX = ".mcap.zstd"
-"""Suffix of the files that rosbag2 compressed as a whole."""
-
-
 ColumnsT = TypeVar("ColumnsT", SampleColumns, ForceColumns, ReferenceColumns)
 _Decode = Callable[[bytes, IntArray, IntArray], tuple[ColumnsT, Refused]]
 
@@ -83,7 +73,7 @@ class RunBlock(NamedTuple):
     """Control forces that did not act."""
 
 
-class Recording:
+class Recording(BagFiles):
     """A bag that is open for reading; a context manager that closes it.
 
     Columns are read on first access. `blocks` yields them chunk by chunk, in the memory of one
@@ -127,28 +117,13 @@ class Recording:
         belt_speed: float | None = None,
         layout: BagLayout = ANY_LAYOUT,
     ) -> None:
-        self.path = Path(path)
+        super().__init__(path)
         self._belt_speed, self._given_layout = belt_speed, layout
         self._namespace = namespace
         self._motion: MotionReader | None = None
         self._timed_by_log = ""
-        self._unreadable: list[str] = []
         self._refused: Counter[str] = Counter()
         self._reasons: dict[str, str] = {}
-        paths = _mcap_files(self.path)
-        with ExitStack() as opened:
-            files = self._readable_files([_unpacked(path, opened) for path in paths])
-            self.files = [opened.enter_context(closing(file)) for file in files]
-            """The MCAP files in order, without those that cannot be read."""
-            self._opened = opened.pop_all()
-        self._metadata_faults = metadata_faults(self.path, paths) if self.path.is_dir() else []
-        self.topics = {
-            channel.topic: file.schemas[channel.schema_id].name
-            for file in self.files
-            for channel in file.channels.values()
-            if channel.schema_id in file.schemas
-        }
-        """Types by name, such as `sensor_msgs/msg/JointState` by `/feed_drive/joint_states`."""
 
     @property
     def notes(self) -> Sequence[str]:
@@ -172,9 +147,7 @@ class Recording:
         They name an incomplete end, damage, and messages that could not be decoded.
         """
         sentences = [
-            *self._metadata_faults,
-            *self._unreadable,
-            *(sentence for file in self.files for sentence in file.damage),
+            *self.damage,
             *(
                 f"{number} messages on {topic} could not be read: {self._reasons[topic]}"
                 for topic, number in self._refused.items()
@@ -206,7 +179,7 @@ class Recording:
         if self._layout.force == "effort":
             return self._states_and_efforts[1]
         name = self._topic(CONTROL_FORCE)
-        blocks = [self._forces(name, block, ids) for block, ids in self._blocks(name)]
+        blocks = [self._forces(name, block, ids) for block, ids in self.message_blocks(name)]
         self._check_clocks()
         return NO_FORCES.followed_by(*blocks)
 
@@ -259,7 +232,8 @@ class Recording:
     def blocks(self, least: int = 1) -> Iterator[RunBlock]:
         """Yield joint states, control forces and dropped forces in file order, chunk by chunk.
 
-        Messages that cannot be decoded are skipped and listed in `missing`.
+        What another machine recorded is one block. Messages that cannot be decoded are skipped and
+        listed in `missing`.
 
         Parameters
         ----------
@@ -285,7 +259,7 @@ class Recording:
         self._motion = motion = self._motion_reader(states)
         gathered: list[RunBlock] = []
         count = 0
-        for messages, channels in self._blocks(states, forces, dropped):
+        for messages, channels in self.message_blocks(states, forces, dropped):
             samples, efforts = self._states(motion, states, messages, channels)
             block = RunBlock(
                 samples,
@@ -294,116 +268,12 @@ class Recording:
             )
             gathered.append(block)
             count += sum(map(len, block))
-            if count >= least:
+            if count >= least and motion.own:
                 yield _joined_blocks(gathered)
                 gathered, count = [], 0
         self._check_clocks()
         if gathered:
             yield _joined_blocks(gathered)
-
-    def messages(self, *topics: str) -> Iterator[tuple[str, int, bytes]]:
-        """Yield the serialized messages of some topics in file order.
-
-        Parameters
-        ----------
-        *topics : str
-            Full names, such as `/feed_drive/joint_states`.
-
-        Yields
-        ------
-        topic : str
-            Full name of the topic.
-        log_time : int
-            ns.
-        data : bytes
-            The message, serialized as CDR.
-
-        Raises
-        ------
-        BagError
-            If the operating system fails to read the bag.
-        """
-        for block, channels in self._blocks(*topics):
-            names = {channel: topic for topic, ids in channels.items() for channel in ids}
-            columns = (block.channel, block.log_time, block.begin, block.end)
-            for channel, stamp, begin, end in zip(*(c.tolist() for c in columns), strict=True):
-                yield names[channel], stamp, block.data[begin:end]
-
-    def offered_qos(self, topic: str) -> str:
-        """Return the QoS profiles that the recorded publishers of a topic offered.
-
-        Parameters
-        ----------
-        topic : str
-            Full name, such as `/feed_drive/joint_states`.
-
-        Returns
-        -------
-        str
-            rosbag2's YAML, a list with one profile for each publisher; empty if unknown.
-        """
-        found = [
-            channel.metadata.get("offered_qos_profiles", "")
-            for file in self.files
-            for channel in file.channels.values()
-            if channel.topic == topic
-        ]
-        return next(filter(None, found), "")
-
-    def metadata(self, name: str) -> dict[str, str] | None:
-        """Return the last metadata table of a name in the bag.
-
-        Parameters
-        ----------
-        name : str
-            Name of the MCAP metadata record, such as `stickslip_ros/analyzer`.
-
-        Returns
-        -------
-        dict or None
-            The table, strings by strings; None if the bag has none of this name.
-        """
-        last = deque((table for file in self.files for table in file.tables(name)), maxlen=1)
-        return last[0].metadata if last else None
-
-    def attachment(self, name: str) -> bytes | None:
-        """Return the last attached file of a name in the bag.
-
-        Parameters
-        ----------
-        name : str
-            Name of the attachment.
-
-        Returns
-        -------
-        bytes or None
-            The content of the file; None if the bag has none of this name.
-        """
-        attachments = (found for file in self.files for found in file.attachments(name))
-        last = deque(attachments, maxlen=1)
-        return last[0].data if last else None
-
-    def close(self) -> None:
-        """Close the files."""
-        self._opened.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *exception: object) -> None:
-        self.close()
-
-    def _readable_files(self, paths: Sequence[Path]) -> Iterator[McapFile]:
-        """Open the files; raise BagError if none can be read, otherwise list those that cannot."""
-        errors: list[BagError] = []
-        for path in paths:
-            try:
-                yield McapFile(path)
-            except BagError as error:
-                errors.append(error)
-        if len(errors) == len(paths):
-            raise errors[0]
-        self._unreadable = [str(error) for error in errors]
 
     @cached_property
     def _layout(self) -> BagLayout:
@@ -465,15 +335,10 @@ class Recording:
             )
         return name
 
-    def _blocks(self, *topics: str) -> Iterator[tuple[MessageBlock, dict[str, list[int]]]]:
-        """Yield the messages of these topics chunk by chunk, and the channels of each topic."""
-        for file in self.files:
-            channels: dict[str, list[int]] = {}
-            for number, channel in file.channels.items():
-                if channel.topic in topics:
-                    channels.setdefault(channel.topic, []).append(number)
-            for block in file.blocks([number for ids in channels.values() for number in ids]):
-                yield block, channels
+    @property
+    def of_another_machine(self) -> bool:
+        """Whether the joint states that were read are not those of our plant."""
+        return self._motion is not None and not self._motion.own
 
     @property
     def velocity_estimated(self) -> bool:
@@ -491,7 +356,7 @@ class Recording:
         """All joint states, and their efforts if these are the forces."""
         name = self._topic(JOINT_STATES)
         self._motion = motion = self._motion_reader(name)
-        read = [self._states(motion, name, block, ids) for block, ids in self._blocks(name)]
+        read = [self._states(motion, name, block, ids) for block, ids in self.message_blocks(name)]
         states, efforts = zip(*read, strict=True) if read else ((), ())
         return NO_SAMPLES.followed_by(*states), NO_FORCES.followed_by(*efforts)
 
@@ -560,7 +425,9 @@ class Recording:
     def _whole(self, topic: Topic[Any], decode: _Decode[ColumnsT]) -> ColumnsT:
         """Return all columns of a topic as one."""
         name = self._topic(topic)
-        blocks = [self._decoded(name, block, ids, decode) for block, ids in self._blocks(name)]
+        blocks = [
+            self._decoded(name, block, ids, decode) for block, ids in self.message_blocks(name)
+        ]
         if not blocks:
             nothing = np.empty(0, np.int64)
             blocks = [decode(b"", nothing, nothing)[0]]
@@ -574,40 +441,3 @@ def _content(block: MessageBlock) -> Messages:
 def _joined_blocks(blocks: Sequence[RunBlock]) -> RunBlock:
     parts: Any = zip(*blocks, strict=True)
     return RunBlock(*(first.followed_by(*others) for first, *others in parts))
-
-
-def _mcap_files(path: Path) -> list[Path]:
-    """Return the files of a bag in the order in which they were recorded."""
-    if not os.path.exists(path):
-        raise BagError(f"the bag {path} does not exist")
-    files, sqlite = [path], path.suffix == ".db3"
-    if path.is_dir():
-        files = sorted([*path.glob("*.mcap"), *path.glob(f"*{_PACKED_SUFFIX}")], key=_place_in_bag)
-        sqlite = not files and any(path.glob("*.db3"))
-    if sqlite:
-        raise BagError(
-            f"the bag {path} is stored as sqlite3, and only MCAP can be read; "
-            "convert it with `ros2 bag convert`"
-        )
-    if not files:
-        raise BagError(f"the directory {path} is not a bag: it holds no .mcap file")
-    return files
-
-
-def _unpacked(path: Path, opened: ExitStack) -> Path:
-    """Return a file as MCAP; unpack one that rosbag2 compressed as a whole until the bag closes."""
-    if not path.name.endswith(_PACKED_SUFFIX):
-        return path
-    directory = opened.enter_context(tempfile.TemporaryDirectory(prefix="stickslip_ros_"))
-    unpacked = Path(directory, path.name.removesuffix(".zstd"))
-    try:
-        unpack_file(path, unpacked)
-    except OSError as error:
-        raise BagError(f"the file {path} cannot be unpacked: {error.strerror}") from error
-    return unpacked
-
-
-def _place_in_bag(file: Path) -> tuple[int, str]:
-    """Sort `bag_2.mcap` before `bag_10.mcap`, as rosbag2 numbers the files of a bag it splits."""
-    number = re.search(r"_(\d+)\.mcap", file.name)
-    return (int(number[1]) if number else 0), file.name

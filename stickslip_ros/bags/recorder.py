@@ -23,10 +23,10 @@ from mcap.data_stream import RecordBuilder
 from mcap.records import Channel, Schema
 from mcap.writer import CompressionType, Writer
 
+from stickslip_ros.bags.bag_files import BagFiles
 from stickslip_ros.bags.definitions import message_definition, type_hash
 from stickslip_ros.bags.mcap_file import McapFile
 from stickslip_ros.bags.metadata import BagDescription, opening_information
-from stickslip_ros.bags.reader import Recording
 from stickslip_ros.errors import BagError
 from stickslip_ros.stamps import NANOSECONDS
 
@@ -369,8 +369,8 @@ class Recorder:
         self._end()
         self._stream.cut()
         left = "it holds no message"  # the disk may have had no room for the first ones
-        with suppress(BagError), Recording(self.directory) as recording:
-            if next(recording.messages(*self._topics), None) is not None:
+        with suppress(BagError), BagFiles(self.directory) as bag:
+            if next(bag.messages(*self._topics), None) is not None:
                 left = "what was written so far can be read"
         raise BagError(
             f"the bag {self.directory} can no longer be written ({error}); {left}"

@@ -6,9 +6,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from stickslip_ros.bags.bag_files import BagFiles
 from stickslip_ros.bags.mcap_file import McapFile
 from stickslip_ros.bags.metadata import METADATA_FILE
-from stickslip_ros.bags.reader import Recording
 from stickslip_ros.bags.recorder import Recorder, check_new_bag
 from stickslip_ros.errors import BagError
 from stickslip_ros.text import printable
@@ -39,20 +39,20 @@ def repair(path: Path, out: Path, progress: Callable[[int], None] = lambda _: No
     if out.resolve().is_relative_to(original.resolve()):
         raise BagError(f"the bag {out} would lie within {original}, which must not be changed")
     repaired = Repaired()
-    with Recording(path) as recording:
-        if not recording.topics:
-            why = "; ".join(recording.missing) or "it holds no topics"
+    with BagFiles(path) as bag:
+        if not bag.topics:
+            why = "; ".join(bag.damage) or "it holds no topics"
             raise BagError(f"nothing in the bag {path} can be repaired: {why}")
         try:
             with Recorder(out) as recorder:
                 channels: dict[_Definition, int] = {}
-                for file in recording.files:
+                for file in bag.files:
                     _copy_tables(file, recorder)
                     _copy_messages(file, recorder, channels, repaired, progress)
         except BaseException:
             shutil.rmtree(out, ignore_errors=True)  # it would look like a complete bag
             raise
-        repaired.missing[:0] = recording.missing
+        repaired.missing[:0] = bag.damage
     return repaired
 
 

@@ -14,7 +14,8 @@ from stickslip_ros.arrays import BoolArray, IntArray
 from stickslip_ros.bags.motion_reader import ANY_LAYOUT, BagLayout
 from stickslip_ros.bags.reader import Recording
 from stickslip_ros.bags.table_clock import LONGEST
-from stickslip_ros.bags.table_file import TableRecording, is_table, read_table
+from stickslip_ros.bags.table_columns import is_table
+from stickslip_ros.bags.table_file import TableRecording, read_table
 from stickslip_ros.bags.text_table import ANY_FORM, TableFormat
 from stickslip_ros.errors import BagError, InvalidInputError
 from stickslip_ros.messages.topics import CONTROL_FORCE, JOINT_STATES
@@ -133,12 +134,12 @@ def report_of_recording(
             reading=reading_at_recording(recording, stick_speed),
         )
         meter.timing = _timing_of_recording(recording)
-        whole = isinstance(recording, TableRecording)
-        run = _RunReader(meter, start, end, observer, take, slips, whole=whole)
+        run = _RunReader(meter, start, end, observer, take, slips)
         # Measuring each chunk by itself would take twice as long.
         for block in recording.blocks(least=20_000):
             if recording.velocity_estimated and meter.motion.reading.noisy is None:
                 meter.motion.reading = SampleAssumptions(noisy=True)
+            run.whole = recording.of_another_machine
             run.feed(*block)
         run.finish()
         missing = recording.missing
@@ -170,11 +171,10 @@ class _RunReader:
         observer: RunObserver | None,
         take: Callable[[SampleColumns | ForceColumns], None],
         slips: SlipThreshold | None,
-        *,
-        whole: bool,
     ) -> None:
         self.meter = meter
-        self._whole = whole  # the run is fed in one block
+        self.whole = False
+        """Whether it is of another machine, and fed in one block."""
         self._feed = 0.0
         self._ends = f"from {start:g} s on" + ("" if end == inf else f" and before {end:g} s")
         self._slips = None if slips is None else (SlipMeter(slips), SlipMeter(slips))
@@ -199,7 +199,7 @@ class _RunReader:
             self._measured += len(part)
             self._find_slips(part)
             self._take(part)
-            if self._whole:
+            if self.whole:
                 part, self._feed = relative_to_feed(part)
             self.meter.motion.feed(part)
             if self._observer is not None:
@@ -231,7 +231,7 @@ class _RunReader:
                 f"the slide advances at {feed} on a guide at rest: the measures "
                 f"are those of its position less this feed, {advance} in a cycle",
             ]
-        if self._whole and report["regime"] == Regime.PURE_SLIP:
+        if self.whole and report["regime"] == Regime.PURE_SLIP:
             steps = report["amplitude"] / (self.meter.motion.drift.resolution or float_info.min)
             each = report["period"] / report["duration"] * report["samples"]
             few = f"{steps:.2g} steps of the encoder in the amplitude" * (steps < _LEAST_STEPS)

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from stickslip_ros.arrays import FloatArray, IntArray
+from stickslip_ros.arrays import FloatArray, IntArray, windows
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.stamps import NANOSECONDS
 from stickslip_ros.text import quantity
@@ -31,11 +31,11 @@ def even_times(time: FloatArray) -> tuple[FloatArray, list[str]]:
     >>> round(float(time[1]), 9), notes[0][:33]
     (0.0004, 'the times are rounded to 1 ms: th')
     """
-    steps = np.diff(time)
-    if len(time) < _FEWEST or time[-1] > LONGEST or np.ptp(steps) < 0.5 / NANOSECONDS:
+    if len(time) < _FEWEST or time[-1] > LONGEST:
         return time, []
-    rounding, notes = _rounding(steps), list[str]()
+    rounding, notes = _rounding(np.diff(time[:_MOST])), list[str]()
     if rounding:
+        steps = np.diff(time)
         gaps = np.flatnonzero(steps > np.median(steps) + 2.5 * rounding) + 1
         parts = [_even(part, rounding) for part in np.split(time, gaps)]
         found = np.concatenate([time[:0], *(part for part in parts if part is not None)])
@@ -53,21 +53,24 @@ def even_times(time: FloatArray) -> tuple[FloatArray, list[str]]:
                 f"the times are multiples of {quantity(rounding, 's')}: if they are rounded, "
                 f"velocities err by {share:.0%}"
             ]
-    if stand := np.count_nonzero(steps == 0.0):
+    if stand := np.count_nonzero(time[1:] == time[:-1]):
         notes.append(f"{stand} of {len(time)} rows have the time of the row before")
     return time, notes
 
 
 def stamps_of(path: Path, time: FloatArray) -> IntArray:
     """Return times, s, as stamps, ns, from the first one; InvalidInputError if they are too far."""
-    if np.abs(time).max() > LONGEST:
+    if max(time.max(), -time.min()) > LONGEST:
         raise InvalidInputError(f"{path}: the times differ by more than {LONGEST:g} s")
-    return np.rint(time * NANOSECONDS).astype(np.int64)
+    stamp = np.empty(len(time), np.int64)
+    for part in windows(len(time)):
+        stamp[part] = np.rint(time[part] * NANOSECONDS)
+    return stamp
 
 
 def _rounding(steps: FloatArray) -> float:
     """Return the least difference of usual steps, s; 0 if it is a small share of them."""
-    sizes, counts = np.unique(np.rint(steps[:_MOST] * NANOSECONDS), return_counts=True)
+    sizes, counts = np.unique(np.rint(steps * NANOSECONDS), return_counts=True)
     sizes = sizes[counts >= _COMMON_SHARE * counts.sum()] / NANOSECONDS
     step = float(np.diff(sizes).min(initial=np.inf))
     return step if _COARSE_SHARE * float(np.median(steps)) <= step < np.inf else 0.0

@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from io import StringIO, TextIOWrapper
+from itertools import islice
 from pathlib import Path
 from statistics import mode
 from typing import Any
@@ -22,7 +23,7 @@ from stickslip_ros.text import shown
 
 _HEAD, _TAIL = 1 << 20, 10
 """Bytes from which the form is found; lines at their end that are rows, with or without more."""
-_LARGEST, _MOST_NUMBERS, _MOST_COLUMNS, _CHUNK = 1 << 33, 1 << 28, 10_000, 1 << 20
+_LARGEST, _MOST_NUMBERS, _MOST_COLUMNS, _CHUNK = 1 << 33, 1 << 28, 10_000, 1 << 18
 """Bytes of a file, numbers in the columns that are used, columns, and cells that are read at once.
 """
 _DAY = 86_400.0
@@ -105,10 +106,12 @@ class TextTable:
 
     def _find(self, lines: list[str], skip: int) -> None:
         """Find the separator, the names, their units and the first row."""
-        tail = [line for line in lines[skip:] if line.strip()][-_TAIL:]
+        tail = [*islice(filter(str.strip, reversed(lines[skip:])), _TAIL)][::-1]
         if not tail:
             raise ValueError("it is empty")
         self._separator = max(_SEPARATORS, key=lambda each: _likelihood(each, tail, lines[skip:]))
+        blank = re.compile(f"(^|{re.escape(self._separator)}) ", re.MULTILINE)
+        self._has_blanks = blank.search("".join(lines)) is not None
         rows = [_cells(line, self._separator) for line in tail]
         self.width = width = mode(map(len, rows))
         rows = [row for row in rows if len(row) == width]
@@ -229,7 +232,7 @@ class TextTable:
                 index_col=False,
                 sep=r"\s+" if self._separator == " " else self._separator,
                 decimal=self._expected_decimal,
-                skipinitialspace=True,
+                skipinitialspace=self._has_blanks,
                 skip_blank_lines=False,
                 on_bad_lines="warn",
                 low_memory=False,

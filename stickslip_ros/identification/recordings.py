@@ -13,13 +13,8 @@ from stickslip_ros.arrays import FloatArray, IntArray
 from stickslip_ros.bags.motion_reader import ANY_LAYOUT, BagLayout
 from stickslip_ros.bags.reader import Recording
 from stickslip_ros.bags.table_clock import stamps_of
-from stickslip_ros.bags.table_file import (
-    Table,
-    is_table,
-    own_columns,
-    quantities_of,
-    table_of,
-)
+from stickslip_ros.bags.table_columns import Table, is_table, table_of
+from stickslip_ros.bags.table_quantities import quantities_of
 from stickslip_ros.bags.text_table import ANY_FORM, TableFormat
 from stickslip_ros.errors import BagError, InvalidInputError
 from stickslip_ros.identification.laws import DELAY
@@ -117,7 +112,7 @@ def _of_table(
     table: Table, columns: Mapping[str, str] | None, belt_speed: float | None
 ) -> tuple[IntArray, dict[str, FloatArray], Sequence[str]]:
     path = table.path
-    columns = own_columns(path, table.columns) if columns is None else columns
+    columns = table.own_columns if columns is None else columns
     found, notes = quantities_of(table, columns, belt_speed)
     time = found.pop("time")
     belt = found.get("belt_velocity", np.full(len(time), 0.0))

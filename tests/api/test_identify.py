@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 import stickslip_ros as ss
+from stickslip_ros.errors import InvalidInputError
 
 
 @pytest.fixture(scope="module")
@@ -42,3 +43,9 @@ def test_a_recording_is_predicted(model: ss.Model, tmp_path: Path) -> None:
     ss.simulate(drive, duration=1.0).to_pandas().reset_index().to_csv(path, index=False)
     error = model.check(path)["free_run_error"]
     assert error < 1e-6
+    path.write_text(path.read_text().replace(",", ";").replace(".", ","))
+    assert model.check(path, decimal=",", start=0.1)["free_run_error"] == pytest.approx(
+        model.check(path, start=0.1)["free_run_error"]
+    )
+    with pytest.raises(InvalidInputError, match="force = 'torque' is invalid"):
+        model.check(path, force="torque")

@@ -35,7 +35,7 @@ def test_jumps_away_and_back_are_dropouts(position: FloatArray) -> None:
     lost = {700, 1500, 1501, 1502, 1506, 2000, *range(3000, 3020)}
     position = position + 0.2
     position[[*lost]] = 0.0
-    assert set(np.flatnonzero(Jumps(position).dropouts()).tolist()) == lost
+    assert set(Jumps(position).dropouts().tolist()) == lost
 
 
 @pytest.mark.parametrize("rate", [1000.0, 100.0, 20.0, 7.0])
@@ -49,7 +49,8 @@ def test_motions_have_no_faults(rate: float, step: float, noise: float) -> None:
     for motion in (sawtooth(rate), hit, moved, np.sin(40.0 * time), np.zeros_like(time)):
         signal = motion + noise * rng.standard_normal(len(motion))
         signal = np.round(signal / step) * step if step else signal
-        assert not Jumps(signal).dropouts().any()
+        assert not len(Jumps(signal).dropouts())
+        assert Jumps(signal).shifts() == []
         assert Jumps(signal).wrap() is None
 
 
@@ -96,6 +97,15 @@ def test_what_is_left_out_of_a_table_is_said(tmp_path: Path) -> None:
     found = read_table(path, columns)
     assert "the velocity is 1000 times that of the positions: it is left out" in found.notes
     assert found.velocity_estimated
+
+
+def test_a_jump_from_which_it_does_not_come_back_is_said(tmp_path: Path) -> None:
+    position = POSITION + 0.3 * (TIME >= 1.5)
+    path = table_of(tmp_path / "log.csv", t=TIME, x=position)
+    found = read_table(path, {"time": "t", "position": "x"})
+    sentence = "the position jumps by 300 mm, at line 1502, 1.5 s after the first row, and does not"
+    assert found.notes[0].startswith(sentence)
+    assert np.array_equal(found.samples.position, position)
 
 
 def test_a_counter_that_wraps_is_refused_with_the_expression_that_unwraps_it(

@@ -1,10 +1,14 @@
 """Bags of other machines: joints, topics, stamps and forces as their drivers have them."""
 
+from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from geometry_msgs.msg import WrenchStamped
+from hypothesis import given
+from hypothesis import strategies as st
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, Float64MultiArray
@@ -17,6 +21,7 @@ from stickslip_ros.bags.report import report_of_recording
 from stickslip_ros.errors import BagError, InvalidInputError
 from stickslip_ros.physics.measures.slips import SlipThreshold
 from tests.bags.runs import write_bag
+from tests.examples import examples
 
 BELT = 0.04
 EPOCH, STEP = 3 * 10**9, 1_000_000
@@ -309,3 +314,74 @@ def test_log_times_beside_stamps_of_another_clock_are_refused(tmp_path: Path) ->
 def test_the_joint_of_our_plant_needs_no_option() -> None:
     reference = Path(__file__).parents[2] / "bags" / "reference"
     assert report_of_recording(reference, belt_speed=1.0) == report_of_recording(reference)
+
+
+def test_on_a_guide_at_rest_the_measures_are_those_of_the_stick_slip(tmp_path: Path) -> None:
+    position, velocity, _ = motion(BELT)
+    messages = [
+        (STATES, recorded(i), state(recorded(i), ["axis"], [1e-3 * BELT * i - x], [BELT - v]))
+        for i, (x, v) in enumerate(zip(position[:2000].tolist(), velocity.tolist(), strict=False))
+    ]
+    write_bag(tmp_path / "bag", messages)
+    report = report_of_recording(tmp_path / "bag")
+    assert report["regime"] == "stick_slip"
+    assert report["stick_fraction"] == pytest.approx(0.1001, abs=2e-3)
+    assert report["period"] == pytest.approx(0.0639242, rel=1e-4)
+    assert "advances at 40 mm/s on a guide at rest" in report["notes"][-1]
+
+
+def test_a_jump_from_which_the_joint_does_not_come_back_is_said(tmp_path: Path) -> None:
+    shifted = POSITION + 0.05 * (TIME >= 0.2)
+    messages = [
+        (STATES, recorded(i), state(recorded(i), ["axis"], [x], [0.0]))
+        for i, x in enumerate(shifted.tolist())
+    ]
+    write_bag(tmp_path / "bag", messages)
+    run = ss.read_bag(tmp_path / "bag")
+    assert "the position jumps by 50 mm, 0.2 s after the first sample" in run.report["notes"][0]
+    assert np.array_equal(run.samples.position, shifted)
+
+
+@st.composite
+def machines(draw: st.DrawFn) -> list[tuple[str, int, bytes]]:
+    """Messages of a driver with faults of its own."""
+    chance = draw(st.randoms(use_true_random=False))
+    faults = [fault for fault in range(6) if chance.random() < 0.3]
+    messages = []
+    for i in range(chance.choice([1, 5, 150, 700])):
+        log = recorded(i) + (chance.randrange(STEP) if 0 in faults else 0)
+        names = chance.choice([["axis"], ["axis"], ["belt", "axis"], []]) if 1 in faults else ["a"]
+        values = [
+            [chance.choice([0.01 * i, 1e160, np.nan, -5.0]) if 2 in faults else 0.01 * i]
+            * chance.choice([1, len(names), 0] if 3 in faults else [len(names)])
+            for _ in range(3)
+        ]
+        stamp = chance.choice([0, log // 10**9 * 10**9, log]) if 4 in faults else log
+        data = state(stamp, names, *values)
+        if 5 in faults:
+            place = chance.randrange(len(data))
+            data = data[:place] + bytes([chance.randrange(256)]) + data[place + 1 :]
+        messages.append((STATES, log, data))
+    return messages
+
+
+@examples(quick=15, thorough=500, deadline=None)
+@given(
+    messages=machines(),
+    layout=st.builds(
+        BagLayout,
+        joint=st.sampled_from([None, "axis"]),
+        belt_joint=st.sampled_from([None, "belt"]),
+        states_topic=st.sampled_from([STATES, f"{STATES}[2]"]),
+        time=st.sampled_from(["header", "log"]),
+        force=st.sampled_from(["topic", "effort"]),
+    ),
+)
+def test_any_joint_states_are_measured_or_refused(
+    tmp_path_factory: pytest.TempPathFactory, messages: list[Any], layout: BagLayout
+) -> None:
+    bag = tmp_path_factory.mktemp("machine") / "bag"
+    write_bag(bag, messages)
+    with suppress(InvalidInputError):
+        report = report_of_recording(bag, layout=layout, slips=SlipThreshold(1e-2))
+        assert report["samples"] <= len(messages)

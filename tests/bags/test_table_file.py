@@ -1,5 +1,6 @@
 """Tables of other machines as recordings: CSV and MAT files, and what is refused of them."""
 
+import tracemalloc
 from pathlib import Path
 from typing import Any
 
@@ -8,7 +9,8 @@ import pytest
 from scipy.io import savemat
 
 from stickslip_ros.bags.report import report_of_recording
-from stickslip_ros.bags.table_file import is_table, read_table
+from stickslip_ros.bags.table_columns import is_table
+from stickslip_ros.bags.table_file import read_table
 from stickslip_ros.errors import BagError, InvalidInputError
 from stickslip_ros.physics.measures.slips import SlipThreshold
 
@@ -48,14 +50,14 @@ def test_a_mat_file_gives_the_same_up_to_a_limit(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     most = 4 * len(TIME) + 1 + 9
-    monkeypatch.setattr("stickslip_ros.bags.table_file._MOST_NUMBERS", most)
+    monkeypatch.setattr("stickslip_ros.bags.table_columns._MOST_NUMBERS", most)
     path = tmp_path / "log.mat"
     table = {"t": TIME[:, None], "x": POSITION[None, :], "v": VELOCITY, "u": POSITION, "gain": 1e6}
     savemat(path, {**table, "name": "a machine", "other": np.eye(3)})
     recording = read_table(path, {**COLUMNS, "force": "u*gain*2.5"})
     assert recording.samples.position.tolist() == POSITION.tolist()
     assert recording.forces.force == pytest.approx(POSITION * 2.5e6, rel=1e-15)
-    monkeypatch.setattr("stickslip_ros.bags.table_file._MOST_NUMBERS", most - 1)
+    monkeypatch.setattr("stickslip_ros.bags.table_columns._MOST_NUMBERS", most - 1)
     with pytest.raises(BagError, match=f"it has more than {most - 1} numbers"):
         read_table(path, COLUMNS)
 
@@ -183,6 +185,19 @@ def stairs(rate: float, duration: float) -> tuple[Any, Any]:
     slipping = reach * np.cos(angle) + speed / frequency * np.sin(angle)
     behind = np.where(since < stick, speed * since - reach, slipping)
     return time, speed * time - behind
+
+
+def test_a_long_table_takes_little_more_memory_than_its_columns(tmp_path: Path) -> None:
+    rows = 200_000
+    path = tmp_path / "log.csv"
+    time = 1e-3 * np.arange(rows)
+    np.savetxt(path, np.column_stack([time, np.sin(time)]), "%.3f", ",", header="t,x", comments="")
+    tracemalloc.start()
+    recording = read_table(path, {"time": "t", "position": "x"})
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert len(recording.samples) == rows
+    assert peak < 8 * 10 * rows
 
 
 def test_a_table_on_a_guide_at_rest_has_the_measures_of_its_stick_slip(tmp_path: Path) -> None:

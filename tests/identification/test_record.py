@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from stickslip_ros.bags.table_file import Table
+from stickslip_ros.bags.table_columns import Table
 from stickslip_ros.bags.text_table import TableFormat
 from stickslip_ros.errors import BagError, InvalidInputError
 from stickslip_ros.identification import recordings as module
