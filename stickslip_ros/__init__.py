@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any  # what takes time comes second
 if TYPE_CHECKING:
     from stickslip_ros.api.friction_map import FrictionMap, friction_map
     from stickslip_ros.api.identification import Model, identify
+    from stickslip_ros.api.margin import Margin, margin
     from stickslip_ros.api.recordings import RecordedRun, read_bag, read_table
     from stickslip_ros.api.runs import Run, simulate
     from stickslip_ros.api.scenarios import scenario
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
 __all__ = [
     "Basin",
     "FrictionMap",
+    "Margin",
     "Model",
     "Proposal",
     "RecordedRun",
@@ -46,6 +48,7 @@ __all__ = [
     "design",
     "friction_map",
     "identify",
+    "margin",
     "read_bag",
     "read_table",
     "scenario",
@@ -57,6 +60,7 @@ __all__ = [
 _HOMES = {
     "api.friction_map": ("FrictionMap", "friction_map"),
     "api.identification": ("Model", "identify"),
+    "api.margin": ("Margin", "margin"),
     "api.recordings": ("RecordedRun", "read_bag", "read_table"),
     "api.runs": ("Run", "simulate"),
     "api.scenarios": ("scenario",),

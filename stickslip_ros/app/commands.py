@@ -18,6 +18,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "report": ("Analyze", "measure a recorded run, or compare several"),
     "repair": ("Analyze", "write a sound bag from one that is cut off or damaged"),
     "identify": ("Analyze", "fit a model with intervals to recordings of a machine"),
+    "margin": ("Analyze", "tell from runs that do not vibrate at which feed vibration starts"),
     "stability": ("Analyze", "compute equilibrium, critical speeds and gains, and limit cycles"),
     "design": ("Design", "propose controller gains that suppress the vibration"),
     "list": ("Scenarios", "list the scenarios, friction laws and control laws"),
@@ -42,6 +43,7 @@ EXAMPLES: dict[str, str] = {
     "repair": "stickslip repair bags/killed bags/sound",
     "identify": "stickslip identify log.mat --columns time=t,position=q,force=u*35.15 "
     "--out identified.yaml",
+    "margin": "stickslip margin bags/60 bags/55 bags/50 --plot margin.png",
     "stability": "stickslip stability feed_drive --plot map.png",
     "design": "stickslip design feed_drive --belt-speed 0.01:0.05 --out designed.yaml",
     "list": "stickslip list",

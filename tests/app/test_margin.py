@@ -1,0 +1,79 @@
+"""`stickslip margin` and `ss.margin`."""
+
+from pathlib import Path
+
+import pytest
+
+import stickslip_ros as ss
+from tests.app.conftest import Run
+
+HOPF = 0.0488763
+"""Of feed_drive, m/s."""
+
+
+def logged(folder: Path, feed: float) -> Path:
+    """Write a run of feed_drive with a tap of 30 um at 3 s, by an encoder of 0.5 um."""
+    drive = ss.scenario(
+        "feed_drive",
+        belt_speed=feed,
+        expects_control=False,
+        sensor_position_resolution=5e-7,
+        disturbance_kind="impulse",
+        disturbance_amplitude=300.0,
+        disturbance_start=3.0,
+    )
+    path = folder / f"{1e3 * feed:g}.csv"
+    ss.simulate(drive, duration=5.0).to_pandas().to_csv(path)
+    return path
+
+
+@pytest.fixture
+def logs(tmp_path: Path) -> list[str]:
+    return [str(logged(tmp_path, feed)) for feed in (0.052, 0.054, 0.056)]
+
+
+def test_safe_runs_tell_the_onset(logs: list[str], stickslip: Run, tmp_path: Path) -> None:
+    done = stickslip("margin", *logs, "--plot", "margin.png", "--html", "margin.html")
+    assert done.returncode == 0
+    assert "vibration starts at" in done.stdout
+    assert "the least feed with a margin of 0.1" in done.stdout
+    assert (tmp_path / "margin.png").stat().st_size > 1000
+    assert "vibration starts at" in (tmp_path / "margin.html").read_text(encoding="utf-8")
+    found = ss.margin(*logs, margin=0.2)
+    lower, upper = found.interval
+    assert lower is not None
+    assert upper is not None
+    assert lower < HOPF < upper
+    assert found.onset_speed == pytest.approx(HOPF, rel=0.03)
+    assert found.least_feed == pytest.approx(upper / 0.8)
+    assert stickslip.json("margin", *logs, "--margin", "0.2") == found.to_dict()
+    assert [*found.to_pandas()["decay_rate"]] == pytest.approx([2.84, 4.74, 6.72], rel=0.02)
+    assert "rad/s" in stickslip("margin", *logs, "--rotary").stdout
+
+
+def test_a_sentence_says_what_would_tell_it(logs: list[str], stickslip: Run) -> None:
+    done = stickslip("margin", logs[0])
+    assert done.returncode == 0
+    assert "the onset of vibration cannot be told" in done.stdout
+    assert "a run at another feed" in done.stdout
+    assert "no family" not in done.stdout
+    done = stickslip("margin", logs[0], "--belt-speed", "0")
+    assert "the belt is at rest" in done.stdout
+    done = stickslip("margin", logs[0], "--belt-speed", "0", "--plot", "x.png")
+    assert done.returncode == 2
+    assert "there is no decay to draw" in done.stderr
+    assert "at least 0 and below 1" in stickslip("margin", logs[0], "--margin", "1").stderr
+
+
+def test_both_directions_are_refused(logs: list[str], stickslip: Run, tmp_path: Path) -> None:
+    drive = ss.scenario("feed_drive", belt_speed=-0.05, expects_control=False)
+    back = tmp_path / "back.csv"
+    ss.simulate(drive, duration=2.0).to_pandas().to_csv(back)
+    assert "both directions" in stickslip("margin", logs[0], str(back)).stderr
+
+
+def test_a_machine_that_vibrates_gives_no_number(stickslip: Run) -> None:
+    reference = Path(__file__).parents[2] / "bags" / "reference"
+    done = stickslip("margin", str(reference), "--to", "4.9")
+    assert done.returncode == 0
+    assert "vibrates already" in done.stdout

@@ -1,0 +1,118 @@
+"""The onset of vibration from decay rates: against the Hopf points of the theory."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from stickslip_ros.physics.measures.onset import mean_decays, onset_of
+from stickslip_ros.physics.measures.ring_down import RingDown
+from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.model.friction import Exponential, FrictionLaw, LuGre, Stribeck
+from stickslip_ros.physics.theory.hopf import hopf_points
+from stickslip_ros.physics.theory.linear import expand
+
+LAWS: dict[str, FrictionLaw] = {
+    "stribeck": Stribeck(0.31, 0.22, 0.043),
+    "exponential, exponent 1": Exponential(0.33, 0.21, 0.021),
+    "exponential, exponent 2": Exponential(0.3, 0.24, 0.034, 0.0, 2.0),
+    "lugre": LuGre(Exponential(0.33, 0.21, 0.021), bristle_stiffness=30_000.0),
+}
+
+
+def drive_with(friction: FrictionLaw) -> Drive:
+    return Drive(
+        mass=83.0,
+        damping=410.0,
+        stiffness=7.3e5,
+        normal_force=900.0,
+        belt_speed=0.05,
+        friction=friction,
+    )
+
+
+def decaying(
+    drive: Drive, ratios: tuple[float, ...], share: float = 0.005, seed: int = 0
+) -> tuple[list[RingDown], float]:
+    """Return five ring-downs at each feed, with an error that is a share, and the Hopf speed."""
+    hopf = max(point.belt_speed for point in hopf_points(drive))
+    random = np.random.default_rng(seed)
+    found: list[RingDown] = []
+    for speed in (ratio * hopf for ratio in ratios):
+        expansion = expand(replace(drive, belt_speed=speed))
+        assert expansion is not None
+        pair = expansion.eigenvalues[expansion.eigenvalues.imag > 0.0][0] * drive.angular_frequency
+        rate, frequency = -pair.real, pair.imag / (2.0 * np.pi)
+        for _ in range(5):
+            own = rate * (1.0 + share * random.standard_normal())
+            found.append(RingDown(0.0, 1.0, speed, own, share * rate, frequency, 1e-3, 1e-5))
+    return found, hopf
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_the_interval_contains_the_hopf_speed(name: str) -> None:
+    for seed in range(10):
+        own, hopf = decaying(drive_with(LAWS[name]), (1.2, 1.3, 1.4, 1.5), seed=seed)
+        onset = onset_of(own)
+        assert onset.onset_speed is not None
+        assert onset.lower is not None
+        assert onset.upper is not None
+        assert onset.lower <= hopf <= onset.upper
+        assert onset.lower <= onset.onset_speed <= onset.upper
+        assert name == "lugre" or not onset.families[name].rejected
+        assert onset.onset_speed == pytest.approx(hopf, rel=0.06)
+        assert onset.least_feed(0.2) == pytest.approx(onset.upper / 0.8)
+
+
+def test_a_family_that_fits_gives_the_decay_at_any_feed() -> None:
+    own, hopf = decaying(drive_with(LAWS["stribeck"]), (1.1, 1.2, 1.4), share=1e-6)
+    family = onset_of(own).families["stribeck"]
+    assert family.onset_speed == pytest.approx(hopf, rel=2e-3)
+    rates = family.decay_rate(np.array([each.belt_speed for each in own]))
+    assert rates == pytest.approx([each.decay_rate for each in own], rel=2e-2)
+
+
+def test_families_that_do_not_fit_are_rejected() -> None:
+    own, _ = decaying(drive_with(LAWS["exponential, exponent 1"]), (1.05, 1.2, 1.5, 1.9))
+    onset = onset_of(own)
+    assert {name for name, each in onset.families.items() if each.rejected} >= {"stribeck"}
+    rates = [1.0, 3.0, 0.5, 4.0]
+    mixed = [
+        RingDown(0.0, 1.0, speed, rate, 0.01, 16.0, 1e-3, 1e-5)
+        for speed, rate in zip((0.04, 0.05, 0.06, 0.07), rates, strict=True)
+    ]
+    onset = onset_of(mixed)
+    assert onset.onset_speed is None
+    assert "no family of friction fits" in onset.advice[0]
+
+
+def test_what_tells_nothing_gives_a_sentence() -> None:
+    own, hopf = decaying(drive_with(LAWS["stribeck"]), (1.2,))
+    assert "no ring-down decays" in onset_of([]).advice[0]
+    onset = onset_of(own)
+    assert onset.upper is None
+    assert "all ring-downs are at" in onset.advice[0]
+    same = [*own, *(replace(each, belt_speed=1.3 * hopf) for each in own)]
+    assert "does not rise with the feed" in onset_of(same).advice[0]
+    assert "rad/s" in onset_of(own, "rad").advice[0]
+
+
+def test_far_from_the_onset_only_an_upper_limit_is_told() -> None:
+    own, hopf = decaying(drive_with(LAWS["exponential, exponent 1"]), (1.6, 1.8, 2.0), share=0.02)
+    onset = onset_of(own)
+    assert onset.onset_speed is None
+    assert onset.upper is not None
+    assert onset.upper > hopf
+    assert "only an upper limit" in onset.advice[0]
+    assert "a run at" in onset.advice[0] or "taps at" in onset.advice[0]
+
+
+def test_errors_that_are_common_to_equal_taps_are_not_averaged_out() -> None:
+    equal = [RingDown(0.0, 1.0, 0.05, 2.0, 0.1, 16.0, 1e-3, 1e-5)] * 10
+    (mean,) = mean_decays(equal)
+    assert mean.decay_error == pytest.approx(0.1)
+    random = np.random.default_rng(1)
+    scattered = [replace(each, decay_rate=2.0 + 0.1 * random.standard_normal()) for each in equal]
+    (mean,) = mean_decays(scattered)
+    assert 0.02 < mean.decay_error < 0.08
+    assert mean.ring_downs == 10
