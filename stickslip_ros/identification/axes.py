@@ -86,7 +86,7 @@ class AxisTask:
         found: list[Candidate] = []
         self.limit.begin_stage(_CANDIDATES_TIME)
         for each in laws:
-            if each.memory:
+            if each.memory or not each.of_slip:
                 continue
             if found and self.limit.is_over:
                 self.left.append(each.name)

@@ -121,7 +121,11 @@ def identify(
     _check_records(records)
     moving = any(record.belt_velocity.any() for record in records)
     spring = fixed["stiffness"] > 0.0 if "stiffness" in fixed else moving
-    if not spring and law not in (AUTO, *AXIS_LAWS) and any(own.memory for own in laws):
+    if (
+        not spring
+        and law not in (AUTO, *AXIS_LAWS)
+        and any(own.memory or not own.of_slip for own in laws)
+    ):
         raise InvalidInputError(
             f"law {law} is refused for a drive without a spring: must be one of {AUTO}, "
             f"{', '.join(AXIS_LAWS)}"

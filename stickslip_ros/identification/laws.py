@@ -39,6 +39,8 @@ _LEAST_FRICTION = 0.01
 _RISE_SHARE = 0.3
 """Rise of static friction from which the search starts, as a share of the kinetic one: bristles
 may hide it."""
+_RISE_SHARES = (0.05, 0.2, 0.5)
+"""Rises of static friction from which a law with stiction is searched, as shares of it."""
 _STIFFNESS_RATIOS = (10.0, 100.0)
 """Stiffnesses of bristles from which the search starts, in stiffnesses of the spring."""
 _DAMPING_RATIO = 0.03
@@ -85,6 +87,8 @@ class IdentifiedLaw(ABC):
     """Coordinate of the smallest friction."""
     memory: Sequence[str] = ()
     """Coordinates of the memory of the law."""
+    of_slip: bool = True
+    """Whether friction in slip tells all constants."""
     by_differences: Sequence[str] = ()
     """Coordinates on which the motion depends other than by its equations."""
     straightened: Mapping[str, tuple[float, float] | None] = {}
@@ -234,6 +238,28 @@ class CoulombAdapter(IdentifiedLaw):
     @override
     def coordinates_of(self, forces: Sequence[float], shape: float) -> dict[str, float]:
         return dict(zip(self.coordinates, forces, strict=False))
+
+
+class StictionAdapter(CoulombAdapter):
+    """Coulomb friction with stiction, of which slip tells the kinetic friction only."""
+
+    name = "stiction"
+    coordinates: Sequence[str] = ("kinetic", "rise", "viscous")
+    smallest = "kinetic"
+    of_slip = False
+
+    @override
+    def coordinates_of(self, forces: Sequence[float], shape: float) -> dict[str, float]:
+        kinetic, viscous = forces
+        return {"kinetic": kinetic, "rise": 0.0, "viscous": viscous}
+
+    @override
+    def starts(self, values: Values, fastest: float) -> Sequence[Values]:
+        static = self.static_force(values)
+        return [
+            {**values, "kinetic": (1.0 - share) * static, "rise": share * static}
+            for share in _RISE_SHARES
+        ]
 
 
 class DahlAdapter(CoulombAdapter):
@@ -600,8 +626,13 @@ def _sag(decay: float, middle: float, fastest: float) -> float:
     return chord - exp(-middle / decay)
 
 
-COULOMB, STRIBECK, EXPONENTIAL = CoulombAdapter(), StribeckAdapter(), ExponentialAdapter()
-STATIC_LAWS: Sequence[IdentifiedLaw] = (COULOMB, STRIBECK, EXPONENTIAL)
+EXPONENTIAL = ExponentialAdapter()
+STATIC_LAWS: Sequence[IdentifiedLaw] = (
+    CoulombAdapter(),
+    StictionAdapter(),
+    StribeckAdapter(),
+    EXPONENTIAL,
+)
 """Laws without a memory that compete, the simpler ones first."""
 LUGRE = BristleAdapter("lugre", ("bristle_stiffness", "bristle_damping"))
 DAHL = DahlAdapter()

@@ -8,7 +8,7 @@ from stickslip_ros.scenarios.signal_parameters import ReferenceParameters
 from stickslip_ros.scenarios.template import commented_file
 from tests.scenarios.files import refusal, scenario_file, section
 
-VISCOUS = "by the law stribeck; laws that use it: coulomb, exponential"
+VISCOUS = "by the law stribeck; laws that use it: coulomb, exponential, stiction"
 KINDS = "by the kind none; kinds that use it: "
 CASES = {
     "plant.friction.viscous=5": VISCOUS,

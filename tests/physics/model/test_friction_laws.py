@@ -25,6 +25,7 @@ from stickslip_ros.physics.model.friction import (
     FrictionLaw,
     Linear,
     RateState,
+    Stiction,
     Stribeck,
     Table,
 )
@@ -123,6 +124,7 @@ def compiled(law: FrictionLaw) -> Any:
         (replace(GAUSSIAN, exponent=1.5), -2.0, 0.25 + 0.15 * exp(-8.0) + 0.2),
         (Coulomb(0.4, 0.1), 2.0, -0.6),
         (Coulomb(0.4, 0.1), -2.0, 0.6),
+        (Stiction(0.4, 0.3, 0.1), -2.0, 0.5),
         (Dahl(0.4, 20.0), -0.3, 0.4),
     ],
 )
@@ -165,7 +167,9 @@ def test_friction_starts_at_its_limits_and_is_odd_where_they_are_equal(
     law = data.draw(laws(kind))
     forward, backward = law.limits
     assert min(forward, backward) >= 0.0
-    if law.sticks:
+    if isinstance(law, Stiction):
+        assert law.coefficient(0.0, -1.0) == law.kinetic <= backward == law.static
+    elif law.sticks:
         assert law.coefficient(0.0, 1.0) == pytest.approx(-forward, rel=1e-14, abs=1e-14)
         assert law.coefficient(0.0, -1.0) == pytest.approx(backward, rel=1e-14, abs=1e-14)
     if forward == backward and (law.sticks or speed * sign > 0.0):

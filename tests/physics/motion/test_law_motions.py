@@ -5,15 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import (
     Coulomb,
     Exponential,
     FrictionLaw,
     Linear,
+    Stiction,
     Stribeck,
     Table,
 )
-from stickslip_ros.physics.motion import RecordedMotion
+from stickslip_ros.physics.motion import Motion, RecordedMotion
 from tests.physics.drives import PAPER
 from tests.physics.motion import dop853
 from tests.physics.motion.dop853 import Dop853Drive, Signal
@@ -70,3 +72,20 @@ def test_without_friction_it_passes_the_speed_of_the_belt_unmoved(
     motion.advance(20.0)
     found = motion.position, motion.velocity
     assert found == pytest.approx((np.cos(20.0), -np.sin(20.0)), rel=1e-12)
+
+
+def test_stick_slip_with_stiction_in_closed_form() -> None:
+    """A sine about the kinetic deflection between sticks up to the static one."""
+    drive = Drive(10.0, 0.0, 4000.0, 98.1, 0.01, Stiction(static=0.3, kinetic=0.2))
+    rate, drop = np.sqrt(4000.0 / 10.0), 0.1 * 98.1 / 4000.0
+    slip = (2.0 * np.pi - 2.0 * np.arctan(drop * rate / 0.01)) / rate
+    motion = Motion(drive, 0.3 * 98.1 / 4000.0 - 1e-4, 0.01)
+    for cycle in range(3):
+        motion.advance(slip + (0.11 if cycle == 0 else 2.0 * drop / 0.01))
+        assert motion.sticking
+        assert motion.position == pytest.approx(0.1 * 98.1 / 4000.0 + 0.1 * 0.01, rel=1e-11)
+    turning = RecordedMotion(drive, motion.position, 0.01)
+    turning.advance(2.0)
+    positions = turning.take_breakpoints().position
+    amplitude = np.hypot(drop, 0.01 / rate)
+    assert np.ptp(positions) == pytest.approx(2.0 * amplitude, rel=1e-11)

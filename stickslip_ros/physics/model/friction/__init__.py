@@ -15,6 +15,7 @@ from stickslip_ros.physics.model.friction.maxwell_slip import MaxwellSlip
 from stickslip_ros.physics.model.friction.observer import FrictionObserver
 from stickslip_ros.physics.model.friction.polynomials import Coulomb, Linear, Stribeck
 from stickslip_ros.physics.model.friction.rate_state import RateState
+from stickslip_ros.physics.model.friction.stiction import Stiction
 from stickslip_ros.physics.model.friction.table import Table
 
 LAWS: dict[str, type[FrictionLaw]] = {
@@ -24,6 +25,7 @@ LAWS: dict[str, type[FrictionLaw]] = {
         Coulomb,
         Linear,
         Exponential,
+        Stiction,
         Table,
         Dahl,
         LuGre,
@@ -55,6 +57,7 @@ __all__ = [
     "RateState",
     "SteadyFriction",
     "SteadyPart",
+    "Stiction",
     "Stribeck",
     "Table",
 ]
