@@ -1,7 +1,7 @@
 """Samples of the motion and of forces, one by one and as columns; SI units."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -121,6 +121,20 @@ class SampleColumns(Table):
     """Displacement of the belt, m."""
     belt_velocity: FloatArray
     """Velocity of the belt, m/s."""
+    motor_position: FloatArray = field(default_factory=lambda: np.empty(0))
+    """Displacement of the motor, m; NaN without one of finite mass."""
+    motor_velocity: FloatArray = field(default_factory=lambda: np.empty(0))
+    """Velocity of the motor, m/s; NaN without one of finite mass."""
+
+    def __post_init__(self) -> None:
+        for name in ("motor_position", "motor_velocity"):
+            if len(getattr(self, name)) != len(self.stamp):
+                object.__setattr__(self, name, np.full(len(self.stamp), np.nan))
+
+    @property
+    def has_motor(self) -> bool:
+        """Whether a motor is among the samples."""
+        return bool(np.isfinite(self.motor_position).any())
 
     @classmethod
     def from_samples(cls, samples: Sequence[Sample]) -> Self:
@@ -137,7 +151,9 @@ class SampleColumns(Table):
             Their columns.
         """
         stamp = np.array([sample.stamp for sample in samples], np.int64)
-        others = np.array([sample[1:6] for sample in samples]).reshape(-1, 5)
+        none = np.nan, np.nan
+        rows = [(*sample[1:6], *(sample.motor or none)) for sample in samples]
+        others = np.array(rows).reshape(-1, 7)
         return cls(stamp, *others.T.copy())
 
     @property

@@ -10,7 +10,7 @@ from typing_extensions import override
 from stickslip_ros.api.results import Parts, Summary, Table, TabularResult, attributes
 from stickslip_ros.api.scenarios import ScenarioLike, as_scenario
 from stickslip_ros.physics.loop.trajectory import (
-    MeasuredTrajectory,
+    MeasuredMotorTrajectory,
     SampleRecorder,
     Trajectory,
     TrajectoryRecorder,
@@ -69,7 +69,7 @@ class Run(TabularResult):
     def _table(self) -> Table:
         columns = vars(self.trajectory)
         time = {"time": self.trajectory.time}
-        quantities, source = quantities_of(MeasuredTrajectory), attributes(self.scenario)
+        quantities, source = quantities_of(MeasuredMotorTrajectory), attributes(self.scenario)
         return Table(columns, quantities, self._units, time, source, "time")
 
     @property
@@ -140,7 +140,10 @@ def simulate(
     chosen = as_scenario(scenario)
     given = simulation.default_duration(chosen) if duration is None else duration
     length = number_of("duration", given, "s")
-    recorder = TrajectoryRecorder(chosen.plant.rate, measured=not chosen.plant.sensor.exact)
+    plant = chosen.plant
+    recorder = TrajectoryRecorder(
+        plant.rate, measured=not plant.exactly_measured, motor=plant.motor.kind == "mass"
+    )
     return measured_run(chosen, length, continuous=continuous, recorder=recorder, progress=progress)
 
 

@@ -119,14 +119,15 @@ def _recorder(
         return
     rate = scenario.plant.rate
     every = _samples(arguments.every, rate)
-    measured = not scenario.plant.sensor.exact
+    plant = scenario.plant
+    measured, motor = not plant.exactly_measured, plant.motor.kind == "mass"
     if out.suffix.lower() != ".csv":
         raise InvalidInputError(f"--out {out}: must end in .csv")
     check_new("--out", out)
     from stickslip_ros.studies.simulate import TrajectoryFile
 
     with writing("--out", out), written(out) as stream:
-        yield TrajectoryFile(stream, rate, every, measured=measured)
+        yield TrajectoryFile(stream, rate, every, measured=measured, motor=motor)
 
 
 def _samples(interval: float | None, rate: float) -> int:

@@ -184,7 +184,7 @@ class MotionReader:
         if self._layout_of is None:
             self._choose(messages)
         layout_of = self._layout_of or joint_state_layout
-        rows, stamp, values, refused = decode(*messages, layout_of, 5)
+        rows, stamp, values, refused = decode(*messages, layout_of, 7)
         if log_time is not None:
             if len(rows) and self.clock_offset is None:
                 self.clock_offset = int(log_time[rows[0]] - stamp[0])

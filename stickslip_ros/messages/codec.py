@@ -14,11 +14,19 @@ from math import isnan
 from stickslip_ros.arrays import IntArray
 from stickslip_ros.errors import BagError, MessageError
 from stickslip_ros.messages.cdr import LITTLE_ENDIAN, Decoder, Layout, Refused, decode, joined
-from stickslip_ros.samples import ForceColumns, Reference, ReferenceColumns, Sample, SampleColumns
+from stickslip_ros.samples import (
+    ForceColumns,
+    MotorSample,
+    Reference,
+    ReferenceColumns,
+    Sample,
+    SampleColumns,
+)
 from stickslip_ros.stamps import NANOSECONDS
 
 SLIDE = "slide"
 BELT = "belt"
+MOTOR = "motor"
 
 FORCE_TYPES = (
     "geometry_msgs/msg/WrenchStamped",
@@ -39,6 +47,16 @@ def _name(name: str) -> bytes:
     return struct.pack("<I", len(name) + 1) + name.encode() + b"\x00"
 
 
+def _joint_state_structure(*names: str) -> tuple[struct.Struct, bytes]:
+    """Return the structure of a joint state, and the bytes that name its joints."""
+    joints, count = b"", len(names)
+    for part in (_name(""), struct.pack("<I", count), *map(_name, names), b""):
+        joints += bytes(-len(joints) % 4) + part
+    padding = (4 - len(joints)) % 8
+    values = f"{count}d I4x{count}d I4x{count}d"
+    return struct.Struct(f"<4s iI {len(joints)}s I{padding}x{values}"), joints
+
+
 _JOINT_STATE = struct.Struct("<4s iI 5s3x 14s2x 9s3x I2d I4x2d I4x2d")
 _JOINT_STATE_FRAME = _name("")
 _JOINT_STATE_SLIDE = struct.pack("<I", 2) + _name(SLIDE)
@@ -46,6 +64,7 @@ _JOINT_STATE_BELT = _name(BELT)
 _REFERENCE_JOINT = _JOINT_STATE_FRAME + bytes(3) + struct.pack("<I", 1) + _name(SLIDE) + bytes(2)
 _JOINTS = (_JOINT_STATE_FRAME, _JOINT_STATE_SLIDE, _JOINT_STATE_BELT)
 _JOINT_STATE_CONSTANTS = (LITTLE_ENDIAN, *_JOINTS, 2, 2, 2)
+_MOTOR_STATE, _MOTOR_JOINTS = _joint_state_structure(SLIDE, BELT, MOTOR)
 # The components of the wrench other than force.x are zero when packed and skipped when unpacked.
 _WRENCH = struct.Struct("<4s iI 10s6x d40x")
 _WRENCH_FRAME = _name(SLIDE)
@@ -68,13 +87,9 @@ def pack_joint_state(
     return _pack_joint_state(_JOINT_STATE, _JOINTS, stamp, position, velocity, effort)
 
 
-def joint_state_packer(slide: str, belt: str) -> Callable[..., bytes]:
-    """Return `pack_joint_state` for other names of the joints."""
-    joints = b""
-    for part in (_name(""), struct.pack("<I", 2), _name(slide), _name(belt), b""):
-        joints += bytes(-len(joints) % 4) + part
-    padding = (4 - len(joints)) % 8
-    layout = struct.Struct(f"<4s iI {len(joints)}s I{padding}x2d I4x2d I4x2d")
+def joint_state_packer(*names: str) -> Callable[..., bytes]:
+    """Return `pack_joint_state` for joints of other names, or more of them."""
+    layout, joints = _joint_state_structure(*names)
     return partial(_pack_joint_state, layout, (joints,))
 
 
@@ -82,21 +97,22 @@ def _pack_joint_state(
     layout: struct.Struct,
     joints: tuple[bytes, ...],
     stamp: int,
-    position: tuple[float, float],
-    velocity: tuple[float, float],
-    effort: tuple[float, float],
+    position: tuple[float, ...],
+    velocity: tuple[float, ...],
+    effort: tuple[float, ...],
 ) -> bytes:
+    count = len(position)
     try:
         return layout.pack(
             LITTLE_ENDIAN,
             stamp // NANOSECONDS,
             stamp % NANOSECONDS,
             *joints,
-            2,
+            count,
             *position,
-            2,
+            count,
             *velocity,
-            2,
+            count,
             *effort,
         )
     except struct.error as error:
@@ -145,7 +161,7 @@ def pack_header(stamp: int) -> bytes:
 
 
 def unpack_joint_state(data: bytes) -> Sample:
-    """Read slide and belt from a serialized sensor_msgs/msg/JointState.
+    """Read slide and belt, and a motor if there is one, from a serialized JointState.
 
     Any frame, byte order and order of the joints is accepted, and so are further joints. Raises
     MessageError for other bytes, and if a joint, its position or its velocity is missing.
@@ -172,8 +188,17 @@ def unpack_joint_state(data: bytes) -> Sample:
         if constants == _JOINT_STATE_CONSTANTS:
             stamp = sec * NANOSECONDS + nanosec
             return Sample(stamp, position, velocity, effort, belt_position, belt_velocity)
+    if len(data) == _MOTOR_STATE.size:
+        encapsulation, sec, nanosec, joints, count, *values = _MOTOR_STATE.unpack(data)
+        constants = encapsulation, joints, count, values[3], values[7]
+        if constants == (LITTLE_ENDIAN, _MOTOR_JOINTS, 3, 3, 3):
+            x, belt, motor, _, v, belt_v, motor_v, _, effort, *_ = values
+            stamp = sec * NANOSECONDS + nanosec
+            return Sample(stamp, x, v, effort, belt, belt_v, MotorSample(motor, motor_v))
     stamp, values = joint_state_layout(data).read(data)
-    return Sample(stamp, *values)
+    x, v, effort, belt, belt_v, *motor = values
+    told = None if isnan(motor[0]) else MotorSample(*motor)
+    return Sample(stamp, x, v, effort, belt, belt_v, told)
 
 
 def unpack_reference(data: bytes) -> tuple[int, Reference]:
@@ -230,7 +255,7 @@ def joint_state_columns(messages: Sequence[bytes]) -> tuple[SampleColumns, Refus
 
 def joint_states_in(data: bytes, begin: IntArray, end: IntArray) -> tuple[SampleColumns, Refused]:
     """Decode the serialized joint states `data[begin[i] : end[i]]`, as `joint_state_columns`."""
-    _, stamp, values, refused = decode(data, begin, end, joint_state_layout, 5)
+    _, stamp, values, refused = decode(data, begin, end, joint_state_layout, 7)
     return SampleColumns(stamp, *values), refused
 
 
@@ -294,6 +319,7 @@ def joint_state_layout(data: bytes) -> Layout:
             f"velocities and {efforts} efforts; must be one for each joint, or no efforts"
         )
     slide, belt = 8 * names.index(SLIDE), 8 * names.index(BELT)
+    motor = 8 * names.index(MOTOR) if MOTOR in names else None
     return Layout(
         message,
         stamp,
@@ -303,6 +329,7 @@ def joint_state_layout(data: bytes) -> Layout:
             effort + slide if efforts else None,
             position + belt,
             velocity + belt,
+            *(None if motor is None else each + motor for each in (position, velocity)),
         ],
     )
 
@@ -335,7 +362,8 @@ def joint_layout(data: bytes, joint: str, belt: str | None) -> Layout:
         return start + 8 * names.index(name) if count and name in names else None
 
     own = [place(each, joint) for each in sequences]
-    return Layout(message, stamp, [*own, *(place(each, belt) for each in sequences[:2])])
+    belts = [place(each, belt) for each in sequences[:2]]
+    return Layout(message, stamp, [*own, *belts, None, None])
 
 
 def _reference_layout(data: bytes) -> Layout:

@@ -13,6 +13,7 @@ from std_srvs.srv import Trigger
 
 from stickslip_ros.errors import InvalidInputError, MessageError
 from stickslip_ros.messages.codec import (
+    MOTOR,
     joint_state_packer,
     pack_wrench,
     unpack_command,
@@ -80,7 +81,9 @@ class PlantNode(ManagedNode[PlantParameters]):
         self._answerable = 0
         """Stamp of the sample that may still be answered while the plant pauses, ns."""
         self._clock_time = self.advertise(CLOCK) if self.parameters.publish_clock else None
-        self._pack = joint_state_packer(self.parameters.slide_name, self.parameters.belt_name)
+        own = self.parameters.slide_name, self.parameters.belt_name
+        self._pack = joint_state_packer(*own)
+        self._pack_motor = joint_state_packer(*own, MOTOR)
         self.subscribe_serialized(CONTROL_FORCE, partial(self._on_force, unpack_wrench))
         unpack = partial(unpack_command, joint=self.parameters.slide_name)
         self.subscribe_serialized(JOINT_COMMANDS, partial(self._on_force, unpack))
@@ -213,11 +216,16 @@ class PlantNode(ManagedNode[PlantParameters]):
     def _packed(self, sample: Sample) -> bytes:
         friction = sample.friction_force
         by_actuator = self.parameters.effort == "actuator"
-        return self._pack(
+        positions = sample.position, sample.belt_position
+        velocities = sample.velocity, sample.belt_velocity
+        efforts = (self._loop.applied_force if by_actuator else friction), -friction
+        if (motor := sample.motor) is None:
+            return self._pack(sample.stamp, positions, velocities, efforts)
+        return self._pack_motor(
             sample.stamp,
-            (sample.position, sample.belt_position),
-            (sample.velocity, sample.belt_velocity),
-            (self._loop.applied_force if by_actuator else friction, -friction),
+            (*positions, motor.position),
+            (*velocities, motor.velocity),
+            (*efforts, self._loop.applied_force),
         )
 
     def _end(self) -> None:

@@ -22,6 +22,7 @@ from stickslip_ros.physics.model.constants import (
     constants_of,
 )
 from stickslip_ros.physics.model.control import CONTROL_LAWS, ControlLaw
+from stickslip_ros.physics.model.control.base import seen_by
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import (
     LAWS,
@@ -211,7 +212,8 @@ def try_control_law(law: ControlLaw, *, symbols: bool = False) -> None:
     if linear is not None:
         n, shapes = len(linear.state), [np.shape(each) for each in linear]
         _must(
-            shapes == [(n, n), (n, 2), (n,), (2,)] and all(np.isfinite(x).all() for x in linear),
+            shapes in ([(n, n), (n, m), (n,), (m,)] for m in (2, 4))
+            and all(np.isfinite(x).all() for x in linear),
             f"its linear_feedback has the shapes {shapes}, which must be (n, n), (n, 2), (n,) and "
             "(2,), of finite numbers",
         )
@@ -221,11 +223,12 @@ def try_control_law(law: ControlLaw, *, symbols: bool = False) -> None:
 
     def equations(part: Any, values: Sequence[Any]) -> Iterable[Any]:
         x, y, *own = values
-        return *part.state_rates(x, y, own), part.control_force(x, y, own)
+        seen = seen_by(part, x, y, ())
+        return *part.state_rates(*seen, own), part.control_force(*seen, own)
 
     points: list[Sequence[float]] = []
     for x, y in ((0.1, 0.2), (-0.3, 0.4)):
-        states = _finite("rest", control.rest(x, y), control.states)
+        states = _finite("rest", control.rest(*seen_by(control, x, y, ())), control.states)
         points.append((x, y, *(0.05 + state for state in states)))
     for part in (control, control.silenced(), control.scaled(_DRIVE)):
         _finite("continuous form", equations(part, points[0]), (*control.states, "force"))

@@ -31,6 +31,7 @@ from stickslip_ros.physics.model.constants import (
 )
 from stickslip_ros.physics.model.control import CONTROL_LAWS, ControlLaw
 from stickslip_ros.physics.model.drive import Drive, DriveConstants
+from stickslip_ros.physics.model.motor import Motor
 from stickslip_ros.physics.model.sensor import EXACT_SENSOR, Sensor
 from stickslip_ros.scenarios import Pace
 from stickslip_ros.scenarios.curve_file import Pairs
@@ -60,6 +61,37 @@ class Initial(ParameterGroup):
 
     position: float = constant(0.0, "Initial displacement of the slide.", "m")
     velocity: float = constant(0.0, "Initial velocity of the slide.", "m/s")
+
+
+@dataclass(frozen=True)
+class _MotorKind(ParameterGroup):
+    kind: Literal["ideal", "mass"] = at_build(
+        "ideal",
+        "Motor behind the screw: it moves exactly at the feed and its force acts on the slide "
+        "(ideal), or it is a body of its own (mass).",
+        choices=("ideal", "mass"),
+    )
+
+
+@dataclass(frozen=True)
+class MotorParameters(Motor, _MotorKind):
+    """The motor behind the screw, and its encoder."""
+
+    sensor: Sensor = EXACT_SENSOR
+
+    @override
+    def not_used(self) -> Iterator[tuple[str, str]]:
+        if self.kind == "ideal":
+            yield from ((name, "by the kind ideal; mass uses it") for name in self.known)
+        elif not self.sensor.spans:
+            yield "sensor.difference_samples", "by the velocity exact; difference uses it"
+
+    @property
+    def selected(self) -> Motor | None:
+        """The motor; None if it is ideal."""
+        if self.kind == "ideal":
+            return None
+        return Motor(**{name: getattr(self, name) for name in constants_of(Motor)})
 
 
 @dataclass(frozen=True)
@@ -169,6 +201,7 @@ class PlantParameters(DriveConstants, NodeParameters):
     disturbance: DisturbanceParameters = field(default_factory=DisturbanceParameters)
     sensor: Sensor = EXACT_SENSOR
     actuator: Actuator = IDEAL_ACTUATOR
+    motor: MotorParameters = field(default_factory=MotorParameters)
     publish_truth: bool = at_build(
         False, "Publish the true state and the force of the actuator, too."
     )
@@ -190,6 +223,10 @@ class PlantParameters(DriveConstants, NodeParameters):
             raise ValueError(
                 f"rate = {self.rate} Hz must be at least a thousandth of the natural frequency, "
                 f"{natural:g} Hz with mass = {self.mass} kg and stiffness = {self.stiffness} N/m"
+            )
+        if self.motor.kind == "mass" and self.stiffness == 0.0:
+            raise ValueError(
+                "stiffness = 0.0 N/m is invalid: must be above 0 N/m with motor.kind = mass"
             )
         if self.normal_force + lowest < 0.0:  # the slide is lifted off the belt
             load = "file" if self.load.kind == "table" else "amplitude"
@@ -219,6 +256,11 @@ class PlantParameters(DriveConstants, NodeParameters):
         samples = self.duration * self.rate
         return None if isinf(samples) else round(samples)
 
+    @property
+    def exactly_measured(self) -> bool:
+        """Whether the samples are the true motion, of the slide and of a motor."""
+        return self.sensor.exact and (self.motor.kind == "ideal" or self.motor.sensor.exact)
+
     def as_drive(self) -> Drive:
         """Return the drive."""
         return Drive(
@@ -227,6 +269,7 @@ class PlantParameters(DriveConstants, NodeParameters):
             belt=self.belt.signal(self.period),
             load=self.load.signal(self.period),
             actuator=self.actuator,
+            motor=self.motor.selected,
         )
 
     def drive_names(self) -> list[str]:
@@ -239,6 +282,8 @@ class PlantParameters(DriveConstants, NodeParameters):
             for name, described in constants_of(DriveConstants).items()
             if not (described.simplifies and getattr(self, name) == described.default)
         ]
+        if self.motor.kind == "mass":
+            own += ["motor.kind", "motor.mass", "motor.damping", "motor.friction"]
         return [*own, "friction.law", *(f"friction.{name}" for name in self.friction.names())]
 
     def as_loop(
@@ -263,6 +308,7 @@ class PlantParameters(DriveConstants, NodeParameters):
             expects_control=self.expects_control,
             disturbance=self.disturbance.signal(self.period),
             sensor=self.sensor,
+            motor_sensor=self.motor.sensor,
             overtaken=overtaken,
             advance=advance,
         )

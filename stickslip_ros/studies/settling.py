@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from math import inf
+from operator import attrgetter
 from typing import Any, NamedTuple, Self
 
 import numpy as np
@@ -49,6 +50,8 @@ class MotionState:
     """State of the control law; None: its initial state."""
     memory: tuple[float, ...] | None = None
     """Memory of the friction law; None: its initial memory."""
+    motor: tuple[float, ...] | None = None
+    """Displacement, m, and velocity, m/s, of a motor; None: at rest at the reference."""
 
     @classmethod
     def from_json(cls, values: Sequence[Any]) -> Self:
@@ -82,6 +85,7 @@ class ControlledDrive:
         """
         plant = scenario.plant
         law = scenario.control_law
+        check_motor(scenario)
         if continuous:
             check_continuous(scenario)
         drive = plant.as_drive()
@@ -131,6 +135,16 @@ def check_reference(scenario: Scenario) -> None:
         )
 
 
+def check_motor(scenario: Scenario) -> None:
+    """Raise InvalidInputError if the controller feeds back a motor that is ideal."""
+    law = scenario.control_law
+    if law is not None and law.of_motor and scenario.plant.motor.kind == "ideal":
+        raise InvalidInputError(
+            f"{scenario.controller.node}.{law.of_motor[0]} = motor needs plant.motor.kind = mass; "
+            "it is ideal"
+        )
+
+
 def check_continuous(scenario: Scenario) -> None:
     """Raise InvalidInputError if continuous control does not support the scenario."""
     plant, controller = scenario.plant, scenario.controller
@@ -139,13 +153,14 @@ def check_continuous(scenario: Scenario) -> None:
         raise InvalidInputError(
             f"the control law {law.name} is defined for samples only: it has no continuous form"
         )
-    for group in ("sensor", "actuator"):
-        part = getattr(plant, group)
+    for group in ("sensor", "motor.sensor", "actuator"):
+        part = attrgetter(group)(plant)
         for name, described in constants_of(type(part)).items():
             value = getattr(part, name)
             if value != described.default:
                 raise InvalidInputError(
-                    f"plant.{group}.{name} = {value} is refused: continuous control has no {group}"
+                    f"plant.{group}.{name} = {value} is refused: continuous control has no "
+                    f"{group.rpartition('.')[2]}"
                 )
     limit = float("inf") if law is None else law.force_limit
     for name, value, needed in (
@@ -185,8 +200,10 @@ def settle(case: ControlledDrive, start: MotionState, settling: SettlingOptions)
     control = law.continuous if law is not None and case.sampled is None else None
     motion = RecordedMotion(drive, start.position, start.velocity, control)
     motion.recording = False
-    if start.memory is not None and len(start.memory) == len(drive.friction.states):
-        motion.restart(start.position, start.velocity, start.memory)
+    kept = start.memory is not None and len(start.memory) == len(drive.friction.states)
+    if kept or start.motor is not None:
+        memory = start.memory if kept else None
+        motion.restart(start.position, start.velocity, memory, start.motor)
     motion.take_breakpoints()  # the start is not part of what is measured
     loads = drive.belt_speed != 0.0 and drive.has_spring
     loading = loading_time(drive) if loads else 0.0
@@ -222,7 +239,7 @@ def settle(case: ControlledDrive, start: MotionState, settling: SettlingOptions)
         motion.recording = False
         section = _Section(case.meter(settling.cycles), settling.cycles, once=not drive.has_spring)
         advance(transient, section)
-        if motion.sticking and not controlled and loads:
+        if motion.sticking and not controlled and loads and drive.motor is None:
             left = (release_position(drive) - motion.position) / drive.belt_speed
             if left > period:  # the transient has only started
                 motion.advance(left)
@@ -246,7 +263,7 @@ def settle(case: ControlledDrive, start: MotionState, settling: SettlingOptions)
     if controller is not None and loop is not None:
         answer(loop, controller)
         state = tuple(map(float, controller.state))  # also those of a law that uses numpy
-    end = MotionState(motion.position, motion.velocity, state, motion.memory)
+    end = MotionState(motion.position, motion.velocity, state, motion.memory, motion.motor)
     return section.settled(end)
 
 

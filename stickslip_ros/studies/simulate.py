@@ -21,7 +21,12 @@ from stickslip_ros.progress import Progress
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.stamps import END_OF_TIME, NANOSECONDS
 from stickslip_ros.studies.options import DEFAULT_PERIODS
-from stickslip_ros.studies.settling import check_continuous, check_reference, unit_period
+from stickslip_ros.studies.settling import (
+    check_continuous,
+    check_motor,
+    check_reference,
+    unit_period,
+)
 
 
 def default_duration(scenario: Scenario) -> float:
@@ -71,6 +76,7 @@ def simulate(
     if not 0.0 <= duration <= longest:
         raise InvalidInputError(f"a duration of {duration:g} s: must be from 0 to {longest:g} s")
     check_reference(scenario)
+    check_motor(scenario)
     if continuous:
         check_continuous(scenario)
     plant = scenario.plant
@@ -101,10 +107,16 @@ class TrajectoryFile(SampleRecorder):
     """
 
     def __init__(
-        self, stream: TextIO, rate: float, every: int = 1, *, measured: bool = False
+        self,
+        stream: TextIO,
+        rate: float,
+        every: int = 1,
+        *,
+        measured: bool = False,
+        motor: bool = False,
     ) -> None:
         """Write samples as `SampleRecorder` keeps them."""
-        super().__init__(rate, every, measured=measured)
+        super().__init__(rate, every, measured=measured, motor=motor)
         self._write = csv.writer(stream, lineterminator="\n").writerow
         self._write(self.quantities)
 

@@ -25,7 +25,7 @@ from stickslip_ros.messages.codec import (
     unpack_wrench,
     wrench_columns,
 )
-from stickslip_ros.samples import Sample
+from stickslip_ros.samples import MotorSample, Sample
 
 JOINT_STATE_PADDING = (*range(17, 20), 34, 35, *range(45, 48), *range(72, 76), *range(96, 100))
 WRENCH_PADDING = range(22, 28)
@@ -226,7 +226,12 @@ def test_columns_hold_what_the_single_messages_say(states, choices):
         except MessageError as error:
             refusals.append(str(error))
     columns, refused = joint_state_columns(messages)
-    assert str(rows(columns)) == str([tuple(sample) for sample in expected])  # NaN is NaN
+    assert (
+        str(rows(columns))
+        == str(  # NaN is NaN
+            [(*sample[:6], *(sample.motor or (math.nan, math.nan))) for sample in expected]
+        )
+    )
     assert columns.stamp.dtype == np.int64
     assert refused == (len(refusals), refusals[0] if refusals else "")
 
@@ -239,6 +244,21 @@ def test_joints_of_other_names_are_packed_as_ros_does(stamp, x, v, u, slide, bel
     for values, pair in ((message.position, x), (message.velocity, v), (message.effort, u)):
         assert list(values) == list(pair)
     assert joint_state_packer("slide", "belt")(stamp, x, v, u) == pack_joint_state(stamp, x, v, u)
+
+
+def test_a_motor_is_a_third_joint() -> None:
+    names, values = ["slide", "belt", "motor"], ((1.0, 2.0, 3.0), (4.0, 5.0, 6.0), (7.0, 8.0, 9.0))
+    packed = joint_state_packer(*names)(1, *values)
+    assert list(deserialize_message(packed, JointState).name) == names
+    expected = Sample(1, 1.0, 4.0, 7.0, 2.0, 5.0, MotorSample(3.0, 6.0))
+    turned = JointState(name=names[::-1], position=values[0][::-1], velocity=values[1][::-1])
+    turned.effort = values[2][::-1]
+    turned.header.stamp.nanosec = 1
+    assert unpack_joint_state(packed) == expected == unpack_joint_state(serialize_message(turned))
+    columns, _ = joint_state_columns([packed, pack_joint_state(1, (1, 2), (3, 4), (5, 6))])
+    assert columns.motor_position.tolist()[0] == 3.0
+    assert math.isnan(columns.motor_velocity[1])
+    assert columns.has_motor
 
 
 @pytest.mark.parametrize(
@@ -274,6 +294,6 @@ def test_columns_see_that_a_message_of_the_same_length_has_other_joints():
     valid = pack_joint_state(1, (1.0, 2.0), (3.0, 4.0), (5.0, 6.0))
     assert len(other) == len(valid)
     columns, refused = joint_state_columns([valid, other, valid])
-    assert rows(columns) == [(1, 1.0, 3.0, 5.0, 2.0, 4.0)] * 2
+    assert [row[:6] for row in rows(columns)] == [(1, 1.0, 3.0, 5.0, 2.0, 4.0)] * 2
     assert refused.number == 1
     assert "glide" in refused.reason

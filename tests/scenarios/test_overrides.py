@@ -62,7 +62,7 @@ def test_a_bad_override_is_refused() -> None:
         ("plant.colour=1", "parameter colour; plant has actuator.limit,"),
         ("plant.mass=", "plant.mass=", "plant: mass = None", "a finite number above 0 kg"),
         ("plant.belt_speed=fast", "plant: belt_speed = 'fast'", "in m/s, not text"),
-        ("plant.friction=coulomb", "unknown parameter friction; did you mean plant.friction."),
+        ("plant.friction=coulomb", "unknown parameter friction; did you mean plant."),
     ):
         message = refusal("paper", override, "plant.damping=0.1")
         assert all(fragment in message for fragment in fragments)

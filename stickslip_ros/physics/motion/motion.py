@@ -87,7 +87,11 @@ class Motion(HybridMotion):
         super().__init__(system, state, self._first_detail)
 
     def restart(
-        self, position: float, velocity: float, memory: Sequence[float] | None = None
+        self,
+        position: float,
+        velocity: float,
+        memory: Sequence[float] | None = None,
+        motor: Sequence[float] | None = None,
     ) -> None:
         """Set the state of the slide; forces and gains are kept, the controller is at rest.
 
@@ -101,12 +105,16 @@ class Motion(HybridMotion):
             Velocity of the slide, m/s.
         memory : sequence of float, optional
             Memory of the friction law, SI units, as in `memory`; by default its initial memory.
+        motor : sequence of float, optional
+            Displacement, m, and velocity, m/s, of the motor; by default it rests at the reference.
         """
         drive = self._drive
         x, y = position / drive.length_scale, velocity / drive.speed_scale
         state = self._system.initial_state(x, y)
         if memory is not None:
             self._put_memory(state, memory)
+        if motor is not None:
+            self._put_motor(state, motor)
         self._set_clock()
         self._set_state(state)
 
@@ -120,6 +128,13 @@ class Motion(HybridMotion):
     def _put_memory(self, state: list[float], memory: Sequence[float]) -> None:
         for number, (each, unit) in enumerate(zip(memory, self._memory_units, strict=True)):
             state[MEMORY + number] = each / unit
+
+    def _put_motor(self, state: list[float], motor: Sequence[float]) -> None:
+        """Set the state of the motor (SI); one that is ideal has none."""
+        drive = self._drive
+        if drive.motor is not None:
+            scaled = motor[0] / drive.length_scale, motor[1] / drive.speed_scale
+            state[self._system.motor_states] = scaled
 
     @property
     def _memory_units(self) -> Sequence[float]:
@@ -348,10 +363,8 @@ class Motion(HybridMotion):
         if drive.actuator.states == old.actuator.states:
             ratio = old.normal_force / drive.normal_force
             state[system.actuator_states] = [each * ratio for each in lagging]
-        if motor is not None and drive.motor is not None:
-            state[system.motor_states] = [
-                motor.position / drive.length_scale, motor.velocity / drive.speed_scale
-            ]  # fmt: skip
+        if motor is not None:
+            self._put_motor(state, motor)
         self._set_clock()
         self._instant.inputs = [0.0] * len(system.inputs)
         self.set_forces(force, disturbance)
@@ -414,10 +427,14 @@ class RecordedMotion(Motion):
         self._append_present()
 
     def restart(
-        self, position: float, velocity: float, memory: Sequence[float] | None = None
+        self,
+        position: float,
+        velocity: float,
+        memory: Sequence[float] | None = None,
+        motor: Sequence[float] | None = None,
     ) -> None:
         """Set the state of the slide; see `Motion.restart`."""
-        super().restart(position, velocity, memory)
+        super().restart(position, velocity, memory, motor)
         self._append_present()
 
     @property

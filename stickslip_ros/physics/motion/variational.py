@@ -68,10 +68,14 @@ class VariationalMotion(RecordedMotion):
         self._begin_again()
 
     def restart(
-        self, position: float, velocity: float, memory: Sequence[float] | None = None
+        self,
+        position: float,
+        velocity: float,
+        memory: Sequence[float] | None = None,
+        motor: Sequence[float] | None = None,
     ) -> None:
         """Set the state of the slide; derivatives are by this state from now on."""
-        super().restart(position, velocity, memory)
+        super().restart(position, velocity, memory, motor)
         self._begin_again()
 
     def _begin_again(self) -> None:
@@ -203,10 +207,9 @@ class ShootingMotion(VariationalMotion):
         if memory is None:
             memory = drive.friction.memory_at(-drive.belt_speed, -copysign(1.0, drive.belt_speed))
         self._put_memory(found, memory)
+        self._put_motor(found, motor)
         state = np.array(found)
         state[self._system.control_states] = np.asarray(filter_states) / scale
-        if drive.motor is not None:
-            state[self._system.motor_states] = np.array(motor) / (scale, drive.speed_scale)
         return state
 
     def motor_of(self, state: FloatArray) -> MotorSample | None:

@@ -151,6 +151,8 @@ class LinearSampledLoop:
         feedback = law.linear_feedback(1.0 / self.rate)
         if feedback is None:
             raise InvalidInputError(f"the theory of the sampled loop: {not_linear(law.name)}")
+        if self.drive.motor is None and np.any(feedback.direct[..., 2:]):
+            raise NotCoveredError(f"the law {law.name} feeds back a motor: the motor is ideal")
         if self.drive.motor is not None and not feedback.holds_position:
             raise NotCoveredError(no_position_loop("the theory of the sampled loop", law.name))
         return self._transitions(feedback)

@@ -1,6 +1,7 @@
 """The control laws: one file each, and one entry each in `CONTROL_LAWS`."""
 
 from stickslip_ros.physics.model.control.base import ContinuousControl, ControlLaw, LinearFeedback
+from stickslip_ros.physics.model.control.cascade import Cascade
 from stickslip_ros.physics.model.control.disturbance_observer import DisturbanceObserver
 from stickslip_ros.physics.model.control.friction_feedforward import FrictionFeedforward
 from stickslip_ros.physics.model.control.lugre_observer import LugreObserver
@@ -16,6 +17,7 @@ CONTROL_LAWS: dict[str, type[ControlLaw]] = {
     for law in (
         Washout,
         VelocityFeedback,
+        Cascade,
         Pid,
         DisturbanceObserver,
         SlidingMode,
@@ -32,6 +34,7 @@ CONTROL_LAWS: dict[str, type[ControlLaw]] = {
 __all__ = [
     "CONTROL_LAWS",
     "NO_REFERENCE",
+    "Cascade",
     "ContinuousControl",
     "ControlLaw",
     "DisturbanceObserver",

@@ -281,6 +281,15 @@ class ControlLaw(ABC):
         """Return why the constants do not fit together, as a sentence, or None."""
         return None
 
+    @property
+    def of_motor(self) -> list[str]:
+        """Names of the constants that ask for the motion of a motor of finite mass."""
+        return [
+            name
+            for name, described in constants_of(type(self)).items()
+            if described.choices == (TABLE, MOTOR) and getattr(self, name) == MOTOR
+        ]
+
     def initial_state(self, sample: Sample, reference: Reference) -> State:
         """Return the state at the first sample.
 
