@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.bags.table_columns import table_of
+from stickslip_ros.bags.table_file import table_of
 from stickslip_ros.bags.table_quantities import quantities_of
 from stickslip_ros.errors import RunError
 from stickslip_ros.physics.measures.cycle_measures import Regime

@@ -10,7 +10,7 @@ from typing_extensions import override
 
 from stickslip_ros.api.results import Parts, Result, Summary
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.bags.table_columns import table_of
+from stickslip_ros.bags.table_file import table_of
 from stickslip_ros.bags.table_quantities import speed_and_force
 from stickslip_ros.bags.text_table import TableFormat
 from stickslip_ros.identification.fit import Estimate

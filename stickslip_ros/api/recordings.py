@@ -14,7 +14,7 @@ from stickslip_ros.arrays import FloatArray
 from stickslip_ros.bags.motion_reader import BagLayout
 from stickslip_ros.bags.reader import Recording
 from stickslip_ros.bags.report import report_of_recording
-from stickslip_ros.bags.table_columns import is_table
+from stickslip_ros.bags.table_file import is_table
 from stickslip_ros.bags.text_table import TableFormat
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.loop.trajectory import Trajectory

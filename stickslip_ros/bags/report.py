@@ -14,8 +14,7 @@ from stickslip_ros.arrays import BoolArray, IntArray
 from stickslip_ros.bags.motion_reader import ANY_LAYOUT, BagLayout
 from stickslip_ros.bags.reader import Recording
 from stickslip_ros.bags.table_clock import LONGEST
-from stickslip_ros.bags.table_columns import is_table
-from stickslip_ros.bags.table_file import TableRecording, read_table
+from stickslip_ros.bags.table_file import TableRecording, is_table, read_table
 from stickslip_ros.bags.text_table import ANY_FORM, TableFormat
 from stickslip_ros.errors import BagError, InvalidInputError
 from stickslip_ros.messages.topics import CONTROL_FORCE, JOINT_STATES

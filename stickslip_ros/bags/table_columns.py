@@ -1,22 +1,13 @@
-"""The columns of a table in a file: a text, or a MAT file of MATLAB."""
+"""The columns of a table in a file, whatever its format."""
 
-from collections.abc import Callable, Generator, Mapping, Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Generator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from stickslip_ros.bags.expressions import Expression, listed
-from stickslip_ros.bags.mat_file import is_mat, vectors_of
-from stickslip_ros.bags.text_table import ANY_FORM, TableFormat, TextTable
 from stickslip_ros.errors import BagError, InvalidInputError
-from stickslip_ros.files import open_regular
-
-TABLE_SUFFIXES = (".csv", ".mat", ".txt", ".dat", ".tsv", ".log", ".asc")
-"""Ends of the names of files that are tables, whatever they hold."""
-
-_BAG_SUFFIXES = (".mcap", ".db3")
-_MCAP = b"\x89MCAP"
 
 _OWN_COLUMNS = {
     "time": ("time",),
@@ -28,22 +19,8 @@ _OWN_COLUMNS = {
 }
 """Columns of the files that `stickslip simulate --out` writes; the first one that exists."""
 
-_MOST_NUMBERS = 1 << 24
-"""Numbers of a MAT file."""
 
-
-def is_table(path: Path) -> bool:
-    """Return whether a path names a table rather than a bag: by its end or its first bytes."""
-    if path.suffix.lower() in TABLE_SUFFIXES:
-        return True
-    if not path.is_file() or any(each in _BAG_SUFFIXES for each in path.suffixes):
-        return False
-    with reading_file(path), open_regular(path) as stream:
-        return not stream.read(len(_MCAP)).startswith(_MCAP)
-
-
-@dataclass(frozen=True)
-class Table:
+class Table(ABC):
     """A table of a file: what its columns are, and how they are read."""
 
     path: Path
@@ -53,12 +30,22 @@ class Table:
     """Name of each column; empty if it has none."""
     units: Sequence[str]
     """Units that the table has for its columns; empty where it has none."""
-    read: Callable[[Sequence[int]], list[Any]]
-    """Read columns by their places, as arrays of shape (rows,), or of a constant (1,)."""
-    line: Callable[[int], str]
-    """Name the place of a row in the file."""
-    notes: Callable[[], Sequence[str]]
-    """Return sentences on how the file was read."""
+
+    @property
+    def notes(self) -> Sequence[str]:
+        """Sentences on how the file was read so far."""
+        return ()
+
+    @abstractmethod
+    def read(self, places: Sequence[int]) -> list[Any]:
+        """Return columns as arrays of shape (rows,), or of a constant (1,).
+
+        Cells without a number are NaN. Raises OSError and ValueError.
+        """
+
+    @abstractmethod
+    def line(self, row: int) -> str:
+        """Return where a row is in the file, for a message."""
 
     def has(self, text: str) -> bool:
         """Return whether the table has all columns of an expression."""
@@ -90,36 +77,6 @@ class Table:
                 "time=t,position=x,force=u*2.5"
             )
         return {quantity: name for quantity, name in own.items() if name}
-
-
-def table_of(path: Path, form: TableFormat = ANY_FORM) -> Table:
-    """Return the table in a text or MAT file; raises BagError."""
-    with reading_file(path):
-        with open_regular(path) as stream:
-            if is_mat(path, stream):
-                found = vectors_of(stream, _MOST_NUMBERS)
-                if not found:
-                    raise ValueError("it has no column")
-                vectors = [*found.values()]
-                return Table(
-                    path,
-                    {name: place for place, name in enumerate(found)},
-                    [*found],
-                    [""] * len(found),
-                    lambda wanted: [vectors[place] for place in wanted],
-                    lambda row: f"row {row + 1}",
-                    lambda: (),
-                )
-        text = TextTable(path, form)
-        return Table(
-            path,
-            text.columns,
-            text.names,
-            text.units,
-            text.read,
-            text.line,
-            lambda: text.notes,
-        )
 
 
 @contextmanager

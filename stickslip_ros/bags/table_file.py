@@ -1,19 +1,70 @@
 """Recordings of machines as tables: CSV files, and MAT files of MATLAB."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import nan
 from pathlib import Path
 
 import numpy as np
 
+from stickslip_ros.arrays import FloatArray
+from stickslip_ros.bags.mat_file import is_mat, vectors_of
 from stickslip_ros.bags.reader import RunBlock
 from stickslip_ros.bags.table_clock import stamps_of
-from stickslip_ros.bags.table_columns import table_of
+from stickslip_ros.bags.table_columns import Table, reading_file
 from stickslip_ros.bags.table_quantities import Quantities, differences, quantities_of
-from stickslip_ros.bags.text_table import ANY_FORM, TableFormat
+from stickslip_ros.bags.text_table import ANY_FORM, TableFormat, TextTable
 from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.files import open_regular
 from stickslip_ros.samples import ForceColumns, SampleColumns
+
+TABLE_SUFFIXES = (".csv", ".mat", ".txt", ".dat", ".tsv", ".log", ".asc")
+"""Ends of the names of files that are tables, whatever they hold."""
+
+_BAG_SUFFIXES = (".mcap", ".db3")
+_MCAP = b"\x89MCAP"
+
+_MOST_NUMBERS = 1 << 24
+"""Numbers of a MAT file."""
+
+
+class MatTable(Table):
+    """The vectors of a MAT file."""
+
+    def __init__(self, path: Path, vectors: Mapping[str, FloatArray]) -> None:
+        """Take the vectors by name."""
+        self.path, self.names, self.units = path, [*vectors], [""] * len(vectors)
+        self.columns = {name: place for place, name in enumerate(vectors)}
+        self._vectors = [*vectors.values()]
+
+    def read(self, places: Sequence[int]) -> list[FloatArray]:
+        """Return vectors by their places."""
+        return [self._vectors[place] for place in places]
+
+    def line(self, row: int) -> str:
+        """Return the number of a row, for a message."""
+        return f"row {row + 1}"
+
+
+def is_table(path: Path) -> bool:
+    """Return whether a path names a table rather than a bag: by its end or its first bytes."""
+    if path.suffix.lower() in TABLE_SUFFIXES:
+        return True
+    if not path.is_file() or any(each in _BAG_SUFFIXES for each in path.suffixes):
+        return False
+    with reading_file(path), open_regular(path) as stream:
+        return not stream.read(len(_MCAP)).startswith(_MCAP)
+
+
+def table_of(path: Path, form: TableFormat = ANY_FORM) -> Table:
+    """Return the table in a text or MAT file; raises BagError."""
+    with reading_file(path), open_regular(path) as stream:
+        if not is_mat(path, stream):
+            return TextTable(path, form)
+        vectors = vectors_of(stream, _MOST_NUMBERS)
+        if not vectors:
+            raise ValueError("it has no column")
+        return MatTable(path, vectors)
 
 
 @dataclass(frozen=True)

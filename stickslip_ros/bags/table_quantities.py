@@ -163,7 +163,7 @@ class _Cells:
                     f"{table.path}: {table.name(place)} has {len(column)} numbers and "
                     f"{table.name(leading[0])} {rows}: columns must have the same length"
                 )
-        notes = [*table.notes(), *_lost_cells(table, columns, asked)]
+        notes = [*table.notes, *_lost_cells(table, columns, asked)]
         factors: dict[str, float] = {}
         for name, each in asked.items():
             factors[name], note = _factor(table, name, each)

@@ -5,7 +5,7 @@ import csv
 import os
 import re
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from io import StringIO, TextIOWrapper
@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from stickslip_ros.bags.table_columns import Table
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.files import open_regular
 from stickslip_ros.quantities import number_of
@@ -82,12 +83,12 @@ ANY_FORM = TableFormat()
 """Nothing is known of the form."""
 
 
-class TextTable:
+class TextTable(Table):
     """A table as text, of which the form is known; its columns are read when they are needed."""
 
     def __init__(self, path: Path, given: TableFormat) -> None:
         """Find the form of a table; raises OSError and ValueError if the file has none."""
-        self._path, self._decimal = path, given.decimal
+        self.path, self._decimal = path, given.decimal
         with open_regular(path) as stream:
             if os.fstat(stream.fileno()).st_size > _LARGEST:
                 raise ValueError(f"it has more than {_LARGEST} bytes")
@@ -165,18 +166,13 @@ class TextTable:
         self.first, self.named = start, names[0][0] + 1 if names else None
         self.names = tuple(names[0][1]) if names else ("",) * width
         self.units = tuple(units or map(_unit_of, self.names))
+        self.columns = {f"#{place + 1}": place for place in range(width)}
+        for names_of_columns in (self.names, map(_without_unit, self.names)):
+            for place, name in enumerate(names_of_columns):
+                if name:
+                    self.columns.setdefault(name, place)
         self._units_line = start if units else None
         self._skipped = names[0][0] if names else start
-
-    @property
-    def columns(self) -> Mapping[str, int]:
-        """Places of the columns by name, by name without unit, and by number, such as #1."""
-        found = {f"#{place + 1}": place for place in range(self.width)}
-        for name in (self.names, [_without_unit(each) for each in self.names]):
-            for place, each in enumerate(name):
-                if each:
-                    found.setdefault(each, place)
-        return found
 
     @property
     def notes(self) -> list[str]:
@@ -206,10 +202,7 @@ class TextTable:
         return f"line {line}"
 
     def read(self, places: Sequence[int]) -> list[Any]:
-        """Return columns as arrays of shape (rows,); times become seconds from the first one.
-
-        Cells without a number are NaN. Raises OSError and ValueError.
-        """
+        """Return columns as arrays of shape (rows,); times become seconds from the first one."""
         import pandas as pd
 
         version = tuple(map(int, pd.__version__.split(".")[:2]))
@@ -218,7 +211,7 @@ class TextTable:
         parts: dict[int, list[Any]] = {place: [] for place in places}
         blank: list[int] = []
         with (
-            open_regular(self._path) as stream,
+            open_regular(self.path) as stream,
             TextIOWrapper(stream, encoding=self._encoding, errors="replace", newline="") as file,
             warnings.catch_warnings(record=True) as caught,
         ):

@@ -13,7 +13,8 @@ from stickslip_ros.arrays import FloatArray, IntArray
 from stickslip_ros.bags.motion_reader import ANY_LAYOUT, BagLayout
 from stickslip_ros.bags.reader import Recording
 from stickslip_ros.bags.table_clock import stamps_of
-from stickslip_ros.bags.table_columns import Table, is_table, table_of
+from stickslip_ros.bags.table_columns import Table
+from stickslip_ros.bags.table_file import is_table, table_of
 from stickslip_ros.bags.table_quantities import quantities_of
 from stickslip_ros.bags.text_table import ANY_FORM, TableFormat
 from stickslip_ros.errors import BagError, InvalidInputError

@@ -17,8 +17,7 @@ from scipy.io import savemat
 
 from stickslip_ros.bags.compression import unpack_file
 from stickslip_ros.bags.report import report_of_recording
-from stickslip_ros.bags.table_columns import table_of
-from stickslip_ros.bags.table_file import read_table
+from stickslip_ros.bags.table_file import read_table, table_of
 from stickslip_ros.errors import BagError, InvalidInputError
 from stickslip_ros.physics.measures.slips import SlipThreshold
 from tests.examples import examples

@@ -9,8 +9,7 @@ import pytest
 from scipy.io import savemat
 
 from stickslip_ros.bags.report import report_of_recording
-from stickslip_ros.bags.table_columns import is_table
-from stickslip_ros.bags.table_file import read_table
+from stickslip_ros.bags.table_file import is_table, read_table
 from stickslip_ros.errors import BagError, InvalidInputError
 from stickslip_ros.physics.measures.slips import SlipThreshold
 
@@ -50,14 +49,14 @@ def test_a_mat_file_gives_the_same_up_to_a_limit(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     most = 4 * len(TIME) + 1 + 9
-    monkeypatch.setattr("stickslip_ros.bags.table_columns._MOST_NUMBERS", most)
+    monkeypatch.setattr("stickslip_ros.bags.table_file._MOST_NUMBERS", most)
     path = tmp_path / "log.mat"
     table = {"t": TIME[:, None], "x": POSITION[None, :], "v": VELOCITY, "u": POSITION, "gain": 1e6}
     savemat(path, {**table, "name": "a machine", "other": np.eye(3)})
     recording = read_table(path, {**COLUMNS, "force": "u*gain*2.5"})
     assert recording.samples.position.tolist() == POSITION.tolist()
     assert recording.forces.force == pytest.approx(POSITION * 2.5e6, rel=1e-15)
-    monkeypatch.setattr("stickslip_ros.bags.table_columns._MOST_NUMBERS", most - 1)
+    monkeypatch.setattr("stickslip_ros.bags.table_file._MOST_NUMBERS", most - 1)
     with pytest.raises(BagError, match=f"it has more than {most - 1} numbers"):
         read_table(path, COLUMNS)
 
