@@ -52,15 +52,13 @@ class BagFiles:
         of_files = (sentence for file in self.files for sentence in file.damage)
         return [*map(printable, (*self._metadata_faults, *self._unreadable, *of_files))]
 
-    def message_blocks(self, *topics: str) -> Iterator[tuple[MessageBlock, dict[str, list[int]]]]:
-        """Yield the messages of these topics chunk by chunk, and the channels of each topic."""
+    def message_blocks(self, *topics: str) -> Iterator[tuple[MessageBlock, dict[int, str]]]:
+        """Yield the messages of these topics chunk by chunk, and the topic of each channel."""
         for file in self.files:
-            channels: dict[str, list[int]] = {}
-            for number, channel in file.channels.items():
-                if channel.topic in topics:
-                    channels.setdefault(channel.topic, []).append(number)
-            for block in file.blocks([number for ids in channels.values() for number in ids]):
-                yield block, channels
+            channels = file.channels.items()
+            topic_of = {number: each.topic for number, each in channels if each.topic in topics}
+            for block in file.blocks(topic_of):
+                yield block, topic_of
 
     def messages(self, *topics: str) -> Iterator[tuple[str, int, bytes]]:
         """Yield the serialized messages of some topics in file order.
@@ -84,11 +82,10 @@ class BagFiles:
         BagError
             If the operating system fails to read the bag.
         """
-        for block, channels in self.message_blocks(*topics):
-            names = {channel: topic for topic, ids in channels.items() for channel in ids}
+        for block, topic_of in self.message_blocks(*topics):
             columns = (block.channel, block.log_time, block.begin, block.end)
             for channel, stamp, begin, end in zip(*(c.tolist() for c in columns), strict=True):
-                yield names[channel], stamp, block.data[begin:end]
+                yield topic_of[channel], stamp, block.data[begin:end]
 
     def offered_qos(self, topic: str) -> str:
         """Return the QoS profiles that the recorded publishers of a topic offered.

@@ -179,9 +179,9 @@ class Recording(BagFiles):
         if self._layout.force == "effort":
             return self._states_and_efforts[1]
         name = self._topic(CONTROL_FORCE)
-        blocks = [self._forces(name, block, ids) for block, ids in self.message_blocks(name)]
+        parts = [self._forces(name, on(name)) for on in self._chunks(name)]
         self._check_clocks()
-        return NO_FORCES.followed_by(*blocks)
+        return NO_FORCES.followed_by(*parts)
 
     @cached_property
     def applied_disturbances(self) -> ForceColumns:
@@ -259,12 +259,12 @@ class Recording(BagFiles):
         self._motion = motion = self._motion_reader(states)
         gathered: list[RunBlock] = []
         count = 0
-        for messages, channels in self.message_blocks(states, forces, dropped):
-            samples, efforts = self._states(motion, states, messages, channels)
+        for on in self._chunks(states, forces, dropped):
+            samples, efforts = self._states(motion, states, on(states))
             block = RunBlock(
                 samples,
-                efforts if by_effort else self._forces(forces, messages, channels),
-                self._decoded(dropped, messages, channels, wrenches_in),
+                efforts if by_effort else self._forces(forces, on(forces)),
+                self._decoded(dropped, on(dropped), wrenches_in),
             )
             gathered.append(block)
             count += sum(map(len, block))
@@ -356,14 +356,13 @@ class Recording(BagFiles):
         """All joint states, and their efforts if these are the forces."""
         name = self._topic(JOINT_STATES)
         self._motion = motion = self._motion_reader(name)
-        read = [self._states(motion, name, block, ids) for block, ids in self.message_blocks(name)]
+        read = [self._states(motion, name, on(name)) for on in self._chunks(name)]
         states, efforts = zip(*read, strict=True) if read else ((), ())
         return NO_SAMPLES.followed_by(*states), NO_FORCES.followed_by(*efforts)
 
     def _states(
-        self, motion: MotionReader, topic: str, block: MessageBlock, channels: dict[str, list[int]]
+        self, motion: MotionReader, topic: str, messages: MessageBlock
     ) -> tuple[SampleColumns, ForceColumns]:
-        messages = block.on(channels.get(topic, []))
         states, efforts, refused = motion.read(_content(messages), messages.log_time)
         self._note(topic, refused)
         if self._effort_is_of_actuator:
@@ -375,15 +374,12 @@ class Recording(BagFiles):
         """Whether our plant recorded the force of its actuator in place of the friction."""
         return (self.metadata("stickslip_ros/plant") or {}).get("effort") == '"actuator"'
 
-    def _forces(
-        self, topic: str, block: MessageBlock, channels: dict[str, list[int]]
-    ) -> ForceColumns:
+    def _forces(self, topic: str, messages: MessageBlock) -> ForceColumns:
         layout, kind = self._layout, self.topics.get(topic, CONTROL_FORCE.type_name)
         by_log = layout.time == "log"
         if kind == CONTROL_FORCE.type_name and not (layout.force_topic or by_log):
-            return self._decoded(topic, block, channels, wrenches_in)
+            return self._decoded(topic, messages, wrenches_in)
         number = NumberedTopic.of(layout.force_topic or "").number
-        messages = block.on(channels.get(topic, []))
         forces, unstamped, refused = read_forces(
             force_layouts(layout.joint, number)[kind],
             _content(messages),
@@ -410,28 +406,23 @@ class Recording(BagFiles):
             self._refused[topic] += refused.number
             self._reasons.setdefault(topic, refused.reason)
 
-    def _decoded(
-        self,
-        topic: str,
-        block: MessageBlock,
-        channels: dict[str, list[int]],
-        decode: _Decode[ColumnsT],
-    ) -> ColumnsT:
-        messages = block.on(channels.get(topic, []))
+    def _decoded(self, topic: str, messages: MessageBlock, decode: _Decode[ColumnsT]) -> ColumnsT:
         columns, refused = decode(*_content(messages))
         self._note(topic, refused)
         return columns
 
     def _whole(self, topic: Topic[Any], decode: _Decode[ColumnsT]) -> ColumnsT:
         """Return all columns of a topic as one."""
-        name = self._topic(topic)
-        blocks = [
-            self._decoded(name, block, ids, decode) for block, ids in self.message_blocks(name)
-        ]
-        if not blocks:
-            nothing = np.empty(0, np.int64)
-            blocks = [decode(b"", nothing, nothing)[0]]
-        return blocks[0].followed_by(*blocks[1:])
+        name, nothing = self._topic(topic), np.empty(0, np.int64)
+        parts = (self._decoded(name, on(name), decode) for on in self._chunks(name))
+        return decode(b"", nothing, nothing)[0].followed_by(*parts)
+
+    def _chunks(self, *topics: str) -> Iterator[Callable[[str], MessageBlock]]:
+        """Yield for each chunk of the bag what returns its messages on one of these topics."""
+        for block, topic_of in self.message_blocks(*topics):
+            yield lambda topic, block=block, topic_of=topic_of: block.on(
+                [number for number, name in topic_of.items() if name == topic]
+            )
 
 
 def _content(block: MessageBlock) -> Messages:
