@@ -14,23 +14,24 @@ from itertools import islice
 from math import inf
 from operator import attrgetter
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.qos import ReliabilityPolicy
 from std_msgs.msg import Float64
 
+from stickslip_ros.arrays import IntArray
 from stickslip_ros.bags.motion_reader import BagLayout, MotionReader, read_forces
 from stickslip_ros.bags.recorder import Recorder, check_new_bag
 from stickslip_ros.errors import BagError, InvalidInputError, MessageError
-from stickslip_ros.messages.cdr import Refused, joined
+from stickslip_ros.messages.cdr import Messages, Refused, joined
 from stickslip_ros.messages.codec import (
     UNSTAMPED,
     force_layouts,
     pack_header,
     unpack_header,
-    wrench_columns,
+    wrenches_in,
 )
 from stickslip_ros.messages.topics import (
     AMPLITUDE,
@@ -68,14 +69,12 @@ from stickslip_ros.physics.measures.cycle_measures import trend_text
 from stickslip_ros.physics.measures.run_meter import RunMeter
 from stickslip_ros.physics.measures.sample_meter import SampleAssumptions
 from stickslip_ros.physics.measures.timing import Timing
-from stickslip_ros.samples import NO_FORCES, NO_SAMPLES, ForceColumns, SampleColumns
+from stickslip_ros.samples import NO_FORCES, NO_SAMPLES, ForceColumns
 from stickslip_ros.scenarios.curve_file import CURVES, Pairs, read_pairs
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, AnalyzerParameters
 from stickslip_ros.stamps import END_OF_TIME, NANOSECONDS
 from stickslip_ros.text import number_in, quantity
 from stickslip_ros.versions import versions
-
-ColumnsT = TypeVar("ColumnsT")
 
 VERDICT_TIME = 0.05
 """Time, s, in which a plant that has dropped forces reports the last ones, too."""
@@ -311,7 +310,11 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
             self._keep("stickslip_ros/timing", self._meter.timing._asdict())
 
     def _measure(self) -> None:
-        states, efforts = self._states()
+        states, efforts = self._measured(
+            JOINT_STATES, lambda messages, _: self._motion.read(messages), NO_SAMPLES, NO_FORCES
+        )
+        if self._motion.estimated and self._meter.motion.reading.noisy is None:
+            self._meter.motion.reading = SampleAssumptions(noisy=True)
         windows = self._cycles // self.parameters.window
         for cycle in self._meter.motion.feed(states):
             values = (cycle.amplitude, cycle.stick_fraction, cycle.frequency)
@@ -320,7 +323,7 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
             self._cycles += 1
         if self._cycles // self.parameters.window > windows:
             self._log_measures()
-        dropped = self._columns(DROPPED_FORCE, wrench_columns)
+        (dropped,) = self._measured(DROPPED_FORCE, _wrenches, NO_FORCES)
         self._meter.feed_forces(efforts if len(efforts) else self._forces(), dropped)
         self._match_publishers()
         self._look_for_controllers()
@@ -342,47 +345,33 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
             self._logged = text
             self.get_logger().info(text)
 
-    def _states(self) -> tuple[SampleColumns, ForceColumns]:
-        """Return the joint states to measure, and efforts that are forces."""
-        messages, self._to_measure[JOINT_STATES] = self._to_measure[JOINT_STATES], []
-        try:
-            states, efforts, refused = self._motion.read(joined([each.data for each in messages]))
-        except BagError as error:
-            self.dropped.add(str(error), len(messages))
-            return NO_SAMPLES, NO_FORCES
-        self._drop(JOINT_STATES, refused)
-        if self._motion.estimated and self._meter.motion.reading.noisy is None:
-            self._meter.motion.reading = SampleAssumptions(noisy=True)
-        return states, efforts
-
     def _forces(self) -> ForceColumns:
         """Return the control forces to measure."""
+        read = partial(read_forces, self._force_layout, by_log=True)
         if self._force == CONTROL_FORCE:
-            return self._columns(CONTROL_FORCE, wrench_columns)
-        messages, self._to_measure[self._force] = self._to_measure[self._force], []
+            read = _wrenches
+        return self._measured(self._force, read, NO_FORCES)[0]
+
+    def _measured(
+        self,
+        topic: Topic[Any],
+        read: Callable[[Messages, IntArray], tuple[Any, ...]],
+        *nothing: Any,
+    ) -> Sequence[Any]:
+        """Return what `read` makes of the messages of a topic to measure, or nothing.
+
+        It gets messages and their stamps, and returns values and what it refused, which is dropped.
+        """
+        messages, self._to_measure[topic] = self._to_measure[topic], []
         stamps = np.array([each.stamp for each in messages], np.int64)
         try:
-            forces, _, refused = read_forces(
-                self._force_layout, joined([each.data for each in messages]), stamps, by_log=True
-            )
+            *values, refused = read(joined([each.data for each in messages]), stamps)
         except BagError as error:
             self.dropped.add(str(error), len(messages))
-            return NO_FORCES
-        self._drop(self._force, refused)
-        return forces
-
-    def _columns(
-        self, topic: Topic[Any], decode: Callable[[Sequence[bytes]], tuple[ColumnsT, Refused]]
-    ) -> ColumnsT:
-        """Return the values of a topic to measure; drop unreadable messages."""
-        messages, self._to_measure[topic] = self._to_measure[topic], []
-        columns, refused = decode([each.data for each in messages])
-        self._drop(topic, refused)
-        return columns
-
-    def _drop(self, topic: Topic[Any], refused: Refused) -> None:
+            return nothing
         if refused.number > 0:
             self.dropped.add(f"{topic.name}: {refused.reason}", refused.number)
+        return values
 
     def _match_publishers(self) -> None:
         """Hear best-effort publishers of other machines, too, which no reliable reader matches."""
@@ -461,6 +450,10 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
             self._recorder = None
             self._bag_failure = str(error)
             self.get_logger().error(self._bag_failure)
+
+
+def _wrenches(messages: Messages, _: IntArray) -> tuple[ForceColumns, Refused]:
+    return wrenches_in(*messages)
 
 
 def main() -> None:

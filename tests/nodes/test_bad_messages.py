@@ -217,7 +217,7 @@ def test_messages_of_every_kind_harm_no_node(graph: Graph, tmp_path: Path, pace:
     graph.deactivate("analyzer")
     report = report_of_recording(tmp_path / "bag")
     assert report["notes"]
-    assert all(isfinite(figure) for figure in plant._loop.sample)
+    assert all(isfinite(figure) for figure in plant._loop.sample[:-1])  # without a motor
 
 
 @pytest.mark.long
