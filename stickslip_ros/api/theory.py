@@ -25,8 +25,14 @@ from stickslip_ros.progress import Progress
 from stickslip_ros.quantities import number_of
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.show.parameter_tables import scenario_tables
-from stickslip_ros.show.quantities import CHECKS, CONTROLLER, MARGINS, WORST, Units
-from stickslip_ros.show.study_tables import design_tables, stability_tables
+from stickslip_ros.show.quantities import Units
+from stickslip_ros.show.study_tables import (
+    CHECKS,
+    CONTROLLER,
+    MARGINS,
+    design_tables,
+    stability_tables,
+)
 from stickslip_ros.studies import design as designing
 from stickslip_ros.studies import stability as stabilities
 from stickslip_ros.text import shown
@@ -242,7 +248,7 @@ class Proposal(TabularResult):
             "force_limit": task.force_limit,
             "worst_belt_speed": found.slowest.drive.belt_speed if found.slowest else None,
             "decay_rate": min((check.decay_rate for check in found.checks), default=None),
-            **{name: _largest(check[name] for check in checks) for name in WORST},
+            **{name: _largest(check[name] for check in checks) for name in [*CHECKS][2:]},
             "margins": asdict(found.margins) if found.margins else dict.fromkeys(MARGINS),
             "checks": checks,
             "parameter_file": found.parameter_file,

@@ -56,33 +56,6 @@ STUDY = _OF_CYCLES | {
 COLOURS = ("regime", *quantities_of(CycleMeasures))
 """What the map of a sweep can show in colour."""
 
-CONTROLLER = {
-    "corner_frequency": Quantity("cutoff frequency", "rad/s"),
-    "linear_gain": Quantity("linear gain", "N s/m"),
-    "cubic_gain": Quantity("cubic gain", "N s^3/m^3"),
-    "force_limit": Quantity("force limit", "N"),
-    "start_after": Quantity("start after", "s"),
-}
-MARGINS = {
-    "gain_down": Quantity("lower gain margin"),
-    "gain_up": Quantity("upper gain margin"),
-    "delay": Quantity("delay margin", "s"),
-}
-WORST = {
-    "predicted_settling_time": Quantity("1 % settling time, predicted", "s"),
-    "settling_time": Quantity("simulated", "s"),
-    "predicted_peak_force": Quantity("peak force, predicted", "N"),
-    "peak_force": Quantity("simulated", "N"),
-}
-CHECKS = {"belt_speed": Quantity("belt speed", "m/s"), "vibrates": Quantity("vibrates")} | WORST
-AT_REST = {
-    "belt_speed": CHECKS["belt_speed"],
-    "amplitude": _OF_CYCLES["amplitude"],
-    "peak_force": Quantity("peak force", "N"),
-    "rms_force": Quantity("rms force", "N"),
-}
-"""Values of a design: the proposal, its margins, its checks, and of these at rest."""
-
 _LOOP = {
     "equilibrium_position": Quantity("equilibrium position", "m"),
     "eigenvalues": Quantity("eigenvalues", "1/s"),
@@ -124,7 +97,7 @@ THEORY: Mapping[str, Mapping[str, Quantity]] = {
 """Values of each section of `stability`."""
 
 ONSET = {
-    "belt_speed": CHECKS["belt_speed"],
+    "belt_speed": Quantity("belt speed", "m/s"),
     "decay_rate": Quantity("decay rate", "1/s"),
     "decay_error": Quantity("standard error", "1/s"),
     "frequency": Quantity("frequency", "Hz"),
@@ -191,6 +164,8 @@ _PARAMETERS = {
     "washout_controller.corner_frequency": "cutoff frequency",
     "washout_controller.linear_gain": "linear gain",
     "washout_controller.cubic_gain": "cubic gain",
+    "washout_controller.force_limit": "force limit",
+    "washout_controller.start_after": "start after",
 }
 """Names of parameters in figures and on the page."""
 

@@ -8,13 +8,16 @@ from math import log10
 from typing import Any, cast
 
 from stickslip_ros.physics.measures.cycle_measures import Regime, Trend
-from stickslip_ros.quantities import Quantity
+from stickslip_ros.physics.model.constants import constants_of
+from stickslip_ros.physics.model.control import Washout
+from stickslip_ros.quantities import Quantity, quantities_of
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.show.measure_table import measure_table
-from stickslip_ros.show.quantities import AT_REST, CHECKS, CONTROLLER, MARGINS, THEORY, Units
+from stickslip_ros.show.quantities import THEORY, Units, plain_name
 from stickslip_ros.studies.basin import Attractor, Basins
 from stickslip_ros.studies.columns import Columns
-from stickslip_ros.studies.design import Design
+from stickslip_ros.studies.controller_trial import Rest
+from stickslip_ros.studies.design import Check, Design, Margins
 from stickslip_ros.studies.plan import Grid
 from stickslip_ros.studies.stability import Notes, Section
 from stickslip_ros.studies.study import Point, Study
@@ -22,6 +25,14 @@ from stickslip_ros.tables import TextTable
 
 _MOST_RANGES = 60
 """Rows of the table of a sweep; where there are more, only their regimes are counted."""
+
+CONTROLLER = {
+    name: Quantity(plain_name(f"washout_controller.{name}"), unit)
+    for name in Washout.constants()
+    if (unit := constants_of(Washout)[name].unit)
+}
+CHECKS, MARGINS = quantities_of(Check), quantities_of(Margins)
+"""Quantities of a design: the proposal, its checks and its margins, by name."""
 
 _GAIN_MARGINS = "gain_down", "gain_up"
 """Ratios of the linear gain at the limit of stability and the proposed one."""
@@ -124,7 +135,8 @@ def design_tables(name: str, found: Design) -> Iterator[TextTable | str]:
         yield _side_by_side("verification", CHECKS, checks, units)
         at_rest = [each | each["rest"] for each in checks if each["rest"] is not None]
         if at_rest:
-            yield _side_by_side("at rest, by noise and rounding", AT_REST, at_rest, units)
+            shown = {"belt_speed": CHECKS["belt_speed"], **quantities_of(Rest)}
+            yield _side_by_side("at rest, by noise and rounding", shown, at_rest, units)
     if found.remark is not None:
         yield found.remark
 

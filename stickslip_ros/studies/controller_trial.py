@@ -5,7 +5,7 @@ from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import ceil, hypot, inf, nan
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from stickslip_ros.physics.model.sensor import EXACT_SENSOR, Measure, Sensor
 from stickslip_ros.physics.motion import Motion, RecordedMotion
 from stickslip_ros.physics.theory.cycle_bounds import loading_time, release_position
 from stickslip_ros.physics.theory.linear_sampled_loop import SETTLED
+from stickslip_ros.quantities import Quantity
 from stickslip_ros.samples import Sample
 from stickslip_ros.stamps import NANOSECONDS
 
@@ -110,11 +111,11 @@ class Outcome:
 class Rest:
     """Motion and force that noise and rounding leave at the equilibrium; SI units."""
 
-    amplitude: float
+    amplitude: Annotated[float, Quantity("amplitude", "m")]
     """Half the range of the displacement, m."""
-    peak_force: float
+    peak_force: Annotated[float, Quantity("peak force", "N")]
     """Largest force, N."""
-    rms_force: float
+    rms_force: Annotated[float, Quantity("rms force", "N")]
     """Root mean square of the force, N."""
 
 

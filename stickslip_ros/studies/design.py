@@ -7,6 +7,7 @@ checked by simulation of the drive, sampled, held and delayed as between the nod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from math import copysign, inf, isinf, sqrt
+from typing import Annotated
 
 import numpy as np
 
@@ -21,6 +22,7 @@ from stickslip_ros.physics.theory.linear_sampled_loop import (
 )
 from stickslip_ros.physics.theory.stability_map import StabilityMap
 from stickslip_ros.progress import Progress
+from stickslip_ros.quantities import Quantity
 from stickslip_ros.scenarios.files import Scenario, parameter_file
 from stickslip_ros.scenarios.parameters import controller_node
 from stickslip_ros.studies.controller_trial import FILTER_SETTLED, Bench, Outcome, Rest, Vibration
@@ -46,19 +48,19 @@ _THROWN_SPEEDS = 3.0, 30.0, 300.0
 class Check:
     """Predicted and simulated behaviour of a proposal at one belt speed; SI units."""
 
-    belt_speed: float
+    belt_speed: Annotated[float, Quantity("belt speed", "m/s")]
     """Belt speed, m/s."""
-    vibrates: bool
+    vibrates: Annotated[bool, Quantity("vibrates")]
     """Whether the drive vibrates without control."""
     decay_rate: float
     """Decay rate of a small deviation, 1/s."""
-    predicted_settling_time: float
+    predicted_settling_time: Annotated[float, Quantity("1 % settling time, predicted", "s")]
     """Predicted 1 % settling time of a small deviation, s."""
-    settling_time: float | None
+    settling_time: Annotated[float | None, Quantity("simulated", "s")]
     """Simulated 1 % settling time of the vibration at the worst phase, s; None without it."""
-    predicted_peak_force: float
+    predicted_peak_force: Annotated[float, Quantity("peak force, predicted", "N")]
     """Predicted peak force when the control is activated at the worst phase, N."""
-    peak_force: float | None
+    peak_force: Annotated[float | None, Quantity("simulated", "N")]
     """Simulated peak force at the worst phase, N; None without vibration."""
     rest: Rest | None = None
     """Motion and force that noise and rounding leave at rest, simulated; None without them."""

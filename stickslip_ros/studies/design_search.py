@@ -5,7 +5,7 @@ from copy import copy
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from math import ceil, floor, inf, isinf, log10
-from typing import Self
+from typing import Annotated, Self
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.functions import zero_between
 from stickslip_ros.physics.model.sensor import EXACT_SENSOR, Sensor
 from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop, why_no_linear_loop
+from stickslip_ros.quantities import Quantity
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.studies.controller_trial import Vibration
 from stickslip_ros.studies.options import OWN_SPEED_RANGE
@@ -289,11 +290,11 @@ def rounded(value: float, digits: int = 3, *, up: bool = False) -> float:
 class Margins:
     """Smallest gain and delay margins of a set of stable loops."""
 
-    gain_down: float | None
+    gain_down: Annotated[float | None, Quantity("lower gain margin")]
     """Largest factor below one of the linear gain at which a loop is unstable; None: no such."""
-    gain_up: float | None
+    gain_up: Annotated[float | None, Quantity("upper gain margin")]
     """Smallest factor above one of the linear gain at which a loop is unstable; None: no such."""
-    delay: float | None
+    delay: Annotated[float | None, Quantity("delay margin", "s")]
     """Delay margin: smallest additional delay of the force at which a loop is unstable, s; None: no
     such within half a natural period, or within the range of the theory."""
 
