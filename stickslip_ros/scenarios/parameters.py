@@ -293,7 +293,7 @@ class PlantParameters(DriveConstants, NodeParameters):
         *,
         hold_late: bool = False,
         overtaken: Callable[[int, float], None] = lambda stamp, force: None,
-        advance: Callable[[float], None] | None = None,
+        advance: Callable[[float, float, float], None] | None = None,
     ) -> SampledLoop:
         """Return the sampled loop over `motion`; see `SampledLoop` for the arguments."""
         return SampledLoop(

@@ -93,7 +93,7 @@ def simulate(
     if continuous:
         return simulate_continuous(motion, law, duration, meter, progress, observer, recorder)
     tracer = None if observer is None else MotionTracer(motion, observer)
-    loop = plant.as_loop(motion, advance=None if tracer is None else tracer.advance)
+    loop = plant.as_loop(motion, advance=None if tracer is None else tracer.advance_under)
     controller = None if law is None else scenario.controller.as_controller()
     return simulate_sampled(
         loop, motion, controller, duration, meter, progress, tracer, recorder, measured

@@ -5,7 +5,7 @@ run this same loop.
 """
 
 from collections import Counter, deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from enum import StrEnum
 from fractions import Fraction
 from math import floor, isfinite
@@ -88,7 +88,7 @@ class SampledLoop:
         because a newer one came or arrived before it: the stamp (ns) of the sample that it answers,
         and the force (N).
     advance : callable, optional
-        Replaces the `advance` of `motion` (see `MotionTracer`); its argument is the duration, s.
+        Replaces the `advance_under` of `motion`, see `MotionTracer`.
 
     Examples
     --------
@@ -125,7 +125,7 @@ class SampledLoop:
         sensor: Sensor = EXACT_SENSOR,
         motor_sensor: Sensor = EXACT_SENSOR,
         overtaken: Callable[[int, float], None] = lambda stamp, force: None,
-        advance: Callable[[float], None] | None = None,
+        advance: Callable[[float, float, float], None] | None = None,
     ) -> None:
         self.period = 1.0 / rate
         """Sample period T, s."""
@@ -138,7 +138,7 @@ class SampledLoop:
         self.controller_present = expects_control
         """Whether an answer to the present sample can be expected: one came since the last gap."""
         self._motion = motion
-        self._advance = advance or motion.advance
+        self._advance = advance or motion.advance_under
         self._start = start
         # Sample period in ns, as an exact ratio.
         self._nanoseconds, self._samples = (NANOSECONDS / Fraction(rate)).as_integer_ratio()
@@ -216,7 +216,8 @@ class SampledLoop:
         int
             Stamp, ns.
         """
-        return self._start + _rounded(number * self._nanoseconds, self._samples)
+        since = number * self._nanoseconds
+        return self._start + (since if self._samples == 1 else _rounded(since, self._samples))
 
     def offer(self, stamp: int, force: float) -> Verdict:
         """Offer a force as the answer to a sample.
@@ -336,13 +337,12 @@ class SampledLoop:
         RunError
             If the motion is so stiff that it would take too many steps.
         """
-        motion, period = self._motion, self.period
-        now = 0.0
+        present, period, now = self.sample_number, self.period, 0.0
         if self._by_arrival:
             now = self._deliver()
         else:
             number, force = self._newest
-            if number != self.sample_number:
+            if number != present:
                 number, force = self._stand_in()
             if number > self._sent_number:
                 self._sent_number = number
@@ -351,30 +351,78 @@ class SampledLoop:
             else:
                 self._send(number, force)
                 now = self._deliver()
-        motion.set_forces(self._acting, self.disturbance)
-        self._advance((1.0 - now) * period)
-        drive = motion.drive
+        self._advance(self._acting, self.disturbance, (1.0 - now) * period)
+        drive = self._motion.drive
         belt_position = self.sample.belt_position + drive.belt_speed * period
         if drive.belt.pieces:
-            number = self.sample_number
-            belt_position += drive.belt.integral(number * period, (number + 1) * period)
-        self.sample_number += 1
-        self.sample = self._take_sample(belt_position)
-        return self.sample
+            belt_position += drive.belt.integral(present * period, (present + 1) * period)
+        self.sample_number = present + 1
+        self.sample = sample = self._take_sample(belt_position)
+        return sample
+
+    def run(self, answer: Callable[[Sample], float | None]) -> Iterator[float]:
+        """Answer each sample immediately and advance to the next one, without end.
+
+        The same as `offer` and `advance`, in half the time where no force is delayed and neither
+        belt nor disturbance vary. Nothing else may change the loop meanwhile.
+
+        Parameters
+        ----------
+        answer : callable
+            Returns the control force (N, finite) for a sample, or None for no answer.
+
+        Yields
+        ------
+        float
+            Control force for the sample before the present one, N; 0 for no answer.
+        """
+        motion, advance, reading, new = (
+            self._motion,
+            self._advance,
+            self._motion.reading,
+            tuple.__new__,
+        )
+        drive, period, limiter, measure = motion.drive, self.period, self._limiter, self._measure
+        start, nanoseconds, expects = self._start, self._nanoseconds, self._expects_control
+        travel = drive.belt_speed * period
+        varies = drive.belt.pieces or self._scenario_disturbance.pieces or self.asked_disturbance
+        other = self._next_drive or self._next_start or self._by_arrival or self._measure_motor
+        plain = self._immediate and self._samples == 1 and start > 0 and not (varies or other)
+        while True:
+            sample, number = self.sample, self.sample_number
+            force = answer(sample)
+            if plain and force is not None and self._sent_number == self._newest[0] == number - 1:
+                self._newest, self._sent_number = (number, force), number
+                self.controller_present = expects
+                self._acting = force if limiter is None else limiter(force)
+                advance(self._acting, self.disturbance, period)
+                self.sample_number = number = number + 1
+                position, velocity, friction_force, belt_speed, motor = reading()
+                self._true = position, velocity, motor
+                if measure is not None:
+                    position, velocity = measure(number, position, velocity)
+                stamp, belt_position = start + number * nanoseconds, sample[4] + travel
+                values = stamp, position, velocity, friction_force, belt_position, belt_speed, motor
+                self.sample = new(Sample, values)
+                self.disturbance = 0.0
+            else:
+                if force is not None:
+                    self.offer(sample.stamp, force)
+                self.advance()
+            yield 0.0 if force is None else force
 
     def _deliver(self) -> float:
         """Apply the forces that arrive in the present period; return when the newest one does.
 
         In periods from the present sample on.
         """
-        motion, under_way, number = self._motion, self._under_way, self.sample_number
+        under_way, number = self._under_way, self.sample_number
         now = 0.0
         while under_way and under_way[0][0] == number:
             _, instant, force, answered = under_way.popleft()
             self._acting_number = max(self._acting_number, answered)
             if instant > now:
-                motion.set_forces(self._acting, self.disturbance)
-                self._advance((instant - now) * self.period)
+                self._advance(self._acting, self.disturbance, (instant - now) * self.period)
                 now = instant
             self._acting = force if self._limiter is None else self._limiter(force)
         return now
@@ -402,23 +450,25 @@ class SampledLoop:
 
     def _take_sample(self, belt_position: float) -> Sample:
         motion, number = self._motion, self.sample_number
-        friction_force = motion.friction_force
+        position, velocity, friction_force, belt_speed, motor = motion.reading()
         if self._next_drive is not None:
             motion.drive, self._next_drive = self._next_drive, None
             self._limiter = motion.drive.actuator.limiter
+            position, velocity, _, belt_speed, motor = motion.reading()
         if self._next_start is not None:
             start, self._next_start = self._next_start, None
             motion.restart(*start)
             self._start_sensors()
-            friction_force = motion.friction_force
-        self.disturbance = self._scenario_disturbance.at(number * self.period)
+            position, velocity, friction_force, belt_speed, motor = motion.reading()
+        signal = self._scenario_disturbance
+        self.disturbance = signal.at(number * self.period) if signal.pieces else 0.0
         self.disturbance += self.asked_disturbance
-        stamp, belt_speed = self.stamp(number), motion.belt_speed
-        position, velocity, motor = self._true = motion.position, motion.velocity, motion.motor
+        self._true = position, velocity, motor
         if self._measure is not None:
             position, velocity = self._measure(number, position, velocity)
         if motor is not None and self._measure_motor is not None:
             motor = MotorSample(*self._measure_motor(number, *motor))
+        stamp = self.stamp(number)
         values = stamp, position, velocity, friction_force, belt_position, belt_speed, motor
         return tuple.__new__(Sample, values)  # half as long as the constructor
 

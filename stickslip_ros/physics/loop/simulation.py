@@ -13,7 +13,7 @@ from stickslip_ros.physics.measures.sample_meter import MeasuredMotion, MotionOb
 from stickslip_ros.physics.model.control import ControlLaw
 from stickslip_ros.physics.motion import Motion, RecordedMotion
 from stickslip_ros.progress import Progress
-from stickslip_ros.samples import SampleColumns
+from stickslip_ros.samples import Sample, SampleColumns
 
 _STEPS_PER_PERIOD = 60
 """Least number of steps in a natural period: a line through their ends then shows the motion."""
@@ -28,6 +28,11 @@ class MotionTracer:
         self._now = 0.0
         self._forces: list[tuple[float, float, float, float]] = []
         """Time (s) and force (N) from then on; time, and friction force (N) up to then."""
+
+    def advance_under(self, control: float, disturbance: float, duration: float) -> None:
+        """Set the forces (N), and advance; see `Motion.advance_under`."""
+        self._motion.set_forces(control, disturbance)
+        self.advance(duration)
 
     def advance(self, duration: float) -> None:
         """Advance the motion by `duration` (s), or until it is unbounded."""
@@ -49,6 +54,10 @@ class MotionTracer:
         self._observer.take_motion(motion)
         self._observer.take_control(start, force, np.ones(len(force), dtype=bool))
         self._observer.take_friction(end, friction)
+
+
+def _no_answer(sample: Sample) -> None:
+    """Answer no sample."""
 
 
 def measure_block(
@@ -132,14 +141,15 @@ def simulate_sampled(
     """
     samples = round(duration / loop.period)
     seen, forces = [loop.sample], list[float]()
-    for number in range(1, samples + 1):
-        force = 0.0 if controller is None else answer(loop, controller)
+    answers = loop.run(_no_answer if controller is None else controller.answer)
+    present = loop.true_sample, loop.sample
+    for number, force in zip(range(1, samples + 1), answers, strict=False):
         forces.append(force)
         if recorder is not None:
-            recorder.take(loop.true_sample, force, loop.sample)
-        sample = loop.advance()
+            recorder.take(present[0], force, present[1])
+            present = loop.true_sample, loop.sample
         if measured is not None:
-            seen.append(sample)
+            seen.append(loop.sample)
         if number % 1000 == 0 or number == samples or motion.unbounded:
             measure_block(motion, meter, observer)
             times = loop.period * np.arange(number - len(forces), number)

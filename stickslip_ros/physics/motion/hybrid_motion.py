@@ -9,25 +9,26 @@ import heyoka as hy
 from stickslip_ros.physics.model.hybrid import HybridSystem, Instant, Mode, Transition
 from stickslip_ros.physics.motion.compiled_flow import CompiledFlow, Detail, IntegratorPool
 from stickslip_ros.physics.motion.recurrence import Recurrence
+from stickslip_ros.physics.motion.short_step import (
+    LONGEST_STEP,
+    NO_EVENT,
+    STEPS_PER_ADVANCE,
+    ShortStep,
+    short_step,
+)
 
 STEPS_PER_UNIT = 10_000
 """Integration steps that a motion may take for each unit of time, in the long run."""
 _SPARE_STEPS = 4_000_000
 """Steps that it may take in addition: seconds of work, a thousand times the usual number."""
-_STEPS_PER_ADVANCE = 1_000
-"""Extra steps for each advance, however short: milliseconds of work."""
 _MOST_STEPS = 1e18
 """Largest number of steps that heyoka accepts."""
 _STEPS_OF_A_PHASE = 10
 """Number of steps that the work around the integration of one phase is worth."""
 
-_LONGEST_STEP = 64.0
-"""Longest step: the end of an advance shortens no step that begins earlier before it."""
-
 _DIVERGENCE = -1
 """Stands for a guard where the rates exceed any bound."""
 
-_NO_EVENT = hy.taylor_outcome.time_limit.value
 _STEP_LIMIT = hy.taylor_outcome.step_limit.value
 _NOT_FINITE = hy.taylor_outcome.err_nf_state.value
 
@@ -62,6 +63,7 @@ class HybridMotion:
         self._detail, self._watched = detail, bool(detail)
         self._integrators = IntegratorPool()
         self._flow: CompiledFlow | None = None
+        self._short_step: ShortStep | None = None
         self._begun = 0.0
         """Time of the motion, in the present advance, at which that of the integrator is zero."""
         self._instant = Instant(memoryview(array("d")), [0.0] * len(system.inputs))
@@ -99,7 +101,7 @@ class HybridMotion:
 
     def _enter(self, mode: Mode) -> None:
         """Continue in a mode."""
-        self._mode = mode
+        self._mode, self._short_step = mode, None
         if self._clocked:
             self._switch_time = self._system.next_switch_time(mode)
         prepared = self._prepared.get(mode.flow) or self._prepare(mode)
@@ -131,19 +133,27 @@ class HybridMotion:
 
     def _advance(self, duration: float) -> None:
         """Integrate over a duration; stop early if the motion becomes unbounded."""
+        step = self._short_step
+        if step is None and Detail.DERIVATIVES not in self._detail:
+            step = self._short_step = short_step(
+                self._system, self._mode, self._instant, self._flow, self._switch_time
+            )
+        if step is not None and step(duration, None):
+            self._pass_shortly(duration)
+            return
         system, instant, watched = self._system, self._instant, self._watched
         # Without `min` and further calls: each costs a twentieth of a step of the sampled loop.
         if self._steps_left > _SPARE_STEPS:
             self._steps_left = _SPARE_STEPS
         steps = STEPS_PER_UNIT * duration
-        self._steps_left += _STEPS_PER_ADVANCE + int(steps if steps < _MOST_STEPS else _MOST_STEPS)
+        self._steps_left += STEPS_PER_ADVANCE + int(steps if steps < _MOST_STEPS else _MOST_STEPS)
         mode = system.settled(self._mode, instant)
         if mode is not self._mode:
             self._enter(mode)
         epoch, now, elapsed, self._begun = instant.time, 0.0, 0.0, 0.0
         limits_steps, clocked, has_parts = system.limits_steps, self._clocked, system.has_parts
         slaves = system.slaves
-        is_long = duration > _LONGEST_STEP and not clocked
+        is_long = duration > LONGEST_STEP and not clocked
         recurrence = None
         if is_long and self.recurs and Detail.DERIVATIVES not in self._detail:
             recurrence = Recurrence()
@@ -168,15 +178,15 @@ class HybridMotion:
                     taylor.time = 0.0
                 until = end - self._begun
                 if limits_steps:
-                    longest = min(system.longest_step(instant), _LONGEST_STEP)
+                    longest = min(system.longest_step(instant), LONGEST_STEP)
                     reached = taylor.propagate_until(until, self._steps_left, longest)
                 elif is_long:
-                    reached = taylor.propagate_until(until, self._steps_left, _LONGEST_STEP)
+                    reached = taylor.propagate_until(until, self._steps_left, LONGEST_STEP)
                 else:
                     reached = taylor.propagate_until(until, self._steps_left)
                 outcome, elapsed = reached[0].value, taylor.time
                 self._steps_left -= reached[3] + _STEPS_OF_A_PHASE
-                if outcome == _NO_EVENT:
+                if outcome == NO_EVENT:
                     now = end
                 else:
                     taylor.reset_cooldowns()  # the next integration is another phase
@@ -216,13 +226,13 @@ class HybridMotion:
             if watched:
                 self._pass(mode, guard, following, now)
             if following is None:
-                self.unbounded = True
+                self.unbounded, self._short_step = True, None
                 break
             mode = following
             if recurrence is not None and recurrence.is_known(
                 mode, instant.state, elapsed, self._kept()
             ):
-                now = self._repeat(recurrence, now, duration - _LONGEST_STEP)
+                now = self._repeat(recurrence, now, duration - LONGEST_STEP)
                 mode, recurrence = self._mode, None
             else:
                 self._enter(mode)
@@ -262,6 +272,13 @@ class HybridMotion:
 
         `now` is the time since the last advance. It is not called without any detail.
         """
+
+    def _pass_shortly(self, duration: float) -> None:
+        """Take note of a short step."""
+        self._steps_left += STEPS_PER_ADVANCE  # saved for those that are not short
+        if self._watched:
+            self._begun = 0.0
+            self._pass(self._mode, None, self._mode, duration)
 
     def _overflow(self, flow: CompiledFlow) -> None:
         """End a motion whose rates are no longer finite: its cause exceeds any bound immediately.

@@ -32,9 +32,9 @@ class Told(Motion):
         super().__init__(PAPER, 0.0, 0.0)
         self.pieces: list[tuple[float, float]] = []
 
-    def advance(self, duration: float) -> None:
-        self.pieces.append((self.force, duration))
-        super().advance(duration)
+    def advance_under(self, control: float, disturbance: float, duration: float) -> None:
+        self.pieces.append((control + disturbance, duration))
+        super().advance_under(control, disturbance, duration)
 
     def begin(self) -> None:
         self.pieces.clear()
