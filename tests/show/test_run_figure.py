@@ -430,8 +430,9 @@ def test_the_mean_cycle_of_a_noisy_record_is_shown(
 ) -> None:
     """Raw samples, the fit, and the edges of the stick with their intervals."""
     history, meter = noisy_record
+    measures = meter.measures()
     history.take_analysis(RunAnalysis(meter.mean_cycle, None))
-    figure = figure_of(history, meter.measures(), None, style=STYLES["paper"])
+    figure = figure_of(history, measures, None, style=STYLES["paper"])
     assert faults(figure) == []
     (axes,) = (each for each in figure.axes if "mean cycle" in each.get_title())
     labels = [text.get_text() for text in axes.texts]

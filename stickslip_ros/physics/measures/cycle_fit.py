@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from math import inf, pi
+from math import hypot, inf, pi
 from typing import NamedTuple
 
 import numpy as np
@@ -10,6 +10,7 @@ from numpy.polynomial import chebyshev
 
 from stickslip_ros.arrays import FloatArray, IntArray
 from stickslip_ros.physics.measures.cycle_measures import LEAST_CYCLES, Cycle, CycleMeans
+from stickslip_ros.physics.measures.drift import fit_line
 from stickslip_ros.physics.measures.noise import FEW_SAMPLES, LEAST_SAMPLES
 from stickslip_ros.physics.measures.stick_fit import StickFit, fit_stick
 
@@ -30,8 +31,14 @@ _GRID = 512
 """Points of a cycle at which its extremes are looked for."""
 _PASSING_SHARE = 1.2
 """Share of the belt speed beyond which a motion has passed the belt instead of sticking."""
+_FEW_STEPS = 25.0
+"""Range, in steps of an encoder without noise, up to which stairs hide the form of the friction."""
 _WHITENING_RESIDUAL = 0.45
 """Residual, in steps of an encoder, above which there is noise that makes the rounding white."""
+_LEAST_DRIFTING, _DRIFT_ERRORS = 8, 5.0
+"""Number of cycles, and standard errors of the drift, from which a drift is taken out."""
+_DRAWS = 64
+"""Number of draws from which the error of a share of a cycle is estimated."""
 _OFFSETS = 16
 """Number of offsets of the grid of an encoder for which rounding is looked at."""
 _UNLIKE_NOISE, _UNLIKE_AMPLITUDE = 3.0, 0.05
@@ -54,6 +61,8 @@ class MeanCycle(CycleMeans):
     """Landing and departure within the cycle, s, or None without a stick."""
     edge_errors: tuple[float, float] | None
     """Their standard errors, s."""
+    stick_velocity: tuple[float, float] | None
+    """Velocity while sticking, m/s, and its standard error; None without a stick."""
 
 
 @dataclass(frozen=True)
@@ -67,8 +76,6 @@ class _Shape:
     rows: Callable[[FloatArray, int], FloatArray]
     found: FloatArray
     covariance: FloatArray
-    fastest: float | None
-    """Highest velocity, m/s, where it is known beforehand."""
 
     def value(self, phase: FloatArray, derivative: int = 0) -> FloatArray:
         return self.known(phase, derivative) + self.rows(phase, derivative) @ self.found
@@ -81,6 +88,7 @@ def fit_mean_cycle(
     starts: FloatArray,
     noise: float,
     step: float = 0.0,
+    stick_speed: float = 0.0,
 ) -> MeanCycle | None:
     """Fit the mean of cycles of equal period to samples, s and m, on a belt with a velocity, m/s.
 
@@ -89,8 +97,10 @@ def fit_mean_cycle(
     least squares, from the noise or, if larger, from the scatter of the cycles (cluster-robust).
 
     `starts` are the starts of the cycles and the end of the last, s, `noise` is the standard
-    deviation of the positions, m, and `step` that to which they are rounded, m. None where there
-    are too few samples, or where the cycles are not alike.
+    deviation of the positions, m, and `step` that to which they are rounded, m. With a
+    `stick_speed`, m/s, for friction with a memory, the slide sticks where the Fourier series has
+    at most this relative speed. None where there are too few samples, or where the cycles are not
+    alike.
     """
     count = len(starts) - 1
     if count < LEAST_CYCLES or len(time) < LEAST_SAMPLES * count:
@@ -100,23 +110,29 @@ def fit_mean_cycle(
     fold = _Fold(time - starts[0], sign * position, count, period, step)
     belt_speed = abs(belt_velocity)
     shape = fold.smooth()
+    if fold.remove_drift(shape):
+        shape = fold.smooth()
     if len(time) < FEW_SAMPLES * count and fold.phases < _LEAST_PHASES:
         return None
-    stick = fold.stick(shape, belt_speed, noise) if belt_speed > 0.0 else None
+    rigid = belt_speed > 0.0 and stick_speed == 0.0
+    stick = fold.stick(shape, belt_speed, noise) if rigid else None
     if stick is not None:
-        shape = fold.slip(stick.fit, belt_speed)
+        shape = fold.slip(stick.fit)
         fold.adjust(shape)
-        shape = fold.slip(stick.fit, belt_speed)
+        shape = fold.slip(stick.fit)
     fitted = shape.value(fold.phase)
     residual = fold.position - fitted
     spread = float(np.sqrt(np.mean(residual**2)))
     cycle, errors = _measures(shape, fold, stick, fold.period_error(shape, residual))
+    if stick_speed > 0.0:
+        share, error = _slow_share(shape, fold.period, belt_speed, stick_speed)
+        cycle, errors = replace(cycle, stick_fraction=share), replace(errors, stick_fraction=error)
     if spread > _UNLIKE_NOISE * noise + _UNLIKE_AMPLITUDE * cycle.amplitude:
         return None
     return MeanCycle(
         cycle=replace(cycle, midpoint=sign * cycle.midpoint),
         errors=errors,
-        sticks=stick is not None,
+        sticks=cycle.stick_fraction > 0.0,
         amplitudes=cycle.amplitude * fold.relative_amplitudes(shape, residual),
         noise=spread,
         phase=fold.phase,
@@ -124,12 +140,14 @@ def fit_mean_cycle(
         fitted=sign * fitted,
         edges=None if stick is None else (stick.fit.landing, stick.fit.departure),
         edge_errors=None if stick is None else stick.edge_errors,
+        stick_velocity=None if stick is None else (sign * stick.fit.belt_speed, stick.speed_error),
     )
 
 
 class _Stick(NamedTuple):
     fit: StickFit
     time_error: float
+    speed_error: float
     edge_errors: tuple[float, float]
 
 
@@ -191,12 +209,27 @@ class _Fold:
         choices = [each for each in _HARMONICS if each <= most] or [most]
         return self._linear(rows, choices, lambda phase, derivative: np.zeros(len(phase)))
 
+    def remove_drift(self, shape: _Shape) -> bool:
+        """Return whether the positions drift, after the drift is taken out of them.
+
+        The cycles would not lie on each other. It is that of what the shape leaves in each cycle.
+        """
+        residual, number = self.position - shape.value(self.phase), self.number
+        seen = np.bincount(number, minlength=self.count)
+        if self.count < _LEAST_DRIFTING or seen.min() == 0:
+            return False
+        middle = (np.arange(self.count) - (self.count - 1) / 2.0) * self.period
+        rate, error = fit_line(middle, (np.bincount(number, residual) / seen).astype(np.float64))
+        drifts = abs(rate) > _DRIFT_ERRORS * error
+        if drifts:
+            self.position = self.position - rate * (self.time - self.count * self.period / 2.0)
+        return drifts
+
     def _linear(
         self,
         rows: Callable[[FloatArray, int, int], FloatArray],
         sizes: Sequence[int],
         known: Callable[[FloatArray, int], FloatArray],
-        fastest: float | None = None,
     ) -> _Shape:
         """Return a shape that is linear in coefficients, of the size that the data ask for."""
         phase = self.phase
@@ -219,7 +252,6 @@ class _Fold:
             lambda phase, derivative: rows(phase, derivative, size),
             found.astype(np.float64),
             covariance,
-            fastest,
         )
 
     def stick(self, shape: _Shape, belt_speed: float, noise: float) -> _Stick | None:
@@ -240,32 +272,36 @@ class _Fold:
         time, number = around[used], self.number[used]
         if len(used) < 12:
             return None
-        relative = self.position[used] - belt_speed * time
-        with_stick = fit_stick(time, relative, belt_speed, frequency, guess)
+        position = self.position[used]
+        # The stairs of a few steps look like falls of the friction.
+        may_fall = (
+            noise >= self._step / 2.0 or float(np.ptp(self.position)) > _FEW_STEPS * self._step
+        )
+        with_stick = fit_stick(time, position, belt_speed, frequency, guess, may_fall=may_fall)
         covariance = _clustered(with_stick.jacobian, with_stick.residual, number)
         covariance += self._rounding(with_stick.jacobian, with_stick.residual, self.position[used])
-        middle, length = np.zeros((2, len(covariance)))
-        middle[0] = length[1] = 1.0
-        landing, departure, time_error = (
+        covariance[:3, :3] += with_stick.spread
+        middle, length, speed = np.eye(3, len(covariance))
+        landing, departure, time_error, speed_error = (
             float(np.sqrt(g @ covariance @ g))
-            for g in (middle - length / 2.0, middle + length / 2.0, length)
+            for g in (middle - length / 2.0, middle + length / 2.0, length, speed)
         )
         if with_stick.stick_time < _UNTESTED_ERRORS * time_error:
-            without = fit_stick(time, relative, belt_speed, frequency, 0.0, sticks=False)
+            without = fit_stick(time, position, with_stick.belt_speed, frequency, 0.0, sticks=False)
             variance = with_stick.squares / max(len(time) - with_stick.jacobian.shape[1], 1)
             if without.squares - with_stick.squares <= STICK_LEVEL * variance:
                 return None
         moved = replace(
             with_stick,
             centre=with_stick.centre + centre,
-            offset=with_stick.offset - belt_speed * centre,
+            offset=with_stick.offset - with_stick.belt_speed * centre,
         )
-        return _Stick(moved, time_error, (landing, departure))
+        return _Stick(moved, time_error, speed_error, (landing, departure))
 
-    def slip(self, stick: StickFit, belt_speed: float) -> _Shape:
+    def slip(self, stick: StickFit) -> _Shape:
         """Return the cycle as a stick and a slip that starts and ends at the speed of the belt."""
         length = self.period - stick.stick_time
-        drop = belt_speed * self.period
+        belt_speed, drop = stick.belt_speed, stick.belt_speed * self.period
 
         def since(phase: FloatArray) -> FloatArray:
             return (phase - stick.departure) % self.period
@@ -295,7 +331,7 @@ class _Fold:
         # With a whole number of samples per cycle the slip has few different ones.
         most = self.phases * length / self.period / 2.0
         degrees = [each for each in _DEGREES if each <= most] or _DEGREES[:1]
-        return self._linear(rows, degrees, known, belt_speed)
+        return self._linear(rows, degrees, known)
 
     def adjust(self, shape: _Shape) -> None:
         """Fit the period to what a shape leaves."""
@@ -356,9 +392,9 @@ def _measures(
     at = np.array([highest, lowest, fastest, slowest])
     positions, velocities = shape.value(at), shape.value(at, 1)
     rows, rates = shape.rows(at, 0), shape.rows(at, 1)
-    peak, peak_row = velocities[2], rates[2]
-    if shape.fastest is not None:
-        peak, peak_row = shape.fastest, np.zeros_like(rates[2])
+    peak, peak_row, peak_error = velocities[2], rates[2], 0.0
+    if stick is not None:
+        peak, peak_row, peak_error = stick.fit.belt_speed, 0.0 * rates[2], stick.speed_error
 
     def error(gradient: FloatArray) -> float:
         return float(np.sqrt(gradient @ shape.covariance @ gradient))
@@ -373,13 +409,32 @@ def _measures(
     )
     errors = Cycle(
         amplitude=error((rows[0] - rows[1]) / 2.0),
-        velocity_amplitude=error((peak_row - rates[3]) / 2.0),
+        velocity_amplitude=hypot(error((peak_row - rates[3]) / 2.0), peak_error / 2.0),
         midpoint=error((rows[0] + rows[1]) / 2.0),
         period=period_error,
         frequency=period_error / period**2,
         stick_fraction=0.0 if stick is None else stick.time_error / period,
     )
     return cycle, errors
+
+
+def _slow_share(
+    series: _Shape, period: float, belt_speed: float, stick_speed: float
+) -> tuple[float, float]:
+    """Return the share of a cycle with at most this relative speed, m/s, and its standard error.
+
+    The error is that of draws of the coefficients from their covariance, and the time that a
+    Fourier series resolves, half a period of its last term.
+    """
+    grid, random = np.linspace(0.0, period, 8 * _GRID, endpoint=False), np.random.default_rng(0)
+    draws = random.multivariate_normal(
+        0.0 * series.found, series.covariance, _DRAWS, check_valid="ignore", method="eigh"
+    )
+    relative = series.value(grid, 1) - belt_speed
+    drawn = np.abs(relative + draws @ series.rows(grid, 1).T) <= stick_speed
+    share = float(np.mean(np.abs(relative) <= stick_speed))
+    scatter = float(np.sqrt(np.mean((drawn.mean(axis=1) - share) ** 2)))
+    return share, hypot(scatter, 1.0 / (len(series.found) - 1)) if share else scatter
 
 
 def _refined(grid: FloatArray, values: FloatArray) -> float:

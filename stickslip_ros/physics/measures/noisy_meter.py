@@ -122,6 +122,8 @@ class NoisyCycleMeter:
         """Step of the positions, m, that they are multiples of; 0 as long as none is found."""
         self.within = 0.0
         """Range, m, in which a slide is held as far as its actuator can."""
+        self.stick_speed = 0.0
+        """Relative speed, m/s, up to which a slide sticks whose friction has a memory."""
         self.ends: list[float] = []
         """Time, s, at which each cycle ended that `feed` returned last."""
         self._count = 0
@@ -245,7 +247,13 @@ class NoisyCycleMeter:
             return None
         with np.errstate(over="ignore", invalid="ignore"):  # squares of very large positions
             return fit_mean_cycle(
-                part.time, part.position, belt, np.array(starts), self.noise, self.step
+                part.time,
+                part.position,
+                belt,
+                np.array(starts),
+                self.noise,
+                self.step,
+                self.stick_speed,
             )
 
     @property

@@ -33,9 +33,13 @@ from stickslip_ros.physics.model.friction import LAWS
 from stickslip_ros.physics.model.sensor import Sensor
 from stickslip_ros.samples import SampleColumns
 from stickslip_ros.stamps import NANOSECONDS
+from stickslip_ros.text import quantity
 
 _LASTING_SAMPLES = 4
 """Number of fast samples in one direction that are no impulse of a noisy record."""
+_LEAST_ERRORS, _LEAST_SHARE = 4.0, 1e-3
+"""Difference between the velocities of stick and belt, in standard errors and in belt speeds, above
+which they disagree."""
 
 
 class SampleAssumptions(NamedTuple):
@@ -181,6 +185,8 @@ class SampleMeter:
         """Number of samples so far."""
         self.steps_back = 0
         """Number of samples whose stamp is not later than the previous one."""
+        self.mean_cycle: MeanCycle | None = None
+        """Fit of the last `measures`; None for exact samples and cycles that are not alike."""
         self._observer = observer
         self._grid = SamplingGrid()
         self._meter = CycleMeter(window)
@@ -251,11 +257,6 @@ class SampleMeter:
         """Number of samples that are held for the fits under noise."""
         return self._noisy_meter.held
 
-    @property
-    def mean_cycle(self) -> MeanCycle | None:
-        """Fit of the cycles under noise; None for exact samples and cycles that are not alike."""
-        return self._noisy_meter.measures()[1] if self.noisy else None
-
     def measures(self, *, quick: bool = False) -> Measures:
         """Return the means over the last whole cycles.
 
@@ -269,12 +270,14 @@ class SampleMeter:
         self._meter.unbounded = unbounded
         self._meter.within = self._noisy_meter.within = self.reading.within
         few = not self.noisy and self._per_cycle < FEW_SAMPLES and self._noisy_meter.line
+        self._noisy_meter.stick_speed = self._stick_speed
+        self.mean_cycle = None
         if unbounded or not (self.noisy or few):
             found = self._meter.measures()
         elif few and self._per_cycle < LEAST_SAMPLES:
             found = without_cycles(None, Regime.UNDERSAMPLED)
         else:
-            found = self._noisy_meter.measures(quick=quick)[0]
+            found, self.mean_cycle = self._noisy_meter.measures(quick=quick)
         self.drift.resolution = self._noisy_meter.step
         self.drift.judged = not (self.reading.varies or self._belt_varies)
         return with_drift(found, self.drift)
@@ -294,6 +297,16 @@ class SampleMeter:
                 f"the amplitude is only {measures.amplitude / step:.2g} steps of the encoder: the "
                 "standard errors are not known"
             )
+        mean, belt = self.mean_cycle, self._last.belt_velocity[-1] if self._last else 0.0
+        if mean is not None and mean.stick_velocity is not None and not self._stick_speed:
+            velocity, error = mean.stick_velocity
+            if abs(velocity - belt) > _LEAST_ERRORS * error + _LEAST_SHARE * abs(belt):
+                notes.append(
+                    f"the slide sticks at {quantity(velocity, 'm/s')} (standard error "
+                    f"{quantity(error, 'm/s')}), not at the speed of the belt, "
+                    f"{quantity(belt, 'm/s')}: one of them has another scale, or the positions "
+                    "drift; the stick is that at the former"
+                )
         return notes if self.drift.judged else [*notes, NOT_JUDGED]
 
     def _feed_segment(self, samples: SampleColumns, jittered: bool) -> list[Cycle]:
@@ -302,6 +315,8 @@ class SampleMeter:
         self._elapsed += int(stamp[-1] - stamp[0])
         new, belt = slice(0 if self._last is None else 1, None), samples.belt_velocity
         self.drift.position.feed(time[new], samples.position[new])
+        slip = np.abs(samples.velocity - belt)
+        self._fastest_slip = max(self._fastest_slip, float(slip.max()))
         given, breakpoints, cycles = self.reading.noisy, None, list[Cycle]()
         if not given or self._observer is not None:
             with np.errstate(over="ignore", invalid="ignore"):
@@ -310,7 +325,7 @@ class SampleMeter:
                     samples.position,
                     samples.velocity,
                     belt,
-                    stick_speed=self._present_stick_speed(samples),
+                    stick_speed=self._stick_speed,
                     exact_times=not jittered,
                 )
             if self._last is not None:
@@ -341,12 +356,10 @@ class SampleMeter:
             )
         return cycles
 
-    def _present_stick_speed(self, samples: SampleColumns) -> float:
-        if self.reading.stick_speed is not None:
-            return self.reading.stick_speed
-        slip = np.abs(samples.velocity - samples.belt_velocity)
-        self._fastest_slip = max(self._fastest_slip, float(slip.max()))
-        return STICK_SHARE * (self._fastest_belt or self._fastest_slip)
+    @property
+    def _stick_speed(self) -> float:
+        given = self.reading.stick_speed
+        return STICK_SHARE * (self._fastest_belt or self._fastest_slip) if given is None else given
 
     def _look_for_unbounded(self, samples: SampleColumns) -> None:
         belt_speed = np.abs(samples.belt_velocity)

@@ -153,6 +153,49 @@ def test_a_belt_that_moves_backward_gives_the_same() -> None:
     assert measures.midpoint == pytest.approx(-326.3e-6, rel=1e-3)
 
 
+@pytest.mark.parametrize(("told", "drift"), [(0.1, 0.0), (-0.03, 0.0), (0.0, 2e-4)])
+def test_a_belt_speed_that_is_told_wrong_and_a_drift_leave_the_stick(
+    told: float, drift: float
+) -> None:
+    """The stick has its own speed, in the scale of the positions: the note says where it differs.
+
+    The drift, m/s, is found from the cycles, and taken out of them.
+    """
+    record = samples(noise=1e-6)
+    record = replace(
+        record,
+        position=record.position + drift * np.arange(2000) * 1e-3,
+        belt_velocity=(1.0 + told) * record.belt_velocity,
+    )
+    meter = fed(record, NOISY)
+    found = meter.measures()
+    assert found.regime is Regime.STICK_SLIP
+    assert found.stick_fraction == pytest.approx(
+        0.10006, abs=3.0 * found.errors["stick_fraction"] + 1e-5
+    )
+    assert found.errors["stick_fraction"] < 0.005
+    assert found.amplitude == pytest.approx(434.09e-6, rel=1e-3)
+    velocity, error = meter.mean_cycle.stick_velocity
+    assert velocity == pytest.approx(0.04, abs=4.0 * error)
+    assert any("the slide sticks at" in note for note in meter.notes(found)) == (told != 0.0)
+    assert (found.drift is not None) == (drift != 0.0)
+
+
+def test_friction_with_a_memory_sticks_below_the_stick_speed_under_noise_as_without() -> None:
+    """An overshoot of 2 % of the belt speed is in the band of 1 % where it passes it."""
+    time = np.arange(2000) * 1e-3
+    position = 0.0408 / 100.0 * np.sin(100.0 * time)
+    noise = 1e-7 * np.random.default_rng(0).standard_normal(2000)
+    exact = columns(milliseconds(2000), position, 0.0408 * np.cos(100.0 * time))
+    reading = SampleAssumptions(0.0004, noisy=True)
+    found = measured(replace(exact, position=position + noise), reading)
+    true = measured(exact, SampleAssumptions(0.0004))
+    share = (np.arccos(0.99 / 1.02) - np.arccos(1.01 / 1.02)) / np.pi
+    assert true.stick_fraction == pytest.approx(share, rel=0.02)
+    assert found.stick_fraction == pytest.approx(share, rel=0.05)
+    assert found.regime is true.regime is Regime.STICK_SLIP
+
+
 def test_lost_samples_and_impulses_change_little() -> None:
     """A twentieth of the samples is lost, and every hundredth is far off."""
     record = samples(noise=1e-6, count=3000)
