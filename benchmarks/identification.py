@@ -38,6 +38,7 @@ from stickslip_ros.physics.model.friction import (
     FrictionLaw,
     LuGre,
     RateState,
+    Stiction,
     Stribeck,
 )
 from stickslip_ros.physics.model.signals import table
@@ -50,6 +51,7 @@ LAWS: dict[str, FrictionLaw] = {
     "stribeck": Stribeck(static=0.4037, minimum=0.2519, minimum_speed=0.0507),
     "exponential": _CURVE,
     "coulomb": Coulomb(static=0.3029, viscous=0.807),
+    "stiction": Stiction(static=0.4037, kinetic=0.2519, viscous=0.507),
     "lugre": LuGre(_CURVE, bristle_stiffness=2e4, bristle_damping=1.0),
     "rate_state": RateState(
         kinetic=0.3037, direct_effect=0.0103, evolution_effect=0.0211, slip_distance=2e-5

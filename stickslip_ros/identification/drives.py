@@ -229,7 +229,8 @@ class DriveTask:
     ) -> Refinement:
         """Return the best search; errors that are noise, or a larger loss than `most`, end it."""
         short = self._trajectories(law, _SHORT_SEGMENT * self.period)
-        names = [*self.free, *(name for name in law.coordinates if name not in self.friction)]
+        names = [*self.free, *law.coordinates]
+        names = [name for name in names if name not in (*self.friction, *law.optional)]
         tried: list[Refinement] = []
         for values in starts:
             tried.append(refine(short, names, self._known(law, values), most=_FIRST_STEPS))
@@ -261,8 +262,8 @@ class DriveTask:
 
         They must take away a share of the squared error, and differ clearly from zero.
         """
-        for name in OPTIONAL:
-            if name in self.fixed or name in fit.free:
+        for name in (*OPTIONAL, *fit.law.optional):
+            if name in self.fixed or name in self.friction or name in fit.free:
                 continue
             errors, share = fit.gain(name)
             clear = _LAG_GAIN if name == LAG and DELAY in fit.free else _CLEAR_GAIN

@@ -388,7 +388,7 @@ def _untold(found: Findings) -> dict[str, str]:
             )
         elif found.chosen.by_direction:
             why["bias_force"] = _BY_DIRECTION
-        if not found.stuck and found.law not in ("coulomb", "dahl"):
+        if not found.stuck and found.law not in ("coulomb", "stiction", "dahl"):
             why["friction.static"] = (
                 f"no record shows sticking: it is the curve extended to rest; {slower}"
             )

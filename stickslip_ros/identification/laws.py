@@ -39,8 +39,11 @@ _LEAST_FRICTION = 0.01
 _RISE_SHARE = 0.3
 """Rise of static friction from which the search starts, as a share of the kinetic one: bristles
 may hide it."""
-_RISE_SHARES = (0.05, 0.2, 0.5)
-"""Rises of static friction from which a law with stiction is searched, as shares of it."""
+_RISE_SHARES, _LARGEST_RISE = (0.05, 0.3, 1.0), 3.0
+"""Rises of static friction from which a law with stiction is searched, in kinetic ones, and the
+largest one, in static ones at the start."""
+_EXPONENTS = 1.0, 5.0
+"""Exponents of a decay that are searched."""
 _STIFFNESS_RATIOS = (10.0, 100.0)
 """Stiffnesses of bristles from which the search starts, in stiffnesses of the spring."""
 _DAMPING_RATIO = 0.03
@@ -89,6 +92,8 @@ class IdentifiedLaw(ABC):
     """Coordinates of the memory of the law."""
     of_slip: bool = True
     """Whether friction in slip tells all constants."""
+    optional: Sequence[str] = ()
+    """Coordinates that are fitted only if the records ask for them."""
     by_differences: Sequence[str] = ()
     """Coordinates on which the motion depends other than by its equations."""
     straightened: Mapping[str, tuple[float, float] | None] = {}
@@ -255,11 +260,13 @@ class StictionAdapter(CoulombAdapter):
 
     @override
     def starts(self, values: Values, fastest: float) -> Sequence[Values]:
-        static = self.static_force(values)
-        return [
-            {**values, "kinetic": (1.0 - share) * static, "rise": share * static}
-            for share in _RISE_SHARES
-        ]
+        return [{**values, "rise": share * values["kinetic"]} for share in _RISE_SHARES]
+
+    @override
+    def bounds(self, name: str, values: Values, fastest: float) -> tuple[float, float]:
+        if name == "rise":  # a slide that never breaks loose tells nothing
+            return 0.0, _LARGEST_RISE * self.static_force(values)
+        return super().bounds(name, values, fastest)
 
 
 class DahlAdapter(CoulombAdapter):
@@ -302,19 +309,23 @@ class StribeckAdapter(IdentifiedLaw):
 
 
 class ExponentialAdapter(IdentifiedLaw):
-    """F = F_k + D exp(-w/v_s) + F_v w; the viscous force may be negative.
+    """F = F_k + D exp(-(w/v_s)^n) + F_v w; the viscous force may be negative.
 
-    Records that hardly tell the decay speed from viscous friction have a long curved valley of good
-    fits. It is straight where friction is given by forces: in the search `kinetic` is replaced by
-    that at the fastest speed, m/s, `viscous` by that at rest, and `rise` by how far the force at a
-    third of the fastest speed is below the straight line between them.
+    A regression has the exponent n = 1. Records that hardly tell the decay speed from viscous
+    friction have a long curved valley of good fits. It is straight where friction is given by
+    forces: in the search `kinetic` is replaced by that at the fastest speed, m/s, `viscous` by that
+    at rest, and `rise` by how far the force at a third of the fastest speed is below the straight
+    line between them.
     """
 
     name = "exponential"
     least = 0.0, 0.0, -np.inf
     shaped = True
-    coordinates: Sequence[str] = ("kinetic", "rise", "decay_speed", "viscous")
-    unscaled: Sequence[str] = ("decay_speed",)
+    coordinates: Sequence[str] = ("kinetic", "rise", "decay_speed", "viscous", "exponent")
+    unscaled: Sequence[str] = ("decay_speed", "exponent")
+    optional = ("exponent",)
+    # An exponent that is a whole number makes other equations.
+    by_differences: Sequence[str] = ("exponent",)
     smallest = "kinetic"
     straightened: Mapping[str, tuple[float, float] | None] = {
         "kinetic": (-inf, inf),
@@ -330,22 +341,34 @@ class ExponentialAdapter(IdentifiedLaw):
     @override
     def coordinates_of(self, forces: Sequence[float], shape: float) -> dict[str, float]:
         kinetic, drop, viscous = forces
-        return {"kinetic": kinetic, "rise": drop, "decay_speed": shape, "viscous": viscous}
+        return {
+            "kinetic": kinetic,
+            "rise": drop,
+            "decay_speed": shape,
+            "viscous": viscous,
+            "exponent": 1.0,
+        }
+
+    @override
+    def starts(self, values: Values, fastest: float) -> Sequence[Values]:
+        return [values, {**values, "exponent": 2.0}]
+
+    @override
+    def bounds(self, name: str, values: Values, fastest: float) -> tuple[float, float]:
+        return _EXPONENTS if name == "exponent" else super().bounds(name, values, fastest)
 
     @override
     def to_search(self, values: Values, fastest: float) -> dict[str, float]:
-        decay = values["decay_speed"]
-        sag = values["rise"] * _sag(decay, fastest / 3.0, fastest)
-        end = values["kinetic"] + values["rise"] * exp(-fastest / decay)
+        sag = values["rise"] * _sag(values, fastest)
+        end = values["kinetic"] + values["rise"] * _decay(values, fastest)
         end += values["viscous"] * fastest
         return {**values, "viscous": self.static_force(values), "kinetic": end, "rise": sag}
 
     @override
     def from_search(self, found: Values, fastest: float) -> dict[str, float]:
-        decay = found["decay_speed"]
-        rise = found["rise"] / _sag(decay, fastest / 3.0, fastest)
+        rise = found["rise"] / _sag(found, fastest)
         kinetic = found["viscous"] - rise
-        viscous = (found["kinetic"] - kinetic - rise * exp(-fastest / decay)) / fastest
+        viscous = (found["kinetic"] - kinetic - rise * _decay(found, fastest)) / fastest
         return {**found, "viscous": viscous, "kinetic": kinetic, "rise": rise}
 
 
@@ -453,7 +476,8 @@ class BristleAdapter(ExponentialAdapter):
     def __init__(
         self, name: str, memory: Sequence[str], by_differences: Sequence[str] = ()
     ) -> None:
-        self.name, self.memory, self.by_differences = name, memory, by_differences
+        self.name, self.memory = name, memory
+        self.by_differences = (*ExponentialAdapter.by_differences, *by_differences)
         self.coordinates = (*ExponentialAdapter.coordinates, *memory)
 
     @override
@@ -548,9 +572,9 @@ class DirectionalAdapter(_DerivedAdapter):
     def __init__(self, own: IdentifiedLaw) -> None:
         """Take the adapter of each direction."""
         super().__init__(own)
-        self.coordinates, self.by_differences, self.unscaled = (
+        self.coordinates, self.optional, self.by_differences, self.unscaled = (
             [*names, *(REVERSE + name for name in names)]
-            for names in (own.coordinates, own.by_differences, own.unscaled)
+            for names in (own.coordinates, own.optional, own.by_differences, own.unscaled)
         )
 
     @override
@@ -620,10 +644,14 @@ def _by_direction(values: Values) -> tuple[Values, Values]:
     return values, {**values, **reverse}
 
 
-def _sag(decay: float, middle: float, fastest: float) -> float:
-    """Return how far exp(-w/decay) is below its chord from rest to the fastest speed."""
-    chord = 1.0 + (exp(-fastest / decay) - 1.0) * middle / fastest
-    return chord - exp(-middle / decay)
+def _decay(values: Values, speed: float) -> float:
+    """Return exp(-(w/v_s)^n) at a speed."""
+    return exp(-((speed / values["decay_speed"]) ** values["exponent"]))
+
+
+def _sag(values: Values, fastest: float) -> float:
+    """Return how far it is below its chord from rest to the fastest speed, at a third of that."""
+    return 1.0 + (_decay(values, fastest) - 1.0) / 3.0 - _decay(values, fastest / 3.0)
 
 
 EXPONENTIAL = ExponentialAdapter()

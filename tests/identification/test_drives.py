@@ -90,6 +90,38 @@ def test_a_disturbance_is_not_late() -> None:
     assert late == pytest.approx(known, abs=1e-12)
 
 
+def test_static_above_kinetic_friction_is_recovered() -> None:
+    """A slide that never sticks tells no static friction."""
+    fixed = {"normal_force": study.NORMAL_FORCE, "mass": study.MASS}
+    found, moving = (
+        identify([study.record("stiction", kind, 1, 2.0)], "stiction", fixed)
+        for kind in ("ramp", "stick")
+    )
+    true = study.truth("stiction", "ramp")
+    for name, each in found.fitted.items():
+        assert abs(each.value - true[name]) < _FAR * each.standard_error, name
+    assert found.fitted["friction.static"].standard_error < 1e-3
+    assert "fit alike" in moving.unidentified["friction.static"]
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("exponent", "fixed"), [(1.5, False), (2.0, False), (2.0, True)])
+def test_the_exponent_of_a_decay(
+    exponent: float, fixed: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of 1 and 2 the better one is taken; others are fitted."""
+    law = replace(study.LAWS["exponential"], exponent=exponent)
+    monkeypatch.setitem(study.LAWS, "exponential", law)
+    known = {"normal_force": study.NORMAL_FORCE, "mass": study.MASS}
+    known |= {"friction.exponent": exponent} if fixed else {}
+    found = identify([study.record("exponential", "stick", 0, 2.5)], "exponential", known)
+    assert found.drive.friction.exponent == pytest.approx(exponent, abs=0.1)
+    assert ("friction.exponent" in found.fitted) == (exponent == 1.5)
+    true = study.truth("exponential", "stick")
+    for name, each in found.fitted.items():
+        assert abs(each.value - true[name]) < _FAR * each.standard_error, name
+
+
 def test_rate_and_state_friction_is_recovered() -> None:
     own = study.record("rate_state", "ramp", seed=0, duration=2.5)
     found = identify([own], "rate_state", {"normal_force": study.NORMAL_FORCE})
