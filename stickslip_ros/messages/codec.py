@@ -301,44 +301,14 @@ def _unpackable(kind: str, stamp: int, error: struct.error) -> MessageError:
 
 def joint_state_layout(data: bytes) -> Layout:
     """Return where a joint state has what `unpack_joint_state` reads; raises MessageError."""
-    message = Decoder(data, "joint state")
-    stamp = message.header_stamp()
-    names = _joints(message, "joint state")
-    shown = reprlib.repr(names)
-    (position, positions), (velocity, velocities), (effort, efforts) = (
-        message.doubles(message.count()) for _ in range(3)
-    )
-    missing = [joint for joint in (SLIDE, BELT) if joint not in names]
-    if missing:
-        raise MessageError(
-            f"a joint state names the joints {shown}; {' and '.join(missing)} must be among them"
-        )
-    if (positions, velocities, efforts or len(names)) != (len(names),) * 3:
-        raise MessageError(
-            f"a joint state of the joints {shown} has {positions} positions, {velocities} "
-            f"velocities and {efforts} efforts; must be one for each joint, or no efforts"
-        )
-    slide, belt = 8 * names.index(SLIDE), 8 * names.index(BELT)
-    motor = 8 * names.index(MOTOR) if MOTOR in names else None
-    return Layout(
-        message,
-        stamp,
-        [
-            position + slide,
-            velocity + slide,
-            effort + slide if efforts else None,
-            position + belt,
-            velocity + belt,
-            *(None if motor is None else each + motor for each in (position, velocity)),
-        ],
-    )
+    joints = _Joints(data, "joint state", SLIDE, BELT)
+    joints.check_counts(always=2)
+    return joints.layout(SLIDE, BELT, MOTOR)
 
 
 def joint_names(data: bytes) -> list[str]:
     """Return the names of the joints in a serialized joint state; raises MessageError."""
-    message = Decoder(data, "joint state")
-    message.header_stamp()
-    return _joints(message, "joint state")
+    return _Joints(data, "joint state").names
 
 
 def joint_layout(data: bytes, joint: str, belt: str | None) -> Layout:
@@ -346,51 +316,61 @@ def joint_layout(data: bytes, joint: str, belt: str | None) -> Layout:
 
     What a message lacks is missing: each sequence may be empty, and a joint not among the names.
     """
-    message = Decoder(data, "joint state")
-    stamp = message.header_stamp()
-    names = _joints(message, "joint state")
-    sequences = [message.doubles(message.count()) for _ in range(3)]
-    counts = [count for _, count in sequences]
-    if not {*counts} <= {0, len(names)}:
-        raise MessageError(
-            f"a joint state of the joints {reprlib.repr(names)} has {counts[0]} positions, "
-            f"{counts[1]} velocities and {counts[2]} efforts; must be one for each joint, or none"
-        )
-
-    def place(sequence: tuple[int, int], name: str | None) -> int | None:
-        start, count = sequence
-        return start + 8 * names.index(name) if count and name in names else None
-
-    own = [place(each, joint) for each in sequences]
-    belts = [place(each, belt) for each in sequences[:2]]
-    return Layout(message, stamp, [*own, *belts, None, None])
+    joints = _Joints(data, "joint state")
+    joints.check_counts()
+    return joints.layout(joint, belt, None)
 
 
 def _reference_layout(data: bytes) -> Layout:
-    message = Decoder(data, "reference")
-    stamp = message.header_stamp()
-    names = _joints(message, "reference")
-    shown = reprlib.repr(names)
-    if SLIDE not in names:
-        raise MessageError(f"a reference names the joints {shown}; {SLIDE} must be among them")
-    slide = 8 * names.index(SLIDE)
-    places: list[int | None] = []
-    for what in ("positions", "velocities"):
-        place, count = message.doubles(message.count())
-        if count not in (0, len(names)):
+    joints = _Joints(data, "reference", SLIDE)
+    joints.check_counts(fields=2)
+    return joints.layout(SLIDE)
+
+
+class _Joints:
+    """The joints in a serialized JointState, and where it has what of them."""
+
+    def __init__(self, data: bytes, kind: str, *needed: str) -> None:
+        """Raise MessageError for other bytes, and if a joint is needed and not there."""
+        self._message = message = Decoder(data, kind)
+        self._kind, self._stamp = kind, message.header_stamp()
+        number = message.count()
+        if number > _MOST_JOINTS:
+            raise MessageError(f"a {kind} has {number} joints; must be at most {_MOST_JOINTS}")
+        self.names = [message.string() for _ in range(number)]
+        self.sequences = [message.doubles(message.count()) for _ in range(3)]
+        """Where the positions, velocities and efforts are, and their counts."""
+        missing = " and ".join(joint for joint in needed if joint not in self.names)
+        if missing:
             raise MessageError(
-                f"a reference of the joints {shown} has {count} {what}; must be one for each "
-                "joint, or none"
+                f"a {kind} names the joints {reprlib.repr(self.names)}; {missing} must be among "
+                "them"
             )
-        places.append(place + slide if count else None)
-    return Layout(message, stamp, places)
 
+    def check_counts(self, fields: int = 3, always: int = 0) -> None:
+        """Refuse other numbers than one for each joint or, but for the first fields, none."""
+        counts, number = [count for _, count in self.sequences], len(self.names)
+        if {*counts[:always]} <= {number} and {*counts[:fields]} <= {0, number}:
+            return
+        raise MessageError(
+            f"a {self._kind} of the joints {reprlib.repr(self.names)} has {counts[0]} positions, "
+            f"{counts[1]} velocities and {counts[2]} efforts; must be one for each joint, or "
+            f"{'no efforts' if always else 'none'}"
+        )
 
-def _joints(message: Decoder, kind: str) -> list[str]:
-    joints = message.count()
-    if joints > _MOST_JOINTS:
-        raise MessageError(f"a {kind} has {joints} joints; must be at most {_MOST_JOINTS}")
-    return [message.string() for _ in range(joints)]
+    def place(self, field: int, joint: str | None) -> int | None:
+        """Return where the position (0), velocity (1) or effort (2) of a joint is."""
+        start, count = self.sequences[field]
+        return start + 8 * self.names.index(joint) if count and joint in self.names else None
+
+    def layout(self, joint: str, *others: str | None) -> Layout:
+        """Return position, velocity and effort of a joint, and of others the first two."""
+        places = [self.place(field, joint) for field in range(3)]
+        return self.layout_of(*places, *(self.place(n, each) for each in others for n in (0, 1)))
+
+    def layout_of(self, *places: int | None) -> Layout:
+        """Return the layout of places."""
+        return Layout(self._message, self._stamp, places)
 
 
 def _wrench_layout(data: bytes) -> Layout:
@@ -423,19 +403,17 @@ def _array_layout(data: bytes, number: int | None) -> Layout:
 
 
 def _command_layout(data: bytes, joint: str | None) -> Layout:
-    message = Decoder(data, "joint command")
-    stamp = message.header_stamp()
-    names = _joints(message, "joint command")
-    _, _, (start, efforts) = [message.doubles(message.count()) for _ in range(3)]
+    joints = _Joints(data, "joint command")
+    names, (start, efforts) = joints.names, joints.sequences[2]
     name = joint or (SLIDE if SLIDE in names or len(names) != 1 else names[0])
     if joint is None and efforts == len(names) and name not in names:
         raise BagError(
             f"joint commands have efforts of {reprlib.repr(names)}: --joint must choose one"
         )
     if efforts == len(names):
-        return Layout(message, stamp, [start + 8 * names.index(name) if name in names else None])
+        return joints.layout_of(joints.place(2, name))
     if efforts == 1:  # joints without an effort interface have none
-        return Layout(message, stamp, [start])
+        return joints.layout_of(start)
     raise MessageError(
         f"a joint command of the joints {reprlib.repr(names)} has {efforts} efforts; must be one, "
         "or one for each joint"
