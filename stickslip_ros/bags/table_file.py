@@ -162,6 +162,7 @@ def _recording(path: Path, found: Quantities) -> TableRecording:
         values.get("friction_force", unknown),
         unknown,
         values.get("belt_velocity", rest),
+        *(unknown, unknown),
     )
     if not samples.is_valid.any():
         empty = [name for name, value in values.items() if not np.isfinite(value[present]).any()]

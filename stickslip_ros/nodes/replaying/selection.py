@@ -100,20 +100,22 @@ class Selection:
             return
         states, forces = self._types
         for block in recording.blocks():
-            motion, control = (
-                [column.tolist() for column in vars(table).values()]
-                for table in (block.joint_states, block.control_forces)
-            )
+            own, control = block.joint_states, block.control_forces
+            motion = own.stamp, own.position, own.velocity, own.belt_position, own.belt_velocity
             messages: list[Message] = []
             if states in topics:
                 messages += [
                     (states, stamp, pack_joint_state(stamp, (x, belt), (v, belt_v), (nan, nan)))
-                    for stamp, x, v, _, belt, belt_v in zip(*motion, strict=True)
+                    for stamp, x, v, belt, belt_v in zip(
+                        *(each.tolist() for each in motion), strict=True
+                    )
                 ]
             if forces in topics:
                 messages += [
                     (forces, stamp, pack_wrench(stamp, force))
-                    for stamp, force in zip(*control, strict=True)
+                    for stamp, force in zip(
+                        control.stamp.tolist(), control.force.tolist(), strict=True
+                    )
                 ]
             yield from sorted(messages, key=itemgetter(1))
 
