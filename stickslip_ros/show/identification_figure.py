@@ -39,13 +39,11 @@ def identification_figure(
     spring; and the run without feedback beside the measured positions, with their difference.
     """
     figure = style.figure(10.0, 9.0, narrow=2.6)
-    narrow = style.narrow
-    grid = figure.add_gridspec(5, 1) if narrow else figure.add_gridspec(3, 2)
-    first, *residuals, last = (
-        [grid[row, 0] for row in range(5)]
-        if narrow
-        else [grid[0, :], grid[1, 0], grid[1, 1], grid[2, 0], grid[2, 1]]
-    )
+    if style.narrow:  # the last one has two panels
+        first, *residuals, last = figure.add_gridspec(5, 1, height_ratios=(*[1.0] * 4, 1.8))
+    else:
+        grid = figure.add_gridspec(3, 2)
+        first, *residuals, last = grid[0, :], grid[1, 0], grid[1, 1], grid[2, 0], grid[2, 1]
     _friction(figure.add_subplot(first), found, units)
     left = found.residuals()
     quantity, error_unit = ("position", "m") if found.has_spring else ("force", "N")
@@ -59,7 +57,7 @@ def identification_figure(
         strict=True,
     ):
         _residuals(figure.add_subplot(place), (values, name, unit), errors, units)
-    _free_run(figure, last, found, units)
+    _free_run(figure, last, found, units, short=style.printed)
     names = ", ".join(dict.fromkeys(Path(record.name).name for record in found.records))
     error = f"{100.0 * found.chosen.error:.4g} %"
     title = f"Identified drive, {names}: law {found.chosen.label}, validation error {error}"
@@ -149,14 +147,15 @@ def _residuals(
     axes.set_title(f"residuals over {name}")
 
 
-def _free_run(figure: Figure, place: Any, found: Findings, units: Units) -> None:
+def _free_run(figure: Figure, place: Any, found: Findings, units: Units, *, short: bool) -> None:
     record = found.records[0]
     time = record.period * np.arange(len(record.position))
     run = found.free_run(record)
     below = place.subgridspec(2, 1, height_ratios=(2.0, 1.0))
     upper = figure.add_subplot(below[0])
     lower = figure.add_subplot(below[1], sharex=upper)
-    scale, label = units.axis(units.named("displacement"), "m", record.position)
+    name = units.named("displacement", short=short)
+    scale, label = units.axis(name, "m", record.position)
     upper.plot(time, record.position / scale, color=BLUE)
     upper.plot(time, run / scale, color=ORANGE, ls="--")
     upper.set_ylabel(label)
