@@ -26,6 +26,7 @@ from stickslip_ros.paper.figures import (
 )
 from stickslip_ros.physics.measures.breakpoints import Breakpoints
 from stickslip_ros.show.quantities import Units, typeset
+from stickslip_ros.show.study_figure import draw_section, regime_handles
 from stickslip_ros.show.style import (
     BLUE,
     DASHES,
@@ -80,18 +81,9 @@ def _bifurcation(figure: BifurcationFigure, *, style: FigureStyle) -> Figure:
     drawn = style.figure(8.0, 5.5, narrow=1.25)
     style.set_title(drawn, *figure.title.split(": "))
     above, below = drawn.subplots(2, 1, sharex=True, height_ratios=(3.0, 1.0))
-    handles: list[Artist] = []
-    for regime, look in REGIMES.items():
-        points = [
-            (value, position)
-            for value, motion in zip(figure.values, figure.settled, strict=True)
-            if motion.measures.regime is regime
-            for position in motion.turning_points
-        ]
-        if points:
-            marker: Any = {"marker": look.marker, "color": look.colour, "ls": "", "mew": 0.0}
-            above.plot(*zip(*points, strict=True), **marker, ms=1.8)
-            handles.append(Line2D([], [], **marker, ms=5.0, label=look.label))
+    regimes = np.array([measures.regime for measures in figure.measures], dtype=object)
+    draw_section(above, figure.values, regimes, [s.turning_points for s in figure.settled])
+    handles = regime_handles(regimes)
     unstable = unstable_equilibria(figure)
     if np.isfinite(unstable).any():
         dashed: Any = {"color": GREEN, "lw": 1.2, "ls": (0, (4.0, 2.0))}
@@ -213,7 +205,6 @@ def _outcome(portrait: Portrait) -> str:
 
 def _range(*columns: FloatArray) -> tuple[float, float]:
     """Return limits with a margin around all values."""
-    lowest = min(float(column.min()) for column in columns)
-    highest = max(float(column.max()) for column in columns)
-    room = 0.06 * (highest - lowest)
-    return lowest - room, highest + room
+    values = np.concatenate(columns)
+    low, high, room = values.min(), values.max(), 0.06 * np.ptp(values)
+    return float(low - room), float(high + room)

@@ -111,16 +111,15 @@ def diagram_figure(columns: Columns, study: Study, *, style: FigureStyle = SCREE
     # Wide markers are drawn below the narrow ones.
     for rows, direction in reversed(list(_passes(grid))):
         wide = both and direction is Continuation.DOWN
-        _draw_section(section, columns, axis, rows, length, wide=wide)
+        parts = columns.values[axis.parameter][rows], columns.regime[rows]
+        points, settled = columns.turning_points[rows], columns.steady[rows]
+        draw_section(section, *parts, points, settled, length=length, wide=wide)
         look: Any = {"color": LIGHT_GREY, "lw": 5.0} if wide else {"color": "black", "lw": 1.2}
         for axes, (name, (scale, label)) in zip(lines, scaled.items(), strict=True):
             values: FloatArray = getattr(columns, name)[rows]
             axes.plot(columns.values[axis.parameter][rows], values / scale, **look)
             axes.set_ylabel(label)
-    handles: list[Artist] = [
-        Line2D([], [], color=look.colour, marker=look.marker, ms=5.0, ls="", label=look.label)
-        for _, look in _present(columns)
-    ]
+    handles = regime_handles(columns.regime)
     black: Any = {"color": "black", "marker": "o"}
     if np.any(~columns.steady & ~_are(columns.regime, None)):
         look = {**black, **_HOLLOW, "ms": 5.0, "ls": ""}
@@ -195,7 +194,7 @@ def map_figure(
     if mesh is not None:
         figure.colorbar(mesh, ax=panels, label=bar)
     handles: list[Artist] = []
-    for regime, look in _present(columns):
+    for regime, look in _present(columns.regime):
         if regime is not None and colour == "regime":
             handles.append(_patch(look, look.label))
         elif regime is Regime.UNBOUNDED:
@@ -269,28 +268,45 @@ def _passes(grid: Grid) -> Iterator[tuple[slice, Continuation | None]]:
         yield slice(number * count, (number + 1) * count), direction
 
 
-def _present(columns: Columns) -> Iterator[tuple[Regime | None, Look]]:
+def _present(regimes: npt.NDArray[np.object_]) -> Iterator[tuple[Regime | None, Look]]:
     for regime, look in REGIMES.items():
-        if _are(columns.regime, regime).any():
+        if _are(regimes, regime).any():
             yield regime, look if regime is not None else look._replace(label="no result")
 
 
-def _draw_section(
-    axes: Axes, columns: Columns, axis: Axis, rows: slice, length: float, *, wide: bool
+def regime_handles(regimes: npt.NDArray[np.object_]) -> list[Artist]:
+    """Return the legend entries of the regimes that there are."""
+    return [
+        Line2D([], [], color=look.colour, marker=look.marker, ms=5.0, ls="", label=look.label)
+        for _, look in _present(regimes)
+    ]
+
+
+def draw_section(
+    axes: Axes,
+    values: FloatArray,
+    regimes: npt.NDArray[np.object_],
+    points: Sequence[Sequence[float] | FloatArray],
+    settled: BoolArray | None = None,
+    *,
+    length: float = 1.0,
+    wide: bool = False,
 ) -> None:
-    """Draw turning points, and strokes at the lower edge for points without any."""
-    values, regimes = columns.values[axis.parameter][rows], columns.regime[rows]
-    points = columns.turning_points[rows]
+    """Draw turning points by regime, hollow unless `settled`, with strokes where there are none.
+
+    `length` is the divisor of their positions.
+    """
     counts = np.array([len(found) for found in points])
     positions = np.fromiter(chain.from_iterable(points), dtype=float, count=int(counts.sum()))
-    size = float(np.clip(800.0 / axis.count, 1.8, 3.0)) + 5.0 * wide
+    size = float(np.clip(800.0 / len(values), 1.8, 3.0)) + 5.0 * wide
+    steady = np.ones(len(values), dtype=bool) if settled is None else settled
     rasterized = len(positions) > MANY
     for regime, (colour, _, marker, _) in REGIMES.items():
         shown = _are(regimes, regime)
         pale = tuple(1.0 - 0.4 * (1.0 - part) for part in to_rgb(colour))
         look: Any = {"color": pale if wide else colour, "ls": "", "rasterized": rasterized}
-        for steady, filled in ((True, _FULL), (False, _HOLLOW)):
-            some = shown & (columns.steady[rows] == steady)
+        for full, filled in ((True, _FULL), (False, _HOLLOW)):
+            some = shown & (steady == full)
             places = np.repeat(values[some], counts[some])
             heights = positions[np.repeat(some, counts)] / length
             axes.plot(places, heights, marker=marker, ms=size, **look, **filled)
@@ -344,7 +360,7 @@ def _mark_transitions(
 
 def _draw_regimes(axes: Axes, columns: Columns, grid: Grid, rows: slice) -> None:
     x, y = (_edges(axis) for axis in grid.axes)
-    for regime, look in _present(columns):
+    for regime, look in _present(columns.regime):
         if regime is not None:
             of_it = _are(columns.regime[rows], regime).reshape(grid.shape).T
             _draw_cells(axes, x, y, of_it, look)
