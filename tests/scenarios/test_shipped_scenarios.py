@@ -13,7 +13,15 @@ from stickslip_ros.scenarios.ros_yaml import number_in
 ROOT = Path(__file__).parents[2]
 CONFIG = ROOT / "config"
 
-SHIPPED = ("paper", "feed_drive", "feed_profile", "vibrating_load", "axis")
+SHIPPED = (
+    "paper",
+    "feed_drive",
+    "feed_profile",
+    "vibrating_load",
+    "axis",
+    "ball_screw",
+    "feed_drive_motor",
+)
 
 
 def test_the_shipped_scenarios_are_complete_and_found_by_path_too() -> None:

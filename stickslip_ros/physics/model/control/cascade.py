@@ -36,12 +36,9 @@ class Cascade(ControlLaw, TwoBodyControl):
 
     Examples
     --------
-    >>> from stickslip_ros.physics.loop.controller import Controller
     >>> from stickslip_ros.physics.model.control import Cascade
-    >>> from stickslip_ros.samples import Sample
-    >>> cascade = Controller(Cascade(position_gain=50.0, velocity_gain=2000.0))
-    >>> cascade.answer(Sample(0, 1e-4, 0.01, 0.0, 0.0, 0.04))
-    -30.0
+    >>> Cascade(position_gain=50.0, linear_gain=-100.0).washout.linear_gain
+    -100.0
     """
 
     name: ClassVar[str] = "cascade"
@@ -67,8 +64,8 @@ class Cascade(ControlLaw, TwoBodyControl):
     @property
     def washout(self) -> Washout:
         """The washout term."""
-        gains = self.linear_gain, self.cubic_gain
-        return Washout(self.corner_frequency, *gains, feedback=self.washout_feedback)
+        gains = self.corner_frequency, self.linear_gain, self.cubic_gain
+        return Washout(*gains, feedback=self.washout_feedback)
 
     @override
     def initial_state(self, sample: Sample, reference: Reference) -> State:
@@ -91,16 +88,16 @@ class Cascade(ControlLaw, TwoBodyControl):
 
     @override
     def linear_feedback(self, period: float) -> LinearFeedback:
-        added = self.washout.linear_feedback(period)
-        error, washed = np.zeros(4), np.zeros((2, 4))
+        added, error = self.washout.linear_feedback(period), np.zeros(4)
         error[0 if self.feedback == TABLE else 2] -= self.position_gain
         error[1 if self.velocity_feedback == TABLE else 3] -= 1.0
-        washed[:, : len(added.direct)] = added.input[0], added.direct
-        # States: I at the last sample, its rate, and the washout's z.
+        # I at the last sample, its rate, and the washout's z, as far as they act on the force.
+        kept = np.flatnonzero([self.integral_gain, self.integral_gain, self.linear_gain])
         matrix = np.array([[1.0, period, 0.0], [0.0] * 3, [0.0, 0.0, added.state[0, 0]]])
-        inputs = np.stack([np.zeros(4), self.integral_gain * error, washed[0]])
-        output = np.array([1.0, period, added.output[0]])
-        return LinearFeedback(matrix, inputs, output, self.velocity_gain * error + washed[1])
+        output, inputs = np.array([1.0, period, added.output[0]]), np.zeros((4, 4))
+        inputs[1], inputs[3] = self.integral_gain * error, self.velocity_gain * error
+        inputs[2:, : len(added.direct)] += added.input[0], added.direct
+        return LinearFeedback(matrix[np.ix_(kept, kept)], inputs[kept], output[kept], inputs[3])
 
     @property
     @override
