@@ -286,6 +286,11 @@ class PlantParameters(DriveConstants, NodeParameters):
             own += ["motor.kind", "motor.mass", "motor.damping", "motor.friction"]
         return [*own, "friction.law", *(f"friction.{name}" for name in self.friction.names())]
 
+    @property
+    def linear_sampling(self) -> tuple[float, float, Sensor, Sensor]:
+        """Rate, delay and sensors, the sampling of a `LinearSampledLoop`."""
+        return self.rate, self.force_delay, self.sensor, self.motor.sensor
+
     def as_loop(
         self,
         motion: "Motion",

@@ -36,6 +36,7 @@ from stickslip_ros.physics.theory.linear_system import (
 )
 from stickslip_ros.physics.theory.requirements import (
     AUTONOMOUS,
+    ONE_MASS,
     SMOOTH,
     NotCoveredError,
     require,
@@ -80,12 +81,12 @@ def stability(scenario: Scenario) -> tuple[Section, Notes]:
     plant = scenario.plant
     drive = plant.as_drive()
     require("the theory of stability", drive, AUTONOMOUS)
-    law, expansion = scenario.control_law, expand(drive)
+    law, (expansion, lack) = scenario.control_law, _covered(lambda: expand(drive))
     position = drive.equilibrium_position if expansion else None
     return _separated(
         {
-            "equilibrium_position": _Noted(position, _held(drive)),
-            "open_loop": _open_loop(drive, expansion),
+            "equilibrium_position": _Noted(position, lack or _held(drive)),
+            "open_loop": _open_loop(drive, expansion, lack),
             "sticking": _sticking(drive),
             "closed_loop": _closed_loop(drive, law, plant),
             "sampled_loop": _sampled_loop(drive, law, plant),
@@ -132,8 +133,11 @@ def _omitted(plant: PlantParameters) -> str | None:
     sentences: list[str] = []
     if plant.force_jitter > 0.0:
         sentences.append("force_jitter is omitted: the delay of the force is constant here")
-    sensor, actuator = plant.sensor, plant.actuator
+    sensor, actuator, motor = plant.sensor, plant.actuator, plant.motor.sensor
     values = {
+        "motor.sensor.position_resolution": motor.position_resolution,
+        "motor.sensor.position_noise": motor.position_noise,
+        "motor.sensor.velocity_noise": motor.velocity_noise,
         "sensor.position_resolution": sensor.position_resolution,
         "sensor.position_noise": sensor.position_noise,
         "sensor.velocity_noise": sensor.velocity_noise,
@@ -168,7 +172,10 @@ def _eigenvalues(drive: Drive, expansion: Expansion | None, reason: str | None) 
     }
 
 
-def _open_loop(drive: Drive, expansion: Expansion | None) -> Section:
+def _open_loop(drive: Drive, expansion: Expansion | None, lack: str | None) -> Section | _Noted:
+    if lack is not None:
+        nothing = _eigenvalues(drive, None, None) | _hopf_points([])
+        return _Noted({**nothing, "limit_cycles": []}, lack)
     points = hopf_points(drive)
     cycles, reason = _covered(lambda: limit_cycles(drive))
     if not cycles and reason is None:
@@ -231,21 +238,21 @@ def _sticking(drive: Drive) -> Section | _Noted:
 
 def _closed_loop(drive: Drive, law: ControlLaw | None, plant: PlantParameters) -> _Noted:
     control = None if law is None else law.continuous
-    if law is None or control is None:
+    lack = _NO_CONTROL
+    if law is not None:
+        lack = f"the control law {law.name} has no equations for continuous control"
+    points: list[HopfPoint] | None = None
+    if control is not None:
+        points, lack = _covered(lambda: hopf_points(drive, control))
+    if law is None or control is None or points is None:
         nothing = _eigenvalues(drive, None, None) | dict.fromkeys(_GAINS) | _hopf_points([])
-        return _Noted(
-            {**nothing, "limit_cycles": []},
-            _NO_CONTROL
-            if law is None
-            else f"the control law {law.name} has no equations for continuous control",
-        )
-    points = hopf_points(drive, control)
+        return _Noted({**nothing, "limit_cycles": []}, lack)
     no_hopf_speed = (
         "with these gains no pair of eigenvalues crosses the imaginary axis at any belt speed"
     )
     possible, reason = _covered(
         lambda: (
-            limit_cycle_from_hopf(drive, control),
+            limit_cycle_from_hopf(drive, control) if drive.motor is None else None,
             limit_cycle_of_run(drive, 0.0, control=control),
         ),
     )
@@ -258,7 +265,7 @@ def _closed_loop(drive: Drive, law: ControlLaw | None, plant: PlantParameters) -
             f"none found from rest at zero displacement{started}; there is no search for others, "
             "and none in a very stiff loop"
         )
-    ideal = plant.sensor.exact and plant.actuator == IDEAL_ACTUATOR
+    ideal = plant.exactly_measured and plant.actuator == IDEAL_ACTUATOR
     return _Noted(
         {
             **_eigenvalues(drive, expand(drive, control), _held(drive)),
@@ -285,11 +292,13 @@ def _sampled_loop(drive: Drive, law: ControlLaw | None, plant: PlantParameters) 
     rate, force_delay = plant.rate, plant.force_delay
     if law is None:
         return _Noted(dict.fromkeys(_SAMPLED_LOOP), _NO_CONTROL)
-    loop = LinearSampledLoop.from_drive(drive, rate, force_delay, plant.sensor)
+    loop = LinearSampledLoop.from_drive(drive, *plant.linear_sampling)
     if loop is None or law.linear_feedback(1.0 / rate) is None:
         reason = why_no_linear_loop(drive, rate, force_delay)
         return _Noted(dict.fromkeys(_SAMPLED_LOOP), reason or not_linear(law.name))
-    radius = loop.spectral_radius(law)
+    radius, lack = _covered(lambda: loop.spectral_radius(law))
+    if radius is None:
+        return _Noted(dict.fromkeys(_SAMPLED_LOOP), lack)
     growing = "a deviation from the equilibrium does not decay" if radius >= 1.0 else None
     settling_time = _Noted(loop.settling_time(law), growing)
     values = radius, radius < 1.0, loop.decay_rate(law), settling_time, *_sampled_gains(loop, law)
@@ -306,7 +315,7 @@ def linear_systems(scenario: Scenario) -> tuple[LinearSystem | None, LinearSyste
     require("the theory of stability", drive, AUTONOMOUS)
     control = None if law is None else law.continuous
     continuous = None if control is None else continuous_system(drive, control)
-    loop = LinearSampledLoop.from_drive(drive, plant.rate, plant.force_delay, plant.sensor)
+    loop = LinearSampledLoop.from_drive(drive, *plant.linear_sampling)
     if loop is None or law is None or law.linear_feedback(1.0 / plant.rate) is None:
         return continuous, None
     return continuous, sampled_system(loop, law)
@@ -332,9 +341,11 @@ def _sampled_gains(loop: LinearSampledLoop, law: ControlLaw) -> tuple[_Noted, _N
 
 def _closed_forms(drive: Drive, law: ControlLaw | None) -> Section | _Noted:
     """Return the closed forms of the cubic Stribeck law, in the same units; omit missing ones."""
-    cubic = CubicLoop.from_drive(drive)
+    cubic, lack = _covered(lambda: CubicLoop.from_drive(drive))
     if cubic is None:
-        return _Noted(None, _held(drive) or "closed forms exist for the cubic Stribeck law only")
+        return _Noted(
+            None, lack or _held(drive) or "closed forms exist for the cubic Stribeck law only"
+        )
     speed, force = drive.speed_scale, drive.normal_force
     gains = gains_of(law)
 
@@ -388,8 +399,10 @@ def why_no_figure(scenario: Scenario) -> str | None:
         except NotCoveredError as error:
             return str(error)
         return None
-    no_loop = why_no_linear_loop(plant.as_drive(), plant.rate, plant.force_delay)
-    return no_loop or why_no_gains(law)
+    drive = plant.as_drive()
+    no_loop = why_no_linear_loop(drive, plant.rate, plant.force_delay)
+    _, no_map = _covered(lambda: require("the stability map", drive, ONE_MASS))
+    return no_loop or why_no_gains(law) or no_map
 
 
 def stability_map(scenario: Scenario) -> tuple[StabilityMap, CriticalGainCurves]:
@@ -399,7 +412,7 @@ def stability_map(scenario: Scenario) -> tuple[StabilityMap, CriticalGainCurves]
     """
     plant = scenario.plant
     drive, gains = plant.as_drive(), gains_of(scenario.control_law)
-    loop = LinearSampledLoop.from_drive(drive, plant.rate, plant.force_delay, plant.sensor)
+    loop = LinearSampledLoop.from_drive(drive, *plant.linear_sampling)
     assert loop is not None
     assert gains is not None
     rates = plant.rate * np.array((0.1, 0.3, 1.0))

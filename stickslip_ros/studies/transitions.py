@@ -69,7 +69,7 @@ def hopf_margin(case: ControlledDrive, *, coarse: bool = False) -> float:
         control = None if law is None else law.continuous
         expansion = expand(drive, control) if law is None or control is not None else None
         return nan if expansion is None else float(hurwitz_determinants(expansion.jacobian).min())
-    loop = LinearSampledLoop.from_drive(drive, plant.rate, plant.force_delay, plant.sensor)
+    loop = LinearSampledLoop.from_drive(drive, *plant.linear_sampling)
     if loop is None or plant.force_jitter > 0.0 or law.force_limit == 0.0:
         return nan
     if law.linear_feedback(1.0 / plant.rate) is None:

@@ -111,10 +111,10 @@ def _drive(plant: Values) -> Drive:
 
 def _loop(plant: Values) -> LinearSampledLoop:
     parameters = PlantParameters().changed(plant, "plant")
-    drive, rate, delay = parameters.as_drive(), parameters.rate, parameters.force_delay
-    loop = LinearSampledLoop.from_drive(drive, rate, delay, parameters.sensor)
+    drive, sampling = parameters.as_drive(), parameters.linear_sampling
+    loop = LinearSampledLoop.from_drive(drive, *sampling)
     if loop is None:
-        raise InvalidInputError(f"{why_no_linear_loop(drive, rate, delay)}")
+        raise InvalidInputError(f"{why_no_linear_loop(drive, *sampling[:2])}")
     return loop
 
 

@@ -94,10 +94,17 @@ class LinearSampledLoop:
     """Jacobian of the open loop, dimensionless (see `Expansion.jacobian`); shape (n, n)."""
     difference_samples: int = 0
     """Samples that a difference for the velocity spans; 0 if the velocity is exact."""
+    motor_difference_samples: int = 0
+    """The same of the velocity of a motor."""
 
     @classmethod
     def from_drive(
-        cls, drive: Drive, rate: float, force_delay: float = 0.0, sensor: Sensor = EXACT_SENSOR
+        cls,
+        drive: Drive,
+        rate: float,
+        force_delay: float = 0.0,
+        sensor: Sensor = EXACT_SENSOR,
+        motor_sensor: Sensor = EXACT_SENSOR,
     ) -> Self | None:
         """Return the linear loop of a drive.
 
@@ -111,6 +118,8 @@ class LinearSampledLoop:
             Delay from a sample to the start of its force, s.
         sensor : Sensor, optional
             Sensor, of which only the difference for the velocity is used.
+        motor_sensor : Sensor, optional
+            The same of a motor of finite mass.
 
         Returns
         -------
@@ -126,7 +135,8 @@ class LinearSampledLoop:
         if why_no_linear_loop(drive, rate, force_delay):
             return None
         (jacobian,) = jacobians(drive, None, np.array([drive.belt_speed / drive.speed_scale]))
-        return cls(drive, rate, force_delay, jacobian, sensor.spans)
+        spans = motor_sensor.spans if drive.motor is not None else 0
+        return cls(drive, rate, force_delay, jacobian, sensor.spans, spans)
 
     def transition_matrix(self, law: ControlLaw) -> FloatArray:
         """Return the matrix from the state at one sample to the state at the next.
@@ -278,6 +288,8 @@ class LinearSampledLoop:
         half of what it spans; the sum is kept. A loop of small order is returned as it is.
         """
         spans = self.difference_samples
+        if self.motor_difference_samples:
+            return self
         if self.under_way + spans <= 21:  # searching many gains is quick
             return self
         latest = self.force_delay + spans / self.rate
@@ -369,18 +381,23 @@ class LinearSampledLoop:
         under_way, drive = self.under_way, self.drive
         slide, starting, ending = self.held
         stacked, states = feedback.output.shape[:-1], feedback.output.shape[-1]
-        order, spans = len(slide), self.difference_samples
+        order, spans, of_motor = len(slide), self.difference_samples, self.motor_difference_samples
         own, first, past = slice(order, order + states), order + states, order + states + under_way
-        size = past + spans
+        size = past + spans + of_motor
         matrix = np.zeros((*stacked, size, size))
         forces = np.zeros((*stacked, 1 + under_way, size))
         seen = np.eye(2, size)  # what the controller sees of the state
         if spans:
             seen[SPEED, SPEED] = 0.0
             seen[SPEED, POSITION] = 1.0 / (spans * self.period)
-            seen[SPEED, -1] = -seen[SPEED, POSITION]
+            seen[SPEED, past + spans - 1] = -seen[SPEED, POSITION]
+        motor = len(self.jacobian) - 2
         if feedback.direct.shape[-1] > 2:
-            seen = np.vstack([seen, np.eye(2, size, len(self.jacobian) - 2)])
+            seen = np.vstack([seen, np.eye(2, size, motor)])
+            if of_motor:
+                seen[3, motor + 1] = 0.0
+                seen[3, motor] = 1.0 / (of_motor * self.period)
+                seen[3, -1] = -seen[3, motor]
         units = np.resize([drive.length_scale, drive.speed_scale], len(seen))
         forces[..., 0, :] = (feedback.direct * units / drive.normal_force) @ seen
         forces[..., 0, own] = feedback.output * drive.speed_scale / drive.normal_force
@@ -392,9 +409,11 @@ class LinearSampledLoop:
         matrix[..., own, :] += (feedback.input * (units / drive.speed_scale)) @ seen
         matrix[..., own, own] += feedback.state
         matrix[..., first:past, :] = forces[..., :-1, :]
-        if spans:
-            matrix[..., past, POSITION] = 1.0
-            matrix[..., past + 1 :, past:-1] = np.eye(spans - 1)
+        for place, count, start in ((POSITION, spans, past), (motor, of_motor, past + spans)):
+            if count:
+                matrix[..., start, place] = 1.0
+                stop = start + count
+                matrix[..., start + 1 : stop, start : stop - 1] = np.eye(count - 1)
         return matrix
 
 

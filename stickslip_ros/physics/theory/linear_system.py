@@ -63,13 +63,15 @@ def sampled_system(loop: LinearSampledLoop, law: ControlLaw) -> LinearSystem:
     Raises InvalidInputError if the law is not linear near the equilibrium.
     """
     drive, matrix, disturbed = loop.drive, loop.transition_matrix(law), loop.disturbed
-    own = len(matrix) - len(disturbed) - loop.under_way - loop.difference_samples
+    earlier = loop.difference_samples, loop.motor_difference_samples
+    own = len(matrix) - len(disturbed) - loop.under_way - sum(earlier)
     names = (
         *drive_system(replace(drive, actuator=IDEAL_ACTUATOR)).states,
         *(f"actuator.{name}" for name in drive.actuator.states),
         *(f"control.{number}" for number in range(1, own + 1)),
         *(f"force.{number}" for number in range(1, loop.under_way + 1)),
-        *(f"earlier_x.{number}" for number in range(1, loop.difference_samples + 1)),
+        *(f"earlier_x.{number}" for number in range(1, earlier[0] + 1)),
+        *(f"earlier_motor.x.{number}" for number in range(1, earlier[1] + 1)),
     )
     forced = np.pad(disturbed, (0, len(matrix) - len(disturbed)))
     return _system(drive, names, matrix, forced, 1.0 / loop.rate)
