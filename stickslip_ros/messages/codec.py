@@ -324,7 +324,7 @@ def joint_layout(data: bytes, joint: str, belt: str | None) -> Layout:
 def _reference_layout(data: bytes) -> Layout:
     joints = _Joints(data, "reference", SLIDE)
     joints.check_counts(fields=2)
-    return joints.layout(SLIDE)
+    return joints.layout_of(joints.place(0, SLIDE), joints.place(1, SLIDE))
 
 
 class _Joints:

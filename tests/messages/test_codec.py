@@ -13,19 +13,22 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
 from stickslip_ros.errors import MessageError
+from stickslip_ros.messages.cdr import joined
 from stickslip_ros.messages.codec import (
     joint_state_columns,
     joint_state_packer,
     pack_header,
     pack_joint_state,
     pack_wrench,
+    references_in,
     unpack_command,
     unpack_header,
     unpack_joint_state,
+    unpack_reference,
     unpack_wrench,
     wrench_columns,
 )
-from stickslip_ros.samples import MotorSample, Sample
+from stickslip_ros.samples import MotorSample, Reference, Sample
 
 JOINT_STATE_PADDING = (*range(17, 20), 34, 35, *range(45, 48), *range(72, 76), *range(96, 100))
 WRENCH_PADDING = range(22, 28)
@@ -152,6 +155,25 @@ def test_a_joint_state_that_lacks_something_is_refused_in_a_line(message, compla
     with pytest.raises(MessageError, match=complaint) as refusal:
         unpack_joint_state(serialize_message(message))
     assert len(str(refusal.value)) < 400
+
+
+def test_a_reference_of_another_node_is_read_by_its_names():
+    """Positions or velocities may be empty; efforts have no effect."""
+    names, sent = (
+        ["gripper", "slide"],
+        {(1.0, None): ([0.0, 1.0], []), (None, 2.0): ([], [0.0, 2.0])},
+    )
+    for reference, values in sent.items():
+        data = serialize_message(joint_state(7, *values, [9.0], names))
+        columns, refused = references_in(*joined([data]))
+        assert unpack_reference(data) == (7, Reference(*reference))
+        assert [columns.stamp[0], refused.number] == [7, 0]
+        row = [columns.position[0], columns.velocity[0]]
+        assert [None if math.isnan(each) else each for each in row] == [*reference]
+    with pytest.raises(MessageError, match="1 positions, 0 velocities"):
+        unpack_reference(serialize_message(joint_state(7, [1.0], [], [], names)))
+    with pytest.raises(MessageError, match="slide must be among them"):
+        unpack_reference(serialize_message(joint_state(7, [1.0], [], [], ["gripper"])))
 
 
 def test_what_is_no_message_is_refused():
