@@ -16,6 +16,7 @@ if is_run(__name__, "stickslip", *NODE_SCRIPTS):
 from typing import TYPE_CHECKING, Any  # what takes time comes second
 
 if TYPE_CHECKING:
+    from stickslip_ros.api.comparison import ComparedLaws, compare
     from stickslip_ros.api.friction_map import FrictionMap, friction_map
     from stickslip_ros.api.identification import Model, identify
     from stickslip_ros.api.margin import Margin, margin
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Basin",
+    "ComparedLaws",
     "FrictionMap",
     "Margin",
     "Model",
@@ -45,6 +47,7 @@ __all__ = [
     "Sweep",
     "__version__",
     "basin",
+    "compare",
     "design",
     "friction_map",
     "identify",
@@ -58,6 +61,7 @@ __all__ = [
 ]
 
 _HOMES = {
+    "api.comparison": ("ComparedLaws", "compare"),
     "api.friction_map": ("FrictionMap", "friction_map"),
     "api.identification": ("Model", "identify"),
     "api.margin": ("Margin", "margin"),

@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from operator import index
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TextIO
 
 import numpy as np
 from typing_extensions import override
@@ -33,7 +33,7 @@ from stickslip_ros.studies.basin import (
     basin_study,
     default_axes,
 )
-from stickslip_ros.studies.columns import Columns, json_entries
+from stickslip_ros.studies.columns import Columns, json_entries, write_csv
 from stickslip_ros.studies.options import BASIN_COUNT, BASIN_OPTIONS
 from stickslip_ros.studies.plan import Axis, Continuation, Grid, ListedAxis, RandomSample
 from stickslip_ros.studies.runner import CountPoints, compute_columns
@@ -72,6 +72,16 @@ class Points(TabularResult):
     @abstractmethod
     def _found(self) -> dict[str, Any]:
         """Return what belongs to all points together, for JSON."""
+
+    def write_csv(self, stream: TextIO) -> None:
+        """Write a row for each point.
+
+        Parameters
+        ----------
+        stream : TextIO
+            Where it is written.
+        """
+        write_csv(stream, self.columns, self.further)
 
     @override
     def _entries(self) -> dict[str, Any]:
@@ -291,7 +301,7 @@ def sweep(
         [
             *map(Axis.parse, axes),
             *(
-                _axis(keyword, parameter_of(keyword, chosen.nodes), given, listed=True)
+                axis_of(keyword, parameter_of(keyword, chosen.nodes), given, listed=True)
                 for keyword, given in parameters.items()
             ),
         ],
@@ -369,7 +379,7 @@ def basin(
             axes.append(default_axes(chosen, BASIN_COUNT)[place])
             continue
         ends = sample is not None and isinstance(given, tuple) and len(given) == 2
-        axes.append(_axis(name, parameter, (*given, 2) if ends else given))
+        axes.append(axis_of(name, parameter, (*given, 2) if ends else given))
     plan = Grid(tuple(axes)) if sample is None else RandomSample(tuple(axes), sample, seed)
     settling = _settling(BASIN_OPTIONS, transient, cycles)
     study = basin_study(chosen, plan, settling=settling, continuous=continuous)
@@ -379,7 +389,8 @@ def basin(
     return Basin(study, columns)
 
 
-def _axis(name: str, parameter: str, given: Any, *, listed: bool = False) -> Axis:
+def axis_of(name: str, parameter: str, given: Any, *, listed: bool = False) -> Axis:
+    """Return the axis of values that are given by keyword; of a list too, if that is allowed."""
     try:
         if listed and isinstance(given, list | np.ndarray):
             values = tuple(number_of(parameter, v, described(parameter).unit) for v in given)

@@ -21,6 +21,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "margin": ("Analyze", "tell from runs that do not vibrate at which feed vibration starts"),
     "stability": ("Analyze", "compute equilibrium, critical speeds and gains, and limit cycles"),
     "design": ("Design", "propose controller gains that suppress the vibration"),
+    "compare": ("Design", "compare control laws: which one holds the drive, with what force"),
     "list": ("Scenarios", "list the scenarios, friction laws and control laws"),
     "show": ("Scenarios", "show every parameter of a scenario and where its value comes from"),
     "new": ("Scenarios", "write a commented scenario file to edit"),
@@ -46,6 +47,8 @@ EXAMPLES: dict[str, str] = {
     "margin": "stickslip margin bags/60 bags/55 bags/50 --plot margin.png",
     "stability": "stickslip stability feed_drive --plot map.png",
     "design": "stickslip design feed_drive --belt-speed 0.01:0.05 --out designed.yaml",
+    "compare": "stickslip compare feed_drive --controllers washout,pid,sliding_mode "
+    "--over plant.belt_speed=0.01:0.04:4 --seeds 20 --spread 0.2 --workers 2 --html compared.html",
     "list": "stickslip list",
     "show": "stickslip show feed_drive",
     "new": "stickslip new my_drive.yaml --from feed_drive",

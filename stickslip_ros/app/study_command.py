@@ -16,6 +16,7 @@ from stickslip_ros.files import written
 from stickslip_ros.studies.options import SettlingOptions
 
 if TYPE_CHECKING:
+    from stickslip_ros.api.comparison import ComparedLaws
     from stickslip_ros.api.studies import Points
     from stickslip_ros.studies.journal import Journal
     from stickslip_ros.studies.study import Study
@@ -45,6 +46,11 @@ def add_running(parser: argparse.ArgumentParser, settling: SettlingOptions) -> N
         metavar="COUNT",
         help="whole cycles that are measured after them (default: %(default)d)",
     )
+    add_workers(parser)
+
+
+def add_workers(parser: argparse.ArgumentParser) -> None:
+    """Add where the points are computed, and --out."""
     where = parser.add_mutually_exclusive_group()
     where.add_argument(
         "--workers",
@@ -76,8 +82,13 @@ def settling_of(arguments: argparse.Namespace, default: SettlingOptions) -> Sett
 
 
 @contextmanager
-def computed(arguments: argparse.Namespace, study: "Study", label: str) -> "Generator[Journal]":
-    """Compute the missing points of the study, and provide its complete journal."""
+def computed(
+    arguments: argparse.Namespace, study: "Study", label: str, columns: Any = None
+) -> "Generator[Journal]":
+    """Compute the missing points of the study, and provide its complete journal.
+
+    `columns` take the points; by default those of a sweep.
+    """
     from stickslip_ros.studies.journal import Journal, kept_journal
     from stickslip_ros.studies.runner import DaskError, dask_executor, run, run_here
 
@@ -86,9 +97,9 @@ def computed(arguments: argparse.Namespace, study: "Study", label: str) -> "Gene
         if out.suffix.lower() not in _TABLES:
             raise InvalidInputError(f"--out {out}: must end in one of {', '.join(_TABLES)}")
         check_new("--out", out)
-        journal = Journal(study, out.with_name(f"{out.name}.part"))
+        journal = Journal(study, out.with_name(f"{out.name}.part"), columns)
     else:
-        journal = kept_journal(study)
+        journal = kept_journal(study, columns)
     with journal:
         kept, part = "; without --out no point is kept", journal.path
         if part is not None:
@@ -129,20 +140,21 @@ def _advice(study: "Study") -> str:
 
 
 def finish(
-    arguments: argparse.Namespace, journal: "Journal", result: "Points", **options: Any
+    arguments: argparse.Namespace,
+    journal: "Journal",
+    result: "Points | ComparedLaws",
+    **options: Any,
 ) -> None:
     """Write and print the result of a complete journal, which need not be kept any more then.
 
     The `options` are those of the result's `plot`.
     """
-    from stickslip_ros.studies.columns import write_csv
-
     write_results(arguments, result, **options)
     out: Path | None = arguments.out
     if out is not None:
         with writing("--out", out), written(out) as stream:
             if out.suffix.lower() == ".csv":
-                write_csv(stream, result.columns, result.further)
+                result.write_csv(stream)
             else:
                 result.write_json(stream)
     print_result(arguments, result)

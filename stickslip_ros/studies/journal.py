@@ -18,7 +18,7 @@ import numpy as np
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.studies.columns import Columns
 from stickslip_ros.studies.settling import MotionState
-from stickslip_ros.studies.study import Piece, Point, Study
+from stickslip_ros.studies.study import Piece, Study
 from stickslip_ros.versions import versions
 
 _OPENING, _VERSION = b'{"format": "stickslip_ros study ', b'2"'
@@ -33,14 +33,16 @@ class Journal:
     killed, is removed.
     """
 
-    def __init__(self, study: Study, path: Path | None = None) -> None:
+    def __init__(self, study: Study, path: Path | None = None, columns: Any = None) -> None:
         """Start a journal, or continue the one that exists; without a path only in memory.
+
+        `columns` take the points; by default they are `Columns`.
 
         Raises InvalidInputError if the file is not a journal of this study or has been changed,
         another process writes it, or it cannot be written.
         """
         self.study, self.path = study, path
-        self.columns = Columns.of(study.plan)
+        self.columns = Columns.of(study.plan) if columns is None else columns
         self._ends: dict[int, MotionState | None] = {}
         self._file: BinaryIO | None = None
         if path is None:
@@ -119,7 +121,7 @@ class Journal:
         offset = len(first)
         while (line := file.readline()).endswith(b"\n"):
             with self._unchanged(offset):
-                piece = _piece(line, offset)
+                piece = self._piece(line, offset)
                 indices = [point.number for point in piece.points]
                 if not 0 <= min(indices) <= max(indices) < self.study.plan.size:
                     raise ValueError
@@ -128,6 +130,11 @@ class Journal:
             offset += len(line)
         file.seek(offset)
         file.truncate()
+
+    def _piece(self, line: bytes, offset: int) -> Piece:
+        values = _parsed(line, offset)
+        end = None if values["end"] is None else MotionState.from_json(values["end"])
+        return Piece([self.study.row(each) for each in values["points"]], end)
 
     def _compare(self, header: Mapping[str, Any], line: bytes) -> None:
         if not line.startswith(_OPENING):
@@ -157,16 +164,16 @@ class Journal:
             ) from None
 
 
-def kept_journal(study: Study) -> Journal:
+def kept_journal(study: Study, columns: Any = None) -> Journal:
     """Return the journal of a study in the user's cache; without a file if that is not to be."""
     name = f"{study.scenario.name}-{sha256(_heading(study)).hexdigest()[:16]}.part"
     try:
         cache = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
         path = Path(cache, "stickslip_ros", name)
         path.parent.mkdir(parents=True, exist_ok=True)
-        return Journal(study, path)
+        return Journal(study, path, columns)
     except (OSError, RuntimeError, InvalidInputError):  # no home, or the same study runs elsewhere
-        return Journal(study)
+        return Journal(study, None, columns)
 
 
 def _heading(study: Study) -> bytes:
@@ -205,12 +212,6 @@ def _parsed(line: bytes, offset: int) -> dict[str, Any]:
         return json.loads(text)
     except RecursionError:
         raise ValueError from None
-
-
-def _piece(line: bytes, offset: int) -> Piece:
-    values = _parsed(line, offset)
-    end = None if values["end"] is None else MotionState.from_json(values["end"])
-    return Piece([Point.from_json(each) for each in values["points"]], end)
 
 
 def _differences(found: Mapping[str, Any], expected: Mapping[str, Any]) -> Iterator[str]:

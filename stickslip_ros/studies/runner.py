@@ -23,7 +23,6 @@ from typing import Any, cast
 import numpy as np
 
 from stickslip_ros.errors import InvalidInputError, RunError
-from stickslip_ros.studies.columns import Columns
 from stickslip_ros.studies.journal import Journal
 from stickslip_ros.studies.settling import MotionState
 from stickslip_ros.studies.study import Piece, Study, compute, pieces_of
@@ -145,7 +144,8 @@ def compute_columns(
     in_flight: int = IN_FLIGHT,
     path: Path | None = None,
     progress: CountPoints = lambda _: None,
-) -> Columns:
+    columns: Any = None,
+) -> Any:
     """Compute a study and return its points as columns.
 
     The result does not depend on how the work is shared.
@@ -164,11 +164,13 @@ def compute_columns(
         Journal file. An interrupted study continues from it, and it is kept at the end.
     progress : Callable[[int], None]
         Receives the number of points that are done.
+    columns : optional
+        What takes the points; by default `Columns`.
 
     Returns
     -------
     Columns
-        The results, one row for each point.
+        The results, one row for each point; or `columns`.
 
     Raises
     ------
@@ -190,7 +192,7 @@ def compute_columns(
     >>> print(f"{found.values['plant.belt_speed'][sticks].max():.1f}")
     0.4
     """
-    with Journal(study, path) as journal:
+    with Journal(study, path, columns) as journal:
         if executor is not None:
             run(journal, executor, in_flight=in_flight, progress=progress)
         else:

@@ -61,7 +61,7 @@ class Point(_Row):
 class Piece(NamedTuple):
     """Points of a study that one task has computed, in the order of the task."""
 
-    points: list[Point]
+    points: list[Any]
     end: MotionState | None
     """State in which the point after the last one starts; None: its own initial state, because the
     last one diverged or failed, or the plan has no continuation."""
@@ -123,6 +123,36 @@ class Study:
             why = reasons.get(name, "in this study" if name.startswith(unused) else None)
             if why is not None:
                 raise InvalidInputError(f"{axis}: {name} is not used {why}")
+
+    def compute_point(
+        self, index: int, start: MotionState | None
+    ) -> tuple[Any, MotionState | None]:
+        """Return a computed point, and the state in which the next one of a chain starts."""
+        try:
+            case, initial = self.case(index)
+            if start is not None and case.law is not None:
+                case = replace(case, law=replace(case.law, start_after=0.0))
+            settled = settle(case, start or initial, self.settling)
+        except (StickslipError, ArithmeticError) as error:
+            return Point(index, reason=" ".join(str(error).split())), None
+        measures, end = settled.measures, settled.end
+        reason = trend_text(vars(measures)) if measures.drift else None
+        match measures.regime:
+            case Regime.UNBOUNDED:
+                end, reason = None, "the motion diverges"
+            case Regime.EQUILIBRIUM | Regime.HELD:
+                end = replace(end, velocity=end.velocity - _NUDGE * case.drive.belt_speed)
+            case None:
+                reason = "no whole cycle in the measured time"
+            case _:
+                pass
+        values = [getattr(measures, name) for name in MEASURES]
+        turning_points = tuple(settled.turning_points.tolist())
+        return Point._make([index, *values, settled.steady, turning_points, reason]), end
+
+    def row(self, values: Sequence[Any]) -> Any:
+        """Return the point of a list that went through JSON."""
+        return Point.from_json(values)
 
     def cost(self) -> float:
         """Return the approximate time that a point takes, s; the longest one of a sampled loop."""
@@ -223,38 +253,11 @@ def compute(study: Study, points: Sequence[int], start: MotionState | None) -> P
     initial state, as does the point after one that failed or diverged.
     """
     continuation, end = study.plan.continuation, start
-    found: list[Point] = []
+    found: list[Any] = []
     for index in points:
-        point, end = _compute_point(study, index, end if continuation else None)
+        point, end = study.compute_point(index, end if continuation else None)
         found.append(point)
     return Piece(found, end if continuation else None)
-
-
-def _compute_point(
-    study: Study, index: int, start: MotionState | None
-) -> tuple[Point, MotionState | None]:
-    """Return a computed point, and the state in which the next one of a chain starts."""
-    try:
-        case, initial = study.case(index)
-        if start is not None and case.law is not None:
-            case = replace(case, law=replace(case.law, start_after=0.0))
-        settled = settle(case, start or initial, study.settling)
-    except (StickslipError, ArithmeticError) as error:
-        return Point(index, reason=" ".join(str(error).split())), None
-    measures, end = settled.measures, settled.end
-    reason = trend_text(vars(measures)) if measures.drift else None
-    match measures.regime:
-        case Regime.UNBOUNDED:
-            end, reason = None, "the motion diverges"
-        case Regime.EQUILIBRIUM | Regime.HELD:
-            end = replace(end, velocity=end.velocity - _NUDGE * case.drive.belt_speed)
-        case None:
-            reason = "no whole cycle in the measured time"
-        case _:
-            pass
-    values = [getattr(measures, name) for name in MEASURES]
-    turning_points = tuple(settled.turning_points.tolist())
-    return Point._make([index, *values, settled.steady, turning_points, reason]), end
 
 
 def pieces_of(points: range, size: int) -> Iterator[range]:

@@ -43,6 +43,7 @@ class Cascade(ControlLaw, TwoBodyControl):
 
     name: ClassVar[str] = "cascade"
     states: ClassVar[Sequence[str]] = ("integral", "w")
+    tuned: ClassVar[Sequence[str]] = ("position_gain", "velocity_gain", "integral_gain")
     follows_reference: ClassVar[bool] = True
     state_units: ClassVar[Mapping[str, str | None]] = {
         "integral": "N", "rate": "N/s", **Washout.state_units

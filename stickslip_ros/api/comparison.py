@@ -1,0 +1,366 @@
+"""Comparison of control laws: which one holds the drive, and at what cost."""
+
+import csv
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple, TextIO
+
+import numpy as np
+from typing_extensions import override
+
+from stickslip_ros.api.results import Parts, Summary, Table, TabularResult, attributes
+from stickslip_ros.api.scenarios import ScenarioLike, as_scenario
+from stickslip_ros.api.studies import Values, axis_of
+from stickslip_ros.arrays import FloatArray
+from stickslip_ros.progress import Progress
+from stickslip_ros.quantities import Quantity
+from stickslip_ros.scenarios.files import Scenario
+from stickslip_ros.scenarios.keywords import keyword_of, parameter_of
+from stickslip_ros.show.parameter_tables import scenario_tables
+from stickslip_ros.show.quantities import Units
+from stickslip_ros.studies.case_outcome import OUTCOMES, is_positioning
+from stickslip_ros.studies.comparison import DISTURBANCES, Comparison, Outcomes, compared
+from stickslip_ros.studies.plan import Axis
+from stickslip_ros.studies.runner import CountPoints, compute_columns
+from stickslip_ros.studies.tuning import Tuned
+from stickslip_ros.tables import TextTable
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from stickslip_ros.show.style import FigureStyle
+
+_MEANS = {
+    False: ("rms_velocity", "rms_force", "settling_time", "peak_force", "mean_force", "set_point"),
+    True: ("final_error", "rms_force", "settling_time", "peak_force", "hunting_amplitude"),
+}
+"""What the table has means of, by whether the task is positioning, the second criterion first."""
+
+
+class Rank(NamedTuple):
+    """A law in the ranked table; means over its cases, with standard errors over the seeds."""
+
+    law: str
+    """Name of the law."""
+    held: float
+    """Share of the cases that it holds."""
+    held_error: float
+    """Its standard error; NaN with one seed."""
+    means: Mapping[str, tuple[float, float]]
+    """Mean and standard error of columns of `OUTCOMES`, over the cases where they exist."""
+    at_limit: float
+    """Mean share of samples at the force limit."""
+    failures: int
+    """Number of cases that diverged or failed."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ComparedLaws(TabularResult):
+    """Outcomes of control laws on one drive; it prints as a ranked table."""
+
+    study: Comparison
+    """The scenario and its cases."""
+    outcomes: Outcomes
+    """Outcome of each case."""
+    tuned: Mapping[str, Tuned]
+    """Gains that were found, by law; the others were given."""
+
+    @property
+    def scenario(self) -> Scenario:
+        """The scenario of the drive."""
+        return self.study.scenario
+
+    @cached_property
+    def ranks(self) -> tuple[Rank, ...]:
+        """The laws, the best first: by cases held, then error, then force beyond the mean."""
+        positioning = is_positioning(self.scenario)
+        held = self._array("held")
+        ranks: list[Rank] = []
+        for row, law in enumerate(self.study.plan.laws):
+            share, error = _mean_of_seeds(held[row])
+            means = {name: _mean_of_seeds(self._array(name)[row]) for name in _MEANS[positioning]}
+            at_limit = float(np.nan_to_num(self._array("at_limit")[row]).mean())
+            failures = int(np.isnan(self._array("rms_velocity")[row]).sum())
+            ranks.append(Rank(law, share, error, means, at_limit, failures))
+        second, third, *_ = _MEANS[positioning]
+
+        def order(rank: Rank) -> tuple[float, ...]:
+            return -rank.held, *(
+                np.nan_to_num(rank.means[n][0], nan=np.inf) for n in (second, third)
+            )
+
+        return tuple(sorted(ranks, key=order))
+
+    def held_at_points(self, law: str) -> FloatArray:
+        """Return the share of the cases that a law holds, at each point of the parameters."""
+        row = [*self.study.plan.laws].index(law)
+        return np.nan_to_num(self._array("held")[row]).mean(axis=(1, 2))
+
+    def _array(self, name: str) -> FloatArray:
+        return self.outcomes.column(name).reshape(self.study.plan.shape)
+
+    @override
+    def draw(self, style: "FigureStyle") -> "Figure":
+        from stickslip_ros.show.comparison_figure import comparison_figure
+
+        second, third, *_ = _MEANS[is_positioning(self.scenario)]
+        costs = {rank.law: (rank.means[third][0], rank.means[second][0]) for rank in self.ranks}
+        held = {rank.law: self.held_at_points(rank.law) for rank in self.ranks}
+        return comparison_figure(self.study, held, costs, (third, second), style=style)
+
+    @property
+    def _columns(self) -> dict[str, Any]:
+        """Columns of all cases by name, those of the plan first."""
+        plan = self.study.plan
+        cases = [plan.case(number) for number in range(plan.size)]
+        laws, texts = [*plan.laws], [str(each) for each in plan.disturbances]
+        found: dict[str, Any] = {"law": [laws[case.law] for case in cases]}
+        if plan.grid is not None:
+            values = [plan.grid.values(case.point) for case in cases]
+            found |= dict(zip(plan.parameters, zip(*values, strict=True), strict=True))
+        found["disturbance"] = [texts[case.disturbance] for case in cases]
+        found["seed"] = [case.seed for case in cases]
+        for name in OUTCOMES:
+            found[name] = [getattr(row, name) for row in self.outcomes.rows]
+        return found
+
+    def write_csv(self, stream: TextIO) -> None:
+        """Write a row for each case.
+
+        Parameters
+        ----------
+        stream : TextIO
+            Where it is written.
+        """
+        columns = self._columns
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow(columns)
+        writer.writerows(zip(*columns.values(), strict=True))
+
+    @override
+    def _table(self) -> Table:
+        quantities: dict[str, Quantity] = {"law": Quantity("control law")}
+        columns: dict[str, Any] = {}
+        for name, values in self._columns.items():
+            quantity = OUTCOMES.get(name)
+            if name in self.study.plan.parameters:
+                name, quantity = keyword_of(name), Quantity(keyword_of(name))
+            text = name in ("law", "disturbance", "reason")
+            columns[name] = np.array(values, dtype=object if text else float)
+            quantities[name] = quantity or Quantity(name)
+        drive = self.scenario.plant.as_drive()
+        dimensions = {"case": range(self.study.plan.size)}
+        source = attributes(self.scenario)
+        return Table(columns, quantities, Units.for_drive(drive), dimensions, source)
+
+    @override
+    def _entries(self) -> dict[str, Any]:
+        plan = self.study.plan
+        ranked = [
+            {
+                "law": rank.law,
+                "held": rank.held,
+                "held_error": rank.held_error,
+                **{name: mean for name, (mean, _) in rank.means.items()},
+                **{f"{name}_error": error for name, (_, error) in rank.means.items()},
+                "delay_margin": self.tuned[rank.law].delay_margin
+                if rank.law in self.tuned
+                else None,
+                "at_limit": rank.at_limit,
+                "failures": rank.failures,
+                "constants": dict(plan.laws[rank.law]),
+                "remark": getattr(self.tuned.get(rank.law), "remark", None),
+            }
+            for rank in self.ranks
+        ]
+        return {
+            **self.scenario.provenance(),
+            "task": self._task,
+            "duration": plan.duration,
+            "tolerance": plan.tolerance,
+            "spread": plan.spread,
+            "ranks": ranked,
+            "cases": self._columns,
+        }
+
+    @property
+    def _task(self) -> str:
+        return "positioning" if is_positioning(self.scenario) else "regulation"
+
+    @override
+    def parts(self) -> Parts:
+        plan, drive = self.study.plan, self.scenario.plant.as_drive()
+        units, names = (
+            Units.for_drive(drive, plan.parameters),
+            _MEANS[is_positioning(self.scenario)],
+        )
+        laws, points, disturbances, seeds = plan.shape
+        rows: list[list[str]] = []
+        for rank in self.ranks:
+            tuned = self.tuned.get(rank.law)
+            margin = "given" if tuned is None else units.text(tuned.delay_margin, "s")
+            rows.append(
+                [
+                    rank.law,
+                    f"{rank.held:.1%}" + _plus_minus(f"{rank.held_error:.1%}", rank.held_error),
+                    *(_with_error(units, *rank.means[name], OUTCOMES[name].unit) for name in names),
+                    margin,
+                    f"{rank.at_limit:.1%}",
+                ]
+            )
+        where = "of the belt speed" if self._task == "regulation" else "of the reference's motion"
+        title = (
+            f"{self.scenario.name}, {self._task}: {points} points, {disturbances} disturbances, "
+            f"{seeds} seeds, constants off by up to {plan.spread:.0%}; held within "
+            f"{plan.tolerance:.2g} {where}"
+        )
+        labels = [OUTCOMES[name].label for name in names]
+        headings = ["law", "held", *labels, "delay margin", "at the limit"]
+        yield TextTable(title, headings, rows)
+        yield f"disturbances: {', '.join(map(str, plan.disturbances))}"
+        for law, tuned in self.tuned.items():
+            gains = (f"{name} {getattr(tuned.law, name):.4g}" for name in tuned.law.tuned)
+            yield f"{law}: {', '.join(gains)}" + (f"; {tuned.remark}" if tuned.remark else "")
+        for rank in self.ranks:
+            if rank.failures:
+                reasons = {row.reason for row in self._rows(rank.law) if row.reason}
+                yield f"{rank.law}: {rank.failures} of {plan.size // laws} cases failed: " + (
+                    "; ".join(sorted(reasons)[:3])
+                )
+
+    def _rows(self, law: str) -> Sequence[Any]:
+        size = self.study.plan.size // len(self.study.plan.laws)
+        first = [*self.study.plan.laws].index(law) * size
+        return self.outcomes.rows[first : first + size]
+
+    @override
+    def _summary(self) -> Summary:
+        best = self.ranks[0]
+        verdict = f"{best.law} holds {best.held:.1%} of its cases"
+        parameters = scenario_tables(self.scenario, used=True)
+        return Summary("Comparison of control laws", self.scenario.name, verdict, parameters)
+
+
+def compare(
+    scenario: ScenarioLike,
+    controllers: str | Sequence[str],
+    /,
+    *axes: str,
+    disturbances: str | Sequence[str] = DISTURBANCES,
+    given: str | Sequence[str] = (),
+    seeds: int = 1,
+    spread: float = 0.0,
+    duration: float = 6.0,
+    tolerance: float | None = None,
+    workers: int = 1,
+    executor: Executor | None = None,
+    journal: Path | None = None,
+    progress: CountPoints = lambda _: None,
+    tuning_progress: Progress = lambda _: None,
+    **parameters: Values | list[Any] | FloatArray,
+) -> ComparedLaws:
+    """Compare control laws on one drive: which holds it, how well, and with what force.
+
+    The gains of each law are tuned by one rule, or given. Each law meets the same disturbances, the
+    same noise and the same drives.
+
+    Parameters
+    ----------
+    scenario : Scenario, str or Path
+        The scenario, its name or its path. With a moving belt the task is regulation: hold the
+        slide still. With the belt at rest it is positioning at the scenario's reference.
+    controllers : str or sequence of str
+        Names of control laws, as a list or a text separated by commas.
+    *axes : str
+        Texts NODE.PARAMETER=A:B:COUNT, as in `sweep`.
+    disturbances : str or sequence of str
+        `none`, `step`, `impulse` and `sine`, also with an amplitude, as in `sine=300N@8Hz`.
+    given : str or sequence of str
+        Laws whose constants are those of the scenario, without tuning.
+    seeds : int
+        Number of seeds of the noise of the sensor and of the constants of the drive.
+    spread : float
+        Largest deviation of the constants of the drive, as a share.
+    duration : float
+        Duration of a case, s.
+    tolerance : float, optional
+        What a law that holds may leave: share of the belt speed (0.05), or of the reference's
+        motion (0.001).
+    workers, executor, journal, progress
+        As for `sweep`.
+    tuning_progress : callable
+        Receives the share of the laws whose gains are found, 0 to 1.
+    **parameters
+        As for `sweep`, such as `belt_speed=(0.002, 0.03, 4)`.
+
+    Returns
+    -------
+    ComparedLaws
+        The outcomes of all cases, and the ranked table.
+
+    Raises
+    ------
+    InvalidInputError
+        If an argument is not allowed, or a law has no gains that make all loops stable.
+    RunError
+        If worker processes keep dying.
+
+    Examples
+    --------
+    >>> import stickslip_ros as ss
+    >>> drive = ss.scenario("feed_drive", controller="velocity_feedback", velocity_gain=-3000.0)
+    >>> laws = "velocity_feedback,washout"
+    >>> found = ss.compare(drive, laws, disturbances="step", given=laws, duration=1.0)
+    >>> [rank.held for rank in found.ranks]
+    [1.0, 0.0]
+    """
+    chosen = as_scenario(scenario)
+    every = [*map(Axis.parse, axes)]
+    for keyword, values in parameters.items():
+        every.append(axis_of(keyword, parameter_of(keyword, chosen.nodes), values, listed=True))
+    study, tuned = compared(
+        chosen,
+        controllers,
+        every,
+        disturbances=disturbances,
+        given=given,
+        seeds=seeds,
+        spread=spread,
+        duration=duration,
+        tolerance=tolerance,
+        progress=tuning_progress,
+    )
+    outcomes = compute_columns(
+        study,
+        workers=workers,
+        executor=executor,
+        path=journal,
+        progress=progress,
+        columns=Outcomes(study.plan.size),
+    )
+    return ComparedLaws(study, outcomes, tuned)
+
+
+def _mean_of_seeds(values: FloatArray) -> tuple[float, float]:
+    """Return the mean over all cases that have a value, and its standard error over the seeds."""
+    known = ~np.isnan(values)
+    if not known.any():
+        return np.nan, np.nan
+    counts = known.sum(axis=(0, 1))
+    sums = np.where(known, values, 0.0).sum(axis=(0, 1))
+    of_seeds = sums[counts > 0] / counts[counts > 0]
+    error = of_seeds.std(ddof=1) / np.sqrt(len(of_seeds)) if len(of_seeds) > 1 else np.nan
+    return float(values[known].mean()), float(error)
+
+
+def _plus_minus(text: str, error: float) -> str:
+    return "" if np.isnan(error) else f" ± {text}"
+
+
+def _with_error(units: Units, mean: float, error: float, unit: str) -> str:
+    if np.isnan(mean):
+        return "-"
+    return units.text(mean, unit) + _plus_minus(units.text(error, unit), error)

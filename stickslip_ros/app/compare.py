@@ -1,0 +1,112 @@
+"""`stickslip compare`: which control law holds a drive, how well, and with what force."""
+
+import argparse
+
+from stickslip_ros.app.arguments import (
+    add_json,
+    add_scenario,
+    check_speeds,
+    naming,
+    scenario_of,
+    whole,
+)
+from stickslip_ros.app.output import progress_bar
+from stickslip_ros.app.result import add_html, add_plot, check_results
+from stickslip_ros.app.study_command import add_workers, computed, finish
+
+_DESCRIPTION = """Compare control laws on one drive. The gains of each law are tuned by one rule for
+the sampled loop, or given by the scenario. With a moving belt the task is regulation: the slide is
+held still against disturbances. With the belt at rest it is positioning at the reference of the
+scenario's controller. All laws meet the same noise and the same drives."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of the command."""
+    parser.description = _DESCRIPTION
+    add_scenario(parser)
+    parser.add_argument(
+        "--controllers",
+        required=True,
+        metavar="LAW,LAW,...",
+        help="control laws to compare (`stickslip list` prints them)",
+    )
+    parser.add_argument(
+        "--given",
+        default="",
+        metavar="LAW,...",
+        help="laws among them whose gains are those of the scenario (default: all are tuned)",
+    )
+    parser.add_argument(
+        "--over",
+        action="append",
+        default=[],
+        metavar="NODE.PARAMETER=A:B:COUNT",
+        help="COUNT values of a parameter, as in --over plant.belt_speed=0.002:0.03:4; the gains "
+        "are for all belt speeds",
+    )
+    parser.add_argument(
+        "--disturbances",
+        default="step,impulse,sine",
+        metavar="KIND,...",
+        help="none, step, impulse, sine, also with an amplitude as in sine=300N@8Hz (default: "
+        "%(default)s, of a tenth of the static friction)",
+    )
+    parser.add_argument(
+        "--seeds",
+        type=whole("a number of seeds, from {} to {}", 1, 100_000),
+        default=1,
+        metavar="N",
+        help="seeds of noise and of the constants of the drive (default: %(default)d)",
+    )
+    parser.add_argument(
+        "--spread",
+        type=float,
+        default=0.0,
+        metavar="SHARE",
+        help="largest deviation of the constants of the drive, as in 0.2 (default: 0)",
+    )
+    parser.add_argument(
+        "--duration", type=float, default=6.0, metavar="S", help="of a case (default: %(default)g)"
+    )
+    parser.add_argument(
+        "--tolerance",
+        type=float,
+        metavar="SHARE",
+        help="what a law that holds may leave: share of the belt speed (default: 0.05), or of the "
+        "motion of the reference (default: 0.001)",
+    )
+    add_workers(parser)
+    add_plot(parser, "which law holds where, and error against force")
+    add_html(parser)
+    add_json(parser)
+
+
+def run(arguments: argparse.Namespace) -> None:
+    """Run the command."""
+    from stickslip_ros.api.comparison import ComparedLaws
+    from stickslip_ros.studies.comparison import Outcomes, compared
+    from stickslip_ros.studies.plan import Axis
+
+    with naming("--over"):
+        axes = [Axis.parse(text) for text in arguments.over]
+    scenario = scenario_of(arguments, unused=[axis.parameter for axis in axes])
+    belts = [axis for axis in axes if axis.parameter == "plant.belt_speed"]
+    check_speeds(arguments, scenario, *(end for axis in belts for end in (axis.first, axis.last)))
+    check_results(arguments)
+    with progress_bar(f"gains for {scenario.name}", 1.0, lines=True) as progress:
+        study, tuned = compared(
+            scenario,
+            arguments.controllers,
+            axes,
+            disturbances=arguments.disturbances,
+            given=arguments.given.split(",") if arguments.given else (),
+            seeds=arguments.seeds,
+            spread=arguments.spread,
+            duration=arguments.duration,
+            tolerance=arguments.tolerance,
+            progress=progress,
+        )
+    label = f"comparison on {scenario.name}, {study.plan.size} cases"
+    outcomes = Outcomes(study.plan.size)
+    with computed(arguments, study, label, outcomes) as journal:
+        finish(arguments, journal, ComparedLaws(study, outcomes, tuned))

@@ -1,0 +1,67 @@
+"""The figure of a comparison: which law holds where, and error against force."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from stickslip_ros.arrays import FloatArray
+from stickslip_ros.show.quantities import Units
+from stickslip_ros.show.style import SCREEN, FigureStyle, finish, styled
+from stickslip_ros.studies.case_outcome import OUTCOMES
+from stickslip_ros.studies.comparison import Comparison
+
+_MARKERS = "osD^vPX*<>"
+
+
+@styled
+def comparison_figure(
+    study: Comparison,
+    held: Mapping[str, FloatArray],
+    costs: Mapping[str, tuple[float, float]],
+    names: tuple[str, str],
+    *,
+    style: FigureStyle = SCREEN,
+) -> Figure:
+    """Return the figure.
+
+    `held` has the share of held cases at each point by law, the best law first; `costs` the values
+    of the outcomes with these `names`.
+    """
+    figure = style.figure(9.6, 4.4, narrow=1.5)
+    style.set_title(figure, f"control laws compared, {study.scenario.name}")
+    panels = (2, 1) if style.narrow else (1, 2)
+    where, cost = figure.subplots(*panels)
+    units = Units.for_drive(study.scenario.plant.as_drive(), study.plan.parameters)
+    shares = np.array([*held.values()])
+    where.imshow(shares, cmap="RdYlGn", vmin=0.0, vmax=1.0, aspect="auto")
+    where.grid(visible=False)
+    for (row, column), share in np.ndenumerate(shares):
+        where.text(column, row, f"{share:.0%}", ha="center", va="center", fontsize=7.0)
+    where.set_yticks(range(len(held)), [*held])
+    grid = study.plan.grid
+    if grid is None:
+        where.set_xticks([])
+    else:
+        values = [grid.values(point) for point in range(grid.size)]
+        axes_units = [axis.unit for axis in grid.axes]
+        texts = [
+            "\n".join(units.text(v, u) for v, u in zip(row, axes_units, strict=True))
+            for row in values
+        ]
+        where.set_xticks(range(grid.size), texts, fontsize=7.0)
+        where.set_xlabel(", ".join(axis.parameter for axis in grid.axes))
+    where.set_title("share of cases held")
+    scales = [
+        units.axis(OUTCOMES[name].label, OUTCOMES[name].unit, [costs[law][place] for law in costs])
+        for place, name in enumerate(names)
+    ]
+    for number, (law, values) in enumerate(costs.items()):
+        force, error = (value / scale for value, (scale, _) in zip(values, scales, strict=True))
+        marker = _MARKERS[number % len(_MARKERS)]
+        cost.plot(force, error, marker, color=f"C{number % 10}", ls="", label=law)
+    cost.set(xlabel=scales[0][1], ylabel=scales[1][1], xscale="symlog", yscale="symlog")
+    cost.set_title("means of all cases")
+    finish(figure)
+    style.legend_below(figure, cost.get_legend_handles_labels()[0])
+    return figure

@@ -1,0 +1,212 @@
+"""One case of a comparison: a law holds a drive against a disturbance, or positions it."""
+
+from dataclasses import dataclass
+from math import inf, pi
+from typing import Annotated, Any, NamedTuple
+
+import numpy as np
+
+from stickslip_ros.arrays import rms
+from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.physics.loop.controller import answer
+from stickslip_ros.physics.measures.holding import Trial, hunting, settling_time
+from stickslip_ros.physics.motion import Motion
+from stickslip_ros.quantities import Quantity, number_of, quantities_of
+from stickslip_ros.scenarios.files import Scenario
+
+KINDS = ("none", "step", "impulse", "sine")
+"""Kinds of disturbances."""
+_START, _END, _JUDGED = 1.0 / 3.0, 1.0 / 2.0, 2.0 / 3.0
+"""Start and end of the disturbance, and start of the time that is judged, of a case's duration."""
+_FRICTION_SHARE = 0.1
+"""Default amplitude of a disturbance, as a share of the static friction."""
+
+
+@dataclass(frozen=True)
+class Disturbance:
+    """A disturbance force on the slide; it starts after a third of a case.
+
+    A step lasts a sixth of it, an impulse one sample, and a sine to the end.
+    """
+
+    kind: str
+    """One of `KINDS`."""
+    amplitude: float = 0.0
+    """Amplitude, N."""
+    frequency: float = 1.0
+    """Frequency of a sine, Hz."""
+
+    def __str__(self) -> str:
+        text = self.kind if self.kind == "none" else f"{self.kind}={self.amplitude:.4g}N"
+        return f"{text}@{self.frequency:.4g}Hz" if self.kind == "sine" else text
+
+    @classmethod
+    def parse(cls, text: str, scenario: Scenario) -> "Disturbance":
+        """Return the disturbance of a text KIND, KIND=AMPLITUDE or sine=AMPLITUDE@FREQUENCY.
+
+        By default the amplitude is a tenth of the static friction; of an impulse it has the
+        momentum that moves the slide as far as a step of it. A sine has half the natural frequency,
+        or 1 Hz without a spring.
+        """
+        plant, drive = scenario.plant, scenario.plant.as_drive()
+        kind, _, size = text.partition("=")
+        amplitude, _, frequency = size.partition("@")
+        if kind not in KINDS or (frequency and kind != "sine") or (size and kind == "none"):
+            raise InvalidInputError(
+                f"disturbance {text:.80}: must be {', '.join(KINDS)}, with =AMPLITUDE, or "
+                "sine=AMPLITUDE@FREQUENCY"
+            )
+        natural = drive.angular_frequency if drive.has_spring else 4.0 * pi
+        usual = _FRICTION_SHARE * max(drive.friction.limits) * drive.normal_force
+        if kind == "impulse":
+            usual *= max(plant.rate / natural, 1.0)
+        return cls(
+            kind,
+            number_of(text, amplitude, "N") if amplitude else float(f"{usual:.3g}"),
+            number_of(text, frequency, "Hz") if frequency else float(f"{natural / 4.0 / pi:.3g}"),
+        )
+
+    def parameters(self, duration: float) -> dict[str, Any]:
+        """Return the parameters of the plant for a case of some duration (s), by name."""
+        values: dict[str, Any] = {"kind": self.kind}
+        if self.kind != "none":
+            values |= {"amplitude": self.amplitude, "start": _START * duration}
+        if self.kind == "step":
+            values["duration"] = (_END - _START) * duration
+        elif self.kind == "sine":
+            values |= {"duration": inf, "frequency": self.frequency}
+        return {f"plant.disturbance.{name}": value for name, value in values.items()}
+
+
+class Outcome(NamedTuple):
+    """What a case came to; SI units, None for what its task does not have.
+
+    The time that is judged is its last third: after the disturbance, or under a sine.
+    """
+
+    number: int
+    """Number of the case, from 0."""
+    held: Annotated[bool | None, Quantity("held")] = None
+    """Whether the law did its task."""
+    sticking: Annotated[float | None, Quantity("share of time sticking")] = None
+    """Share of the samples that are judged at which the slide stuck."""
+    rms_velocity: Annotated[float | None, Quantity("rms velocity", "m/s")] = None
+    """Root mean square of the velocity, from there on."""
+    set_point: Annotated[float | None, Quantity("set point", "m")] = None
+    """Mean displacement there."""
+    mean_force: Annotated[float | None, Quantity("mean force", "N")] = None
+    """Mean control force there: the friction that a law with a position loop carries."""
+    rms_force: Annotated[float | None, Quantity("rms force beyond the mean", "N")] = None
+    """Root mean square of the force beyond its mean there."""
+    peak_force: Annotated[float | None, Quantity("peak force", "N")] = None
+    """Largest force from the first sample on."""
+    settling_time: Annotated[float | None, Quantity("settling time", "s")] = None
+    """Time from the end of the disturbance, or of the reference's motion, until it is held."""
+    at_limit: Annotated[float | None, Quantity("share of time at the limit")] = None
+    """Share of all samples at which the force had its limit."""
+    final_error: Annotated[float | None, Quantity("final error", "m")] = None
+    """Largest distance from the reference in the time that is judged; of positioning."""
+    hunting_amplitude: Annotated[float | None, Quantity("hunting amplitude", "m")] = None
+    """Amplitude of the vibration about the reference; of positioning, 0 without one."""
+    hunting_period: Annotated[float | None, Quantity("hunting period", "s")] = None
+    """Its mean period; of positioning."""
+    reason: Annotated[str | None, Quantity("reason")] = None
+    """Why the case failed, in words."""
+
+
+OUTCOMES = quantities_of(Outcome)
+"""Columns of the outcomes, with labels and units."""
+
+
+def is_positioning(scenario: Scenario) -> bool:
+    """Return whether the task is positioning on a guide at rest, not regulation at a feed."""
+    return scenario.plant.as_drive().fastest_belt == 0.0
+
+
+def simulate_case(
+    scenario: Scenario, duration: float, disturbance: Disturbance, tolerance: float
+) -> Outcome:
+    """Return the outcome of the sampled loop of a scenario.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Scenario with the disturbance; its controller acts from the first sample on.
+    duration : float
+        Duration, s.
+    disturbance : Disturbance
+        The disturbance, for its end.
+    tolerance : float
+        What a law that holds may leave, as a share of the belt speed or the reference's motion.
+
+    Returns
+    -------
+    Outcome
+        Outcome with the number 0.
+
+    Raises
+    ------
+    StickslipError
+        If the law fails, or the motion is too stiff to be followed.
+    """
+    plant = scenario.plant
+    drive, limit = plant.as_drive(), scenario.controller.control_law.force_limit
+    motion = Motion(drive, plant.initial.position, plant.initial.velocity)
+    loop, controller = plant.as_loop(motion), scenario.controller.as_controller()
+    rows: list[tuple[float, float, float, float, bool]] = []
+    slow = 0.0 if drive.friction.sticks else 0.01
+    for _ in range(round(duration * plant.rate)):
+        answered = answer(loop, controller)
+        speed, belt = motion.velocity, motion.belt_speed
+        sticks = motion.sticking or abs(speed - belt) < slow * abs(belt)
+        aim = controller.reference.position or 0.0
+        rows.append((motion.position, speed, answered, aim, sticks))
+        loop.advance()
+        if loop.unbounded:
+            return Outcome(0, held=False, reason="the motion diverges")
+    position, velocity, force, target, sticks = np.array(rows).T.copy()
+    trial = Trial(position, velocity, force, target, sticks != 0.0)
+    late = trial[round(_JUDGED * len(trial)) :]
+    limit = min(limit, drive.actuator.limit)
+    middle, swing = float(late.position.mean()), rms(late.velocity)
+    found = Outcome(
+        0,
+        sticking=float(late.sticks.mean()),
+        rms_velocity=swing,
+        set_point=middle,
+        mean_force=float(late.force.mean()),
+        rms_force=float(late.force.std()),
+        peak_force=float(np.abs(trial.force).max()),
+        at_limit=float((np.abs(trial.force) >= limit).mean()),
+    )
+    if is_positioning(scenario):
+        return _positioned(found, trial, late, tolerance, plant.rate)
+    allowed = tolerance * abs(drive.belt_speed)
+    if disturbance.kind == "sine":
+        return found._replace(held=found.sticking == 0.0)
+    ends = {"step": _END, "none": 0.0}.get(disturbance.kind, _START) * duration
+    omega = drive.angular_frequency if drive.has_spring else 0.0
+    distance = np.hypot(omega * (trial.position - middle), trial.velocity)
+    return found._replace(
+        held=found.sticking == 0.0 and swing <= allowed,
+        settling_time=settling_time(distance, 2.0 * allowed, ends, plant.rate),
+    )
+
+
+def _positioned(
+    found: Outcome, trial: Trial, late: Trial, tolerance: float, rate: float
+) -> Outcome:
+    """Return an outcome with what positioning on a guide at rest has."""
+    target, error = trial.target, np.abs(trial.position - trial.target)
+    allowed = tolerance * (float(np.ptp(target)) or float(np.abs(target).max()) or 1.0)
+    moving = np.flatnonzero(np.diff(target))
+    ends = (int(moving[-1]) + 1) / rate if len(moving) else 0.0
+    amplitude, period = hunting(late.position - late.target, allowed, rate)
+    final = float(error[-len(late) :].max())
+    return found._replace(
+        held=final <= allowed,
+        settling_time=settling_time(error, allowed, ends, rate),
+        final_error=final,
+        hunting_amplitude=amplitude,
+        hunting_period=period,
+    )

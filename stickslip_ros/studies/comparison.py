@@ -1,0 +1,278 @@
+"""Comparison of control laws: cases of law, parameters, disturbance and seed, each simulated."""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+from typing_extensions import override
+
+from stickslip_ros.arrays import BoolArray, FloatArray
+from stickslip_ros.errors import InvalidInputError, StickslipError
+from stickslip_ros.progress import Progress
+from stickslip_ros.scenarios.files import Scenario
+from stickslip_ros.scenarios.parameters import known_law
+from stickslip_ros.studies.case_outcome import Disturbance, Outcome, is_positioning, simulate_case
+from stickslip_ros.studies.plan import Axis, Grid
+from stickslip_ros.studies.settling import MotionState, check_reference
+from stickslip_ros.studies.study import Study
+from stickslip_ros.studies.tuning import Goal, Tuned, tune, with_law
+from stickslip_ros.text import shown
+
+FEED_TOLERANCE, POSITION_TOLERANCE = 0.05, 0.001
+"""Default tolerance, as a share: of the belt speed, or of the motion of the reference."""
+DISTURBANCES = ("step", "impulse", "sine")
+"""Default disturbances."""
+
+
+class Outcomes:
+    """The outcomes of all cases as columns, and which are known."""
+
+    def __init__(self, size: int) -> None:
+        self.done: BoolArray = np.zeros(size, dtype=bool)
+        """Whether the case is simulated."""
+        self.rows: list[Outcome] = [Outcome(number) for number in range(size)]
+        """The outcomes, in the order of the cases."""
+
+    def enter(self, outcomes: Iterable[Outcome]) -> None:
+        """Enter the outcomes of cases that were simulated."""
+        for outcome in outcomes:
+            self.rows[outcome.number] = outcome
+            self.done[outcome.number] = True
+
+    def column(self, name: str) -> FloatArray:
+        """Return a column of numbers; NaN for what does not exist."""
+        values = [getattr(row, name) for row in self.rows]
+        return np.array([np.nan if value is None else float(value) for value in values])
+
+
+class Case(NamedTuple):
+    """Places of a case in the lists of a plan."""
+
+    law: int
+    point: int
+    disturbance: int
+    seed: int
+
+
+@dataclass(frozen=True)
+class Cases:
+    """All combinations of laws, points of a grid, disturbances and seeds; the seed varies fastest.
+
+    A seed is that of the sensor's noise and of the jitter, and draws the constants of the drive;
+    these are the same for all laws.
+    """
+
+    kind: ClassVar[str] = "comparison"
+    """Name of this kind of plan in journals."""
+    continuation: ClassVar[None] = None
+    """None: the cases are independent."""
+    laws: Mapping[str, Mapping[str, Any]]
+    """Constants of each law, by name of the law."""
+    grid: Grid | None
+    """Values of parameters that vary; None for those of the scenario."""
+    disturbances: tuple[Disturbance, ...]
+    seeds: int = 1
+    spread: float = 0.0
+    """Largest deviation of a constant of the drive, as a share."""
+    duration: float = 6.0
+    """Duration of a case, s."""
+    tolerance: float = FEED_TOLERANCE
+    """What a law that holds may leave, as a share; see `FEED_TOLERANCE`."""
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Numbers of laws, points, disturbances and seeds."""
+        points = 1 if self.grid is None else self.grid.size
+        return len(self.laws), points, len(self.disturbances), self.seeds
+
+    @property
+    def size(self) -> int:
+        """Number of cases."""
+        return int(np.prod(self.shape))
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """NODE.PARAMETER of the values that vary."""
+        return () if self.grid is None else self.grid.parameters
+
+    def case(self, number: int) -> Case:
+        """Return the places of a case."""
+        return Case(*map(int, np.unravel_index(number, self.shape)))
+
+    def chains(self) -> Iterator[range]:
+        """Yield all numbers together."""
+        yield range(self.size)
+
+
+@dataclass(frozen=True)
+class Comparison(Study):
+    """The cases of a comparison, with all other parameters from a scenario."""
+
+    plan: Cases  # type: ignore[assignment]
+
+    def scenario_of(self, number: int) -> Scenario:
+        """Return the scenario of a case.
+
+        Raises
+        ------
+        InvalidInputError
+            If its values are out of bounds, or do not fit together.
+        """
+        plan, case = self.plan, self.plan.case(number)
+        law = [*plan.laws][case.law]
+        found = with_law(self.scenario, law, plan.laws[law])
+        values: dict[str, Any] = {"plant.sensor.seed": case.seed}
+        values["plant.force_jitter_seed"] = case.seed
+        values |= plan.disturbances[case.disturbance].parameters(plan.duration)
+        if plan.grid is not None:
+            values |= zip(plan.parameters, plan.grid.values(case.point), strict=True)
+        found = found.changed(values)
+        return found.changed(drawn(found, case.seed, plan.spread)) if plan.spread else found
+
+    @override
+    def compute_point(
+        self, index: int, start: MotionState | None
+    ) -> tuple[Outcome, MotionState | None]:
+        try:
+            plan, case = self.plan, self.plan.case(index)
+            found = simulate_case(
+                self.scenario_of(index),
+                plan.duration,
+                plan.disturbances[case.disturbance],
+                plan.tolerance,
+            )
+            return found._replace(number=index), None
+        except (StickslipError, ArithmeticError) as error:
+            return Outcome(index, held=False, reason=" ".join(str(error).split())), None
+
+    @override
+    def row(self, values: Sequence[Any]) -> Outcome:
+        return Outcome(*values)
+
+    @override
+    def cost(self) -> float:
+        return self.plan.duration * self.scenario.plant.rate * 2e-5
+
+    @override
+    def as_dict(self) -> dict[str, Any]:
+        plan = asdict(self.plan)
+        return {"scenario": self.scenario.as_dict(), "plan": {"kind": self.plan.kind, **plan}}
+
+    def check(self) -> None:
+        """Refuse a comparison of which no first case of a law can be simulated."""
+        for number in range(0, self.plan.size, self.plan.size // len(self.plan.laws)):
+            check_reference(self.scenario_of(number))
+
+
+def drawn(scenario: Scenario, seed: int, spread: float) -> dict[str, float]:
+    """Return constants of the drive that are off by at most a share, by NODE.PARAMETER.
+
+    Each constant with a unit but the belt speed and the bias force is multiplied by a factor of
+    its own, uniformly distributed; coefficients of friction change with the normal force.
+    """
+    plant, rng = scenario.plant, np.random.default_rng((seed, 1))
+    values, known = plant.flat(), plant.known
+    found: dict[str, float] = {}
+    for name in plant.drive_names():
+        if known[name].unit and name not in ("belt_speed", "bias_force") and values[name]:
+            factor = 1.0 + spread * float(rng.uniform(-1.0, 1.0))
+            found[f"plant.{name}"] = values[name] * factor
+    return found
+
+
+def compared(
+    scenario: Scenario,
+    controllers: str | Sequence[str],
+    axes: Sequence[Axis] = (),
+    *,
+    disturbances: str | Sequence[str] = DISTURBANCES,
+    given: str | Sequence[str] = (),
+    seeds: int = 1,
+    spread: float = 0.0,
+    duration: float = 6.0,
+    tolerance: float | None = None,
+    progress: Progress = lambda _: None,
+) -> tuple[Comparison, dict[str, Tuned]]:
+    """Return the cases of a comparison, with the gains that were found for its laws.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Scenario with drive, loop, sensor and the reference of the laws.
+    controllers : str or sequence of str
+        Names of control laws, as a text separated by commas.
+    axes : sequence of Axis, optional
+        Parameters that vary, such as the belt speed.
+    disturbances : str or sequence of str
+        Disturbances, see `Disturbance.parse`.
+    given : str or sequence of str
+        Laws whose constants are those of the scenario; also those that name no gains to tune.
+    seeds : int
+        Number of seeds.
+    spread : float
+        Largest deviation of the constants of the drive, as a share below 1.
+    duration : float
+        Duration of a case, s.
+    tolerance : float, optional
+        What a law that holds may leave: share of the belt speed, or of the reference's motion.
+    progress : callable
+        Receives the share of the gains that are found, 0 to 1.
+
+    Raises
+    ------
+    InvalidInputError
+        If an argument is not allowed, or a law has no gains that make all loops stable.
+    """
+    limits = {"seeds": (seeds, 1, 100_000), "spread": (spread, 0.0, 0.9)}
+    limits["duration"] = (duration, 0.01, 1e5)
+    for name, (value, low, high) in limits.items():
+        if not low <= value <= high:
+            raise InvalidInputError(f"{name} {value:g}: must be from {low:g} to {high:g}")
+    if tolerance is None:
+        tolerance = POSITION_TOLERANCE if is_positioning(scenario) else FEED_TOLERANCE
+    laws = [known_law(law) for law in _names("controllers", controllers)]
+    fixed = [known_law(law) for law in _names("given", given)] if given else []
+    if not {*fixed} <= {*laws}:
+        raise InvalidInputError(f"given {shown(fixed)}: must be among {', '.join(laws)}")
+    found = tuple(
+        Disturbance.parse(text, scenario) for text in _names("disturbances", disturbances)
+    )
+    step = max((each.amplitude for each in found if each.kind in ("step", "sine")), default=0.0)
+    tuned: dict[str, Tuned] = {}
+    constants: dict[str, dict[str, Any]] = {}
+    for number, law in enumerate(laws):
+        own = with_law(scenario, law, {}).controller.control_law
+        if own.tuned and law not in fixed:
+            goal = Goal.from_scenario(scenario, feeds(scenario, axes), step, own.force_limit)
+            tuned[law] = tune(scenario, law, goal)
+            own = tuned[law].law
+        constants[law] = {name: getattr(own, name) for name in own.constants()}
+        progress((number + 1) / len(laws))
+    grid = Grid(tuple(axes)) if axes else None
+    plan = Cases(constants, grid, found, seeds, spread, duration, tolerance)
+    study = Comparison(scenario, plan)
+    study.check()
+    return study, tuned
+
+
+def feeds(scenario: Scenario, axes: Sequence[Axis]) -> list[float]:
+    """Return the speeds, m/s, at which the loops of a scenario are to hold.
+
+    At a feed these are the belt speeds. On a guide at rest they are the largest speed of the
+    reference and a tenth of it, or without one 10 mm/s and 1 mm/s.
+    """
+    for axis in axes:
+        if axis.parameter == "plant.belt_speed":
+            return axis.values().tolist()
+    if not is_positioning(scenario):
+        return [scenario.plant.belt_speed]
+    fastest = scenario.controller.reference.signal(period=1.0 / scenario.plant.rate).steepest
+    return [0.1 * (fastest or 0.01), fastest or 0.01]
+
+
+def _names(what: str, text: str | Sequence[str]) -> list[str]:
+    names = text.split(",") if isinstance(text, str) else [*text]
+    if not names or "" in names or len({*names}) < len(names):
+        raise InvalidInputError(f"{what} {shown(text)}: must be different names")
+    return names

@@ -1,0 +1,292 @@
+"""Gains of a control law by one rule, from the sampled loops at all feeds.
+
+The smallest decay rate at these feeds is made as large as it gets while the delay margin is at
+least that of the goal, and force and noise stay within its limits.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import inf, log, sqrt
+from typing import Any, ClassVar
+
+import numpy as np
+from typing_extensions import override
+
+from stickslip_ros.arrays import FloatArray
+from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.physics.model.constants import constants_of
+from stickslip_ros.physics.model.control import ControlLaw, LinearFeedback, Reference
+from stickslip_ros.physics.model.control.base import State
+from stickslip_ros.physics.model.dimensionless_drive import SPEED
+from stickslip_ros.physics.theory.linear import jacobians
+from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop, why_no_linear_loop
+from stickslip_ros.physics.theory.linear_system import sampled_system
+from stickslip_ros.physics.theory.loop_response import LoopResponse, PlantResponse
+from stickslip_ros.physics.theory.requirements import AUTONOMOUS, require
+from stickslip_ros.samples import Sample
+from stickslip_ros.scenarios.files import Scenario
+from stickslip_ros.studies.design_search import rounded
+
+_STARTS, _KEPT, _REFINED = 300, 6, 40
+"""Random gains of which the best are refined, and steps of the refinement."""
+_RANGE = 2.5
+"""Gains are searched within this many decades on either side of the scales of the drive."""
+_NOISE_SHARE = 0.05
+"""Largest rms force by noise, as a share of the limit, or of the static friction if it is less."""
+
+
+@dataclass(frozen=True)
+class Goal:
+    """What gains are to achieve; SI units."""
+
+    feeds: tuple[float, ...]
+    """Belt speeds, m/s."""
+    force_limit: float
+    """Largest force, N: of the law, or of a weaker actuator."""
+    disturbance: float
+    """Step of a disturbance force, N, under which the force stays within the limit."""
+    delay_margin: float
+    """Least delay margin, s."""
+
+    @classmethod
+    def from_scenario(
+        cls, scenario: Scenario, feeds: Sequence[float], disturbance: float, force_limit: float
+    ) -> "Goal":
+        """Return the goal at some feeds (m/s): a delay margin of two sample periods."""
+        limit = min(force_limit, scenario.plant.actuator.limit)
+        return cls(tuple(feeds), limit, disturbance, 2.0 / scenario.plant.rate)
+
+
+@dataclass(frozen=True)
+class Tuned:
+    """The gains that were found for a law, and what the linear loops say of them."""
+
+    law: ControlLaw
+    """The law with its gains."""
+    goal: Goal
+    """The goal."""
+    decay_rate: float
+    """Smallest decay rate at the feeds, 1/s."""
+    delay_margin: float | None
+    """Smallest delay margin, s; None if no delay turns the loop unstable."""
+    phase_margin: float | None
+    """Smallest phase margin, rad; None without any."""
+    gain_down: float | None
+    """Largest factor below one of the force at which a loop is unstable; None without any."""
+    gain_up: float | None
+    """Smallest factor above one of the force at which a loop is unstable; None without any."""
+    sensitivity_peak: float
+    """Largest magnitude of the sensitivity."""
+    peak_force: float
+    """Largest force by disturbance, mean friction and noise, N."""
+    noise_force: float
+    """Largest rms force by noise and rounding of the encoder, N."""
+    remark: str | None
+    """What of the goal is not met, or None."""
+    responses: tuple[LoopResponse, ...]
+    """The linear loops at the feeds."""
+
+
+def with_law(scenario: Scenario, law: str, constants: Mapping[str, float]) -> Scenario:
+    """Return a scenario with a law that acts from the first sample on, and these constants.
+
+    The reference is that of the scenario's own controller.
+    """
+    found, reference = scenario.with_controller(law), scenario.controller.reference
+    node = found.controller.node
+    values: dict[str, Any] = {f"{node}.{name}": value for name, value in constants.items()}
+    values[f"{node}.start_after"] = 0.0
+    found = replace(found.changed(values), plant=replace(found.plant, expects_control=True))
+    if not found.controller.control_law.follows_reference:
+        return found
+    return replace(found, controller=replace(found.controller, reference=reference))
+
+
+class _Search:
+    """Loops at the feeds, and the value of gains."""
+
+    def __init__(self, scenario: Scenario, law: ControlLaw, goal: Goal) -> None:
+        self.goal, self.law = goal, law
+        plant = scenario.plant
+        drive, sensor = plant.as_drive(), plant.sensor
+        self.period = 1.0 / plant.rate
+        require("the theory of the sampled loop", drive, AUTONOMOUS)
+        delay = plant.force_delay + plant.force_jitter / 2.0
+        self.plants: list[PlantResponse] = []
+        for feed in goal.feeds:
+            at_feed = replace(drive, belt_speed=feed)
+            reason = why_no_linear_loop(at_feed, plant.rate, delay)
+            if reason is not None:
+                raise InvalidInputError(f"gains of {law.name} by theory: {reason}")
+            # Of a drive without a spring too, at any of its rests.
+            (jacobian,) = jacobians(at_feed, None, np.array([feed / drive.speed_scale]))
+            loop = LinearSampledLoop(at_feed, plant.rate, delay, jacobian, sensor.spans)
+            self.plants.append(PlantResponse.of(loop))
+        # The loops differ in the slope of the friction only: the two extreme ones decide.
+        slopes = [float(each.loop.jacobian[SPEED, SPEED]) for each in self.plants]
+        ends = sorted({int(np.argmin(slopes)), int(np.argmax(slopes))})
+        self.extremes = [self.plants[row] for row in ends]
+        self.noise = sqrt(sensor.position_resolution**2 / 12.0 + sensor.position_noise**2)
+        self.friction = max(drive.friction.limits) * drive.normal_force
+        constants = constants_of(type(law))
+        self.units = [1.0 / drive.scales.factor(constants[name].unit) for name in law.tuned]
+        self.signs = [-1.0 if constants[name].default < 0.0 else 1.0 for name in law.tuned]
+
+    def with_gains(self, point: FloatArray) -> ControlLaw:
+        """Return the law with gains of these magnitudes, in logarithms of the drive's scales."""
+        values = np.exp(point) * self.units * self.signs
+        gains: dict[str, Any] = dict(
+            zip(self.law.tuned, map(rounded, values.tolist()), strict=True)
+        )
+        return replace(self.law, **gains)
+
+    def decay_rate(self, feedback: LinearFeedback) -> float:
+        """Return the smallest decay rate, 1/s."""
+        linear = _Linear(form=feedback)
+        return min(plant.loop.decay_rate(linear) for plant in self.extremes)
+
+    def feedback(self, law: ControlLaw) -> LinearFeedback:
+        """Return the linear part of the law."""
+        found = law.linear_part(self.period)
+        if found is None:
+            raise InvalidInputError(f"control law {law.name}: it has no linear part to tune")
+        return found
+
+    def judged(self, law: ControlLaw, plants: Sequence[PlantResponse]) -> Tuned:
+        """Return what the loops of these plants say of a stable law."""
+        feedback = self.feedback(law)
+        responses = tuple(LoopResponse(plant, feedback) for plant in plants)
+        steps = [each.step_response() for each in responses]
+        noise = max(each.noise_force(self.noise) for each in responses)
+        peak = max(
+            self.goal.disturbance * float(np.abs(step).max()) + self.friction * share
+            for step, share in zip(steps, (self.carried(each) for each in responses), strict=True)
+        )
+        below, above = zip(*(each.gain_margins for each in responses), strict=True)
+        return Tuned(
+            law,
+            self.goal,
+            self.decay_rate(feedback),
+            _least(each.delay_margin for each in responses),
+            _least(each.phase_margin for each in responses),
+            max((factor for factor in below if factor is not None), default=None),
+            _least(above),
+            max(each.sensitivity_peak for each in responses),
+            peak + 4.0 * noise,
+            noise,
+            None,
+            responses,
+        )
+
+    def carried(self, response: LoopResponse) -> float:
+        """Return the share of a constant force on the slide, such as friction, that a law carries.
+
+        The spring carries the rest; without one, or in front of a motor, it carries nothing.
+        """
+        drive = response.plant.loop.drive
+        if drive.motor is not None or not drive.has_spring:
+            return 1.0
+        system = sampled_system(response.plant.loop, _Linear(form=response.feedback))
+        rest = system.C @ np.linalg.solve(np.eye(len(system.A)) - system.A, system.B)
+        return abs(1.0 - drive.stiffness * float(rest[0, 0]))
+
+    def excess(self, found: Tuned) -> dict[str, float]:
+        """Return by how much, as logarithms, a law exceeds each limit of the goal."""
+        goal = self.goal
+        noise = _NOISE_SHARE * min(goal.force_limit, self.friction)
+        ratios = {
+            "the delay margin": goal.delay_margin / (found.delay_margin or inf),
+            "the peak force": found.peak_force / goal.force_limit,
+            "the rms force by noise": found.noise_force / noise,
+        }
+        return {name: log(ratio) for name, ratio in ratios.items() if ratio > 1.0}
+
+    def value(self, point: FloatArray) -> tuple[float, float]:
+        """Return what is made large: first that the goal is met, then the decay rate."""
+        law = self.with_gains(point)
+        decay_rate = self.decay_rate(self.feedback(law))
+        if decay_rate <= 0.0:
+            return -inf, decay_rate
+        return -sum(self.excess(self.judged(law, self.extremes)).values()), decay_rate
+
+
+def tune(scenario: Scenario, law: str, goal: Goal) -> Tuned:
+    """Return the gains of a law for a scenario by the rule, see the module.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Scenario that gives drive, rate, delay and sensor.
+    law : str
+        Name of the control law. Its constants that are no gains are those of the scenario or
+        follow from the drive.
+    goal : Goal
+        The goal.
+
+    Returns
+    -------
+    Tuned
+        The gains; the remark says what of the goal they do not meet.
+
+    Raises
+    ------
+    InvalidInputError
+        If the law has no gains to tune, or no gains make all loops stable.
+    """
+    found = with_law(scenario, law, {}).controller.control_law
+    if not found.tuned:
+        raise InvalidInputError(f"control law {law}: it names no gains to tune, so give them")
+    start = replace(found.for_drive(scenario.plant.as_drive()), force_limit=goal.force_limit)
+    search = _Search(scenario, start, goal)
+    rng, count = np.random.default_rng(1), len(start.tuned)
+    points = log(10.0) * rng.uniform(-_RANGE, _RANGE, (_STARTS, count))
+    rates = [search.decay_rate(search.feedback(search.with_gains(point))) for point in points]
+    ranked = [points[row] for row in np.argsort(rates)[::-1] if rates[row] > 0.0]
+    if not ranked:
+        speeds = ", ".join(f"{feed:g}" for feed in goal.feeds)
+        raise InvalidInputError(f"control law {law}: no gains make the loop stable at {speeds} m/s")
+    valued = sorted(((search.value(point), tuple(point)) for point in ranked[:60]), reverse=True)
+    best = max(_refined(search, np.array(point), value) for value, point in valued[:_KEPT])
+    judged = search.judged(search.with_gains(np.array(best[1])), search.plants)
+    missed = search.excess(judged)
+    remark = f"no gains were found within the limits of {' and '.join(missed)}"
+    return replace(judged, remark=remark if missed else None)
+
+
+def _refined(
+    search: _Search, point: FloatArray, value: tuple[float, float]
+) -> tuple[tuple[float, float], tuple[float, ...]]:
+    """Return the best value and point of a search along the axes, with ever smaller steps."""
+    step = 1.0
+    for _ in range(_REFINED):
+        trials = [point + step * sign * axis for axis in np.eye(len(point)) for sign in (1.0, -1.0)]
+        found = max((search.value(trial), tuple(trial)) for trial in trials)
+        if found[0] > value:
+            value, point = found[0], np.array(found[1])
+        elif step < 0.05:
+            break
+        else:
+            step /= 2.0
+    return value, tuple(point)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Linear(ControlLaw):
+    """A law of which only its linear form is used."""
+
+    name: ClassVar[str] = "linear"
+    form: LinearFeedback
+
+    @override
+    def respond(
+        self, state: State, elapsed: float, sample: Sample, reference: Reference
+    ) -> tuple[float, State]:
+        raise NotImplementedError
+
+    @override
+    def linear_feedback(self, period: float) -> LinearFeedback:
+        return self.form
+
+
+def _least(values: Any) -> float | None:
+    return min((value for value in values if value is not None), default=None)

@@ -1,0 +1,167 @@
+"""Comparison of control laws: its cases, their outcomes, and that it is resumed."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import stickslip_ros as ss
+from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.physics.model.control import VelocityFeedback
+from stickslip_ros.scenarios.files import Scenario, load_scenario
+from stickslip_ros.studies.case_outcome import Disturbance, simulate_case
+from stickslip_ros.studies.comparison import Cases, Comparison, Outcomes, compared, drawn
+from stickslip_ros.studies.journal import Journal
+from stickslip_ros.studies.plan import Axis
+from stickslip_ros.studies.runner import run
+from stickslip_ros.studies.study import compute
+
+LAWS = "washout,velocity_feedback"
+GAINS = {
+    "washout": {"corner_frequency": 20.0, "linear_gain": -6000.0},
+    "velocity_feedback": {"velocity_gain": -6000.0},
+}
+
+
+def feed_drive(*overrides: str) -> Scenario:
+    return load_scenario("feed_drive", ["plant.sensor.position_resolution=1e-7", *overrides])
+
+
+def comparison(seeds: int = 2, **options: Any) -> Comparison:
+    scenario = feed_drive()
+    texts = ("step", "sine=20N@5Hz")
+    found = tuple(Disturbance.parse(text, scenario) for text in texts)
+    return Comparison(scenario, Cases(GAINS, None, found, seeds, duration=0.6, **options))
+
+
+def outcome(scenario: Scenario, disturbance: str = "step", duration: float = 3.0) -> Any:
+    parsed = Disturbance.parse(disturbance, scenario)
+    disturbed = scenario.changed(parsed.parameters(duration))
+    return simulate_case(disturbed, duration, parsed, 0.05)
+
+
+def test_a_drive_that_is_damped_is_held_and_one_that_is_not_sticks() -> None:
+    gain = "velocity_feedback_controller.velocity_gain"
+    scenario = load_scenario("feed_drive", [f"{gain}=-3000"], controller="velocity_feedback")
+    held = outcome(scenario)
+    assert held.held
+    assert (held.sticking, held.at_limit) == (0.0, 0.0)
+    assert held.rms_velocity < 1e-4
+    assert held.set_point == pytest.approx(scenario.plant.as_drive().equilibrium_position, rel=1e-4)
+    loose = outcome(scenario.changed({gain: 0.0}))
+    assert not loose.held
+    assert loose.sticking > 0.05
+    assert loose.settling_time is None
+
+
+def test_a_position_loop_carries_the_mean_friction_apart_from_the_force_beyond_it() -> None:
+    node = "pid_controller"
+    values = {f"{node}.position_gain": 5e5, f"{node}.integral_gain": 5e6}
+    values[f"{node}.velocity_gain"] = 6000.0
+    scenario = load_scenario("feed_drive", controller="pid").changed(values)
+    found, drive = outcome(scenario), scenario.plant.as_drive()
+    friction = drive.stiffness * drive.equilibrium_position
+    assert found.held
+    assert found.mean_force == pytest.approx(-friction, rel=1e-2)
+    assert found.rms_force < 1e-2 * friction
+    assert found.set_point == pytest.approx(0.0, abs=2e-6)
+
+
+def test_positioning_on_a_guide_at_rest_tells_the_final_error() -> None:
+    reference = {"kind": "step", "amplitude": 1e-3}
+    scenario = load_scenario("axis", controller="pid").changed(
+        {f"pid_controller.reference.{name}": value for name, value in reference.items()}
+        | {"pid_controller.position_gain": 1e6, "pid_controller.velocity_gain": 1e4}
+        | {"pid_controller.integral_gain": 0.0, "plant.bias_force": 0.0}
+    )
+    found = outcome(scenario, "none", 1.0)
+    # PD control stops where friction holds.
+    assert 0.0 < found.final_error <= 0.0206277 * 1000.0 / 1e6 + 12e-6
+    assert (found.hunting_amplitude, found.hunting_period) == (0.0, None)
+    assert found.held
+
+
+def test_all_laws_meet_the_same_drives_and_the_same_noise() -> None:
+    study = comparison(seeds=3, spread=0.2)
+    cases = [study.plan.case(number) for number in range(study.plan.size)]
+    plants: dict[Any, list[Any]] = {}
+    for number, case in enumerate(cases):
+        plants.setdefault(case[1:], []).append(study.scenario_of(number).plant)
+    assert all(one == other for one, other in plants.values())
+    drives = {plant[0].as_drive() for plant in plants.values()}
+    assert len(drives) == 3
+    nominal = study.scenario.plant.flat()
+    factors = [
+        value / nominal[name.removeprefix("plant.")]
+        for seed in range(100)
+        for name, value in drawn(study.scenario, seed, 0.2).items()
+    ]
+    assert 0.8 <= min(factors) < 0.81
+    assert 1.19 < max(factors) <= 1.2
+
+
+def test_an_interrupted_comparison_continues_and_gives_the_same_table(tmp_path: Path) -> None:
+    study = comparison(spread=0.1)
+    whole = Outcomes(study.plan.size)
+    with Journal(study, None, whole) as journal:
+        run(journal)
+    path = tmp_path / "part"
+    with Journal(study, path, Outcomes(study.plan.size)) as journal:
+        journal.add(compute(study, [0, 1, 5], None))
+    rest = Outcomes(study.plan.size)
+    with Journal(study, path, rest) as journal:
+        assert journal.count == 3
+        run(journal)
+    assert rest.rows == whole.rows
+    other = replace(study, plan=replace(study.plan, spread=0.2))
+    with pytest.raises(InvalidInputError, match="another study"):
+        Journal(other, path, Outcomes(study.plan.size))
+
+
+def test_a_case_that_fails_is_a_row_with_its_reason() -> None:
+    study = comparison()
+    wrong = {"washout": {"corner_frequency": -1.0}}
+    found = compute(replace(study, plan=replace(study.plan, laws=wrong)), [0], None).points[0]
+    assert (found.held, found.rms_velocity) == (False, None)
+    assert "corner_frequency = -1.0 is invalid" in found.reason
+
+
+def test_the_best_law_comes_first_and_ties_are_told_by_the_velocity() -> None:
+    drive = feed_drive().changed({"plant.rate": 1000.0})
+    found = ss.compare(drive, LAWS, disturbances="step,sine", seeds=2, spread=0.2, duration=1.5)
+    first, second = found.ranks
+    assert (first.held, -first.means["rms_velocity"][0]) >= (
+        second.held, -second.means["rms_velocity"][0],
+    )  # fmt: skip
+    assert first.means["rms_velocity"][1] > 0.0
+    assert isinstance(found.tuned["velocity_feedback"].law, VelocityFeedback)
+    assert len(found.to_pandas()) == found.study.plan.size == 8
+    assert len(found.to_dict()["ranks"]) == 2
+    assert np.shape(found.held_at_points("washout")) == (1,)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"controllers": "washout,washout"}, "must be different names"),
+        ({"controllers": "washuot"}, "did you mean washout"),
+        ({"disturbances": "bump"}, "must be none, step, impulse, sine"),
+        ({"disturbances": "step=3m"}, "must be a number in N"),
+        ({"seeds": 0}, "must be from 1"),
+        ({"spread": 1.5}, "must be from 0 to 0.9"),
+        ({"given": "pid"}, "must be among washout"),
+    ],
+)
+def test_what_is_not_allowed_is_refused(arguments: dict[str, Any], message: str) -> None:
+    given = {"controllers": "washout", "given": "washout", **arguments}
+    with pytest.raises(InvalidInputError, match=message):
+        compared(feed_drive(), given.pop("controllers"), [], **given)
+
+
+def test_gains_are_for_all_belt_speeds_that_vary() -> None:
+    axis = Axis("plant.belt_speed", 0.02, 0.04, 2)
+    study, tuned = compared(feed_drive(), "velocity_feedback", [axis], disturbances="none")
+    assert tuned["velocity_feedback"].goal.feeds == (0.02, 0.04)
+    assert study.plan.size == 2

@@ -1,0 +1,66 @@
+"""Gains by the rule: they meet the goal, and none near them do it and damp faster."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop
+from stickslip_ros.scenarios.files import Scenario, load_scenario
+from stickslip_ros.studies.tuning import Goal, tune
+
+FEEDS = (0.01, 0.04)
+
+
+def scenario(**values: float) -> Scenario:
+    found = load_scenario("feed_drive", ["plant.sensor.position_resolution=2e-7"])
+    return found.changed({"plant.sensor.velocity": "difference", "plant.rate": 2000.0, **values})
+
+
+def goal(force_limit: float = 600.0) -> Goal:
+    return Goal.from_scenario(scenario(), FEEDS, 40.0, force_limit)
+
+
+@pytest.mark.parametrize("law", ["washout", "velocity_feedback", "pid", "disturbance_observer"])
+def test_the_gains_meet_the_goal_and_others_near_them_damp_no_faster(law: str) -> None:
+    found = tune(scenario(), law, goal())
+    assert found.remark is None
+    assert found.delay_margin is None or found.delay_margin >= goal().delay_margin
+    assert found.peak_force <= 600.0
+    plant = scenario().plant
+    loops = [
+        LinearSampledLoop.from_drive(
+            replace(plant.as_drive(), belt_speed=feed), plant.rate, 0.0, plant.sensor
+        )
+        for feed in FEEDS
+    ]
+    rates = [loop.decay_rate(found.law) for loop in loops if loop is not None]
+    assert found.decay_rate == pytest.approx(min(rates), rel=1e-9)
+    assert found.decay_rate > 0.0
+    rng = np.random.default_rng(0)
+    for _ in range(10):
+        gains = {name: getattr(found.law, name) for name in found.law.tuned}
+        other = {name: value * rng.uniform(0.9, 1.1) for name, value in gains.items()}
+        fixed = replace(found.law, **other)
+        faster = min(loop.decay_rate(fixed) for loop in loops if loop is not None)
+        if faster > 1.15 * found.decay_rate:
+            pytest.fail(f"{other} damps with {faster}, not {found.decay_rate}")
+
+
+def test_a_law_that_is_not_linear_gets_the_gains_of_its_linear_part() -> None:
+    pid, reset = (tune(scenario(), law, goal()) for law in ("pid", "reset_integral"))
+    for name in pid.law.tuned:
+        assert getattr(pid.law, name) == getattr(reset.law, name)
+
+
+def test_a_goal_that_no_gains_meet_is_told() -> None:
+    found = tune(scenario(), "pid", goal(force_limit=100.0))
+    assert found.remark is not None
+    assert "the peak force" in found.remark
+
+
+def test_a_delay_that_no_gains_stand_is_refused() -> None:
+    late = scenario(**{"plant.force_delay": 0.03})
+    with pytest.raises(InvalidInputError, match="no gains make the loop stable"):
+        tune(late, "velocity_feedback", goal())
