@@ -97,6 +97,8 @@ class Fit(ABC):
 
     has_spring: ClassVar[bool]
     """Whether the drive has a spring."""
+    least_gain: ClassVar[float] = 0.0
+    """Difference of validation errors that tells nothing, because the errors of all laws have it."""
 
     @property
     @abstractmethod
@@ -255,13 +257,13 @@ class Candidate:
 def better_by(better: Candidate, worse: Candidate) -> float:
     """Return by how many standard errors one model predicts better than the other.
 
-    Less than one per cent counts as nothing. It compares the logarithms of the errors part by part:
+    Less than one per cent, and than `Fit.least_gain`, counts as nothing. It compares the logarithms of the errors part by part:
     a single bad part decides nothing. Models that were not compared on the same parts are told
     apart by their errors alone.
     """
     if len(better.held_out) != len(worse.held_out):
         return copysign(inf, worse.error - better.error)
-    if worse.error < (1.0 + _LEAST_GAIN) * better.error:
+    if worse.error < (1.0 + _LEAST_GAIN) * better.error + better.fit.least_gain:
         return 0.0
     tiny = np.finfo(float).tiny
     ratios = np.log(np.maximum(worse.held_out, tiny) / np.maximum(better.held_out, tiny))

@@ -132,6 +132,7 @@ class Regression(Fit):
     """The equation of motion with a friction curve in each direction, fitted to rows."""
 
     has_spring = False
+    least_gain = 3e-3  # the filters blur reversals
     rows: Rows
     curve: IdentifiedLaw
     """Law whose terms are fitted in each direction."""

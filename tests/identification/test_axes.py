@@ -113,9 +113,9 @@ def test_the_law_is_chosen_by_held_out_parts() -> None:
 
 @pytest.mark.long
 def test_coulomb_friction_needs_no_table() -> None:
-    found = identify([record("coulomb", duration=10.0)])
+    found = identify([record("coulomb", duration=6.0)])
     assert found.law == "coulomb"
-    assert found.as_good["exponential"]
+    assert found.as_good["table"]
 
 
 def test_the_controller_is_found_from_the_record_if_the_forces_are_its_own() -> None:

@@ -41,11 +41,18 @@ def test_no_constants_have_no_covariance() -> None:
     assert block_covariance(np.empty((_ROWS, 0)), np.ones(_ROWS)).shape == (0, 0)
 
 
-def candidate(name: str, errors: list[float], variances: list[float]) -> Candidate:
+def candidate(
+    name: str, errors: list[float], variances: list[float], least_gain: float = 0.0
+) -> Candidate:
     """Return a fit with an error in each block, a share, and variances of its constants."""
     law = SimpleNamespace(name=name, deflection=0.0)
     fit: Any = SimpleNamespace(
-        law=law, point=variances, covariance=np.diag(variances), has_spring=False, scale=1.0
+        law=law,
+        point=variances,
+        covariance=np.diag(variances),
+        has_spring=False,
+        scale=1.0,
+        least_gain=least_gain,
     )
     return Candidate(fit, np.square(errors))
 
@@ -59,6 +66,13 @@ def test_the_simplest_within_the_error_is_chosen() -> None:
     chosen, as_good = choose([rough, plain, best])
     assert chosen is plain
     assert as_good == {"stribeck": True, "coulomb": True, "table": True}
+
+
+def test_a_gain_that_is_that_of_the_filters_is_none() -> None:
+    for least_gain, name in ((0.0, "table"), (3e-3, "coulomb")):
+        best = candidate("table", [0.0113, 0.0114] * 3, [1.0] * 9, least_gain)
+        plain = candidate("coulomb", [0.0135, 0.0136] * 3, [1.0] * 5, least_gain)
+        assert choose([plain, best])[0].law == name
 
 
 def test_a_law_with_constants_that_are_not_told_is_not_chosen() -> None:
