@@ -98,7 +98,7 @@ class Fit(ABC):
     has_spring: ClassVar[bool]
     """Whether the drive has a spring."""
     least_gain: ClassVar[float] = 0.0
-    """Difference of validation errors that tells nothing, because the errors of all laws have it."""
+    """Difference of validation errors that tells nothing of the laws."""
 
     @property
     @abstractmethod
@@ -257,9 +257,9 @@ class Candidate:
 def better_by(better: Candidate, worse: Candidate) -> float:
     """Return by how many standard errors one model predicts better than the other.
 
-    Less than one per cent, and than `Fit.least_gain`, counts as nothing. It compares the logarithms of the errors part by part:
-    a single bad part decides nothing. Models that were not compared on the same parts are told
-    apart by their errors alone.
+    Less than one per cent, or than `Fit.least_gain`, counts as nothing. It compares the logarithms
+    of the errors part by part: a single bad part decides nothing. Models that were not compared on
+    the same parts are told apart by their errors alone.
     """
     if len(better.held_out) != len(worse.held_out):
         return copysign(inf, worse.error - better.error)
