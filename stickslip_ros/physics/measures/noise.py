@@ -260,8 +260,8 @@ def rest(
     """Return the measures of a motion without cycles, steady once it lasts for `needed` s.
 
     The amplitude is that of a sine whose variance is what that of the positions exceeds the noise
-    by. A line through the positions tells a slide that moves on by more than is `resolved`, m,
-    which has no regime.
+    by. A slide that moves on by more than is `resolved`, m, by a line through the positions, or
+    to and fro from sample to sample, has no regime.
     """
     none = without_cycles(None, None)
     if len(samples) < 8:
@@ -273,8 +273,12 @@ def rest(
     far = max(resolved, REVERSAL * noise, PRECISION * abs(samples.position[0]))
     if abs(slope) > _SLIP_SHARE * belt_speed and abs(slope) * float(time[-1]) > far:
         return none
+    amplitude = sqrt(2.0 * max(spread**2 - noise**2, 0.0))
+    speed = float(np.std(np.diff(samples.position))) * (len(time) - 1) / max(float(time[-1]), 1e-9)
+    if amplitude > far and speed > _SLIP_SHARE * belt_speed > 0.0:
+        return none
     at_rest = Cycle(
-        amplitude=sqrt(2.0 * max(spread**2 - noise**2, 0.0)),
+        amplitude=amplitude,
         velocity_amplitude=0.0,
         midpoint=float(np.mean(samples.position)),
         period=0.0,

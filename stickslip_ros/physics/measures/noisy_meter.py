@@ -39,6 +39,7 @@ from stickslip_ros.physics.measures.noise import (
     vertex,
     white_noise,
 )
+from stickslip_ros.physics.measures.slips import regime_by_slips
 
 _FEW_STEPS = 25.0
 """Amplitude, in steps of an encoder without noise, below which the errors are not known."""
@@ -207,8 +208,23 @@ class NoisyCycleMeter:
         fit = None if quick else self._fit(window.samples, window.starts)
         if fit is not None:
             return self._found(window.samples, fit, fit.noise), fit
+        return self._unlike(window, by_slips=not quick), None
+
+    def _unlike(self, window: _Window, *, by_slips: bool) -> Measures:
+        """Return the measures of cycles that are not alike, whose slips tell whether it sticks."""
         # Half of the cycles: a single one may seem to stick for a moment.
-        return self._found(window.samples, CycleMeans.over(window.cycles, 0.5), self.noise), None
+        means = CycleMeans.over(window.cycles, 0.5)
+        found = self._found(window.samples, means, self.noise)
+        if not by_slips or found.regime not in (Regime.STICK_SLIP, Regime.PURE_SLIP):
+            return found
+        part = window.samples[window.samples.row(window.starts[0]) :]
+        sign = -1.0 if float(part.belt[-1]) < 0.0 else 1.0
+        size = max(means.cycle.amplitude / 2.0, REVERSAL * self.noise)
+        regime = regime_by_slips(part.time, sign * part.position, size, means.cycle.period)
+        if regime in (None, found.regime):
+            return found
+        share = None if regime is Regime.STICK_SLIP else 0.0
+        return replace(found, regime=regime, stick_fraction=share)
 
     def _by_line(self, samples: NoisySamples, line: float) -> tuple[Measures, MeanCycle | None]:
         """Return the measures of the cycles that a line of the spectrum shows."""

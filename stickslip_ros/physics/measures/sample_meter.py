@@ -297,6 +297,11 @@ class SampleMeter:
                 f"the amplitude is only {measures.amplitude / step:.2g} steps of the encoder: the "
                 "standard errors are not known"
             )
+        if measures.stick_fraction is None and measures.regime is Regime.STICK_SLIP:
+            notes.append(
+                "the cycles are not alike: by their slips the slide sticks, for how long is not "
+                "known from single cycles (see --slips)"
+            )
         mean, belt = self.mean_cycle, self._last.belt_velocity[-1] if self._last else 0.0
         if mean is not None and mean.stick_velocity is not None and not self._stick_speed:
             velocity, error = mean.stick_velocity

@@ -207,6 +207,22 @@ class SlipMeter:
         )
 
 
+def regime_by_slips(
+    time: FloatArray, position: FloatArray, size: float, period: float
+) -> Regime | None:
+    """Return whether a motion sticks between slips of at least a `size`, m; None without two.
+
+    The `period`, s, is the mean time from slip to slip, and a quarter of it the longest slip. It
+    sticks if the median time from the end of a slip to the next is 2.5 times that of a slip.
+    """
+    slips = SlipMeter(SlipThreshold(size, within=period / 4.0)).feed(time, position)
+    if len(slips) < 2:
+        return None
+    slip_time = float(np.median([slip.slip_time for slip in slips]))
+    between = float(np.nanmedian([np.nan, *(slip.stick_time for slip in slips[1:])]))
+    return Regime.STICK_SLIP if between > _STICKING_RATIO * slip_time else Regime.PURE_SLIP
+
+
 def _distribution(values: FloatArray) -> dict[str, float] | None:
     values = values[np.isfinite(values)]
     if len(values) == 0:
