@@ -4,6 +4,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property
+from math import inf
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
@@ -380,6 +381,9 @@ class Recording(BagFiles):
         if kind == CONTROL_FORCE.type_name and not (layout.force_topic or by_log):
             return self._decoded(topic, messages, wrenches_in)
         number = NumberedTopic.of(layout.force_topic or "").number
+        kept = number_in(self._of_the_analyzer.get("force_number", ""))
+        if number is None and 0.0 < kept < inf:
+            number = int(kept)
         forces, unstamped, refused = read_forces(
             force_layouts(layout.joint, number)[kind],
             _content(messages),

@@ -395,7 +395,8 @@ def _array_layout(data: bytes, number: int | None) -> Layout:
     start, count = message.doubles(message.count())
     if number is None and count > 1:
         raise BagError(
-            f"an array of forces has {count} numbers: --force-topic 'NAME[1]' takes the first"
+            f"an array of forces has {count} numbers: --force-topic 'NAME[1]' takes the first, as "
+            "force_number 1 of the analyzer does"
         )
     if (number or 1) > count:
         raise MessageError(f"an array of forces has {count} numbers, and no number {number or 1}")

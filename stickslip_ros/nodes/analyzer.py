@@ -119,7 +119,7 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         self._topics = [
             self._force if topic == CONTROL_FORCE else topic for topic in RECORDED_TOPICS
         ]
-        self._force_layout = force_layouts(own.joint or None, None)[kind]
+        self._force_layout = force_layouts(own.joint or None, own.force_number or None)[kind]
         layout = BagLayout(
             own.joint or None, own.belt_joint or None, force="effort" if by_effort else "topic"
         )

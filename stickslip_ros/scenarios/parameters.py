@@ -459,6 +459,13 @@ class AnalyzerParameters(MachineParameters):
         "Type of the messages on `control_force`; `effort`: the force is the effort of the joint.",
         choices=(*FORCE_TYPES, "effort"),
     )
+    force_number: int = at_build(
+        0,
+        "Number of the force in the arrays on `control_force`, from 1; 0: they have only one.",
+        whole=True,
+        at_least=0,
+        at_most=1000,
+    )
 
     @property
     def given_stick_speed(self) -> float | None:

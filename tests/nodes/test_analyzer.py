@@ -14,7 +14,7 @@ from rclpy.parameter import Parameter
 from rclpy.qos import ReliabilityPolicy
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Float64
+from std_msgs.msg import Float64, Float64MultiArray
 
 from stickslip_ros.api.recordings import recorded_drive
 from stickslip_ros.bags.reader import Recording
@@ -90,17 +90,19 @@ def test_it_records_the_bytes_it_hears_measures_them_and_logs_each_figure_once(
     assert all(one != next_one for one, next_one in pairwise(lines))
 
 
-@pytest.mark.parametrize("effort", [False, True])
-def test_it_measures_a_joint_of_another_machine(graph: Graph, tmp_path: Path, effort: bool) -> None:
+@pytest.mark.parametrize("kind", ["number", "array", "effort"])
+def test_it_measures_a_joint_of_another_machine(graph: Graph, tmp_path: Path, kind: str) -> None:
     """Best effort, several joints, numbers or efforts as forces; its bag needs no options."""
-    kind = "effort" if effort else "std_msgs/msg/Float64"
-    machine = {"joint": "axis", "belt_speed": 0.5, "force_type": kind}
+    effort = kind == "effort"
+    message = Float64MultiArray(data=[9.0, -3.0]) if kind == "array" else Float64(data=-3.0)
+    force_type = "effort" if effort else f"std_msgs/msg/{type(message).__name__}"
+    machine = {"joint": "axis", "belt_speed": 0.5, "force_type": force_type, "force_number": 2}
     analyzer = graph.add(AnalyzerNode, bag=str(tmp_path / "bag"), **machine)
     graph.wait_until(lambda: analyzer.active, "analyzer active")
     best_effort = qos_profile(JOINT_STATES, reliability=ReliabilityPolicy.BEST_EFFORT)
     states = graph.observer.create_publisher(JointState, "joint_states", best_effort)
     topic = "other" if effort else "control_force"
-    forces = graph.observer.create_publisher(Float64, topic, best_effort)
+    forces = graph.observer.create_publisher(type(message), topic, best_effort)
     wanted = [states] if effort else [states, forces]
     graph.wait_until(lambda: all(each.get_subscription_count() for each in wanted), "it reads")
     for number in range(200):
@@ -112,7 +114,7 @@ def test_it_measures_a_joint_of_another_machine(graph: Graph, tmp_path: Path, ef
             NANOSECONDS + number * NANOSECONDS // 10, NANOSECONDS
         )
         states.publish(state)
-        forces.publish(Float64(data=-3.0))
+        forces.publish(message)
     graph.wait_until(
         lambda: (
             analyzer._meter.motion.samples == 200
