@@ -7,15 +7,14 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray, rms
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.identification.filtered import filtered
-from stickslip_ros.identification.fit import Candidate
-from stickslip_ros.identification.laws import (
-    DELAY,
+from stickslip_ros.identification.adapters import (
     BristledTableAdapter,
-    IdentifiedLaw,
     SaturatingAdapter,
     TableAdapter,
 )
+from stickslip_ros.identification.filtered import filtered
+from stickslip_ros.identification.fit import Candidate
+from stickslip_ros.identification.laws import DELAY, IdentifiedLaw
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.regression import (
     LINEAR,

@@ -10,18 +10,16 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray, rms
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.identification.filtered import filtered
-from stickslip_ros.identification.fit import Candidate
-from stickslip_ros.identification.laws import (
+from stickslip_ros.identification.adapters import (
     DAHL,
-    DELAY,
     EXPONENTIAL,
-    LAG,
     LUGRE,
     DirectionalAdapter,
-    IdentifiedLaw,
     TableAdapter,
 )
+from stickslip_ros.identification.filtered import filtered
+from stickslip_ros.identification.fit import Candidate
+from stickslip_ros.identification.laws import DELAY, LAG, IdentifiedLaw
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.refinement import Refinement, refine, restarted
 from stickslip_ros.identification.regression import LINEAR, Regression, Rows, regress

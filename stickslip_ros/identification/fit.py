@@ -10,7 +10,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from stickslip_ros.arrays import BoolArray, FloatArray
-from stickslip_ros.identification.laws import DELAY, DirectionalAdapter, IdentifiedLaw
+from stickslip_ros.identification.adapters import DirectionalAdapter
+from stickslip_ros.identification.laws import DELAY, IdentifiedLaw
 from stickslip_ros.identification.record import Record
 from stickslip_ros.physics.model.drive import Drive
 

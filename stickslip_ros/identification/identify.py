@@ -4,18 +4,13 @@ from collections.abc import Callable, Mapping, Sequence
 from math import inf, isfinite
 
 from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.identification.adapters import COMPETING, KNOWN_LAWS, TableAdapter
 from stickslip_ros.identification.axes import AXIS_LAWS, AxisTask
 from stickslip_ros.identification.drives import AUTO, DriveTask
 from stickslip_ros.identification.findings import Findings
 from stickslip_ros.identification.fit import choose
 from stickslip_ros.identification.foreign_laws import foreign_adapter, foreign_names
-from stickslip_ros.identification.laws import (
-    COMPETING,
-    DELAY,
-    KNOWN_LAWS,
-    IdentifiedLaw,
-    TableAdapter,
-)
+from stickslip_ros.identification.laws import DELAY, IdentifiedLaw
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.recordings import ReadRecords
 from stickslip_ros.identification.regression import LINEAR

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.identification.adapters import SaturatingAdapter
 from stickslip_ros.identification.findings import Findings, notes_on
 from stickslip_ros.identification.identify import identify
-from stickslip_ros.identification.laws import SaturatingAdapter
 from stickslip_ros.identification.record import Record, evenly_spaced
 from stickslip_ros.identification.regression import regress
 from stickslip_ros.identification.servo import closed_loop, servo_of

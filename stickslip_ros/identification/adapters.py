@@ -1,0 +1,474 @@
+"""Friction laws as they are identified: one adapter for each law."""
+
+from collections.abc import Mapping, Sequence
+from math import exp, inf, log, sqrt
+from typing import Any
+
+import numpy as np
+from typing_extensions import override
+
+from stickslip_ros.arrays import FloatArray
+from stickslip_ros.identification.laws import LEAST_RISE, REVERSE, IdentifiedLaw, Values
+from stickslip_ros.physics.model.friction import (
+    LAWS,
+    Directional,
+    FrictionLaw,
+    RateState,
+    Table,
+)
+
+_LEAST_FRICTION = 0.01
+"""Least friction of bristles at a speed, as a share of the largest."""
+_RISE_SHARE = 0.3
+"""Rise of static friction from which the search starts, as a share of the kinetic one: bristles
+may hide it."""
+_RISE_SHARES, _LARGEST_RISE = (0.05, 0.3, 1.0), 3.0
+"""Rises of static friction from which a law with stiction is searched, in kinetic ones, and the
+largest one, in static ones at the start."""
+_EXPONENTS = 1.0, 5.0
+"""Exponents of a decay that are searched."""
+_STIFFNESS_RATIOS = (10.0, 100.0)
+"""Stiffnesses of bristles from which the search starts, in stiffnesses of the spring."""
+_DAMPING_RATIO = 0.03
+"""Damping of the bristles from which the search starts, as a share of the critical one."""
+_DIRECT_EFFECT, _LEAST_DIRECT_EFFECT = 0.03, 0.01
+"""Direct effect from which the search starts, as a share of the friction at the fastest speed; the
+least one, as a share of the friction at the reference speed."""
+_SLIP_DISTANCES, _LEAST_SLIP_DISTANCE = (0.03, 0.1), 1e-3
+"""Slip distances from which the search starts, and the least one, in amplitudes of the free
+vibration whose speed is the fastest one."""
+_REFERENCE_SPEED = float(RateState().reference_speed)
+
+
+class CoulombAdapter(IdentifiedLaw):
+    """Coulomb and viscous friction: F = F_s + F_v w."""
+
+    name = "coulomb"
+    least = 0.0, 0.0
+    coordinates: Sequence[str] = ("static", "viscous")
+    smallest = "static"
+
+    @override
+    def terms(self, speed: FloatArray, shape: float) -> FloatArray:
+        return np.column_stack([np.ones_like(speed), speed])
+
+    @override
+    def coordinates_of(self, forces: Sequence[float], shape: float) -> dict[str, float]:
+        return dict(zip(self.coordinates, forces, strict=False))
+
+
+class StictionAdapter(CoulombAdapter):
+    """Coulomb friction with stiction, of which slip tells the kinetic friction only."""
+
+    name = "stiction"
+    coordinates: Sequence[str] = ("kinetic", "rise", "viscous")
+    smallest = "kinetic"
+    of_slip = False
+
+    @override
+    def coordinates_of(self, forces: Sequence[float], shape: float) -> dict[str, float]:
+        kinetic, viscous = forces
+        return {"kinetic": kinetic, "rise": 0.0, "viscous": viscous}
+
+    @override
+    def starts(self, values: Values, fastest: float) -> Sequence[Values]:
+        return [{**values, "rise": share * values["kinetic"]} for share in _RISE_SHARES]
+
+    @override
+    def bounds(self, name: str, values: Values, fastest: float) -> tuple[float, float]:
+        if name == "rise":  # a slide that never breaks loose tells nothing
+            return 0.0, _LARGEST_RISE * self.static_force(values)
+        return super().bounds(name, values, fastest)
+
+
+class DahlAdapter(CoulombAdapter):
+    """Dahl's law: Coulomb friction that bristles follow, without viscous friction."""
+
+    name = "dahl"
+    least = (0.0,)
+    coordinates: Sequence[str] = ("static", "bristle_stiffness")
+    memory: Sequence[str] = ("bristle_stiffness",)
+
+    @override
+    def terms(self, speed: FloatArray, shape: float) -> FloatArray:
+        return np.ones((len(speed), 1))
+
+    @override
+    def starts(self, values: Values, fastest: float) -> Sequence[Values]:
+        return _bristle_starts(values)
+
+
+class StribeckAdapter(IdentifiedLaw):
+    """The cubic law of the paper: F = F_s - D (3 r - r^3)/2 with r = w/v_m, eq. 3."""
+
+    name = "stribeck"
+    least = 0.0, 0.0
+    shaped = True
+    coordinates: Sequence[str] = ("minimum", "rise", "minimum_speed")
+    unscaled: Sequence[str] = ("minimum_speed",)
+    smallest = "minimum"
+
+    @override
+    def terms(self, speed: FloatArray, shape: float) -> FloatArray:
+        ratio = speed / shape
+        return np.column_stack([np.ones_like(speed), -0.5 * (3.0 * ratio - ratio**3)])
+
+    @override
+    def coordinates_of(self, forces: Sequence[float], shape: float) -> dict[str, float]:
+        static, drop = forces
+        rise = min(drop, static)
+        return {"minimum": static - rise, "rise": rise, "minimum_speed": shape}
+
+
+class ExponentialAdapter(IdentifiedLaw):
+    """F = F_k + D exp(-(w/v_s)^n) + F_v w; the viscous force may be negative.
+
+    A regression has the exponent n = 1. Records that hardly tell the decay speed from viscous
+    friction have a long curved valley of good fits. It is straight where friction is given by
+    forces: in the search `kinetic` is replaced by that at the fastest speed, m/s, `viscous` by that
+    at rest, and `rise` by how far the force at a third of the fastest speed is below the straight
+    line between them.
+    """
+
+    name = "exponential"
+    least = 0.0, 0.0, -np.inf
+    shaped = True
+    coordinates: Sequence[str] = ("kinetic", "rise", "decay_speed", "viscous", "exponent")
+    unscaled: Sequence[str] = ("decay_speed", "exponent")
+    optional = ("exponent",)
+    # An exponent that is a whole number makes other equations.
+    by_differences: Sequence[str] = ("exponent",)
+    smallest = "kinetic"
+    straightened: Mapping[str, tuple[float, float] | None] = {
+        "kinetic": (-inf, inf),
+        "rise": None,
+        "decay_speed": None,
+        "viscous": (0.0, inf),
+    }
+
+    @override
+    def terms(self, speed: FloatArray, shape: float) -> FloatArray:
+        return np.column_stack([np.ones_like(speed), np.exp(-speed / shape), speed])
+
+    @override
+    def coordinates_of(self, forces: Sequence[float], shape: float) -> dict[str, float]:
+        kinetic, drop, viscous = forces
+        return {
+            "kinetic": kinetic,
+            "rise": drop,
+            "decay_speed": shape,
+            "viscous": viscous,
+            "exponent": 1.0,
+        }
+
+    @override
+    def starts(self, values: Values, fastest: float) -> Sequence[Values]:
+        return [values, {**values, "exponent": 2.0}]
+
+    @override
+    def bounds(self, name: str, values: Values, fastest: float) -> tuple[float, float]:
+        return _EXPONENTS if name == "exponent" else super().bounds(name, values, fastest)
+
+    @override
+    def to_search(self, values: Values, fastest: float) -> dict[str, float]:
+        sag = values["rise"] * _sag(values, fastest)
+        end = values["kinetic"] + values["rise"] * _decay(values, fastest)
+        end += values["viscous"] * fastest
+        return {**values, "viscous": self.static_force(values), "kinetic": end, "rise": sag}
+
+    @override
+    def from_search(self, found: Values, fastest: float) -> dict[str, float]:
+        rise = found["rise"] / _sag(found, fastest)
+        kinetic = found["viscous"] - rise
+        viscous = (found["kinetic"] - kinetic - rise * _decay(found, fastest)) / fastest
+        return {**found, "viscous": viscous, "kinetic": kinetic, "rise": rise}
+
+
+class TableAdapter(IdentifiedLaw):
+    """Friction without a law, a sum of straight lines between knots: forces at given speeds."""
+
+    name = "table"
+    smallest = "force_0"
+
+    def __init__(self, speeds: FloatArray, knots: FloatArray | None = None) -> None:
+        """Take the speeds of the points and of the knots, m/s, from 0; by default the same."""
+        self.speeds, self.knots = speeds, speeds if knots is None else knots
+        self.least = (0.0, *[-np.inf] * (len(self.knots) - 1))
+        self.coordinates = [f"force_{number}" for number in range(len(speeds))]
+        # The polynomials of the pieces are made from them.
+        self.by_differences = self.coordinates
+
+    @override
+    def terms(self, speed: FloatArray, shape: float) -> FloatArray:
+        low, high = self.knots[:-1], self.knots[1:]
+        shares = np.clip((speed[:, None] - low) / (high - low), 0.0, 1.0)
+        return np.column_stack([np.ones_like(speed), shares])
+
+    @override
+    def coordinates_of(self, forces: Sequence[float], shape: float) -> dict[str, float]:
+        found = self.terms(self.speeds, shape) @ np.array(forces)
+        return dict(zip(self.coordinates, found.tolist(), strict=True))
+
+    @override
+    def start(self, values: Values, smallest: float) -> dict[str, float]:
+        least = LEAST_RISE * max(map(abs, values.values()))
+        return {name: max(value, least) for name, value in values.items()}
+
+    @override
+    def friction(self, values: Values, normal_force: float) -> FrictionLaw:
+        sizes = [max(values[name], 0.0) / normal_force for name in self.coordinates]
+        return Table(tuple(zip(self.speeds.tolist(), sizes, strict=True)))
+
+
+class SaturatingAdapter(TableAdapter):
+    """F = F_0 + R (1 - exp(-w/v_s)) + F_v w: friction that rises ever less, as of ball screws."""
+
+    shaped = True
+    least_shape = 1.0  # a rise far below the slowest speed is one with the force at rest
+
+    def __init__(self, speeds: FloatArray) -> None:
+        """Take the speeds of the points of its table, m/s, from 0."""
+        super().__init__(speeds)
+        self.least = 0.0, 0.0, 0.0
+
+    @override
+    def terms(self, speed: FloatArray, shape: float) -> FloatArray:
+        return np.column_stack([np.ones_like(speed), 1.0 - np.exp(-speed / shape), speed])
+
+
+class _DerivedAdapter(IdentifiedLaw):
+    """A law that is made from another one, whose friction in steady slip it has."""
+
+    def __init__(self, own: IdentifiedLaw) -> None:
+        """Take the adapter of the other law."""
+        self.own, self.name, self.deflection = own, own.name, own.deflection
+        self.least, self.shaped, self.least_shape = own.least, own.shaped, own.least_shape
+
+    @override
+    def terms(self, speed: FloatArray, shape: float) -> FloatArray:
+        return self.own.terms(speed, shape)
+
+    @override
+    def coordinates_of(self, forces: Sequence[float], shape: float) -> dict[str, float]:
+        return self.own.coordinates_of(forces, shape)
+
+
+class BristledTableAdapter(_DerivedAdapter):
+    """A table that friction follows over a path, as bristles do: F' = |v_r| (F_table - F) / d.
+
+    It is the LuGre law without damping of the bristles, of one deflection d at all speeds.
+    """
+
+    def __init__(self, table: TableAdapter, deflection: float) -> None:
+        """Take the table in steady slip, and the deflection, m."""
+        super().__init__(table)
+        self.name, self.deflection, self.smallest = "lugre", deflection, table.smallest
+        self.memory = "bristle_stiffness", "bristle_damping"
+        self.coordinates = (*table.coordinates, *self.memory)
+
+    @override
+    def joined(self, directions: Sequence[Values]) -> dict[str, float]:
+        # A law has one contact: the mean friction of both directions is that of its stiffness.
+        mean = float(np.mean([max(0.0, *each.values()) for each in directions]))
+        own = {"bristle_stiffness": mean / self.deflection, "bristle_damping": 0.0}
+        # Bristles need friction to deflect.
+        least = _LEAST_FRICTION * mean
+        return super().joined(
+            [{name: max(each[name], least) for name in each} | own for each in directions]
+        )
+
+    @override
+    def friction(self, values: Values, normal_force: float) -> FrictionLaw:
+        return _bristled(self, self.own, values, normal_force)
+
+
+class BristleAdapter(ExponentialAdapter):
+    """A law with a memory that follows an exponential curve."""
+
+    def __init__(
+        self, name: str, memory: Sequence[str], by_differences: Sequence[str] = ()
+    ) -> None:
+        self.name, self.memory = name, memory
+        self.by_differences = (*ExponentialAdapter.by_differences, *by_differences)
+        self.coordinates = (*ExponentialAdapter.coordinates, *memory)
+
+    @override
+    def starts(self, values: Values, fastest: float) -> Sequence[Values]:
+        rise = max(values["rise"], _RISE_SHARE * values["kinetic"])
+        return _bristle_starts({**values, "rise": rise})
+
+    @override
+    def friction(self, values: Values, normal_force: float) -> FrictionLaw:
+        return _bristled(self, EXPONENTIAL, values, normal_force)
+
+
+class RateStateAdapter(IdentifiedLaw):
+    """F = F_k + (A - B) ln(w/v_0) in steady slip, of which A is immediate.
+
+    The reference speed v_0 is that by default: another one only changes F_k. Far from v_0, F_k
+    hardly differs from the slope A - B: in the search `kinetic` is replaced by friction in steady
+    slip at the fastest speed.
+    """
+
+    name = "rate_state"
+    least = 0.0, -inf
+    coordinates: Sequence[str] = (
+        "kinetic", "direct_effect", "evolution_effect", "slip_distance",
+    )  # fmt: skip
+    unscaled: Sequence[str] = ("slip_distance",)
+    smallest = "kinetic"
+    memory: Sequence[str] = coordinates[1:]
+    straightened: Mapping[str, tuple[float, float] | None] = {"kinetic": (0.0, inf)}
+
+    @override
+    def terms(self, speed: FloatArray, shape: float) -> FloatArray:
+        decades = np.log(np.maximum(speed / _REFERENCE_SPEED, 1.0))
+        return np.column_stack([np.ones_like(speed), decades])
+
+    @override
+    def coordinates_of(self, forces: Sequence[float], shape: float) -> dict[str, float]:
+        kinetic, slope = forces
+        return {
+            "kinetic": kinetic,
+            "direct_effect": max(slope, 0.0),
+            "evolution_effect": max(-slope, 0.0),
+        }
+
+    @override
+    def starts(self, values: Values, fastest: float) -> Sequence[Values]:
+        amplitude = fastest * sqrt(values["mass"] / values["stiffness"])
+        slope = values["direct_effect"] - values["evolution_effect"]
+        direct = max(_DIRECT_EFFECT * self.to_search(values, fastest)["kinetic"], abs(slope))
+        effects = {"direct_effect": direct, "evolution_effect": direct - slope}
+        return [
+            {**values, **effects, "slip_distance": share * amplitude} for share in _SLIP_DISTANCES
+        ]
+
+    @override
+    def friction(self, values: Values, normal_force: float) -> FrictionLaw:
+        return RateState(
+            **{
+                name: values[name] / (1.0 if name in self.unscaled else normal_force)
+                for name in self.coordinates
+            }
+        )
+
+    @override
+    def bounds(self, name: str, values: Values, fastest: float) -> tuple[float, float]:
+        if name == "slip_distance":
+            amplitude = fastest * sqrt(values["mass"] / values["stiffness"])
+            return _LEAST_SLIP_DISTANCE * amplitude, amplitude
+        if name == "direct_effect":
+            return _LEAST_DIRECT_EFFECT * values["kinetic"], inf
+        if name == "evolution_effect":
+            return 0.0, inf
+        return super().bounds(name, values, fastest)
+
+    @override
+    def to_search(self, values: Values, fastest: float) -> dict[str, float]:
+        return {**values, "kinetic": values["kinetic"] + self._rise(values, fastest)}
+
+    @override
+    def from_search(self, found: Values, fastest: float) -> dict[str, float]:
+        return {**found, "kinetic": found["kinetic"] - self._rise(found, fastest)}
+
+    def _rise(self, values: Values, fastest: float) -> float:
+        """Return how far friction in steady slip rises to the fastest speed, N."""
+        slope = values["direct_effect"] - values["evolution_effect"]
+        return slope * log(fastest / _REFERENCE_SPEED)
+
+
+class DirectionalAdapter(_DerivedAdapter):
+    """A law that has constants of its own in each direction of slip."""
+
+    def __init__(self, own: IdentifiedLaw) -> None:
+        """Take the adapter of each direction."""
+        super().__init__(own)
+        self.coordinates, self.optional, self.by_differences, self.unscaled = (
+            [*names, *(REVERSE + name for name in names)]
+            for names in (own.coordinates, own.optional, own.by_differences, own.unscaled)
+        )
+
+    @override
+    def static_force(self, values: Values) -> float:
+        """Return the larger static friction, N."""
+        return max(self.own.static_force(each) for each in _by_direction(values))
+
+    @override
+    def friction(self, values: Values, normal_force: float) -> FrictionLaw:
+        both = _by_direction(values)
+        return Directional(*(self.own.friction(each, normal_force) for each in both))
+
+    @override
+    def bounds(self, name: str, values: Values, fastest: float) -> tuple[float, float]:
+        own = _by_direction(values)[name.startswith(REVERSE)]
+        return self.own.bounds(name.removeprefix(REVERSE), own, fastest)
+
+    @override
+    def size(self, name: str, values: Values, fastest: float) -> float:
+        # Both directions are of a size.
+        larger = max(_by_direction(values), key=self.own.static_force)
+        return self.own.size(name.removeprefix(REVERSE), larger, fastest)
+
+
+def _bristled(
+    law: IdentifiedLaw, curve: IdentifiedLaw, values: Values, normal_force: float
+) -> FrictionLaw:
+    kind: Any = LAWS[law.name]
+    own = {name: values[name] / normal_force for name in law.memory}
+    return kind(curve.friction(values, normal_force), **own)
+
+
+def _bristle_starts(values: Values) -> Sequence[Values]:
+    """Return coordinates with bristles of some stiffnesses."""
+    stiffnesses = [ratio * values["stiffness"] for ratio in _STIFFNESS_RATIOS]
+    return [
+        {**values, "bristle_stiffness": stiffness}
+        | {"bristle_damping": _DAMPING_RATIO * sqrt(stiffness * values["mass"])}
+        for stiffness in stiffnesses
+    ]
+
+
+def _by_direction(values: Values) -> tuple[Values, Values]:
+    """Return the coordinates of forward and of backward slip by the same names."""
+    reverse = {
+        name.removeprefix(REVERSE): value
+        for name, value in values.items()
+        if name.startswith(REVERSE)
+    }
+    return values, {**values, **reverse}
+
+
+def _decay(values: Values, speed: float) -> float:
+    """Return exp(-(w/v_s)^n) at a speed."""
+    return exp(-((speed / values["decay_speed"]) ** values["exponent"]))
+
+
+def _sag(values: Values, fastest: float) -> float:
+    """Return how far it is below its chord from rest to the fastest speed, at a third of that."""
+    return 1.0 + (_decay(values, fastest) - 1.0) / 3.0 - _decay(values, fastest / 3.0)
+
+
+EXPONENTIAL = ExponentialAdapter()
+STATIC_LAWS: Sequence[IdentifiedLaw] = (
+    CoulombAdapter(),
+    StictionAdapter(),
+    StribeckAdapter(),
+    EXPONENTIAL,
+)
+"""Laws without a memory that compete, the simpler ones first."""
+LUGRE = BristleAdapter("lugre", ("bristle_stiffness", "bristle_damping"))
+DAHL = DahlAdapter()
+MEMORY_LAWS: Sequence[IdentifiedLaw] = (
+    LUGRE,
+    DAHL,
+    # Its elastic limit is made from the smallest friction.
+    BristleAdapter("elasto_plastic", LUGRE.memory, ("kinetic",)),
+    BristleAdapter("maxwell_slip", ("bristle_stiffness",)),
+)
+"""Laws with a memory that compete. Those after LuGre are searched from what LuGre gives."""
+COMPETING = (*STATIC_LAWS, *MEMORY_LAWS)
+KNOWN_LAWS: Mapping[str, IdentifiedLaw] = {
+    each.name: each for each in (*COMPETING, RateStateAdapter())
+}
+"""All laws with constants by their name."""
