@@ -40,6 +40,7 @@ from stickslip_ros.text import shown
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from stickslip_ros.api.tuned_design import TunedProposal
     from stickslip_ros.show.style import FigureStyle
 
 
@@ -291,7 +292,7 @@ def design(
     *,
     force_limit: float | None = None,
     progress: Progress = lambda _: None,
-) -> Proposal:
+) -> "Proposal | TunedProposal":
     """Propose gains that damp the vibration within a force limit, checked by simulation.
 
     Parameters
@@ -307,14 +308,14 @@ def design(
 
     Returns
     -------
-    Proposal
-        The gains with their margins and checks, or the reason why there are none.
+    Proposal or TunedProposal
+        The gains with their margins and checks, or the reason why there are none; of another law
+        than the washout by the rule of `ss.compare`.
 
     Raises
     ------
     InvalidInputError
-        If an argument is not allowed, or if the scenario's controller is one of another control law
-        than that whose gains a design proposes.
+        If an argument is not allowed, or if the scenario's control law has no gains to tune.
 
     Examples
     --------
@@ -326,6 +327,12 @@ def design(
     chosen = as_scenario(scenario)
     if force_limit is not None:
         chosen = chosen.overridden([], {f"{chosen.controller.node}.force_limit": force_limit})
+    law = chosen.control_law
+    if law is not None and not isinstance(law, Washout):
+        from stickslip_ros.api.tuned_design import TunedProposal
+        from stickslip_ros.studies.tuned_design import design_by_rule
+
+        return TunedProposal(design_by_rule(chosen, _range(belt_speed), progress))
     task = designing.Task.from_scenario(chosen, _range(belt_speed))
     return Proposal(designing.design(task, progress))
 

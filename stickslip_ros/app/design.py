@@ -28,12 +28,14 @@ from stickslip_ros.quantities import number_of
 from stickslip_ros.studies.options import OWN_SPEED_RANGE
 
 if TYPE_CHECKING:
+    from stickslip_ros.scenarios.files import Scenario
     from stickslip_ros.studies.design import Design
+    from stickslip_ros.studies.tuned_design import TunedDesign
 
-_DESCRIPTION = """Propose a cutoff frequency and gains that suppress the vibration within a force
-limit. The scenario gives the drive, rate, force_delay and the force_limit of the controller. The
-gains of the scenario are not used. The proposal is verified by simulation, at several belt speeds
-and phases of the vibration."""
+_DESCRIPTION = """Propose gains of the controller that suppress the vibration within a force limit.
+The scenario gives the drive, rate, force_delay and the force_limit of the controller. The gains of
+the scenario are not used. The proposal is verified by simulation, at several belt speeds: of the
+washout law at several phases of the vibration, of any other law under disturbances."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -62,6 +64,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> None:
     """Run the command."""
     from stickslip_ros.api.theory import Proposal
+    from stickslip_ros.physics.model.control import Washout
     from stickslip_ros.studies.design import Task, design
 
     proposed = law_constants("force_limit", "start_after")
@@ -69,6 +72,9 @@ def run(arguments: argparse.Namespace) -> None:
         if text.partition("=")[0] in proposed:
             raise InvalidInputError(f"-p {text:.80}: is not used, because a design proposes it")
     scenario = scenario_of(arguments, unused=proposed)
+    if not isinstance(scenario.controller.control_law, Washout) and scenario.plant.expects_control:
+        _design_by_rule(arguments, scenario)
+        return
     task = Task.from_scenario(scenario, _belt_speeds(arguments.belt_speed))
     check_speeds(arguments, scenario, *task.belt_speeds)
     if arguments.out is not None:
@@ -88,6 +94,25 @@ def run(arguments: argparse.Namespace) -> None:
         _write(arguments.out, found)
 
 
+def _design_by_rule(arguments: argparse.Namespace, scenario: "Scenario") -> None:
+    """Tune another law than the washout by the rule for all laws."""
+    from stickslip_ros.api.tuned_design import TunedProposal
+    from stickslip_ros.studies.tuned_design import design_by_rule
+
+    speeds = _belt_speeds(arguments.belt_speed)
+    check_speeds(arguments, scenario, *(speeds or ()))
+    if arguments.out is not None:
+        check_new("--out", arguments.out)
+    check_results(arguments)
+    with progress_bar(f"designing for {scenario.name}", 1.0, lines=True) as progress:
+        found = design_by_rule(scenario, speeds, progress)
+    proposal = TunedProposal(found)
+    print_result(arguments, proposal)
+    write_results(arguments, proposal)
+    if arguments.out is not None:
+        _write(arguments.out, found)
+
+
 def _belt_speeds(text: str | None) -> tuple[float, float] | None:
     if text is None:
         return None
@@ -97,7 +122,7 @@ def _belt_speeds(text: str | None) -> tuple[float, float] | None:
     return speeds[0], speeds[-1]
 
 
-def _write(path: Path, found: "Design") -> None:
+def _write(path: Path, found: "Design | TunedDesign") -> None:
     if found.parameter_file is None:
         _report_omitted(f"--out {path}: not written")
         return

@@ -1,4 +1,4 @@
-"""The figure of a comparison: which law holds where, and error against force."""
+"""The figures of a comparison, which law holds where, and of a tuned loop, its Bode diagram."""
 
 from collections.abc import Mapping
 
@@ -10,6 +10,7 @@ from stickslip_ros.show.quantities import Units
 from stickslip_ros.show.style import SCREEN, FigureStyle, finish, styled
 from stickslip_ros.studies.case_outcome import OUTCOMES
 from stickslip_ros.studies.comparison import Comparison
+from stickslip_ros.studies.tuned_design import TunedDesign
 
 _MARKERS = "osD^vPX*<>"
 
@@ -64,4 +65,27 @@ def comparison_figure(
     cost.set_title("means of all cases")
     finish(figure)
     style.legend_below(figure, cost.get_legend_handles_labels()[0])
+    return figure
+
+
+@styled
+def bode_figure(found: TunedDesign, *, style: FigureStyle = SCREEN) -> Figure:
+    """Return magnitude and phase of the loop transfer function, and the sensitivity, by feed."""
+    figure = style.figure(7.0, 6.0, narrow=1.3)
+    style.set_title(figure, f"loop with {found.tuned.law.name}, {found.scenario.name}")
+    size, phase, sensitivity = figure.subplots(3, 1, sharex=True)
+    units = Units.for_drive(found.scenario.plant.as_drive())
+    for response in found.tuned.responses:
+        hertz = response.plant.frequency / (2.0 * np.pi)
+        label = units.text(response.plant.loop.drive.belt_speed, "m/s")
+        size.loglog(hertz, np.abs(response.open_loop), label=label)
+        phase.semilogx(hertz, np.degrees(np.unwrap(np.angle(response.open_loop))))
+        sensitivity.loglog(hertz, np.abs(response.sensitivity))
+    size.axhline(1.0, color="grey", lw=0.8)
+    size.set_ylabel("|L|")
+    phase.set_ylabel("arg L, degrees")
+    sensitivity.axhline(1.0, color="grey", lw=0.8)
+    sensitivity.set(xlabel=units.label("frequency", "Hz"), ylabel="|S|")
+    finish(figure)
+    style.legend_below(figure, size.get_legend_handles_labels()[0])
     return figure

@@ -10,6 +10,7 @@ from math import inf, log, sqrt
 from typing import Any, ClassVar
 
 import numpy as np
+import numpy.typing as npt
 from typing_extensions import override
 
 from stickslip_ros.arrays import FloatArray
@@ -85,6 +86,16 @@ class Tuned:
     """What of the goal is not met, or None."""
     responses: tuple[LoopResponse, ...]
     """The linear loops at the feeds."""
+
+    @property
+    def poles(self) -> dict[float, npt.NDArray[np.complex128]]:
+        """Poles of the linear loop per sample, by belt speed, m/s."""
+        found: dict[float, npt.NDArray[np.complex128]] = {}
+        for each in self.responses:
+            loop = each.plant.loop
+            matrix = loop.transition_matrix(_Linear(form=each.feedback))
+            found[loop.drive.belt_speed] = np.linalg.eigvals(matrix).astype(np.complex128)
+        return found
 
 
 def with_law(scenario: Scenario, law: str, constants: Mapping[str, float]) -> Scenario:

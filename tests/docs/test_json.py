@@ -135,6 +135,10 @@ CALLS = [
     ("design", ("design", *RIG, "0.06")),
     ("design", ("design", *RIG, "0.02:0.04", "-p", "plant.force_delay=0.02")),
     pytest.param("design", ("design", *RIG, "0.03", *ENCODER), marks=pytest.mark.long),
+    (
+        "design of another law",
+        ("design", *RIG, "0.04", "--controller", "velocity_feedback"),
+    ),
     ("compare", ("compare", "feed_drive", "--controllers", "washout", "--duration", "0.3")),
     ("identify", ("identify", REFERENCE, "--to", "0.6", "--law", "stribeck", *KNOWN)),
     ("margin", ("margin", REFERENCE)),

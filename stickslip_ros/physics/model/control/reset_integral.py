@@ -30,7 +30,7 @@ class ResetIntegral(Pid):
     state_units: ClassVar[Mapping[str, str | None]] = {"integral": "N", "side": None}
 
     reset_share: float = constant(
-        1.0, "Share a of the integral that a reset turns round.", at_least=0.0, at_most=1.0
+        0.5, "Share a of the integral that a reset turns round.", at_least=0.0, at_most=1.0
     )
     """Share a of the integral that a reset turns round."""
     reset_band: float = constant(

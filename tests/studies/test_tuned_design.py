@@ -1,0 +1,42 @@
+"""Design of any law by the rule: it is simulated, and says where it does not hold."""
+
+from math import pi
+
+import numpy as np
+import pytest
+
+import stickslip_ros as ss
+from stickslip_ros.api.tuned_design import TunedProposal
+from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.scenarios.files import load_scenario
+from stickslip_ros.studies.tuned_design import design_by_rule
+
+
+def test_a_proposal_holds_in_simulation_and_its_file_has_the_gains() -> None:
+    drive = ss.scenario("feed_drive", "plant.force_delay=0.001", controller="velocity_feedback")
+    found = ss.design(drive, (0.03, 0.04))
+    assert isinstance(found, TunedProposal)
+    assert found.remark is None
+    assert all(check.outcome.held for check in found.design.checks)
+    assert len(found.design.checks) == 10
+    gain = found.scenario.controller.control_law.velocity_gain
+    assert f'"velocity_gain": {gain}' in found.design.parameter_file
+    margin = found.design.tuned.phase_margin
+    assert margin is not None
+    assert 0.0 < margin < pi
+    radius = max(np.abs(poles).max() for poles in found.poles.values())
+    assert -np.log(radius) * 1000.0 == pytest.approx(found.design.tuned.decay_rate, rel=1e-6)
+    assert len(found.to_pandas()) == 10
+    assert found.plot().axes
+
+
+def test_a_limit_that_is_too_low_is_told() -> None:
+    weak = load_scenario("feed_drive", controller="velocity_feedback").changed(
+        {"velocity_feedback_controller.force_limit": 5.0}
+    )
+    assert "the peak force" in (design_by_rule(weak, (0.03, 0.03)).remark or "")
+
+
+def test_a_belt_at_rest_is_refused() -> None:
+    with pytest.raises(InvalidInputError, match="gains are for a moving belt"):
+        design_by_rule(load_scenario("axis", controller="pid"))
