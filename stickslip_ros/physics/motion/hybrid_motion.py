@@ -50,9 +50,6 @@ class HybridMotion:
     the last bit, is not integrated again. All values are dimensionless.
     """
 
-    recurs = True
-    """Whether phases that are known are not integrated again."""
-
     def __init__(
         self, system: HybridSystem, state: list[float], detail: Detail = Detail.STATES
     ) -> None:
@@ -155,7 +152,7 @@ class HybridMotion:
         slaves = system.slaves
         is_long = duration > LONGEST_STEP and not clocked
         recurrence = None
-        if is_long and self.recurs and Detail.DERIVATIVES not in self._detail:
+        if is_long and Detail.DERIVATIVES not in self._detail:
             recurrence = Recurrence()
         while now < duration:
             end, corner = duration, self._switch_time - epoch
