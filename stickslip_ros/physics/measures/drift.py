@@ -43,17 +43,22 @@ class TrendMeter:
 
     def feed(self, time: npt.ArrayLike, value: npt.ArrayLike) -> None:
         """Add the times, s, and values that follow, in blocks of any length."""
+        if np.size(time) == 0:
+            return
         new = np.array([np.ones(np.shape(time)), time, value]).T
         new = new[np.isfinite(new[:, 2])]
         self._largest = max(self._largest, float(np.abs(new[:, 2]).max(initial=0.0)))
         while len(new) > 0:
-            part, new = np.split(new, [2 * _PARTS * self._each - self._count])
+            fits = 2 * _PARTS * self._each - self._count
+            part, new = new[:fits], new[fits:]
             place = (self._count + np.arange(len(part))) / self._each
-            before = np.floor(place)
-            weights = np.column_stack([1.0 - place + before, place - before])
-            rows = np.column_stack([before, before + 1.0]).astype(np.int64)
+            rows = np.repeat(place.astype(np.int64), 2)
+            weights = np.repeat(place, 2) - rows
+            weights[::2] = 1.0 - place + rows[::2]
+            rows[1::2] += 1
             with np.errstate(over="ignore", invalid="ignore"):
-                np.add.at(self._sums, rows, weights[:, :, None] * part[:, None, :])
+                for sums, values in zip(self._sums.T, part.T, strict=True):  # quicker than at once
+                    np.add.at(sums, rows, weights * np.repeat(values, 2))
             self._count += len(part)
             if self._count == 2 * _PARTS * self._each:
                 odd = self._sums[1::2] / 2.0
