@@ -127,6 +127,16 @@ STICK_FRACTION: Topic[Any] = Topic(
 FREQUENCY: Topic[Any] = Topic(
     "limit_cycle/frequency", _NUMBER, meaning="One over the period of that cycle, Hz."
 )
+DECAY_RATE: Topic[Any] = Topic(
+    "stability/decay_rate",
+    _NUMBER,
+    meaning="Decay rate of the vibration after each tap or step of the feed, 1/s.",
+)
+ONSET_SPEED: Topic[Any] = Topic(
+    "stability/onset_speed",
+    _NUMBER,
+    meaning="Belt speed at which vibration starts, m/s, by the decay rates so far.",
+)
 DIAGNOSTICS: Topic[Any] = Topic(
     "/diagnostics",
     "diagnostic_msgs/msg/DiagnosticArray",
@@ -153,6 +163,8 @@ TOPICS = (
     AMPLITUDE,
     STICK_FRACTION,
     FREQUENCY,
+    DECAY_RATE,
+    ONSET_SPEED,
     RECORDED,
     DIAGNOSTICS,
     CLOCK,

@@ -19,6 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.qos import ReliabilityPolicy
+from rclpy.serialization import serialize_message
 from std_msgs.msg import Float64
 
 from stickslip_ros.arrays import IntArray
@@ -36,11 +37,13 @@ from stickslip_ros.messages.codec import (
 from stickslip_ros.messages.topics import (
     AMPLITUDE,
     CONTROL_FORCE,
+    DECAY_RATE,
     DEEP,
     DIAGNOSTICS,
     DROPPED_FORCE,
     FREQUENCY,
     JOINT_STATES,
+    ONSET_SPEED,
     RECORDED,
     RECORDED_IF_PUBLISHED,
     RECORDED_TOPICS,
@@ -66,6 +69,7 @@ from stickslip_ros.nodes.base.managed import (
 from stickslip_ros.nodes.base.process import run_node
 from stickslip_ros.nodes.base.ros_topics import qos_profile, timed_messages
 from stickslip_ros.physics.measures.cycle_measures import trend_text
+from stickslip_ros.physics.measures.onset import OnsetWatch
 from stickslip_ros.physics.measures.run_meter import RunMeter
 from stickslip_ros.physics.measures.sample_meter import SampleAssumptions
 from stickslip_ros.physics.measures.timing import Timing
@@ -105,6 +109,7 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         if self.parameters.bag:
             check_new_bag(self._next_bag())
         self._limit_cycle = [self.advertise(t) for t in (AMPLITUDE, STICK_FRACTION, FREQUENCY)]
+        self._stability = {topic: self.advertise(topic) for topic in (DECAY_RATE, ONSET_SPEED)}
         self.subscribe(DIAGNOSTICS, self._note_timing)
         self._channels: dict[str, int] = {}
         # Messages are taken in batches: single ones would each wake a thread and find cold caches.
@@ -125,6 +130,7 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         )
         self._motion = MotionReader(JOINT_STATES.name, layout, own.belt_speed)
         self._meter = RunMeter(own.window, reading=own.reading_of({}))
+        self._watch = OnsetWatch()
         self._cycles = self._newest = self._newest_recorded = 0
         self._heard_at = inf
         self._timings: dict[str, Timing] = {}
@@ -194,12 +200,15 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         counts = {name: report[name] for name in ("regime", "steady", "samples", "lost_samples")}
         counts["trend"] = trend_text(report)
         notes = {"notes": "; ".join(report["notes"])}
-        values = {**counts, **self.dropped.values, **notes, **bag}
+        stability, near = self._watch.status(self.parameters.onset_margin)
+        values = {**counts, "stability": stability, **self.dropped.values, **notes, **bag}
         if self._bag_failure:
             return ERROR, self._bag_failure, values
         complaints = [self.dropped.complaint, *self.duplicate_publishers(*self._topics)]
         if report["lost_samples"]:
             complaints.append("samples were lost")
+        if near:
+            complaints.append(f"vibration may start near this feed: {stability}")
         return diagnosis(complaints, values)
 
     def _if_active(self, callback: Callable[[], None]) -> None:
@@ -321,6 +330,10 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
             for publisher, value in zip(self._limit_cycle, values, strict=True):
                 publisher.publish(Float64(data=value))
             self._cycles += 1
+        for ring_down in self._watch.feed(states):
+            self._tell(DECAY_RATE, ring_down.decay_rate)
+            if self._watch.onset.speed is not None:
+                self._tell(ONSET_SPEED, self._watch.onset.speed)
         if self._cycles // self.parameters.window > windows:
             self._log_measures()
         (dropped,) = self._measured(DROPPED_FORCE, _wrenches, NO_FORCES)
@@ -329,6 +342,19 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         self._look_for_controllers()
         for call in self._parameter_calls.values():
             call.pursue()
+
+    def _tell(self, topic: Topic[Any], value: float) -> None:
+        """Publish a number of the stability, and record it with the stamp of the newest sample."""
+        message, stamp = Float64(data=value), self._newest
+        self._stability[topic].publish(message)
+        if topic.name not in self._published:
+            self._published.add(topic.name)
+            self._record(lambda recorder: self._add_topic(recorder, topic))
+        self._record(
+            lambda recorder: recorder.write(
+                self._channels[topic.name], serialize_message(message), stamp
+            )
+        )
 
     def _log_measures(self) -> None:
         """Log the measures of the last window of cycles, unless the text is unchanged."""

@@ -433,6 +433,12 @@ class AnalyzerParameters(MachineParameters):
         "m/s",
         at_least=-1.0,
     )
+    onset_margin: float = constant(
+        0.1,
+        "Share of the belt speed by which it must exceed the onset of vibration; else a warning.",
+        at_least=0.0,
+        at_most=1.0,
+    )
     flush_period: float = at_build(
         1.0, "Longest wall time until a recorded message is on disk.", "s", at_least=_SHORTEST_TIME
     )

@@ -96,16 +96,6 @@ THEORY: Mapping[str, Mapping[str, Quantity]] = {
 }
 """Values of each section of `stability`."""
 
-ONSET = {
-    "belt_speed": Quantity("belt speed", "m/s"),
-    "decay_rate": Quantity("decay rate", "1/s"),
-    "decay_error": Quantity("standard error", "1/s"),
-    "frequency": Quantity("frequency", "Hz"),
-    "frequency_error": Quantity("standard error", "Hz"),
-    "ring_downs": Quantity("ring-downs"),
-}
-"""Decay at each belt speed, of `margin`."""
-
 PREDICTIONS = {
     "force_error": Quantity("force error"),
     "free_run_error": Quantity("simulation error", "m"),

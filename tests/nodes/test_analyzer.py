@@ -12,6 +12,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.duration import Duration
 from rclpy.parameter import Parameter
 from rclpy.qos import ReliabilityPolicy
+from rclpy.serialization import deserialize_message
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, Float64MultiArray
@@ -24,13 +25,15 @@ from stickslip_ros.messages.codec import joint_state_columns, pack_joint_state, 
 from stickslip_ros.messages.topics import (
     AMPLITUDE,
     CONTROL_FORCE,
+    DECAY_RATE,
     DIAGNOSTICS,
     JOINT_STATES,
+    ONSET_SPEED,
     RECORDED,
     STICK_FRACTION,
 )
 from stickslip_ros.nodes.analyzer import AnalyzerNode
-from stickslip_ros.nodes.base.managed import ERROR
+from stickslip_ros.nodes.base.managed import ERROR, WARN
 from stickslip_ros.nodes.base.ros_topics import qos_profile
 from stickslip_ros.nodes.plant import PlantNode
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
@@ -41,8 +44,13 @@ from tests.nodes.graph import PATIENCE, Graph
 _FIGURES = r"stick_slip: amplitude \d+\.?\d* mm, frequency \d+\.?\d* mHz, stick fraction 0\.\d{1,3}"
 
 
-def run_to_the_end(graph: Graph, bag: Path, window: int = 20, **plant_parameters: object) -> None:
-    """Run plant and analyzer until the plant pauses by itself, and the analyzer has closed."""
+def run_to_the_end(
+    graph: Graph, bag: Path, window: int = 20, **plant_parameters: object
+) -> tuple[int, str]:
+    """Run plant and analyzer until the plant pauses by itself, and the analyzer has closed.
+
+    Return level and message of the last diagnosis of the analyzer before that.
+    """
     analyzer = graph.add(AnalyzerNode, bag=str(bag), window=window)
     graph.wait_until(lambda: analyzer.active, "analyzer active")
     parameters = {"wait_for": ["analyzer"], "expects_control": False, **plant_parameters}
@@ -52,7 +60,10 @@ def run_to_the_end(graph: Graph, bag: Path, window: int = 20, **plant_parameters
     graph.wait_until(lambda: not plant.active, "plant pauses")
     last = plant.diagnose()[2]["newest_stamp"]
     graph.wait_until(lambda: recorded and stamp_of(recorded[-1].stamp) == last, "all is recorded")
+    graph.wait_until(lambda: last in analyzer._watch._kept.stamp[-1:], "all is measured")
+    level, message, _ = analyzer.diagnose()
     graph.deactivate("analyzer")
+    return level, message
 
 
 def stamp_of(time: Time) -> int:
@@ -88,6 +99,36 @@ def test_it_records_the_bytes_it_hears_measures_them_and_logs_each_figure_once(
     assert lines[-1].startswith("stick_slip: amplitude 318.6 mm, ")
     assert all(re.fullmatch(_FIGURES, line) for line in lines)
     assert all(one != next_one for one, next_one in pairwise(lines))
+
+
+def test_it_warns_before_a_falling_feed_reaches_the_onset(graph: Graph, tmp_path: Path) -> None:
+    """feed_drive, tapped once a second, falls from 58 to 51 mm/s; its onset is at 48.9 mm/s."""
+    taps = tmp_path / "taps.csv"
+    rows = [(t + 1e-3 * k, 100.0 * (k == 1)) for t in range(1, 14) for k in range(3)]
+    taps.write_text("".join(f"{t!r},{force!r}\n" for t, force in [(0.0, 0.0), *rows]))
+    decays, onsets = graph.listen(DECAY_RATE), graph.listen(ONSET_SPEED)
+    drive = {"mass": 100.0, "stiffness": 1e6, "damping": 200.0, "normal_force": 1000.0}
+    friction = {"friction.static": 0.4, "friction.minimum": 0.25, "friction.minimum_speed": 0.05}
+    falls = {"belt.kind": "ramp", "belt.amplitude": -0.007, "belt.duration": 14.0}
+    tapped = {"disturbance.kind": "table", "disturbance.file": str(taps)}
+    encoder = {"sensor.position_resolution": 5e-7, "rate": 1000.0, "belt_speed": 0.058}
+    parameters = drive | friction | falls | tapped | encoder
+    level, message = run_to_the_end(graph, tmp_path / "bag", duration=14.5, **parameters)
+    with Recording(tmp_path / "bag") as recording:
+        rates, speeds = (
+            [deserialize_message(data, Float64).data for *_, data in recording.messages(topic)]
+            for topic in ("/test/stability/decay_rate", "/test/stability/onset_speed")
+        )
+    assert len(rates) > 8
+    assert rates[0] > rates[-1] > 0.0
+    assert speeds[-1] == pytest.approx(0.0489, rel=0.03)
+    graph.wait_until(lambda: decays and onsets, "decay and onset are heard")
+    assert {each.data for each in decays} <= {*rates}
+    assert {each.data for each in onsets} <= {*speeds}
+    assert level == WARN
+    found = re.fullmatch(r"vibration may start near this feed: (.*)", message)
+    assert found
+    assert re.fullmatch(r"decay \S+ 1/s, onset 4\S+ \+- \S+ mm/s, feed 51 mm/s", found[1])
 
 
 @pytest.mark.parametrize("kind", ["number", "array", "effort"])
