@@ -5,15 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.identification_conditions import CASES, summary, tried
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.identification.adapters import SaturatingAdapter
 from stickslip_ros.identification.findings import Findings, notes_on
 from stickslip_ros.identification.identify import identify
-from stickslip_ros.identification.record import Record, evenly_spaced
+from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.regression import regress
 from stickslip_ros.identification.servo import closed_loop, servo_of
 from stickslip_ros.identification.trajectory import Predictor, free_run
-from stickslip_ros.physics.model.friction import Coulomb, Directional
+from stickslip_ros.physics.model.friction import Coulomb
 from tests.identification.axis_record import COULOMB, SATURATING, SERVO, axis, record
 
 
@@ -39,48 +40,21 @@ def test_the_constants_of_coulomb_friction_by_direction(coulomb: Findings) -> No
     assert {"damping", "bias_force", "normal_force"} <= coulomb.unidentified.keys()
 
 
-@pytest.mark.parametrize(("rate", "rest"), [(250, 0.0), (500, 0.5), (1000, 0.8)])
-def test_an_axis_that_sticks_has_no_delay(rate: int, rest: float) -> None:
-    """Rows at rest tell nothing of slip; a force is held from its sample to the next."""
-    time, random = np.arange(6000) / rate, np.random.default_rng(rate)
-    frequencies, moving = np.array([0.2, 0.37, 0.61, 0.97, 1.6, 2.7]), time % 2.0 >= 2.0 * rest
-    sines = np.sin(2.0 * np.pi * np.cumsum(moving)[:, None] / rate * frequencies + np.arange(6.0))
-    reference = (sines - sines[0]) @ (0.007 / frequencies)
-    drive = replace(axis(Directional(Coulomb(17.0, 140.0), Coulomb(21.0, 180.0))), mass=38.0)
-    still, servo = np.zeros(len(time)), replace(SERVO, position_gain=1.5e5, velocity_gain=3.3e3)
-    start = Record("axis", 1.0 / rate, still, still, reference=reference)
-    position, force = closed_loop(start, drive, servo, 0.0)
-    own = replace(
-        start,
-        position=np.rint(position / 2e-6) * 2e-6,
-        force=force + 0.5 * random.standard_normal(len(time)),
-    )
-    found = identify([own], "coulomb")
-    assert found.delay == 0.0
-    for name, value in (("mass", 38.0), ("friction.static", 17.0), ("friction.viscous", 140.0)):
-        estimate = found.fitted[name]
-        assert abs(estimate.value - value) < 4.0 * estimate.standard_error, name
-        assert estimate.standard_error < 0.02 * value, name
+@pytest.mark.parametrize("case", ["axis 250 0", "axis 500 0.5", "axis 1000 0.8", "uneven"])
+def test_an_axis_that_sticks_or_turns_slowly_has_no_delay(case: str) -> None:
+    """Rows at rest tell nothing of slip; a force is held, or read when the position is."""
+    errors, delay = tried(case, 3)
+    assert delay == 0.0
+    assert len(errors) == 5
+    for name, (error, standard_error) in errors.items():
+        assert abs(error) < 4.0 * standard_error, name
 
 
-def test_a_force_that_is_read_with_the_position_is_not_late() -> None:
-    """Steps of 10 or 12 ms; the slide turns so slowly that it might rest."""
-    random = np.random.default_rng(103)
-    time = np.cumsum(random.choice([0.010, 0.012], p=[0.7, 0.3], size=3500))
-    angles = 2.0 * np.pi * np.array([0.1, 0.23, 0.6]) * time[:, None] + np.array([0.3, 1.1, 2.0])
-    rates, sizes = 2.0 * np.pi * np.array([0.1, 0.23, 0.6]), np.array([0.6, 0.2, 0.06])
-    velocity = np.cos(angles) @ (sizes * rates)
-    force = -4.0 * np.sin(angles) @ (sizes * rates**2) + 11.0 * velocity + 7.0 * np.sign(velocity)
-    columns = {
-        "position": np.round(np.sin(angles) @ sizes, 4),
-        "belt_velocity": 0.0 * time,
-        "force": force + 0.2 * random.standard_normal(len(time)),
-    }
-    found = identify(evenly_spaced("log", np.rint(1e9 * time).astype(np.int64), columns), "coulomb")
-    assert found.delay == 0.0
-    for name, value in (("mass", 4.0), ("friction.static", 7.0), ("friction.viscous", 11.0)):
-        estimate = found.fitted[name]
-        assert abs(estimate.value - value) < 3.0 * estimate.standard_error < 0.02 * value, name
+@pytest.mark.long
+@pytest.mark.parametrize("case", [case for case in CASES if not case.startswith("late")])
+def test_a_twentieth_of_the_study(case: str) -> None:
+    """Of 25 intervals of 95 %."""
+    assert summary(case, 5)["covered"] > 0.8
 
 
 def test_what_is_known_is_not_fitted(coulomb: Findings) -> None:

@@ -1,0 +1,121 @@
+"""Do the intervals of `stickslip identify` cover where a machine rests, or a force is late?
+
+- `axis RATE DWELL`: an axis of 38 kg under position control with that share of rest, an encoder of
+  2 um and noise of 0.5 N; the law is `coulomb`.
+- `uneven`: steps of 10 or 12 ms, force and position read at once, on an axis of 4 kg.
+- `late DELAY LAG`, ms: the run `taps` of the drive of `benchmarks.identification`, whose force is
+  late; the law is `stribeck`.
+
+The law is named: `benchmarks.identification` tells whether it is found.
+"""
+
+import argparse
+import json
+from dataclasses import replace
+from math import inf
+from typing import Any
+
+import numpy as np
+
+from benchmarks import identification as study
+from stickslip_ros.identification.identify import identify
+from stickslip_ros.identification.laws import DELAY, LAG
+from stickslip_ros.identification.record import Record, evenly_spaced
+from stickslip_ros.identification.servo import Servo, closed_loop
+from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.model.friction import Coulomb, Directional
+from stickslip_ros.versions import versions
+
+CASES = (
+    *(f"axis {rate} 0" for rate in (250, 500, 1000, 2000)),
+    *(f"axis 500 {dwell}" for dwell in (0.1, 0.45, 0.72)),
+    "uneven",
+    *(f"late {delay} 0" for delay in (1, 2, 5)),
+    *(f"late 0 {lag}" for lag in (1, 2, 5)),
+    "late 1 1",
+)
+SERVO = Servo(position_gain=1.5e5, velocity_gain=3.3e3, difference_samples=2, limit=inf)
+AXIS = Drive(38.0, 0.0, 0.0, 1.0, 0.0, Directional(Coulomb(17.0, 140.0), Coulomb(21.0, 180.0)))
+
+
+def axis_record(rate: int, dwell: float, seed: int, count: int = 6000) -> Record:
+    """Return a run of `AXIS` along six sines that stand still for a share of every 2 s."""
+    time, random = np.arange(count) / rate, np.random.default_rng(seed)
+    frequencies, moving = np.array([0.2, 0.37, 0.61, 0.97, 1.6, 2.7]), time % 2.0 >= 2.0 * dwell
+    phases = 2.0 * np.pi * np.cumsum(moving)[:, None] / rate * frequencies
+    sines = np.sin(phases + np.arange(6.0) + 0.1 * seed)
+    reference, still = (sines - sines[0]) @ (0.007 / frequencies), np.zeros(count)
+    start = Record("axis", 1.0 / rate, still, still, reference=reference)
+    position, force = closed_loop(start, AXIS, SERVO, 0.0)
+    noise = 0.5 * random.standard_normal(count)
+    return replace(start, position=np.rint(position / 2e-6) * 2e-6, force=force + noise)
+
+
+def uneven_record(seed: int, count: int = 5000) -> Record:
+    """Return a motion of 4 kg in closed form; it turns so slowly that it might rest."""
+    random = np.random.default_rng(seed)
+    time = np.cumsum(random.choice([0.010, 0.012], p=[0.7, 0.3], size=count))
+    rates, sizes = 2.0 * np.pi * np.array([0.1, 0.23, 0.6]), np.array([0.6, 0.2, 0.06])
+    angles = rates * time[:, None] + np.array([0.3, 1.1, 2.0])
+    velocity = np.cos(angles) @ (sizes * rates)
+    force = -4.0 * np.sin(angles) @ (sizes * rates**2) + 11.0 * velocity + 7.0 * np.sign(velocity)
+    columns = {
+        "position": np.round(np.sin(angles) @ sizes, 4),
+        "belt_velocity": 0.0 * time,
+        "force": force + 0.2 * random.standard_normal(count),
+    }
+    return evenly_spaced("log", np.rint(1e9 * time).astype(np.int64), columns)[0]
+
+
+def tried(case: str, seed: int) -> tuple[dict[str, list[float]], float]:
+    """Return error and standard error of each constant, and the delay, s."""
+    kind, *numbers = case.split()
+    if kind == "late":
+        delay, lag = (1e-3 * float(each) for each in numbers)
+        true = study.truth("stribeck", "taps") | {DELAY: delay, LAG: lag}
+        own = study.record("stribeck", "taps", seed, delay=delay, lag=lag)
+        found = identify([own], "stribeck", {"normal_force": study.NORMAL_FORCE})
+    else:
+        values = (38.0, 17.0, 140.0, 21.0, 180.0) if kind == "axis" else (4.0, 7.0, 11.0, 7.0, 11.0)
+        names = ("static", "viscous", "reverse.static", "reverse.viscous")
+        true = dict(zip(("mass", *(f"friction.{each}" for each in names)), values, strict=True))
+        found = identify(
+            [
+                axis_record(int(numbers[0]), float(numbers[1]), seed)
+                if kind == "axis"
+                else uneven_record(seed)
+            ],
+            "coulomb",
+        )
+    errors = {
+        name: [each.value - true.get(name, 0.0), each.standard_error]
+        for name, each in found.fitted.items()
+    }
+    return errors, found.delay
+
+
+def summary(case: str, seeds: int) -> dict[str, Any]:
+    """Return coverage and delays over the seeds of a case."""
+    trials = [tried(case, seed) for seed in range(seeds)]
+    pairs = [pair for errors, _ in trials for pair in errors.values()]
+    return {
+        "case": case,
+        "seeds": seeds,
+        "intervals": len(pairs),
+        "covered": float(np.mean([abs(error) <= study.QUANTILE * s for error, s in pairs])),
+        "delays": [delay for _, delay in trials],
+    }
+
+
+def main() -> None:
+    """Print the study as JSON."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seeds", type=int, default=100)
+    parser.add_argument("--cases", nargs="*", default=CASES)
+    arguments = parser.parse_args()
+    cases = [summary(case, arguments.seeds) for case in arguments.cases]
+    print(json.dumps({"cases": cases, "versions": versions()}, indent=1))
+
+
+if __name__ == "__main__":
+    main()
