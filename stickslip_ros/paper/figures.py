@@ -14,7 +14,8 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.physics.measures.breakpoints import Breakpoints
-from stickslip_ros.physics.measures.cycle_measures import Cycle, CycleMeter, Measures, Regime
+from stickslip_ros.physics.measures.cycle_measures import Cycle, Measures, Regime
+from stickslip_ros.physics.measures.cycle_meter import CycleMeter
 from stickslip_ros.physics.model.control import Washout
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import Coulomb, FrictionLaw, Linear, Stribeck

@@ -12,7 +12,8 @@ import numpy as np
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.physics.loop.controller import Controller, answer
 from stickslip_ros.physics.loop.sampled_loop import LOCKSTEP_START, SampledLoop
-from stickslip_ros.physics.measures.cycle_measures import CycleMeter, Measures, Regime
+from stickslip_ros.physics.measures.cycle_measures import Measures, Regime
+from stickslip_ros.physics.measures.cycle_meter import CycleMeter
 from stickslip_ros.physics.model.control import Washout
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.sensor import EXACT_SENSOR, Measure, Sensor

@@ -17,13 +17,8 @@ from stickslip_ros.physics.loop.controller import (
     no_reference,
 )
 from stickslip_ros.physics.loop.simulation import measure_block, simulate_sampled
-from stickslip_ros.physics.measures.cycle_measures import (
-    LEAST_CYCLES,
-    RESTS,
-    CycleMeter,
-    Measures,
-    Regime,
-)
+from stickslip_ros.physics.measures.cycle_measures import LEAST_CYCLES, RESTS, Measures, Regime
+from stickslip_ros.physics.measures.cycle_meter import CycleMeter
 from stickslip_ros.physics.measures.sample_meter import MeasuredMotion
 from stickslip_ros.physics.model.constants import constants_of
 from stickslip_ros.physics.model.control import ContinuousControl, ControlLaw

@@ -2,7 +2,8 @@
 
 from typing import NamedTuple
 
-from stickslip_ros.physics.measures.cycle_measures import CycleMeter, Measures
+from stickslip_ros.physics.measures.cycle_measures import Measures
+from stickslip_ros.physics.measures.cycle_meter import CycleMeter
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import Stribeck
 from stickslip_ros.physics.motion import RecordedMotion

@@ -16,7 +16,8 @@ import stickslip_ros as ss
 from benchmarks.measures_under_noise import motion
 from stickslip_ros.bags import Recording
 from stickslip_ros.bags.report import report_of_recording
-from stickslip_ros.physics.measures.cycle_measures import Cycle, CycleMeter, Measures, measures_of
+from stickslip_ros.physics.measures.cycle_measures import Cycle, Measures, measures_of
+from stickslip_ros.physics.measures.cycle_meter import CycleMeter
 from stickslip_ros.physics.measures.run_meter import RunAnalysis
 from stickslip_ros.physics.measures.sample_meter import (
     MeasuredMotion,

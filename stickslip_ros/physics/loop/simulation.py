@@ -7,7 +7,8 @@ import numpy as np
 from stickslip_ros.physics.loop.controller import Controller, answer
 from stickslip_ros.physics.loop.sampled_loop import SampledLoop
 from stickslip_ros.physics.loop.trajectory import SampleRecorder
-from stickslip_ros.physics.measures.cycle_measures import CycleMeter, Measures
+from stickslip_ros.physics.measures.cycle_measures import Measures
+from stickslip_ros.physics.measures.cycle_meter import CycleMeter
 from stickslip_ros.physics.measures.run_meter import RunObserver
 from stickslip_ros.physics.measures.sample_meter import MeasuredMotion, MotionObserver, SampleMeter
 from stickslip_ros.physics.model.control import ControlLaw

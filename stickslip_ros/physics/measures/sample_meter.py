@@ -18,12 +18,12 @@ from stickslip_ros.physics.measures.cycle_fit import MeanCycle
 from stickslip_ros.physics.measures.cycle_measures import (
     UNBOUNDED_BELT_SPEEDS,
     Cycle,
-    CycleMeter,
     Measures,
     Regime,
     with_drift,
     without_cycles,
 )
+from stickslip_ros.physics.measures.cycle_meter import CycleMeter
 from stickslip_ros.physics.measures.drift import Drift
 from stickslip_ros.physics.measures.noise import FEW_SAMPLES, LEAST_SAMPLES
 from stickslip_ros.physics.measures.noisy_meter import NoisyCycleMeter

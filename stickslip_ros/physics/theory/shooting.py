@@ -15,7 +15,8 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.physics.measures.breakpoints import Breakpoints
-from stickslip_ros.physics.measures.cycle_measures import CycleMeter, Measures
+from stickslip_ros.physics.measures.cycle_measures import Measures
+from stickslip_ros.physics.measures.cycle_meter import CycleMeter
 from stickslip_ros.physics.model.control import ContinuousControl
 from stickslip_ros.physics.model.dimensionless_drive import SPEED
 from stickslip_ros.physics.model.drive import Drive

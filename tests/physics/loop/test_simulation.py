@@ -9,7 +9,8 @@ import pytest
 from stickslip_ros.physics.loop.controller import Controller
 from stickslip_ros.physics.loop.sampled_loop import SampledLoop
 from stickslip_ros.physics.loop.simulation import simulate_continuous, simulate_sampled
-from stickslip_ros.physics.measures.cycle_measures import CycleMeter, Measures, Regime
+from stickslip_ros.physics.measures.cycle_measures import Measures, Regime
+from stickslip_ros.physics.measures.cycle_meter import CycleMeter
 from stickslip_ros.physics.model.control import Washout
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import Linear

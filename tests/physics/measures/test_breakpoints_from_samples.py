@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.physics.measures.breakpoints import Breakpoints, breakpoints_from_samples
-from stickslip_ros.physics.measures.cycle_measures import CycleMeter, Measures, Regime
+from stickslip_ros.physics.measures.cycle_measures import Measures, Regime
+from stickslip_ros.physics.measures.cycle_meter import CycleMeter
 
 CYCLES = 15
 

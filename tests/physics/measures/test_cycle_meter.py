@@ -10,7 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from stickslip_ros.physics.measures.breakpoints import Breakpoints
-from stickslip_ros.physics.measures.cycle_measures import Cycle, CycleMeter, Measures, Regime, Trend
+from stickslip_ros.physics.measures.cycle_measures import Cycle, Measures, Regime, Trend
+from stickslip_ros.physics.measures.cycle_meter import CycleMeter
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.motion import RecordedMotion
 from stickslip_ros.quantities import quantities_of

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from stickslip_ros.physics.loop.simulation import simulate_continuous
-from stickslip_ros.physics.measures.cycle_measures import CycleMeter, Regime
+from stickslip_ros.physics.measures.cycle_measures import Regime
+from stickslip_ros.physics.measures.cycle_meter import CycleMeter
 from stickslip_ros.physics.model.control import Washout
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import Coulomb, Exponential, FrictionLaw, Linear, Stribeck
