@@ -15,13 +15,7 @@ from stickslip_ros.app.arguments import (
     writing,
 )
 from stickslip_ros.app.output import progress_bar, tell
-from stickslip_ros.app.result import (
-    add_html,
-    add_plot,
-    check_results,
-    print_result,
-    write_results,
-)
+from stickslip_ros.app.result import add_html, add_plot, check_results, give_result
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.files import written
 from stickslip_ros.quantities import number_of
@@ -83,13 +77,12 @@ def run(arguments: argparse.Namespace) -> None:
     with progress_bar(f"designing for {scenario.name}", 1.0, lines=True) as progress:
         found = design(task, progress)
     proposal = Proposal(found)
-    print_result(arguments, proposal)
-    if not arguments.json and found.parameter_file is not None and arguments.out is None:
-        print("--out FILE writes the scenario with these gains, --json prints it: parameter_file")
     if arguments.plot is not None and found.map_around() is None:
         _report_omitted(f"--plot {arguments.plot}: not drawn")
         arguments.plot = None
-    write_results(arguments, proposal)
+    give_result(arguments, proposal)
+    if not arguments.json and found.parameter_file is not None and arguments.out is None:
+        print("--out FILE writes the scenario with these gains, --json prints it: parameter_file")
     if arguments.out is not None:
         _write(arguments.out, found)
 

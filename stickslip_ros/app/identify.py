@@ -18,13 +18,7 @@ from stickslip_ros.app.arguments import (
     writing,
 )
 from stickslip_ros.app.output import progress_bar, tell
-from stickslip_ros.app.result import (
-    add_html,
-    add_plot,
-    check_results,
-    print_result,
-    write_results,
-)
+from stickslip_ros.app.result import add_html, add_plot, check_results, give_result
 from stickslip_ros.errors import InvalidInputError
 
 if TYPE_CHECKING:
@@ -133,8 +127,7 @@ def run(arguments: argparse.Namespace) -> None:
         )
         progress(0.0, "predicting")
         _ = model.predictions  # they take a while, and are kept
-    print_result(arguments, model)
-    write_results(arguments, model)
+    give_result(arguments, model)
     if arguments.out is not None:
         _write(arguments.out, model.findings)
 
@@ -148,8 +141,7 @@ def _fit_map(arguments: argparse.Namespace, columns: Mapping[str, str] | None) -
             raise InvalidInputError(f"--{option}: a map has friction only, and no drive")
     options = {"law": arguments.law, "rotary": arguments.rotary, **vars(form_of(arguments))}
     found = friction_map(*arguments.recordings, columns=columns or {}, **options)
-    print_result(arguments, found)
-    write_results(arguments, found)
+    give_result(arguments, found)
 
 
 def _write(path: Path, found: "Findings") -> None:

@@ -12,7 +12,7 @@ from stickslip_ros.app.arguments import (
     form_of,
     layout_of,
 )
-from stickslip_ros.app.result import add_html, add_plot, check_results, print_result, write_results
+from stickslip_ros.app.result import add_html, add_plot, check_results, give_result
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -52,5 +52,4 @@ def run(arguments: argparse.Namespace) -> None:
         **vars(form_of(arguments)),
         **vars(layout_of(arguments)),
     )
-    print_result(arguments, found)
-    write_results(arguments, found)
+    give_result(arguments, found)

@@ -133,6 +133,12 @@ def print_result(arguments: argparse.Namespace, result: "Result") -> None:
         print_parts(*result.parts())
 
 
+def give_result(arguments: argparse.Namespace, result: "Result") -> None:
+    """Print a result that took long, then write what --plot and --html ask for: it may fail."""
+    print_result(arguments, result)
+    write_results(arguments, result)
+
+
 def _write_figure(arguments: argparse.Namespace, draw: "Callable[[FigureStyle], Figure]") -> None:
     """Draw a figure as it is asked for, and write it to the file that --plot names."""
     from stickslip_ros.show.style import STYLES, save

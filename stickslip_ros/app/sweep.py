@@ -2,13 +2,7 @@
 
 import argparse
 
-from stickslip_ros.app.arguments import (
-    add_json,
-    add_scenario,
-    check_speeds,
-    naming,
-    scenario_of,
-)
+from stickslip_ros.app.arguments import add_json, add_scenario, check_speeds, naming, scenario_of
 from stickslip_ros.app.result import add_html, add_plot, check_results
 from stickslip_ros.app.study_command import add_running, computed, finish, settling_of
 from stickslip_ros.studies.options import Continuation, SettlingOptions

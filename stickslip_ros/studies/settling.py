@@ -10,12 +10,7 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.loop.controller import (
-    Controller,
-    ReferenceSource,
-    answer,
-    no_reference,
-)
+from stickslip_ros.physics.loop.controller import Controller, ReferenceSource, answer, no_reference
 from stickslip_ros.physics.loop.simulation import measure_block, simulate_sampled
 from stickslip_ros.physics.measures.cycle_measures import LEAST_CYCLES, RESTS, Measures, Regime
 from stickslip_ros.physics.measures.cycle_meter import CycleMeter

@@ -17,12 +17,7 @@ from stickslip_ros.physics.measures.cycle_measures import (
 from stickslip_ros.quantities import quantities_of
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.studies.plan import Axis, Continuation, Grid, Plan
-from stickslip_ros.studies.settling import (
-    ControlledDrive,
-    MotionState,
-    SettlingOptions,
-    settle,
-)
+from stickslip_ros.studies.settling import ControlledDrive, MotionState, SettlingOptions, settle
 
 _NUDGE = EQUILIBRIUM_SPEED / 2.0
 """Share of the belt speed by which a slide at rest is pushed before the next point: rounding alone

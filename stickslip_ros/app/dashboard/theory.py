@@ -20,10 +20,7 @@ from stickslip_ros.nodes.base.child_process import end_with
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.theory.bifurcation_branches import BifurcationBranches
 from stickslip_ros.physics.theory.gain_intervals import gains_of, why_no_gains
-from stickslip_ros.physics.theory.linear_sampled_loop import (
-    LinearSampledLoop,
-    why_no_linear_loop,
-)
+from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop, why_no_linear_loop
 from stickslip_ros.physics.theory.stability_map import StabilityMap
 from stickslip_ros.scenarios.parameters import CONTROLLER_PARAMETERS, PlantParameters
 
