@@ -100,8 +100,7 @@ def _design_by_rule(arguments: argparse.Namespace, scenario: "Scenario") -> None
     with progress_bar(f"designing for {scenario.name}", 1.0, lines=True) as progress:
         found = design_by_rule(scenario, speeds, progress)
     proposal = TunedProposal(found)
-    print_result(arguments, proposal)
-    write_results(arguments, proposal)
+    give_result(arguments, proposal)
     if arguments.out is not None:
         _write(arguments.out, found)
 

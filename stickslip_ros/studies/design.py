@@ -5,7 +5,7 @@ checked by simulation of the drive, sampled, held and delayed as between the nod
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from math import copysign, inf, isinf, sqrt
 from typing import Annotated
 
@@ -117,9 +117,9 @@ class Design:
 
     @property
     def _constants(self) -> dict[str, float]:
-        """Constants of the proposal by name; none without one."""
-        names = self.controller.constants() if self.controller is not None else []
-        return {name: getattr(self.controller, name) for name in names}
+        """Constants of the proposal that are numbers, by name; none without one."""
+        values = {} if self.controller is None else asdict(self.controller)
+        return {name: value for name, value in values.items() if isinstance(value, float)}
 
     def map_around(self) -> StabilityMap | None:
         """Return the stability map of the slowest loop around the proposal; None without one."""
