@@ -204,6 +204,11 @@ class _RunReader:
             if self._observer is not None:
                 time = (part.stamp - first) / NANOSECONDS
                 self._observer.take_friction(time, part.friction_force)
+                if part.has_motor:
+                    slide, motor = (
+                        (part.position, part.velocity), (part.motor_position, part.motor_velocity)
+                    )  # fmt: skip
+                    self._observer.take_motor(time, np.array([*slide, *motor]))
         if self.first is None:
             self._early.append((forces, dropped))
             if sum(len(forces.stamp) for forces, _ in self._early) > 1_000_000:  # limits the memory

@@ -113,6 +113,8 @@ def _of_table(
     table: Table, columns: Mapping[str, str] | None, belt_speed: float | None
 ) -> tuple[IntArray, dict[str, FloatArray], Sequence[str]]:
     path = table.path
+    if columns is None and "motor_position" in table.columns:
+        raise _has_motor(path)
     columns = table.own_columns if columns is None else columns
     found, notes = quantities_of(table, columns, belt_speed)
     time = found.pop("time")
@@ -130,6 +132,13 @@ def _of_table(
     return stamps_of(path, time), used, notes
 
 
+def _has_motor(path: Path) -> InvalidInputError:
+    return InvalidInputError(
+        f"identification needs an ideal motor: {path} has the motion of a motor, on which the "
+        "force acts"
+    )
+
+
 def _of_bag(
     path: Path, namespace: str | None, belt_speed: float | None, layout: BagLayout
 ) -> tuple[IntArray, dict[str, FloatArray], dict[str, float], Sequence[str]]:
@@ -142,6 +151,8 @@ def _of_bag(
         references = recording.references
         notes = recording.notes
         texts = recording.metadata("stickslip_ros/plant") or {}
+    if states.has_motor:
+        raise _has_motor(path)
     plant: dict[str, Any] = {}
     for name, text in texts.items():
         with suppress(ValueError, RecursionError):

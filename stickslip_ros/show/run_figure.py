@@ -141,8 +141,10 @@ def run_figure(*runs: DrawnRun, style: FigureStyle = SCREEN) -> Figure:
     Of one run it shows the whole run, the instant at which the controller is switched on, if there
     is one, and its last cycles over time, shaded by the share of time in which the slide sticks;
     the phase portrait of these cycles and of the start; amplitude and stick fraction of each cycle;
-    and the friction law with the range of relative speeds. The equilibrium and the friction law
-    need a drive, the equilibrium also a moving belt. The belt speed is that at the end of the run.
+    and the friction law with the range of relative speeds; with a motor of finite mass, on a
+    screen, the force of the transmission and the phase planes of slide and motor. The
+    equilibrium and the friction law need a drive, the equilibrium also a moving belt. The belt
+    speed is that at the end of the run.
 
     Of several runs there is a column each: displacement and force over time, with the same axes.
     Below are all runs together: the phase portrait of the last cycles, and amplitude and stick
@@ -163,15 +165,18 @@ def _single(run: DrawnRun, style: FigureStyle) -> Figure:
     if history.left_out:
         notes.append(f"not drawn: {history.left_out} samples without an increasing time")
     analysis = history.analysis
-    rows = 3 if analysis.mean_cycle is not None or analysis.slips is not None else 2
-    size = (12.0, 10.0 if rows == 2 else 12.5)
+    extra = ["analysis"] if analysis.mean_cycle is not None or analysis.slips is not None else []
+    if drive is not None and drive.motor is not None and not style.printed:
+        extra += ["motor"] if len(history.motor.columns()[0]) else []
+    rows = 2 + len(extra)
+    size = (12.0, 10.0 + 2.5 * len(extra))
     panels = _OneRun([run], narrow=style.narrow, short=style.crowded(*size))
-    figure = style.figure(*size, wide=1.1 if rows == 2 else 1.4, narrow=2.5 if rows == 2 else 2.76)
+    figure = style.figure(*size, wide=1.1 + 0.3 * len(extra), narrow=2.5 + 0.26 * len(extra))
     style.set_title(figure, run.title, measures_text(run.measures, panels.units), *notes)
-    ratios = (2.8, 2.4, 1.5) if panels.short else (3.0, 1.9, 1.2)
+    ratios = (2.8, 2.4, *[1.5] * len(extra)) if panels.short else (3.0, 1.9, *[1.2] * len(extra))
     if style.narrow:
-        ratios = (4.4, 3.6, 2.2)
-    grid = figure.add_gridspec(rows, 1, height_ratios=ratios[:rows])
+        ratios = (4.4, 3.6, *[2.2] * len(extra))
+    grid = figure.add_gridspec(rows, 1, height_ratios=ratios)
     above, below = grid[0], grid[1]
     panels.over_time(figure, above)
     has_cycles, has_law = len(history.cycles[0]) > 0, drive is not None
@@ -182,9 +187,12 @@ def _single(run: DrawnRun, style: FigureStyle) -> Figure:
     else:
         left, *others = below.subgridspec(1, 1 + has_cycles + has_law)
         middle, right = others[:has_cycles], others[has_cycles:]
-    if rows == 3:
-        part = grid[2].subgridspec(1, 3)
-        draw_analysis(figure, part, analysis, panels.units, short=panels.short)
+    for row, which in enumerate(extra, 2):
+        part = grid[row].subgridspec(1, 3)
+        if which == "analysis":
+            draw_analysis(figure, part, analysis, panels.units, short=panels.short)
+        else:
+            panels.behind_the_screw(*(figure.add_subplot(cell) for cell in part))
     panels.portrait(figure.add_subplot(left))
     for part in middle:
         cells = part.subgridspec(*((1, 2) if style.narrow else (2, 1)))
@@ -206,7 +214,7 @@ def _single(run: DrawnRun, style: FigureStyle) -> Figure:
         ),
         Line2D([], [], **_EARLIER | {"lw": 4.0}, label="start of the run"),
     ]
-    if drive is not None and drive.has_spring:
+    if drive is not None and drive.has_spring and drive.motor is None:
         handles.insert(2, Line2D([], [], **POINT | _REST, label="equilibrium"))
     if panels.holds:
         handles.append(Line2D([], [], **_HELD, label="no new force: last one"))
@@ -327,7 +335,7 @@ class _OneRun(_Panels):
     def _draw_motion(self, position: Axes, velocity: Axes, pane: Pane) -> None:
         rows, gap = pane.rows, self._history.gap
         length, speed = self._length[0], self._speed[0]
-        if self._drive is not None and self._drive.has_spring:
+        if self._drive is not None and self._drive.has_spring and self._drive.motor is None:
             # On a belt at rest any position within the static friction is an equilibrium.
             belt = np.where(rows.belt_velocity == 0.0, np.nan, rows.belt_velocity)
             by_friction = self._drive.friction.at_rest(belt) * self._drive.length_scale
@@ -356,10 +364,29 @@ class _OneRun(_Panels):
             axes.plot(np.where(stuck, position, np.nan) / length, belt / speed, **_STICKS)
         belt_speed = float(self._last.belt_velocity[-1])
         axes.axhline(belt_speed / speed, **BELT)
-        if self._drive is not None and self._drive.has_spring and belt_speed != 0.0:
+        fixed = self._drive is not None and self._drive.motor is None and belt_speed != 0.0
+        if fixed and self._drive is not None and self._drive.has_spring:
             axes.plot(self._drive.equilibrium_position / length, 0.0, zorder=3.0, **POINT)
         axes.set_xlim(widened(*axes.get_xlim()))
         axes.set_ylim(widened(*axes.get_ylim()))
+
+    def behind_the_screw(self, force: Axes, slide: Axes, motor: Axes) -> None:
+        """Draw the force of the spring, and the phase planes of slide and motor, at the end."""
+        (length, label), (speed, speed_label) = self._length, self._speed
+        start = float(self._last.time[0]) if len(self._last.time) else -np.inf
+        time, *states = self._history.motor.since(start)
+        if self._drive is not None and len(time):
+            x, y, far, rate = states
+            spring = self._drive.stiffness * (x - far) + self._drive.damping * (y - rate)
+            size, name = self.units.axis("force", "N", spring)
+            force.plot(time, spring / size, **MOTION)
+            label_axis(force.xaxis, *self.units.axis("time", "s", time[0], time[-1]))
+            force.set(title="force of the transmission", ylabel=name)
+        for axes, body, (position, velocity) in (
+            (slide, "slide", states[:2]), (motor, "motor", states[2:])
+        ):  # fmt: skip
+            axes.plot(position / length, velocity / speed, **MOTION)
+            axes.set(title=f"phase plane of the {body}", xlabel=label, ylabel=speed_label)
 
     def cycles(self, amplitude: Axes, stick_fraction: Axes) -> None:
         """Draw amplitude and stick fraction of each cycle over time."""

@@ -146,6 +146,8 @@ class RunHistory:
         """Force (N) over the time from which it acts or is requested."""
         self.dropped = Trace(1)
         """Force (N) that was requested and did not act, as far as known."""
+        self.motor = Trace(4)
+        """Displacement (m) and velocity (m/s) of the slide, then of a motor of finite mass."""
         self.switched_on: float | None = None
         """Time of the first force that is not zero, s; None as long as there is none."""
         self.analysis = RunAnalysis(None, None)
@@ -156,7 +158,7 @@ class RunHistory:
         self._first_rows = 0
         self._stick_time = 0.0
         self._motion_end = self._cycles_end = -float("inf")
-        self._friction_end = self._control_end = -float("inf")
+        self._friction_end = self._control_end = self._motor_end = -float("inf")
 
     @property
     def motion(self) -> DrawnMotion:
@@ -244,6 +246,12 @@ class RunHistory:
         self._friction_end = float(time.max(initial=self._friction_end))
         rows = later & (np.abs(force) <= LARGEST)
         self.friction.add(time[rows], force[rows])
+
+    def take_motor(self, time: FloatArray, states: FloatArray) -> None:
+        """Add the states of slide and motor at the next samples."""
+        rows = _later(time, self._motor_end) & np.all(np.abs(states) <= LARGEST, axis=0)
+        self._motor_end = float(time.max(initial=self._motor_end))
+        self.motor.add(time[rows], *states[:, rows])
 
     def take_control(self, time: FloatArray, force: FloatArray, acted: BoolArray) -> None:
         """Add the next control forces, with the time from which each acts or is requested."""

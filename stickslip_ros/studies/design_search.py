@@ -88,6 +88,10 @@ class Task:
                 f"control law = {law.name} is invalid: must be {Washout.name}, "
                 "whose gains a design proposes"
             )
+        if plant.motor.kind == "mass":
+            raise InvalidInputError(
+                "plant.motor.kind = mass is refused: a design needs an ideal motor"
+            )
         if belt_speeds is None:
             own = abs(plant.belt_speed)
             if own == 0.0:

@@ -24,6 +24,7 @@ RUNS: Mapping[str, tuple[str, str]] = {
     "moving belt": ("feed_profile --duration 1.8", "--composed"),
     "load": ("vibrating_load --duration 1.8", ""),
     "no spring": ("axis -p plant.initial.position=1e-3 --duration 1.5", "--composed"),
+    "motor": ("feed_drive_motor -p plant.motor.sensor.position_resolution=1e-6 --duration 1.5", ""),
     "rate and state": (f"feed_drive -p plant.friction.law=rate_state {SLIPS} {LATE}", ""),
     "sensor and actuator": (f"feed_drive {ENCODER} {DRIVE} {LATE}", ""),
     "sensor and actuator, composed": (f"feed_drive {ENCODER} {DRIVE} {LATE}", "--composed"),

@@ -29,6 +29,8 @@ class MotionTracer:
         self._now = 0.0
         self._forces: list[tuple[float, float, float, float]] = []
         """Time (s) and force (N) from then on; time, and friction force (N) up to then."""
+        self._motor: list[tuple[float, ...]] = []
+        """The same times, and the states of slide and motor, if it has a mass."""
 
     def advance_under(self, control: float, disturbance: float, duration: float) -> None:
         """Set the forces (N), and advance; see `Motion.advance_under`."""
@@ -47,6 +49,8 @@ class MotionTracer:
             motion.advance(duration / steps)
             self._now += duration / steps
             self._forces.append((start, force, self._now, motion.friction_force))
+            if (motor := motion.motor) is not None:
+                self._motor.append((self._now, motion.position, motion.velocity, *motor))
 
     def take_motion(self, motion: MeasuredMotion) -> None:
         """Pass the motion to the observer, and the forces up to its end."""
@@ -55,6 +59,10 @@ class MotionTracer:
         self._observer.take_motion(motion)
         self._observer.take_control(start, force, np.ones(len(force), dtype=bool))
         self._observer.take_friction(end, friction)
+        if self._motor:
+            time, *states = np.array(self._motor).T
+            self._observer.take_motor(time, np.array(states))
+            self._motor.clear()
 
 
 def _no_answer(sample: Sample) -> None:

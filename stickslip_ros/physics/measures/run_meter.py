@@ -152,6 +152,10 @@ class RunObserver(MotionObserver, Protocol):
         """Receive the control forces that follow, and whether each acted, as far as it is known."""
         ...
 
+    def take_motor(self, time: FloatArray, states: FloatArray) -> None:
+        """Receive displacement and velocity of slide and motor, as rows, shape (4, instants)."""
+        ...
+
     def take_analysis(self, analysis: RunAnalysis) -> None:
         """Receive the analysis of the whole run, at its end."""
         ...
