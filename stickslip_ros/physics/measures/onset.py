@@ -36,9 +36,11 @@ _FAMILIES: Mapping[str, tuple[FrictionLaw, str, int]] = {
 }
 """Families of friction laws: a law, any multiple of which is in it; the constant that may have any
 value; number of constants of the decay rate, of which viscous damping is one."""
-_WINDOW, _PAUSE, _LONG, _MOST_KEPT = 8 * NANOSECONDS, NANOSECONDS, 4.0, 300
+_WINDOW, _PAUSE, _LONG = 8 * NANOSECONDS, NANOSECONDS, 4.0
 """Time that a watch keeps, and between its looks, ns; length of a ring-down that need not have
-ended, s; number of ring-downs that it keeps."""
+ended, s."""
+_MOST_KEPT, _MOST_SAMPLES = 300, 100_000
+"""Number of ring-downs and of samples that it keeps at most."""
 
 
 @dataclass(frozen=True)
@@ -132,7 +134,8 @@ def onset_of(ring_downs: Sequence[RingDown], length: str = "m") -> Onset:
     if feeds[-1].belt_speed < _LEAST_RANGE * slowest:
         run = f"a run at another feed, such as {quantity(0.9 * slowest, unit)}"
         return Onset(feeds, {}, advice=f"one feed tells no onset: {run}, would tell it")
-    speed, rate, error = (np.array([getattr(each, name) for each in feeds]) for name in _FITTED)
+    values = [(each.belt_speed, each.decay_rate, each.decay_error) for each in feeds]
+    speed, rate, error = np.array(values).T
     weight = 1.0 / (error**2 + (_SYSTEMATIC * rate) ** 2)
     constant = float(weight @ (rate - weight @ rate / weight.sum()) ** 2)
     fits = {name: _fit(speed, rate, weight, *family) for name, family in _FAMILIES.items()}
@@ -164,9 +167,6 @@ def onset_of(ring_downs: Sequence[RingDown], length: str = "m") -> Onset:
     found = float(weights @ [families[name].onset_speed for name in kept] / weights.sum())
     advice = f"{run} it more exactly" if upper - lower > _WIDE * found else ""
     return Onset(feeds, families, found, lower, upper, advice)
-
-
-_FITTED = "belt_speed", "decay_rate", "decay_error"
 
 
 def _fit(
@@ -234,7 +234,7 @@ class OnsetWatch:
         for edge in np.flatnonzero(np.diff(pauses)).tolist():
             self._kept = self._kept.followed_by(samples[first:edge])
             found, first = [*found, *self._look()], edge
-        self._kept = self._kept.followed_by(samples[first:])
+        self._kept = self._kept.followed_by(samples[first:])[-_MOST_SAMPLES:]
         if found:
             self.ring_downs = [*self.ring_downs, *found][-_MOST_KEPT:]
             self.onset = onset_of(self.ring_downs)
@@ -265,11 +265,11 @@ class OnsetWatch:
         """
         if not self.ring_downs:
             return "", False
-        upper, feed = self.onset.upper, float(abs(self._kept.belt_velocity[-1]))
-        speed, lower = self.onset.speed or 0.0, self.onset.lower or 0.0
+        own, feed = self.onset, float(abs(self._kept.belt_velocity[-1]))
         text = f"decay {self.ring_downs[-1].decay_rate:.2g} 1/s, "
-        if upper is not None:
-            half = f"{1e3 * speed:.3g} +- {500.0 * (upper - lower):.2g}"
-            text += f"onset {half if speed else f'below {1e3 * upper:.3g}'} mm/s, "
-        near = upper is not None and upper > (1.0 - margin) * feed
-        return f"{text}feed {1e3 * feed:.3g} mm/s", near
+        if own.speed and own.lower and own.upper:
+            half = 500.0 * (own.upper - own.lower)
+            text += f"onset {1e3 * own.speed:.3g} +- {half:.2g} mm/s, "
+        elif own.upper:
+            text += f"onset below {1e3 * own.upper:.3g} mm/s, "
+        return f"{text}feed {1e3 * feed:.3g} mm/s", (own.upper or 0.0) > (1.0 - margin) * feed
