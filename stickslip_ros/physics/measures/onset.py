@@ -17,8 +17,9 @@ from stickslip_ros.text import quantity
 
 _SAME_SPEED, _LEAST_RANGE = 1.005, 1.03
 """Largest ratio of belt speeds that are one feed; least ratio of the fastest to the slowest."""
-_SYSTEMATIC = 0.003
-"""Systematic error of a decay rate, as a share of it."""
+_SYSTEMATIC, _SCATTER = 0.003, 4.0
+"""Systematic error of a decay rate, as a share of it; chi^2 by degrees of freedom up to which decay
+rates count as having larger errors."""
 _INTERVAL, _RISES, _REJECTED = 3.84, 10.8, 0.01
 """Chi^2 of the ends of a 95 % interval beyond the least, and by which a constant decay must be
 worse (0.1 %); probability below which a family is rejected."""
@@ -146,6 +147,11 @@ def onset_of(ring_downs: Sequence[RingDown], length: str = "m") -> Onset:
         advice = f"the decay does not rise with the feed by more than its errors: {runs} would tell"
         return Onset(feeds, {}, advice=advice)
     kept = [name for name, each in families.items() if not each.rejected]
+    excess = least / max(len(feeds) - 3, 1)
+    if not kept and excess < _SCATTER:
+        factor = 1.1 * sqrt(max(excess, 1.0))
+        wider = [replace(each, decay_error=factor * each.decay_error) for each in ring_downs]
+        return onset_of(wider, length)
     if not kept:
         runs = "runs at the same load, temperature and position"
         advice = f"no family of friction fits the decay: {runs} would tell whether friction changes"

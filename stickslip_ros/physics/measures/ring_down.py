@@ -33,7 +33,7 @@ class RingDown:
     end: float
     """Times of its first and last sample."""
     belt_speed: float
-    """Mean belt speed, weighted by the energy of the vibration."""
+    """Belt speed when the decay rate is the one found."""
     decay_rate: float
     """Decay rate of the amplitude as it tends to zero; below zero it grows."""
     decay_error: float
@@ -140,8 +140,11 @@ def _fit(
     covariance = np.linalg.pinv(information)
     rounding = _ROUNDING * min(2.0 * step / amplitude, 1.0) ** 1.5
     rounding *= max(1.0 / float(time[-1]), abs(shape[0]))
+    # A decay rate that changes evenly is found as it is at this time.
     energy = np.exp(-2.0 * shape[0] * time)
-    belt_speed = float(energy @ belt / energy.sum())
+    middle = float(energy @ time / energy.sum())
+    middle += float(energy @ (time - middle) ** 3) / float(energy @ (time - middle) ** 2) / 2.0
+    belt_speed = float(np.interp(middle, time, belt))
     # What the amplitude does beyond r^2 is of the order of its square.
     higher = 2.0 * prior * (omega * amplitude * size / float(np.mean(belt))) ** 2
     turns, errors = 2.0 * pi, np.sqrt(np.diag(covariance) + rounding**2 + higher**2)
