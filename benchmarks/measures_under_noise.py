@@ -259,15 +259,15 @@ def shortfalls(found: dict[str, Any]) -> list[str]:
         most = STICK_LIMITS.get(row["resolution"], 0.001)
         ask(stick["rms"] <= most, f"stick fraction: rms error {stick['rms']:.2e}")
         if row["resolution"]:  # otherwise the positions are exact
-            for name in ("amplitude", "period", "stick_fraction"):
-                if name != "stick_fraction" or stick["true"] > 0.0:
-                    share = row[name]["covered"]
-                    ask(0.9 <= share <= 0.99, f"{name}: covered in {share:.1%}")
-    rows = found.get("sticks", {}).get("cases", [])
-    for row in rows:
-        if row["covered"] < 0.9:
-            case = f"{row['ratio']:g}, {row['exponent']:g}, {row['told']:.0%}"
-            said.append(f"steep curve {case}: covered in {row['covered']:.1%}")
+            for name in ("amplitude", "period"):
+                share = row[name]["covered"]
+                ask(0.9 <= share <= 0.99, f"{name}: covered in {share:.1%}")
+    sticks = [row["stick_fraction"] for row in found["cases"] if row["resolution"]]
+    pooled = [[stick["covered"] for stick in sticks if stick["true"] > 0.0]]
+    pooled.append([row["covered"] for row in found["sticks"]["cases"]])
+    for shares in pooled:  # a case has few seeds
+        if np.mean(shares) < 0.9 or min(shares) < 0.8:
+            said.append(f"stick fraction: covered in {np.mean(shares):.1%}, at least {min(shares)}")
     return said
 
 

@@ -133,7 +133,7 @@ def _measures(
         midpoint=error((rows[0] + rows[1]) / 2.0),
         period=period_error,
         frequency=period_error / period**2,
-        stick_fraction=0.0 if stick is None else stick.time_error / period,
+        stick_fraction=(fold.hidden_stick if stick is None else stick.time_error) / period,
     )
     return cycle, errors
 

@@ -70,6 +70,8 @@ class FoldedCycles:
     ) -> None:
         self.time, self.position, self.count, self.period = time, position, count, period
         self._step = step
+        self.hidden_stick = 0.0
+        """Stick time, s, that fits as well as none: the error of a stick that is not shown."""
 
     @property
     def _turns(self) -> FloatArray:
@@ -202,6 +204,7 @@ class FoldedCycles:
             without = fit_stick(time, position, with_stick.belt_speed, frequency, 0.0, sticks=False)
             variance = with_stick.squares / max(len(time) - with_stick.jacobian.shape[1], 1)
             if without.squares - with_stick.squares <= STICK_LEVEL * variance:
+                self.hidden_stick = with_stick.stick_time
                 return None
         moved = replace(
             with_stick,

@@ -78,6 +78,13 @@ def test_a_part_of_the_study_agrees_with_it(case: study.Case) -> None:
             assert row[name]["covered"] >= 0.6
 
 
+@pytest.mark.long
+@pytest.mark.parametrize("told", [0.0, 0.03])
+def test_the_stick_of_a_steep_curve_is_within_its_error(told: float) -> None:
+    """Six intervals of 95 %, of three encoders: four must cover."""
+    assert study.sticking(0.3, 1.0, told, seeds=2)["covered"] >= 0.6
+
+
 @examples(quick=3, thorough=10, deadline=None)
 @given(st.lists(st.integers(1, 799), max_size=6).map(sorted))
 def test_blocks_of_any_length_give_the_same(starts: list[int]) -> None:
