@@ -19,11 +19,12 @@ from stickslip_ros.physics.model.constants import constants_of
 from stickslip_ros.physics.model.control import ControlLaw, LinearFeedback, Reference
 from stickslip_ros.physics.model.control.base import State
 from stickslip_ros.physics.model.dimensionless_drive import SPEED
+from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.theory.linear import jacobians
 from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop, why_no_linear_loop
 from stickslip_ros.physics.theory.linear_system import sampled_system
 from stickslip_ros.physics.theory.loop_response import LoopResponse, PlantResponse
-from stickslip_ros.physics.theory.requirements import AUTONOMOUS, require
+from stickslip_ros.physics.theory.requirements import AUTONOMOUS, STATIC, require
 from stickslip_ros.samples import Sample
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.studies.design_search import rounded
@@ -129,9 +130,7 @@ class _Search:
             reason = why_no_linear_loop(at_feed, plant.rate, delay)
             if reason is not None:
                 raise InvalidInputError(f"gains of {law.name} by theory: {reason}")
-            # Of a drive without a spring too, at any of its rests.
-            (jacobian,) = jacobians(at_feed, None, np.array([feed / drive.speed_scale]))
-            loop = LinearSampledLoop(at_feed, plant.rate, delay, jacobian, sensor.spans)
+            loop = LinearSampledLoop(at_feed, plant.rate, delay, _jacobian(at_feed), sensor.spans)
             self.plants.append(PlantResponse.of(loop))
         # The loops differ in the slope of the friction only: the two extreme ones decide.
         slopes = [float(each.loop.jacobian[SPEED, SPEED]) for each in self.plants]
@@ -252,12 +251,12 @@ def tune(scenario: Scenario, law: str, goal: Goal) -> Tuned:
     rng, count = np.random.default_rng(1), len(start.tuned)
     points = log(10.0) * rng.uniform(-_RANGE, _RANGE, (_STARTS, count))
     rates = [search.decay_rate(search.feedback(search.with_gains(point))) for point in points]
-    ranked = [points[row] for row in np.argsort(rates)[::-1] if rates[row] > 0.0]
-    if not ranked:
-        speeds = ", ".join(f"{feed:g}" for feed in goal.feeds)
-        raise InvalidInputError(f"control law {law}: no gains make the loop stable at {speeds} m/s")
+    ranked = points[np.argsort(rates)[::-1]]
     valued = sorted(((search.value(point), tuple(point)) for point in ranked[:60]), reverse=True)
     best = max(_refined(search, np.array(point), value) for value, point in valued[:_KEPT])
+    if best[0][1] <= 0.0:
+        speeds = ", ".join(f"{feed:g}" for feed in goal.feeds)
+        raise InvalidInputError(f"control law {law}: no gains make the loop stable at {speeds} m/s")
     judged = search.judged(search.with_gains(np.array(best[1])), search.plants)
     missed = search.excess(judged)
     remark = f"no gains were found within the limits of {' and '.join(missed)}"
@@ -297,6 +296,18 @@ class _Linear(ControlLaw):
     @override
     def linear_feedback(self, period: float) -> LinearFeedback:
         return self.form
+
+
+def _jacobian(drive: Drive) -> FloatArray:
+    """Return the dimensionless Jacobian in steady slip; without a spring at any of the rests."""
+    if drive.has_spring:
+        return jacobians(drive, None, np.array([drive.belt_speed / drive.speed_scale]))[0]
+    require("gains without a spring", drive, STATIC)
+    scaled = drive.dimensionless
+    speeds = -scaled.belt_speed * np.array([1.0 - 1e-5, 1.0 + 1e-5])
+    friction = scaled.friction.coefficient(speeds, np.sign(speeds))
+    slope = float(np.diff(friction)[0] / np.diff(speeds)[0])
+    return np.array([[0.0, 1.0], [0.0, slope - scaled.damping_coefficient]])
 
 
 def _least(values: Any) -> float | None:
