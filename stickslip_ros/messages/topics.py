@@ -41,7 +41,8 @@ JOINT_STATES = Topic(
     DEEP,
     meaning="State at each sample, as the sensor tells it: `name` slide and belt, `position` m, "
     "`velocity` m/s, `effort` N (friction on the slide and its reaction on the belt, under the "
-    "force held up to this sample).",
+    "force held up to this sample); a motor of finite mass is the third joint, `motor`, with the "
+    "force on it.",
     decode=unpack_joint_state,
 )
 TRUE_JOINT_STATES = Topic(
