@@ -1,11 +1,13 @@
 """Axes without a spring: constants, curves, the controller, motions, predictions."""
 
+import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from benchmarks.identification_conditions import CASES, summary, tried
+from benchmarks import identification_conditions as conditions
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.identification.adapters import SaturatingAdapter
 from stickslip_ros.identification.findings import Findings, notes_on
@@ -43,18 +45,29 @@ def test_the_constants_of_coulomb_friction_by_direction(coulomb: Findings) -> No
 @pytest.mark.parametrize("case", ["axis 250 0", "axis 500 0.5", "axis 1000 0.8", "uneven"])
 def test_an_axis_that_sticks_or_turns_slowly_has_no_delay(case: str) -> None:
     """Rows at rest tell nothing of slip; a force is held, or read when the position is."""
-    errors, delay = tried(case, 3)
+    errors, delay = conditions.tried(case, 3)
     assert delay == 0.0
     assert len(errors) == 5
     for name, (error, standard_error) in errors.items():
         assert abs(error) < 4.0 * standard_error, name
 
 
+def test_the_committed_study() -> None:
+    path = Path(conditions.__file__).with_suffix(".json")
+    cases = json.loads(path.read_text(encoding="utf-8"))["cases"]
+    assert {case["case"] for case in cases} <= {*conditions.CASES}
+    for case in cases:
+        if not case["case"].startswith("late"):
+            assert case["seeds"] >= 20
+            assert case["covered"] >= 0.9, case["case"]
+            assert set(case["delays"]) == {0.0}, case["case"]
+
+
 @pytest.mark.long
-@pytest.mark.parametrize("case", [case for case in CASES if not case.startswith("late")])
+@pytest.mark.parametrize("case", [case for case in conditions.CASES if not case.startswith("late")])
 def test_a_twentieth_of_the_study(case: str) -> None:
     """Of 25 intervals of 95 %."""
-    assert summary(case, 5)["covered"] > 0.8
+    assert conditions.summary(case, 5)["covered"] > 0.8
 
 
 def test_what_is_known_is_not_fitted(coulomb: Findings) -> None:
