@@ -35,7 +35,8 @@ def comparison_figure(
     where, cost = figure.subplots(*panels)
     units = Units.for_drive(study.scenario.plant.as_drive(), study.plan.parameters)
     shares = np.array([*held.values()])
-    where.imshow(shares, cmap="RdYlGn", vmin=0.0, vmax=1.0, aspect="auto")
+    # Pale, so that the numbers are read, and not red and green, which many do not tell apart.
+    where.imshow(shares, cmap="viridis", vmin=0.0, vmax=1.0, aspect="auto", alpha=0.5)
     where.grid(visible=False)
     for (row, column), share in np.ndenumerate(shares):
         where.text(column, row, f"{share:.0%}", ha="center", va="center", fontsize=7.0)
@@ -61,7 +62,10 @@ def comparison_figure(
         force, error = (value / scale for value, (scale, _) in zip(values, scales, strict=True))
         marker = _MARKERS[number % len(_MARKERS)]
         cost.plot(force, error, marker, color=f"C{number % 10}", ls="", label=law)
-    cost.set(xlabel=scales[0][1], ylabel=scales[1][1], xscale="symlog", yscale="symlog")
+    cost.set(xlabel=scales[0][1], ylabel=scales[1][1])
+    for axis, of_axis in zip("xy", np.transpose([*costs.values()]), strict=True):
+        if np.max(of_axis) > 10.0 * np.min(of_axis):  # else there is no power of ten to label
+            cost.set(**{f"{axis}scale": "symlog"})
     cost.set_title("means of all cases")
     finish(figure)
     style.legend_below(figure, cost.get_legend_handles_labels()[0])
