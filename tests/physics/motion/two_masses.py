@@ -70,7 +70,7 @@ class TwoMasses:
     pieces: Sequence[Piece]
     law_of_force: Callable[[Sequence[float]], float] = lambda state: 0.0
     """Further force on the motor by the state x, x', X, X', z."""
-    rtol: float = 1e-12
+    rtol: float = 1e-13
     events: list[float] = field(default_factory=list[float])
     both_stick: float = 0.0
     """Time for which both bodies stick."""
