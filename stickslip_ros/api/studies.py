@@ -164,7 +164,15 @@ class Sweep(Points):
 
     @override
     def draw(self, style: "FigureStyle", colour: str = "regime") -> "Figure":
-        """Return the figure in a style, in a colour as for `plot`; see `Result.draw`."""
+        """Return the figure in a style.
+
+        Parameters
+        ----------
+        style : FigureStyle
+            Size, resolution and layout.
+        colour : str
+            As for `plot`.
+        """
         from stickslip_ros.show.study_figure import sweep_figure
 
         return sweep_figure(self.columns, self.study, colour, style=style)

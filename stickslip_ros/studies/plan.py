@@ -354,7 +354,13 @@ class RandomSample:
         return tuple(axis.parameter for axis in self.axes)
 
     def values(self, index: int) -> tuple[float, ...]:
-        """Return the values of the parameters at a point; see `Grid.values`."""
+        """Return the values of the parameters at a point, as `Grid` does.
+
+        Parameters
+        ----------
+        index : int
+            Index of the point, from 0.
+        """
         # The index comes first: it is one word, while numpy would mix the words of a longer seed
         # with those that follow.
         shares = np.random.default_rng((index, self.seed)).random(len(self.axes)).tolist()
