@@ -14,7 +14,6 @@ from matplotlib.figure import Figure
 from stickslip_ros.bags import Recording
 from stickslip_ros.physics.loop.controller import Controller
 from stickslip_ros.physics.model.control import Washout
-from stickslip_ros.samples import Sample
 
 folder = Path(sys.argv[1] if len(sys.argv) > 1 else "build")
 folder.mkdir(parents=True, exist_ok=True)
@@ -27,8 +26,7 @@ recorded = Washout(**{name: json.loads(table[name]) for name in names})
 doubled = replace(recorded, linear_gain=2.0 * recorded.linear_gain)
 
 time = 1e-9 * (states.stamp - states.stamp[0])
-columns = [column.tolist() for column in vars(states).values()]
-samples = [Sample(*values) for values in zip(*columns, strict=True)]
+samples = states.samples()
 figure = Figure(figsize=(8.0, 3.6), layout="constrained")
 axes = figure.subplots()
 for law in (doubled, recorded):

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import repeat
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -155,6 +156,18 @@ class SampleColumns(Table):
         rows = [(*sample[1:6], *(sample.motor or none)) for sample in samples]
         others = np.array(rows).reshape(-1, 7)
         return cls(stamp, *others.T.copy())
+
+    def samples(self) -> list[Sample]:
+        """Return the samples one by one.
+
+        Returns
+        -------
+        list of Sample
+            A sample for each row; with a motor where the samples have one.
+        """
+        slide = (column.tolist() for column in list(vars(self).values())[:6])
+        motor = map(MotorSample, self.motor_position.tolist(), self.motor_velocity.tolist())
+        return [*map(Sample, *slide, motor if self.has_motor else repeat(None))]
 
     @property
     def is_valid(self) -> BoolArray:

@@ -95,7 +95,18 @@ class ComparedLaws(TabularResult):
         return tuple(sorted(ranks, key=order))
 
     def held_at_points(self, law: str) -> FloatArray:
-        """Return the share of the cases that a law holds, at each point of the parameters."""
+        """Return the share of the cases that a law holds, at each point of the parameters.
+
+        Parameters
+        ----------
+        law : str
+            Name of the law.
+
+        Returns
+        -------
+        ndarray
+            Shares, 0 to 1, shape (points,).
+        """
         row = [*self.study.plan.laws].index(law)
         return np.nan_to_num(self._array("held")[row]).mean(axis=(1, 2))
 
@@ -213,8 +224,8 @@ class ComparedLaws(TabularResult):
             )
         where = "of the belt speed" if self._task == "regulation" else "of the reference's motion"
         title = (
-            f"{self.scenario.name}, {self._task}: {points} points, {disturbances} disturbances, "
-            f"{seeds} seeds, constants off by up to {plan.spread:.0%}; held within "
+            f"{self.scenario.name}, {self._task}: points {points}, disturbances {disturbances}, "
+            f"seeds {seeds}, constants off by up to {plan.spread:.0%}; held within "
             f"{plan.tolerance:.2g} {where}"
         )
         labels = [OUTCOMES[name].label for name in names]
@@ -314,8 +325,8 @@ def compare(
     >>> drive = ss.scenario("feed_drive", controller="velocity_feedback", velocity_gain=-3000.0)
     >>> laws = "velocity_feedback,washout"
     >>> found = ss.compare(drive, laws, disturbances="step", given=laws, duration=1.0)
-    >>> [rank.held for rank in found.ranks]
-    [1.0, 0.0]
+    >>> [(rank.law, rank.held) for rank in found.ranks]
+    [('velocity_feedback', 1.0), ('washout', 1.0)]
     """
     chosen = as_scenario(scenario)
     every = [*map(Axis.parse, axes)]

@@ -37,7 +37,8 @@ class Margin(Result):
     """Onset with its interval, decay at each feed, and families of friction."""
     notes: Sequence[str]
     """Sentences on recordings without a decay, what cannot be told, and which run would tell it."""
-    _units: Units = SI
+    units: Units = SI
+    """Units of its tables and its figure."""
 
     @property
     def least_feed(self) -> float | None:
@@ -47,7 +48,7 @@ class Margin(Result):
 
     @override
     def parts(self) -> Parts:
-        texts, shown = self._units.texts, quantities_of(FeedDecay)
+        texts, shown = self.units.texts, quantities_of(FeedDecay)
         yield self._verdict
         if self.onset.feeds:
             cells = zip(*(vars(each).values() for each in self.onset.feeds), strict=True)
@@ -68,7 +69,7 @@ class Margin(Result):
         if found.upper is None:
             return "the onset of vibration cannot be told"
         speeds = [found.speed, found.lower, found.upper, self.least_feed]
-        onset, lower, upper, least = (self._units.text(each, "m/s") for each in speeds)
+        onset, lower, upper, least = (self.units.text(each, "m/s") for each in speeds)
         text = f"at {onset} (95 % interval {lower} to {upper})" if found.lower else f"below {upper}"
         return (
             f"vibration starts {text}; the least feed with a margin of {self.margin:g} is {least}"
@@ -80,7 +81,7 @@ class Margin(Result):
 
         if not self.onset.feeds:
             raise InvalidInputError("there is no decay to draw: " + "; ".join(self.notes))
-        return margin_figure(self._names, self.onset, style=style, units=self._units)
+        return margin_figure(self._names, self.onset, style=style, units=self.units)
 
     @property
     def _names(self) -> str:
@@ -120,9 +121,11 @@ def margin(
     ----------
     *recordings : Path or str
         Bags, and CSV or MAT files, of one machine that is tapped, at several feeds.
+    columns : mapping of str to str, optional
+        As for `read_table`.
     margin : float, optional
         Share of the belt speed by which it is to exceed the onset, for `least_feed`.
-    columns, rotary, **options : optional
+    rotary, **options : optional
         As for `read_bag` and `read_table`, whose errors it raises, too.
 
     Returns

@@ -245,7 +245,7 @@ class Proposal(TabularResult):
         checks = [asdict(check) for check in found.checks]
         return {
             "belt_speeds": list(task.belt_speeds),
-            **(asdict(found.controller) if found.controller else dict.fromkeys(CONTROLLER)),
+            **{name: getattr(found.controller, name, None) for name in CONTROLLER},
             "force_limit": task.force_limit,
             "worst_belt_speed": found.slowest.drive.belt_speed if found.slowest else None,
             "decay_rate": min((check.decay_rate for check in found.checks), default=None),

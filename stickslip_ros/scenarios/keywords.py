@@ -43,8 +43,8 @@ def parameter_of(keyword: str, nodes: Sequence[str]) -> str:
         if owners:
             in_use = next(node for node in nodes if node not in ("plant", "analyzer"))
             raise InvalidInputError(
-                f"{keyword}: is a parameter of {' and '.join(owners)}, and the controller in use "
-                f"is {in_use}"
+                f"{keyword}: is a parameter of {', '.join(owners)}; the controller in use is "
+                f"{in_use}"
             )
         raise InvalidInputError(
             f"{keyword:.80}: no node has such a parameter; "

@@ -28,7 +28,7 @@ def test_it_has_what_the_bag_has(found: ss.RecordedRun) -> None:
     assert found.measures.amplitude == report["amplitude"]
     assert found.missing == []
     for name, column in vars(states).items():
-        assert np.array_equal(getattr(found.samples, name), column)
+        assert np.array_equal(getattr(found.samples, name), column, equal_nan=True)
     assert np.array_equal(found.forces.stamp, forces.stamp)
     assert np.array_equal(found.forces.force, forces.force)
     assert found.drive == ss.scenario("feed_drive").plant.as_drive()

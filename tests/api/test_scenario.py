@@ -145,10 +145,10 @@ def test_the_controller_is_chosen_and_its_constants_are_keywords() -> None:
 
 def test_a_keyword_of_a_controller_that_is_not_in_use_names_both() -> None:
     with pytest.raises(InvalidInputError) as refused:
-        ss.scenario("paper", velocity_gain=-1.0)
+        ss.scenario("paper", reset_band=1.0)
     assert str(refused.value) == (
-        "velocity_gain: is a parameter of velocity_feedback_controller, and the controller in use "
-        "is washout_controller"
+        "reset_band: is a parameter of reset_integral_controller; the controller in use is "
+        "washout_controller"
     )
     with pytest.raises(InvalidInputError, match="linear_gain: is a parameter of washout_control"):
         ss.sweep(ss.scenario("paper", controller="velocity_feedback"), linear_gain=(-1.0, 0.0, 2))

@@ -28,7 +28,7 @@ LAW = "feed_drive -p plant.friction.law="
 REFUSED: Mapping[str, Mapping[str, str]] = {
     "simulate": {
         "": "the following arguments are required: SCENARIO",
-        "nosuch": "unknown scenario 'nosuch' ... axis, feed_drive, feed_profile, paper",
+        "nosuch": "unknown scenario 'nosuch' ... axis, ball_screw, feed_drive, ",
         "two.yaml": TWO,
         "paper --duration nan": "'nan' is not a time in seconds, 0 or more",
         # No option: a negative number.

@@ -72,7 +72,11 @@ def test_what_is_completed(complete: Complete, shell: str) -> None:
     assert {"feed_drive", "paper", "mine.yaml", "bags"} <= set(proposed)
     assert "notes.txt" not in proposed
     assert complete("simulate", "pa") == ["paper"]
-    assert complete("new", "x.yaml", "--from", "fe") == ["feed_drive", "feed_profile"]
+    assert complete("new", "x.yaml", "--from", "fe") == [
+        "feed_drive",
+        "feed_drive_motor",
+        "feed_profile",
+    ]
     assert complete("report", "b") == ["bags"]
     assert complete("simulate", "paper", "--plot", "no") == ["notes.txt"]
     # Parameters and their values.

@@ -219,7 +219,7 @@ class NoisyCycleMeter:
             return found
         part = window.samples[window.samples.row(window.starts[0]) :]
         sign = -1.0 if float(part.belt[-1]) < 0.0 else 1.0
-        size = max(means.cycle.amplitude / 2.0, REVERSAL * self.noise)
+        size = max(means.cycle.amplitude / 2.0, REVERSAL * max(self.noise, self.step))
         regime = regime_by_slips(part.time, sign * part.position, size, means.cycle.period)
         if regime in (None, found.regime):
             return found

@@ -307,7 +307,15 @@ class Motion(HybridMotion):
         return scaled * self._drive.normal_force
 
     def advance_under(self, control: float, disturbance: float, duration: float) -> None:
-        """Set the forces, and advance: the same as `set_forces` and `advance`, in less time."""
+        """Set the forces, and advance: the same as `set_forces` and `advance`, in less time.
+
+        Parameters
+        ----------
+        control, disturbance : float
+            Forces on the slide, N.
+        duration : float
+            Time to advance by, s.
+        """
         step, drive = self._short_step, self._drive
         force = (control + disturbance) / drive.normal_force
         if (

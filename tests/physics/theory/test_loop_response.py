@@ -36,7 +36,7 @@ LAWS = [
     VelocityFeedback(velocity_gain=-6000.0),
     Pid(position_gain=2e5, integral_gain=3e6, velocity_gain=6e3),
     Cascade(position_gain=30.0, velocity_gain=6e3, integral_gain=1e5),
-    DisturbanceObserver(mass=80.0, bandwidth=50.0, position_gain=1e5, velocity_gain=3e3),
+    DisturbanceObserver(nominal_mass=80.0, bandwidth=50.0, position_gain=1e5, velocity_gain=3e3),
 ]
 laws = pytest.mark.parametrize("law", LAWS, ids=lambda law: law.name)
 

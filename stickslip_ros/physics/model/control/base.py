@@ -386,7 +386,18 @@ class ControlLaw(ABC):
         return self
 
     def limited(self, force: float) -> float:
-        """Return a force (N) within `force_limit`."""
+        """Return a force within `force_limit`.
+
+        Parameters
+        ----------
+        force : float
+            Force, N.
+
+        Returns
+        -------
+        float
+            The force nearest to it that the limit allows, N.
+        """
         return max(-self.force_limit, min(self.force_limit, force))
 
 

@@ -30,7 +30,9 @@ class DisturbanceObserver(FeedbackLaw):
     >>> from stickslip_ros.physics.loop.controller import Controller
     >>> from stickslip_ros.physics.model.control import DisturbanceObserver
     >>> from stickslip_ros.samples import Sample
-    >>> law = DisturbanceObserver(mass=100.0, bandwidth=50.0, position_gain=0.0, velocity_gain=0.0)
+    >>> law = DisturbanceObserver(
+    ...     nominal_mass=100.0, bandwidth=50.0, position_gain=0.0, velocity_gain=0.0
+    ... )
     >>> observer = Controller(law)
     >>> observer.answer(Sample(0, 0.0, 0.0, 0.0, 0.0, 0.04))
     0.0
@@ -43,7 +45,7 @@ class DisturbanceObserver(FeedbackLaw):
     state_units: ClassVar[Mapping[str, str | None]] = {"filtered": "N", "filter_input": "N"}
     tuned: ClassVar[Sequence[str]] = ("position_gain", "velocity_gain", "bandwidth")
 
-    mass: float = constant(1.0, "Mass m that the observer assumes.", "kg", positive=True)
+    nominal_mass: float = constant(1.0, "Mass m that the observer assumes.", "kg", positive=True)
     """Mass m that the observer assumes, kg."""
     bandwidth: float = constant(1.0, "Cutoff frequency g of the estimate.", "rad/s", positive=True)
     """Cutoff frequency g of the estimate, rad/s."""
@@ -55,7 +57,7 @@ class DisturbanceObserver(FeedbackLaw):
     @override
     def initial_state(self, sample: Sample, reference: Reference) -> State:
         momentum_flow = (
-            self.bandwidth * self.mass * sample.of(self.feedback).velocity
+            self.bandwidth * self.nominal_mass * sample.of(self.feedback).velocity
         )  # no disturbance is known yet
         return momentum_flow, momentum_flow
 
@@ -66,11 +68,11 @@ class DisturbanceObserver(FeedbackLaw):
         filtered, held = state
         seen = sample.of(self.feedback)
         filtered -= expm1(-self.bandwidth * elapsed) * (held - filtered)
-        momentum_flow = self.bandwidth * self.mass * seen.velocity
+        momentum_flow = self.bandwidth * self.nominal_mass * seen.velocity
         disturbance = momentum_flow - filtered
         error, rate = tracking_error(seen, reference)
         force = self.position_gain * error + self.velocity_gain * rate - disturbance
-        force += self.mass * (reference.acceleration or 0.0)
+        force += self.nominal_mass * (reference.acceleration or 0.0)
         return force, (filtered, self.limited(force) + momentum_flow)
 
     @override
@@ -79,4 +81,4 @@ class DisturbanceObserver(FeedbackLaw):
 
     @override
     def for_drive(self, drive: Drive) -> Self:
-        return replace(self, mass=moved_mass(drive))
+        return replace(self, nominal_mass=moved_mass(drive))

@@ -30,7 +30,7 @@ class FrictionFeedforward(Pid):
 
     name: ClassVar[str] = "friction_feedforward"
 
-    mass: float = constant(1.0, "Mass m that is accelerated.", "kg", at_least=0.0)
+    nominal_mass: float = constant(1.0, "Mass m that is accelerated.", "kg", at_least=0.0)
     """Mass m that is accelerated, kg."""
     kinetic_force: float = constant(0.25, "Kinetic friction F_k.", "N", at_least=0.0)
     """Kinetic friction F_k, N."""
@@ -51,14 +51,25 @@ class FrictionFeedforward(Pid):
     ) -> tuple[float, State]:
         error, rate = tracking_error(sample.of(self.feedback), reference)
         speed = (reference.velocity or 0.0) - sample.belt_velocity
-        forward = self.mass * (reference.acceleration or 0.0) + self.viscous_damping * speed
+        forward = self.nominal_mass * (reference.acceleration or 0.0) + self.viscous_damping * speed
         if speed != 0.0:
             forward += self.size(abs(speed)) * (1.0 if speed > 0.0 else -1.0)
         force, integral = self.force_and_integral(state[0], elapsed, error, rate, forward)
         return force, (integral,)
 
     def size(self, speed: float) -> float:
-        """Return the friction without its viscous part, N, at a speed, m/s, of at least 0."""
+        """Return the friction without its viscous part.
+
+        Parameters
+        ----------
+        speed : float
+            Sliding speed, m/s, at least 0.
+
+        Returns
+        -------
+        float
+            Size of the friction force, N.
+        """
         decay = exp(-((speed / self.decay_speed) ** self.exponent))
         return self.kinetic_force + (self.static_force - self.kinetic_force) * decay
 
@@ -80,7 +91,7 @@ class FrictionFeedforward(Pid):
             viscous += drive.damping
         return replace(
             self,
-            mass=moved_mass(drive),
+            nominal_mass=moved_mass(drive),
             static_force=float(forces[0]),
             kinetic_force=float(forces[1]),
             decay_speed=float(decay),

@@ -60,7 +60,7 @@ class LugreObserver(FrictionFeedforward):
         change = speed + self.observer_gain * error - decay * deflection
         friction = self.bristle_stiffness * deflection + self.bristle_damping * change
         friction += self.viscous_damping * speed
-        friction += self.mass * (reference.acceleration or 0.0)
+        friction += self.nominal_mass * (reference.acceleration or 0.0)
         force, integral = self.force_and_integral(integral, elapsed, error, rate, friction)
         return force, (integral, deflection)
 

@@ -100,7 +100,18 @@ class Pid(FeedbackLaw):
         return self.linear_part(period)
 
     def linear_part(self, period: float) -> LinearFeedback:
-        """Return PID control alone, without what a derived law adds to it."""
+        """Return PID control alone, without what a derived law adds to it.
+
+        Parameters
+        ----------
+        period : float
+            Sample period, s.
+
+        Returns
+        -------
+        LinearFeedback
+            The linear part.
+        """
         gains = {name: getattr(self, name) for name in Pid.tuned}
         return superposed(Pid(**gains), 1, period).of(self.feedback)
 

@@ -32,7 +32,9 @@ class SlidingMode(FeedbackLaw):
     >>> from stickslip_ros.physics.loop.controller import Controller
     >>> from stickslip_ros.physics.model.control import SlidingMode
     >>> from stickslip_ros.samples import Sample
-    >>> law = SlidingMode(mass=100.0, slope=50.0, switching_force=500.0, boundary_layer=0.01)
+    >>> law = SlidingMode(
+    ...     nominal_mass=100.0, slope=50.0, switching_force=500.0, boundary_layer=0.01
+    ... )
     >>> Controller(law).answer(Sample(0, 1e-4, 0.0, 0.0, 0.0, 0.04))
     -250.0
     """
@@ -41,7 +43,7 @@ class SlidingMode(FeedbackLaw):
     follows_reference: ClassVar[bool] = True
     tuned: ClassVar[Sequence[str]] = ("slope", "boundary_layer")
 
-    mass: float = constant(1.0, "Mass m that the law assumes.", "kg", at_least=0.0)
+    nominal_mass: float = constant(1.0, "Mass m that the law assumes.", "kg", at_least=0.0)
     """Mass m that the law assumes, kg."""
     slope: float = constant(1.0, "Slope L of the surface: decay rate on it.", "1/s", at_least=0.0)
     """Slope L of the surface, 1/s."""
@@ -59,7 +61,7 @@ class SlidingMode(FeedbackLaw):
         error, rate = tracking_error(sample.of(self.feedback), reference)
         distance, layer = rate + self.slope * error, self.boundary_layer
         share = distance / layer if layer > abs(distance) else (distance > 0.0) - (distance < 0.0)
-        force = self.mass * ((reference.acceleration or 0.0) + self.slope * rate)
+        force = self.nominal_mass * ((reference.acceleration or 0.0) + self.slope * rate)
         return force + self.switching_force * share, state
 
     @override
@@ -67,11 +69,11 @@ class SlidingMode(FeedbackLaw):
         if self.boundary_layer == 0.0:
             return None
         gain = self.switching_force / self.boundary_layer
-        direct = -np.array([gain * self.slope, gain + self.mass * self.slope])
+        direct = -np.array([gain * self.slope, gain + self.nominal_mass * self.slope])
         feedback = LinearFeedback(np.empty((0, 0)), np.empty((0, 2)), np.empty(0), direct)
         return feedback.of(self.feedback)
 
     @override
     def for_drive(self, drive: Drive) -> Self:
         force = _RESERVE * max(map(abs, drive.friction.limits)) * drive.normal_force
-        return replace(self, mass=moved_mass(drive), switching_force=force)
+        return replace(self, nominal_mass=moved_mass(drive), switching_force=force)

@@ -8,7 +8,7 @@ from stickslip_ros.physics.model.control import DisturbanceObserver
 from stickslip_ros.physics.model.drive import Drive
 from tests.physics.model.control.answers import answers, assert_same, random_record
 
-LAW = DisturbanceObserver(mass=80.0, bandwidth=120.0, position_gain=2e5, velocity_gain=3e3)
+LAW = DisturbanceObserver(nominal_mass=80.0, bandwidth=120.0, position_gain=2e5, velocity_gain=3e3)
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -31,4 +31,4 @@ def test_the_estimate_is_the_low_pass_of_the_force_that_is_not_known(
 
 
 def test_it_takes_the_mass_of_a_drive() -> None:
-    assert LAW.for_drive(Drive(mass=250.0)).mass == 250.0
+    assert LAW.for_drive(Drive(mass=250.0)).nominal_mass == 250.0

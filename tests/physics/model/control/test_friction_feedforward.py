@@ -17,7 +17,7 @@ LAW = FrictionFeedforward(
     position_gain=3e5,
     integral_gain=4e6,
     velocity_gain=2e3,
-    mass=90.0,
+    nominal_mass=90.0,
     kinetic_force=250.0,
     static_force=400.0,
     decay_speed=0.02,
@@ -54,4 +54,4 @@ def test_it_takes_over_the_friction_of_a_drive(law: FrictionLaw) -> None:
     expected = -1000.0 * law.coefficient(speeds, np.ones(len(speeds)))
     forces = [found.size(v) + found.viscous_damping * v for v in speeds.tolist()]
     np.testing.assert_allclose(forces, expected, rtol=1e-6 if exact else 0.15)
-    assert found.mass == 90.0
+    assert found.nominal_mass == 90.0

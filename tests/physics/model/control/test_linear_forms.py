@@ -37,8 +37,8 @@ LAWS = [
     VelocityFeedback(velocity_gain=-3000.0),
     Pid(**PID),
     FrictionFeedforward(**PID, kinetic_force=0.0, static_force=0.0),
-    DisturbanceObserver(mass=80.0, bandwidth=50.0, position_gain=1e5, velocity_gain=3e3),
-    SlidingMode(mass=50.0, slope=30.0, switching_force=600.0, boundary_layer=0.1),
+    DisturbanceObserver(nominal_mass=80.0, bandwidth=50.0, position_gain=1e5, velocity_gain=3e3),
+    SlidingMode(nominal_mass=50.0, slope=30.0, switching_force=600.0, boundary_layer=0.1),
 ]
 
 

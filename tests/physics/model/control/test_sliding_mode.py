@@ -12,12 +12,12 @@ def test_the_force_is_that_of_the_surface(seed: int, layer: float) -> None:
     distance = record.rate + 40.0 * record.error
     expected = 70.0 * (record.reference[2] + 40.0 * record.rate)
     expected += 500.0 * np.clip(distance / layer, -1.0, 1.0)
-    law = SlidingMode(mass=70.0, slope=40.0, switching_force=500.0, boundary_layer=layer)
+    law = SlidingMode(nominal_mass=70.0, slope=40.0, switching_force=500.0, boundary_layer=layer)
     assert_same(answers(law, record), expected)
 
 
 def test_without_a_layer_it_switches_and_is_not_linear() -> None:
-    law = SlidingMode(mass=0.0, slope=40.0, switching_force=500.0, boundary_layer=0.0)
+    law = SlidingMode(nominal_mass=0.0, slope=40.0, switching_force=500.0, boundary_layer=0.0)
     record = random_record(7)
     expected = 500.0 * np.sign(record.rate + 40.0 * record.error)
     assert_same(answers(law, record), expected)
