@@ -216,11 +216,12 @@ def regime_by_slips(
     sticks if the median time from the end of a slip to the next is 2.5 times that of a slip.
     """
     slips = SlipMeter(SlipThreshold(size, within=period / 4.0)).feed(time, position)
-    if len(slips) < 2:
+    between = [slip.stick_time for slip in slips[1:] if isfinite(slip.stick_time)]
+    if not between:
         return None
     slip_time = float(np.median([slip.slip_time for slip in slips]))
-    between = float(np.nanmedian([np.nan, *(slip.stick_time for slip in slips[1:])]))
-    return Regime.STICK_SLIP if between > _STICKING_RATIO * slip_time else Regime.PURE_SLIP
+    sticks = float(np.median(between)) > _STICKING_RATIO * slip_time
+    return Regime.STICK_SLIP if sticks else Regime.PURE_SLIP
 
 
 def _distribution(values: FloatArray) -> dict[str, float] | None:

@@ -359,8 +359,8 @@ def test_what_is_mistyped_is_refused_and_a_run_that_diverges_says_so(
     gain = page.get_by_label("cubic gain, value")
     gain.fill("9")  # MN s^3/m^3: the force grows faster than what damps the slide
     gain.press("Enter")
-    expect(events(page).get_by_text(re.compile(r"t = .* s: \w+\.\w+: \S+ to "))).to_have_text(
-        [re.compile("washout_controller.cubic_gain: 0 to 9e\\+06$")]
+    expect(events(page).get_by_text(re.compile(r"t = .* s: \w+\.\w+: .* to "))).to_have_text(
+        [re.compile(r"washout_controller.cubic_gain: 0 .* to 9 MN s\^3/m\^3$")]
     )
     wait_for(lambda: swing(page) > 800.0, "the limit cycle is drawn")  # µm
     control.click()
@@ -403,7 +403,7 @@ def test_a_page_that_comes_and_goes_changes_nothing(
             for name in vars(columns):
                 values = getattr(columns, name)
                 common = getattr(others, name)[: len(values)]
-                assert np.array_equal(values, common), (kind, name)
+                assert np.array_equal(values, common, equal_nan=True), (kind, name)
 
 
 def test_a_page_of_no_run_and_of_a_node_that_dies_and_returns(

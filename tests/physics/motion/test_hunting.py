@@ -74,7 +74,7 @@ def test_the_observer_helps_and_with_forces_30_percent_off_harms() -> None:
     def amplitude(share: float) -> float:
         law = LugreObserver(
             **GAINS,
-            mass=1.0,
+            nominal_mass=1.0,
             static_force=1.5 * share,
             kinetic_force=share,
             decay_speed=1e-3,
