@@ -374,4 +374,5 @@ def _plus_minus(text: str, error: float) -> str:
 def _with_error(units: Units, mean: float, error: float, unit: str) -> str:
     if np.isnan(mean):
         return "-"
-    return units.text(mean, unit) + _plus_minus(units.text(error, unit), error)
+    value, deviation = units.texts([mean, error], unit, 3)
+    return value + _plus_minus(deviation, error)

@@ -12,7 +12,7 @@ from stickslip_ros.app.arguments import (
 )
 from stickslip_ros.app.output import progress_bar
 from stickslip_ros.app.result import add_html, add_plot, check_results
-from stickslip_ros.app.study_command import add_workers, computed, finish
+from stickslip_ros.app.study_command import add_workers, check_out, computed, finish
 
 _DESCRIPTION = """Compare control laws on one drive. The gains of each law are tuned by one rule for
 the sampled loop, or given by the scenario. With a moving belt the task is regulation: the slide is
@@ -93,6 +93,7 @@ def run(arguments: argparse.Namespace) -> None:
     belts = [axis for axis in axes if axis.parameter == "plant.belt_speed"]
     check_speeds(arguments, scenario, *(end for axis in belts for end in (axis.first, axis.last)))
     check_results(arguments)
+    check_out(arguments.out)
     with progress_bar(f"gains for {scenario.name}", 1.0, lines=True) as progress:
         study, tuned = compared(
             scenario,

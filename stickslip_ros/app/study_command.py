@@ -81,6 +81,14 @@ def settling_of(arguments: argparse.Namespace, default: SettlingOptions) -> Sett
     return replace(default, transient=arguments.transient, cycles=arguments.cycles)
 
 
+def check_out(out: Path | None) -> None:
+    """Refuse a file of points that cannot be written."""
+    if out is not None:
+        if out.suffix.lower() not in _TABLES:
+            raise InvalidInputError(f"--out {out}: must end in one of {', '.join(_TABLES)}")
+        check_new("--out", out)
+
+
 @contextmanager
 def computed(
     arguments: argparse.Namespace, study: "Study", label: str, columns: Any = None
@@ -93,10 +101,8 @@ def computed(
     from stickslip_ros.studies.runner import DaskError, dask_executor, run, run_here
 
     out: Path | None = arguments.out
+    check_out(out)
     if out is not None:
-        if out.suffix.lower() not in _TABLES:
-            raise InvalidInputError(f"--out {out}: must end in one of {', '.join(_TABLES)}")
-        check_new("--out", out)
         journal = Journal(study, out.with_name(f"{out.name}.part"), columns)
     else:
         journal = kept_journal(study, columns)

@@ -38,6 +38,7 @@ def test_mistakes_are_one_sentence(stickslip: Run) -> None:
         (("--controllers", "washuot"), "did you mean washout?"),
         (("--controllers", "washout", "--disturbances", "bump"), "disturbance bump: must be none"),
         (("--controllers", "washout", "--over", "plant.mas=1:2:3"), "did you mean plant.mass"),
+        (("--controllers", "washout", "--out", "cases.txt"), "must end in one of .csv, .json"),
     ):
         done = stickslip("compare", "feed_drive", *options)
         assert done.returncode == 2
