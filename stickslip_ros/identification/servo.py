@@ -114,7 +114,8 @@ def closed_loop(
     """Return positions, m, and forces, N, of a drive that the servo leads along the reference.
 
     It starts from the measured state of the record and has the record's belt. `delay` is the time
-    from a sample until its force acts, s; a force cannot act before it.
+    from a sample until its force acts, s; a force cannot act before it, and a disturbance is never
+    late.
     """
     assert record.reference is not None
     span, period = servo.difference_samples, record.period
@@ -125,13 +126,13 @@ def closed_loop(
     loop = SampledLoop(motion, 1.0 / period, LOCKSTEP_START, force_delay=max(delay, 0.0))
     # Before the record the slide moves as at its start.
     positions = [float(position[0]) - velocity * period * number for number in range(span, 0, -1)]
-    nothing = np.zeros(len(position))
-    disturbance = nothing if record.disturbance is None else record.disturbance
-    added = nothing if record.force is None else servo.added(record)
+    added = np.zeros(len(position)) if record.force is None else servo.added(record)
+    _, disturbance = record.held_forces
+    loop.disturbance = float(disturbance[0])
     forces: list[float] = []
     sample = loop.sample
-    inputs = zip(record.reference.tolist(), added.tolist(), disturbance.tolist(), strict=True)
-    for number, (wanted, more, other) in enumerate(inputs):
+    inputs = zip(record.reference.tolist(), added.tolist(), strict=True)
+    for number, (wanted, more) in enumerate(inputs):
         positions.append(sample.position)
         speed = (positions[-1] - positions[-1 - span]) / (span * period)
         force = servo.position_gain * (wanted - sample.position) - servo.velocity_gain * speed
@@ -139,7 +140,8 @@ def closed_loop(
         forces.append(force)
         if number == len(position) - 1 or motion.unbounded:
             break
-        loop.offer(sample.stamp, force + other)
+        loop.offer(sample.stamp, force)
+        loop.disturb(float(disturbance[number + 1]))
         sample = loop.advance()
     found = np.full((2, len(position)), np.nan)
     found[0, : len(forces)], found[1, : len(forces)] = positions[span:], forces

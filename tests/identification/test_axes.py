@@ -239,6 +239,16 @@ def test_the_loop_has_the_belt_of_the_record() -> None:
     assert force[-1] == pytest.approx(-20.0, rel=0.01)
 
 
+def test_a_disturbance_is_not_late_as_the_force_is() -> None:
+    still = np.zeros(200)
+    pulse = np.where(np.arange(200) == 100, 500.0, 0.0)
+    record = Record("axis", 1e-3, still, still, disturbance=pulse, reference=still)
+    weak = replace(SERVO, position_gain=0.0, velocity_gain=0.0)
+    late, _ = closed_loop(record, axis(COULOMB), weak, 0.02)
+    assert np.flatnonzero(late)[0] == 101
+    assert late.tolist() == closed_loop(record, axis(COULOMB), weak, 0.0)[0].tolist()
+
+
 def test_no_velocity_at_the_start_near_the_found_one_is_better() -> None:
     drive, velocity = axis(Coulomb(static=20.0, viscous=200.0)), 0.35
     time, still = 1e-3 * np.arange(4000), np.zeros(4000)
