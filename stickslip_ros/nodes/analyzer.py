@@ -73,6 +73,7 @@ from stickslip_ros.physics.measures.onset import OnsetWatch
 from stickslip_ros.physics.measures.run_meter import RunMeter
 from stickslip_ros.physics.measures.sample_meter import SampleAssumptions
 from stickslip_ros.physics.measures.timing import Timing
+from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.samples import NO_FORCES, NO_SAMPLES, ForceColumns
 from stickslip_ros.scenarios.curve_file import CURVES, Pairs, read_pairs
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, AnalyzerParameters
@@ -446,6 +447,9 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         self._keep(f"stickslip_ros/{node}", values)
         if node == "plant":
             self._meter.motion.reading = self.parameters.reading_of(values)
+            with suppress(InvalidInputError, KeyError, TypeError):  # a plant of another version
+                period = Drive(mass=values["mass"], stiffness=values["stiffness"]).natural_period
+                self._watch.pause = max(1.0, period if period < inf else 0.0)
         known, curves = NODE_PARAMETERS[node].known, dict[str, Pairs]()
         for name, path in values.items():
             if known[name].file and path and isinstance(path, str):

@@ -37,9 +37,8 @@ _FAMILIES: Mapping[str, tuple[FrictionLaw, str, int]] = {
 }
 """Families of friction laws: a law, any multiple of which is in it; the constant that may have any
 value; number of constants of the decay rate, of which viscous damping is one."""
-_WINDOW, _PAUSE, _LONG = 8 * NANOSECONDS, NANOSECONDS, 4.0
-"""Time that a watch keeps, and between its looks, ns; length of a ring-down that need not have
-ended, s."""
+_WINDOW, _LONG = 8, 4
+"""Time that a watch keeps, and length of a ring-down that need not have ended, in its pauses."""
 _MOST_KEPT, _MOST_SAMPLES = 300, 100_000
 """Number of ring-downs and of samples that it keeps at most."""
 
@@ -224,20 +223,25 @@ def _slope(law: FrictionLaw, speed: FloatArray) -> FloatArray:
 
 
 class OnsetWatch:
-    """Follows the onset of a running machine by the ring-downs in its last seconds."""
+    """Follows the onset of a running machine by the ring-downs in its last seconds.
+
+    The pause between its looks, 1 s, must not be shorter than the period of the vibration.
+    """
 
     def __init__(self) -> None:
         self.ring_downs: list[RingDown] = []
         self.onset = Onset([], {})
-        self._kept, self._pause, self._after = NO_SAMPLES, 0, -inf
+        self.pause = 1.0
+        """Time between two looks, s."""
+        self._kept, self._looks, self._after = NO_SAMPLES, 0, -inf
 
     def feed(self, samples: SampleColumns) -> list[RingDown]:
         """Add samples, in blocks of any length; return the ring-downs that have ended with them."""
         samples = samples[samples.is_valid]
-        pauses = np.append(self._pause, samples.stamp // _PAUSE)
+        looks = np.append(self._looks, samples.stamp // round(self.pause * NANOSECONDS))
         found: list[RingDown] = []
-        first, self._pause = 0, int(pauses[-1])
-        for edge in np.flatnonzero(np.diff(pauses)).tolist():
+        first, self._looks = 0, int(looks[-1])
+        for edge in np.flatnonzero(np.diff(looks)).tolist():
             self._kept = self._kept.followed_by(samples[first:edge])
             found, first = [*found, *self._look()], edge
         self._kept = self._kept.followed_by(samples[first:])[-_MOST_SAMPLES:]
@@ -254,13 +258,15 @@ class OnsetWatch:
         kept = kept[int(gaps[-1]) + 1 :] if len(gaps) else kept
         if usual <= 0.0:
             return []
-        self._kept = kept = kept[kept.stamp > kept.stamp[-1] - _WINDOW]
+        first = kept.stamp[-1] - round(_WINDOW * self.pause * NANOSECONDS)
+        self._kept = kept = kept[kept.stamp > first]
         origin, now = kept.stamp[[0, -1]] / NANOSECONDS
         period = usual / NANOSECONDS
         after = self._after - origin if self._after < now else -inf  # a clock may be set back
         seen = ring_downs(kept.position, kept.belt_velocity, period, after)
         ended = now - origin - 2.0 * period
-        found = [each for each in seen if each.end < ended or each.end - each.start > _LONG]
+        long = _LONG * self.pause
+        found = [each for each in seen if each.end < ended or each.end - each.start > long]
         self._after = origin + found[-1].end if found else self._after
         return found
 

@@ -147,6 +147,11 @@ def test_a_watch_warns_near_the_onset_however_samples_are_divided() -> None:
     assert re.fullmatch(r"decay \S+ 1/s, onset 4\S+ \+- \S+ mm/s, feed 51 mm/s", text)
     again = samples[:5000]
     assert watch.feed(again)  # the clock is set back
+    slowly = replace(samples, stamp=100 * stamp, belt_velocity=belt / 100.0)
+    watch = OnsetWatch()
+    watch.pause = 100.0 * drive.natural_period
+    assert watch.feed(slowly)
+    assert watch.status(margin=0.1)[1]
 
 
 def test_a_watch_without_ring_downs_says_nothing() -> None:
