@@ -23,29 +23,23 @@ class DriveConstants:
     """The constants of a drive itself, in SI units; the plant has them as parameters."""
 
     mass: float = constant(1.0, "Mass of the slide.", "kg", positive=True)
-    """Mass m of the slide, kg."""
     damping: float = constant(0.02, "Viscous damping of the transmission.", "N s/m", at_least=0.0)
-    """Viscous damping c, N s/m."""
     stiffness: float = constant(
         1.0,
         "Stiffness of the transmission; 0 for an axis that no spring holds.",
         "N/m",
         at_least=0.0,
     )
-    """Stiffness k of the transmission, N/m; 0 for an axis that no spring holds."""
     normal_force: float = constant(
         1.0, "Force that presses the slide onto the belt.", "N", positive=True
     )
-    """Force N that presses the slide onto the belt, N."""
     belt_speed: float = constant(
         0.4, "Speed of the belt (feed speed), positive or negative.", "m/s"
     )
-    """Belt (feed) speed v_belt, m/s; positive, negative or zero."""
     _: KW_ONLY
     bias_force: float = constant(
         0.0, "Constant force on the slide, such as an offset.", "N", simplifies=True
     )
-    """Constant force on the slide, N, such as an offset of the drive or a weight."""
     guide_damping: float = constant(
         0.0,
         "Viscous damping between slide and belt.",
@@ -53,7 +47,6 @@ class DriveConstants:
         at_least=0.0,
         simplifies=True,
     )
-    """Viscous damping c_g between slide and belt, N s/m, beside friction of any law."""
 
 
 @dataclass(frozen=True)

@@ -24,13 +24,10 @@ class Motor:
     """
 
     mass: Any = constant(1.0, "Mass of the motor, reflected to the slide.", "kg", positive=True)
-    """Mass M, kg, of motor and screw as the slide feels it."""
     damping: Any = constant(0.0, "Viscous damping between motor and guide.", "N s/m", at_least=0.0)
-    """Viscous damping c_m against the guide, N s/m."""
     friction: Any = constant(
         0.0, "Dry friction of the motor against the guide.", "N", at_least=0.0, simplifies=True
     )
-    """Dry friction F_m against the guide, N."""
 
     @property
     def sticks(self) -> bool:

@@ -9,7 +9,7 @@ from typing import Any, ClassVar, NamedTuple, Protocol, Self
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.physics.model.constants import constant, constants_of
+from stickslip_ros.physics.model.constants import constant, constants_of, scaled
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.samples import Reference, Sample
 
@@ -108,7 +108,7 @@ class ContinuousControl(Protocol):
         ContinuousControl
             The same control, dimensionless.
         """
-        ...
+        return scaled(self, drive.scales)
 
     def silenced(self) -> Self:
         """Return a control with the same states that gives no force."""
@@ -265,11 +265,9 @@ class ControlLaw(ABC):
     """Gains that a design chooses, see `linear_part`; each has the sign of its default."""
 
     force_limit: float = constant(inf, "Largest magnitude of the force.", "N", at_least=0.0)
-    """Largest magnitude of the force, N."""
     start_after: float = constant(
         0.0, "Time after the first sample during which the force is zero.", "s", at_least=0.0
     )
-    """Time from the first sample during which the force is zero, s."""
 
     @classmethod
     def constants(cls) -> list[str]:
@@ -303,9 +301,9 @@ class ControlLaw(ABC):
         Returns
         -------
         tuple of float
-            State; by default the law has none.
+            State; by default zero for each of `state_units`.
         """
-        return ()
+        return (0.0,) * len(self.state_units)
 
     @abstractmethod
     def respond(
@@ -406,4 +404,3 @@ class FeedbackLaw(ControlLaw):
     """Control law that feeds back the motion of one body, which `feedback` names."""
 
     feedback: str = body(TABLE, "motion is fed back")
-    """Body whose motion is fed back, `TABLE` or `MOTOR`."""

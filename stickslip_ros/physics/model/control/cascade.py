@@ -8,7 +8,6 @@ import numpy as np
 from typing_extensions import override
 
 from stickslip_ros.physics.model.constants import constant
-from stickslip_ros.physics.model.constants import scaled as in_scales
 from stickslip_ros.physics.model.control.base import (
     TABLE,
     ControlLaw,
@@ -104,10 +103,6 @@ class Cascade(ControlLaw, TwoBodyControl):
     @override
     def continuous(self) -> Self:
         return self
-
-    @override
-    def scaled(self, drive: Drive) -> Self:
-        return in_scales(self, drive.scales)
 
     @override
     def silenced(self) -> Self:

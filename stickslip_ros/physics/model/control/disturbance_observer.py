@@ -46,13 +46,9 @@ class DisturbanceObserver(FeedbackLaw):
     tuned: ClassVar[Sequence[str]] = ("position_gain", "velocity_gain", "bandwidth")
 
     nominal_mass: float = constant(1.0, "Mass m that the observer assumes.", "kg", positive=True)
-    """Mass m that the observer assumes, kg."""
     bandwidth: float = constant(1.0, "Cutoff frequency g of the estimate.", "rad/s", positive=True)
-    """Cutoff frequency g of the estimate, rad/s."""
     position_gain: float = constant(1.0, "Gain k_p of the position error.", "N/m", at_least=0.0)
-    """Gain k_p of the position error, N/m."""
     velocity_gain: float = constant(1.0, "Gain k_d of the velocity error.", "N s/m", at_least=0.0)
-    """Gain k_d of the velocity error, N s/m."""
 
     @override
     def initial_state(self, sample: Sample, reference: Reference) -> State:

@@ -31,19 +31,13 @@ class FrictionFeedforward(Pid):
     name: ClassVar[str] = "friction_feedforward"
 
     nominal_mass: float = constant(1.0, "Mass m that is accelerated.", "kg", at_least=0.0)
-    """Mass m that is accelerated, kg."""
     kinetic_force: float = constant(0.25, "Kinetic friction F_k.", "N", at_least=0.0)
-    """Kinetic friction F_k, N."""
     static_force: float = constant(0.4, "Static friction F_s.", "N", at_least=0.0)
-    """Static friction F_s, N."""
     decay_speed: float = constant(
         0.5, "Speed v_s of the decay from F_s to F_k.", "m/s", positive=True
     )
-    """Speed v_s of the decay from F_s to F_k, m/s."""
     exponent: float = constant(1.0, "Exponent n of the decay.", at_least=1.0, at_most=100.0)
-    """Exponent n of the decay."""
     viscous_damping: float = constant(0.0, "Viscous damping c.", "N s/m", at_least=0.0)
-    """Viscous damping c, N s/m."""
 
     @override
     def respond(

@@ -34,17 +34,10 @@ class LugreObserver(FrictionFeedforward):
     state_units: ClassVar[Mapping[str, str | None]] = {"integral": "N", "z": "m"}
 
     bristle_stiffness: float = constant(1000.0, "Stiffness S of the contact.", "N/m", positive=True)
-    """Stiffness S of the contact, N/m."""
     bristle_damping: float = constant(30.0, "Damping D of the contact.", "N s/m", at_least=0.0)
-    """Damping D of the contact, N s/m."""
     observer_gain: float = constant(
         0.0, "Gain k by which the position error corrects the deflection.", "1/s", at_least=0.0
     )
-    """Gain k by which the position error corrects the deflection, 1/s."""
-
-    @override
-    def initial_state(self, sample: Sample, reference: Reference) -> State:
-        return 0.0, 0.0
 
     @override
     def respond(

@@ -43,21 +43,13 @@ class Pid(FeedbackLaw):
     position_gain: float = constant(
         1.0, "Gain k_p of the position error; positive gains act against it.", "N/m", at_least=0.0
     )
-    """Gain k_p of the position error, N/m."""
     integral_gain: float = constant(
         0.1, "Gain k_i of the integral of the position error.", "N/(m s)", at_least=0.0
     )
-    """Gain k_i of the integral of the position error, N/(m s)."""
     velocity_gain: float = constant(1.0, "Gain k_d of the velocity error.", "N s/m", at_least=0.0)
-    """Gain k_d of the velocity error, N s/m."""
     tracking_time: float = constant(
         0.1, "Time constant of the anti-windup at the force limit.", "s", positive=True
     )
-    """Time constant of the anti-windup, s."""
-
-    @override
-    def initial_state(self, sample: Sample, reference: Reference) -> State:
-        return (0.0,)
 
     @override
     def respond(

@@ -32,15 +32,9 @@ class ResetIntegral(Pid):
     reset_share: float = constant(
         0.5, "Share a of the integral that a reset turns round.", at_least=0.0, at_most=1.0
     )
-    """Share a of the integral that a reset turns round."""
     reset_band: float = constant(
         0.0, "Largest position error without a sign of its own.", "m", at_least=0.0
     )
-    """Largest position error without a sign of its own, m."""
-
-    @override
-    def initial_state(self, sample: Sample, reference: Reference) -> State:
-        return 0.0, 0.0
 
     @override
     def respond(

@@ -44,15 +44,11 @@ class SlidingMode(FeedbackLaw):
     tuned: ClassVar[Sequence[str]] = ("slope", "boundary_layer")
 
     nominal_mass: float = constant(1.0, "Mass m that the law assumes.", "kg", at_least=0.0)
-    """Mass m that the law assumes, kg."""
     slope: float = constant(1.0, "Slope L of the surface: decay rate on it.", "1/s", at_least=0.0)
-    """Slope L of the surface, 1/s."""
     switching_force: float = constant(1.0, "Switching force K.", "N", at_least=0.0)
-    """Switching force K, N."""
     boundary_layer: float = constant(
         0.5, "Boundary layer B of the surface; 0: the force switches.", "m/s", at_least=0.0
     )
-    """Boundary layer B of the surface, m/s."""
 
     @override
     def respond(

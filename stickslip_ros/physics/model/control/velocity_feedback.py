@@ -43,11 +43,9 @@ class VelocityFeedback(FeedbackLaw, ContinuousControl):
     velocity_gain: Any = constant(
         -1.0, "Gain k1 of the velocity; a negative gain removes energy.", "N s/m"
     )
-    """Gain k1 of the velocity, N s/m."""
     position_gain: Any = constant(
         0.0, "Gain k0 of the displacement; it moves the equilibrium.", "N/m"
     )
-    """Gain k0 of the displacement, N/m."""
 
     @override
     def respond(
@@ -66,14 +64,6 @@ class VelocityFeedback(FeedbackLaw, ContinuousControl):
     @override
     def continuous(self) -> Self:
         return self
-
-    @override
-    def scaled(self, drive: Drive) -> Self:
-        return replace(
-            self,
-            position_gain=self.position_gain * drive.length_scale / drive.normal_force,
-            velocity_gain=self.velocity_gain * drive.speed_scale / drive.normal_force,
-        )
 
     @override
     def silenced(self) -> Self:

@@ -53,11 +53,8 @@ class Washout(FeedbackLaw, ContinuousControl):
     corner_frequency: Any = constant(
         2.0, "Cutoff frequency d of the filter.", "rad/s", positive=True
     )
-    """Cutoff frequency d of the filter, rad/s."""
     linear_gain: Any = constant(-1.0, "Linear gain k1; a negative gain removes energy.", "N s/m")
-    """Linear gain k1, N s/m."""
     cubic_gain: Any = constant(-1.0, "Cubic gain k2.", "N s^3/m^3")
-    """Cubic gain k2, N s^3/m^3."""
 
     def force(self, filtered: Any) -> Any:
         """Return the control force, u = k1 v + k2 v^3, eq. 18.
@@ -103,15 +100,6 @@ class Washout(FeedbackLaw, ContinuousControl):
     @override
     def continuous(self) -> Self:
         return self
-
-    @override
-    def scaled(self, drive: Drive) -> Self:
-        return replace(
-            self,
-            corner_frequency=self.corner_frequency / drive.angular_frequency,
-            linear_gain=self.linear_gain * drive.speed_scale / drive.normal_force,
-            cubic_gain=self.cubic_gain * drive.speed_scale**3 / drive.normal_force,
-        )
 
     def silenced(self) -> Self:
         """Return the filter alone, which gives no force."""
