@@ -36,9 +36,23 @@ CASES = (
 )
 SERVO = Servo(position_gain=1.5e5, velocity_gain=3.3e3, difference_samples=2, limit=inf)
 AXIS = Drive(38.0, 0.0, 0.0, 1.0, 0.0, Directional(Coulomb(17.0, 140.0), Coulomb(21.0, 180.0)))
+AXIS_VALUES = 38.0, 17.0, 140.0, 21.0, 180.0
 
 
-def axis_record(rate: int, dwell: float, seed: int, count: int = 6000) -> Record:
+def named(*values: float) -> dict[str, float]:
+    """Return mass and Coulomb friction by direction by their names as constants."""
+    names = ("static", "viscous", "reverse.static", "reverse.viscous")
+    return dict(zip(("mass", *(f"friction.{each}" for each in names)), values, strict=True))
+
+
+def axis_record(
+    rate: int,
+    dwell: float,
+    seed: int,
+    count: int = 6000,
+    encoder: float = 2e-6,
+    noise: float = 0.5,
+) -> Record:
     """Return a run of `AXIS` along six sines that stand still for a share of every 2 s."""
     time, random = np.arange(count) / rate, np.random.default_rng(seed)
     frequencies, moving = np.array([0.2, 0.37, 0.61, 0.97, 1.6, 2.7]), time % 2.0 >= 2.0 * dwell
@@ -47,8 +61,8 @@ def axis_record(rate: int, dwell: float, seed: int, count: int = 6000) -> Record
     reference, still = (sines - sines[0]) @ (0.007 / frequencies), np.zeros(count)
     start = Record("axis", 1.0 / rate, still, still, reference=reference)
     position, force = closed_loop(start, AXIS, SERVO, 0.0)
-    noise = 0.5 * random.standard_normal(count)
-    return replace(start, position=np.rint(position / 2e-6) * 2e-6, force=force + noise)
+    measured = np.rint(position / encoder) * encoder
+    return replace(start, position=measured, force=force + noise * random.standard_normal(count))
 
 
 def uneven_record(seed: int, count: int = 5000) -> Record:
@@ -76,9 +90,7 @@ def tried(case: str, seed: int) -> tuple[dict[str, list[float]], float]:
         own = study.record("stribeck", "taps", seed, delay=delay, lag=lag)
         found = identify([own], "stribeck", {"normal_force": study.NORMAL_FORCE})
     else:
-        values = (38.0, 17.0, 140.0, 21.0, 180.0) if kind == "axis" else (4.0, 7.0, 11.0, 7.0, 11.0)
-        names = ("static", "viscous", "reverse.static", "reverse.viscous")
-        true = dict(zip(("mass", *(f"friction.{each}" for each in names)), values, strict=True))
+        true = named(*(AXIS_VALUES if kind == "axis" else (4.0, 7.0, 11.0, 7.0, 11.0)))
         found = identify(
             [
                 axis_record(int(numbers[0]), float(numbers[1]), seed)

@@ -28,8 +28,9 @@ _REST_ERRORS, _REST_DRIFT = 12.0, 10.0
 the filter blurs both ends."""
 _REVERSAL_SAMPLES = 3
 """Samples on both sides of a reversal within which a slide that rests may stick unseen."""
-_REACH, _TAPER = 5, 10
-"""Samples that are left out beside a rest, and those over which the weight rises from there."""
+_REACH, _TAPER = 0.5, 1.0
+"""Times beside a rest, in periods of the cutoff: that which is left out, and that over which the
+weight rises from there."""
 _LEAST_WEIGHT = 0.5
 """Weight of the samples of a row from which on it is used."""
 
@@ -129,6 +130,11 @@ def filtered(record: Record, *, decimated: bool, delay: float | None = None) -> 
     # The velocity is meant over the same time.
     velocity[1:-1] -= np.diff(velocity, 2) / 12.0
     relative = velocity - smooth(record.belt_velocity)
+    weight = _moving_weight(record, relative, acceleration, rate / cutoff) if decimated else None
+    if weight is not None:
+        # The low-pass would carry the jump where the slide stops into the rows beside it; that of
+        # the rows is enough for noise.
+        acceleration[1:-1] = np.diff(record.position, 2) / record.period**2
     force = record.held_force if delay is None else _shifted(record, delay)
     if not decimated:
         force = smooth(force)  # all that enters the equation passes the same filter
@@ -142,7 +148,7 @@ def filtered(record: Record, *, decimated: bool, delay: float | None = None) -> 
         relative[inside],
         force[inside],
         decimated,
-        _moving_weight(record, relative, acceleration) if decimated else None,
+        weight,
         _slipping(relative[inside], 0.5 * rate / cutoff),
         _slipping(relative[inside], 2.0 * rate / cutoff),
     )
@@ -170,12 +176,13 @@ def _slipping(relative: FloatArray, reach: float) -> BoolArray:
 
 
 def _moving_weight(
-    record: Record, relative: FloatArray, acceleration: FloatArray
+    record: Record, relative: FloatArray, acceleration: FloatArray, width: float
 ) -> FloatArray | None:
     """Return the weight of each sample in rows that tell of slip; None if the slide never rests.
 
     While it rests, friction is what the other forces ask for, and tells nothing of the law. The
     weight is zero there, near reversals, where it may stick between samples, and at both ends.
+    `width` is the period of the cutoff in samples.
     """
     from scipy.ndimage import maximum_filter1d
 
@@ -187,9 +194,9 @@ def _moving_weight(
     reversing = _REVERSAL_SAMPLES * record.period * np.abs(acceleration)
     left_out |= np.abs(relative) < reversing
     left_out[:START] = left_out[-END:] = True
-    reach = _REACH + _TAPER // 2
+    taper = np.hanning(round(_TAPER * width) + 2)
+    reach = round((_REACH + 0.5 * _TAPER) * width)
     away = 1.0 - maximum_filter1d(left_out.astype(float), 2 * reach + 1)
-    taper = np.hanning(_TAPER + 2)
     weight: FloatArray = np.convolve(away, taper / np.sum(taper), "same")
     return weight[START:-END]
 

@@ -20,6 +20,9 @@ _DIRECTION_SHARE = 0.05
 """Least share of the rows of a direction that has a curve of its own."""
 _FASTEST_SHAPE = 4.0
 """Largest shape of a curve that is sought, in fastest speeds."""
+_LEAST_ERROR = 1e-4
+"""Least error of rows, as a share of the forces: without noise, filters and differences leave up to
+a quarter of it, with the same sign in all blocks."""
 LINEAR = ("mass", "damping", "stiffness", "bias_force")
 """Constants of the equation beside those of friction."""
 
@@ -265,7 +268,8 @@ class Regression(Fit):
             step = np.where(np.arange(len(self.shapes)) == number, 1e-4 * shape, 0.0)
             below, above = (replace(self, shapes=self.shapes + sign * step) for sign in (-1, 1))
             columns.append(((below.residual - above.residual) / (2e-4 * shape))[:, None])
-        return np.hstack(columns), self.residual, 0
+        least = _LEAST_ERROR * self.scale / max(rms(self.residual), np.finfo(float).tiny)
+        return np.hstack(columns), self.residual * max(least, 1.0), 0
 
     @cached_property
     def held_out(self) -> FloatArray:

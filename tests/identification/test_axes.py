@@ -52,6 +52,17 @@ def test_an_axis_that_sticks_or_turns_slowly_has_no_delay(case: str) -> None:
         assert abs(error) < 4.0 * standard_error, name
 
 
+@pytest.mark.parametrize("rate", [250, 1000])
+def test_intervals_without_noise(rate: int) -> None:
+    """What filters and differences leave, with the same sign everywhere, is within them."""
+    own = conditions.axis_record(rate, 0.0, 0, encoder=1e-12, noise=0.0)
+    found = identify([own], "coulomb", {"force_delay": 0.0})
+    for name, value in conditions.named(*conditions.AXIS_VALUES).items():
+        low, high = found.fitted[name].interval
+        assert low <= value <= high, name
+        assert found.fitted[name].value == pytest.approx(value, rel=1e-4), name
+
+
 def test_the_committed_study() -> None:
     path = Path(conditions.__file__).with_suffix(".json")
     cases = json.loads(path.read_text(encoding="utf-8"))["cases"]
