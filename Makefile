@@ -14,7 +14,7 @@ PIP := $(BIN)/python -m pip install -qq --disable-pip-version-check
 # A test that hangs fails by itself, with its name. What was skipped is listed at the end, and why.
 # Three at a time on two cores: some of it is waiting. Of what takes long, more is.
 TESTS ?= tests
-PYTEST := $(BIN)/python -m pytest $(TESTS) --timeout=300 --numprocesses=3 --dist=worksteal -rs
+PYTEST := $(BIN)/python -m pytest $(TESTS) --timeout=600 --numprocesses=3 --dist=worksteal -rs
 
 # What Python compiles is kept, even if the environment says not to: the tests start hundreds.
 export PYTHONDONTWRITEBYTECODE :=

@@ -22,6 +22,7 @@ from array import array
 from collections.abc import Generator, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -51,7 +52,9 @@ OVERRIDES = (
 )
 
 WARM_UP = 30.0
-"""Time of the run, s, after which the memory of a process must stay constant."""
+"""Time of the run, s, once it is recorded, after which the memory of a process stays constant."""
+HIDDEN, UNEXPLAINED = -1, -2
+"""In place of the age of a force."""
 _LOOK_PERIOD = 0.02
 _MEMORY_PERIOD = 1.0
 _SAME_SPEED = 1e-14
@@ -110,8 +113,10 @@ class Outcome:
     """Deadlines that were certainly missed."""
     late_forces: int
     """Late forces according to the motion."""
+    hidden_steps: int
+    """Steps of the motion whose next sample, or a force that may have acted, is not in the bag."""
     unexplained_steps: int
-    """Steps of the motion whose next sample, or the force that acted, is missing in the bag."""
+    """Steps of the motion that none of the forces that may have acted explains."""
 
 
 def soak(duration: float, *, composed: bool, burners: int, directory: Path) -> Outcome:
@@ -129,7 +134,8 @@ def soak(duration: float, *, composed: bool, burners: int, directory: Path) -> O
             while process.poll() is None:
                 samples.take()
                 recorded.take()
-                if WARM_UP <= samples.span < duration and time.monotonic() >= next_look:
+                warm = recorded.span >= WARM_UP and samples.span < duration
+                if warm and time.monotonic() >= next_look:
                     next_look = time.monotonic() + _MEMORY_PERIOD
                     _look_at_memory(process.pid, memory)
                 time.sleep(_LOOK_PERIOD)
@@ -153,34 +159,45 @@ def soak(duration: float, *, composed: bool, burners: int, directory: Path) -> O
         furthest_behind=max(largest_backlog, round(behind)),
         missed_deadlines=_missed_deadlines(samples, period),
         late_forces=int(np.sum(ages > 0)),
-        unexplained_steps=int(np.sum(ages < 0)),
+        hidden_steps=int(np.sum(ages == HIDDEN)),
+        unexplained_steps=int(np.sum(ages == UNEXPLAINED)),
     )
 
 
 def force_ages(recording: Recording, parameters: PlantParameters) -> NDArray[np.int64]:
     """Return the age, in periods, of the force that acted from each sample to the next.
 
-    Without a force, the age is larger than any other. It is -1 if no force in the bag explains the
-    step, or if the next sample is missing.
+    Without a force, the age is larger than any other. It is `HIDDEN` if the next sample, or one of
+    the forces that may have acted, is missing in the bag; `UNEXPLAINED` if none of them acted.
     """
     states, forces = recording.joint_states, recording.control_forces
-    stamps, positions = states.stamp.tolist(), states.position.tolist()
-    velocities = states.velocity.tolist()
-    force_of = dict(zip(forces.stamp.tolist(), forces.force.tolist(), strict=True))
+
+    def number_of(stamp: int) -> int:
+        return round((stamp - int(states.stamp[0])) * parameters.rate / NANOSECONDS)
+
+    numbers = [number_of(stamp) for stamp in states.stamp.tolist()]
+    positions, velocities = states.position.tolist(), states.velocity.tolist()
+    answered = map(number_of, forces.stamp.tolist())
+    force_of = dict(zip(answered, forces.force.tolist(), strict=True))
     longest_held = int(parameters.force_timeout * parameters.rate)
     motion = Motion(parameters.as_drive(), positions[0], velocities[0])
-    ages = np.full(len(stamps) - 1, -1)
+    ages = np.full(len(numbers) - 1, HIDDEN)
     newest = 0
-    for number in range(len(ages)):
+    for place, (number, following) in enumerate(pairwise(numbers)):
+        if following > number + 1:
+            continue
         oldest = max(newest, number - longest_held)
         # Its own force or, most likely otherwise, the one that was held before.
-        samples = dict.fromkeys([number, oldest, *range(number - 1, oldest, -1)])
-        for sample in [*(n for n in samples if stamps[n] in force_of), -1]:
-            motion.restart(positions[number], velocities[number])
-            motion.force = 0.0 if sample < 0 else force_of[stamps[sample]]
+        possible = dict.fromkeys([number, oldest, *range(number - 1, oldest, -1)])
+        known = [sample for sample in possible if sample in force_of]
+        if len(known) == len(possible):
+            ages[place] = UNEXPLAINED
+        for sample in [*known, -1]:
+            motion.restart(positions[place], velocities[place])
+            motion.force = 0.0 if sample < 0 else force_of[sample]
             motion.advance(1.0 / parameters.rate)
-            if abs(motion.velocity - velocities[number + 1]) < _SAME_SPEED:
-                ages[number] = number - sample
+            if abs(motion.velocity - velocities[place + 1]) < _SAME_SPEED:
+                ages[place] = number - sample
                 newest = max(newest, sample)
                 break
     return ages
@@ -195,9 +212,13 @@ def _missed_deadlines(samples: Sendings, period: float) -> int:
 
 
 def _largest_backlog(samples: Sendings, recorded: Sendings, period: float) -> int:
-    """Return the largest number of samples sent between two reports of the recorded stamp."""
-    newest = np.searchsorted(samples.sent, recorded.sent[1:], side="right") - 1
-    behind = np.array(samples.stamps)[newest] - np.array(recorded.stamps[:-1])
+    """Return the largest number of samples sent between two reports of the recorded stamp.
+
+    Of samples that the observer lost, too, those after a report count as if sent before it.
+    """
+    last = len(samples.stamps) - 1
+    following = np.minimum(np.searchsorted(samples.sent, recorded.sent[1:], side="right"), last)
+    behind = np.array(samples.stamps)[following] - np.array(recorded.stamps[:-1])
     return round(float(behind.max()) / (period * NANOSECONDS))
 
 
@@ -271,6 +292,7 @@ def lines(outcome: Outcome) -> Iterator[str]:
     yield f"furthest behind  {outcome.furthest_behind} samples, of all readers"
     yield f"missed deadlines {run['missed_deadlines']}; for sure {outcome.missed_deadlines}"
     yield f"late forces      {run['late_forces']}; by the motion {outcome.late_forces}"
+    yield f"hidden           {outcome.hidden_steps} steps of the motion, by what is not in the bag"
     yield f"unexplained      {outcome.unexplained_steps} steps of the motion"
     for name, sizes in outcome.memory.items():
         quarters = np.array_split(np.array(sizes) / 1e6, 4)

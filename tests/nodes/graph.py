@@ -20,10 +20,10 @@ from stickslip_ros.nodes.base.managed import ManagedNode
 from stickslip_ros.nodes.base.ros_topics import message_class, qos_profile
 from stickslip_ros.nodes.base.spinner import Spinner
 
-PATIENCE = 60.0
+PATIENCE = 120.0
 """How long a test waits, s, for what should happen at once on an idle machine."""
 
-_ATTEMPTS = 6
+_ATTEMPTS = 12
 """To get an answer from a service within that time."""
 
 

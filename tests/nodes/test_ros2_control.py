@@ -16,7 +16,7 @@ from stickslip_ros.nodes.plant import PlantNode
 from stickslip_ros.samples import SampleColumns
 from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.scenarios.parameters import PlantParameters
-from tests.nodes.graph import Graph
+from tests.nodes.graph import PATIENCE, Graph
 from tests.nodes.ros2_control import HardwareInterface
 
 SAMPLES = 2_000
@@ -58,7 +58,8 @@ def at_rest(states: SampleColumns) -> bool:
 
 def test_triggered_by_the_state_each_sample_is_answered_and_again_the_same(graph: Graph) -> None:
     heard = graph.listen(JOINT_STATES, raw=True)
-    plant, interface = start(graph, -1.0)
+    # However slow the machine, no sample goes without its command.
+    plant, interface = start(graph, -1.0, command_timeout=PATIENCE, reply_timeout=PATIENCE)
     interface.on_state = interface.cycle
     first, counts = run(graph, plant, heard)
     assert (counts["silent_samples"], counts["late_forces"], counts["superseded"]) == (0, 0, 0)
@@ -69,7 +70,8 @@ def test_triggered_by_the_state_each_sample_is_answered_and_again_the_same(graph
     plant.trigger_cleanup()
     plant.trigger_configure()
     graph.wait_until(lambda: interface.readers == 1, "matched")
-    again, _ = run(graph, plant, heard)
+    again, counts = run(graph, plant, heard)
+    assert counts["silent_samples"] == 0
     for name in ("position", "velocity", "friction_force"):
         assert np.array_equal(getattr(first, name), getattr(again, name))
 

@@ -9,8 +9,8 @@ from stickslip_ros.messages.topics import JOINT_STATES
 
 SECONDS, WARM_UP = 20.0, 10.0
 GROWTH = 2e6
-MESSAGE = 1e3
-"""Bytes, at most, that a message takes which waits for a reader."""
+SAMPLE = 2e3
+"""Bytes, at most, that a state and its force take which wait for a reader."""
 
 
 @pytest.mark.long
@@ -26,10 +26,11 @@ def test_a_run_in_real_time_lasts(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     assert missing == 0 or outcome.largest_backlog >= JOINT_STATES.depth
     assert run["missed_deadlines"] >= outcome.missed_deadlines
     # The first force is zero, and so is none: whether it was late does not show in the motion.
-    hidden = 1 + missing + outcome.unexplained_steps
+    hidden = 1 + missing + outcome.hidden_steps
     assert 0 <= run["late_forces"] - outcome.late_forces <= hidden
-    assert outcome.unexplained_steps < 0.01 * run["samples"]
-    assert set(outcome.memory) == {"main", "plant", "controller", "analyzer"}
+    assert outcome.unexplained_steps == 0
+    if outcome.furthest_behind < 500 * (SECONDS - WARM_UP):  # all are warm before the end
+        assert set(outcome.memory) == {"main", "plant", "controller", "analyzer"}
     for process, sizes in outcome.memory.items():
-        room = GROWTH + MESSAGE * outcome.furthest_behind
+        room = GROWTH + SAMPLE * outcome.furthest_behind
         assert max(sizes) - sizes[0] < room, process

@@ -172,9 +172,9 @@ class _Page:
         whole.props["data-start"] = json.dumps(start)
         self._refresh()
         ui.timer(_REFRESH, self._refresh)
-        opened.add(self)
         self._client = ui.context.client
-        self._client.on_delete(lambda: opened.discard(self))
+        self._client.on_connect(lambda: opened.add(self))
+        self._client.on_disconnect(lambda: opened.discard(self))
 
     def _add_header(self) -> None:
         with ui.row().classes("w-full items-center"):

@@ -27,6 +27,12 @@ from stickslip_ros.nodes.base.spinner import Spinner, spin
 
 _HOST = "127.0.0.1"
 
+_RECONNECT_TIME = 30.0
+"""Time, s, for which a page without connection is kept; then it is loaded again.
+
+A page that does not answer for longer than this counts as one without connection.
+"""
+
 _POLICY = (
     "default-src 'none'; script-src 'self' 'nonce-{nonce}' 'unsafe-eval'; connect-src 'self'; "
     "style-src 'self' 'unsafe-inline'; font-src 'self'; img-src 'self' data:; base-uri 'none'; "
@@ -63,7 +69,13 @@ def serve(
             _keep_others_out(app)
             pages = Pages(app, listener, frames)
             title = f"stickslip {namespace}"
-            ui.run_with(app, title=title, language="en-US", show_welcome_message=False)
+            ui.run_with(
+                app,
+                title=title,
+                language="en-US",
+                show_welcome_message=False,
+                reconnect_timeout=_RECONNECT_TIME,
+            )
             host, port = listening.getsockname()
             print(f"dashboard of {namespace}, {reach}: http://{host}:{port}", file=sys.stderr)
             config = uvicorn.Config(
