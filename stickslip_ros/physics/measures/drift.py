@@ -11,22 +11,12 @@ from stickslip_ros.arrays import FloatArray
 
 _PARTS = 128
 """Least number of parts of a long run; the trend is that over the last quarter of them."""
-_NOISES = 6.0
-"""Range of the noise, in standard deviations."""
 _LEAST_PARTS = 8
 """Number of parts from which a trend is looked for."""
 _LEAST_ERRORS = 3.0
 """Trend, in standard errors, above which it is one."""
 _LEAST_CHANGE = 0.01
 """Change over one more run, as a share of the largest magnitude, above which it matters."""
-
-
-def resolved(step: float, noise: float = 0.0) -> float:
-    """Return the range of positions, m, within which a sensor with this step and noise tells none.
-
-    Rounding to the step is noise, too.
-    """
-    return step + _NOISES * max(noise, step / sqrt(12.0)) if step else 0.0
 
 
 class TrendMeter:
