@@ -10,14 +10,13 @@ from stickslip_ros.arrays import FloatArray
 from stickslip_ros.physics.model.control import ContinuousControl, Washout
 from stickslip_ros.physics.model.dimensionless_drive import MEMORY, POSITION, SPEED
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.functions import zero_between
 from stickslip_ros.physics.theory.gain_intervals import (
     GainInterval,
     gains_of,
     nearest_to_zero,
 )
 from stickslip_ros.physics.theory.hopf import ComplexPair, first_lyapunov_coefficient
-from stickslip_ros.physics.theory.linear import expand, hurwitz_determinants
+from stickslip_ros.physics.theory.linear import expand
 from stickslip_ros.physics.theory.requirements import (
     AUTONOMOUS,
     ONE_MASS,
@@ -29,7 +28,7 @@ from stickslip_ros.physics.theory.requirements import (
 from stickslip_ros.physics.theory.shooting import LimitCycle, shoot
 
 _ROUNDING = 1e-9
-"""Relative change of a determinant with the gain below which it is treated as zero."""
+"""Square of a frequency, in that of the drive, below which it is rounding."""
 
 _STEPS = 16
 """Number of gains from the critical to the requested one, densest where the cycle is small."""
@@ -89,8 +88,7 @@ def critical_gains(drive: Drive, gains: ContinuousControl) -> CriticalGains | No
     without, with_unit = (expand(drive, replace(own, linear_gain=each)) for each in (0.0, unit))
     if without is None or with_unit is None:
         return None
-    find = _critical_linear_gain if STATIC.lack(drive) is None else _critical_gain_of_any_order
-    dimensionless = find(without.jacobian, with_unit.jacobian)
+    dimensionless = _critical_linear_gain(without.jacobian, with_unit.jacobian)
     if dimensionless is None:
         return None
     linear = dimensionless * unit
@@ -128,54 +126,28 @@ def why_no_linear_gain(drive: Drive, gains: Washout) -> str | None:
 
 
 def _critical_linear_gain(without: FloatArray, with_unit: FloatArray) -> float | None:
-    """Return the linear gain at which the last determinant of Routh and Hurwitz changes sign.
-
-    A static friction law enters the Jacobian of eq. 20 by its slope at the belt speed only. The
-    determinant is then affine in the gain: those at gains of zero and one give its zero.
-    """
-    margins = [float(hurwitz_determinants(each)[-1]) for each in (without, with_unit)]
-    slope = margins[1] - margins[0]
-    least = _ROUNDING * max(1.0, *map(abs, margins))
-    return None if slope > -least else -margins[0] / slope
-
-
-def _critical_gain_of_any_order(without: FloatArray, with_unit: FloatArray) -> float | None:
     """Return the end nearest to zero of the gains with which the equilibrium is stable.
 
-    The characteristic polynomial is p(s) + k q(s): where s = j w is an eigenvalue, p conj(q) is
-    real there, which is a polynomial equation for w^2, and k = -p/q.
+    The characteristic polynomial is p(s) + k s^2 r(s): the filter passes no constant speed, and a
+    constant force causes none. Where s = j w is an eigenvalue, p conj(r) is real, which is a
+    polynomial equation for w^2, and k = p/(w^2 r).
     """
     p = np.poly(without)
-    q = np.poly(with_unit) - p
-    powers = 1j ** np.arange(len(p))[::-1]
-    crossing = np.polymul(p * powers, np.conj(q * powers)).imag
-    frequencies = [root.real for root in np.roots(crossing) if _is_frequency(root)]
-
-    def margin(gain: float) -> float:
-        """Return the largest real part of the eigenvalues."""
-        return float(np.linalg.eigvals(without + gain * (with_unit - without)).real.max())
-
-    found = [-np.polyval(p, 1j * w) / np.polyval(q, 1j * w) for w in frequencies]
-    ends = sorted({float(each.real) for each in found})
+    r = (np.poly(with_unit) - p)[1:-2]
+    on_axis = [of * 1j ** np.arange(len(of))[::-1] for of in (p, r)]
+    squares = np.roots(np.polymul(on_axis[0], on_axis[1].conj()).imag[::2])
+    squares = squares.real[
+        (squares.real > _ROUNDING) & (np.abs(squares.imag) < 1e-6 * abs(squares))
+    ]
+    w = np.sqrt(squares)
+    ends = (np.polyval(on_axis[0], w) / (squares * np.polyval(on_axis[1], w))).real
     stable = [
         GainInterval(low, high)
-        for low, high in pairwise([-inf, *ends, inf])
-        if margin(_between(low, high)) < 0.0
+        for low, high in pairwise([-inf, *sorted(ends.tolist()), inf])
+        if np.linalg.eigvals(without + _between(low, high) * (with_unit - without)).real.max() < 0.0
     ]
-    if not stable:
-        return None
-    end = nearest_to_zero(stable).critical
-    if not isfinite(end):
-        return None
-    step = 1e-6 * max(abs(end), 1.0)
-    if margin(end - step) * margin(end + step) < 0.0:
-        end = zero_between(margin, end - step, end + step)
-    return end
-
-
-def _is_frequency(root: complex) -> bool:
-    """Return whether a root is a frequency, and not the rounding of one at zero, of the filter."""
-    return root.real > 1e-6 and abs(root.imag) < 1e-6 * abs(root)
+    end = nearest_to_zero(stable).critical if stable else inf
+    return end if isfinite(end) else None
 
 
 def _between(low: float, high: float) -> float:

@@ -149,27 +149,11 @@ def jacobians(
 def hurwitz_determinants(jacobian: FloatArray) -> FloatArray:
     """Return the Routh-Hurwitz determinants of Jacobians (..., n, n): shape (..., n).
 
-    With the characteristic polynomial l^n + c1 l^(n-1) + ... + cn they are c2, c1, or for order 3
-    c3, c1, c1 c2 - c3, and in general cn and the leading principal minors of Hurwitz's matrix of
-    orders 1 to n-1. All are above zero if the equilibrium is stable. At a Hopf point the last one
-    is zero, and the others are above zero.
+    With the characteristic polynomial l^n + c1 l^(n-1) + ... + cn, here by the Faddeev-LeVerrier
+    algorithm, they are c2, c1, or for order 3 c3, c1, c1 c2 - c3, and in general cn and the leading
+    principal minors of Hurwitz's matrix of orders 1 to n-1. All are above zero if the equilibrium
+    is stable. At a Hopf point the last one is zero, and the others are above zero.
     """
-    order = jacobian.shape[-1]
-    if order > 3:
-        return _hurwitz_minors(jacobian)
-    trace = np.trace(jacobian, axis1=-2, axis2=-1)
-    determinant = np.linalg.det(jacobian)
-    if order == 2:
-        return np.stack([determinant, -trace], axis=-1)
-    minors = sum(
-        jacobian[..., i, i] * jacobian[..., j, j] - jacobian[..., i, j] * jacobian[..., j, i]
-        for i, j in ((0, 1), (0, 2), (1, 2))
-    )
-    return np.stack([-determinant, -trace, determinant - trace * minors], axis=-1)
-
-
-def _hurwitz_minors(jacobian: FloatArray) -> FloatArray:
-    """Return cn and the minors of orders 1 to n-1, by the Faddeev-LeVerrier algorithm."""
     order = jacobian.shape[-1]
     identity = np.eye(order)
     power, coefficients = np.broadcast_to(identity, jacobian.shape), [np.ones(jacobian.shape[:-2])]

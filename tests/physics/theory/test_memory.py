@@ -109,12 +109,15 @@ def test_stiff_bristles_have_the_hopf_speed_of_the_curve() -> None:
     )
 
 
+@pytest.mark.parametrize("corner_frequency", [20.0, 1000.0])
 @pytest.mark.parametrize("law", LAWS[:3], ids=lambda law: law.name)
-def test_the_critical_gain_divides_stable_from_unstable(law: FrictionLaw) -> None:
-    drive = replace(FEED, friction=law)
-    found = critical_gains(drive, GAINS)
+def test_the_critical_gain_divides_stable_from_unstable(
+    law: FrictionLaw, corner_frequency: float
+) -> None:
+    drive, gains = replace(FEED, friction=law), replace(GAINS, corner_frequency=corner_frequency)
+    found = critical_gains(drive, gains)
     for ratio, stable in ((1.0 + 1e-7, True), (1.0 - 1e-7, False)):
-        expansion = expand(drive, replace(GAINS, linear_gain=ratio * found.linear))
+        expansion = expand(drive, replace(gains, linear_gain=ratio * found.linear))
         assert bool(np.all(expansion.eigenvalues.real < 0.0)) is stable
 
 
