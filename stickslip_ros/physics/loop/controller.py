@@ -91,8 +91,8 @@ class Controller:
             If the law raises anything, or returns no finite force or no state of the size that it
             had. The next sample continues from the last one whose state was good.
         """
-        stamp, last, law, before = sample.stamp, self._stamp, self.law, self.state
-        starts = last is None
+        stamp, last = sample.stamp, self._stamp
+        law, before, starts = self.law, self.state, last is None
         if last is None:
             self._first_stamp = last = stamp
         elif stamp <= last:

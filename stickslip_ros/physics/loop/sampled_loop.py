@@ -8,6 +8,7 @@ from collections import Counter, deque
 from collections.abc import Callable, Iterator
 from enum import StrEnum
 from fractions import Fraction
+from itertools import count
 from math import floor, isfinite
 from random import Random
 from typing import TYPE_CHECKING
@@ -37,6 +38,9 @@ class Verdict(StrEnum):
     OVERTAKEN = "overtaken by a newer one"
     """The force was accepted, and a newer one came before it could act."""
     SUPERSEDED = "came after the command that answers the sample"
+
+
+_ACCEPTED = Verdict.ACCEPTED  # in Python 3.11 looking it up takes a thirtieth of a sample
 
 
 class SampledLoop:
@@ -142,6 +146,9 @@ class SampledLoop:
         self._start = start
         # Sample period in ns, as an exact ratio.
         self._nanoseconds, self._samples = (NANOSECONDS / Fraction(rate)).as_integer_ratio()
+        self._stamps: Iterator[int] = map(self.stamp, count())
+        if self._samples == 1:  # the same numbers, counted in C
+            self._stamps = count(start, self._nanoseconds)
         # Delays in periods.
         self._delay, self._jitter = force_delay / self.period, force_jitter / self.period
         self._shortest_delay = whole, rest = whole_and_rest(self._delay)
@@ -168,7 +175,8 @@ class SampledLoop:
         """Disturbance force from the present sample to the next, N."""
         self._next_drive: Drive | None = None
         self._next_start: tuple[float, float] | None = None
-        self._limiter = motion.drive.actuator.limiter
+        self._changes = False
+        self._take_drive()
         self._sensor, self._motor_sensor = sensor, motor_sensor
         self._start_sensors()
         motion.restart_signals()
@@ -180,7 +188,7 @@ class SampledLoop:
     @property
     def true_sample(self) -> Sample:
         """State of slide and belt at the present sample."""
-        if self._measure is None and self._measure_motor is None:
+        if not self._measures:
             return self.sample
         position, velocity, motor = self._true
         return self.sample._replace(position=position, velocity=velocity, motor=motor)
@@ -234,14 +242,22 @@ class SampledLoop:
         Verdict
             ACCEPTED, or the reason why the force will not act.
         """
-        number = self.sample_number if stamp == self.sample.stamp else self.number(stamp)
-        refusal = self._refusal(number, stamp, force)
-        if refusal is None:
-            if self._newest[0] > self._sent_number:
-                self._lose(*self._newest)
-            self._newest = (number, force)
-            self.controller_present = self._expects_control
-            return Verdict.ACCEPTED
+        present, newest = self.sample_number, self._newest[0]
+        is_present = stamp == self.sample.stamp
+        number = present if is_present else self.number(stamp)
+        if not isfinite(force):
+            refusal = Verdict.NOT_FINITE
+        elif stamp == 0:
+            refusal = Verdict.NO_STAMP
+        elif not (is_present or (0 <= number < present and self.stamp(number) == stamp)):
+            refusal = Verdict.UNKNOWN_STAMP
+        elif number <= newest:
+            refusal = Verdict.ANSWERED
+        elif number < present and not self._hold_late:
+            refusal = Verdict.TOO_LATE
+        else:
+            self._accept(number, force)
+            return _ACCEPTED
         self.dropped[refusal] += 1
         if refusal is Verdict.TOO_LATE:
             self.controller_present = self._expects_control
@@ -290,7 +306,7 @@ class SampledLoop:
         signal : Signal
             Disturbance force, N, held from sample to sample.
         """
-        self._scenario_disturbance = signal.held(self.period)
+        self._scenario_disturbance = signal.held(self.period) if signal.pieces else None
 
     def disturb(self, force: float) -> None:
         """Add a disturbance force from the next sample on, until you set it again.
@@ -310,7 +326,7 @@ class SampledLoop:
         drive : Drive
             New drive; the slide keeps its position and velocity, and its actuator its state.
         """
-        self._next_drive = drive
+        self._next_drive, self._changes = drive, True
 
     def reset(self, position: float, velocity: float) -> None:
         """Set the state of the slide at the next sample.
@@ -322,7 +338,7 @@ class SampledLoop:
         velocity : float
             Velocity of the slide, m/s.
         """
-        self._next_start = (position, velocity)
+        self._next_start, self._changes = (position, velocity), True
 
     def advance(self) -> Sample:
         """Advance to the next sample with the forces that have arrived.
@@ -337,10 +353,8 @@ class SampledLoop:
         RunError
             If the motion is so stiff that it would take too many steps.
         """
-        present, period, now = self.sample_number, self.period, 0.0
-        if self._by_arrival:
-            now = self._deliver()
-        else:
+        present, period, left = self.sample_number, self.period, self.period
+        if not self._by_arrival:
             number, force = self._newest
             if number != present:
                 number, force = self._stand_in()
@@ -350,21 +364,18 @@ class SampledLoop:
                 self._acting = force if self._limiter is None else self._limiter(force)
             else:
                 self._send(number, force)
-                now = self._deliver()
-        self._advance(self._acting, self.disturbance, (1.0 - now) * period)
-        drive = self._motion.drive
-        belt_position = self.sample.belt_position + drive.belt_speed * period
-        if drive.belt.pieces:
-            belt_position += drive.belt.integral(present * period, (present + 1) * period)
+        if self._under_way:
+            left = (1.0 - self._deliver()) * period
+        self._advance(self._acting, self.disturbance, left)
+        belt_position = self.sample[4] + self._travel
+        if self._moving_belt is not None:
+            belt_position += self._moving_belt.integral(present * period, (present + 1) * period)
         self.sample_number = present + 1
         self.sample = sample = self._take_sample(belt_position)
         return sample
 
     def run(self, answer: Callable[[Sample], float | None]) -> Iterator[float]:
         """Answer each sample immediately and advance to the next one, without end.
-
-        The same as `offer` and `advance`, in half the time where no force is delayed and neither
-        belt nor disturbance vary. Nothing else may change the loop meanwhile.
 
         Parameters
         ----------
@@ -376,40 +387,18 @@ class SampledLoop:
         float
             Control force for the sample before the present one, N; 0 for no answer.
         """
-        motion, advance, reading, new = (
-            self._motion,
-            self._advance,
-            self._motion.reading,
-            tuple.__new__,
-        )
-        drive, period, limiter, measure = motion.drive, self.period, self._limiter, self._measure
-        start, nanoseconds, expects = self._start, self._nanoseconds, self._expects_control
-        travel = drive.belt_speed * period
-        varies = drive.belt.pieces or self._scenario_disturbance.pieces or self.asked_disturbance
-        other = self._next_drive or self._next_start or self._by_arrival or self._measure_motor
-        plain = self._immediate and self._samples == 1 and start > 0 and not (varies or other)
         while True:
-            sample, number = self.sample, self.sample_number
-            force = answer(sample)
-            if plain and force is not None and self._sent_number == self._newest[0] == number - 1:
-                self._newest, self._sent_number = (number, force), number
-                self.controller_present = expects
-                self._acting = force if limiter is None else limiter(force)
-                advance(self._acting, self.disturbance, period)
-                self.sample_number = number = number + 1
-                position, velocity, friction_force, belt_speed, motor = reading()
-                self._true = position, velocity, motor
-                if measure is not None:
-                    position, velocity = measure(number, position, velocity)
-                stamp, belt_position = start + number * nanoseconds, sample[4] + travel
-                values = stamp, position, velocity, friction_force, belt_position, belt_speed, motor
-                self.sample = new(Sample, values)
-                self.disturbance = 0.0
-            else:
-                if force is not None:
-                    self.offer(sample.stamp, force)
-                self.advance()
+            force = answer(self.sample)
+            if force is not None:
+                self._accept(self.sample_number, force)
+            self.advance()
             yield 0.0 if force is None else force
+
+    def _accept(self, number: int, force: float) -> None:
+        if self._newest[0] > self._sent_number:
+            self._lose(*self._newest)
+        self._newest = (number, force)
+        self.controller_present = self._expects_control
 
     def _deliver(self) -> float:
         """Apply the forces that arrive in the present period; return when the newest one does.
@@ -449,32 +438,48 @@ class SampledLoop:
         self._overtaken(self.stamp(number), force)
 
     def _take_sample(self, belt_position: float) -> Sample:
-        motion, number = self._motion, self.sample_number
-        position, velocity, friction_force, belt_speed, motor = motion.reading()
+        number = self.sample_number
+        position, velocity, friction_force, belt_speed, motor = self._motion.reading()
+        if self._changes:
+            friction_force = self._change(friction_force)
+            position, velocity, _, belt_speed, motor = self._motion.reading()
+        disturbance = 0.0
+        if self._scenario_disturbance is not None:
+            disturbance = self._scenario_disturbance.at(number * self.period)
+        self.disturbance = disturbance + self.asked_disturbance
+        if self._measures:
+            self._true = position, velocity, motor
+            if self._measure is not None:
+                position, velocity = self._measure(number, position, velocity)
+            if motor is not None and self._measure_motor is not None:
+                motor = MotorSample(*self._measure_motor(number, *motor))
+        stamp = next(self._stamps)
+        values = stamp, position, velocity, friction_force, belt_position, belt_speed, motor
+        return tuple.__new__(Sample, values)  # half as long as the constructor
+
+    def _change(self, friction_force: float) -> float:
+        """Take the drive and the state that were set since the last sample; return the friction."""
+        motion, self._changes = self._motion, False
         if self._next_drive is not None:
             motion.drive, self._next_drive = self._next_drive, None
-            self._limiter = motion.drive.actuator.limiter
-            position, velocity, _, belt_speed, motor = motion.reading()
+            self._take_drive()
         if self._next_start is not None:
             start, self._next_start = self._next_start, None
             motion.restart(*start)
             self._start_sensors()
-            position, velocity, friction_force, belt_speed, motor = motion.reading()
-        signal = self._scenario_disturbance
-        self.disturbance = signal.at(number * self.period) if signal.pieces else 0.0
-        self.disturbance += self.asked_disturbance
-        self._true = position, velocity, motor
-        if self._measure is not None:
-            position, velocity = self._measure(number, position, velocity)
-        if motor is not None and self._measure_motor is not None:
-            motor = MotorSample(*self._measure_motor(number, *motor))
-        stamp = self.stamp(number)
-        values = stamp, position, velocity, friction_force, belt_position, belt_speed, motor
-        return tuple.__new__(Sample, values)  # half as long as the constructor
+            return motion.friction_force
+        return friction_force
+
+    def _take_drive(self) -> None:
+        drive = self._motion.drive
+        self._limiter = drive.actuator.limiter
+        self._travel = drive.belt_speed * self.period
+        self._moving_belt = drive.belt if drive.belt.pieces else None
 
     def _start_sensors(self) -> None:
         self._measure = self._sensor.start(self.period)
         self._measure_motor = self._motor_sensor.start(self.period)
+        self._measures = self._measure is not None or self._measure_motor is not None
 
     def _stand_in(self) -> tuple[int, float]:
         """Return the replacement for the missing force of the present sample.
@@ -489,22 +494,6 @@ class SampledLoop:
             return number, force
         self.controller_present = False
         return -1, 0.0
-
-    def _refusal(self, number: int, stamp: int, force: float) -> Verdict | None:
-        if not isfinite(force):
-            return Verdict.NOT_FINITE
-        if stamp == 0:
-            return Verdict.NO_STAMP
-        present = self.sample_number
-        if stamp != self.sample.stamp and (
-            not 0 <= number < present or self.stamp(number) != stamp
-        ):
-            return Verdict.UNKNOWN_STAMP
-        if number <= self._newest[0]:
-            return Verdict.ANSWERED
-        if number < present and not self._hold_late:
-            return Verdict.TOO_LATE
-        return None
 
     def number(self, stamp: int) -> int:
         """Return the number of the sample whose stamp is nearest.

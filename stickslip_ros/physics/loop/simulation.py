@@ -1,5 +1,6 @@
 """Simulation of the closed loop without ROS, sampled or continuous as in the paper."""
 
+from itertools import islice
 from math import ceil, inf
 
 import numpy as np
@@ -15,6 +16,9 @@ from stickslip_ros.physics.model.control import ControlLaw
 from stickslip_ros.physics.motion import Motion, RecordedMotion
 from stickslip_ros.progress import Progress
 from stickslip_ros.samples import Sample, SampleColumns
+
+_BLOCK = 1000
+"""Number of samples after which meters and observers receive the motion."""
 
 _STEPS_PER_PERIOD = 60
 """Least number of steps in a natural period: a line through their ends then shows the motion."""
@@ -148,30 +152,30 @@ def simulate_sampled(
     >>> simulate_sampled(loop, motion, washout, 5.0, CycleMeter(20)).regime.value
     'equilibrium'
     """
-    samples = round(duration / loop.period)
-    seen, forces = [loop.sample], list[float]()
+    samples, done = round(duration / loop.period), 0
+    seen, present = [loop.sample], (loop.true_sample, loop.sample)
     answers = loop.run(_no_answer if controller is None else controller.answer)
-    present = loop.true_sample, loop.sample
-    for number, force in zip(range(1, samples + 1), answers, strict=False):
-        forces.append(force)
-        if recorder is not None:
-            recorder.take(present[0], force, present[1])
-            present = loop.true_sample, loop.sample
-        if measured is not None:
-            seen.append(loop.sample)
-        if number % 1000 == 0 or number == samples or motion.unbounded:
-            measure_block(motion, meter, observer)
-            times = loop.period * np.arange(number - len(forces), number)
-            meter.drift.force.feed(times, forces)
+    while done < samples and not motion.unbounded:
+        forces = list[float]()
+        for force in islice(answers, min(_BLOCK, samples - done)):
+            forces.append(force)
+            if recorder is not None:
+                recorder.take(present[0], force, present[1])
+                present = loop.true_sample, loop.sample
             if measured is not None:
-                measured.feed(SampleColumns.from_samples(seen))
-                measured.drift.force.feed(times, forces)
-                seen.clear()
-            forces.clear()
-            progress(number / samples)
+                seen.append(loop.sample)
             if motion.unbounded:
-                meter.unbounded = True
                 break
+        measure_block(motion, meter, observer)
+        times = loop.period * np.arange(done, done + len(forces))
+        meter.drift.force.feed(times, forces)
+        if measured is not None:
+            measured.feed(SampleColumns.from_samples(seen))
+            measured.drift.force.feed(times, forces)
+            seen.clear()
+        done += len(forces)
+        progress(done / samples)
+    meter.unbounded = meter.unbounded or motion.unbounded
     if recorder is not None:
         recorder.take(loop.true_sample, answer(loop, controller), loop.sample)
     return meter.measures()

@@ -120,6 +120,10 @@ class Motion(HybridMotion):
 
     def _use(self, system: HybridSystem) -> None:
         super()._use(system)
+        drive = self._drive
+        # Those of the drive take longer to look up.
+        self._frequency, self._length = drive.angular_frequency, drive.length_scale
+        self._speed, self._weight = drive.speed_scale, drive.normal_force
         # Whether a sum of forces acts, and an advance prepares nothing.
         self._one_force = self._system.sticks and len(self._system.inputs) == 1
 
@@ -316,15 +320,15 @@ class Motion(HybridMotion):
         duration : float
             Time to advance by, s.
         """
-        step, drive = self._short_step, self._drive
-        force = (control + disturbance) / drive.normal_force
+        step, force = self._short_step, (control + disturbance) / self._weight
+        scaled = duration * self._frequency
         if (
             step is not None
             and self._one_force
             and -_LARGEST_FORCE <= force <= _LARGEST_FORCE
-            and step(duration * drive.angular_frequency, force)
+            and step(scaled, force)
         ):
-            self._pass_shortly(duration * drive.angular_frequency)
+            self._pass_shortly(scaled)
             self._pass_time(duration)
         else:
             self.set_forces(control, disturbance)
@@ -332,13 +336,14 @@ class Motion(HybridMotion):
 
     def reading(self) -> tuple[float, float, float, float, MotorSample | None]:
         """Return position, velocity, friction force, belt speed (SI units) and motor at once."""
-        drive, system, mode, state = self._drive, self._system, self._mode, self._instant.state
+        mode, instant, drive = self._mode, self._instant, self._drive
+        state = instant.state
         speed = velocity = self.belt_speed if self._clocked else drive.belt_speed
         if mode.flow != STICK:
-            velocity = state[SPEED] * drive.speed_scale
-        friction = system.friction_force(mode, self._instant) * drive.normal_force
+            velocity = state[SPEED] * self._speed
+        friction = self._system.friction_force(mode, instant) * self._weight
         motor = None if drive.motor is None else self.motor
-        return state[POSITION] * drive.length_scale, velocity, friction, speed, motor
+        return state[POSITION] * self._length, velocity, friction, speed, motor
 
     def advance(self, duration: float) -> None:
         """Integrate over a duration, the force held; stop early if the motion becomes unbounded.

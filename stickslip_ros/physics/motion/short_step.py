@@ -1,6 +1,7 @@
 """Short advances of a motion that stay in one phase, as those of a sampled loop mostly do."""
 
 from collections.abc import Callable
+from math import inf
 
 import heyoka as hy
 
@@ -15,6 +16,9 @@ _LONGEST_ADVANCE = 1.0
 
 NO_EVENT = hy.taylor_outcome.time_limit.value
 """Value of the outcome of an integration that has reached its end."""
+
+_STEP_ENDED = hy.taylor_outcome.success.value
+"""Value of the outcome of a step that the end of an advance does not shorten."""
 
 STEPS_PER_ADVANCE = 1_000
 """Number of steps that an advance may take, however short: milliseconds of work."""
@@ -51,13 +55,14 @@ def short_step(
         return move
     if system.slaves:
         return lambda duration, force: False
-    taylor, propagate = flow.taylor, flow.taylor.propagate_until
+    taylor, step, propagate = flow.taylor, flow.taylor.step, flow.taylor.propagate_until
     parameters, epoch = flow.parameters, flow.epoch
     limits_steps, longest_step = system.limits_steps, system.longest_step
     places = [index for number, index in flow.inputs if number == 0]
+    has_corner = corner < inf
 
     def integrate(duration: float, force: float | None) -> bool:
-        if duration > _LONGEST_ADVANCE or duration >= corner - instant.time:
+        if duration > _LONGEST_ADVANCE or (has_corner and duration >= corner - instant.time):
             return False
         before = state.tobytes()
         if force is not None:
@@ -70,10 +75,12 @@ def short_step(
             taylor.time = 0.0
             if limits_steps:
                 longest = min(longest_step(instant), LONGEST_STEP)
-                reached = propagate(duration, STEPS_PER_ADVANCE, longest)
-            else:
-                reached = propagate(duration, STEPS_PER_ADVANCE)
-            if reached[0].value == NO_EVENT:
+                outcome = propagate(duration, STEPS_PER_ADVANCE, longest)[0].value
+            else:  # mostly one step, which takes less time by itself
+                outcome = step(duration)[0].value
+                if outcome == _STEP_ENDED:
+                    outcome = propagate(duration, STEPS_PER_ADVANCE)[0].value
+            if outcome == NO_EVENT:
                 return True
             taylor.reset_cooldowns()
             flow.take_marks()
