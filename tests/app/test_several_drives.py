@@ -17,7 +17,7 @@ from tests.app.test_run import wait_for_samples
 from tests.nodes.graph import PATIENCE
 from tests.nodes.runs import messages_of
 
-LOCKSTEP = ("--pace", "lockstep", "--duration", "10")
+LOCKSTEP = ("--pace", "lockstep", "--duration", "10", "-p", f"plant.reply_timeout={PATIENCE}")
 DRIVES = {
     "a": (*LOCKSTEP, "-p", "plant.belt_speed=0.2"),
     "b": (*LOCKSTEP, "--composed", "-p", "plant.belt_speed=0.3"),
