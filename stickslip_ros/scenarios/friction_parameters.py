@@ -21,6 +21,7 @@ from stickslip_ros.physics.model.friction import (
     CurveFollower,
     Directional,
     FrictionLaw,
+    Stiction,
     Table,
 )
 from stickslip_ros.scenarios.curve_file import Pairs, read_curve
@@ -63,7 +64,7 @@ def _curve(direction: str = "") -> Any:
 add_laws_of_other_packages()
 
 _FOLLOWERS = [name for name, law in LAWS.items() if issubclass(law, CurveFollower)]
-_CURVES = [name for name, law in LAWS.items() if not law.states and name not in _FOLLOWERS]
+_CURVES = [name for name, law in LAWS.items() if not law.states and law is not Stiction]
 """The laws that a law with a memory can follow."""
 
 
@@ -99,8 +100,9 @@ class _ChosenLaw(ParameterGroup):
         choices=_CURVES,
         refused={
             **{
-                name: f"law {name} has a memory: a curve must be a static law"
-                for name in LAWS
+                name: f"law {name} has {'a memory' if law.states else 'stiction'}: a curve "
+                "must be a static law whose friction does not fall where slip starts"
+                for name, law in LAWS.items()
                 if name not in _CURVES
             },
             **FRICTION_LAWS.refused,

@@ -9,6 +9,7 @@ from typing import Any, ClassVar, Self
 from stickslip_ros.physics.model.constants import constant
 from stickslip_ros.physics.model.friction.base import FrictionLaw, Numbers, Values
 from stickslip_ros.physics.model.friction.exponential import Exponential
+from stickslip_ros.physics.model.friction.stiction import Stiction
 
 LEAST_SIZE = 1e-12
 """Least coefficient at which bristles yield."""
@@ -121,13 +122,15 @@ class CurveFollower(SteadyPart):
         return (*switches[:own], *self.curve.switches_after(margin, sign, switches[own:]))
 
     def refusal(self) -> str | None:
-        """Refuse a curve with a memory, or one that is not above 0 everywhere."""
+        """Refuse a curve with a memory or stiction, or one that is not above 0 everywhere."""
         name = self.curve.name
         if self.curve.states:
             return f"curve = {name} must be a static law: it has a memory"
         refusal = self.curve.refusal()
         if refusal is not None:
             return refusal
+        if isinstance(self.curve, Stiction):
+            return f"curve = {name} must be a law whose friction does not fall where slip starts"
         least, _ = self._dry.size_range
         if least >= LEAST_SIZE:
             return None
