@@ -1,16 +1,15 @@
 """Margins: how far a machine is from chatter, from recordings of safe runs."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from typing_extensions import override
 
+from stickslip_ros.api.recordings import with_forms
 from stickslip_ros.api.results import Parts, Result, Summary
-from stickslip_ros.bags.motion_reader import BagLayout
-from stickslip_ros.bags.text_table import TableFormat
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.identification.recordings import read_all
 from stickslip_ros.physics.measures.onset import FeedDecay, Onset, onset_of
@@ -141,10 +140,7 @@ def margin(
     if not 0.0 <= margin < 1.0:
         raise InvalidInputError(f"margin = {margin} is invalid: must be at least 0 and below 1")
     paths, units = [*dict.fromkeys(map(Path, recordings))], Units(rotary=rotary)
-    for name, kind in (("form", TableFormat), ("layout", BagLayout)):
-        own = {each.name for each in fields(kind)} & options.keys()
-        options[name] = kind(**{each: options.pop(each) for each in own})
-    read = read_all(paths, columns, **options)
+    read = read_all(paths, columns, **with_forms(options))
     records = [record for path in paths for record in read[path].records]
     if {-1.0, 1.0} <= {float(np.sign(record.belt_velocity.mean())) for record in records}:
         raise InvalidInputError("the belt moves in both directions: friction may differ in them")

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -336,7 +336,7 @@ def recorded_run(
     rotary: bool = False,
     **options: Any,
 ) -> RecordedRun:
-    """Return the run that `report_of_recording` with these options measures.
+    """Return the run that `report_of_recording` measures with these options, or `with_forms`.
 
     Its samples need not be `kept`; a run that is not to be `drawn` is measured faster.
     """
@@ -360,7 +360,7 @@ def recorded_run(
         length="rad" if rotary else "m",
         observer=observer,
         **taking,
-        **options,
+        **with_forms(options),
     )
     drive = None if table else recorded_drive(path, namespace)
     return RecordedRun(
@@ -374,6 +374,18 @@ def recorded_run(
         namespace,
         rotary,
     )
+
+
+def with_forms(options: Mapping[str, Any]) -> dict[str, Any]:
+    """Return options in which those of a `TableFormat` and a `BagLayout` are `form` and `layout`.
+
+    Raises InvalidInputError if one of them is not allowed.
+    """
+    found = dict(options)
+    for name, kind in (("form", TableFormat), ("layout", BagLayout)):
+        own = {each.name: found.pop(each.name) for each in fields(kind) if each.name in found}
+        found |= {name: kind(**own)} if own else {}
+    return found
 
 
 def recorded_drive(bag: Path, namespace: str | None = None) -> Drive | None:

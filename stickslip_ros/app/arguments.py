@@ -20,8 +20,6 @@ from stickslip_ros.scenarios import DEFAULT_NAMESPACE, LONGEST_NAMESPACE
 from stickslip_ros.text import shown
 
 if TYPE_CHECKING:
-    from stickslip_ros.bags.motion_reader import BagLayout
-    from stickslip_ros.bags.text_table import TableFormat
     from stickslip_ros.scenarios.files import Scenario
 
 DEFAULT_CONTROLLER = "(default: the one that the scenario has a section for)"
@@ -90,8 +88,13 @@ def add_json(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def add_columns(parser: argparse.ArgumentParser) -> None:
-    """Add --columns, which says what the columns of tables are."""
+def add_recordings(parser: argparse.ArgumentParser, what: str) -> None:
+    """Add RECORDING, and `what` it is."""
+    parser.add_argument("recordings", metavar="RECORDING", nargs="+", type=Path, help=what)
+
+
+def add_reading(parser: argparse.ArgumentParser) -> None:
+    """Add the options that say how recordings are read: see `reading_of`."""
     parser.add_argument(
         "--columns",
         metavar="QUANTITY=COLUMN,...",
@@ -118,13 +121,41 @@ def add_columns(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="show displacements as angles, rad, and forces as torques, N m",
     )
+    parser.add_argument(
+        "--from",
+        dest="start",
+        type=seconds,
+        default=0.0,
+        metavar="S",
+        help="start of the part that is used, s from the first sample of each recording "
+        "(default: 0)",
+    )
+    parser.add_argument(
+        "--to",
+        dest="end",
+        type=seconds,
+        default=float("inf"),
+        metavar="S",
+        help="end of the part that is used, s from the first sample of each recording "
+        "(default: the end)",
+    )
+    parser.add_argument(
+        "--namespace",
+        metavar="NS",
+        help="ROS namespace of the drive, if a bag holds several",
+    )
+    add_bag_layout(parser)
 
 
-def form_of(arguments: argparse.Namespace) -> "TableFormat":
-    """Return what the options say of the form of tables."""
+def reading_of(arguments: argparse.Namespace) -> dict[str, Any]:
+    """Return how recordings are read, by the names that the functions of the API have for it."""
+    from stickslip_ros.bags.motion_reader import BagLayout
     from stickslip_ros.bags.text_table import TableFormat
 
-    return TableFormat(arguments.decimal, arguments.skip, arguments.encoding)
+    names = [each.name for kind in (TableFormat, BagLayout) for each in fields(kind)]
+    names += ["rotary", "start", "end", "namespace", "belt_speed"]
+    columns = _columns_of(arguments.columns)
+    return {"columns": columns} | {name: getattr(arguments, name) for name in names}
 
 
 def add_bag_layout(parser: argparse.ArgumentParser) -> None:
@@ -170,14 +201,7 @@ def add_bag_layout(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def layout_of(arguments: argparse.Namespace) -> "BagLayout":
-    """Return what the options say of bags of other machines."""
-    from stickslip_ros.bags.motion_reader import BagLayout
-
-    return BagLayout(**{each.name: getattr(arguments, each.name) for each in fields(BagLayout)})
-
-
-def columns_of(text: str | None) -> dict[str, str] | None:
+def _columns_of(text: str | None) -> dict[str, str] | None:
     """Return the columns that --columns names, by quantity."""
     from stickslip_ros.bags.expressions import parts_of
 
@@ -193,33 +217,6 @@ def columns_of(text: str | None) -> dict[str, str] | None:
             )
         found[quantity] = column
     return found
-
-
-def add_part(parser: argparse.ArgumentParser) -> None:
-    """Add the options that say which part of a recording is used, and of which drive."""
-    parser.add_argument(
-        "--from",
-        dest="start",
-        type=seconds,
-        default=0.0,
-        metavar="S",
-        help="start of the part that is used, s from the first sample of each recording "
-        "(default: 0)",
-    )
-    parser.add_argument(
-        "--to",
-        dest="end",
-        type=seconds,
-        default=float("inf"),
-        metavar="S",
-        help="end of the part that is used, s from the first sample of each recording "
-        "(default: the end)",
-    )
-    parser.add_argument(
-        "--namespace",
-        metavar="NS",
-        help="ROS namespace of the drive, if a bag holds several",
-    )
 
 
 def add_namespace(parser: argparse.ArgumentParser) -> None:

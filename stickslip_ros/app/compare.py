@@ -2,17 +2,16 @@
 
 import argparse
 
-from stickslip_ros.app.arguments import (
-    add_json,
-    add_scenario,
-    check_speeds,
-    naming,
-    scenario_of,
-    whole,
-)
+from stickslip_ros.app.arguments import add_scenario, whole
 from stickslip_ros.app.output import progress_bar
-from stickslip_ros.app.result import add_html, add_plot, check_results
-from stickslip_ros.app.study_command import add_workers, check_out, computed, finish
+from stickslip_ros.app.result import add_results, check_results
+from stickslip_ros.app.study_command import (
+    add_workers,
+    check_out,
+    computed,
+    finish,
+    scenario_over,
+)
 
 _DESCRIPTION = """Compare control laws on one drive. The gains of each law are tuned by one rule for
 the sampled loop, or given by the scenario. With a moving belt the task is regulation: the slide is
@@ -76,22 +75,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "motion of the reference (default: 0.001)",
     )
     add_workers(parser)
-    add_plot(parser, "which law holds where, and error against force")
-    add_html(parser)
-    add_json(parser)
+    add_results(parser, "which law holds where, and error against force")
 
 
 def run(arguments: argparse.Namespace) -> None:
     """Run the command."""
     from stickslip_ros.api.comparison import ComparedLaws
     from stickslip_ros.studies.comparison import Outcomes, compared
-    from stickslip_ros.studies.plan import Axis
 
-    with naming("--over"):
-        axes = [Axis.parse(text) for text in arguments.over]
-    scenario = scenario_of(arguments, unused=[axis.parameter for axis in axes])
-    belts = [axis for axis in axes if axis.parameter == "plant.belt_speed"]
-    check_speeds(arguments, scenario, *(end for axis in belts for end in (axis.first, axis.last)))
+    scenario, axes = scenario_over(arguments)
     check_results(arguments)
     check_out(arguments.out)
     with progress_bar(f"gains for {scenario.name}", 1.0, lines=True) as progress:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from stickslip_ros.app.commands import COMMANDS, command_parser
 
-_FILES = ("BAG", "DIR", "FILE", "OUT")
+_FILES = ("BAG", "DIR", "FILE", "OUT", "RECORDING")
 """Metavars of files and directories."""
 
 _PARAMETERS = ("NODE.PARAMETER=VALUE", "NODE.PARAMETER=A:B:COUNT")

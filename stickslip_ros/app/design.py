@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from stickslip_ros.app.arguments import (
-    add_json,
     add_scenario,
     check_new,
     check_speeds,
@@ -15,14 +14,13 @@ from stickslip_ros.app.arguments import (
     writing,
 )
 from stickslip_ros.app.output import progress_bar, tell
-from stickslip_ros.app.result import add_html, add_plot, check_results, give_result
+from stickslip_ros.app.result import add_results, check_results, give_result
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.files import written
 from stickslip_ros.quantities import number_of
 from stickslip_ros.studies.options import OWN_SPEED_RANGE
 
 if TYPE_CHECKING:
-    from stickslip_ros.scenarios.files import Scenario
     from stickslip_ros.studies.design import Design
     from stickslip_ros.studies.tuned_design import TunedDesign
 
@@ -50,57 +48,43 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="write a complete scenario with the proposed gains; an existing file is refused",
     )
-    add_plot(parser, "the decay rate over cutoff frequency and linear gain, and the force limit")
-    add_html(parser)
-    add_json(parser)
+    add_results(parser, "the decay rate over cutoff frequency and linear gain, and the force limit")
 
 
 def run(arguments: argparse.Namespace) -> None:
     """Run the command."""
     from stickslip_ros.api.theory import Proposal
+    from stickslip_ros.api.tuned_design import TunedProposal
     from stickslip_ros.physics.model.control import Washout
     from stickslip_ros.studies.design import Task, design
+    from stickslip_ros.studies.tuned_design import design_by_rule
 
     proposed = law_constants("force_limit", "start_after")
     for text in arguments.overrides:
         if text.partition("=")[0] in proposed:
             raise InvalidInputError(f"-p {text:.80}: is not used, because a design proposes it")
     scenario = scenario_of(arguments, unused=proposed)
-    if not isinstance(scenario.controller.control_law, Washout) and scenario.plant.expects_control:
-        _design_by_rule(arguments, scenario)
-        return
-    task = Task.from_scenario(scenario, _belt_speeds(arguments.belt_speed))
-    check_speeds(arguments, scenario, *task.belt_speeds)
-    if arguments.out is not None:
-        check_new("--out", arguments.out)
-    check_results(arguments)
-    with progress_bar(f"designing for {scenario.name}", 1.0, lines=True) as progress:
-        found = design(task, progress)
-    proposal = Proposal(found)
-    if arguments.plot is not None and found.map_around() is None:
-        _report_omitted(f"--plot {arguments.plot}: not drawn")
-        arguments.plot = None
-    give_result(arguments, proposal)
-    if not arguments.json and found.parameter_file is not None and arguments.out is None:
-        print("--out FILE writes the scenario with these gains, --json prints it: parameter_file")
-    if arguments.out is not None:
-        _write(arguments.out, found)
-
-
-def _design_by_rule(arguments: argparse.Namespace, scenario: "Scenario") -> None:
-    """Tune another law than the washout by the rule for all laws."""
-    from stickslip_ros.api.tuned_design import TunedProposal
-    from stickslip_ros.studies.tuned_design import design_by_rule
-
-    speeds = _belt_speeds(arguments.belt_speed)
+    speeds, task = _belt_speeds(arguments.belt_speed), None
+    if isinstance(scenario.controller.control_law, Washout) or not scenario.plant.expects_control:
+        task = Task.from_scenario(scenario, speeds)
+        speeds = task.belt_speeds
     check_speeds(arguments, scenario, *(speeds or ()))
     if arguments.out is not None:
         check_new("--out", arguments.out)
     check_results(arguments)
     with progress_bar(f"designing for {scenario.name}", 1.0, lines=True) as progress:
-        found = design_by_rule(scenario, speeds, progress)
-    proposal = TunedProposal(found)
+        if task is None:
+            found = design_by_rule(scenario, speeds, progress)
+            proposal = TunedProposal(found)
+        else:
+            found = design(task, progress)
+            proposal = Proposal(found)
+            if arguments.plot is not None and found.map_around() is None:
+                _report_omitted(f"--plot {arguments.plot}: not drawn")
+                arguments.plot = None
     give_result(arguments, proposal)
+    if task and not arguments.json and found.parameter_file is not None and arguments.out is None:
+        print("--out FILE writes the scenario with these gains, --json prints it: parameter_file")
     if arguments.out is not None:
         _write(arguments.out, found)
 

@@ -2,23 +2,18 @@
 
 import argparse
 import shlex
-from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from stickslip_ros.app.arguments import (
-    add_bag_layout,
-    add_columns,
-    add_json,
-    add_part,
+    add_reading,
+    add_recordings,
     check_new,
-    columns_of,
-    form_of,
-    layout_of,
+    reading_of,
     writing,
 )
 from stickslip_ros.app.output import progress_bar, tell
-from stickslip_ros.app.result import add_html, add_plot, check_results, give_result
+from stickslip_ros.app.result import add_results, check_results, give_result
 from stickslip_ros.errors import InvalidInputError
 
 if TYPE_CHECKING:
@@ -33,15 +28,10 @@ were held out; a simpler one is preferred where the difference is noise."""
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of the command."""
     parser.description = _DESCRIPTION
-    parser.add_argument(
-        "recordings",
-        metavar="RECORDING",
-        nargs="+",
-        type=Path,
-        help="bag, or table (text, .mat) with --columns; several of the same machine are fitted "
-        "together",
+    add_recordings(
+        parser,
+        "bag, or table (text, .mat) with --columns; several of one machine are fitted together",
     )
-    add_columns(parser)
     parser.add_argument(
         "--map",
         action="store_true",
@@ -78,17 +68,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="RECORDING",
         help="predict a recording that is not fitted; can be repeated",
     )
-    add_part(parser)
-    add_bag_layout(parser)
+    add_reading(parser)
     parser.add_argument(
         "--out",
         type=Path,
         metavar="FILE",
         help="write a complete scenario of the drive; an existing file is refused",
     )
-    add_plot(parser, "the friction curve with its band, residuals, and the run without feedback")
-    add_html(parser)
-    add_json(parser)
+    add_results(parser, "the friction curve with its band, residuals, and the run without feedback")
 
 
 def run(arguments: argparse.Namespace) -> None:
@@ -97,7 +84,7 @@ def run(arguments: argparse.Namespace) -> None:
     from stickslip_ros.identification.identify import fixed_of
     from stickslip_ros.identification.scenario import curve_files
 
-    columns = columns_of(arguments.columns)
+    reading = reading_of(arguments)
     if arguments.out is not None:
         if arguments.out.suffix not in (".yaml", ".yml"):
             raise InvalidInputError(f"--out {arguments.out}: must end in .yaml or .yml")
@@ -105,25 +92,18 @@ def run(arguments: argparse.Namespace) -> None:
             check_new("--out", path)
     check_results(arguments)
     if arguments.map:
-        _fit_map(arguments, columns)
+        _fit_map(arguments, reading)
         return
     fixed = fixed_of(arguments.fix)
     with progress_bar("identifying", None, lines=True) as progress:
         model = identify(
             *arguments.recordings,
-            columns=columns,
             law=arguments.law,
             fixed=fixed,
             time_limit=arguments.time_limit,
-            start=arguments.start,
-            end=arguments.end,
-            namespace=arguments.namespace,
-            belt_speed=arguments.belt_speed,
-            **vars(form_of(arguments)),
-            **vars(layout_of(arguments)),
-            rotary=arguments.rotary,
             check=arguments.check,
             progress=lambda law: progress(0.0, f"identifying: {law}"),
+            **reading,
         )
         progress(0.0, "predicting")
         _ = model.predictions  # they take a while, and are kept
@@ -132,15 +112,16 @@ def run(arguments: argparse.Namespace) -> None:
         _write(arguments.out, model.findings)
 
 
-def _fit_map(arguments: argparse.Namespace, columns: Mapping[str, str] | None) -> None:
+def _fit_map(arguments: argparse.Namespace, reading: dict[str, Any]) -> None:
     """Fit friction to pairs of velocity and force; refuse what a map has not."""
     from stickslip_ros.api.friction_map import friction_map
 
     for option in ("out", "fix", "check"):
         if getattr(arguments, option):
             raise InvalidInputError(f"--{option}: a map has friction only, and no drive")
-    options = {"law": arguments.law, "rotary": arguments.rotary, **vars(form_of(arguments))}
-    found = friction_map(*arguments.recordings, columns=columns or {}, **options)
+    options = {name: reading[name] for name in ("rotary", "decimal", "skip", "encoding")}
+    columns = reading["columns"] or {}
+    found = friction_map(*arguments.recordings, columns=columns, law=arguments.law, **options)
     give_result(arguments, found)
 
 

@@ -4,25 +4,14 @@ import argparse
 from pathlib import Path
 
 from stickslip_ros.app.arguments import (
-    add_bag_layout,
-    add_columns,
-    add_json,
-    add_part,
-    columns_of,
-    form_of,
-    layout_of,
+    add_reading,
+    add_recordings,
     length,
+    reading_of,
     seconds,
     speed,
 )
-from stickslip_ros.app.result import (
-    add_html,
-    add_plot,
-    check_results,
-    is_drawn,
-    print_result,
-    write_results,
-)
+from stickslip_ros.app.result import add_results, check_results, give_result, is_drawn
 from stickslip_ros.errors import InvalidInputError
 
 _MOST_DRAWN = 6
@@ -31,16 +20,12 @@ _MOST_DRAWN = 6
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of the command."""
-    parser.add_argument(
-        "bags",
-        metavar="BAG",
-        nargs="+",
-        type=Path,
-        help="bag directory, or one .mcap file; also one that is being recorded, cut off or "
-        "damaged: the readable part is measured, and a sentence names what is missing. Or a table, "
-        "as text or .mat: one of `stickslip simulate --out`, or any other with --columns",
+    add_recordings(
+        parser,
+        "bag directory, or one .mcap file; also one that is being recorded, cut off or damaged: "
+        "the readable part is measured, and a sentence names what is missing. Or a table, as text "
+        "or .mat: one of `stickslip simulate --out`, or any other with --columns",
     )
-    add_columns(parser)
     parser.add_argument(
         "--stick-speed",
         type=speed,
@@ -62,15 +47,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="S",
         help="longest time in which a slip drops by as much, s (default: 0.1)",
     )
-    add_part(parser)
-    add_bag_layout(parser)
-    add_plot(
+    add_reading(parser)
+    add_results(
         parser,
         "motion, force, cycles and friction law of a bag; of several bags motion and force side by "
         "side, their cycles and phase portraits in the same panels",
     )
-    add_html(parser)
-    add_json(parser)
 
 
 def run(arguments: argparse.Namespace) -> None:
@@ -79,35 +61,26 @@ def run(arguments: argparse.Namespace) -> None:
     from stickslip_ros.bags.table_file import is_table
     from stickslip_ros.physics.measures.slips import SlipThreshold
 
-    bags: list[Path] = [*dict.fromkeys(arguments.bags)]
+    bags: list[Path] = [*dict.fromkeys(arguments.recordings)]
     check_results(arguments)
     for option, path in (("--plot", arguments.plot), ("--html", arguments.html)):
         if path is not None and len(bags) > _MOST_DRAWN:
             raise InvalidInputError(
                 f"{option} {path}: draws at most {_MOST_DRAWN} bags, and {len(bags)} were given"
             )
-    columns = columns_of(arguments.columns)
-    if columns is not None and not any(map(is_table, bags)):
+    reading = reading_of(arguments)
+    if reading["columns"] is not None and not any(map(is_table, bags)):
         raise InvalidInputError(f"--columns {arguments.columns}: a bag has no columns")
     slips = None if arguments.slips is None else SlipThreshold(arguments.slips, arguments.slip_time)
     runs = [
         recorded_run(
             bag,
-            columns=columns,
-            start=arguments.start,
-            end=arguments.end,
-            namespace=arguments.namespace,
             stick_speed=arguments.stick_speed,
-            belt_speed=arguments.belt_speed,
-            form=form_of(arguments),
-            layout=layout_of(arguments),
             slips=slips,
-            rotary=arguments.rotary,
             kept=False,
             drawn=is_drawn(arguments),
+            **reading,
         )
         for bag in bags
     ]
-    result = runs[0] if len(runs) == 1 else Comparison(tuple(runs))
-    write_results(arguments, result)
-    print_result(arguments, result)
+    give_result(arguments, runs[0] if len(runs) == 1 else Comparison(tuple(runs)))

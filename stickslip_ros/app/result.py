@@ -9,7 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from stickslip_ros.app.arguments import check_writable, whole, writing
+from stickslip_ros.app.arguments import add_json, check_writable, whole, writing
 from stickslip_ros.app.optional_dependencies import load_matplotlib
 from stickslip_ros.app.output import print_parts
 from stickslip_ros.errors import InvalidInputError
@@ -64,8 +64,9 @@ def add_style(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def add_html(parser: argparse.ArgumentParser) -> None:
-    """Add --html, which writes a page."""
+def add_results(parser: argparse.ArgumentParser, shown: str) -> None:
+    """Add the forms of a result: --plot as in `add_plot`, --html, which writes a page, --json."""
+    add_plot(parser, shown)
     parser.add_argument(
         "--html",
         type=Path,
@@ -74,6 +75,7 @@ def add_html(parser: argparse.ArgumentParser) -> None:
         "prints, its figure, parameters with units, notes and versions; an existing file is "
         "replaced",
     )
+    add_json(parser)
 
 
 def check_results(arguments: argparse.Namespace) -> None:
@@ -116,27 +118,21 @@ def is_drawn(arguments: argparse.Namespace) -> bool:
     return arguments.plot is not None or getattr(arguments, "html", None) is not None
 
 
-def write_results(arguments: argparse.Namespace, result: "Result", **options: Any) -> None:
-    """Write what --plot and --html ask for; `options` are those of the result's `plot`."""
+def give_result(arguments: argparse.Namespace, result: "Result", **options: Any) -> None:
+    """Print a result, which may have taken long; then write what --plot and --html ask for.
+
+    It is printed as tables and sentences, or with --json as one object. The `options` are those of
+    its `plot`. Writing may fail.
+    """
+    if arguments.json:
+        result.write_json(sys.stdout)
+    else:
+        print_parts(*result.parts())
     if arguments.plot is not None:
         _write_figure(arguments, partial(result.draw, **options))
     if getattr(arguments, "html", None) is not None:
         with writing("--html", arguments.html):
             result.to_html(arguments.html, **options)
-
-
-def print_result(arguments: argparse.Namespace, result: "Result") -> None:
-    """Print a result: its tables and sentences, or with --json one object."""
-    if arguments.json:
-        result.write_json(sys.stdout)
-    else:
-        print_parts(*result.parts())
-
-
-def give_result(arguments: argparse.Namespace, result: "Result") -> None:
-    """Print a result that took long, then write what --plot and --html ask for: it may fail."""
-    print_result(arguments, result)
-    write_results(arguments, result)
 
 
 def _write_figure(arguments: argparse.Namespace, draw: "Callable[[FigureStyle], Figure]") -> None:

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from stickslip_ros.app.arguments import (
-    add_json,
     add_scenario,
     check_new,
     naming,
@@ -16,14 +15,7 @@ from stickslip_ros.app.arguments import (
     writing,
 )
 from stickslip_ros.app.output import progress_bar
-from stickslip_ros.app.result import (
-    add_html,
-    add_plot,
-    check_results,
-    is_drawn,
-    print_result,
-    write_results,
-)
+from stickslip_ros.app.result import add_results, check_results, give_result, is_drawn
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.files import written
 from stickslip_ros.studies.options import DEFAULT_PERIODS
@@ -66,9 +58,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="S",
         help="time from row to row of --out, s: a multiple of the sample period (default: one)",
     )
-    add_plot(parser, "motion, force, cycles and friction law")
-    add_html(parser)
-    add_json(parser)
+    add_results(parser, "motion, force, cycles and friction law")
 
 
 def run(arguments: argparse.Namespace) -> None:
@@ -100,8 +90,7 @@ def run(arguments: argparse.Namespace) -> None:
             drawn=is_drawn(arguments),
             progress=progress,
         )
-        write_results(arguments, found)
-    print_result(arguments, found)
+    give_result(arguments, found)
 
 
 @contextmanager

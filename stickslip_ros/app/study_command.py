@@ -8,9 +8,16 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from stickslip_ros.app.arguments import check_new, naming, whole, writing
+from stickslip_ros.app.arguments import (
+    check_new,
+    check_speeds,
+    naming,
+    scenario_of,
+    whole,
+    writing,
+)
 from stickslip_ros.app.output import progress_bar, tell
-from stickslip_ros.app.result import print_result, write_results
+from stickslip_ros.app.result import give_result
 from stickslip_ros.errors import InvalidInputError, RunError
 from stickslip_ros.files import written
 from stickslip_ros.studies.options import SettlingOptions
@@ -18,7 +25,9 @@ from stickslip_ros.studies.options import SettlingOptions
 if TYPE_CHECKING:
     from stickslip_ros.api.comparison import ComparedLaws
     from stickslip_ros.api.studies import Points
+    from stickslip_ros.scenarios.files import Scenario
     from stickslip_ros.studies.journal import Journal
+    from stickslip_ros.studies.plan import Axis
     from stickslip_ros.studies.study import Study
 
 _TABLES = (".csv", ".json")
@@ -74,6 +83,18 @@ def add_workers(parser: argparse.ArgumentParser) -> None:
         "If interrupted, the finished points stay in FILE.part, without --out in ~/.cache, and the "
         "same command continues",
     )
+
+
+def scenario_over(arguments: argparse.Namespace) -> "tuple[Scenario, list[Axis]]":
+    """Return the scenario, and the axes of --over, whose belt speeds must be likely ones."""
+    from stickslip_ros.studies.plan import Axis
+
+    with naming("--over"):
+        axes = [Axis.parse(text) for text in arguments.over]
+    scenario = scenario_of(arguments, unused=[axis.parameter for axis in axes])
+    belts = [axis for axis in axes if axis.parameter == "plant.belt_speed"]
+    check_speeds(arguments, scenario, *(end for axis in belts for end in (axis.first, axis.last)))
+    return scenario, axes
 
 
 def settling_of(arguments: argparse.Namespace, default: SettlingOptions) -> SettlingOptions:
@@ -155,7 +176,6 @@ def finish(
 
     The `options` are those of the result's `plot`.
     """
-    write_results(arguments, result, **options)
     out: Path | None = arguments.out
     if out is not None:
         with writing("--out", out), written(out) as stream:
@@ -163,5 +183,5 @@ def finish(
                 result.write_csv(stream)
             else:
                 result.write_json(stream)
-    print_result(arguments, result)
+    give_result(arguments, result, **options)
     journal.discard()

@@ -2,9 +2,15 @@
 
 import argparse
 
-from stickslip_ros.app.arguments import add_json, add_scenario, check_speeds, naming, scenario_of
-from stickslip_ros.app.result import add_html, add_plot, check_results
-from stickslip_ros.app.study_command import add_running, computed, finish, settling_of
+from stickslip_ros.app.arguments import add_scenario, naming
+from stickslip_ros.app.result import add_results, check_results
+from stickslip_ros.app.study_command import (
+    add_running,
+    computed,
+    finish,
+    scenario_over,
+    settling_of,
+)
 from stickslip_ros.studies.options import Continuation, SettlingOptions
 
 _DESCRIPTION = """Measure the settled motion of a scenario over the values of one parameter or two:
@@ -33,7 +39,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "point in the scenario's initial state)",
     )
     add_running(parser, SettlingOptions())
-    add_plot(parser, "the bifurcation diagram, or the map")
     parser.add_argument(
         "--colour",
         default="regime",
@@ -41,24 +46,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="quantity that the map shows: the regime, or a measure of the table of --out, as in "
         "--colour amplitude (default: %(default)s)",
     )
-    add_html(parser)
-    add_json(parser)
+    add_results(parser, "the bifurcation diagram, or the map")
 
 
 def run(arguments: argparse.Namespace) -> None:
     """Run the command."""
     from stickslip_ros.api.studies import Sweep
     from stickslip_ros.show.quantities import check_colour
-    from stickslip_ros.studies.plan import Axis
     from stickslip_ros.studies.study import sweep_study
 
-    with naming("--over"):
-        axes = [Axis.parse(text) for text in arguments.over]
     with naming("--colour:"):
-        check_colour(arguments.colour, len(axes))
-    scenario = scenario_of(arguments, unused=[axis.parameter for axis in axes])
-    belts = [axis for axis in axes if axis.parameter == "plant.belt_speed"]
-    check_speeds(arguments, scenario, *(end for axis in belts for end in (axis.first, axis.last)))
+        check_colour(arguments.colour, len(arguments.over))
+    scenario, axes = scenario_over(arguments)
     study = sweep_study(
         scenario,
         axes,

@@ -57,13 +57,9 @@ def _joint_state_structure(*names: str) -> tuple[struct.Struct, bytes]:
     return struct.Struct(f"<4s iI {len(joints)}s I{padding}x{values}"), joints
 
 
-_JOINT_STATE = struct.Struct("<4s iI 5s3x 14s2x 9s3x I2d I4x2d I4x2d")
-_JOINT_STATE_FRAME = _name("")
-_JOINT_STATE_SLIDE = struct.pack("<I", 2) + _name(SLIDE)
-_JOINT_STATE_BELT = _name(BELT)
-_REFERENCE_JOINT = _JOINT_STATE_FRAME + bytes(3) + struct.pack("<I", 1) + _name(SLIDE) + bytes(2)
-_JOINTS = (_JOINT_STATE_FRAME, _JOINT_STATE_SLIDE, _JOINT_STATE_BELT)
-_JOINT_STATE_CONSTANTS = (LITTLE_ENDIAN, *_JOINTS, 2, 2, 2)
+_JOINT_STATE, _JOINTS = _joint_state_structure(SLIDE, BELT)
+_JOINT_STATE_CONSTANTS = (LITTLE_ENDIAN, _JOINTS, 2, 2, 2)
+_REFERENCE_JOINT = _name("") + bytes(3) + struct.pack("<I", 1) + _name(SLIDE) + bytes(2)
 _MOTOR_STATE, _MOTOR_JOINTS = _joint_state_structure(SLIDE, BELT, MOTOR)
 # The components of the wrench other than force.x are zero when packed and skipped when unpacked.
 _WRENCH = struct.Struct("<4s iI 10s6x d40x")
@@ -89,13 +85,12 @@ def pack_joint_state(
 
 def joint_state_packer(*names: str) -> Callable[..., bytes]:
     """Return `pack_joint_state` for joints of other names, or more of them."""
-    layout, joints = _joint_state_structure(*names)
-    return partial(_pack_joint_state, layout, (joints,))
+    return partial(_pack_joint_state, *_joint_state_structure(*names))
 
 
 def _pack_joint_state(
     layout: struct.Struct,
-    joints: tuple[bytes, ...],
+    joints: bytes,
     stamp: int,
     position: tuple[float, ...],
     velocity: tuple[float, ...],
@@ -107,7 +102,7 @@ def _pack_joint_state(
             LITTLE_ENDIAN,
             stamp // NANOSECONDS,
             stamp % NANOSECONDS,
-            *joints,
+            joints,
             count,
             *position,
             count,
@@ -167,27 +162,11 @@ def unpack_joint_state(data: bytes) -> Sample:
     MessageError for other bytes, and if a joint, its position or its velocity is missing.
     """
     if len(data) == _JOINT_STATE.size:
-        (
-            encapsulation,
-            sec,
-            nanosec,
-            frame,
-            slide,
-            belt,
-            position_count,
-            position,
-            belt_position,
-            velocity_count,
-            velocity,
-            belt_velocity,
-            effort_count,
-            effort,
-            _,
-        ) = _JOINT_STATE.unpack(data)
-        constants = encapsulation, frame, slide, belt, position_count, velocity_count, effort_count
+        encapsulation, sec, nanosec, joints, count, *values = _JOINT_STATE.unpack(data)
+        x, belt, velocities, v, belt_v, efforts, effort, _ = values
+        constants = encapsulation, joints, count, velocities, efforts
         if constants == _JOINT_STATE_CONSTANTS:
-            stamp = sec * NANOSECONDS + nanosec
-            return Sample(stamp, position, velocity, effort, belt_position, belt_velocity)
+            return Sample(sec * NANOSECONDS + nanosec, x, v, effort, belt, belt_v)
     if len(data) == _MOTOR_STATE.size:
         encapsulation, sec, nanosec, joints, count, *values = _MOTOR_STATE.unpack(data)
         constants = encapsulation, joints, count, values[3], values[7]

@@ -30,17 +30,12 @@ TIME = 1e-3 * np.arange(300)
 POSITION, VELOCITY = 0.01 * np.sin(9.0 * TIME), 0.09 * np.cos(9.0 * TIME)
 
 
-def record(directory: Path, noise: float, *, velocities: bool, name: str = "axis_x") -> Path:
+def record(directory: Path, noise: float, *, velocities: bool) -> Path:
     """Record the motion of feed_drive as a joint of another machine tells it."""
     position, velocity, _ = motion(BELT)
     position = position[:2000] + noise * np.random.default_rng(1).standard_normal(2000)
-    messages = []
-    for number, (x, v) in enumerate(zip(position.tolist(), velocity.tolist(), strict=False)):
-        message = JointState(name=[name], position=[x], velocity=[v] if velocities else [])
-        stamp = 10**9 + number * 1_000_000
-        message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp, 10**9)
-        messages.append(("/machine/joint_states", stamp, serialize_message(message)))
-    write_bag(directory, messages)
+    motions = enumerate(zip(position.tolist(), velocity.tolist(), strict=False))
+    write_bag(directory, [axis(i, x, [v] * velocities) for i, (x, v) in motions])
     return directory
 
 
@@ -85,6 +80,21 @@ def recorded(number: int) -> int:
     return EPOCH + number * STEP
 
 
+def axis(
+    number: int,
+    position: list[float] | float,
+    velocity: list[float] | float = 0.0,
+    effort: list[float] | None = None,
+    *,
+    name: str = "axis",
+    stamp: int | None = None,
+) -> tuple[str, int, bytes]:
+    """Return a joint state, one of `number`, of a single joint, as it is recorded."""
+    values = [each if isinstance(each, list) else [each] for each in (position, velocity)]
+    at = recorded(number) if stamp is None else stamp
+    return STATES, recorded(number), state(at, [name], *values, effort)
+
+
 def test_without_a_belt_speed_the_belt_is_at_rest_and_a_note_says_so(tmp_path: Path) -> None:
     report = report_of_recording(record(tmp_path / "bag", 0.0, velocities=True))
     assert "the belt counts as at rest, unless --belt-speed" in report["notes"][0]
@@ -110,7 +120,7 @@ def test_joints_in_messages_of_their_own_are_several(tmp_path: Path) -> None:
     write_bag(
         tmp_path / "bag",
         [
-            (STATES, recorded(i), state(recorded(i), [name], [x], [0.0]))
+            axis(i, x, name=name)
             for i, x in enumerate(POSITION.tolist())
             for name in ("left", "right")
         ],
@@ -149,10 +159,8 @@ def test_stamps_that_stand_are_refused_and_the_log_has_others(
 
 
 def test_stamps_that_one_of_two_sources_lacks_are_refused(tmp_path: Path) -> None:
-    messages = [
-        (STATES, recorded(i), state(recorded(i) if i % 2 else 0, ["axis"], [x], [0.0]))
-        for i, x in enumerate(POSITION.tolist())
-    ]
+    stamps = {i: recorded(i) * (i % 2) for i in range(len(TIME))}
+    messages = [axis(i, x, stamp=stamps[i]) for i, x in enumerate(POSITION.tolist())]
     write_bag(tmp_path / "bag", messages)
     with pytest.raises(BagError, match="0, which nobody filled in: 150 of 300 are 0"):
         report_of_recording(tmp_path / "bag")
@@ -161,8 +169,7 @@ def test_stamps_that_one_of_two_sources_lacks_are_refused(tmp_path: Path) -> Non
 def test_of_two_sources_that_take_turns_one_must_be_chosen(tmp_path: Path) -> None:
     messages = []
     for i, x in enumerate(POSITION.tolist()):
-        messages += [(STATES, recorded(i), state(recorded(i), ["axis"], [x], [0.0]))]
-        messages += [(STATES, recorded(i), state(recorded(i) + 400_000, ["axis"], [x + 1], [0.0]))]
+        messages += [axis(i, x), axis(i, x + 1, stamp=recorded(i) + 400_000)]
     write_bag(tmp_path / "bag", messages)
     with pytest.raises(BagError, match=r"two sources take turns .* --states-topic .*ates\[1\]'"):
         report_of_recording(tmp_path / "bag")
@@ -175,10 +182,9 @@ def test_of_two_sources_that_take_turns_one_must_be_chosen(tmp_path: Path) -> No
 def test_what_jumps_away_and_back_is_of_another_source(tmp_path: Path, every: int) -> None:
     messages = []
     for i, x in enumerate(POSITION.tolist()):
-        messages += [(STATES, recorded(i), state(recorded(i), ["axis"], [x], [0.0]))]
+        messages += [axis(i, x)]
         if i % every == every // 2:
-            late = recorded(i) + 400_000
-            messages += [(STATES, late, state(late, ["axis"], [5.0], [0.0]))]
+            messages += [axis(i, 5.0, stamp=recorded(i) + 400_000)]
     write_bag(tmp_path / "bag", messages)
     run = ss.read_bag(tmp_path / "bag")
     assert np.array_equal(run.samples.position, POSITION)
@@ -188,9 +194,9 @@ def test_what_jumps_away_and_back_is_of_another_source(tmp_path: Path, every: in
 def test_a_belt_may_have_messages_of_its_own(tmp_path: Path) -> None:
     messages = []
     for i in range(6):
-        messages += [(STATES, recorded(i), state(recorded(i), ["axis"], [0.1 * i], [0.0]))]
+        messages += [axis(i, 0.1 * i)]
         if i in (2, 4):
-            messages += [(STATES, recorded(i), state(recorded(i), ["conveyor"], [], [0.1 * i]))]
+            messages += [axis(i, [], 0.1 * i, name="conveyor")]
     write_bag(tmp_path / "bag", messages)
     run = ss.read_bag(tmp_path / "bag", belt_joint="conveyor")
     assert run.samples.belt_velocity.tolist() == [0.2, 0.2, 0.2, 0.2, 0.2, 0.4]
@@ -202,7 +208,7 @@ def test_velocities_that_some_messages_lack(tmp_path: Path, every: int, left_out
     write_bag(
         tmp_path / "bag",
         [
-            (STATES, recorded(i), state(recorded(i), ["axis"], [x], [v] if i % every == 0 else []))
+            axis(i, x, [v] if i % every == 0 else [])
             for i, (x, v) in enumerate(zip(POSITION.tolist(), VELOCITY.tolist(), strict=True))
         ],
     )
@@ -216,14 +222,8 @@ def test_velocities_that_some_messages_lack(tmp_path: Path, every: int, left_out
 
 
 def test_positions_that_are_not_recorded_are_the_integral_of_the_velocity(tmp_path: Path) -> None:
-    write_bag(
-        tmp_path / "bag",
-        [
-            (STATES, recorded(i), state(recorded(i), ["axis"], [], [v]))
-            for i, v in enumerate(VELOCITY.tolist())
-        ],
-        flush_every=70,
-    )
+    messages = [axis(i, [], v) for i, v in enumerate(VELOCITY.tolist())]
+    write_bag(tmp_path / "bag", messages, flush_every=70)
     with Recording(tmp_path / "bag") as recording:
         assert recording.joint_states.position == pytest.approx(POSITION, abs=1e-6)
         assert "the position is not recorded" in recording.notes[0]
@@ -270,11 +270,7 @@ def test_forces_of_any_type(tmp_path: Path, kind: str, topic: str, message) -> N
 
 
 def test_the_effort_is_a_force_if_asked_and_no_friction(tmp_path: Path) -> None:
-    messages = [
-        (STATES, recorded(i), state(recorded(i), ["axis"], [0.0], [0.0], [float(i)]))
-        for i in range(5)
-    ]
-    write_bag(tmp_path / "bag", messages)
+    write_bag(tmp_path / "bag", [axis(i, 0.0, 0.0, [float(i)]) for i in range(5)])
     run = ss.read_bag(tmp_path / "bag", force="effort")
     assert run.forces.force.tolist() == [0, 1, 2, 3, 4]
     assert np.isnan(run.samples.friction_force).all()
@@ -286,10 +282,7 @@ def test_the_effort_is_a_force_if_asked_and_no_friction(tmp_path: Path) -> None:
 
 
 def test_choices_that_a_bag_cannot_meet_are_refused(tmp_path: Path) -> None:
-    messages = [
-        (STATES, recorded(0), state(recorded(0), ["axis"], [0.0])),
-        (COMMANDS, recorded(0) + 10**10, array(1.0, 2.0)),
-    ]
+    messages = [axis(0, 0.0, []), (COMMANDS, recorded(0) + 10**10, array(1.0, 2.0))]
     write_bag(tmp_path / "bag", messages, types={COMMANDS: "std_msgs/msg/Float64MultiArray"})
     for options, reason in (
         ({"force": "effort"}, "have no effort of axis: .* --force-topic names"),
@@ -304,9 +297,8 @@ def test_choices_that_a_bag_cannot_meet_are_refused(tmp_path: Path) -> None:
 
 def test_log_times_beside_stamps_of_another_clock_are_refused(tmp_path: Path) -> None:
     number = serialize_message(Float64(data=1.0))
-    messages = [(COMMANDS, recorded(0), number)]
-    messages += [(STATES, recorded(i), state(i * STEP + 10, ["axis"], [0.0])) for i in range(3)]
-    write_bag(tmp_path / "bag", messages)
+    messages = [axis(i, 0.0, [], stamp=i * STEP + 10) for i in range(3)]
+    write_bag(tmp_path / "bag", [(COMMANDS, recorded(0), number), *messages])
     with pytest.raises(BagError, match=r"have no stamps, .* --time log takes the log times"):
         report_of_recording(tmp_path / "bag", layout=BagLayout(force_topic=COMMANDS))
     layout = BagLayout(force_topic=COMMANDS, time="log")
@@ -321,7 +313,7 @@ def test_the_joint_of_our_plant_needs_no_option() -> None:
 def test_on_a_guide_at_rest_the_measures_are_those_of_the_stick_slip(tmp_path: Path) -> None:
     position, velocity, _ = motion(BELT)
     messages = [
-        (STATES, recorded(i), state(recorded(i), ["axis"], [1e-3 * BELT * i - x], [BELT - v]))
+        axis(i, 1e-3 * BELT * i - x, BELT - v)
         for i, (x, v) in enumerate(zip(position[:2000].tolist(), velocity.tolist(), strict=False))
     ]
     write_bag(tmp_path / "bag", messages)
@@ -334,11 +326,7 @@ def test_on_a_guide_at_rest_the_measures_are_those_of_the_stick_slip(tmp_path: P
 
 def test_a_jump_from_which_the_joint_does_not_come_back_is_said(tmp_path: Path) -> None:
     shifted = POSITION + 0.05 * (TIME >= 0.2)
-    messages = [
-        (STATES, recorded(i), state(recorded(i), ["axis"], [x], [0.0]))
-        for i, x in enumerate(shifted.tolist())
-    ]
-    write_bag(tmp_path / "bag", messages)
+    write_bag(tmp_path / "bag", [axis(i, x) for i, x in enumerate(shifted.tolist())])
     run = ss.read_bag(tmp_path / "bag")
     assert "the position jumps by 50 mm, 0.2 s after the first sample" in run.report["notes"][0]
     assert np.array_equal(run.samples.position, shifted)

@@ -33,6 +33,8 @@ CURSOR: dict[str, Any] = {"trigger": "axis", "axisPointer": {"type": "cross"}}
 
 LEGEND: dict[str, Any] = {"top": 0, "left": 0, "itemWidth": 16, "itemGap": 7}
 
+STILL: dict[str, Any] = {"animation": False, "backgroundColor": "transparent"}
+
 _LEFT, _RIGHT = 64, 16
 
 
@@ -43,13 +45,18 @@ def line(name: str, colour: str, style: str = "solid") -> dict[str, Any]:
     return series | {"lineStyle": look, "itemStyle": {"color": colour}}
 
 
+def points(name: str, colour: str, size: float, symbol: str = "circle") -> dict[str, Any]:
+    """Return a series that is drawn as points."""
+    look: dict[str, Any] = {"symbol": symbol, "symbolSize": size, "itemStyle": {"color": colour}}
+    return {"type": "scatter", "name": name, "data": []} | look
+
+
 def _of(grid: int) -> dict[str, int]:
     return {"xAxisIndex": grid, "yAxisIndex": grid}
 
 
 TRACE: dict[str, Any] = {
-    "animation": False,
-    "backgroundColor": "transparent",
+    **STILL,
     "legend": LEGEND,
     "grid": [
         {"left": _LEFT, "right": _RIGHT, "top": top, "height": "20%"}
@@ -67,14 +74,7 @@ TRACE: dict[str, Any] = {
         line("belt", GREY, "dashed") | _of(1),
         line("control force", ORANGE) | {"step": "end"} | _of(2),
         line("held, no new force", ORANGE, "dotted") | _of(2),
-        {
-            "type": "scatter",
-            "name": "sent, not applied",
-            "symbolSize": 3,
-            "itemStyle": {"color": ORANGE},
-            "data": [],
-            **_of(2),
-        },
+        points("sent, not applied", ORANGE, 3) | _of(2),
         line("A", GREEN, "dotted"),
         line("B", SKY_BLUE, "dotted"),
     ],
@@ -82,29 +82,19 @@ TRACE: dict[str, Any] = {
 """Displacement, velocity of slide and belt, and control force over time."""
 
 PORTRAIT: dict[str, Any] = {
-    "animation": False,
-    "backgroundColor": "transparent",
+    **STILL,
     "legend": LEGEND | {"data": ["slide", "equilibrium"]},
     "grid": {"left": _LEFT, "right": _RIGHT, "top": 56, "bottom": 45},
     "xAxis": AXIS | CENTRED,
     "yAxis": AXIS,
     "series": [
-        {
-            "type": "scatter",
-            "name": "equilibrium",
-            "symbol": "diamond",
-            "symbolSize": 14,
-            "itemStyle": {"color": GREEN},
-            "silent": True,
-            "data": [],
-        },
+        points("equilibrium", GREEN, 14, "diamond") | {"silent": True},
         line("slide", BLUE)
         | {
             "markLine": {
                 "symbol": "none",
                 "silent": True,
-                "animation": False,
-                "backgroundColor": "transparent",
+                **STILL,
                 "lineStyle": {"color": GREY, "type": "dashed"},
                 "label": {"formatter": "belt", "position": "insideEndTop"},
                 "data": [],
@@ -115,8 +105,7 @@ PORTRAIT: dict[str, Any] = {
 """Phase portrait: velocity over displacement, with belt speed and equilibrium."""
 
 CYCLES: dict[str, Any] = {
-    "animation": False,
-    "backgroundColor": "transparent",
+    **STILL,
     "legend": LEGEND,
     "toolbox": TOOLBOX,
     "tooltip": CURSOR,

@@ -12,7 +12,7 @@ from typing import Any
 from nicegui import ui
 from nicegui.events import GenericEventArguments
 
-from stickslip_ros.app.dashboard.elements import call, named
+from stickslip_ros.app.dashboard.elements import call, named, table
 from stickslip_ros.app.dashboard.listener import Answer, ListenerNode
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.model.constants import SMALLEST, Changes, Parameter, constants_of
@@ -251,12 +251,7 @@ class Settings:
             shown = ui.checkbox("overlay", value=True)
             shown.on_value_change(lambda event: call("showKept", event.value))
         self._refusal = refusal_label()
-        columns = [
-            {"name": name, "label": label, "field": name, "align": "left"}
-            for name, label in (("what", "setting"), ("A", "A"), ("B", "B"), ("now", "now"))
-        ]
-        self._table = ui.table(columns=columns, rows=[], row_key="what")
-        self._table.classes("w-full").props("flat dense wrap-cells hide-bottom")
+        self._table = table(what="setting", A="A", B="B", now="now")
         self._table.set_visibility(False)
 
     def refresh(self) -> None:

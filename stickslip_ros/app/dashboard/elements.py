@@ -37,6 +37,16 @@ def chart(options: dict[str, Any], name: str) -> ui.echart:
     return named(ui.echart(options).classes("relative w-full chart").props("role=img"), name)
 
 
+def table(**headings: str) -> ui.table:
+    """Add an empty table with columns by name; the first tells its rows apart."""
+    columns = [
+        {"name": name, "label": heading, "field": name, "align": "left"}
+        for name, heading in headings.items()
+    ]
+    added = ui.table(columns=columns, rows=[], row_key=columns[0]["name"])
+    return added.classes("w-full").props("wrap-cells flat dense hide-bottom")
+
+
 def show_commands(commands: Sequence[str]) -> None:
     """Add commands for a terminal."""
     with ui.row().classes("w-full no-wrap items-start commands"):

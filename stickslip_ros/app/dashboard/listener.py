@@ -16,10 +16,9 @@ from geometry_msgs.msg import WrenchStamped
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 from rcl_interfaces.msg import ParameterEvent
-from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.context import Context
 from rclpy.duration import Duration
-from rclpy.parameter import Parameter, parameter_value_to_python
+from rclpy.parameter import parameter_value_to_python
 from rclpy.qos import ReliabilityPolicy, qos_profile_parameter_events
 from rclpy.timer import Timer
 from std_msgs.msg import Float64
@@ -38,7 +37,13 @@ from stickslip_ros.messages.topics import (
     STICK_FRACTION,
     Topic,
 )
-from stickslip_ros.nodes.base.clients import ANSWER_TIME, ServiceCall, parameters_call
+from stickslip_ros.nodes.base.clients import (
+    OnAnswer,
+    ServiceCall,
+    parameters_call,
+    setting_call,
+    transition_request,
+)
 from stickslip_ros.nodes.base.managed import FIRST_STAMP, STATE
 from stickslip_ros.nodes.base.ros_topics import PollingNode, qos_profile, waiting_messages
 from stickslip_ros.nodes.base.spinner import steady_clock
@@ -241,27 +246,20 @@ class ListenerNode(PollingNode):
             self._tell(f"{node} refused: {response.result.reason}")
             return response.result.reason
 
-        return self._request(
-            node,
-            SetParametersAtomically,
-            "set_parameters_atomically",
-            SetParametersAtomically.Request(
-                parameters=[Parameter(name, value=value).to_parameter_msg()]
-            ),
-            outcome,
-        )
+        return self._request(node, partial(setting_call, self, node, {name: value}), outcome)
 
     def set_active(self, node: str, active: bool) -> Answer:
         """Activate or deactivate a managed (lifecycle) node."""
         done = "activated" if active else "deactivated"
         transition = Transition.TRANSITION_ACTIVATE if active else Transition.TRANSITION_DEACTIVATE
+
+        def call(on_answer: OnAnswer) -> ServiceCall:
+            longest = 8.0  # s, of a transition
+            call = ServiceCall(self, ChangeState, f"{node}/change_state", answer_time=longest)
+            return call.start(transition_request(transition), on_answer)
+
         return self._request(
-            node,
-            ChangeState,
-            "change_state",
-            ChangeState.Request(transition=Transition(id=transition)),
-            lambda response: "" if response.success else f"{node} could not be {done}",
-            answer_time=8.0,  # a transition may take that long
+            node, call, lambda response: "" if response.success else f"{node} could not be {done}"
         )
 
     def reset(self) -> Answer:
@@ -273,7 +271,10 @@ class ListenerNode(PollingNode):
             self._tell("reset to the initial state", "reset")
             return ""
 
-        return self._request("plant", Trigger, "reset", Trigger.Request(), outcome)
+        def call(on_answer: OnAnswer) -> ServiceCall:
+            return ServiceCall(self, Trigger, "plant/reset").start(Trigger.Request(), on_answer)
+
+        return self._request("plant", call, outcome)
 
     def tap(self, force: float, duration: float) -> Answer:
         """Apply an impulse to the slide: a force (N) for a simulated time (s)."""
@@ -327,23 +328,16 @@ class ListenerNode(PollingNode):
             self.executor.create_task(call)
 
     def _request(
-        self,
-        node: str,
-        kind: Any,
-        service: str,
-        request: Any,
-        outcome: Callable[[Any], str],
-        answer_time: float = ANSWER_TIME,
+        self, node: str, call: Callable[[OnAnswer], ServiceCall], outcome: Callable[[Any], str]
     ) -> Answer:
-        """Call a service of a node; `outcome` turns its response into the answer."""
+        """Start a call of a service of a node; `outcome` turns its response into the answer."""
         answer = Answer()
 
         def ask() -> None:
-            call = ServiceCall(self, kind, f"{node}/{service}", answer_time=answer_time)
-            call.start(request, lambda response: _settle(answer, outcome(response)))
-            call.pursue()
+            started = call(lambda response: _settle(answer, outcome(response)))
+            started.pursue()
             give_up = partial(_settle, answer, f"{node} does not answer")
-            self._calls.append((call, time.monotonic() + _ANSWER_TIMEOUT, give_up))
+            self._calls.append((started, time.monotonic() + _ANSWER_TIMEOUT, give_up))
 
         self._call_soon(ask)
         return answer

@@ -25,7 +25,15 @@ from stickslip_ros.app.dashboard.controls import (
     refusals_in,
     report,
 )
-from stickslip_ros.app.dashboard.elements import call, card, chart, heading, named, show_commands
+from stickslip_ros.app.dashboard.elements import (
+    call,
+    card,
+    chart,
+    heading,
+    named,
+    show_commands,
+    table,
+)
 from stickslip_ros.app.dashboard.ended_run import EndedRun
 from stickslip_ros.app.dashboard.frames import PERIODS, Frames
 from stickslip_ros.app.dashboard.listener import ABSENT, SILENT, Health, ListenerNode
@@ -233,13 +241,8 @@ class _Page:
             self._act_refusal = refusal_label()
 
     def _add_health(self) -> None:
-        columns = [
-            {"name": name, "label": name, "field": name, "align": "left"}
-            for name in ("node", "state", "health")
-        ]
         with card("Nodes"):
-            self._health = ui.table(columns=columns, rows=[], row_key="node")
-            self._health.classes("w-full").props("wrap-cells flat dense hide-bottom")
+            self._health = table(node="node", state="state", health="health")
             self._complaints = ui.label("").classes("text-sm whitespace-pre-line")
             with ui.expansion("all values").classes("w-full").props("dense"):
                 self._raw = ui.label("").classes("text-xs whitespace-pre-wrap break-all")

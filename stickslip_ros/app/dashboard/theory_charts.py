@@ -6,7 +6,15 @@ from typing import Any
 import numpy as np
 from contourpy import contour_generator
 
-from stickslip_ros.app.dashboard.charts import AXIS, CENTRED, LEGEND, TOOLBOX, line
+from stickslip_ros.app.dashboard.charts import (
+    AXIS,
+    CENTRED,
+    LEGEND,
+    STILL,
+    TOOLBOX,
+    line,
+    points,
+)
 from stickslip_ros.app.dashboard.theory import Decay, FrictionCurve
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.physics.model.control import Washout
@@ -120,10 +128,9 @@ def decay_chart(found: Decay, drive: Drive) -> Options:
         ("without control", found.uncontrolled, ORANGE, "triangle"),
         ("with control", found.controlled, BLUE, "circle"),
     ):
-        points = [[_number(s.real), _number(s.imag)] for s in values if abs(s) < reach]
-        if points:
-            look = {"symbol": symbol, "symbolSize": 10, "itemStyle": {"color": colour}}
-            series.append({"type": "scatter", "name": name, "data": points} | look)
+        places = [[_number(s.real), _number(s.imag)] for s in values if abs(s) < reach]
+        if places:
+            series.append(points(name, colour, 10, symbol) | {"data": places})
     series.append(_verticals([(0.0, "limit of stability", GREY, _LEFT_OF_IT)]))
     names = [str(each["name"]) for each in series if each["name"]]
     real, imaginary = (units.label(f"{part} part", unit) for part, unit in _PARTS)
@@ -138,19 +145,13 @@ def _regions(found: StabilityMap, linear: Any) -> Iterable[tuple[str, tuple[floa
     ):
         rows, columns = np.nonzero(inside)
         if len(rows) > 20:
-            yield (
-                text,
-                (
-                    float(found.corner_frequencies[int(np.median(rows))]),
-                    float(linear[int(np.median(columns))]),
-                ),
-            )
+            corner = found.corner_frequencies[int(np.median(rows))]
+            yield text, (float(corner), float(linear[int(np.median(columns))]))
 
 
 def _options(x: str, y: str, series: Sequence[Options], legend: Sequence[str]) -> Options:
     return {
-        "animation": False,
-        "backgroundColor": "transparent",
+        **STILL,
         "legend": LEGEND | {"data": list(legend)},
         "grid": {"left": 60, "right": 34, "top": 90, "bottom": 45},
         "toolbox": TOOLBOX | {"orient": "vertical", "top": 84},  # the legend needs the whole width
@@ -171,27 +172,13 @@ def _line(
 
 
 def _point(name: str, x: float, y: float) -> Options:
-    return {
-        "type": "scatter",
-        "name": name,
-        "symbol": "diamond",
-        "symbolSize": 14,
-        "itemStyle": {"color": GREEN},
-        "z": 5,
-        "data": [[_number(x), _number(y)]],
-    }
+    return points(name, GREEN, 14, "diamond") | {"z": 5, "data": [[_number(x), _number(y)]]}
 
 
 def _region(text: str, x: float, y: float) -> Options:
     label = {"show": True, "formatter": text, "fontStyle": "italic", "fontSize": 12, "color": GREY}
-    return {
-        "type": "scatter",
-        "name": "",
-        "symbolSize": 1,
-        "silent": True,
-        "label": label,
-        "data": [[_number(x), _number(y)]],
-    }
+    place = {"silent": True, "label": label, "data": [[_number(x), _number(y)]]}
+    return points("", GREY, 1) | place
 
 
 def _verticals(marks: Iterable[tuple[float, str, str, str]]) -> Options:

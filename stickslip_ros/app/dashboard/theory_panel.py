@@ -1,5 +1,6 @@
 """The part of the page that shows the theory of the running drive."""
 
+from functools import partial
 from typing import Any
 
 from nicegui import ui
@@ -35,6 +36,8 @@ _CHARTS = (
     ("decay", decay, "Closed-loop poles", "closed-loop poles in the complex plane"),
 )
 """Name, computation, title, and text for readers of screens."""
+_DRAWN = {"bifurcation": bifurcation_chart, "friction": friction_chart, "decay": decay_chart}
+"""What draws a result in a chart, by name, where the gains have no part in it."""
 
 
 class TheoryPanel:
@@ -69,7 +72,8 @@ class TheoryPanel:
             self.charts[name].set_visibility(not result.refusal)
             self._said[name].set_text(result.refusal)
             if result.value is not None:
-                self._draw(name, _options(name, result.value, drive, gains))
+                draw = partial(stability_chart, gains=gains) if name == "map" else _DRAWN[name]
+                self._draw(name, draw(result.value, drive))
                 self._explain(name, result.value, Units.for_drive(drive))
 
     def _draw(self, name: str, options: dict[str, Any]) -> None:
@@ -92,19 +96,6 @@ class TheoryPanel:
             return gains_of(CONTROLLER_PARAMETERS[law].changed(values, law).control_law)
         except InvalidInputError:  # a controller of another version
             return None
-
-
-def _options(name: str, found: Any, drive: Drive, gains: Washout | None) -> dict[str, Any]:
-    """Return the options of the chart of that name, with a result drawn."""
-    match name:
-        case "map":
-            return stability_chart(found, drive, gains)
-        case "bifurcation":
-            return bifurcation_chart(found, drive)
-        case "friction":
-            return friction_chart(found, drive)
-        case _:
-            return decay_chart(found, drive)
 
 
 def _decay_text(found: Decay, units: Units) -> str:

@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from math import inf
-from typing import Any
+from typing import Any, Self
 
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
@@ -46,6 +46,9 @@ _DISCOVERY_TIME = 5.0
 
 _ANSWER_TIME = 10.0
 
+OnAnswer = Callable[[Any], None]
+"""Called with the answer of a service."""
+
 
 class ServiceCall:
     """Calls a service as soon as it exists, until it has answered.
@@ -67,14 +70,15 @@ class ServiceCall:
         self._pending: Future | None = None
         self._factor = 1.0
 
-    def start(self, request: Any, on_answer: Callable[[Any], None] = lambda _: None) -> None:
-        """Send this request from now on, in place of an earlier one."""
+    def start(self, request: Any, on_answer: OnAnswer = lambda _: None) -> Self:
+        """Send this request from now on, in place of an earlier one; return the call."""
         self._request = request
         self._on_answer = on_answer
         self.answer: Any = None
         """The answer; None until it arrives."""
         self._pending = None
         self._attempt_ends: float | None = None
+        return self
 
     @property
     def exists(self) -> bool:
@@ -148,8 +152,7 @@ def parameters_call(
         on_answer(dict(zip(names, values, strict=False)))
 
     call = ServiceCall(node, GetParameters, f"{other}/get_parameters")
-    call.start(GetParameters.Request(names=names), take)
-    return call
+    return call.start(GetParameters.Request(names=names), take)
 
 
 class LifecycleClient:
@@ -182,12 +185,12 @@ class LifecycleClient:
             state = self.state()
             if state == _STATE_AFTER[transition] or state not in NEXT_TRANSITION:
                 return state == _STATE_AFTER[transition]
-        self._change_state.ask(self._spinner, _request(transition), self._timeout)
+        self._change_state.ask(self._spinner, transition_request(transition), self._timeout)
         return self.changed
 
     def start_change(self, transition: int) -> None:
         """Request a transition and do not wait for the answer: see `change_ended`."""
-        self._change_state.start(_request(transition))
+        self._change_state.start(transition_request(transition))
 
     @property
     def changed(self) -> bool:
@@ -222,7 +225,8 @@ class LifecycleClient:
                 self.change_state(NEXT_TRANSITION[state])
 
 
-def _request(transition: int) -> ChangeState.Request:
+def transition_request(transition: int) -> ChangeState.Request:
+    """Return the request of a transition of a managed node."""
     return ChangeState.Request(transition=Transition(id=transition))
 
 
@@ -271,12 +275,13 @@ def _not_found(node: Node, name: str) -> str:
     return f"{what}; running: {', '.join(elsewhere)}" if elsewhere else what
 
 
-def setting_call(node: Node, other: str, values: Mapping[str, Any]) -> ServiceCall:
+def setting_call(
+    node: Node, other: str, values: Mapping[str, Any], on_answer: OnAnswer = lambda _: None
+) -> ServiceCall:
     """Return a call that sets parameters of the node `other`, all of them or none."""
     call = ServiceCall(node, SetParametersAtomically, f"{other}/set_parameters_atomically")
     given = [_parameter(name, value).to_parameter_msg() for name, value in values.items()]
-    call.start(SetParametersAtomically.Request(parameters=given))
-    return call
+    return call.start(SetParametersAtomically.Request(parameters=given), on_answer)
 
 
 def _parameter(name: str, value: Any) -> Parameter:
