@@ -178,9 +178,11 @@ def why_no_cycle(regime: str | None, duration: float, drive: Drive | None) -> st
     said = f"no whole cycle was completed in {duration:g} {units.of_unit('s')}".rstrip()
     if drive is None:
         return said
-    ratio, period = hopf_ratio(drive), drive.natural_period
+    period = drive.natural_period
+    likely = abs(drive.belt_speed) < _LARGEST_RATIO * drive.speed_scale
+    if duration < 3.0 * period < inf and likely:
+        return f"{said}: the natural period is {units.text(period, 's')}, so run it for longer"
+    ratio = hopf_ratio(drive)
     if ratio is not None and not 1.0 / _LARGEST_RATIO < ratio < _LARGEST_RATIO:
         return f"{said}: the slide has neither turned back nor settled; {hopf_distance(drive)}"
-    if duration < 3.0 * period < inf:
-        return f"{said}: the natural period is {units.text(period, 's')}, so run it for longer"
     return f"{said}: the slide has neither turned back twice nor settled; run it for longer"
