@@ -11,7 +11,13 @@ from stickslip_ros.app.arguments import (
     seconds,
     speed,
 )
-from stickslip_ros.app.result import add_results, check_results, give_result, is_drawn
+from stickslip_ros.app.result import (
+    add_results,
+    check_results,
+    is_drawn,
+    print_result,
+    write_results,
+)
 from stickslip_ros.errors import InvalidInputError
 
 _MOST_DRAWN = 6
@@ -83,4 +89,6 @@ def run(arguments: argparse.Namespace) -> None:
         )
         for bag in bags
     ]
-    give_result(arguments, runs[0] if len(runs) == 1 else Comparison(tuple(runs)))
+    result = runs[0] if len(runs) == 1 else Comparison(tuple(runs))
+    write_results(arguments, result)
+    print_result(arguments, result)

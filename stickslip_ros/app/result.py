@@ -118,21 +118,27 @@ def is_drawn(arguments: argparse.Namespace) -> bool:
     return arguments.plot is not None or getattr(arguments, "html", None) is not None
 
 
-def give_result(arguments: argparse.Namespace, result: "Result", **options: Any) -> None:
-    """Print a result, which may have taken long; then write what --plot and --html ask for.
-
-    It is printed as tables and sentences, or with --json as one object. The `options` are those of
-    its `plot`. Writing may fail.
-    """
-    if arguments.json:
-        result.write_json(sys.stdout)
-    else:
-        print_parts(*result.parts())
+def write_results(arguments: argparse.Namespace, result: "Result", **options: Any) -> None:
+    """Write what --plot and --html ask for; `options` are those of the result's `plot`."""
     if arguments.plot is not None:
         _write_figure(arguments, partial(result.draw, **options))
     if getattr(arguments, "html", None) is not None:
         with writing("--html", arguments.html):
             result.to_html(arguments.html, **options)
+
+
+def print_result(arguments: argparse.Namespace, result: "Result") -> None:
+    """Print a result: its tables and sentences, or with --json one object."""
+    if arguments.json:
+        result.write_json(sys.stdout)
+    else:
+        print_parts(*result.parts())
+
+
+def give_result(arguments: argparse.Namespace, result: "Result") -> None:
+    """Print a result that took long, then write what --plot and --html ask for: it may fail."""
+    print_result(arguments, result)
+    write_results(arguments, result)
 
 
 def _write_figure(arguments: argparse.Namespace, draw: "Callable[[FigureStyle], Figure]") -> None:

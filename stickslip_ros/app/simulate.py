@@ -15,7 +15,13 @@ from stickslip_ros.app.arguments import (
     writing,
 )
 from stickslip_ros.app.output import progress_bar
-from stickslip_ros.app.result import add_results, check_results, give_result, is_drawn
+from stickslip_ros.app.result import (
+    add_results,
+    check_results,
+    is_drawn,
+    print_result,
+    write_results,
+)
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.files import written
 from stickslip_ros.studies.options import DEFAULT_PERIODS
@@ -90,7 +96,8 @@ def run(arguments: argparse.Namespace) -> None:
             drawn=is_drawn(arguments),
             progress=progress,
         )
-    give_result(arguments, found)
+        write_results(arguments, found)
+    print_result(arguments, found)
 
 
 @contextmanager

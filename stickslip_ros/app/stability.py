@@ -4,7 +4,7 @@ import argparse
 
 from stickslip_ros.app.arguments import add_json, add_scenario, scenario_of
 from stickslip_ros.app.output import progress_bar
-from stickslip_ros.app.result import add_plot, check_results, give_result
+from stickslip_ros.app.result import add_plot, check_results, print_result, write_results
 from stickslip_ros.errors import InvalidInputError
 
 
@@ -33,4 +33,6 @@ def run(arguments: argparse.Namespace) -> None:
             raise InvalidInputError(f"--plot {arguments.plot}: there is nothing to draw: {reason}")
     with progress_bar(f"theory of {scenario.name}", None):
         found = stability(scenario)
-    give_result(arguments, found)
+    with progress_bar("drawing", None):
+        write_results(arguments, found)
+    print_result(arguments, found)

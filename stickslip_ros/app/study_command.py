@@ -17,7 +17,7 @@ from stickslip_ros.app.arguments import (
     writing,
 )
 from stickslip_ros.app.output import progress_bar, tell
-from stickslip_ros.app.result import give_result
+from stickslip_ros.app.result import print_result, write_results
 from stickslip_ros.errors import InvalidInputError, RunError
 from stickslip_ros.files import written
 from stickslip_ros.studies.options import SettlingOptions
@@ -176,6 +176,7 @@ def finish(
 
     The `options` are those of the result's `plot`.
     """
+    write_results(arguments, result, **options)
     out: Path | None = arguments.out
     if out is not None:
         with writing("--out", out), written(out) as stream:
@@ -183,5 +184,5 @@ def finish(
                 result.write_csv(stream)
             else:
                 result.write_json(stream)
-    give_result(arguments, result, **options)
+    print_result(arguments, result)
     journal.discard()
