@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any  # what takes time comes second
 
 if TYPE_CHECKING:
     from stickslip_ros.api.comparison import ComparedLaws, compare
+    from stickslip_ros.api.design import Proposal, design
     from stickslip_ros.api.friction_map import FrictionMap, friction_map
     from stickslip_ros.api.identification import Model, identify
     from stickslip_ros.api.margin import Margin, margin
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
     from stickslip_ros.api.runs import Run, simulate
     from stickslip_ros.api.scenarios import scenario
     from stickslip_ros.api.studies import Basin, Sweep, basin, sweep
-    from stickslip_ros.api.theory import Proposal, Stability, design, stability
+    from stickslip_ros.api.theory import Stability, stability
     from stickslip_ros.errors import StickslipError
     from stickslip_ros.physics.measures.slips import SlipThreshold
     from stickslip_ros.scenarios.files import Scenario
@@ -62,6 +63,7 @@ __all__ = [
 
 _HOMES = {
     "api.comparison": ("ComparedLaws", "compare"),
+    "api.design": ("Proposal", "design"),
     "api.friction_map": ("FrictionMap", "friction_map"),
     "api.identification": ("Model", "identify"),
     "api.margin": ("Margin", "margin"),
@@ -69,7 +71,7 @@ _HOMES = {
     "api.runs": ("Run", "simulate"),
     "api.scenarios": ("scenario",),
     "api.studies": ("Basin", "Sweep", "basin", "sweep"),
-    "api.theory": ("Proposal", "Stability", "design", "stability"),
+    "api.theory": ("Stability", "stability"),
     "errors": ("StickslipError",),
     "physics.measures.slips": ("SlipThreshold",),
     "scenarios.files": ("Scenario",),

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TextIO
 import numpy as np
 from typing_extensions import override
 
-from stickslip_ros.api.results import Parts, Summary, Table, TabularResult, attributes
+from stickslip_ros.api.results import Parts, Summary, Table, TabularResult, attributes, column
 from stickslip_ros.api.scenarios import ScenarioLike, as_scenario
 from stickslip_ros.api.studies import Values, axis_of
 from stickslip_ros.arrays import FloatArray
@@ -159,8 +159,7 @@ class ComparedLaws(TabularResult):
             quantity = OUTCOMES.get(name)
             if name in self.study.plan.parameters:
                 name, quantity = keyword_of(name), Quantity(keyword_of(name))
-            text = name in ("law", "disturbance", "reason")
-            columns[name] = np.array(values, dtype=object if text else float)
+            columns[name] = column(values, text=name == "reason")
             quantities[name] = quantity or Quantity(name)
         drive = self.scenario.plant.as_drive()
         dimensions = {"case": range(self.study.plan.size)}

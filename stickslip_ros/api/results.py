@@ -282,6 +282,13 @@ class TabularResult(Result):
         return found
 
 
+def column(values: Sequence[Any], *, text: bool = False) -> Any:
+    """Return values as an array: numbers, with NaN for None, or texts as objects."""
+    if text or any(isinstance(value, str) for value in values):
+        return np.array(values, dtype=object)
+    return np.array([np.nan if value is None else float(value) for value in values])
+
+
 def attributes(scenario: Scenario) -> dict[str, str]:
     """Return the attributes of a data set: scenario, overrides and version."""
     return {

@@ -3,7 +3,6 @@
 import argparse
 import shlex
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from stickslip_ros.app.arguments import (
     add_scenario,
@@ -19,10 +18,6 @@ from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.files import written
 from stickslip_ros.quantities import number_of
 from stickslip_ros.studies.options import OWN_SPEED_RANGE
-
-if TYPE_CHECKING:
-    from stickslip_ros.studies.design import Design
-    from stickslip_ros.studies.tuned_design import TunedDesign
 
 _DESCRIPTION = """Propose gains of the controller that suppress the vibration within a force limit.
 The scenario gives the drive, rate, force_delay and the force_limit of the controller. The gains of
@@ -53,40 +48,30 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> None:
     """Run the command."""
-    from stickslip_ros.api.theory import Proposal
-    from stickslip_ros.api.tuned_design import TunedProposal
-    from stickslip_ros.physics.model.control import Washout
-    from stickslip_ros.studies.design import Task, design
-    from stickslip_ros.studies.tuned_design import design_by_rule
+    from stickslip_ros.api.design import proposal
+    from stickslip_ros.studies.design import Task
 
     proposed = law_constants("force_limit", "start_after")
     for text in arguments.overrides:
         if text.partition("=")[0] in proposed:
             raise InvalidInputError(f"-p {text:.80}: is not used, because a design proposes it")
     scenario = scenario_of(arguments, unused=proposed)
-    speeds, task = _belt_speeds(arguments.belt_speed), None
-    if isinstance(scenario.controller.control_law, Washout) or not scenario.plant.expects_control:
-        task = Task.from_scenario(scenario, speeds)
-        speeds = task.belt_speeds
-    check_speeds(arguments, scenario, *(speeds or ()))
+    task = Task.from_scenario(scenario, _belt_speeds(arguments.belt_speed))
+    check_speeds(arguments, scenario, *task.belt_speeds)
     if arguments.out is not None:
         check_new("--out", arguments.out)
     check_results(arguments)
     with progress_bar(f"designing for {scenario.name}", 1.0, lines=True) as progress:
-        if task is None:
-            found = design_by_rule(scenario, speeds, progress)
-            proposal = TunedProposal(found)
-        else:
-            found = design(task, progress)
-            proposal = Proposal(found)
-            if arguments.plot is not None and found.map_around() is None:
-                _report_omitted(f"--plot {arguments.plot}: not drawn")
-                arguments.plot = None
-    give_result(arguments, proposal)
-    if task and not arguments.json and found.parameter_file is not None and arguments.out is None:
+        found = proposal(task, progress)
+    text = found.design.parameter_file
+    if arguments.plot is not None and text is None:
+        _report_omitted(f"--plot {arguments.plot}: not drawn")
+        arguments.plot = None
+    give_result(arguments, found)
+    if not arguments.json and text is not None and arguments.out is None:
         print("--out FILE writes the scenario with these gains, --json prints it: parameter_file")
     if arguments.out is not None:
-        _write(arguments.out, found)
+        _write(arguments.out, text)
 
 
 def _belt_speeds(text: str | None) -> tuple[float, float] | None:
@@ -98,12 +83,12 @@ def _belt_speeds(text: str | None) -> tuple[float, float] | None:
     return speeds[0], speeds[-1]
 
 
-def _write(path: Path, found: "Design | TunedDesign") -> None:
-    if found.parameter_file is None:
+def _write(path: Path, text: str | None) -> None:
+    if text is None:
         _report_omitted(f"--out {path}: not written")
         return
     with writing("--out", path), written(path) as file:
-        file.write(found.parameter_file)
+        file.write(text)
     tell(f"{path} is written: `{shlex.join(['stickslip', 'run', str(path)])}` runs it")
 
 

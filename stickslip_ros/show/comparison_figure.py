@@ -76,9 +76,9 @@ def comparison_figure(
 def bode_figure(found: TunedDesign, *, style: FigureStyle = SCREEN) -> Figure:
     """Return magnitude and phase of the loop transfer function, and the sensitivity, by feed."""
     figure = style.figure(7.0, 6.0, narrow=1.3)
-    style.set_title(figure, f"loop with {found.tuned.law.name}, {found.scenario.name}")
+    style.set_title(figure, f"loop with {found.tuned.law.name}, {found.task.scenario.name}")
     size, phase, sensitivity = figure.subplots(3, 1, sharex=True)
-    units = Units.for_drive(found.scenario.plant.as_drive())
+    units = Units.for_drive(found.task.drive)
     for response in found.tuned.responses:
         hertz = response.plant.frequency / (2.0 * np.pi)
         label = units.text(response.plant.loop.drive.belt_speed, "m/s")

@@ -37,8 +37,8 @@ from stickslip_ros.show.style import (
     text_width,
     title_of,
 )
-from stickslip_ros.studies.design import Design
 from stickslip_ros.studies.stability import bifurcation_branches, stability_map
+from stickslip_ros.studies.washout_design import WashoutDesign
 
 _UNSTABLE = "#E4E4E4"
 _GAINS: Any = {"color": "white", "mec": "black", "marker": "*", "ls": "", "zorder": 5.0}
@@ -108,16 +108,17 @@ def stability_figure(
 
 
 @styled
-def design_figure(found: Design, *, style: FigureStyle = SCREEN) -> Figure:
+def design_figure(found: WashoutDesign, *, style: FigureStyle = SCREEN) -> Figure:
     """Return the map around a proposal, with the force limit; there must be a proposal."""
     around, scenario = found.map_around(), found.scenario
     assert around is not None
+    assert scenario is not None
     figure = style.figure(6.8, 6.2, narrow=1.2)
     what, (low, high) = "Designed gains", found.task.belt_speeds
     if low != high:
         ends = Units.for_drive(found.task.drive).texts([low, high], "m/s")
         what += f" for {' to '.join(ends)}"
-    title = what if scenario is None else title_of(what, scenario, _PROPOSED)
+    title = title_of(what, scenario, _PROPOSED)
     _set_title(figure, title, around, style, " (slowest to settle)" * (low != high))
     axes = figure.subplots()
     handles = _draw_map(figure, axes, around)

@@ -1,23 +1,18 @@
-"""The tables of studies: sweeps, basins of attraction, designs, and what theory says."""
+"""The tables of studies: sweeps, basins of attraction, and what theory says."""
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict
 from itertools import groupby, islice
 from math import log10
 from typing import Any, cast
 
 from stickslip_ros.physics.measures.cycle_measures import Regime, Trend
-from stickslip_ros.physics.model.constants import constants_of
-from stickslip_ros.physics.model.control import Washout
-from stickslip_ros.quantities import Quantity, quantities_of
+from stickslip_ros.quantities import Quantity
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.show.measure_table import measure_table
-from stickslip_ros.show.quantities import THEORY, Units, plain_name
+from stickslip_ros.show.quantities import THEORY, Units
 from stickslip_ros.studies.basin import Attractor, Basins
 from stickslip_ros.studies.columns import Columns
-from stickslip_ros.studies.controller_trial import Rest
-from stickslip_ros.studies.design import Check, Design, Margins
 from stickslip_ros.studies.plan import Grid
 from stickslip_ros.studies.stability import Notes, Section
 from stickslip_ros.studies.study import Point, Study
@@ -25,14 +20,6 @@ from stickslip_ros.tables import TextTable
 
 _MOST_RANGES = 60
 """Rows of the table of a sweep; where there are more, only their regimes are counted."""
-
-CONTROLLER = {
-    name: Quantity(plain_name(f"washout_controller.{name}"), unit)
-    for name in Washout.constants()
-    if (unit := constants_of(Washout)[name].unit)
-}
-CHECKS, MARGINS = quantities_of(Check), quantities_of(Margins)
-"""Quantities of a design: the proposal, its checks and its margins, by name."""
 
 _GAIN_MARGINS = "gain_down", "gain_up"
 """Ratios of the linear gain at the limit of stability and the proposed one."""
@@ -115,33 +102,7 @@ def attractor_name(attractor: Attractor) -> str:
     return name if attractor.steady or attractor.regime is None else f"{name}, not steady"
 
 
-def design_tables(name: str, found: Design) -> Iterator[TextTable | str]:
-    """Yield the tables of a design for the scenario of that name, and the remark on it."""
-    units = Units.for_drive(found.task.drive)
-    speeds = units.texts(sorted({*found.task.belt_speeds}), "m/s")
-    task = f"{name}, belt speed {' to '.join(speeds)}"
-    if found.controller is None:
-        yield f"{task}: nothing to propose"
-    else:
-        values = {
-            name: None if value == float("inf") else value
-            for name, value in asdict(found.controller).items()
-        }
-        yield _one_below_another(f"{task}: proposal", CONTROLLER, values, units)
-        if found.margins is not None:
-            title, margins = "margins at the worst of these belt speeds", asdict(found.margins)
-            yield _one_below_another(title, MARGINS, margins, units)
-        checks = [asdict(check) for check in found.checks]
-        yield _side_by_side("verification", CHECKS, checks, units)
-        at_rest = [each | each["rest"] for each in checks if each["rest"] is not None]
-        if at_rest:
-            shown = {"belt_speed": CHECKS["belt_speed"], **quantities_of(Rest)}
-            yield _side_by_side("at rest, by noise and rounding", shown, at_rest, units)
-    if found.remark is not None:
-        yield found.remark
-
-
-def _side_by_side(
+def side_by_side(
     title: str, shown: _Quantities, rows: Sequence[Mapping[str, Any]], units: Units
 ) -> TextTable:
     """Return a table with a column for each of `shown`, all its values with one prefix."""
@@ -152,9 +113,10 @@ def _side_by_side(
     return TextTable(title, headings, list(zip(*columns, strict=True)))
 
 
-def _one_below_another(
+def one_below_another(
     title: str, shown: _Quantities, values: Mapping[str, Any], units: Units
 ) -> TextTable:
+    """Return a table with a row for each of `shown`; margins of gain also in dB."""
     rows = [[label, units.text(values[name], unit)] for name, (label, unit, _) in shown.items()]
     for row, name in zip(rows, shown, strict=True):
         if name in _GAIN_MARGINS and values[name] is not None:

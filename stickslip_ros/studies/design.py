@@ -1,69 +1,111 @@
-"""Design of a controller: the gains that damp fastest within a force limit.
+"""The task of a design, and its result: gains of a control law, or why there are none."""
 
-The proposal comes from the linear sampled loop and from the vibration without control. It is then
-checked by simulation of the drive, sampled, held and delayed as between the nodes.
-"""
-
-from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, field, replace
-from math import copysign, inf, isinf, sqrt
-from typing import Annotated
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from math import copysign
+from typing import Any, Self
 
 import numpy as np
 
-from stickslip_ros.arrays import FloatArray
-from stickslip_ros.physics.measures.cycle_measures import Regime
-from stickslip_ros.physics.model.control import Washout
+from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.physics.model.constants import LARGEST, SMALLEST
+from stickslip_ros.physics.model.control import ControlLaw, Washout
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.theory.linear_sampled_loop import (
-    LinearSampledLoop,
-    settling_time,
-    why_no_linear_loop,
-)
-from stickslip_ros.physics.theory.stability_map import StabilityMap
-from stickslip_ros.progress import Progress
-from stickslip_ros.quantities import Quantity
 from stickslip_ros.scenarios.files import Scenario, parameter_file
-from stickslip_ros.scenarios.parameters import controller_node
-from stickslip_ros.studies.controller_trial import FILTER_SETTLED, Bench, Outcome, Rest, Vibration
-from stickslip_ros.studies.design_search import (
-    CUBIC_SHARES,
-    RESERVE,
-    Candidates,
-    Margins,
-    Task,
-    little_margin,
-    margins,
-    rounded,
-)
-from stickslip_ros.studies.stability import number_text
-
-_SHARE_OF_VIBRATIONS = 0.1
-"""Approximate share of the work that goes into the vibrations without control."""
-_THROWN_SPEEDS = 3.0, 30.0, 300.0
-"""Speeds with which the slide must return to equilibrium, in the speed scale of the drive."""
+from stickslip_ros.studies.options import OWN_SPEED_RANGE
 
 
 @dataclass(frozen=True)
-class Check:
-    """Predicted and simulated behaviour of a proposal at one belt speed; SI units."""
+class Task:
+    """The task of a design; SI units. Create it with `Task.from_scenario`."""
 
-    belt_speed: Annotated[float, Quantity("belt speed", "m/s")]
-    """Belt speed, m/s."""
-    vibrates: Annotated[bool, Quantity("vibrates")]
-    """Whether the drive vibrates without control."""
-    decay_rate: float
-    """Decay rate of a small deviation, 1/s."""
-    predicted_settling_time: Annotated[float, Quantity("1 % settling time, predicted", "s")]
-    """Predicted 1 % settling time of a small deviation, s."""
-    settling_time: Annotated[float | None, Quantity("simulated", "s")]
-    """Simulated 1 % settling time of the vibration at the worst phase, s; None without it."""
-    predicted_peak_force: Annotated[float, Quantity("peak force, predicted", "N")]
-    """Predicted peak force when the control is activated at the worst phase, N."""
-    peak_force: Annotated[float | None, Quantity("simulated", "N")]
-    """Simulated peak force at the worst phase, N; None without vibration."""
-    rest: Rest | None = None
-    """Motion and force that noise and rounding leave at rest, simulated; None without them."""
+    scenario: Scenario
+    """Drive, loop and control law; the gains of the law are not used."""
+    belt_speeds: tuple[float, float]
+    """Lowest and highest belt speed, m/s, above zero."""
+    force_limit: float
+    """Largest allowed force, N: that of the controller, or the limit of a weaker actuator."""
+
+    @classmethod
+    def from_scenario(
+        cls, scenario: Scenario, belt_speeds: tuple[float, float] | None = None
+    ) -> Self:
+        """Return the task of a scenario.
+
+        Parameters
+        ----------
+        scenario : Scenario
+            Source of drive, loop, control law and force limit.
+        belt_speeds : tuple[float, float], optional
+            Lowest and highest belt speed, m/s; by default 10 % below and above the scenario's.
+
+        Returns
+        -------
+        Task
+            The task.
+
+        Raises
+        ------
+        InvalidInputError
+            If the speeds are not a range above zero, if they are omitted and the scenario's belt
+            is at rest, or if the scenario has no controller.
+        """
+        plant, law = scenario.plant, scenario.control_law
+        if law is None:
+            raise InvalidInputError(
+                "plant.expects_control = False: without control there are no gains"
+            )
+        if isinstance(law, Washout) and plant.motor.kind == "mass":
+            raise InvalidInputError(
+                f"plant.motor.kind = mass is refused: a design of the {law.name} law needs an "
+                "ideal motor"
+            )
+        if belt_speeds is None:
+            own = abs(plant.belt_speed)
+            if own == 0.0:
+                raise InvalidInputError(
+                    "plant.belt_speed = 0: gains are for a moving belt, so speeds must be given"
+                )
+            belt_speeds = (own * (1.0 - OWN_SPEED_RANGE), own * (1.0 + OWN_SPEED_RANGE))
+        low, high = belt_speeds
+        if not SMALLEST <= low <= high <= LARGEST:
+            raise InvalidInputError(
+                f"belt speeds {low:g} to {high:g} m/s: must be from {SMALLEST:g} to {LARGEST:g}, "
+                "the lower first"
+            )
+        return cls(scenario, (low, high), min(law.force_limit, plant.actuator.limit))
+
+    @cached_property
+    def drive(self) -> Drive:
+        """The drive at the scenario's belt speed."""
+        return self.scenario.plant.as_drive()
+
+    @property
+    def speeds(self) -> list[float]:
+        """Five belt speeds across the range, m/s, or the only one."""
+        low, high = self.belt_speeds
+        return np.linspace(low, high, 5 if low < high else 1).tolist()
+
+    @property
+    def drives(self) -> list[Drive]:
+        """The drive at these speeds; the opposite direction is symmetric."""
+        return [replace(self.drive, belt_speed=speed) for speed in self.speeds]
+
+    def with_law(self, law: ControlLaw) -> Scenario:
+        """Return the scenario with the constants of its law.
+
+        Its belt speed is that of the scenario, or the nearest one within the range.
+        """
+        (low, high), own = self.belt_speeds, self.scenario.plant.belt_speed
+        values = {name: getattr(law, name) for name in law.constants()}
+        proposed: dict[str, Any] = {
+            f"{self.scenario.controller.node}.{name}": value
+            for name, value in values.items()
+            if isinstance(value, float)
+        }
+        proposed["plant.belt_speed"] = copysign(min(max(abs(own), low), high), own)
+        return self.scenario.overridden([], proposed)
 
 
 @dataclass(frozen=True)
@@ -72,299 +114,28 @@ class Design:
 
     task: Task
     """The task."""
-    controller: Washout | None = None
+    controller: ControlLaw | None = None
     """The proposed controller; None if no gains meet the task."""
     remark: str | None = None
     """Why there is no proposal, or a caution about it."""
-    slowest: LinearSampledLoop | None = None
-    """The loop at the belt speed at which a small deviation decays most slowly."""
-    margins: Margins | None = None
-    """Smallest stability margins of the loops at all speeds; None without control."""
-    checks: tuple[Check, ...] = ()
-    """Checks of the proposal, in order of belt speed."""
-    vibrations: tuple[Vibration, ...] = field(default=(), compare=False, repr=False)
-    """Vibrations without control that the force was computed from, in order of belt speed."""
+    checks: Sequence[Any] = ()
+    """Simulations of the proposal, in order of belt speed."""
 
-    @property
+    @cached_property
     def scenario(self) -> Scenario | None:
-        """The task's scenario with the proposal; None without a proposal or a scenario.
-
-        Its belt speed is that of the scenario, or the nearest one within the range.
-        """
-        scenario = self.task.scenario
-        if self.controller is None or scenario is None:
-            return None
-        (low, high), own = self.task.belt_speeds, scenario.plant.belt_speed
-        proposed = {
-            f"{scenario.controller.node}.{name}": value for name, value in self._constants.items()
-        }
-        proposed["plant.belt_speed"] = copysign(min(max(abs(own), low), high), own)
-        return scenario.overridden([], proposed)
+        """The task's scenario with the proposal, see `Task.with_law`; None without one."""
+        return None if self.controller is None else self.task.with_law(self.controller)
 
     @property
     def parameter_file(self) -> str | None:
-        """Text of a parameter file with the proposal; None without one.
-
-        It contains the complete `scenario`, or the gains alone if the task has no scenario.
-        """
-        if self.controller is None:
-            return None
+        """Text of a parameter file with the complete `scenario`; None without a proposal."""
         if self.scenario is None:
-            return parameter_file({controller_node(self.controller.name): self._constants})
+            return None
         nodes = self.scenario.as_dict()
         del nodes["analyzer"]["bag"]
         return parameter_file(nodes)
 
-    @property
-    def _constants(self) -> dict[str, float]:
-        """Constants of the proposal that are numbers, by name; none without one."""
-        values = {} if self.controller is None else asdict(self.controller)
-        return {name: value for name, value in values.items() if isinstance(value, float)}
 
-    def map_around(self) -> StabilityMap | None:
-        """Return the stability map of the slowest loop around the proposal; None without one."""
-        if self.slowest is None or self.controller is None:
-            return None
-        return StabilityMap.around(self.slowest, self.controller)
-
-    def peak_forces(self, around: StabilityMap) -> FloatArray:
-        """Return the largest force over the gains of a map.
-
-        It is the force of a controller with the proposed cubic gain that is activated at the worst
-        phase of the vibration without control, at the worst belt speed.
-
-        Parameters
-        ----------
-        around : StabilityMap
-            Map of m cutoff frequencies and n linear gains.
-
-        Returns
-        -------
-        ndarray
-            Force in N, shape (m, n); zero where nothing vibrates.
-        """
-        linear = around.linear_gains[:, np.newaxis]
-        forces = np.zeros((len(around.corner_frequencies), len(around.linear_gains)))
-        for row, corner_frequency in enumerate(around.corner_frequencies.tolist()):
-            for vibration in self.vibrations:
-                speeds = np.linspace(0.0, vibration.peak_speed(corner_frequency), 50)
-                gains = Washout(corner_frequency, linear, around.gains.cubic_gain)
-                force = np.abs(gains.force(speeds)).max(axis=1)
-                forces[row] = np.maximum(forces[row], force)
-        return forces
-
-
-def design(task: Task, progress: Progress = lambda _: None) -> Design:
-    """Find the gains with the fastest decay at the slowest belt speed of the range.
-
-    The force stays within the limit when the control, its filter settled, is activated at any phase
-    of the vibration. Gains that fail in simulation are not proposed: the next attempt is more
-    cautious. If all attempts fail, the remark gives the reason and a sufficient force limit, if
-    one exists.
-
-    Parameters
-    ----------
-    task : Task
-        The drive, its loop, the force limit and the range of belt speeds.
-    progress : Callable[[float], None]
-        Receives the share of the work that is done, 0 to 1.
-
-    Returns
-    -------
-    Design
-        The proposal with its margins and checks, or the reason why there is none.
-
-    Examples
-    --------
-    >>> from stickslip_ros.scenarios.files import load_scenario
-    >>> from stickslip_ros.studies.design import Task, design
-    >>> overrides = ["washout_controller.force_limit=200"]
-    >>> task = Task.from_scenario(load_scenario("feed_drive", overrides), (0.03, 0.05))
-    >>> found = design(task)
-    >>> max(check.peak_force or 0.0 for check in found.checks) < 200.0
-    True
-    """
-    found = _design(task, progress)
-    if task.scenario is None or task.scenario.plant.force_jitter == 0.0:
-        return found
-    no_jitter = "force_jitter is omitted: the delay of the force is constant here"
-    return replace(found, remark=_joined(found.remark, no_jitter))
-
-
-def _design(task: Task, progress: Progress) -> Design:
-    drives = task.drives()
-    reason = why_no_linear_loop(drives[0], task.rate, task.force_delay)
-    if reason is not None:
-        return Design(task, remark=reason)
-    bench = Bench(task.rate, task.force_delay, task.sensor)
-    vibrations: list[Vibration] = []
-    for number, drive in enumerate(drives, 1):
-        vibrations.append(bench.vibration(drive))
-        progress(_SHARE_OF_VIBRATIONS * number / len(drives))
-        if vibrations[-1].regime is Regime.UNBOUNDED:
-            speed = number_text(drive, drive.belt_speed, "m/s")
-            reason = f"without control the motion diverges at a belt speed of {speed}"
-            return Design(task, remark=f"{reason}, so there is no limit cycle to suppress")
-    candidates = Candidates(task, vibrations)
-    found = _propose(bench, candidates, progress)
-    if found.controller is None and not isinf(task.force_limit):
-        enough = _sufficient_limit(bench, candidates)
-        if enough is not None:
-            limit = f"a force limit of about {number_text(task.drive, enough, 'N')}"
-            return replace(found, remark=f"{found.remark}; {limit} is sufficient")
-    return found
-
-
-def _propose(bench: Bench, candidates: Candidates, progress: Progress) -> Design:
-    """Return a proposal that was checked by simulation, or the reason why there is none."""
-    task, loops = candidates.task, candidates.loops
-    strength, shares = RESERVE, CUBIC_SHARES
-    failure: str | None = None
-    for attempt in range(8):
-        gains = candidates.best(strength, shares)
-        if gains is None:
-            return Design(task, remark=failure or candidates.why_none())
-        waits = FILTER_SETTLED / gains.corner_frequency if gains.linear_gain != 0.0 else 0.0
-        controller = replace(
-            gains,
-            force_limit=task.force_limit,
-            start_after=rounded(waits, digits=2, up=True),
-        )
-        left = (1.0 - _SHARE_OF_VIBRATIONS) * 0.5**attempt
-        checks: list[Check] = []
-        for loop, vibration in zip(loops, candidates.vibrations, strict=True):
-            checks.append(_check(task, bench, loop, vibration, controller))
-            progress(1.0 - left * (1.0 - 0.25 * len(checks) / len(loops)))
-            failure = _failure_of(task, checks[-1])
-            if failure is not None:
-                break
-        slowest = candidates.slowest(gains)
-        remark, found, little = candidates.why_zero(), None, None
-        if failure is None and gains.linear_gain != 0.0:
-            found = margins(loops, gains)
-            little = little_margin(task, found)
-            ends = [loop.drive for loop in loops if loop in (loops[0], loops[-1], slowest)]
-            remark, failure = _throw_from_high_speeds(bench, ends, controller)
-        if failure is None:
-            progress(1.0)
-            seen = tuple(candidates.vibrations)
-            remark = _joined(remark, little)
-            return Design(task, controller, remark, slowest, found, tuple(checks), seen)
-        peak = max((check.peak_force or 0.0 for check in checks), default=0.0)
-        if peak > task.force_limit:
-            strength *= 0.97 * task.force_limit / peak
-        elif gains.cubic_gain != 0.0:
-            shares = CUBIC_SHARES[:1]
-        else:
-            strength *= 0.8
-    return Design(task, remark=failure)
-
-
-def _joined(*remarks: str | None) -> str | None:
+def joined(*remarks: str | None) -> str | None:
+    """Return the remarks that there are as one text; None without any."""
     return "; ".join(filter(None, remarks)) or None
-
-
-def _check(
-    task: Task, bench: Bench, loop: LinearSampledLoop, vibration: Vibration, controller: Washout
-) -> Check:
-    """Return the check of the controller at one belt speed."""
-    drive, decay_rate = loop.drive, loop.decay_rate(controller)
-    predicted = settling_time(decay_rate)
-    assert predicted is not None
-    caught: Outcome | None = None
-    if vibration.vibrates:
-        patience = 5.0 * predicted + 20.0 * drive.natural_period
-        caught = bench.catch(vibration, controller, patience)
-    rest: Rest | None = None
-    if task.is_rough:
-        settled = max(predicted, FILTER_SETTLED / controller.corner_frequency)
-        rest = bench.rest(drive, controller, settled)
-    return Check(
-        belt_speed=drive.belt_speed,
-        vibrates=vibration.vibrates,
-        decay_rate=decay_rate,
-        predicted_settling_time=predicted,
-        settling_time=None if caught is None else caught.settling_time,
-        predicted_peak_force=vibration.peak_force(controller),
-        peak_force=None if caught is None else caught.peak_force,
-        rest=rest,
-    )
-
-
-def _failure_of(task: Task, check: Check) -> str | None:
-    """Return how the simulated control fails; None if it does not."""
-    speed = f"at a belt speed of {number_text(task.drive, check.belt_speed, 'm/s')}"
-    if check.vibrates and check.settling_time is None:
-        if task.is_rough:
-            return (
-                f"{speed} the vibration does not decay to 1 % with the noise and rounding of "
-                "sensor and actuator"
-            )
-        return f"{speed} the vibration does not decay, although a small one would"
-    if check.peak_force is not None and check.peak_force > task.force_limit:
-        peak, limit = (
-            number_text(task.drive, n, "N") for n in (check.peak_force, task.force_limit)
-        )
-        return f"{speed} the force reaches {peak}, above the limit of {limit}"
-    return None
-
-
-def _throw_from_high_speeds(
-    bench: Bench, drives: Sequence[Drive], controller: Washout
-) -> tuple[str | None, str | None]:
-    """Return a remark on motions with a fast start, and how the controller fails, if it does."""
-    remark: str | None = None
-    unlimited = replace(controller, force_limit=inf)
-    for drive in drives:
-        for speed in (thrown * drive.speed_scale for thrown in _THROWN_SPEEDS):
-            if bench.returns(drive, controller, speed):
-                continue
-            slide = (
-                f"started at {number_text(drive, speed, 'm/s')} on a belt at "
-                f"{number_text(drive, drive.belt_speed, 'm/s')}, the slide"
-            )
-            if controller.cubic_gain != 0.0 or not bench.returns(drive, unlimited, speed):
-                return None, f"{slide} does not return to equilibrium"
-            remark = remark or f"{slide} needs more force than the limit"
-    return remark, None
-
-
-def _sufficient_limit(bench: Bench, candidates: Candidates) -> float | None:
-    """Return the lowest force limit (N) for which there is a proposal, to a few per cent.
-
-    None if even a force without limit does not suffice.
-    """
-
-    def simulated(limit: float) -> Design:
-        return _propose(bench, candidates.limited(limit), lambda _: None)
-
-    def tried(limit: float) -> bool:
-        return simulated(limit).controller is not None
-
-    def in_theory(limit: float) -> bool:
-        limited = candidates.limited(limit)
-        gains = limited.best(RESERVE, CUBIC_SHARES)
-        return gains is not None and limited.slowest(gains).decay_rate(gains) > slowest
-
-    def narrowed(does: Callable[[float], bool], low: float, high: float) -> tuple[float, float]:
-        low = max(low, 1e-3 * high)
-        while high > 1.015 * low:
-            middle = sqrt(low * high)
-            low, high = (low, middle) if does(middle) else (middle, high)
-        return low, rounded(high, up=True)
-
-    # A slower decay takes too long to simulate, and needs hardly less force.
-    slowest = 0.01 / candidates.task.drive.natural_period
-    limit = least = candidates.task.force_limit
-    # One simulated limit takes longer than bisection with the linear theory.
-    enough = candidates.free_peak_force() / RESERVE
-    if enough > limit:
-        least, enough = narrowed(in_theory, limit, enough)
-        if tried(enough):
-            return enough
-    free = simulated(inf)
-    enough = max((check.peak_force or 0.0 for check in free.checks), default=0.0) / RESERVE
-    if enough <= limit:
-        return None
-    _, enough = narrowed(tried, least, enough)
-    return enough if tried(enough) else None

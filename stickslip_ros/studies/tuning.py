@@ -4,33 +4,30 @@ The smallest decay rate at these feeds is made as large as it gets while the del
 least that of the goal, and force and noise stay within its limits.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import inf, log, sqrt
-from typing import Any, ClassVar
+from typing import Annotated, Any
 
 import numpy as np
 import numpy.typing as npt
-from typing_extensions import override
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.model.constants import constants_of
-from stickslip_ros.physics.model.control import ControlLaw, LinearFeedback, Reference
-from stickslip_ros.physics.model.control.base import State
-from stickslip_ros.physics.model.dimensionless_drive import SPEED
+from stickslip_ros.physics.model.control import ControlLaw
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.theory.linear import jacobians
 from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop, why_no_linear_loop
 from stickslip_ros.physics.theory.linear_system import sampled_system
 from stickslip_ros.physics.theory.loop_response import LoopResponse, PlantResponse
 from stickslip_ros.physics.theory.requirements import AUTONOMOUS, STATIC, require
-from stickslip_ros.samples import Sample
+from stickslip_ros.quantities import Quantity, quantities_of
 from stickslip_ros.scenarios.files import Scenario
-from stickslip_ros.studies.design_search import rounded
+from stickslip_ros.studies.gain_search import Loops, fastest, linear_part, rounded
 
-_STARTS, _KEPT, _REFINED = 300, 6, 40
-"""Random gains of which the best are refined, and steps of the refinement."""
+_STARTS = 300
+"""Random gains from which the search starts."""
 _RANGE = 2.5
 """Gains are searched within this many decades on either side of the scales of the drive."""
 _NOISE_SHARE = 0.05
@@ -67,21 +64,21 @@ class Tuned:
     """The law with its gains."""
     goal: Goal
     """The goal."""
-    decay_rate: float
+    decay_rate: Annotated[float, Quantity("smallest decay rate", "1/s")]
     """Smallest decay rate at the feeds, 1/s."""
-    delay_margin: float | None
+    delay_margin: Annotated[float | None, Quantity("delay margin", "s")]
     """Smallest delay margin, s; None if no delay turns the loop unstable."""
-    phase_margin: float | None
+    phase_margin: Annotated[float | None, Quantity("phase margin", "rad")]
     """Smallest phase margin, rad; None without any."""
-    gain_down: float | None
+    gain_down: Annotated[float | None, Quantity("lower gain margin")]
     """Largest factor below one of the force at which a loop is unstable; None without any."""
-    gain_up: float | None
+    gain_up: Annotated[float | None, Quantity("upper gain margin")]
     """Smallest factor above one of the force at which a loop is unstable; None without any."""
-    sensitivity_peak: float
+    sensitivity_peak: Annotated[float, Quantity("peak of the sensitivity")]
     """Largest magnitude of the sensitivity."""
-    peak_force: float
+    peak_force: Annotated[float, Quantity("peak force by step, mean friction and noise", "N")]
     """Largest force by disturbance, mean friction and noise, N."""
-    noise_force: float
+    noise_force: Annotated[float, Quantity("rms force by noise", "N")]
     """Largest rms force by noise and rounding of the encoder, N."""
     remark: str | None
     """What of the goal is not met, or None."""
@@ -94,9 +91,13 @@ class Tuned:
         found: dict[float, npt.NDArray[np.complex128]] = {}
         for each in self.responses:
             loop = each.plant.loop
-            matrix = loop.transition_matrix(_Linear(form=each.feedback))
+            matrix = loop.transition_matrix(each.feedback)
             found[loop.drive.belt_speed] = np.linalg.eigvals(matrix).astype(np.complex128)
         return found
+
+
+LINEAR = quantities_of(Tuned)
+"""What the linear loops say, by name."""
 
 
 def with_law(scenario: Scenario, law: str, constants: Mapping[str, float]) -> Scenario:
@@ -121,7 +122,6 @@ class _Search:
         self.goal, self.law = goal, law
         plant = scenario.plant
         drive, sensor = plant.as_drive(), plant.sensor
-        self.period = 1.0 / plant.rate
         require("the theory of the sampled loop", drive, AUTONOMOUS)
         delay = plant.force_delay + plant.force_jitter / 2.0
         self.plants: list[PlantResponse] = []
@@ -132,10 +132,8 @@ class _Search:
                 raise InvalidInputError(f"gains of {law.name} by theory: {reason}")
             loop = LinearSampledLoop(at_feed, plant.rate, delay, _jacobian(at_feed), sensor.spans)
             self.plants.append(PlantResponse.of(loop))
-        # The loops differ in the slope of the friction only: the two extreme ones decide.
-        slopes = [float(each.loop.jacobian[SPEED, SPEED]) for each in self.plants]
-        ends = sorted({int(np.argmin(slopes)), int(np.argmax(slopes))})
-        self.extremes = [self.plants[row] for row in ends]
+        self.loops = Loops([each.loop for each in self.plants])
+        self.deciding = [self.plants[place] for place in self.loops.ends]
         self.noise = sqrt(sensor.position_resolution**2 / 12.0 + sensor.position_noise**2)
         self.friction = max(drive.friction.limits) * drive.normal_force
         constants = constants_of(type(law))
@@ -150,21 +148,9 @@ class _Search:
         )
         return replace(self.law, **gains)
 
-    def decay_rate(self, feedback: LinearFeedback) -> float:
-        """Return the smallest decay rate, 1/s."""
-        linear = _Linear(form=feedback)
-        return min(plant.loop.decay_rate(linear) for plant in self.extremes)
-
-    def feedback(self, law: ControlLaw) -> LinearFeedback:
-        """Return the linear part of the law."""
-        found = law.linear_part(self.period)
-        if found is None:
-            raise InvalidInputError(f"control law {law.name}: it has no linear part to tune")
-        return found
-
     def judged(self, law: ControlLaw, plants: Sequence[PlantResponse]) -> Tuned:
         """Return what the loops of these plants say of a stable law."""
-        feedback = self.feedback(law)
+        feedback = linear_part(law, plants[0].loop)
         responses = tuple(LoopResponse(plant, feedback) for plant in plants)
         steps = [each.step_response() for each in responses]
         noise = max(each.noise_force(self.noise) for each in responses)
@@ -176,7 +162,7 @@ class _Search:
         return Tuned(
             law,
             self.goal,
-            self.decay_rate(feedback),
+            min(plant.loop.decay_rate(feedback) for plant in plants),
             _least(each.delay_margin for each in responses),
             _least(each.phase_margin for each in responses),
             max((factor for factor in below if factor is not None), default=None),
@@ -196,7 +182,7 @@ class _Search:
         drive = response.plant.loop.drive
         if drive.motor is not None or not drive.has_spring:
             return 1.0
-        system = sampled_system(response.plant.loop, _Linear(form=response.feedback))
+        system = sampled_system(response.plant.loop, response.feedback)
         rest = system.C @ np.linalg.solve(np.eye(len(system.A)) - system.A, system.B)
         return abs(1.0 - drive.stiffness * float(rest[0, 0]))
 
@@ -210,14 +196,6 @@ class _Search:
             "the rms force by noise": found.noise_force / noise,
         }
         return {name: log(ratio) for name, ratio in ratios.items() if ratio > 1.0}
-
-    def value(self, point: FloatArray) -> tuple[float, float]:
-        """Return what is made large: first that the goal is met, then the decay rate."""
-        law = self.with_gains(point)
-        decay_rate = self.decay_rate(self.feedback(law))
-        if decay_rate <= 0.0:
-            return -inf, decay_rate
-        return -sum(self.excess(self.judged(law, self.extremes)).values()), decay_rate
 
 
 def tune(scenario: Scenario, law: str, goal: Goal) -> Tuned:
@@ -248,54 +226,21 @@ def tune(scenario: Scenario, law: str, goal: Goal) -> Tuned:
         raise InvalidInputError(f"control law {law}: it names no gains to tune, so give them")
     start = replace(found.for_drive(scenario.plant.as_drive()), force_limit=goal.force_limit)
     search = _Search(scenario, start, goal)
-    rng, count = np.random.default_rng(1), len(start.tuned)
-    points = log(10.0) * rng.uniform(-_RANGE, _RANGE, (_STARTS, count))
-    rates = [search.decay_rate(search.feedback(search.with_gains(point))) for point in points]
-    ranked = points[np.argsort(rates)[::-1]]
-    valued = sorted(((search.value(point), tuple(point)) for point in ranked[:60]), reverse=True)
-    best = max(_refined(search, np.array(point), value) for value, point in valued[:_KEPT])
-    if best[0][1] <= 0.0:
+    starts = log(10.0) * np.random.default_rng(1).uniform(
+        -_RANGE, _RANGE, (_STARTS, len(start.tuned))
+    )
+
+    def excess(law: ControlLaw) -> Iterable[float]:
+        return search.excess(search.judged(law, search.deciding)).values()
+
+    best = fastest(search.loops, starts, search.with_gains, excess)
+    if best is None:
         speeds = ", ".join(f"{feed:g}" for feed in goal.feeds)
         raise InvalidInputError(f"control law {law}: no gains make the loop stable at {speeds} m/s")
-    judged = search.judged(search.with_gains(np.array(best[1])), search.plants)
+    judged = search.judged(best, search.plants)
     missed = search.excess(judged)
     remark = f"no gains were found within the limits of {' and '.join(missed)}"
     return replace(judged, remark=remark if missed else None)
-
-
-def _refined(
-    search: _Search, point: FloatArray, value: tuple[float, float]
-) -> tuple[tuple[float, float], tuple[float, ...]]:
-    """Return the best value and point of a search along the axes, with ever smaller steps."""
-    step = 1.0
-    for _ in range(_REFINED):
-        trials = [point + step * sign * axis for axis in np.eye(len(point)) for sign in (1.0, -1.0)]
-        found = max((search.value(trial), tuple(trial)) for trial in trials)
-        if found[0] > value:
-            value, point = found[0], np.array(found[1])
-        elif step < 0.05:
-            break
-        else:
-            step /= 2.0
-    return value, tuple(point)
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Linear(ControlLaw):
-    """A law of which only its linear form is used."""
-
-    name: ClassVar[str] = "linear"
-    form: LinearFeedback
-
-    @override
-    def respond(
-        self, state: State, elapsed: float, sample: Sample, reference: Reference
-    ) -> tuple[float, State]:
-        raise NotImplementedError
-
-    @override
-    def linear_feedback(self, period: float) -> LinearFeedback:
-        return self.form
 
 
 def _jacobian(drive: Drive) -> FloatArray:

@@ -1,23 +1,38 @@
 """`stickslip design`: the proposal as a table, as JSON, as a parameter file and as a figure."""
 
 import json
-from functools import cache
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from stickslip_ros.progress import Progress
-from stickslip_ros.studies.design import Design, Task, design
+from stickslip_ros.studies.design import Task
+from stickslip_ros.studies.washout_design import WashoutDesign, design_washout
 from tests.app.conftest import Run
 
 LIMIT = ("-p", "washout_controller.force_limit=200")
 
 
+DESIGN = "stickslip_ros.api.design.design_washout"
+
+
+def once() -> Callable[[Task, Progress], WashoutDesign]:
+    """Return the function that designs, but once only: a test looks at one result several times."""
+    found: list[WashoutDesign] = []
+
+    def design(task: Task, _: Progress) -> WashoutDesign:
+        if not found:
+            found.append(design_washout(task))
+        return found[0]
+
+    return design
+
+
 def test_the_parameter_file_quenches_the_vibration(
     stickslip: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    once = cache(design)
-    monkeypatch.setattr("stickslip_ros.studies.design.design", lambda task, _: once(task))
+    monkeypatch.setattr(DESIGN, once())
     found = stickslip.json("design", "feed_drive", *LIMIT, "--out", "gains.yaml", "--plot", "m.png")
     assert (tmp_path / "gains.yaml").read_text() == found["parameter_file"]
     assert (tmp_path / "m.png").read_bytes().startswith(b"\x89PNG")
@@ -63,8 +78,7 @@ def test_without_vibration_nothing_is_simulated(stickslip: Run) -> None:
 def test_no_proposal_is_a_result_with_a_reason(
     stickslip: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    once = cache(design)
-    monkeypatch.setattr("stickslip_ros.studies.design.design", lambda task, _: once(task))
+    monkeypatch.setattr(DESIGN, once())
     limit = ("-p", "washout_controller.force_limit=5", "--belt-speed", "0.04")
     done = stickslip("design", "feed_drive", *limit, "--out", "gains.yaml", "--plot", "map.png")
     assert done.returncode == 0, done.stderr
@@ -86,11 +100,11 @@ def test_what_cannot_be_written_in_the_end_costs_no_result(
 ) -> None:
     (tmp_path / "below").mkdir()
 
-    def design_while_the_directory_goes(task: Task, progress: Progress) -> Design:
+    def design_while_the_directory_goes(task: Task, progress: Progress) -> WashoutDesign:
         (tmp_path / "below").rmdir()
-        return design(task, progress)
+        return design_washout(task, progress)
 
-    monkeypatch.setattr("stickslip_ros.studies.design.design", design_while_the_directory_goes)
+    monkeypatch.setattr(DESIGN, design_while_the_directory_goes)
     where = ("--belt-speed", "0.06")
     done = stickslip("design", "feed_drive", *where, "--json", option, f"below/{file}")
     assert done.returncode == 2

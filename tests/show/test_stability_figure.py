@@ -18,7 +18,8 @@ from stickslip_ros.physics.theory.stability_map import CriticalGainCurves, Stabi
 from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.show.stability_figure import branches_figure, design_figure, stability_figure
 from stickslip_ros.show.style import STYLES
-from stickslip_ros.studies.design import Design, Task, design
+from stickslip_ros.studies.design import Task
+from stickslip_ros.studies.washout_design import WashoutDesign, design_washout
 from tests.physics.drives import FEED_DRIVE, PAPER
 from tests.show.texts import faults, in_styles, legend_texts
 
@@ -113,9 +114,9 @@ def test_the_map_of_a_loop_and_its_critical_gains(style: str) -> None:
 
 
 @cache
-def designed(force_limit: float) -> Design:
+def designed(force_limit: float) -> WashoutDesign:
     limit = f"washout_controller.force_limit={force_limit}"
-    return design(Task.from_scenario(load_scenario("feed_drive", [limit]), (0.04, 0.04)))
+    return design_washout(Task.from_scenario(load_scenario("feed_drive", [limit]), (0.04, 0.04)))
 
 
 @in_styles

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import pytest
 
-from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.model.control import CONTROL_LAWS
 from stickslip_ros.physics.model.friction import Coulomb
 from stickslip_ros.physics.model.signals import sine
@@ -14,7 +13,6 @@ from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop
 from stickslip_ros.scenarios.files import Scenario, load_scenario
 from stickslip_ros.scenarios.parameters import ControllerParameters
 from stickslip_ros.show.study_tables import stability_tables
-from stickslip_ros.studies.design import Task
 from stickslip_ros.studies.stability import (
     Notes,
     Section,
@@ -83,14 +81,6 @@ def test_a_law_without_equations_says_so(switching: Scenario) -> None:
     assert set(found["sampled_loop"].values()) == {None}
     assert found["closed_loop"]["eigenvalues"] is None
     assert found["open_loop"]["limit_cycles"]
-
-
-def test_a_design_refuses_another_law_by_name(damped: Scenario) -> None:
-    with pytest.raises(InvalidInputError) as refused:
-        Task.from_scenario(damped)
-    assert str(refused.value) == (
-        "control law = velocity_feedback is invalid: must be washout, whose gains a design proposes"
-    )
 
 
 def test_the_equilibrium_under_control_is_told_beside_that_without() -> None:

@@ -138,13 +138,13 @@ class LinearSampledLoop:
         spans = motor_sensor.spans if drive.motor is not None else 0
         return cls(drive, rate, force_delay, jacobian, sensor.spans, spans)
 
-    def transition_matrix(self, law: ControlLaw) -> FloatArray:
+    def transition_matrix(self, law: ControlLaw | LinearFeedback) -> FloatArray:
         """Return the matrix from the state at one sample to the state at the next.
 
         Parameters
         ----------
-        law : ControlLaw
-            Control law in SI units, of which only the linear part is used.
+        law : ControlLaw or LinearFeedback
+            Control law in SI units, of which only the linear part is used, or that part.
 
         Returns
         -------
@@ -158,21 +158,24 @@ class LinearSampledLoop:
         InvalidInputError
             If the law is not linear near the equilibrium.
         """
-        feedback = law.linear_feedback(1.0 / self.rate)
+        if isinstance(law, LinearFeedback):
+            name, feedback = "linear feedback", law
+        else:
+            name, feedback = law.name, law.linear_feedback(1.0 / self.rate)
         if feedback is None:
-            raise InvalidInputError(f"the theory of the sampled loop: {not_linear(law.name)}")
+            raise InvalidInputError(f"the theory of the sampled loop: {not_linear(name)}")
         if self.drive.motor is None and np.any(feedback.direct[..., 2:]):
-            raise NotCoveredError(f"the law {law.name} feeds back a motor: the motor is ideal")
+            raise NotCoveredError(f"the law {name} feeds back a motor: the motor is ideal")
         if self.drive.motor is not None and not feedback.holds_position:
-            raise NotCoveredError(no_position_loop("the theory of the sampled loop", law.name))
+            raise NotCoveredError(no_position_loop("the theory of the sampled loop", name))
         return self._transitions(feedback)
 
-    def spectral_radius(self, law: ControlLaw) -> float:
+    def spectral_radius(self, law: ControlLaw | LinearFeedback) -> float:
         """Return the factor by which a small deviation grows per sample, in the long run.
 
         Parameters
         ----------
-        law : ControlLaw
+        law : ControlLaw or LinearFeedback
             Control law in SI units, linear near the equilibrium.
 
         Returns
@@ -182,12 +185,12 @@ class LinearSampledLoop:
         """
         return float(_spectral_radius(self.transition_matrix(law)))
 
-    def decay_rate(self, law: ControlLaw) -> float:
+    def decay_rate(self, law: ControlLaw | LinearFeedback) -> float:
         """Return the rate at which a small deviation decays.
 
         Parameters
         ----------
-        law : ControlLaw
+        law : ControlLaw or LinearFeedback
             Control law in SI units, linear near the equilibrium.
 
         Returns

@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.physics.model.actuator import IDEAL_ACTUATOR
-from stickslip_ros.physics.model.control import ContinuousControl, ControlLaw
+from stickslip_ros.physics.model.control import ContinuousControl, ControlLaw, LinearFeedback
 from stickslip_ros.physics.model.dimensionless_drive import POSITION, SPEED
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.plain_drive import drive_system
@@ -57,7 +57,7 @@ def continuous_system(drive: Drive, control: ContinuousControl | None) -> Linear
     return _system(drive, names, expansion.jacobian * frequency, forced * frequency, 0.0)
 
 
-def sampled_system(loop: LinearSampledLoop, law: ControlLaw) -> LinearSystem:
+def sampled_system(loop: LinearSampledLoop, law: ControlLaw | LinearFeedback) -> LinearSystem:
     """Return the linear loop with sampled control.
 
     Raises InvalidInputError if the law is not linear near the equilibrium.

@@ -1,27 +1,23 @@
-"""The search for gains that damp fastest within a force limit, by the linear sampled loop."""
+"""The gains of the washout law: those that damp fastest within a force limit, and their margins."""
 
 from collections.abc import Sequence
 from copy import copy
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
-from math import ceil, floor, inf, isinf, log10
-from typing import Annotated, Self
+from math import exp, inf, isinf, log10
+from typing import Annotated, Self, cast
 
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.model.constants import LARGEST, SMALLEST
 from stickslip_ros.physics.model.control import Washout
-from stickslip_ros.physics.model.dimensionless_drive import SPEED
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.functions import zero_between
-from stickslip_ros.physics.model.sensor import EXACT_SENSOR, Sensor
 from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop, why_no_linear_loop
 from stickslip_ros.quantities import Quantity
-from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.studies.controller_trial import Vibration
-from stickslip_ros.studies.options import OWN_SPEED_RANGE
+from stickslip_ros.studies.design import Task
+from stickslip_ros.studies.gain_search import Loops, fastest, rounded
 from stickslip_ros.studies.stability import hopf_distance, hopf_ratio, number_text
 
 CUBIC_SHARES = (0.0, 0.125, 0.25, 0.5)
@@ -31,101 +27,15 @@ With a share of 1 the loop would diverge from high speeds. A positive cubic gain
 where the vibration is large, so that the force limit allows more linear gain.
 """
 
+_UNITS = np.array([0.25, 0.2])
+"""Logarithm of the cutoff frequency, and share of the largest gain, that one step covers first."""
+
+_PARTS = -1.0, -0.4, 0.0, 0.4, 1.0
+_WAYS = [(x, y) for x in _PARTS for y in _PARTS]
+"""Steps of the search: the fastest decay is often on a ridge, askew to the gains."""
+
 RESERVE = 0.95
 """Share of the allowed force and gain that the first proposal uses."""
-
-
-@dataclass(frozen=True)
-class Task:
-    """The task of a design; SI units. Create it with `Task.from_scenario`."""
-
-    drive: Drive
-    """The drive; `belt_speeds` replaces its belt speed."""
-    rate: float
-    """Samples per second, Hz."""
-    force_delay: float
-    """Delay from a sample to the start of its force, s."""
-    force_limit: float
-    """Largest allowed force, N: that of the controller, or the limit of a weaker actuator."""
-    belt_speeds: tuple[float, float]
-    """Lowest and highest belt speed, m/s, above zero; the opposite direction is symmetric."""
-    sensor: Sensor = EXACT_SENSOR
-    """Sensor that measures the samples."""
-    scenario: Scenario | None = field(default=None, compare=False, repr=False)
-    """The scenario that the task comes from, if any."""
-
-    @classmethod
-    def from_scenario(
-        cls, scenario: Scenario, belt_speeds: tuple[float, float] | None = None
-    ) -> Self:
-        """Return the task of a scenario.
-
-        Parameters
-        ----------
-        scenario : Scenario
-            Source of drive, rate, delay and force limit.
-        belt_speeds : tuple[float, float], optional
-            Lowest and highest belt speed, m/s; by default 10 % below and above the scenario's.
-
-        Returns
-        -------
-        Task
-            The task.
-
-        Raises
-        ------
-        InvalidInputError
-            If the speeds are not a range above zero, if they are omitted and the scenario's belt
-            is at rest, or if a design does not cover the scenario's control law.
-        """
-        plant, law = scenario.plant, scenario.control_law
-        if law is None:
-            raise InvalidInputError(
-                "plant.expects_control = False: without control there are no gains"
-            )
-        if not isinstance(law, Washout):
-            raise InvalidInputError(
-                f"control law = {law.name} is invalid: must be {Washout.name}, "
-                "whose gains a design proposes"
-            )
-        if plant.motor.kind == "mass":
-            raise InvalidInputError(
-                "plant.motor.kind = mass is refused: a design needs an ideal motor"
-            )
-        if belt_speeds is None:
-            own = abs(plant.belt_speed)
-            if own == 0.0:
-                raise InvalidInputError(
-                    "plant.belt_speed = 0: gains are for a moving belt, so speeds must be given"
-                )
-            belt_speeds = (own * (1.0 - OWN_SPEED_RANGE), own * (1.0 + OWN_SPEED_RANGE))
-        low, high = belt_speeds
-        if not SMALLEST <= low <= high <= LARGEST:
-            raise InvalidInputError(
-                f"belt speeds {low:g} to {high:g} m/s: must be from {SMALLEST:g} to {LARGEST:g}, "
-                "the lower first"
-            )
-        return cls(
-            plant.as_drive(),
-            plant.rate,
-            plant.force_delay,
-            min(law.force_limit, plant.actuator.limit),
-            (low, high),
-            plant.sensor,
-            scenario,
-        )
-
-    @property
-    def is_rough(self) -> bool:
-        """Whether noise or rounding keep the loop from resting."""
-        rounded = self.sensor.position_resolution or self.drive.actuator.resolution
-        return bool(rounded or self.sensor.position_noise or self.sensor.velocity_noise)
-
-    def drives(self) -> list[Drive]:
-        """Return the drive at five speeds across the range, or at the only one."""
-        low, high = self.belt_speeds
-        speeds = np.linspace(low, high, 5 if low < high else 1)
-        return [replace(self.drive, belt_speed=speed) for speed in speeds.tolist()]
 
 
 class Candidates:
@@ -133,18 +43,15 @@ class Candidates:
 
     def __init__(self, task: Task, vibrations: Sequence[Vibration]) -> None:
         self.task, self.vibrations = task, vibrations
+        plant = task.scenario.plant
         loops = (
-            LinearSampledLoop.from_drive(each.drive, task.rate, task.force_delay, task.sensor)
+            LinearSampledLoop.from_drive(each.drive, plant.rate, plant.force_delay, plant.sensor)
             for each in vibrations
         )
-        self.loops = [loop for loop in loops if loop is not None]
-        # The loops differ in the slope of the friction only: the two extreme ones decide.
-        slopes = [float(loop.jacobian[SPEED, SPEED]) for loop in self.loops]
-        ends = sorted({int(np.argmin(slopes)), int(np.argmax(slopes))})
-        self._extremes = [self.loops[index].coarsened() for index in ends]
+        self.loops = Loops([loop for loop in loops if loop is not None])
         # Twice the gain that settles without overshoot: a larger one does not damp faster.
         unit = task.drive.normal_force / task.drive.speed_scale
-        self._largest_gain = (4.0 + 2.0 * max(map(abs, slopes))) * unit
+        self._largest_gain = (4.0 + 2.0 * self.loops.steepest) * unit
         self._cubic_coefficient = _cubic_coefficient(task.drive)
         self._peaks: dict[float, float] = {}
         """Largest filtered speed of all vibrations, m/s, by cutoff frequency."""
@@ -162,10 +69,6 @@ class Candidates:
             return 0.0
         return max(vibration.peak_force(gains) for vibration in self.vibrations)
 
-    def slowest(self, gains: Washout) -> LinearSampledLoop:
-        """Return the loop in which a small deviation decays most slowly."""
-        return min(self.loops, key=lambda loop: loop.decay_rate(gains))
-
     def best(self, strength: float, cubic_shares: Sequence[float]) -> Washout | None:
         """Return the gains that damp fastest, with the share `strength` of what is allowed.
 
@@ -173,7 +76,7 @@ class Candidates:
         """
         if not self._vibrates:
             none = Washout(rounded(self.task.drive.angular_frequency), 0.0, 0.0)
-            if self.slowest(none).decay_rate(none) > 0.0:
+            if self.loops.slowest(none).decay_rate(none) > 0.0:
                 return none
         best, fastest = None, 0.0
         for share in cubic_shares:
@@ -181,7 +84,7 @@ class Candidates:
             if share > 0.0 and (cubic == 0.0 or isinf(self.task.force_limit)):
                 break
             gains = self._fastest(strength, cubic)
-            decay_rate = self.slowest(gains).decay_rate(gains)
+            decay_rate = 0.0 if gains is None else self.loops.slowest(gains).decay_rate(gains)
             if decay_rate > fastest * 1.05:  # less is not worth a larger cubic gain
                 best, fastest = gains, decay_rate
         return best
@@ -205,7 +108,7 @@ class Candidates:
     def why_none(self) -> str:
         """Return why no gains are stable at all speeds within the force limit."""
         frequencies = self._corner_frequencies(17).tolist()
-        sets = [[loop.stable_linear_gains(d) for loop in self._extremes] for d in frequencies]
+        sets = [[loop.stable_linear_gains(d) for loop in self.loops.deciding] for d in frequencies]
         if not any(
             max(one.low, other.low) < min(one.high, other.high)
             for each in sets
@@ -226,36 +129,29 @@ class Candidates:
     def _vibrates(self) -> bool:
         return any(vibration.vibrates for vibration in self.vibrations)
 
-    def _fastest(self, strength: float, cubic: float) -> Washout:
-        """Return the fastest gains: from five grids, each refined around the best point so far."""
+    def _fastest(self, strength: float, cubic: float) -> Washout | None:
+        """Return the fastest gains with this cubic gain; None if none are stable."""
+        corners = np.log(self._corner_frequencies(25)).tolist()
         # A positive cubic gain softens the control with a negative linear gain only.
-        limits = np.array(
-            [np.log(self._corner_frequencies(2)), [-1.0, 0.0 if cubic > 0.0 else 1.0]]
-        )
-        window, counts = limits, (25, 41)
-        best = Washout(0.0, 0.0, 0.0)
-        for _ in range(5):
-            logarithms, shares = (
-                np.linspace(low, high, count)
-                for (low, high), count in zip(window, counts, strict=True)
-            )
-            corners = np.exp(logarithms)
-            largest = [self._largest(corner, strength, cubic) for corner in corners.tolist()]
-            gains = np.outer(largest, shares)
-            rates = np.min([loop.decay_rates(corners, gains) for loop in self._extremes], axis=0)
-            row, column = np.unravel_index(int(np.argmax(rates)), rates.shape)
-            best = Washout(*map(rounded, (corners[row], gains[row, column], cubic)))
-            centre = np.array([[logarithms[row]], [shares[column]]])
-            reach = 0.3 / 2.0 * (window[:, 1:] - window[:, :1])
-            window = np.clip(centre + reach * [-1.0, 1.0], limits[:, :1], limits[:, 1:])
-            counts = (9, 9)
-        return best
+        most = 0.0 if cubic > 0.0 else 1.0
+        shares = np.linspace(-1.0, most, 21)
+
+        def gains(point: FloatArray) -> Washout:
+            logarithm, share = (point * _UNITS).tolist()
+            corner = rounded(exp(min(max(logarithm, corners[0]), corners[-1])))
+            share = min(max(share, -1.0), most)
+            linear = share * self._largest(corner, strength, cubic)
+            return Washout(corner, rounded(linear), rounded(cubic))
+
+        starts = np.stack(np.meshgrid(corners, shares), axis=-1).reshape(-1, 2) / _UNITS
+        found = fastest(self.loops, starts, gains, ways=_WAYS, kept=3)
+        return cast(Washout | None, found)
 
     def _corner_frequencies(self, count: int) -> FloatArray:
         """Return cutoff frequencies (rad/s), up to the rate: a faster filter passes nothing."""
         omega = self.task.drive.angular_frequency
         low, high = 0.02 * omega, 20.0 * omega
-        return np.geomspace(low, max(min(high, self.task.rate), 2.0 * low), count)
+        return np.geomspace(low, max(min(high, self.task.scenario.plant.rate), 2.0 * low), count)
 
     def _largest(self, corner_frequency: float, strength: float, cubic: float) -> float:
         """Return the largest allowed magnitude of the linear gain.
@@ -278,16 +174,6 @@ def _cubic_coefficient(drive: Drive) -> float:
     law, high = drive.dimensionless.friction, 1e6
     coefficient = -float(law.coefficient(high, 1.0)) / high**3
     return coefficient * drive.normal_force / drive.speed_scale**3 if coefficient > 1e-6 else 0.0
-
-
-def rounded(value: float, digits: int = 3, *, up: bool = False) -> float:
-    """Return a value rounded to `digits` significant digits, `up` or to the nearest."""
-    if value == 0.0:
-        return 0.0
-    if up:
-        unit = 10.0 ** (floor(log10(value)) + 1 - digits)
-        value = ceil(value / unit) * unit
-    return float(f"{value:.{digits}g}")
 
 
 @dataclass(frozen=True)

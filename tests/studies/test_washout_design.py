@@ -1,0 +1,258 @@
+"""Gains of the washout law for a drive, and whether they meet the stated requirements."""
+
+import re
+from dataclasses import replace
+from functools import cache
+from math import inf
+from typing import Any
+
+import numpy as np
+import pytest
+
+from stickslip_ros.physics.loop.controller import Controller
+from stickslip_ros.physics.loop.sampled_loop import LOCKSTEP_START, SampledLoop
+from stickslip_ros.physics.loop.simulation import simulate_sampled
+from stickslip_ros.physics.measures.cycle_measures import Measures, Regime
+from stickslip_ros.physics.measures.cycle_meter import CycleMeter
+from stickslip_ros.physics.model.control import Washout
+from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.model.friction import Coulomb
+from stickslip_ros.physics.motion import RecordedMotion
+from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop
+from stickslip_ros.samples import Sample
+from stickslip_ros.scenarios.files import load_scenario
+from stickslip_ros.studies.design import Task
+from stickslip_ros.studies.washout_design import WashoutDesign, design_washout
+from stickslip_ros.studies.washout_search import margins
+from tests.physics.drives import FEED_DRIVE
+
+
+def task(
+    belt_speeds: tuple[float, float] = (0.036, 0.044), force_limit: float = inf, **values: Any
+) -> Task:
+    """Return a task for the feed drive with other values of the plant; "__" stands for a point."""
+    changed = {f"plant.{name.replace('__', '.')}": value for name, value in values.items()}
+    return Task(load_scenario("feed_drive").changed(changed), belt_speeds, force_limit)
+
+
+@cache
+def designed(**values: Any) -> WashoutDesign:
+    """Return the design of a task; several tests look at the same one."""
+    return design_washout(task(**values))
+
+
+AT_40 = (0.04, 0.04)
+
+
+class RecordingController(Controller):
+    """Keeps the largest force it asked for."""
+
+    peak = 0.0
+
+    def answer(self, sample: Sample) -> float | None:
+        force = super().answer(sample)
+        self.peak = max(self.peak, abs(force or 0.0))
+        return force
+
+
+def controlled(
+    drive: Drive, delay: float, controller: Washout, duration: float
+) -> tuple[Measures, float]:
+    """Run the drive from rest, the controller coming on as it says; return measures and peak."""
+    motion = RecordedMotion(drive, 0.0, 0.0)
+    loop = SampledLoop(motion, 1000.0, LOCKSTEP_START, force_delay=delay)
+    washout = RecordingController(controller)
+    measures = simulate_sampled(loop, motion, washout, duration, CycleMeter(5))
+    return measures, washout.peak
+
+
+def proposal(found: WashoutDesign) -> Washout:
+    assert found.controller is not None, found.remark
+    return found.controller
+
+
+def check_from_its_own_limit_cycle(**values: Any) -> None:
+    """Check that the proposal brings the drive to rest, at speeds that were checked and others."""
+    found = designed(**values)
+    task = found.task
+    controller = proposal(found)
+    for speed in (*task.belt_speeds, sum(task.belt_speeds) / 2.0):
+        drive = replace(task.drive, belt_speed=speed)
+        start = 2.0 + controller.start_after
+        longest = max(check.settling_time or 0.0 for check in found.checks)
+        late = replace(controller, start_after=start, force_limit=inf)
+        measures, peak = controlled(
+            drive, values.get("force_delay", 0.0), late, start + 5.0 * longest + 1.0
+        )
+        assert measures.regime is Regime.EQUILIBRIUM
+        assert 0.0 < peak <= task.force_limit
+
+
+def test_a_proposal_brings_the_drive_to_rest_about_as_predicted() -> None:
+    found = designed(force_limit=100.0)
+    check_from_its_own_limit_cycle(force_limit=100.0)
+    for check in found.checks:
+        assert check.vibrates
+        # A large vibration dies out as nonlinearly as the friction is: here faster.
+        assert 0.3 < check.settling_time / check.predicted_settling_time < 1.0
+        assert check.peak_force == pytest.approx(check.predicted_peak_force, rel=0.02)
+        assert check.predicted_peak_force <= 100.0
+    assert len({check.belt_speed for check in found.checks}) == len(found.checks) > 3
+    assert "margin" not in (found.remark or "")
+
+
+def test_late_and_over_a_wide_range_too_it_brings_the_drive_to_rest() -> None:
+    check_from_its_own_limit_cycle(force_delay=0.005, force_limit=150.0)
+    check_from_its_own_limit_cycle(belt_speeds=(0.008, 0.04), force_limit=300.0)
+
+
+def test_nothing_near_a_proposal_is_much_faster() -> None:
+    gains = proposal(designed(belt_speeds=AT_40))
+    loop = LinearSampledLoop.from_drive(FEED_DRIVE, 1000.0)
+    corners = gains.corner_frequency * np.linspace(0.5, 2.0, 31)
+    linear = gains.linear_gain * np.linspace(0.5, 2.0, 31)
+    assert loop.decay_rate(gains) > 0.95 * loop.decay_rates(corners, linear).max()
+
+
+def test_margins_lead_to_the_edge_of_stability() -> None:
+    loop = LinearSampledLoop.from_drive(FEED_DRIVE, 1000.0, 0.0025)
+    gains = Washout(20.0, -3000.0, 0.0)
+    found = margins([loop], gains)
+    for factor in (found.gain_down, found.gain_up):
+        at_edge = replace(gains, linear_gain=factor * gains.linear_gain)
+        assert loop.spectral_radius(at_edge) == pytest.approx(1.0, abs=1e-9)
+    late = replace(loop, force_delay=0.0025 + found.delay)
+    assert late.spectral_radius(gains) == pytest.approx(1.0, abs=1e-9)
+
+
+def test_margins_are_the_tightest_of_the_range() -> None:
+    """The highest speed is stable without control, the lowest is the worst."""
+    found = designed(belt_speeds=(0.001, 0.06))
+    tightest = found.margins
+    for speed in np.linspace(0.001, 0.06, 9).tolist():
+        loop = LinearSampledLoop.from_drive(replace(FEED_DRIVE, belt_speed=speed), 1000.0)
+        one = margins([loop], proposal(found))
+        assert (one.gain_down or 0.0) <= tightest.gain_down < 1.0
+        assert (one.gain_up or inf) >= (tightest.gain_up or inf) > 1.0
+        assert (one.delay or inf) >= (tightest.delay or inf) > 0.0
+
+
+def test_without_damping_no_share_of_the_gain_is_unstable() -> None:
+    loop = LinearSampledLoop.from_drive(
+        replace(FEED_DRIVE, friction=Coulomb(0.4), damping=0.0), 1000.0
+    )
+    assert margins([loop], Washout(20.0, -3000.0, 0.0)).gain_down is None
+
+
+def test_a_tighter_limit_is_slower_and_in_the_end_there_is_nothing() -> None:
+    rates = []
+    for limit in (600.0, 200.0, 100.0):
+        found = designed(belt_speeds=AT_40, force_limit=limit)
+        rates.append(min(check.decay_rate for check in found.checks))
+    assert rates == sorted(rates, reverse=True)
+    found = designed(belt_speeds=AT_40, force_limit=20.0)
+    assert found.controller is None
+    assert found.parameter_file is None
+    assert "force limit of 20 N is too small" in (found.remark or "")
+
+
+def test_the_cubic_gain_is_within_what_the_friction_law_bears() -> None:
+    """The law's own, (mu_s - mu_m) N / (2 v_m^3), is 6e5 N s^3/m^3."""
+    controller = proposal(designed(force_limit=100.0))
+    assert 0.0 <= controller.cubic_gain <= 3e5
+    # From any speed it comes back, even with a force that is not limited.
+    for speed in (0.3, -3.0, 30.0):
+        motion = RecordedMotion(FEED_DRIVE, 0.0, speed)
+        loop = SampledLoop(motion, 1000.0, LOCKSTEP_START)
+        free = replace(controller, force_limit=inf, start_after=0.0)
+        measures = simulate_sampled(loop, motion, Controller(free), 8.0, CycleMeter(5))
+        assert measures.regime is Regime.EQUILIBRIUM
+
+
+@pytest.mark.parametrize(
+    "friction",
+    [
+        {"friction__law": "coulomb"},
+        {"friction__law": "exponential", "friction__kinetic": 0.25, "friction__decay_speed": 0.1},
+    ],
+)
+def test_a_law_that_does_not_grow_with_speed_gets_no_cubic_gain(friction: dict[str, Any]) -> None:
+    found = designed(damping=100.0, force_limit=200.0, **friction)
+    assert proposal(found).cubic_gain == 0.0
+
+
+def test_on_a_slow_belt_too_the_vibration_is_seen() -> None:
+    """At 0.2 mm/s the slide sticks for dozens of natural periods in each cycle."""
+    found = designed(belt_speeds=(0.0002, 0.0002))
+    (check,) = found.checks
+    assert check.vibrates
+    assert proposal(found).linear_gain < 0.0
+
+
+@pytest.mark.parametrize(
+    ("belt_speed", "said"),
+    [
+        (40.0, "40 m/s is 818.4 times the critical speed of 0.04888 m/s (belt speeds are in m/s)"),
+        (0.05, "(belt speeds are in m/s), with a very small margin"),
+    ],
+)
+def test_where_nothing_vibrates_the_gains_are_zero(belt_speed: float, said: str) -> None:
+    found = designed(belt_speeds=(belt_speed, belt_speed))
+    controller = proposal(found)
+    assert (controller.linear_gain, controller.cubic_gain) == (0.0, 0.0)
+    remark = found.remark or ""
+    assert remark.startswith("nothing vibrates")
+    assert remark.endswith(said)
+    (check,) = found.checks
+    assert not check.vibrates
+    assert check.settling_time is None
+
+
+def test_where_there_is_nothing_to_propose_it_says_why() -> None:
+    linear = {"friction__law": "linear", "friction__slope": 9.0}
+    tasks: list[tuple[dict[str, Any], str]] = [
+        ({"rate": 10.0, "force_limit": 1.0}, "no linear gain"),
+        ({"force_delay": 1.0}, "1000 periods late"),
+        (linear, "diverges"),
+    ]
+    for values, reason in tasks:
+        found = designed(**values)
+        assert found.controller is None
+        assert found.parameter_file is None
+        assert reason in (found.remark or "")
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("force_limit", "values"),
+    [(135.0, {"force_delay": 0.0015, "belt_speeds": (0.02, 0.04)}), (0.0, {})],
+)
+def test_the_force_that_it_says_would_do_does(force_limit: float, values: dict[str, Any]) -> None:
+    remark = designed(force_limit=force_limit, **values).remark or ""
+    hint = re.search(r"a force limit of about (\S+) N is sufficient", remark)
+    enough = float(hint[1])
+    assert enough > force_limit
+    assert designed(force_limit=enough, **values).controller is not None
+    assert designed(force_limit=0.95 * enough, **values).controller is None
+
+
+def test_next_to_no_margin_is_said() -> None:
+    late = designed(force_delay=0.018, belt_speeds=(0.02, 0.04))
+    assert late.margins.delay == pytest.approx(2e-4, rel=0.1)
+    assert "the margin is very small: an additional delay of 0.0001" in (late.remark or "")
+
+
+def test_what_a_limited_force_cannot_do_is_said() -> None:
+    friction = {"friction__law": "linear", "friction__slope": 4.5}
+    found = designed(force_limit=600.0, belt_speeds=AT_40, **friction)
+    assert proposal(found).cubic_gain == 0.0
+    assert "needs more force than the limit" in (found.remark or "")
+
+
+def test_it_is_the_same_every_time_and_progress_reaches_the_end() -> None:
+    shares: list[float] = []
+    first = design_washout(task(force_limit=200.0), shares.append)
+    second = designed(force_limit=200.0)
+    assert (first.controller, first.checks) == (second.controller, second.checks)
+    assert shares == sorted(shares)
+    assert shares[-1] == 1.0
