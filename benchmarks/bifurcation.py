@@ -1,6 +1,6 @@
 """How much longer than bare heyoka does a bifurcation diagram of 1,000 points take?
 
-Ours: `settled_from_rest` for the drives of the paper's figures 2 and 3, including compilation,
+Ours: `BifurcationFigure.settled` of the paper's figures 2 and 3, including compilation,
 transients, turning points and measures. Peer: heyoka's integrators of slip and stick with their
 terminal events, compiled beforehand, and the loop over these phases, for the same motions from
 rest over the same number of periods.
@@ -10,30 +10,26 @@ import time
 
 from benchmarks.bare import BareMotion
 from benchmarks.slices import Row, by_turns, compare_times, show
-from stickslip_ros.paper.figures import (
-    SETTLING,
-    bifurcation_drives,
-    bifurcation_values,
-    settled_from_rest,
-)
+from stickslip_ros.paper.figures import SETTLING, BifurcationFigure, compute_figure
 
 POINTS, ROUNDS = 1000, 3
 PERIODS = SETTLING.transient + SETTLING.cycles + 2
 
 
 def row(number: int) -> Row:
-    drives = bifurcation_drives(number, bifurcation_values(number, POINTS))
+    figure = compute_figure(number, points=POINTS)
+    assert isinstance(figure, BifurcationFigure)
     bare = BareMotion()
 
     def ours() -> float:
         start = time.perf_counter()
-        for drive in drives:
-            settled_from_rest(drive)
+        settled = BifurcationFigure(number, figure.values).settled
+        assert len(settled) == POINTS
         return time.perf_counter() - start
 
     def peer() -> float:
         start = time.perf_counter()
-        for drive in drives:
+        for drive in figure.drives:
             bare.run(drive, PERIODS * drive.natural_period)
         return time.perf_counter() - start
 

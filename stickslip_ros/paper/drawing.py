@@ -1,7 +1,6 @@
 """Drawing the paper's figures: bifurcation diagrams and phase portraits."""
 
 import re
-from itertools import cycle
 from math import ceil
 from pathlib import Path
 from textwrap import fill
@@ -13,7 +12,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.lines import Line2D
 
-from stickslip_ros.arrays import FloatArray
 from stickslip_ros.paper.figures import (
     LAST_CYCLES,
     BifurcationFigure,
@@ -21,15 +19,12 @@ from stickslip_ros.paper.figures import (
     PaperFigure,
     Portrait,
     PortraitFigure,
-    transition_marks,
-    unstable_equilibria,
 )
 from stickslip_ros.physics.measures.breakpoints import Breakpoints
 from stickslip_ros.show.quantities import Units, typeset
-from stickslip_ros.show.study_figure import draw_section, regime_handles
+from stickslip_ros.show.study_figure import draw_section, draw_transitions, regime_handles
 from stickslip_ros.show.style import (
     BLUE,
-    DASHES,
     GREEN,
     ORANGE,
     REGIMES,
@@ -84,7 +79,7 @@ def _bifurcation(figure: BifurcationFigure, *, style: FigureStyle) -> Figure:
     regimes = np.array([measures.regime for measures in figure.measures], dtype=object)
     draw_section(above, figure.values, regimes, [s.turning_points for s in figure.settled])
     handles = regime_handles(regimes)
-    unstable = unstable_equilibria(figure)
+    unstable = figure.unstable_equilibria
     if np.isfinite(unstable).any():
         dashed: Any = {"color": GREEN, "lw": 1.2, "ls": (0, (4.0, 2.0))}
         above.plot(figure.values, unstable, **dashed)
@@ -96,11 +91,8 @@ def _bifurcation(figure: BifurcationFigure, *, style: FigureStyle) -> Figure:
     below.set_ylim(0.0, max(1.05 * float(np.nanmax(stick, initial=0.0)), _LEAST_STICK_FRACTION))
     below.set_xlabel(typeset(figure.parameter))
     below.margins(x=0.01)
-    for (name, value), dashes in zip(transition_marks(figure).items(), cycle(DASHES)):
-        for axes in (above, below):
-            label = f"{transition_label(name)} {value:.5g}"
-            line = axes.axvline(value, color="black", lw=1.0, ls=dashes, label=label)
-        handles.append(line)
+    marks = {transition_label(name): [value] for name, value in figure.transitions.items()}
+    handles += draw_transitions((above, below), marks, lambda values: f"{values[0]:.5g}")
     style.legend_below(drawn, handles)
     finish(drawn)
     return drawn
@@ -138,18 +130,20 @@ def _portraits(figure: PortraitFigure, *, style: FigureStyle) -> Figure:
 def _panel(subfigure: SubFigure, panel: Panel, rows: int, columns: int, style: FigureStyle) -> None:
     title = fill(panel.title, _LINE_LENGTH) if style.narrow else panel.title
     subfigure.suptitle(typeset(title), fontweight="bold")
-    bounded = [portrait for portrait in panel.portraits if not portrait.runs_away]
     # A diverging motion gets a frame of its own: in a common one the others would be too small.
-    share = len(bounded) == len(panel.portraits)
+    share = not any(portrait.runs_away for portrait in panel.portraits)
     grid = subfigure.subplots(rows, columns, sharex=share, sharey=share, squeeze=False)
-    belt_speeds = np.array([portrait.drive.belt_speed for portrait in panel.portraits])
     for axes in grid.flat[len(panel.portraits) :]:
         axes.set_visible(False)
+    framed: Axes | None = None
     for number, (axes, portrait) in enumerate(zip(grid.flat, panel.portraits, strict=False)):
+        if not portrait.runs_away and not share:
+            if framed is not None:
+                axes.sharex(framed)
+                axes.sharey(framed)
+            framed = axes
+        axes.margins(0.06)
         _portrait(axes, portrait, style)
-        shown = [_framed(other) for other in ([portrait] if portrait.runs_away else bounded)]
-        axes.set_xlim(_range(*(breakpoints.position for breakpoints in shown)))
-        axes.set_ylim(_range(*(breakpoints.velocity for breakpoints in shown), belt_speeds))
         if number % columns == 0:
             axes.set_ylabel(_UNITS.named("velocity", short=True))
         if number + columns >= len(panel.portraits):
@@ -201,10 +195,3 @@ def _outcome(portrait: Portrait) -> str:
     if portrait.settling_time is None:
         outcome = "still settling"
     return f"{outcome}, amplitude {measures.amplitude:#.3g}"
-
-
-def _range(*columns: FloatArray) -> tuple[float, float]:
-    """Return limits with a margin around all values."""
-    values = np.concatenate(columns)
-    low, high, room = values.min(), values.max(), 0.06 * np.ptp(values)
-    return float(low - room), float(high + room)

@@ -21,7 +21,13 @@ from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import Coulomb, FrictionLaw, Linear, Stribeck
 from stickslip_ros.physics.motion import RecordedMotion
 from stickslip_ros.studies.options import SettlingOptions
-from stickslip_ros.studies.settling import ControlledDrive, MotionState, Settled, settle
+from stickslip_ros.studies.settling import (
+    CYCLES,
+    ControlledDrive,
+    MotionState,
+    Settled,
+    settle,
+)
 from stickslip_ros.studies.transitions import (
     HOPF_POINT,
     STICKING_LIMIT,
@@ -106,6 +112,11 @@ class Portrait:
         return self.measures.regime is Regime.UNBOUNDED
 
     @property
+    def vibrates(self) -> bool:
+        """Whether it ends in a limit cycle."""
+        return self.measures.regime in CYCLES
+
+    @property
     def last_cycles(self) -> Breakpoints:
         """The end of the trajectory: `LAST_CYCLES` cycles, or natural periods if there are none."""
         time = self.trajectory.time
@@ -131,22 +142,60 @@ class Portrait:
 
 @dataclass(frozen=True)
 class BifurcationFigure:
-    """A figure of one bifurcation diagram."""
+    """A figure of one bifurcation diagram; its motions are computed when first asked for."""
 
     number: int
-    title: str
-    parameter: str
-    """Name and symbol of the varied parameter."""
     values: FloatArray
-    """Its value for each drive."""
-    drives: tuple[Drive, ...]
-    settled: tuple[Settled, ...]
-    """The motion that each drive settles on from rest at X = 0."""
+    """Value of the varied parameter for each drive."""
+
+    @property
+    def title(self) -> str:
+        """Title of the figure."""
+        return _BIFURCATIONS[self.number].title
+
+    @property
+    def parameter(self) -> str:
+        """Name and symbol of the varied parameter."""
+        return _BIFURCATIONS[self.number].parameter
+
+    @cached_property
+    def drives(self) -> list[Drive]:
+        """The drive for each value."""
+        return [_BIFURCATIONS[self.number].drive(value) for value in self.values.tolist()]
+
+    @cached_property
+    def settled(self) -> list[Settled]:
+        """The motion that each drive settles on from rest at X = 0."""
+        rest = MotionState(0.0, 0.0)
+        return [settle(ControlledDrive(drive), rest, SETTLING) for drive in self.drives]
 
     @cached_property
     def measures(self) -> list[Measures]:
         """The measures of each motion."""
         return [motion.measures for motion in self.settled]
+
+    @property
+    def vibrating(self) -> list[bool]:
+        """Whether each drive ends in a limit cycle."""
+        return [measures.regime in CYCLES for measures in self.measures]
+
+    @property
+    def transitions(self) -> dict[str, float]:
+        """The values of the parameter at the transitions that the diagram shows, by name."""
+        drive, values = _BIFURCATIONS[self.number].drive, self.values.tolist()
+        found: dict[str, float] = {}
+        for name, margin in ((HOPF_POINT, hopf_margin), (STICKING_LIMIT, stick_margin)):
+            places = [*sign_changes(lambda x, of=margin: of(ControlledDrive(drive(x))), values)]
+            if places:
+                found[name] = places[-1]
+        return found
+
+    @property
+    def unstable_equilibria(self) -> FloatArray:
+        """The displacement of the unstable equilibrium for each drive, NaN if it is stable."""
+        margins = [hopf_margin(ControlledDrive(drive)) for drive in self.drives]
+        rest = [drive.equilibrium_position for drive in self.drives]
+        return np.where(np.less(margins, 0.0), rest, np.nan)
 
 
 @dataclass(frozen=True)
@@ -181,33 +230,11 @@ def compute_figure(number: int, *, points: int = POINTS) -> PaperFigure:
     `points` is the number of drives in a bifurcation diagram.
     """
     if number in _BIFURCATIONS:
-        return bifurcation_figure(number, bifurcation_values(number, points))
+        plan = _BIFURCATIONS[number]
+        return BifurcationFigure(number, np.linspace(plan.start, plan.end, points))
     title, panels = _PORTRAITS[number]
     computed = (Panel(name, tuple(map(portrait_of, cases))) for name, cases in panels.items())
     return PortraitFigure(number, title, tuple(computed))
-
-
-def bifurcation_values(number: int, points: int = POINTS) -> FloatArray:
-    """Return the values of the parameter of bifurcation diagram `number`."""
-    plan = _BIFURCATIONS[number]
-    return np.linspace(plan.start, plan.end, points)
-
-
-def bifurcation_figure(number: int, values: FloatArray) -> BifurcationFigure:
-    """Return bifurcation diagram `number` for some values of its parameter."""
-    plan, drives = _BIFURCATIONS[number], bifurcation_drives(number, values)
-    settled = tuple(map(settled_from_rest, drives))
-    return BifurcationFigure(number, plan.title, plan.parameter, values, tuple(drives), settled)
-
-
-def bifurcation_drives(number: int, values: FloatArray) -> list[Drive]:
-    """Return the drive of bifurcation diagram `number` for each value of its parameter."""
-    return [_BIFURCATIONS[number].drive(value) for value in values.tolist()]
-
-
-def settled_from_rest(drive: Drive) -> Settled:
-    """Return the motion that a drive settles on from rest at X = 0."""
-    return settle(ControlledDrive(drive), MotionState(0.0, 0.0), SETTLING)
 
 
 def portrait_of(case: PortraitCase) -> Portrait:
@@ -252,26 +279,6 @@ def _first_rise(trajectory: Breakpoints) -> float:
     falling = int(np.argmax(trajectory.velocity < 0.0))
     rise = falling + int(np.argmax(trajectory.velocity[falling:] >= 0.0))
     return float(trajectory.time[rise])
-
-
-def transition_marks(figure: BifurcationFigure) -> dict[str, float]:
-    """Return the values of the parameter at the transitions that the diagram shows, by name."""
-    drive, values = _BIFURCATIONS[figure.number].drive, figure.values.tolist()
-    found: dict[str, float] = {}
-    for name, margin in ((HOPF_POINT, hopf_margin), (STICKING_LIMIT, stick_margin)):
-        if places := [*sign_changes(lambda x, of=margin: of(ControlledDrive(drive(x))), values)]:
-            found[name] = places[-1]
-    return found
-
-
-def unstable_equilibria(figure: BifurcationFigure) -> FloatArray:
-    """Return the displacement of the unstable equilibrium for each drive, NaN if it is stable."""
-    return np.array(
-        [
-            drive.equilibrium_position if hopf_margin(ControlledDrive(drive)) < 0.0 else np.nan
-            for drive in figure.drives
-        ]
-    )
 
 
 @dataclass(frozen=True)

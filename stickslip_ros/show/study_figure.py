@@ -1,6 +1,6 @@
 """Figures of studies: the bifurcation diagram or map of a sweep, and basins of attraction."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import chain, cycle
 from math import prod
 from typing import Any
@@ -345,16 +345,29 @@ def _mark_transitions(
     panels: Sequence[Axes], study: Study, axis: Axis, units: Units
 ) -> list[Artist]:
     """Draw lines at the transitions; return their legend entries."""
+
+    def text(values: Sequence[float]) -> str:
+        more = [] if len(values) <= _MOST_SHOWN else ["..."]
+        return ", ".join(units.texts(values[:_MOST_SHOWN], axis.unit, 5) + more)
+
+    found = transitions(study, axis).items()
+    marks = {transition_label(name, axis.parameter): values for name, values in found}
+    return draw_transitions(panels, marks, text)
+
+
+def draw_transitions(
+    panels: Sequence[Axes],
+    marks: Mapping[str, Sequence[float]],
+    text: Callable[[Sequence[float]], str],
+) -> list[Artist]:
+    """Draw lines at the transitions, by label; return legend entries, with a text of the values."""
     handles: list[Artist] = []
-    for (name, values), dashes in zip(transitions(study, axis).items(), cycle(DASHES)):
+    for (label, values), dashes in zip(marks.items(), cycle(DASHES)):
         look: Any = {"color": "black", "lw": 1.2, "ls": dashes}
         for axes in panels:
             for value in values:
                 axes.axvline(value, **look)
-        more = [] if len(values) <= _MOST_SHOWN else ["..."]
-        shown = ", ".join(units.texts(values[:_MOST_SHOWN], axis.unit, 5) + more)
-        label = transition_label(name, axis.parameter)
-        handles.append(Line2D([], [], **look, label=f"{label} {shown}"))
+        handles.append(Line2D([], [], **look, label=f"{label} {text(values)}"))
     return handles
 
 

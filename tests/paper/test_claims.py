@@ -27,11 +27,11 @@ from stickslip_ros.paper.figures import (
     NUMBERS,
     PRINTED_SLOPE,
     STRIBECK,
+    BifurcationFigure,
     Panel,
     PaperFigure,
     PortraitCase,
     PortraitFigure,
-    bifurcation_figure,
     portrait_of,
     unit_drive,
 )
@@ -265,10 +265,10 @@ def test_under_the_printed_slope_the_stick_fraction_rises_with_the_damping_and_f
 
 
 def test_verdicts_survive_ten_times_the_range() -> None:
-    speeds = bifurcation_figure(2, np.array([0.02, 0.05, 0.2, 0.34, 0.6, 1.0, 3.0, 10.0]))
+    speeds = BifurcationFigure(2, np.array([0.02, 0.05, 0.2, 0.34, 0.6, 1.0, 3.0, 10.0]))
     assert verdict("rest-at-high-speed", speeds).verdict is HOLDS
     assert verdict("eq-3-range", speeds).verdict is CORRECTED
-    stiffnesses = bifurcation_figure(4, np.array([0.02, 0.2, 1.0, 5.0, 50.0]))
+    stiffnesses = BifurcationFigure(4, np.array([0.02, 0.2, 1.0, 5.0, 50.0]))
     assert verdict("fig-4-influence", stiffnesses).verdict is CORRECTED
     minima = (0.001, 0.01, 0.1, 0.25, 0.37, 0.39, 0.399)
     drives = [unit_drive(0.4, friction=replace(STRIBECK, minimum=m)) for m in minima]
@@ -277,8 +277,8 @@ def test_verdicts_survive_ten_times_the_range() -> None:
     assert verdict("fig-11-amplitude", figure).verdict is HOLDS
     wide = {
         2: speeds,
-        3: bifurcation_figure(3, np.array([0.0, 0.01, 0.05, 0.5])),
-        5: bifurcation_figure(5, np.array([1.0, 1.1, 2.0, 11.0])),
+        3: BifurcationFigure(3, np.array([0.0, 0.01, 0.05, 0.5])),
+        5: BifurcationFigure(5, np.array([1.0, 1.1, 2.0, 11.0])),
     }
     (claim,) = (claim for claim in CLAIMS if claim.identifier == "what-inhibits")
     assert claim.check(Evidence(wide.__getitem__)).verdict is HOLDS

@@ -12,20 +12,17 @@ import pytest
 
 from stickslip_ros.paper.figures import (
     SETTLED,
+    SETTLING,
     BifurcationFigure,
     Portrait,
     PortraitCase,
-    bifurcation_drives,
-    bifurcation_values,
     compute_figure,
     portrait_of,
-    settled_from_rest,
-    transition_marks,
-    unstable_equilibria,
 )
 from stickslip_ros.physics.measures.cycle_measures import Regime
 from stickslip_ros.physics.model.friction import Coulomb, Linear
 from stickslip_ros.physics.motion.motion import Motion
+from stickslip_ros.studies.settling import ControlledDrive, MotionState, settle
 from tests.physics.drives import FEED_DRIVE, LIMIT_CYCLES, PAPER, LimitCycle
 
 DECAY = 0.05
@@ -55,8 +52,8 @@ def regimes(figure: BifurcationFigure) -> list[Regime | None]:
 
 def test_the_parameter_of_a_bifurcation_diagram_is_all_that_varies() -> None:
     for number in (2, 3, 4, 5):
-        values = bifurcation_values(number, 5)
-        drives = bifurcation_drives(number, values)
+        figure = compute_figure(number, points=5)
+        values, drives = figure.values, figure.drives
         varied = {
             2: [drive.belt_speed for drive in drives],
             3: [drive.damping / 2.0 for drive in drives],
@@ -74,7 +71,8 @@ def test_a_settled_motion_has_the_turning_points_of_its_drive() -> None:
     at_rest = replace(PAPER, belt_speed=0.6)
     cycle = next(cycle for cycle in LIMIT_CYCLES if cycle.belt_speed == 0.4)
     drives = [PAPER, runs_away, PAPER, resting_belt, at_rest, FEED_DRIVE]
-    settled = [settled_from_rest(drive) for drive in drives]
+    rest = MotionState(0.0, 0.0)
+    settled = [settle(ControlledDrive(drive), rest, SETTLING) for drive in drives]
     first, away, again, held, rest, feed = (motion.turning_points for motion in settled)
     assert len(first) >= 10
     assert np.abs(first - cycle.midpoint) == pytest.approx(cycle.amplitude, abs=1e-8)
@@ -105,13 +103,13 @@ def test_over_the_belt_speed_sticking_ends_and_then_the_vibration() -> None:
 
 def test_theory_adds_the_unstable_equilibria_and_the_last_of_each_transition() -> None:
     figure = over_belt_speed()
-    found = unstable_equilibria(figure)
+    found = figure.unstable_equilibria
     # Eq. 9: v_b1 = 0.4888. On a belt at rest there is no equilibrium of slip.
     assert np.isfinite(found).tolist() == [False, *[True] * 4, *[False] * 6]
     # Eq. 6: X0 = mu_s - a v0 + b v0^3.
     values = figure.values[1:5]
     assert found[1:5] == pytest.approx(0.4 - 0.45 * values + 0.6 * values**3, rel=1e-12)
-    marks = transition_marks(figure)
+    marks = figure.transitions
     assert marks["Hopf point"] == pytest.approx(0.48876, abs=1e-5)
     assert marks["limit of sticking"] == pytest.approx(0.4395, abs=1e-3)
 

@@ -13,7 +13,6 @@ from stickslip_ros.paper.claims.paper_values import (
     STATES,
     TAKEN_DAMPING,
     TAKEN_FOR_DAMPING,
-    VIBRATING,
     critical_beta,
     cycles,
     expansion,
@@ -27,6 +26,7 @@ from stickslip_ros.paper.figures import STRIBECK, BifurcationFigure, unit_drive
 from stickslip_ros.physics.measures.cycle_measures import Regime
 from stickslip_ros.physics.model.functions import zero_between
 from stickslip_ros.physics.theory.hopf import hopf_points
+from stickslip_ros.studies.settling import CYCLES
 
 computes = Computations()
 
@@ -51,7 +51,7 @@ def _turning_points(figure: BifurcationFigure, row: int) -> int:
 
 def _periodicity(figure: BifurcationFigure, end: float) -> Observation:
     """Observe whether the vibrations up to the value `end` are not periodic."""
-    rows = _rows(figure, lambda value, regime: regime in VIBRATING and value < end)
+    rows = _rows(figure, lambda value, regime: regime in CYCLES and value < end)
     counts = {_turning_points(figure, row) for row in rows}
     return Observation(min(counts) > 2, counts=sorted(counts), motions=len(rows), end=end)
 
@@ -132,9 +132,8 @@ def _(evidence: Evidence) -> Observation:
     figure, speed = evidence.bifurcation(2), hopf_point().belt_speed
     below = _rows(figure, lambda v, _: 0.0 < v < _SETTLED_SHARE * speed)
     above = _rows(figure, lambda v, _: v > speed / _SETTLED_SHARE)
-    measures = figure.measures
-    agree = [measures[row].regime in VIBRATING for row in below]
-    agree += [measures[row].regime is Regime.EQUILIBRIUM for row in above]
+    agree = [figure.vibrating[row] for row in below]
+    agree += [figure.measures[row].regime is Regime.EQUILIBRIUM for row in above]
     return Observation(
         all(agree), agreeing=sum(agree), total=len(agree), settled_share=_SETTLED_SHARE, speed=speed
     )
@@ -144,7 +143,7 @@ def _(evidence: Evidence) -> Observation:
 def _(evidence: Evidence) -> Observation:
     figure = evidence.bifurcation(3)
     critical = critical_beta(figure.drives[0].belt_speed)
-    vibrating = [measure.regime in VIBRATING for measure in figure.measures]
+    vibrating = figure.vibrating
     edges = sum(a != b for a, b in pairwise(vibrating))
     return Observation(
         vibrating[0] and not vibrating[-1] and edges == 1,
@@ -198,14 +197,14 @@ def _(evidence: Evidence) -> Observation:
 @computes("fig-4-no-cure")
 def _(evidence: Evidence) -> Observation:
     figure = evidence.bifurcation(4)
-    vibrating = [measure.regime in VIBRATING for measure in figure.measures]
+    vibrating = figure.vibrating
     return Observation(all(vibrating), count=sum(vibrating), total=len(vibrating))
 
 
 @computes("fig-5-ratio")
 def _(evidence: Evidence) -> Observation:
     figure = evidence.bifurcation(5)
-    vibrating = [measure.regime in VIBRATING for measure in figure.measures]
+    vibrating = figure.vibrating
     edges = sum(a != b for a, b in pairwise(vibrating))
 
     def p(ratio: float) -> float:

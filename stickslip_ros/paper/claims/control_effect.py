@@ -14,7 +14,6 @@ from stickslip_ros.paper.claims.paper_values import (
     STUDIED_SPEED,
     TAKEN_DAMPING,
     TAKEN_FOR_DAMPING,
-    VIBRATING,
     amplitude,
     amplitudes,
     border,
@@ -36,6 +35,7 @@ from stickslip_ros.physics.measures.cycle_measures import Regime
 from stickslip_ros.physics.model.control import Washout
 from stickslip_ros.physics.motion import Motion
 from stickslip_ros.physics.theory.hopf import hopf_points
+from stickslip_ros.studies.settling import CYCLES
 
 computes = Computations()
 
@@ -271,7 +271,7 @@ def _(evidence: Evidence) -> Observation:
     linear, cubic, _ = evidence.portraits(13).panels
     ends = linear.portraits[-1].measures.regime
     strongest = cubic.portraits[-1]
-    vibrates = sum(portrait.measures.regime in VIBRATING for portrait in cubic.portraits)
+    vibrates = sum(portrait.vibrates for portrait in cubic.portraits)
     starts = ((3.0, 0.0), (-3.0, 0.0), (0.0, 3.0), (0.0, -3.0))
     resting = [_comes_to_rest(k1, x, y) for k1 in (-1.0, -10.0) for x, y in starts]
     return Observation(
@@ -321,9 +321,9 @@ _SETTLING_TRACE = 0.02
 def _(evidence: Evidence) -> Observation:
     figures = [evidence.bifurcation(number) for number in (2, 3, 4, 5)]
     agree = [
-        (measures.regime in VIBRATING) == (p > 0.0)
+        vibrates == (p > 0.0)
         for figure in figures
-        for measures, drive in zip(figure.measures, figure.drives, strict=True)
+        for vibrates, drive in zip(figure.vibrating, figure.drives, strict=True)
         if drive.belt_speed > 0.0 and abs(p := trace_of(drive)) > _SETTLING_TRACE
     ]
     return Observation(
@@ -383,8 +383,8 @@ def _(evidence: Evidence) -> Observation:
     quiet = [ends[0].measures[-1], ends[1].measures[-1], ends[2].measures[0]]
     loud = [ends[0].measures[slow], ends[1].measures[0], ends[2].measures[-1]]
     return Observation(
-        all(measures.regime in VIBRATING for measures in loud)
-        and not any(measures.regime in VIBRATING for measures in quiet),
+        all(measures.regime in CYCLES for measures in loud)
+        and not any(measures.regime in CYCLES for measures in quiet),
         outcome=", ".join(str(measures.regime) for measures in quiet),
         speed=ends[0].drives[slow].belt_speed,
         loud=", ".join(str(measures.regime) for measures in loud),
@@ -419,7 +419,7 @@ def _(evidence: Evidence) -> Observation:
 def _(evidence: Evidence) -> Observation:
     linear, cubic, slow = evidence.portraits(13).panels
     portraits = [*linear.portraits[1:], *cubic.portraits, *slow.portraits]
-    vibrating = [portrait.measures.regime in VIBRATING for portrait in portraits]
+    vibrating = [portrait.vibrates for portrait in portraits]
     return Observation(
         not any(vibrating),
         not all(vibrating),

@@ -56,9 +56,6 @@ STUDIED_SPEED = 0.49
 FILTER = Washout(corner_frequency=2.0, linear_gain=0.0, cubic_gain=0.0)
 """A washout filter with the cutoff frequency of eq. 20 and no gain."""
 
-VIBRATING = (Regime.STICK_SLIP, Regime.PURE_SLIP)
-"""Regimes of vibration."""
-
 _ROUNDING = 1e-12
 """Deviation below which a speed equals that of the belt, as a share of it."""
 
@@ -269,8 +266,4 @@ def amplitude(portrait: Portrait) -> float:
 
 def stick_fractions(portraits: Sequence[Portrait]) -> list[float]:
     """Return the stick fractions of the vibrating motions."""
-    return [
-        portrait.measures.stick_fraction or 0.0
-        for portrait in portraits
-        if portrait.measures.regime in VIBRATING
-    ]
+    return [each.measures.stick_fraction or 0.0 for each in portraits if each.vibrates]

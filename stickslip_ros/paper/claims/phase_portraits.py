@@ -11,7 +11,6 @@ from stickslip_ros.paper.claims.paper_values import (
     FASTER,
     PRINTED_HOPF_SPEED,
     SLOWER,
-    VIBRATING,
     amplitude,
     approximate_onset,
     arrivals,
@@ -93,7 +92,7 @@ def _(evidence: Evidence) -> Observation:
 def _(evidence: Evidence) -> Observation:
     below = _of_speed(evidence, 0.0, hopf_point().belt_speed)
     return Observation(
-        set(regimes(below)) <= set(VIBRATING),
+        all(portrait.vibrates for portrait in below),
         speeds=belt_speeds(below),
         sizes=[amplitude(portrait) for portrait in below],
     )
@@ -250,7 +249,7 @@ def _(evidence: Evidence) -> Observation:
     # the tangent slope, and the printed one at two belt speeds
     tangent, printed, slow = evidence.portraits(9).panels
     least = [panel.portraits[0] for panel in (tangent, printed, slow)]
-    vibrates = [portrait.measures.regime in VIBRATING for portrait in least]
+    vibrates = [portrait.vibrates for portrait in least]
     laws = [Linear(STRIBECK.static, slope) for slope in (PRINTED_SLOPE, TANGENT_SLOPE)]
     fastest = [
         border(lambda v, law=law: stays(unit_drive(v, friction=law)), 0.01, 2.0) for law in laws
@@ -299,10 +298,10 @@ def _(evidence: Evidence) -> Observation:
 def _(evidence: Evidence) -> Observation:
     laws = (Coulomb(STRIBECK.static), Linear(STRIBECK.static, TANGENT_SLOPE))
     traces = [trace_of(unit_drive(0.2, friction=law)) for law in laws]
-    flat = [p.measures.regime for p in evidence.portraits(8).portraits if p.drive.damping > 0.0]
-    falls = evidence.portraits(9).panels[0].portraits[0].measures.regime
+    flat = [p.vibrates for p in evidence.portraits(8).portraits if p.drive.damping > 0.0]
+    falls = evidence.portraits(9).panels[0].portraits[0].vibrates
     return Observation(
-        traces[0] < 0.0 < traces[1] and falls in VIBRATING and not set(flat) & set(VIBRATING),
+        traces[0] < 0.0 < traces[1] and falls and not any(flat),
         traces=traces,
     )
 
