@@ -153,7 +153,8 @@ class Pacer:
 class LockstepPacer(Pacer):
     """Continues as soon as the force has arrived, but not too far ahead of the recorder.
 
-    A controller or recorder that is silent for `reply_timeout` is ignored until it publishes again.
+    A controller or recorder that is silent for `reply_timeout`, while this node runs, is ignored
+    until it publishes again.
     """
 
     def __init__(
@@ -175,9 +176,11 @@ class LockstepPacer(Pacer):
         )
         self._scheduled = False
         self._seen = -1
-        self._seen_at = 0.0
-        shortest = min(self._silence, self._reply_timeout)
-        self._watchdog = node.every(min(0.1, shortest / 10.0), self._watch)
+        self._held_up = 0.0
+        """Time, s, since the present sample was seen."""
+        self._watched_at = time.monotonic()
+        self._look_period = min(0.1, min(self._silence, self._reply_timeout) / 10.0)
+        self._watchdog = node.every(self._look_period, self._watch)
 
     def start(self, last: int) -> None:
         """Publish sample 0 and, once the node is active, continue when it is answered."""
@@ -251,11 +254,15 @@ class LockstepPacer(Pacer):
     def _watch(self) -> None:
         """Stop waiting for a controller or recorder that has held up the loop for too long."""
         now = time.monotonic()
+        # While this node could not run, what the others sent could not come.
+        passed = min(now - self._watched_at, 2.0 * self._look_period)
+        self._watched_at = now
         if self._loop.sample_number != self._seen:
-            self._seen, self._seen_at = self._loop.sample_number, now
+            self._seen, self._held_up = self._loop.sample_number, 0.0
             return
-        patience_ends = now - self._seen_at >= self._reply_timeout
-        silent = self._awaits_force and now - self._seen_at >= self._silence
+        self._held_up += passed
+        patience_ends = self._held_up >= self._reply_timeout
+        silent = self._awaits_force and self._held_up >= self._silence
         if self._awaits_recorder and (silence := self._flow.give_up(patience_ends)):
             self.complaint = silence
             self._node.get_logger().warning(silence)

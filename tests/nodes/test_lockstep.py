@@ -2,11 +2,12 @@
 
 import time
 from collections.abc import Callable
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
-from stickslip_ros.messages.codec import unpack_header
+from stickslip_ros.messages.codec import pack_wrench, unpack_header
 from stickslip_ros.messages.topics import CONTROL_FORCE
 from stickslip_ros.nodes.base.managed import WARN
 from stickslip_ros.nodes.plant import PlantNode
@@ -90,6 +91,26 @@ def test_a_killed_analyzer_holds_the_plant_up_once_and_no_longer_than_the_timeou
     assert figures["late_forces"] == 0
     assert len(watch.log_lines(SILENT_RECORDER)) == 1
     assert watch.longest_gap() >= timeout
+
+
+def test_time_in_which_the_plant_does_not_run_is_not_silence_of_others(
+    graph: Graph, watch: Watch, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stopped = 0.0
+    clock = SimpleNamespace(monotonic=lambda: time.monotonic() + stopped)
+    monkeypatch.setattr("stickslip_ros.nodes.pacing.time", clock)
+    plant = graph.add(PlantNode, wait_for=["observer"], reply_timeout=1e3)
+    force = graph.publisher(CONTROL_FORCE, 1)
+    for number, stamp in enumerate(grid(3)):
+        graph.wait_until(lambda count=number + 1: len(watch.stamps) == count, "the sample")
+        graph.run_for(0.5)
+        stopped += 1e4
+        graph.run_for(0.5)
+        force.publish(pack_wrench(stamp, 0.25))
+    graph.wait_until(lambda: len(watch.stamps) == 4, "the last sample")
+    figures = plant.diagnose()[2]
+    assert (figures["late_forces"], figures["dropped_messages"]) == (0, 0)
+    assert not watch.log_lines(NO_FORCE)
 
 
 def test_a_controller_that_falls_silent_is_waited_for_once_and_taken_back(
