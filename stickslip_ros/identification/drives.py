@@ -21,8 +21,10 @@ from stickslip_ros.identification.filtered import filtered
 from stickslip_ros.identification.fit import Candidate
 from stickslip_ros.identification.laws import DELAY, LAG, IdentifiedLaw
 from stickslip_ros.identification.record import Record
-from stickslip_ros.identification.refinement import Refinement, refine, restarted
+from stickslip_ros.identification.refinement import Refinement
 from stickslip_ros.identification.regression import LINEAR, Regression, Rows, regress
+from stickslip_ros.identification.search import refine
+from stickslip_ros.identification.starts import Errors, best_starts
 from stickslip_ros.identification.time_limit import TimeLimit
 from stickslip_ros.identification.trajectories import Trajectories, segments_of
 from stickslip_ros.identification.trajectory import Predictor
@@ -146,7 +148,7 @@ class DriveTask:
         least = min(map(_loss, found))
         near = [each for each in found if _loss(each) <= _HOPELESS_LOSS_RATIO * least]
         candidates = {
-            each: Candidate(each, each.losses, "much worse in the search: not fitted further")
+            each: Candidate(each, each.best.losses, "much worse in the search: not fitted further")
             for each in found
         }
         for number, each in enumerate(sorted(near, key=_loss)):
@@ -179,7 +181,7 @@ class DriveTask:
         """Return a model fitted to short segments, from several starts, or from a LuGre one."""
         if like is not None:
             # The static friction of Dahl's law is the kinetic one.
-            values = {**like.values, "static": like.values["kinetic"]}
+            values = {**like.best.values, "static": like.best.values["kinetic"]}
             return self._nearest(law, [values], _GIVEN_UP_LOSS_RATIO * _loss(like))
         own = law.own if isinstance(law, DirectionalAdapter) else law
         fastest = float(self.rows.speeds[-1])
@@ -236,7 +238,7 @@ class DriveTask:
                 return tried[-1]
         finished: list[Refinement] = []
         for near in sorted(tried, key=_loss)[:_FINALISTS]:
-            fit = self._settled(near)
+            fit = self._settled(near.best)
             if not is_white(fit):
                 fit = self._with_optional(fit, least_share=_OPTIONAL_GAIN)
             finished.append(fit)
@@ -244,58 +246,61 @@ class DriveTask:
                 break
         return min(finished, key=_loss)
 
-    def _settled(self, near: Refinement) -> Refinement:
-        """Return the best fit near another one: segments with wrong starts try others."""
-        near = refine(near.task, near.free, near.values, near.starts, most=_STEPS)
-        while near.has_outliers:
-            starts = restarted(near).starts
-            other = refine(near.task, near.free, near.values, starts, most=_STEPS)
-            if _loss(other) > _RESTART_LOSS_RATIO * _loss(near):
+    def _settled(self, near: Errors) -> Refinement:
+        """Return the best fit near other values: segments with wrong starts try others."""
+        fit = refine(near.task, near.names, near.values, near.starts, most=_STEPS)
+        while fit.best.has_outliers:
+            starts = fit.best.restarted().starts
+            other = refine(near.task, near.names, fit.best.values, starts, most=_STEPS)
+            if _loss(other) > _RESTART_LOSS_RATIO * _loss(fit):
                 break
-            near = other
-        return near
+            fit = other
+        return fit
 
     def _with_optional(self, fit: Refinement, *, least_share: float) -> Refinement:
         """Return the fit with the constants that the records ask for.
 
         They must take away a share of the squared error, and differ clearly from zero.
         """
+        task = fit.best.task
         for name in (*OPTIONAL, *fit.law.optional):
-            if name in self.fixed or name in self.friction or name in fit.free:
+            best = fit.best
+            if name in self.fixed or name in self.friction or name in best.names:
                 continue
             errors, share = fit.gain(name)
-            clear = _LAG_GAIN if name == LAG and DELAY in fit.free else _CLEAR_GAIN
+            clear = _LAG_GAIN if name == LAG and DELAY in best.names else _CLEAR_GAIN
             unclear = abs(errors) < _OPTIONAL_ERRORS and share < clear
             if unclear or share < least_share:
                 continue
-            more = refine(fit.task, [*fit.free, name], fit.values, fit.starts, most=_STEPS)
+            more = refine(task, [*best.names, name], best.values, best.starts, most=_STEPS)
             if _loss(more) >= _loss(fit):
                 continue
             if _errors_from_zero(more, name) > _ZERO_ERRORS:
                 fit = more
                 continue
             # It was not needed, but may have led the others out of a local minimum.
-            without = {**more.values, name: fit.values[name]}
-            other = refine(fit.task, fit.free, without, more.starts, most=_STEPS)
+            without = {**more.best.values, name: best.values[name]}
+            other = refine(task, best.names, without, more.best.starts, most=_STEPS)
             fit = min(fit, other, key=_loss)
-        if {DELAY, LAG} <= {*fit.free} and _errors_from_zero(fit, DELAY) < _ZERO_ERRORS:
+        best = fit.best
+        if {DELAY, LAG} <= {*best.names} and _errors_from_zero(fit, DELAY) < _ZERO_ERRORS:
             # It stood for the lag.
-            free = [name for name in fit.free if name != DELAY]
-            fit = refine(fit.task, free, {**fit.values, DELAY: 0.0}, fit.starts, most=_STEPS)
+            free = [name for name in best.names if name != DELAY]
+            fit = refine(task, free, {**best.values, DELAY: 0.0}, best.starts, most=_STEPS)
         return fit
 
     def finished(self, near: Refinement) -> Candidate:
         """Return a fit to long segments, with the constants that the records ask for."""
         task = self._trajectories(near.law, _LONG_SEGMENT * self.period)
         # Measured starts are too rough for motions that grow over a segment.
-        begun = refine(task, (), near.values)
-        fit = self._settled(replace(begun, free=near.free))
+        begun = best_starts(task, near.best.values)
+        fit = self._settled(replace(begun, names=near.best.names))
         fit = self._with_optional(fit, least_share=0.0)
         held_out = _held_out(fit)
         if not self.limit.is_over:
             return Candidate(fit, held_out)
         self.left.append(fit.law.name)
-        return Candidate(fit, fit.losses, OUT_OF_TIME)
+        return Candidate(fit, fit.best.losses, OUT_OF_TIME)
 
     def _regression(self, law: IdentifiedLaw, shape: float | None = None) -> Regression:
         fixed = {name: 0.0 for name in LINEAR if name not in self.free} | {
@@ -328,31 +333,31 @@ def is_white(fit: Refinement) -> bool:
 
 def _errors_from_zero(fit: Refinement, name: str) -> float:
     """Return by how many standard errors a fitted coordinate differs from zero."""
-    place = [*fit.free].index(name)
+    place = [*fit.best.names].index(name)
     error = sqrt(max(fit.covariance[place, place], 0.0))
-    return abs(fit.values[name]) / error if error > 0.0 else inf
+    return abs(fit.best.values[name]) / error if error > 0.0 else inf
 
 
 def _share(fit: Refinement) -> float:
     """Return the rms error as a share of the rms motion."""
-    return sqrt(_loss(fit) / len(fit.residual)) / float(np.std(fit.task.positions))
+    return sqrt(_loss(fit) / len(fit.best.residual)) / fit.scale
 
 
 def _loss(fit: Refinement) -> float:
-    return float(fit.residual @ fit.residual)
+    return fit.best.loss
 
 
 def _held_out(fit: Refinement) -> FloatArray:
     """Return the mean square error in each segment, fitted to the other half of the segments."""
-    count = len(fit.task.segments)
+    best = fit.best
+    count = len(best.starts)
     losses = np.empty(count)
     if count < 4:
-        return fit.losses
+        return best.losses
     for half in (0, 1):
         trained = np.arange(count) % 2 == half
-        others = refine(fit.task.chosen(trained), fit.free, fit.values, fit.starts[trained], most=6)
-        predicted = refine(
-            fit.task.chosen(~trained), (), others.values, fit.starts[~trained], most=12
-        )
-        losses[~trained] = predicted.losses
+        task, starts = best.task.chosen(trained), best.starts[trained]
+        others = refine(task, best.names, best.values, starts, most=6)
+        rest = best.task.chosen(~trained)
+        losses[~trained] = best_starts(rest, others.best.values, best.starts[~trained]).losses
     return losses

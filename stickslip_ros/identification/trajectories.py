@@ -4,7 +4,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
-from typing import NamedTuple
 
 import numpy as np
 
@@ -24,17 +23,6 @@ _MOTION_STEP = 1e-5
 """Step, as a share of the value, of what a motion has no derivatives by."""
 _UNBOUNDED_ERROR = 10.0
 """Error of a motion that is not bounded, in spans of the record."""
-
-
-class Sensitivities(NamedTuple):
-    """Outputs of segments with their derivatives; arrays with a row for each output."""
-
-    outputs: FloatArray
-    """Positions, m, and velocities, m/s, see `Predictor.followed`."""
-    by_names: FloatArray
-    """Derivatives by coordinates, SI units; shape (rows, names)."""
-    by_start: FloatArray
-    """Derivatives by position and velocity at the start of the own segment; shape (rows, 2)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,60 +113,62 @@ class Trajectories:
 
     def sensitivities(
         self, values: Mapping[str, float], starts: FloatArray, names: Sequence[str]
-    ) -> Sensitivities:
-        """Return the outputs of all segments, and their derivatives: zero without a motion."""
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return the outputs of all segments, and their derivatives: zero without a motion.
+
+        The derivatives are those by coordinates, SI units, shape (rows, names), and by position and
+        velocity at the start of the own segment, shape (rows, 2).
+        """
         count = len(self.measured)
-        found = Sensitivities(
-            np.full(count, np.nan), np.zeros((count, len(names))), np.zeros((count, 2))
-        )
-        try:
-            self._follow(values, starts, names, found)
-        except (InvalidInputError, RunError):
-            found.outputs[:] = np.nan
-        found = found._replace(outputs=self._bounded(found.outputs))
+        outputs = np.full(count, np.nan)
+        by_names, by_start = np.zeros((count, len(names))), np.zeros((count, 2))
         typical = self.typical(values)
-        for name in self._by_differences(names):
+        others = [name for name in names if name in (DELAY, LAG, *self.law.by_differences)]
+        own = [name for name in names if name not in others]
+        place = {name: number for number, name in enumerate(names)}
+        try:
+            steps = {name: _STEP * max(abs(values[name]), typical.get(name, 0.0)) for name in own}
+            followed = self._followed(values, starts, steps)
+            for part, (found, *derivatives) in zip(self.parts, followed, strict=True):
+                outputs[part] = found
+                by_names[part, [place[name] for name in own]], by_start[part] = derivatives
+        except (InvalidInputError, RunError):
+            outputs[:] = np.nan
+        outputs = self._bounded(outputs)
+        for name in others:
             step = _MOTION_STEP * max(abs(values[name]), typical.get(name, 0.0))
             moved = self.predicted({**values, name: values[name] + step}, starts)
-            found.by_names[:, list(names).index(name)] = (moved - found.outputs) / step
-        return found
+            by_names[:, place[name]] = (moved - outputs) / step
+        return outputs, by_names, by_start
 
-    def _follow(
-        self,
-        values: Mapping[str, float],
-        starts: FloatArray,
-        names: Sequence[str],
-        found: Sensitivities,
-    ) -> None:
+    def _followed(
+        self, values: Mapping[str, float], starts: FloatArray, steps: Mapping[str, float]
+    ) -> Iterator[tuple[FloatArray, FloatArray, FloatArray]]:
+        """Yield outputs, and derivatives by coordinates and by the start, of each segment.
+
+        `steps` are those of the coordinates in differences of the constants.
+        """
         drive = self._drive(values)
-        typical, moved = self.typical(values), list[tuple[float, Drive]]()
-        others = self._by_differences(names)
-        columns = [number for number, name in enumerate(names) if name not in others]
-        for name in (names[number] for number in columns):
-            step = _STEP * max(abs(values[name]), typical.get(name, 0.0))
-            other = {**values, name: values[name] + step}
-            moved.append((step, self._drive(other)))
+        moved = [
+            (step, self._drive({**values, name: values[name] + step}))
+            for name, step in steps.items()
+        ]
 
         def by_coordinates(function: Callable[[Drive], FloatArray]) -> FloatArray:
             base = function(drive)
-            return np.column_stack([(function(other) - base) / step for step, other in moved])
+            columns = [(function(other) - base) / step for step, other in moved]
+            return np.transpose(columns).reshape(len(base), len(moved))
 
         def of_system(other: Drive) -> FloatArray:
             system = drive_system(in_units_of(drive, other))
             return np.array([system.constants[name] for name in system.free_constants])
 
-        of_constants = by_coordinates(of_system) if moved else None
-        parts = iter(self.parts)
+        of_constants = by_coordinates(of_system)
         for predictor, segments, own in self._by_record(values, starts):
             delay, belt = values.get(DELAY, 0.0), predictor.record.belt_velocity
             runs = predictor.sensitivities(drive, segments, own, delay)
             units = 1.0 / drive.length_scale, 1.0 / drive.speed_scale
             for segment, (_, velocity), (outputs, rows) in zip(segments, own, runs, strict=True):
-                part = next(parts)
-                found.outputs[part] = outputs
-                found.by_start[part] = rows[:, :2] * units
-                if of_constants is None:
-                    continue
                 order = rows.shape[1] - len(of_constants)
                 derivatives = rows[:, order:] @ of_constants
                 if order > MEMORY:
@@ -188,7 +178,7 @@ class Trajectories:
                             np.array(steady_memory(other, *speeds)) / drive.length_scale
                         )
                     )
-                found.by_names[part, columns] = derivatives
+                yield outputs, derivatives, rows[:, :2] * units
 
     def _drive(self, values: Mapping[str, float]) -> Drive:
         """Return the drive of coordinates; raises InvalidInputError if there is none."""
@@ -197,10 +187,6 @@ class Trajectories:
         if refusal is not None:
             raise InvalidInputError(refusal)
         return drive
-
-    def _by_differences(self, names: Sequence[str]) -> Sequence[str]:
-        """Return those of these coordinates by which a motion has no derivatives of its own."""
-        return [name for name in names if name in (DELAY, LAG, *self.law.by_differences)]
 
     def _by_record(
         self, values: Mapping[str, float], starts: FloatArray

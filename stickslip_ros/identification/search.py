@@ -1,0 +1,131 @@
+"""Search of the constants whose trajectories are nearest to what records have measured."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from stickslip_ros.arrays import FloatArray
+from stickslip_ros.identification.refinement import Refinement
+from stickslip_ros.identification.starts import ROUGH_TOLERANCE, Errors
+from stickslip_ros.identification.time_limit import OutOfTimeError
+from stickslip_ros.identification.trajectories import Trajectories
+
+_BOUND_DISTANCE = 1e-9
+"""Distance of the start of a search from its bounds, as a share of the value."""
+_STEP = 1e-6
+"""Step of the differences of coordinates, as a share of the value."""
+_WORSE_LOSS_RATIO = 4.0
+"""Squared error from predicted starts, in that of the best point, from which the starts of that
+are tried, too."""
+
+
+def refine(
+    task: Trajectories,
+    free: Sequence[str],
+    values: Mapping[str, float],
+    starts: FloatArray | None = None,
+    *,
+    most: int = 30,
+) -> Refinement:
+    """Fit the coordinates in `free`, if any, and the states at the starts of the segments.
+
+    The starts follow the coordinates (variable projection, G. H. Golub, V. Pereyra, The
+    differentiation of pseudo-inverses and nonlinear least squares problems whose variables
+    separate, SIAM Journal on Numerical Analysis 10(2), 1973). The search begins at all coordinates
+    in `values` and at states of shape (segments, 2), by default the measured ones; it takes `most`
+    steps at most, and ends at the best ones so far when the time of the task is over.
+    """
+    from scipy.optimize import least_squares
+
+    search = _Search(task, free, values, task.starts if starts is None else starts)
+    point = search.best[0]
+    if len(free):
+        solve: Any = least_squares  # its types know no function for jac
+        try:
+            point = solve(
+                search.residual,
+                point,
+                search.derivatives,
+                bounds=search.bounds,
+                x_scale="jac",
+                ftol=1e-7,
+                xtol=1e-8,
+                gtol=1e-12,
+                max_nfev=most,
+            ).x
+        except OutOfTimeError:
+            point = search.best[0]
+    return Refinement(search.at(point).settled())
+
+
+class _Search:
+    """The errors at the best starts, as a function of a point: the coordinates of the search."""
+
+    def __init__(
+        self,
+        task: Trajectories,
+        free: Sequence[str],
+        values: Mapping[str, float],
+        starts: FloatArray,
+    ) -> None:
+        law, fastest = task.law, task.fastest
+        self._task, self._free, self._values = task, free, values
+        self._scale = 1.0 / (1e-3 * float(np.ptp(task.positions)))
+        self._straight = law.straightened if {*law.straightened} <= {*free} else {}
+        to_search = law.to_search(values, fastest) if self._straight else values
+        first = np.array([to_search[name] for name in free])
+        bounds = [self._straight.get(name) or law.bounds(name, values, fastest) for name in free]
+        self.bounds = np.array(bounds, float).reshape(-1, 2).T
+        """Smallest and largest values of a point, shape (2, coordinates)."""
+        # No more than a part of narrow bounds that the start is far away from.
+        least = np.minimum(_BOUND_DISTANCE * np.abs(first), 0.25 * np.ptp(self.bounds, axis=0))
+        first = np.clip(first, self.bounds[0] + least, self.bounds[1] - least)
+        begun = Errors.at(task, free, self._coordinates(first), starts)
+        self.best = self._last = first, begun.settled(ROUGH_TOLERANCE)
+        """The best point so far, with its errors."""
+
+    def residual(self, point: FloatArray) -> FloatArray:
+        """Return the errors at a point, at starts that are best to first order."""
+        found = self.at(point)
+        if self._task.limit.is_over:
+            raise OutOfTimeError
+        return found.without_starts(found.residual[:, None])[:, 0] * self._scale
+
+    def derivatives(self, point: FloatArray) -> FloatArray:
+        """Return the derivatives of the errors at a point, at starts that follow it."""
+        found = self.at(point)
+        return found.without_starts(found.by_names) @ self._by_point(point) * self._scale
+
+    def at(self, point: FloatArray) -> Errors:
+        """Return the errors at a point, at starts that are nearly the best ones."""
+        for known, found in (self._last, self.best):
+            if np.array_equal(known, point):
+                return found
+        before, best = self.best
+        change = best.by_names @ self._by_point(before) @ (point - before)
+        values = self._coordinates(point)
+        found = Errors.at(self._task, self._free, values, best.starts - best.steps(change))
+        if found.loss > _WORSE_LOSS_RATIO * best.loss:
+            found = min(found, found.moved(best.starts), key=lambda each: each.loss)
+        self._last = point.copy(), found.settled(ROUGH_TOLERANCE)
+        self.best = min(self.best, self._last, key=lambda each: each[1].loss)
+        return self._last[1]
+
+    def _coordinates(self, point: FloatArray) -> dict[str, float]:
+        """Return all coordinates at a point."""
+        found = {**self._values, **dict(zip(self._free, point.tolist(), strict=True))}
+        return self._task.law.from_search(found, self._task.fastest) if self._straight else found
+
+    def _by_point(self, point: FloatArray) -> FloatArray:
+        """Return the derivatives of the coordinates by those of the search."""
+        if not self._straight:
+            return np.eye(len(point))
+        base, columns = self._coordinates(point), list[list[float]]()
+        for number in range(len(point)):
+            step = _STEP * max(abs(float(point[number])), 1e-12)
+            moved = point.copy()
+            moved[number] += step
+            other = self._coordinates(moved)
+            columns.append([(other[each] - base[each]) / step for each in self._free])
+        return np.transpose(columns)

@@ -1,0 +1,163 @@
+"""States at the starts of segments: those from which given constants fit best."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from stickslip_ros.arrays import BoolArray, FloatArray
+from stickslip_ros.identification.trajectories import Trajectories
+
+_RANK = 1e-9
+"""Share of the largest singular value below which the start of a segment is not identifiable."""
+ROUGH_TOLERANCE, _FINAL_TOLERANCE = 0.03, 1e-6
+"""Starts are good enough if better ones would lower the squared error by less than this share:
+while the constants change, and at their end."""
+_SHORTEST_STEP = 1e-3
+"""A start whose steps are shortened below this share of a full one is not changed further."""
+_START_STEPS = 8
+"""Largest number of steps of the starts for one set of constants."""
+_OUTLIER_LOSS_RATIO = 9.0
+"""The start of a segment is doubted if its squared error is larger than that of the median one by
+this factor."""
+_KICKS = (0.0, 0.5, -0.5, 2.0, -2.0)
+"""Changes of the velocity at such a start, in errors of position per period."""
+
+
+@dataclass(frozen=True, eq=False)
+class Errors:
+    """Weighted errors that constants and starts leave, with their derivatives."""
+
+    task: Trajectories
+    names: Sequence[str]
+    """Coordinates by which there are derivatives."""
+    values: Mapping[str, float]
+    """All coordinates."""
+    starts: FloatArray
+    """State at the start of each segment, m and m/s; shape (segments, 2)."""
+    residual: FloatArray
+    """Predicted less measured outputs, weighted, m."""
+    by_names: FloatArray
+    """Derivatives of the residual by `names`; shape (rows, names)."""
+    by_start: FloatArray
+    """Derivatives of the residual by the start of the own segment; shape (rows, 2)."""
+
+    @classmethod
+    def at(
+        cls,
+        task: Trajectories,
+        names: Sequence[str],
+        values: Mapping[str, float],
+        starts: FloatArray,
+    ) -> "Errors":
+        """Return the errors of coordinates from states of shape (segments, 2)."""
+        outputs, by_names, by_start = task.sensitivities(values, starts, names)
+        weight = task.weight[:, None]
+        residual = task.weight * (outputs - task.measured)
+        return cls(task, names, values, starts, residual, weight * by_names, weight * by_start)
+
+    @property
+    def loss(self) -> float:
+        """Sum of the squared errors, m^2."""
+        return float(self.residual @ self.residual)
+
+    @property
+    def losses(self) -> FloatArray:
+        """Mean square of the weighted errors in each segment, m^2."""
+        return self._sums(self.residual) / self._sums(self.task.weight)
+
+    @property
+    def has_outliers(self) -> bool:
+        """Whether most of the error is that of a few segments: their starts may be wrong."""
+        losses = self.losses
+        worse = losses > _OUTLIER_LOSS_RATIO * np.median(losses)
+        return float(losses[worse].sum()) > 0.5 * float(losses.sum())
+
+    def without_starts(self, columns: FloatArray) -> FloatArray:
+        """Return the part of columns, shape (rows, columns), that no change of starts explains."""
+        found = np.array(columns)
+        for part, (basis, _) in zip(self.task.parts, self._bases, strict=True):
+            found[part] -= basis @ (basis.T @ found[part])
+        return found
+
+    def steps(self, column: FloatArray) -> FloatArray:
+        """Return the changes of the starts that explain a column best; shape (segments, 2)."""
+        return np.array(
+            [
+                inverse @ (basis.T @ column[part])
+                for part, (basis, inverse) in zip(self.task.parts, self._bases, strict=True)
+            ]
+        )
+
+    def settled(self, tolerance: float = _FINAL_TOLERANCE) -> "Errors":
+        """Return the errors from starts that are best up to a share of the squared error.
+
+        The start of a segment has no part in the others: each takes steps of its own length.
+        """
+        found, share = self, np.ones(len(self.starts))
+        for _ in range(_START_STEPS):
+            left = found.without_starts(found.residual[:, None])[:, 0]
+            gains = found._sums(found.residual) - found._sums(left)
+            if float(np.sum(gains * (share >= _SHORTEST_STEP))) <= tolerance * found.loss:
+                break
+            other = found.moved(found.starts - share[:, None] * found.steps(found.residual))
+            found, better = found._better(other)
+            share = np.where(better, np.minimum(2.0 * share, 1.0), 0.25 * share)
+        return found
+
+    def moved(self, starts: FloatArray) -> "Errors":
+        """Return the errors of the same coordinates from other states."""
+        return Errors.at(self.task, self.names, self.values, starts)
+
+    def restarted(self) -> "Errors":
+        """Return the errors from what kicks of the measured starts lead to, where that is better.
+
+        They are the same if no segment fits much worse than the others.
+        """
+        found = self
+        rough = np.sqrt(np.median(self.losses)) / self.task.predictors[0].record.period
+        for kick in _KICKS if self.has_outliers else ():
+            other = self.moved(self.task.starts + np.array([0.0, kick * rough])).settled()
+            found, _ = found._better(other)
+        return found
+
+    def _better(self, other: "Errors") -> tuple["Errors", BoolArray]:
+        """Return the better one of two fits of each segment, and for which it is the other one."""
+        better = self._sums(other.residual) < self._sums(self.residual)
+        rows = better[self.task.block]
+        return Errors(
+            self.task,
+            self.names,
+            self.values,
+            np.where(better[:, None], other.starts, self.starts),
+            np.where(rows, other.residual, self.residual),
+            np.where(rows[:, None], other.by_names, self.by_names),
+            np.where(rows[:, None], other.by_start, self.by_start),
+        ), better
+
+    def _sums(self, column: FloatArray) -> FloatArray:
+        """Return the sum of the squares of a column in each segment."""
+        return np.bincount(self.task.block, column * column).astype(float)
+
+    @cached_property
+    def _bases(self) -> Sequence[tuple[FloatArray, FloatArray]]:
+        """Basis of the derivatives by the start of each segment, and their inverse by it."""
+        return [_decomposed(self.by_start[part]) for part in self.task.parts]
+
+
+def best_starts(
+    task: Trajectories, values: Mapping[str, float], starts: FloatArray | None = None
+) -> Errors:
+    """Return the errors of coordinates from the best starts near some, by default measured ones."""
+    begun = Errors.at(task, (), values, task.starts if starts is None else starts)
+    return begun.settled(ROUGH_TOLERANCE).settled()
+
+
+def _decomposed(columns: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return an orthogonal basis of the columns, and their pseudo-inverse by that basis."""
+    norms = np.linalg.norm(columns, axis=0)
+    norms[norms == 0.0] = 1.0
+    left, sizes, right = np.linalg.svd(columns / norms, full_matrices=False)
+    kept = sizes > _RANK * max(float(sizes[0]), 1e-300)
+    return left[:, kept], (right[kept].T / sizes[kept]) / norms[:, None]
