@@ -25,7 +25,7 @@ from typing import Any
 
 import numpy as np
 
-from stickslip_ros.identification.drives import AUTO
+from stickslip_ros.identification.choice import AUTO
 from stickslip_ros.identification.findings import Findings
 from stickslip_ros.identification.fit import QUANTILE
 from stickslip_ros.identification.identify import identify

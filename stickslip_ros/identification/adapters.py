@@ -199,6 +199,10 @@ class TableAdapter(IdentifiedLaw):
         self.by_differences = self.coordinates
 
     @override
+    def curve_speeds(self, recorded: FloatArray) -> FloatArray:
+        return self.speeds
+
+    @override
     def terms(self, speed: FloatArray, shape: float) -> FloatArray:
         low, high = self.knots[:-1], self.knots[1:]
         shares = np.clip((speed[:, None] - low) / (high - low), 0.0, 1.0)
@@ -388,6 +392,11 @@ class DirectionalAdapter(_DerivedAdapter):
             [*names, *(REVERSE + name for name in names)]
             for names in (own.coordinates, own.optional, own.by_differences, own.unscaled)
         )
+
+    @property
+    @override
+    def one_way(self) -> IdentifiedLaw:
+        return self.own
 
     @override
     def static_force(self, values: Values) -> float:

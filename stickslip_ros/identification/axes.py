@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
+from typing_extensions import override
 
 from stickslip_ros.arrays import FloatArray, rms
 from stickslip_ros.errors import InvalidInputError
@@ -12,8 +13,8 @@ from stickslip_ros.identification.adapters import (
     SaturatingAdapter,
     TableAdapter,
 )
+from stickslip_ros.identification.choice import Candidate, Task
 from stickslip_ros.identification.filtered import filtered
-from stickslip_ros.identification.fit import Candidate
 from stickslip_ros.identification.laws import DELAY, IdentifiedLaw
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.regression import (
@@ -52,7 +53,7 @@ AXIS_LAWS = ("coulomb", "stribeck", "exponential", "table", "lugre")
 """Laws that can be identified for an axis without a spring."""
 
 
-class AxisTask:
+class AxisTask(Task[Regression]):
     """Records of an axis without a spring, with what is known of it."""
 
     def __init__(
@@ -66,8 +67,7 @@ class AxisTask:
                 f"{'the recorded force is always 0' if given else 'no force is recorded'}: without "
                 f"a force neither mass nor friction of an axis is identifiable{hint}"
             )
-        self.records, self.limit = records, limit
-        self.left: list[str] = []
+        super().__init__(records, limit)
         own = {name: fixed[name] for name in LINEAR if name in fixed}
         self.fixed = {**dict.fromkeys(LINEAR[1:], 0.0), **own}
         self.free = [name for name in LINEAR if name not in self.fixed]
@@ -78,11 +78,12 @@ class AxisTask:
         if self.delay is not None or self.rows.resting:
             self.rows = self._rows(self.delay or 0.0)
 
+    @override
     def candidates(
         self, law: str, laws: Sequence[IdentifiedLaw], progress: Callable[[str], None]
-    ) -> list[Candidate]:
+    ) -> list[Candidate[Regression]]:
         """Return the fits of the laws that compete, or of the one that is asked for."""
-        found: list[Candidate] = []
+        found: list[Candidate[Regression]] = []
         self.limit.begin_stage(_CANDIDATES_TIME)
         for each in laws:
             if each.memory or not each.of_slip:
@@ -99,21 +100,22 @@ class AxisTask:
             knots = np.quantile(self.rows.speeds, np.linspace(0.0, 1.0, _KNOTS))
             knots[0] = 0.0
             tables = SaturatingAdapter(self.rows.curve_speeds), TableAdapter(knots)
-            best = min(map(self._with_delay, tables), key=lambda each: each.error)
+            fitted = ((self._with_delay(each), each) for each in tables)
+            best, table = min(fitted, key=lambda each: each[0].error)
             found += [best] if law != "lugre" else []
             if law != "table":
                 progress("lugre")
-                found.append(self._with_memory(best, asked=law == "lugre"))
+                found.append(self._with_memory(best, table, asked=law == "lugre"))
         return found
 
-    def adjusted(self, found: Candidate) -> Candidate:
+    @override
+    def adjusted(self, found: Candidate[Regression]) -> Candidate[Regression]:
         """Return a table that fits its free run, too; laws with constants stay as they are."""
         fit = found.fit
-        assert isinstance(fit, Regression)
         fit.require("mass")
         return replace(found, fit=adjusted(fit, self.records)) if found.law == "table" else found
 
-    def _with_delay(self, law: IdentifiedLaw) -> Candidate:
+    def _with_delay(self, law: IdentifiedLaw) -> Candidate[Regression]:
         """Return a fit with a delay if the records ask for one."""
         fit = self._fitted(law, self.rows)
         found = Candidate(fit, fit.held_out)
@@ -134,12 +136,11 @@ class AxisTask:
         other = Candidate(fit, fit.held_out)
         return other if other.error < _RESOLVED_ERROR_RATIO * found.error else found
 
-    def _with_memory(self, static: Candidate, *, asked: bool) -> Candidate:
+    def _with_memory(
+        self, static: Candidate[Regression], table: TableAdapter, *, asked: bool
+    ) -> Candidate[Regression]:
         """Return the fit whose friction follows the table of another over a path."""
         fit = static.fit
-        assert isinstance(fit, Regression)
-        table = fit.curve
-        assert isinstance(table, TableAdapter)
         if not table.shaped:
             table = TableAdapter(self.rows.curve_speeds, table.speeds)
         span = max(float(np.ptp(record.position)) for record in self.records)

@@ -7,6 +7,7 @@ from math import inf, pi, sqrt
 from typing import Any
 
 import numpy as np
+from typing_extensions import override
 
 from stickslip_ros.arrays import FloatArray, rms
 from stickslip_ros.errors import InvalidInputError
@@ -17,8 +18,8 @@ from stickslip_ros.identification.adapters import (
     DirectionalAdapter,
     TableAdapter,
 )
+from stickslip_ros.identification.choice import AUTO, Candidate, Task
 from stickslip_ros.identification.filtered import filtered
-from stickslip_ros.identification.fit import Candidate
 from stickslip_ros.identification.laws import DELAY, LAG, IdentifiedLaw
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.refinement import Refinement
@@ -61,8 +62,6 @@ _LAG_GAIN = 0.05
 """The same for a lag beside a delay, which stands for most of it."""
 _ZERO_ERRORS = 3.0
 """Standard errors by which such a constant must differ from zero."""
-AUTO = "auto"
-"""Law that stands for the one that predicts held-out parts best."""
 _MOST_SAMPLES = 15_000
 """Samples of a drive that are fitted: minutes of work."""
 _POINTS = 8
@@ -73,14 +72,13 @@ OPTIONAL = ("damping", "bias_force", DELAY, LAG)
 """Constants that are fitted only if the record asks for them."""
 
 
-class DriveTask:
+class DriveTask(Task[Refinement]):
     """Records of a drive on a spring, with what is known of it."""
 
     def __init__(
         self, records: Sequence[Record], fixed: Mapping[str, float], limit: TimeLimit
     ) -> None:
-        self.records, self.limit = records, limit
-        self.left: list[str] = []
+        super().__init__(records, limit)
         self.normal_force = fixed.get("normal_force", 1.0)
         self.fixed = {name: fixed[name] for name in (*LINEAR, DELAY) if name in fixed}
         self.friction = {
@@ -100,9 +98,10 @@ class DriveTask:
         self.rows = Rows.of(parts, None)
         self.predictors = [Predictor(record) for record in records]
 
+    @override
     def candidates(
         self, law: str, laws: Sequence[IdentifiedLaw], progress: Callable[[str], None]
-    ) -> list[Candidate]:
+    ) -> list[Candidate[Refinement]]:
         """Return the fits of the laws that compete, or of the one that is asked for, fitted first.
 
         Laws without a memory are searched first. Those with a memory follow if the errors of the
@@ -143,7 +142,7 @@ class DriveTask:
             search(self.table, self.table.name)
         return self._finished(found)
 
-    def _finished(self, found: Sequence[Refinement]) -> list[Candidate]:
+    def _finished(self, found: Sequence[Refinement]) -> list[Candidate[Refinement]]:
         """Return searched models fitted further, the better ones first, as far as time allows."""
         least = min(map(_loss, found))
         near = [each for each in found if _loss(each) <= _HOPELESS_LOSS_RATIO * least]
@@ -155,10 +154,6 @@ class DriveTask:
             self.limit.begin_stage(1.0 / (len(near) - number))
             candidates[each] = self.finished(each)
         return [*candidates.values()]
-
-    def adjusted(self, found: Candidate) -> Candidate:
-        """Return what was chosen as it is: its whole motion is fitted already."""
-        return found
 
     @cached_property
     def constants(self) -> Mapping[str, float]:
@@ -183,11 +178,10 @@ class DriveTask:
             # The static friction of Dahl's law is the kinetic one.
             values = {**like.best.values, "static": like.best.values["kinetic"]}
             return self._nearest(law, [values], _GIVEN_UP_LOSS_RATIO * _loss(like))
-        own = law.own if isinstance(law, DirectionalAdapter) else law
         fastest = float(self.rows.speeds[-1])
         starts = [
             start
-            for each in self._regressions(own, thorough)
+            for each in self._regressions(law.one_way, thorough)
             for start in law.starts(self._start(law, each), fastest)
         ]
         return self._nearest(law, starts)
@@ -203,10 +197,9 @@ class DriveTask:
         ]
         # A curve that does not suit the friction may leave no mass or stiffness to them.
         unfit = [name for name in self.free if not constants[name] > 0.0]
-        both = isinstance(law, DirectionalAdapter)
         return {
             **constants,
-            **law.joined(own if both else own[-1:]),
+            **law.joined(own if law.one_way is not law else own[-1:]),
             **{name: self.constants[name] for name in unfit},
         }
 
@@ -289,7 +282,7 @@ class DriveTask:
             fit = refine(task, free, {**best.values, DELAY: 0.0}, best.starts, most=_STEPS)
         return fit
 
-    def finished(self, near: Refinement) -> Candidate:
+    def finished(self, near: Refinement) -> Candidate[Refinement]:
         """Return a fit to long segments, with the constants that the records ask for."""
         task = self._trajectories(near.law, _LONG_SEGMENT * self.period)
         # Measured starts are too rough for motions that grow over a segment.

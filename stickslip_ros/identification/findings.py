@@ -9,16 +9,10 @@ from typing import Any, TypeVar
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray, rms
+from stickslip_ros.identification.choice import Candidate, better_by
 from stickslip_ros.identification.drives import POOR_ERROR
 from stickslip_ros.identification.filtered import START, Filtered, filtered
-from stickslip_ros.identification.fit import (
-    Candidate,
-    Estimate,
-    ForceErrors,
-    Friction,
-    Residuals,
-    better_by,
-)
+from stickslip_ros.identification.fit import Estimate, ForceErrors, Friction, Residuals
 from stickslip_ros.identification.record import FEWEST, Record
 from stickslip_ros.identification.servo import Servo, closed_loop
 from stickslip_ros.physics.model.drive import Drive

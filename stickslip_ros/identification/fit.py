@@ -1,16 +1,15 @@
-"""Fits of a drive to records: their covariances, and the choice by what they predict."""
+"""What a fit of a drive to records tells: constants with intervals, and friction curves."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from math import copysign, inf, sqrt
 from typing import Any, ClassVar
 
 import numpy as np
 
-from stickslip_ros.arrays import BoolArray, FloatArray
-from stickslip_ros.identification.adapters import DirectionalAdapter
+from stickslip_ros.arrays import FloatArray
+from stickslip_ros.identification.covariance import block_covariance, propagated
 from stickslip_ros.identification.laws import DELAY, IdentifiedLaw
 from stickslip_ros.identification.record import Record
 from stickslip_ros.physics.model.drive import Drive
@@ -19,21 +18,11 @@ _STEP = 1e-5
 """Step of differences, as a share of the value."""
 _NEAR_ZERO = 1e-6
 """Standard errors below which a value is nearly zero."""
-BLOCKS = 24
-"""Number of blocks of time from whose scatter covariances are computed."""
 QUANTILE = 2.07
 """Half of a 95 % interval, in standard errors: Student's t with BLOCKS - 1 = 23 degrees of
 freedom."""
-_RANK = 1e-13
-"""Share of the largest eigenvalue below which rows do not tell a combination of parameters."""
-_PART = 1e-6
-"""Part in such a combination from which a parameter is not identifiable; less is rounding error."""
 CURVE_POINTS = 40
 """Points that stand for a curve."""
-_SIGNIFICANT = 3.0
-"""Standard errors by which a model must predict better to be preferred to a simpler one."""
-_LEAST_GAIN = 0.01
-"""Share of the error by which it must be better besides."""
 
 
 @dataclass(frozen=True)
@@ -215,137 +204,3 @@ class Fit(ABC):
             moved[number] += step
             linear[:, number] = (function(moved) - base) / step
         return base, linear
-
-
-@dataclass(frozen=True, eq=False)
-class Candidate:
-    """A fitted model with what it predicts of parts that it was not fitted to."""
-
-    fit: Fit
-    """The fit."""
-    held_out: FloatArray
-    """Mean square of the error in each held-out part, N^2 of forces or m^2 of positions."""
-    remark: str = ""
-    """Restriction of the model, or reason why it is out of the choice."""
-
-    @property
-    def law(self) -> str:
-        """Friction law."""
-        return self.fit.law.name
-
-    @property
-    def size(self) -> int:
-        """Number of fitted constants."""
-        return len(self.fit.point) + (self.fit.law.deflection > 0.0)
-
-    @property
-    def by_direction(self) -> bool:
-        """Whether a law on a spring has constants of its own in each direction."""
-        return self.fit.has_spring and isinstance(self.fit.law, DirectionalAdapter)
-
-    @property
-    def label(self) -> str:
-        """Name of the law, and whether it is by direction."""
-        return f"{self.law} by direction" if self.by_direction else self.law
-
-    @property
-    def error(self) -> float:
-        """Validation error: rms of what is held out, as a share of the scale."""
-        known = len(self.held_out) and self.fit.scale > 0.0
-        return sqrt(float(np.mean(self.held_out))) / self.fit.scale if known else inf
-
-
-def better_by(better: Candidate, worse: Candidate) -> float:
-    """Return by how many standard errors one model predicts better than the other.
-
-    Less than one per cent, or than `Fit.least_gain`, counts as nothing. It compares the logarithms
-    of the errors part by part: a single bad part decides nothing. Models that were not compared on
-    the same parts are told apart by their errors alone.
-    """
-    if len(better.held_out) != len(worse.held_out):
-        return copysign(inf, worse.error - better.error)
-    if worse.error < (1.0 + _LEAST_GAIN) * better.error + better.fit.least_gain:
-        return 0.0
-    tiny = np.finfo(float).tiny
-    ratios = np.log(np.maximum(worse.held_out, tiny) / np.maximum(better.held_out, tiny))
-    mean, count = float(np.mean(ratios)), len(ratios)
-    error = float(np.std(ratios, ddof=1)) / sqrt(count) if count > 1 else 0.0
-    return mean / error if error > 0.0 else copysign(inf, mean) if mean else 0.0
-
-
-def choose(candidates: Sequence[Candidate]) -> tuple[Candidate, Mapping[str, bool]]:
-    """Return the simplest model that predicts as well as any, and which others do, by label.
-
-    A model is as good as the best one if the difference of their validation errors is within three
-    standard errors, from its scatter over the parts, or if it is simpler and better than such a
-    one. A model with constants that the records do not tell is chosen only if all have some.
-    """
-    best = min(candidates, key=lambda each: each.error)
-    near = [each for each in candidates if each is best or better_by(best, each) < _SIGNIFICANT]
-    # An error that scatters much is within it, too: what is simpler and better is as good as that.
-    as_good = [
-        each
-        for each in candidates
-        if any(each.size <= other.size and each.error <= other.error for other in near)
-    ]
-    told = [each for each in as_good if np.isfinite(np.diag(each.fit.covariance)).all()]
-    chosen = min(told or as_good, key=lambda each: (each.size, each.error))
-    return chosen, {each.label: each in as_good for each in candidates}
-
-
-def block_covariance(jacobian: FloatArray, residual: FloatArray, lost: int = 0) -> FloatArray:
-    """Return the covariance of a least-squares fit to a series whose errors may be coloured.
-
-    It is the jackknife over blocks of time, to first order (A. C. Cameron, D. L. Miller, A
-    practitioner's guide to cluster-robust inference, Journal of Human Resources 50(2), 2015):
-    errors may be correlated within a block. No variance is below that with independent errors. The
-    jacobian has the shape (rows, parameters), its rows follow one another in time; `lost` further
-    values were fitted. The variance of what the rows do not tell is infinite, its covariances are
-    0; see `propagated`.
-    """
-    scale = np.linalg.norm(jacobian, axis=0)
-    scale[scale == 0.0] = 1.0
-    scaled = jacobian / scale
-    product = scaled.T @ scaled
-    untold = _untold(product)
-    changes: list[FloatArray] = []
-    for rows in np.array_split(np.arange(len(residual)), BLOCKS):
-        own = scaled[rows]
-        rest = np.linalg.pinv(product - own.T @ own, rcond=_RANK, hermitian=True)
-        changes.append(rest @ (own.T @ residual[rows]))
-    away = np.array(changes) - np.mean(changes, axis=0)
-    found = (away.T @ away) * (BLOCKS - 1) / BLOCKS
-    freedom = max(len(residual) - jacobian.shape[1] - lost, 1)
-    white = np.linalg.pinv(product, rcond=_RANK, hermitian=True)
-    white *= float(residual @ residual) / freedom
-    tiny = np.finfo(float).tiny
-    ratios = np.maximum(np.diag(white), tiny) / np.maximum(np.diag(found), tiny)
-    larger = np.sqrt(np.maximum(ratios, 1.0))
-    found = found * np.outer(larger / scale, larger / scale)
-    found[untold, :] = found[:, untold] = 0.0
-    found[untold, untold] = np.inf
-    return found
-
-
-def _untold(product: FloatArray) -> BoolArray:
-    """Return which parameters have a part in a combination that rows do not tell."""
-    if not len(product):
-        return np.zeros(0, bool)
-    sizes, axes = np.linalg.eigh(product)
-    lost = sizes <= _RANK * max(float(sizes[-1]), np.finfo(float).tiny)
-    return np.any(np.abs(axes[:, lost]) > _PART, axis=1)
-
-
-def propagated(linear: FloatArray, covariance: FloatArray) -> FloatArray:
-    """Return the covariance of results that depend linearly on values with a covariance.
-
-    `linear` has the derivatives of the results, shape (results, values). The variance of what
-    depends on a value with an infinite variance is infinite.
-    """
-    told = np.isfinite(np.diag(covariance))
-    own = linear[:, told]
-    found = own @ covariance[np.ix_(told, told)] @ own.T
-    untold = (linear[:, ~told] != 0.0).any(axis=1)
-    found[untold, :] = found[:, untold] = 0.0
-    found[untold, untold] = np.inf
-    return found

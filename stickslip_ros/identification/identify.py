@@ -6,9 +6,9 @@ from math import inf, isfinite
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.identification.adapters import COMPETING, KNOWN_LAWS, TableAdapter
 from stickslip_ros.identification.axes import AXIS_LAWS, AxisTask
-from stickslip_ros.identification.drives import AUTO, DriveTask
+from stickslip_ros.identification.choice import AUTO
+from stickslip_ros.identification.drives import DriveTask
 from stickslip_ros.identification.findings import Findings
-from stickslip_ros.identification.fit import choose
 from stickslip_ros.identification.foreign_laws import foreign_adapter, foreign_names
 from stickslip_ros.identification.laws import DELAY, IdentifiedLaw
 from stickslip_ros.identification.record import Record
@@ -130,16 +130,10 @@ def identify(
         raise InvalidInputError(f"time limit {time_limit:g} s is invalid: must be above 0 s")
     limit = TimeLimit(_FITTING_SHARE * time_limit if law == AUTO else inf)
     task = (DriveTask if spring else AxisTask)(records, fixed, limit)
-    candidates = task.candidates(law, laws, progress)
-    chosen, as_good = choose(
-        [each for each in candidates if law != AUTO or not each.remark] or candidates
-    )
     servos = [servo_of(record) for record in records]
     return Findings(
         records,
-        candidates,
-        task.adjusted(chosen),
-        as_good,
+        *task.chosen(law, laws, progress),
         fixed.get("normal_force", 1.0),
         fixed,
         next((servo for servo in servos if servo is not None), None),

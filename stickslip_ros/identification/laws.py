@@ -83,6 +83,15 @@ class IdentifiedLaw(ABC):
     def coordinates_of(self, forces: Sequence[float], shape: float) -> dict[str, float]:
         """Return the coordinates of unknown forces, N, and of a shape, m/s."""
 
+    @property
+    def one_way(self) -> "IdentifiedLaw":
+        """The law of each direction of slip."""
+        return self
+
+    def curve_speeds(self, recorded: FloatArray) -> FloatArray:
+        """Return the speeds of the points that stand for a curve, m/s, by default the recorded."""
+        return recorded
+
     def joined(self, directions: Sequence[Values]) -> dict[str, float]:
         """Return the coordinates of one direction, or of forward and backward slip."""
         first, *others = directions

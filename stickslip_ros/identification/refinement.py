@@ -8,14 +8,9 @@ import numpy as np
 from typing_extensions import override
 
 from stickslip_ros.arrays import FloatArray
+from stickslip_ros.identification.covariance import block_covariance
 from stickslip_ros.identification.filtered import filtered
-from stickslip_ros.identification.fit import (
-    CURVE_POINTS,
-    Fit,
-    ForceErrors,
-    Residuals,
-    block_covariance,
-)
+from stickslip_ros.identification.fit import CURVE_POINTS, Fit, ForceErrors, Residuals
 from stickslip_ros.identification.laws import DELAY, LAG, IdentifiedLaw
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.starts import Errors, best_starts

@@ -9,9 +9,10 @@ from typing_extensions import override
 
 from stickslip_ros.arrays import FloatArray, IntArray, rms
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.identification.adapters import DirectionalAdapter, TableAdapter
+from stickslip_ros.identification.adapters import DirectionalAdapter
+from stickslip_ros.identification.covariance import BLOCKS
 from stickslip_ros.identification.filtered import Filtered, filtered
-from stickslip_ros.identification.fit import BLOCKS, CURVE_POINTS, Fit, ForceErrors
+from stickslip_ros.identification.fit import CURVE_POINTS, Fit, ForceErrors
 from stickslip_ros.identification.laws import IdentifiedLaw
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.trajectory import delayed, free_run
@@ -196,7 +197,7 @@ class Regression(Fit):
 
     @override
     def curve_speeds(self, fastest: float) -> FloatArray:
-        return self.curve.speeds if isinstance(self.curve, TableAdapter) else self.rows.curve_speeds
+        return self.curve.curve_speeds(self.rows.curve_speeds)
 
     @override
     def errors(self, record: Record) -> ForceErrors:

@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from stickslip_ros.identification.choice import Candidate
 from stickslip_ros.identification.findings import Findings
-from stickslip_ros.identification.fit import QUANTILE, Candidate, Estimate
+from stickslip_ros.identification.fit import QUANTILE, Estimate
 from stickslip_ros.scenarios.parameters import PlantParameters
 from stickslip_ros.show.quantities import PREDICTIONS, SI, Units
 from stickslip_ros.tables import TextTable

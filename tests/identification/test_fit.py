@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from stickslip_ros.identification.fit import Candidate, block_covariance, choose, propagated
+from stickslip_ros.identification.choice import Candidate, choose
+from stickslip_ros.identification.covariance import block_covariance, propagated
 
 _ROWS = 2400
 
