@@ -115,9 +115,11 @@ class Errors:
 
         They are the same if no segment fits much worse than the others.
         """
+        if not self.has_outliers:
+            return self
         found = self
-        rough = np.sqrt(np.median(self.losses)) / self.task.predictors[0].record.period
-        for kick in _KICKS if self.has_outliers else ():
+        rough = np.sqrt(np.median(found.losses)) / self.task.predictors[0].record.period
+        for kick in _KICKS:
             other = self.moved(self.task.starts + np.array([0.0, kick * rough])).settled()
             found, _ = found._better(other)
         return found

@@ -157,7 +157,7 @@ class Trajectories:
         def by_coordinates(function: Callable[[Drive], FloatArray]) -> FloatArray:
             base = function(drive)
             columns = [(function(other) - base) / step for step, other in moved]
-            return np.transpose(columns).reshape(len(base), len(moved))
+            return np.column_stack(columns) if columns else np.empty((len(base), 0))
 
         def of_system(other: Drive) -> FloatArray:
             system = drive_system(in_units_of(drive, other))

@@ -330,9 +330,9 @@ def test_only_errors_of_positions_are_compared() -> None:
     own = study.record("coulomb", "ramp", 1, 2.0)
     velocity = np.gradient(own.position, own.period)
     velocity += 1e-3 * np.random.default_rng(0).normal(size=len(velocity))
-    fit = identify([replace(own, velocity=velocity)], "coulomb").chosen.fit
-    assert 2 * np.count_nonzero(fit.task.of_positions) == len(fit.residual)
-    assert (fit.task.measured[fit.task.of_positions] == fit.task.positions).all()
+    best = identify([replace(own, velocity=velocity)], "coulomb").chosen.fit.best
+    assert 2 * np.count_nonzero(best.task.of_positions) == len(best.residual)
+    assert (best.task.measured[best.task.of_positions] == best.task.positions).all()
 
 
 def test_missing_samples_are_not_measured() -> None:
