@@ -30,13 +30,22 @@ class TrendMeter:
         self._sums = np.zeros((2 * _PARTS + 1, 3))
         """Weight, and weighted time and value, of each part."""
         self._count, self._each, self._largest = 0, 1, 0.0
+        self._waiting: list[FloatArray] = []
+        """Times and values that are not yet in the sums: short runs have no trend."""
+        self._waiting_count = 0
 
     def feed(self, time: npt.ArrayLike, value: npt.ArrayLike) -> None:
         """Add the times, s, and values that follow, in blocks of any length."""
-        if np.size(time) == 0:
-            return
-        new = np.array([np.ones(np.shape(time)), time, value]).T
-        new = new[np.isfinite(new[:, 2])]
+        if np.size(time) > 0:
+            self._waiting.append(np.array([time, value]))
+            self._waiting_count += np.size(time)
+        if self._waiting_count >= _PARTS:
+            self._add_waiting()
+
+    def _add_waiting(self) -> None:
+        time, value = np.concatenate([np.empty((2, 0)), *self._waiting], axis=1)
+        self._waiting, self._waiting_count = [], 0
+        new = np.array([np.ones(len(time)), time, value]).T[np.isfinite(value)]
         self._largest = max(self._largest, float(np.abs(new[:, 2]).max(initial=0.0)))
         while len(new) > 0:
             fits = 2 * _PARTS * self._each - self._count
@@ -66,6 +75,9 @@ class TrendMeter:
         the quantity by a hundredth, and by more than `least`, the step of a sensor: half the sum or
         difference of two positions has an error of at least its rounding.
         """
+        if self._count + self._waiting_count < _LEAST_PARTS:
+            return None
+        self._add_waiting()
         weight, *sums = self._sums.T
         with np.errstate(invalid="ignore"):
             every, values = np.array(sums)[:, weight == self._each] / self._each
