@@ -2,10 +2,9 @@
 
 import argparse
 import shlex
-import subprocess
 import sys
 from collections.abc import Generator, Mapping, Sequence
-from contextlib import contextmanager, nullcontext, suppress
+from contextlib import contextmanager, nullcontext
 from datetime import UTC, datetime
 from itertools import count, pairwise
 from math import isfinite
@@ -228,21 +227,18 @@ def _again(words: Sequence[str]) -> str:
 @contextmanager
 def _dashboard(namespace: str, bag: Path, scenario: "Scenario", again: str) -> Generator[None]:
     """Serve the page in a process of its own, which has no part in whether the run succeeds."""
-    from stickslip_ros.nodes.base.child_process import start_child
+    from stickslip_ros.nodes.base.child_process import ChildProcesses
 
     command = "-m", "stickslip_ros.app.main", "dashboard", "--namespace", namespace
     command += (f"--command={again}",)
     plant = scenario.plant.flat()
     named = filter(None, (plant[p.name] for p in scenario.plant.known.values() if p.file))
-    process = start_child([sys.executable, *command, *(f"--read={p}" for p in (bag, *named))])
+    page = ChildProcesses()
+    page.start("dashboard", [sys.executable, *command, *(f"--read={p}" for p in (bag, *named))])
     try:
         yield
     finally:
-        process.terminate()
-        with suppress(subprocess.TimeoutExpired):
-            process.wait(10.0)  # its pages fetch the bag
-        process.kill()
-        process.wait()
+        page.end()
 
 
 def default_bag(scenario: str) -> Path:

@@ -2,7 +2,6 @@
 
 import os
 import signal
-import subprocess
 import sys
 import tempfile
 import time
@@ -16,7 +15,7 @@ from rclpy.node import Node
 from rclpy.task import Future
 
 from stickslip_ros.errors import RunError
-from stickslip_ros.nodes.base.child_process import GUARD_TIMEOUT, how_it_ended, start_child
+from stickslip_ros.nodes.base.child_process import EXIT_TIMEOUT, ChildProcesses, how_it_ended
 from stickslip_ros.nodes.base.clients import (
     ACTIVE,
     NEXT_TRANSITION,
@@ -33,7 +32,6 @@ from stickslip_ros.scenarios.sections import section_matches
 
 _READY_TIMEOUT = 30.0
 _ANSWER_TIMEOUT = 5.0
-_EXIT_TIMEOUT = 2.0 * GUARD_TIMEOUT + 2.0
 _DISCOVERY_TIME = 3.0
 """Time, s, after which a problem is reported: a shorter one may be due to discovery."""
 _WATCH_PERIOD = 0.1
@@ -125,7 +123,7 @@ class _Supervisor:
         stop_on_signals(self._spinner.executor, self._stop, self._hurry)
         self._spinner.is_cut_short = self._is_ended
         self._search = ControllerSearch(self._node, namespace, ("analyzer", "plant"))
-        self._processes: dict[str, subprocess.Popen[bytes]] = {}
+        self._processes = ChildProcesses()
         self._clients: dict[str, LifecycleClient] = {}
         self._active: list[str] = []
         self._monitor = RunMonitor(
@@ -182,7 +180,7 @@ class _Supervisor:
             if name == controller.node:
                 law = ["-p", f"law:={controller.law}"]
                 command[2:] = ["stickslip_ros.nodes.controller", *arguments, *law]
-            self._processes[name] = start_child(command)
+            self._processes.start(name, command)
 
     def _suspend(self, *_: object) -> None:
         """Stop this process on Ctrl-Z; the signal does not reach the nodes."""
@@ -197,7 +195,7 @@ class _Supervisor:
         files = ["--params-file", str(self._scenario.path), "--params-file", str(file)]
         interpreter = [] if os.access(executable, os.X_OK) else [sys.executable]
         command = [*interpreter, executable, *in_namespace, *files, "--", *further]
-        self._processes[executable] = start_child(command, guarded=True)
+        self._processes.start(executable, command, guarded=True)
 
     def _bring_up(self, nodes: Collection[str]) -> None:
         self._configure(nodes)
@@ -244,7 +242,7 @@ class _Supervisor:
         if controller is None:
             return
         if command:
-            self._processes[controller] = self._processes.pop(command[0])
+            self._processes.rename(command[0], controller)
         name = controller.rpartition("/")[2]
         for node, others in (("analyzer", [name]), ("plant", ["analyzer", name])):
             self._spinner.spin_until(setting_call(self._node, node, {"wait_for": others}).pursue)
@@ -317,16 +315,8 @@ class _Supervisor:
                 self._deactivate(node)
             if node == "plant" and not self._is_dead(node):
                 self._spinner.spin_until(lambda: self._monitor.plant_stopped, timeout=2.0)
-        for process in self._processes.values():
-            process.terminate()
-        deadline = time.monotonic() + _EXIT_TIMEOUT
-        for name, process in self._processes.items():
-            try:
-                process.wait(max(deadline - time.monotonic(), 0.0))
-            except subprocess.TimeoutExpired:
-                self._notify(f"the node {name} did not end within {_EXIT_TIMEOUT:g} s: killed")
-                process.kill()
-                process.wait()
+        for name in self._processes.end():
+            self._notify(f"the node {name} did not end within {EXIT_TIMEOUT:g} s: killed")
 
     def _let_the_analyzer_catch_up(self) -> None:
         """Wait until the analyzer has the plant's last sample; fail if it makes no progress."""
@@ -361,14 +351,13 @@ class _Supervisor:
         return self._clients[node]
 
     def _is_dead(self, node: str) -> bool:
-        return node in self._processes and self._processes[node].poll() is not None
+        return node in self._processes.ended()
 
     def _watch_processes(self) -> None:
-        for name, process in self._processes.items():
-            status = process.poll()
+        for name, status in self._processes.ended().items():
             if name == "plant" and status == 0 and self._monitor.plant_stopped:
                 self._monitor.finished = True  # it was ended in order from outside
-            elif status is not None:
+            else:
                 self._fail(f"the node {name} died ({how_it_ended(status)})")
 
     def _fail(self, why: str) -> None:

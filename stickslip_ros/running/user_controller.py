@@ -1,8 +1,5 @@
-"""Run a user's controller: a node in a thread, or a command in a process."""
+"""Run a user's controller in this process: a node in a thread."""
 
-import shlex
-import shutil
-from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from threading import Event, Thread
 
@@ -11,8 +8,7 @@ from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
 from rclpy.node import Node
 from rclpy.task import Future
 
-from stickslip_ros.errors import InvalidInputError, RunError
-from stickslip_ros.nodes.base.child_process import how_it_ended, start_child
+from stickslip_ros.errors import RunError
 from stickslip_ros.nodes.base.spinner import destroy
 
 _END_TIMEOUT = 5.0
@@ -93,29 +89,3 @@ class ControllerThread:
                 self._failure = error
         finally:
             self._idle.set()
-
-
-class ControllerProcess:
-    """A command and its children, ended together, at the latest when this process ends."""
-
-    def __init__(self, command: Sequence[str], variables: Mapping[str, str]) -> None:
-        """Start the command with additional environment variables.
-
-        Raises InvalidInputError if the command does not exist.
-        """
-        self._name = shlex.join(command)
-        if shutil.which(command[0]) is None:
-            raise InvalidInputError(f"the controller {self._name}: no command {command[0]!r}")
-        setting = [f"{name}={value}" for name, value in variables.items()]
-        self._process = start_child(["env", *setting, *command], guarded=True)
-
-    def check(self) -> None:
-        """Raise RunError if the process has ended."""
-        status = self._process.poll()
-        if status is not None:
-            raise RunError(f"the controller {self._name} has ended ({how_it_ended(status)})")
-
-    def close(self) -> None:
-        """End the process and its children."""
-        self._process.terminate()
-        self._process.wait()

@@ -1,12 +1,14 @@
 """The closed loop as a context manager: run a scenario and a controller for a simulated time."""
 
 import os
+import shlex
 import tempfile
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from inspect import Parameter, signature
 from os import PathLike, fspath
 from pathlib import Path
+from shutil import which
 from typing import Any, Self
 
 import rclpy
@@ -17,6 +19,7 @@ from rclpy.validate_namespace import validate_namespace
 from stickslip_ros.bags.recorder import check_new_bag
 from stickslip_ros.errors import InvalidInputError, RunError
 from stickslip_ros.nodes.analyzer import VERDICT_TIME
+from stickslip_ros.nodes.base.child_process import ChildProcesses, how_it_ended
 from stickslip_ros.nodes.base.clients import LifecycleClient, parameters_call
 from stickslip_ros.nodes.base.machine import own_domain
 from stickslip_ros.nodes.base.managed import ERROR
@@ -25,7 +28,7 @@ from stickslip_ros.nodes.base.process import loopback_session
 from stickslip_ros.running.bringup import node_parameters
 from stickslip_ros.running.composition import Composition
 from stickslip_ros.running.controller_search import ControllerSearch
-from stickslip_ros.running.user_controller import ControllerProcess, ControllerThread
+from stickslip_ros.running.user_controller import ControllerThread
 from stickslip_ros.scenarios import DEFAULT_NAMESPACE, LONGEST_NAMESPACE
 from stickslip_ros.scenarios.files import Scenario, load_scenario
 from stickslip_ros.scenarios.parameters import CONTROLLER_PARAMETERS
@@ -130,7 +133,8 @@ class ClosedLoop:
         if self._bag is not None:
             check_new_bag(self._bag)
         self._opened = ExitStack()
-        self._running: ControllerThread | ControllerProcess | None = None
+        self._thread: ControllerThread | None = None
+        self._processes = ChildProcesses()
         self._nodes: Composition | None = None
 
     @property
@@ -171,12 +175,12 @@ class ClosedLoop:
         return self
 
     def __exit__(self, kind: object, error: BaseException | None, traceback: object) -> None:
-        running = self._running
+        thread = self._thread
         with self._opened:
-            if isinstance(running, ControllerThread) and error is None:
-                running.settle()  # it may be about to raise
-                if running.unreported:
-                    running.check()
+            if thread is not None and error is None:
+                thread.settle()  # it may be about to raise
+                if thread.unreported:
+                    thread.check()
 
     def run(self, duration: float, *, timeout: float = 300.0) -> RunResult:
         """Run the loop for some simulated time and return the result.
@@ -306,7 +310,8 @@ class ClosedLoop:
         return changed
 
     def _forget(self) -> None:
-        self._nodes = self._running = self.controller = None
+        self._nodes = self._thread = self.controller = None
+        self._processes = ChildProcesses()
 
     def _open_nodes(self) -> Composition:
         if self._nodes is None:
@@ -316,16 +321,20 @@ class ClosedLoop:
     def _start_controller(self, opened: ExitStack) -> None:
         if callable(self._to_control):
             self.controller = self._made_node(self._to_control)
-            self._running = ControllerThread(self.controller)
-            opened.callback(self._running.close)
-            self._running.start()
+            self._thread = ControllerThread(self.controller)
+            opened.callback(self._thread.close)
+            self._thread.start()
         elif self._to_control is not None and not isinstance(self._to_control, str):
             command = list(self._to_control)
             # In rcl, later parameters take precedence: those of the command must.
             at = command.index("--ros-args") if "--ros-args" in command else len(command)
             command[at : at + 1] = self.ros_arguments
-            self._running = ControllerProcess(command, domain_variables(self._domain))
-            opened.callback(self._running.close)
+            name, variables = shlex.join(command), domain_variables(self._domain)
+            if which(command[0]) is None:
+                raise InvalidInputError(f"the controller {name}: no command {command[0]!r}")
+            setting = (f"{variable}={value}" for variable, value in variables.items())
+            self._processes.start(name, ["env", *setting, *command], guarded=True)
+            opened.callback(self._processes.end)
 
     def _made_node(self, make: Callable[..., Node]) -> Node:
         if self.context is rclpy.get_default_context():
@@ -396,14 +405,16 @@ class ClosedLoop:
         return nodes.spinner.spin_until(is_met, timeout)
 
     def _check_running(self) -> None:
-        if self._running is not None:
-            self._running.check()
+        if self._thread is not None:
+            self._thread.check()
+        for name, status in self._processes.ended().items():
+            raise RunError(f"the controller {name} has ended ({how_it_ended(status)})")
 
     def _end_run(self, nodes: Composition) -> dict[str, Diagnostics]:
         """Let the analyzer process pending messages and close its bag; return all diagnostics."""
-        if isinstance(self._running, ControllerThread):
-            self._running.settle()
-            self._running.check()
+        if self._thread is not None:
+            self._thread.settle()
+            self._thread.check()
         level, complaint, _ = nodes.analyzer.diagnose()
         if level == ERROR:
             raise RunError(f"the recording of the run failed: {complaint}")

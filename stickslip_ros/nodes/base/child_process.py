@@ -9,11 +9,15 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Sequence
 from contextlib import suppress
 
 GUARD_TIMEOUT = 3.0
 """Time, s, for a guarded command to end after SIGINT, and again after SIGTERM."""
+
+EXIT_TIMEOUT = 2.0 * GUARD_TIMEOUT + 2.0
+"""Time, s, for children to end after SIGTERM."""
 
 _PARENT_VARIABLE = "STICKSLIP_ROS_PARENT"
 
@@ -32,6 +36,40 @@ def start_child(command: Sequence[str], *, guarded: bool = False) -> subprocess.
         stdout=2,  # not sys.stderr, which may be replaced by an object that is no file
         start_new_session=True,  # Ctrl-C reaches this process only, which ends them in order
     )
+
+
+class ChildProcesses:
+    """Children of this process by name, which are watched, and ended together."""
+
+    def __init__(self) -> None:
+        self._children: dict[str, subprocess.Popen[bytes]] = {}
+
+    def start(self, name: str, command: Sequence[str], *, guarded: bool = False) -> None:
+        """Start a child, as `start_child` does."""
+        self._children[name] = start_child(command, guarded=guarded)
+
+    def rename(self, name: str, new: str) -> None:
+        """Give a child another name."""
+        self._children[new] = self._children.pop(name)
+
+    def ended(self) -> dict[str, int]:
+        """Return the return codes of the children that have ended."""
+        codes = {name: child.poll() for name, child in self._children.items()}
+        return {name: code for name, code in codes.items() if code is not None}
+
+    def end(self) -> list[str]:
+        """End all of them; return the names of those that did not end within EXIT_TIMEOUT."""
+        for child in self._children.values():
+            child.terminate()
+        deadline, killed = time.monotonic() + EXIT_TIMEOUT, list[str]()
+        for name, child in self._children.items():
+            try:
+                child.wait(max(deadline - time.monotonic(), 0.0))
+            except subprocess.TimeoutExpired:
+                killed.append(name)
+                child.kill()
+                child.wait()
+        return killed
 
 
 def how_it_ended(status: int) -> str:
