@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from stickslip_ros.scenarios.files import Scenario
     from stickslip_ros.studies.journal import Journal
     from stickslip_ros.studies.plan import Axis
-    from stickslip_ros.studies.study import Study
+    from stickslip_ros.studies.study import PointStudy
 
 _TABLES = (".csv", ".json")
 
@@ -112,7 +112,7 @@ def check_out(out: Path | None) -> None:
 
 @contextmanager
 def computed(
-    arguments: argparse.Namespace, study: "Study", label: str, columns: Any = None
+    arguments: argparse.Namespace, study: "PointStudy[Any]", label: str, columns: Any = None
 ) -> "Generator[Journal]":
     """Compute the missing points of the study, and provide its complete journal.
 
@@ -153,12 +153,13 @@ def computed(
         yield journal
 
 
-def _advice(study: "Study") -> str:
+def _advice(study: "PointStudy[Any]") -> str:
     """Return what would make a study quicker that simulates every sample of its loop."""
     from stickslip_ros.studies.settling import check_continuous
+    from stickslip_ros.studies.study import Study
 
     plant = study.scenario.plant
-    if study.continuous or not plant.expects_control:
+    if not isinstance(study, Study) or study.continuous or not plant.expects_control:
         return ""
     with suppress(InvalidInputError):
         check_continuous(study.scenario)

@@ -15,7 +15,7 @@ from stickslip_ros.scenarios.parameters import known_law
 from stickslip_ros.studies.case_outcome import Disturbance, Outcome, is_positioning, simulate_case
 from stickslip_ros.studies.plan import Axis, Grid
 from stickslip_ros.studies.settling import MotionState, check_reference
-from stickslip_ros.studies.study import Study
+from stickslip_ros.studies.study import PointStudy
 from stickslip_ros.studies.tuning import Goal, Tuned, tune, with_law
 from stickslip_ros.text import shown
 
@@ -106,10 +106,8 @@ class Cases:
 
 
 @dataclass(frozen=True)
-class Comparison(Study):
+class Comparison(PointStudy[Cases]):
     """The cases of a comparison, with all other parameters from a scenario."""
-
-    plan: Cases  # type: ignore[assignment]
 
     def scenario_of(self, number: int) -> Scenario:
         """Return the scenario of a case.
@@ -196,28 +194,8 @@ def compared(
 ) -> tuple[Comparison, dict[str, Tuned]]:
     """Return the cases of a comparison, with the gains that were found for its laws.
 
-    Parameters
-    ----------
-    scenario : Scenario
-        Scenario with drive, loop, sensor and the reference of the laws.
-    controllers : str or sequence of str
-        Names of control laws, as a text separated by commas.
-    axes : sequence of Axis, optional
-        Parameters that vary, such as the belt speed.
-    disturbances : str or sequence of str
-        Disturbances, see `Disturbance.parse`.
-    given : str or sequence of str
-        Laws whose constants are those of the scenario; also those that name no gains to tune.
-    seeds : int
-        Number of seeds.
-    spread : float
-        Largest deviation of the constants of the drive, as a share below 1.
-    duration : float
-        Duration of a case, s.
-    tolerance : float, optional
-        What a law that holds may leave: share of the belt speed, or of the reference's motion.
-    progress : callable
-        Receives the share of the gains that are found, 0 to 1.
+    The arguments are those of `stickslip_ros.compare`; `progress` receives the share of the gains
+    that are found, 0 to 1.
 
     Raises
     ------

@@ -18,7 +18,7 @@ import numpy as np
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.studies.columns import Columns
 from stickslip_ros.studies.settling import MotionState
-from stickslip_ros.studies.study import Piece, Study
+from stickslip_ros.studies.study import Piece, PointStudy
 from stickslip_ros.versions import versions
 
 _OPENING, _VERSION = b'{"format": "stickslip_ros study ', b'2"'
@@ -33,7 +33,9 @@ class Journal:
     killed, is removed.
     """
 
-    def __init__(self, study: Study, path: Path | None = None, columns: Any = None) -> None:
+    def __init__(
+        self, study: PointStudy[Any], path: Path | None = None, columns: Any = None
+    ) -> None:
         """Start a journal, or continue the one that exists; without a path only in memory.
 
         `columns` take the points; by default they are `Columns`.
@@ -164,7 +166,7 @@ class Journal:
             ) from None
 
 
-def kept_journal(study: Study, columns: Any = None) -> Journal:
+def kept_journal(study: PointStudy[Any], columns: Any = None) -> Journal:
     """Return the journal of a study in the user's cache; without a file if that is not to be."""
     name = f"{study.scenario.name}-{sha256(_heading(study)).hexdigest()[:16]}.part"
     try:
@@ -176,7 +178,7 @@ def kept_journal(study: Study, columns: Any = None) -> Journal:
         return Journal(study, None, columns)
 
 
-def _heading(study: Study) -> bytes:
+def _heading(study: PointStudy[Any]) -> bytes:
     heading = {"versions": versions(), **study.as_dict(), **study.contents()}
     return _OPENING + _VERSION + b", " + json.dumps(heading).encode()[1:]
 

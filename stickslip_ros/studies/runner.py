@@ -25,7 +25,7 @@ import numpy as np
 from stickslip_ros.errors import InvalidInputError, RunError
 from stickslip_ros.studies.journal import Journal
 from stickslip_ros.studies.settling import MotionState
-from stickslip_ros.studies.study import Piece, Study, compute, pieces_of
+from stickslip_ros.studies.study import Piece, PointStudy, compute, pieces_of
 
 IN_FLIGHT = 64
 """Default number of tasks that an executor holds at a time, which limits the memory."""
@@ -137,7 +137,7 @@ def run_here(journal: Journal, workers: int, progress: CountPoints = lambda _: N
 
 
 def compute_columns(
-    study: Study,
+    study: PointStudy[Any],
     *,
     workers: int = 1,
     executor: Executor | None = None,
@@ -152,7 +152,7 @@ def compute_columns(
 
     Parameters
     ----------
-    study : Study
+    study : PointStudy
         The study, as from `sweep_study` or `basin_study`.
     workers : int
         Number of processes on this machine; 1 computes in this process.

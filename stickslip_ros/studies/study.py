@@ -1,11 +1,14 @@
 """A study: many points of one scenario, each simulated until its motion has settled."""
 
+from abc import ABC, abstractmethod
 from collections import namedtuple
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
 from hashlib import sha256
-from typing import Any, NamedTuple, Self
+from typing import Any, Generic, NamedTuple, Self, TypeVar
+
+from typing_extensions import override
 
 from stickslip_ros.errors import InvalidInputError, StickslipError
 from stickslip_ros.physics.measures.cycle_measures import (
@@ -62,9 +65,46 @@ class Piece(NamedTuple):
     last one diverged or failed, or the plan has no continuation."""
 
 
+_Plan = TypeVar("_Plan")
+
+
 @dataclass(frozen=True)
-class Study:
-    """The points of a plan, with all other parameters from a scenario.
+class PointStudy(ABC, Generic[_Plan]):
+    """The points of a plan, with all other parameters from a scenario."""
+
+    scenario: Scenario
+    plan: _Plan
+
+    @abstractmethod
+    def compute_point(
+        self, index: int, start: MotionState | None
+    ) -> tuple[Any, MotionState | None]:
+        """Return a computed point, and the state in which the next one of a chain starts."""
+
+    @abstractmethod
+    def row(self, values: Sequence[Any]) -> Any:
+        """Return the point of a list that went through JSON."""
+
+    @abstractmethod
+    def cost(self) -> float:
+        """Return the approximate time that a point takes, s."""
+
+    @abstractmethod
+    def as_dict(self) -> dict[str, Any]:
+        """Return everything that the result depends on but `contents`, ready for JSON."""
+
+    def contents(self) -> dict[str, str]:
+        """Return a digest of the numbers in each file that the scenario names."""
+        return {
+            f"the content of {path}": sha256(repr(pairs).encode()).hexdigest()[:16]
+            for node in self.scenario.nodes
+            for path, pairs in getattr(self.scenario, node).curves().items()
+        }
+
+
+@dataclass(frozen=True)
+class Study(PointStudy[Plan]):
+    """Motions that settle at the points of a plan.
 
     A motion starts in the scenario's initial state. With a continuation it starts in the
     state in which its neighbour ended, filter included; delayed forces are then dropped, and
@@ -72,8 +112,6 @@ class Study:
     push that is smaller than the limit of rest.
     """
 
-    scenario: Scenario
-    plan: Plan
     settling: SettlingOptions = field(default_factory=SettlingOptions)
     continuous: bool = False
     """Whether control acts without sampling (eq. 19)."""
@@ -119,10 +157,10 @@ class Study:
             if why is not None:
                 raise InvalidInputError(f"{axis}: {name} is not used {why}")
 
+    @override
     def compute_point(
         self, index: int, start: MotionState | None
-    ) -> tuple[Any, MotionState | None]:
-        """Return a computed point, and the state in which the next one of a chain starts."""
+    ) -> tuple[Point, MotionState | None]:
         try:
             case, initial = self.case(index)
             if start is not None and case.law is not None:
@@ -145,12 +183,12 @@ class Study:
         turning_points = tuple(settled.turning_points.tolist())
         return Point._make([index, *values, settled.steady, turning_points, reason]), end
 
-    def row(self, values: Sequence[Any]) -> Any:
-        """Return the point of a list that went through JSON."""
+    @override
+    def row(self, values: Sequence[Any]) -> Point:
         return Point.from_json(values)
 
-    def cost(self) -> float:
-        """Return the approximate time that a point takes, s; the longest one of a sampled loop."""
+    @override
+    def cost(self) -> float:  # of a sampled loop the longest one
         for index in (self.plan.size // 2, 0, self.plan.size - 1):
             with suppress(StickslipError):
                 case, _ = self.case(index)
@@ -162,8 +200,8 @@ class Study:
             return periods * 2e-5
         return self.settling.patience * periods * case.period * case.sampled.rate * 1e-5
 
+    @override
     def as_dict(self) -> dict[str, Any]:
-        """Return everything that the result depends on but `contents`, ready for JSON."""
         plan = asdict(self.plan)
         if "continuation" in plan:
             plan["carry"] = plan.pop("continuation")
@@ -172,14 +210,6 @@ class Study:
             "plan": {"kind": self.plan.kind, **plan},
             "course": asdict(self.settling),
             "continuous_control": self.continuous,
-        }
-
-    def contents(self) -> dict[str, str]:
-        """Return a digest of the numbers in each file that the scenario names."""
-        return {
-            f"the content of {path}": sha256(repr(pairs).encode()).hexdigest()[:16]
-            for node in self.scenario.nodes
-            for path, pairs in getattr(self.scenario, node).curves().items()
         }
 
 
@@ -241,7 +271,7 @@ def sweep_study(
     return study
 
 
-def compute(study: Study, points: Sequence[int], start: MotionState | None) -> Piece:
+def compute(study: PointStudy[Any], points: Sequence[int], start: MotionState | None) -> Piece:
     """Compute some points in their order; a pure function, for any process.
 
     With a continuation the first point starts in `start`. With None it starts in its
