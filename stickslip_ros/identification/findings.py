@@ -14,7 +14,9 @@ from stickslip_ros.identification.drives import POOR_ERROR
 from stickslip_ros.identification.filtered import START, Filtered, filtered
 from stickslip_ros.identification.fit import Estimate, ForceErrors, Friction, Residuals
 from stickslip_ros.identification.record import FEWEST, Record
+from stickslip_ros.identification.rest import static_force
 from stickslip_ros.identification.servo import Servo, closed_loop
+from stickslip_ros.identification.trajectory import delayed
 from stickslip_ros.physics.model.drive import Drive
 
 _STILL_SPEED = 0.02
@@ -33,6 +35,9 @@ _NAMED_CORRELATION = 0.95
 """Correlation from which two constants are named together."""
 _ADDED_SHARE = 0.3
 """Share of samples with added forces from which another controller may have acted."""
+_STATIC_SHARE = 1.1
+"""Largest force at which the slide may break loose, in static friction of the law, to say nothing.
+"""
 _BY_DIRECTION = "it merges with friction by direction, and is taken as 0"
 CHECKED = (
     "force_error",
@@ -341,6 +346,29 @@ def _notes(found: Findings) -> Sequence[str]:
     return notes
 
 
+def _static_friction(found: Findings) -> str:
+    """Return what rests tell of the static friction, where it may be another one than the law's."""
+    fit, texts = found.chosen.fit, list[str]()
+    values = fit.values_at(fit.point)
+    records = [delayed(record, found.delay) for record in found.records]
+    for sign, way in zip((1.0, -1.0), ("forward", "backward"), strict=True):
+        if sign not in found.directions:
+            continue
+        held = (
+            record.held_force + values["bias_force"] - values["stiffness"] * record.position
+            for record in records
+        )
+        bounds = [static_force(*each, sign) for each in zip(records, held, strict=True)]
+        low, high = max(low for low, _ in bounds), min(high for _, high in bounds)
+        own = float(fit.force_at(fit.point, sign, np.zeros(1))[0])
+        if isfinite(low) and isfinite(high) and not low <= own <= high <= _STATIC_SHARE * own:
+            texts.append(
+                f"{way} the slide rests under {low:.3g} N and moves at {high:.3g} N at the latest, "
+                f"where the law has {own:.3g} N"
+            )
+    return ", ".join(texts)
+
+
 def _untold(found: Findings) -> dict[str, str]:
     """Return why parameters of the plant are not identifiable, and the run that would help."""
     why = {
@@ -368,6 +396,11 @@ def _untold(found: Findings) -> dict[str, str]:
             why["friction.static"] = (
                 "no row at rest is fitted: it is the curve at its slowest steady speed extended "
                 f"to rest; {slower}"
+            )
+        if at_rest := _static_friction(found):
+            why["friction.static"] = (
+                f"it is that of slip; {at_rest}: the law stiction has static friction of its own, "
+                "and a force that rises slowly from rest tells it"
             )
     else:
         if found.one_belt_speed:

@@ -14,9 +14,10 @@ from stickslip_ros.identification.findings import Findings, notes_on
 from stickslip_ros.identification.identify import identify
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.regression import regress
+from stickslip_ros.identification.rest import static_force
 from stickslip_ros.identification.servo import closed_loop, servo_of
 from stickslip_ros.identification.trajectory import Predictor, free_run
-from stickslip_ros.physics.model.friction import Coulomb
+from stickslip_ros.physics.model.friction import Coulomb, Stiction
 from tests.identification.axis_record import COULOMB, SATURATING, SERVO, axis, record
 
 
@@ -61,6 +62,25 @@ def test_intervals_without_noise(rate: int) -> None:
         low, high = found.fitted[name].interval
         assert low <= value <= high, name
         assert found.fitted[name].value == pytest.approx(value, rel=1e-4), name
+
+
+@pytest.mark.parametrize("static", [17.0, 25.0])
+def test_rests_tell_static_friction_that_slip_does_not(static: float) -> None:
+    """A force that rises by 20 N/s from rest, and drops once the slide has slipped for a while."""
+    time, count = np.arange(2000) / 500.0, 8
+    ramp = np.where(time < 1.6, 20.0 * time, np.where(time < 1.9, -12.0, 0.0))
+    force = np.concatenate([(-1.0) ** number * ramp for number in range(count)])
+    still = np.zeros(len(force))
+    start = Record("axis", 2e-3, still, still, force=force)
+    position = Predictor(start).positions(axis(Stiction(static, 17.0, 140.0)), 0.0)
+    own = replace(start, position=np.rint(position / 2e-6) * 2e-6)
+    for sign in (1.0, -1.0):
+        low, high = static_force(own, force, sign)
+        assert low <= static <= high <= low + 3.0
+    found = identify([own], "coulomb", {"force_delay": 0.0})
+    assert found.fitted["friction.static"].value == pytest.approx(17.0, rel=0.01)
+    said = found.unidentified.get("friction.static", "")
+    assert said.count("where the law has 17 N") == (2 if static > 17.0 else 0)
 
 
 def test_the_committed_study() -> None:
