@@ -76,12 +76,77 @@ class SlipThreshold:
                 raise InvalidInputError(f"{name} = {value} is invalid: must be above 0 ({unit})")
 
 
+def slips_in(
+    time: FloatArray, position: FloatArray, drop: float, span: int, landing: int | None = None
+) -> list[tuple[Slip, int]]:
+    """Return the slips that positions (m) at times (s) complete, and the row at which each ends.
+
+    A slip is a drop of more than `drop` (m) within `span` samples, of medians over five samples. It
+    ends at the lowest position before a rise by half of it, or before `span` samples without a
+    lower one. Its duration is that from a tenth to nine tenths of the drop, the transition duration
+    of IEEE Std 181.
+
+    They are looked for from the `landing` on, the row at which a stick begins; without one, from
+    the start on, and when the first stick began is not known.
+    """
+    from scipy.ndimage import maximum_filter1d, median_filter  # takes long to import
+
+    # The last medians are not known yet.
+    smooth = median_filter(position, _MEDIAN, mode="nearest")[: -(_MEDIAN // 2)]
+    before = maximum_filter1d(smooth, span + 1, origin=span // 2, mode="nearest")
+    found: list[tuple[Slip, int]] = []
+    while True:
+        begin = landing or 0
+        highest = before[begin:].copy()
+        since = smooth[begin : begin + span]
+        highest[: len(since)] = np.maximum.accumulate(since)
+        low = smooth[begin:] < highest - drop
+        if not low.any():
+            return found
+        start = begin + int(np.argmax(low))
+        fall = smooth[start:]
+        lowest = np.minimum.accumulate(fall)
+        rows = np.arange(len(fall))
+        last = np.maximum.accumulate(np.where(fall <= lowest, rows, 0))
+        first = np.maximum.accumulate(np.where(np.diff(lowest, prepend=np.inf) < 0.0, rows, 0))
+        rests = last - first > span  # a slide on a guide at rest does not move at all
+        over = rests | (fall > lowest + drop / 2.0) | (rows - last > span)
+        if not over.any():
+            return found
+        end = int(np.argmax(over))
+        bottom = start + int(first[end] if rests[end] else last[end])
+        top = max(start - span, begin)
+        top += int(np.argmax(smooth[top : start + 1]))
+        found.append((_slip(time, smooth, top, bottom, landing), bottom))
+        landing = bottom
+
+
+def _slip(time: FloatArray, smooth: FloatArray, top: int, bottom: int, landing: int | None) -> Slip:
+    """Return the slip between two rows, with the stick since the landing if it is long enough."""
+    tenth = (smooth[top] - smooth[bottom]) / 10.0
+    rows = smooth[top : bottom + 1]
+    start = top + int(np.flatnonzero(rows >= smooth[top] - tenth)[-1])
+    end = top + int(np.flatnonzero(rows <= smooth[bottom] + tenth)[0])
+    stick_time = slope = error = nan
+    if landing is not None and start - landing >= _LEAST_SAMPLES:
+        stick_time = float(time[start] - time[landing])
+        # Before a slip the contact creeps.
+        half = slice(landing, (landing + start) // 2 + 1)
+        slope, error = fit_line(time[half] - float(time[half].mean()), smooth[half])
+    return Slip(
+        time=float(time[start]),
+        stick_time=stick_time,
+        drop=float(smooth[top] - smooth[bottom]),
+        slip_time=float(time[end] - time[start]),
+        stick_velocity=slope,
+        stick_velocity_error=error,
+    )
+
+
 class SlipMeter:
     """Finds slips in positions, fed in blocks of any length; the belt moves forward.
 
-    A slip is a drop of more than a threshold within a time, of medians over five samples. It ends
-    at the lowest position before a rise by half the threshold, or before this time without a lower
-    one. Its duration is that from a tenth to nine tenths of the drop.
+    It keeps the samples since the last slip, and calls `slips_in`.
     """
 
     def __init__(self, threshold: SlipThreshold) -> None:
@@ -89,15 +154,12 @@ class SlipMeter:
         self._slips: deque[Slip] = deque(maxlen=_MOST_SLIPS)
         self.count = 0
         """Number of slips."""
-        self.interrupt()
+        self._begin()
 
-    def interrupt(self) -> None:
-        """Drop the current stick: the next sample does not continue the motion so far."""
+    def _begin(self) -> None:
         self._time, self._position = np.empty(0), np.empty(0)
-        self._whole = False
-        self._begin = 0
-        self._ended = 0  # row at which the last slip ended
         self._span = 0
+        self._landing: int | None = None
 
     def feed(self, time: FloatArray, position: FloatArray) -> list[Slip]:
         """Add the samples that follow, in s and m; return the slips that they complete."""
@@ -108,10 +170,24 @@ class SlipMeter:
             if len(self._time) > 2 * _MEDIAN:
                 found += self._find()
             if len(self._time) > _MOST_SAMPLES:
-                self.interrupt()
+                self._begin()
         self._slips.extend(found)
         self.count += len(found)
         return found
+
+    def _find(self) -> list[Slip]:
+        time = self._time
+        if self._span == 0:
+            step = float(time[_MEDIAN * 2] - time[0]) / (_MEDIAN * 2)
+            span = min(self.threshold.within / step, _MOST_SAMPLES) if step > 0.0 else 1
+            self._span = max(round(span), 1)
+        found = slips_in(time, self._position, self.threshold.drop, self._span, self._landing)
+        if found:
+            # What is found must not depend on the blocks: the filters reach back.
+            kept = max(found[-1][1] - self._span - _MEDIAN, 0)
+            self._time, self._position = time[kept:], self._position[kept:]
+            self._landing = found[-1][1] - kept
+        return [slip for slip, _ in found]
 
     def report(self, belt_speed: float) -> dict[str, Any]:
         """Return `count`, threshold, `regime`, distributions and each slip, for JSON; SI units.
@@ -138,73 +214,6 @@ class SlipMeter:
             for name, values in columns.items()
         }
         return {**report, "each": each}
-
-    def _find(self) -> list[Slip]:
-        from scipy.ndimage import maximum_filter1d, median_filter  # takes long to import
-
-        time, drop = self._time, self.threshold.drop
-        # The last medians are not known yet.
-        smooth = median_filter(self._position, _MEDIAN, mode="nearest")[: -(_MEDIAN // 2)]
-        if self._span == 0:
-            step = float(time[_MEDIAN * 2] - time[0]) / (_MEDIAN * 2)
-            span = min(self.threshold.within / step, _MOST_SAMPLES) if step > 0.0 else 1
-            self._span = max(round(span), 1)
-        span, found = self._span, list[Slip]()
-        before = maximum_filter1d(smooth, span + 1, origin=span // 2, mode="nearest")
-        while True:
-            begin = self._begin
-            highest = before[begin:].copy()
-            since = smooth[begin : begin + span]
-            highest[: len(since)] = np.maximum.accumulate(since)
-            low = smooth[begin:] < highest - drop
-            if not low.any():
-                break
-            start = begin + int(np.argmax(low))
-            fall = smooth[start:]
-            lowest = np.minimum.accumulate(fall)
-            rows = np.arange(len(fall))
-            last = np.maximum.accumulate(np.where(fall <= lowest, rows, 0))
-            first = np.maximum.accumulate(np.where(np.diff(lowest, prepend=np.inf) < 0.0, rows, 0))
-            rests = last - first > span  # a slide on a guide at rest does not move at all
-            over = rests | (fall > lowest + drop / 2.0) | (rows - last > span)
-            if not over.any():
-                break
-            end = int(np.argmax(over))
-            bottom = start + int(first[end] if rests[end] else last[end])
-            top = max(start - span, begin)
-            top += int(np.argmax(smooth[top : start + 1]))
-            found.append(self._slip(smooth, top, bottom))
-            self._begin = bottom
-        # What is found must not depend on the blocks: the filters reach back.
-        kept = max(self._begin - span - _MEDIAN, 0)
-        if kept > 0:
-            self._time, self._position = time[kept:], self._position[kept:]
-            self._begin -= kept
-            self._ended -= kept
-        return found
-
-    def _slip(self, smooth: FloatArray, top: int, bottom: int) -> Slip:
-        """Return the slip between two rows, with the stick before it if that is whole."""
-        tenth = (smooth[top] - smooth[bottom]) / 10.0
-        rows = smooth[top : bottom + 1]
-        start = top + int(np.flatnonzero(rows >= smooth[top] - tenth)[-1])
-        end = top + int(np.flatnonzero(rows <= smooth[bottom] + tenth)[0])
-        first, self._ended, whole, self._whole = self._ended, bottom, self._whole, True
-        stick_time = slope = error = nan
-        if whole and start - first >= _LEAST_SAMPLES:
-            stick_time = float(self._time[start] - self._time[first])
-            # Before a slip the contact creeps.
-            half = slice(first, (first + start) // 2 + 1)
-            time = self._time[half]
-            slope, error = fit_line(time - float(time.mean()), smooth[half])
-        return Slip(
-            time=float(self._time[start]),
-            stick_time=stick_time,
-            drop=float(smooth[top] - smooth[bottom]),
-            slip_time=float(self._time[end] - self._time[start]),
-            stick_velocity=slope,
-            stick_velocity_error=error,
-        )
 
 
 def regime_by_slips(
