@@ -6,8 +6,7 @@ from math import inf
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.physics.measures.cycle_fit import MeanCycle
-from stickslip_ros.physics.measures.cycle_measures import LEAST_CYCLES, Cycle, Measures
+from stickslip_ros.physics.measures.cycle_measures import LEAST_CYCLES, Cycle
 from stickslip_ros.physics.measures.noise import (
     PRECISION,
     encoder_step,
@@ -15,7 +14,7 @@ from stickslip_ros.physics.measures.noise import (
     medians,
     white_noise,
 )
-from stickslip_ros.physics.measures.noisy_window import REVERSAL, NoisyWindow
+from stickslip_ros.physics.measures.noisy_window import REVERSAL, LastCycles, NoisyWindow
 from stickslip_ros.physics.measures.single_cycles import (
     NoisySamples,
     Point,
@@ -94,15 +93,10 @@ class NoisyCycleMeter:
         """Whether positions or velocities have noise."""
         self.step = 0.0
         """Step of the positions, m, that they are multiples of; 0 as long as none is found."""
-        self.within = 0.0
-        """Range, m, in which a slide is held as far as its actuator can."""
-        self.stick_speed = 0.0
-        """Relative speed, m/s, up to which a slide sticks whose friction has a memory."""
         self.ends: list[float] = []
         """Time, s, at which each cycle ended that `feed` returned last."""
         self._count = 0
-        self._fastest_belt = 0.0
-        self._before: NoisyWindow | None = None
+        self._before: LastCycles | None = None
         self._begin()
 
     def _begin(self) -> None:
@@ -117,16 +111,11 @@ class NoisyCycleMeter:
         """Number of samples that are held."""
         return len(self._columns)
 
-    @property
-    def line(self) -> float | None:
-        """Frequency of the line in the spectrum of the last positions, see `strongest_line`."""
-        return self._window.line
-
     def interrupt(self) -> None:
         """Drop the current cycle: the next sample does not continue the motion so far."""
         if len(self._cycles) >= (1 if self._before is None else LEAST_CYCLES):
             # The cycles so far are the window until there are enough others.
-            self._before = self._window
+            self._before = self._last
         self._begin()
 
     def feed(
@@ -136,7 +125,6 @@ class NoisyCycleMeter:
         self.ends = []
         completed: list[Cycle] = []
         new = NoisySamples(time, position, velocity, belt)
-        self._fastest_belt = max(self._fastest_belt, float(np.abs(belt).max(initial=0.0)))
         while len(new) > 0:
             due = _BATCH - self._count % _BATCH
             part, new = new[:due], new[due:]
@@ -149,27 +137,23 @@ class NoisyCycleMeter:
                 completed += self._advance()
         return completed
 
-    def measures(self, *, quick: bool = False) -> tuple[Measures, MeanCycle | None]:
-        """Return the measures of the last whole cycles, and the mean cycle if they are alike.
-
-        With `quick`, means over single cycles will do.
-        """
-        return self._window.measures(self._before, quick=quick)
-
-    @property
-    def _window(self) -> NoisyWindow:
+    def window(self, within: float, stick_speed: float, fastest_belt: float) -> NoisyWindow:
+        """Return the window of the last cycles, with these of its fields."""
         return NoisyWindow(
-            self._columns.samples[:-_UNKNOWN],
-            self._cycles,
-            self._starts,
+            self._last,
+            self._before,
             most_cycles=self._most_cycles,
             run=self._count,
             noise=self.noise,
             step=self.step,
-            within=self.within,
-            stick_speed=self.stick_speed,
-            fastest_belt=self._fastest_belt,
+            within=within,
+            stick_speed=stick_speed,
+            fastest_belt=fastest_belt,
         )
+
+    @property
+    def _last(self) -> LastCycles:
+        return LastCycles(self._columns.samples[:-_UNKNOWN], self._cycles, self._starts)
 
     def _take(self, part: NoisySamples) -> None:
         """Hold samples without impulses, which those beside them tell."""
@@ -183,7 +167,7 @@ class NoisyCycleMeter:
     def _look(self) -> None:
         """Estimate the noise, and the step of an encoder, from the last samples."""
         recent = self._columns.samples[:-_UNKNOWN][-_LOOK_LENGTH:]
-        position, count = recent.position, len(recent)
+        position, belt, count = recent.position, recent.belt, len(recent)
         if count < 3:
             return
         noise, step = white_noise(position), encoder_step(position)
@@ -199,17 +183,17 @@ class NoisyCycleMeter:
             self.noisy |= self.step > _ROUNDING_SHARE * moved and not uniform
         fastest = float(np.abs(recent.velocity).max())
         of_velocity = white_noise(recent.velocity)
-        if of_velocity > max(_ROUNDING_SHARE * fastest, PRECISION * self._fastest_belt):
+        if of_velocity > max(_ROUNDING_SHARE * fastest, PRECISION * float(np.abs(belt).max())):
             self.noisy = True
 
     def _advance(self) -> list[Cycle]:
         """Return the cycles that the samples since the last one complete."""
-        samples, window = self._columns.samples[:-_UNKNOWN], self._window
+        last = self._last
+        samples = last.samples
         first = 0 if self._low is None else samples.row(self._low[0])
         if len(samples) - first > _WITHOUT_CYCLES and self._count % _LOOK_INTERVAL:
             return []
-        moves = len(self._cycles) > 0 and not window.resting
-        size = 2.0 * self._cycles[-1].amplitude if moves else 0.0
+        size = 2.0 * self._cycles[-1].amplitude if self._cycles and not last.resting else 0.0
         least = max(REVERSAL * self.noise, _REVERSAL_SHARE * size)
         completed: list[Cycle] = []
         # The median of the last position takes one more.

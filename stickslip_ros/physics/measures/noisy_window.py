@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import sqrt
+from typing import NamedTuple
 
 import numpy as np
 
@@ -43,14 +44,30 @@ _SLIP_SHARE = 0.1
 """Share of the belt speed by which a slide at rest may seem to move."""
 
 
-@dataclass(frozen=True)
-class NoisyWindow:
-    """The last cycles of a run with their samples, and what is known of the sensor; SI units."""
+class LastCycles(NamedTuple):
+    """The last cycles of a part of a run without a gap, with their samples; SI units."""
 
     samples: NoisySamples
     cycles: Sequence[Cycle]
     starts: Sequence[float]
     """Start of each cycle, and the end of the last, s."""
+
+    @property
+    def resting(self) -> bool:
+        """Whether no reversal has come for several periods."""
+        if not self.cycles or len(self.samples) == 0:
+            return False
+        since = float(self.samples.time[-1]) - self.starts[-1]
+        return since > STALE_PERIODS * self.cycles[-1].period
+
+
+@dataclass(frozen=True)
+class NoisyWindow:
+    """The last cycles of a run, and what is known of it and of its sensor; SI units."""
+
+    last: LastCycles
+    before: LastCycles | None
+    """Those before a gap, which count until there are enough others; None without."""
     most_cycles: int
     """Number of cycles that a window has if the run is long enough."""
     run: int
@@ -67,28 +84,20 @@ class NoisyWindow:
     """Largest speed of the belt in the run, m/s."""
 
     @property
-    def resting(self) -> bool:
-        """Whether no reversal has come for several periods."""
-        if not self.cycles or len(self.samples) == 0:
-            return False
-        since = float(self.samples.time[-1]) - self.starts[-1]
-        return since > STALE_PERIODS * self.cycles[-1].period
-
-    @property
-    def recent(self) -> NoisySamples:
+    def _recent(self) -> NoisySamples:
         """Samples of the last part of the run, of several cycles if there are any."""
-        samples = self.samples
+        samples, cycles, _ = self.last
         row = len(samples) - min(max(self.run // 4, _SHORTEST), _LONGEST)
-        if self.cycles and 2.0 * self.cycles[-1].amplitude > self._resolved:
+        if cycles and 2.0 * cycles[-1].amplitude > self._resolved:
             # What seems to be a last cycle may have ended by noise, long after.
-            period = min(cycle.period for cycle in self.cycles)
+            period = min(cycle.period for cycle in cycles)
             row = min(row, samples.row(float(samples.time[-1]) - LEAST_CYCLES * period))
         return samples[max(row, 0) :]
 
     @property
     def line(self) -> float | None:
         """Frequency of the line in the spectrum of the last positions, see `strongest_line`."""
-        position = self.recent.position
+        position = self._recent.position
         # An encoder that rounds a steady motion has lines, too.
         if len(position) < FEWEST_SAMPLES:
             return None
@@ -96,47 +105,44 @@ class NoisyWindow:
         least = max(self._resolved, PRECISION * float(np.abs(position).max()))
         return strongest_line(flat) if np.ptp(flat) > least else None
 
-    def measures(
-        self, before: "NoisyWindow | None" = None, *, quick: bool = False
-    ) -> tuple[Measures, MeanCycle | None]:
+    def measures(self, *, quick: bool = False) -> tuple[Measures, MeanCycle | None]:
         """Return the measures, and the mean cycle if the cycles are alike.
 
-        The cycles of `before` a gap count until there are enough others. Where the reversals do not
-        show cycles, a line of the spectrum may. With `quick`, means over single cycles will do.
+        Where the reversals do not show cycles, a line of the spectrum may. With `quick`, means over
+        single cycles will do.
         """
-        recent, resting, window = self.recent, self.resting, self
+        recent, resting, part = self._recent, self.last.resting, self.last
         # Few samples after a gap tell less than the cycles before it.
-        enough = len(recent) >= (1 if before is None else FEWEST_SAMPLES)
+        enough = len(recent) >= (1 if self.before is None else FEWEST_SAMPLES)
         if enough and 0.0 < self._resolved >= float(np.ptp(recent.position)):
             return self._rest(recent, Regime.HELD), None
-        if len(self.cycles) < LEAST_CYCLES and before is not None and not resting:
-            window = replace(
-                self, samples=before.samples, cycles=before.cycles, starts=before.starts
-            )
-        resting |= not window.cycles
+        if len(part.cycles) < LEAST_CYCLES and self.before is not None and not resting:
+            part = self.before
         line = self.line
+        resting |= not part.cycles
         if line is not None and (resting or line * FEW_SAMPLES > 1.0):
             return self._by_line(recent, line)
         if resting:
             # The second half of what has come since the last cycle.
-            first = self.samples.row(self.starts[-1]) if self.cycles else 0
-            return self._rest(self.samples[(first + len(self.samples)) // 2 :]), None
-        fit = None if quick else window._fit(window.samples, window.starts)
+            samples = part.samples
+            first = samples.row(part.starts[-1]) if part.cycles else 0
+            return self._rest(samples[(first + len(samples)) // 2 :]), None
+        fit = None if quick else self._fit(part.samples, part.starts)
         if fit is not None:
-            return window._found(fit, fit.noise), fit
-        return window._unlike(by_slips=not quick), None
+            return self._found(part.samples, fit, fit.noise), fit
+        return self._unlike(part, by_slips=not quick), None
 
-    def _unlike(self, *, by_slips: bool) -> Measures:
+    def _unlike(self, part: LastCycles, *, by_slips: bool) -> Measures:
         """Return the measures of cycles that are not alike, whose slips tell whether it sticks."""
         # Half of the cycles: a single one may seem to stick for a moment.
-        means = CycleMeans.over(self.cycles, 0.5)
-        found = self._found(means, self.noise)
+        means = CycleMeans.over(part.cycles, 0.5)
+        found = self._found(part.samples, means, self.noise)
         if not by_slips or found.regime not in (Regime.STICK_SLIP, Regime.PURE_SLIP):
             return found
-        part = self.samples[self.samples.row(self.starts[0]) :]
-        sign = -1.0 if float(part.belt[-1]) < 0.0 else 1.0
+        samples = part.samples[part.samples.row(part.starts[0]) :]
+        sign = -1.0 if float(samples.belt[-1]) < 0.0 else 1.0
         size = max(means.cycle.amplitude / 2.0, REVERSAL * max(self.noise, self.step))
-        regime = regime_by_slips(part.time, sign * part.position, size, means.cycle.period)
+        regime = regime_by_slips(samples.time, sign * samples.position, size, means.cycle.period)
         if regime in (None, found.regime):
             return found
         share = None if regime is Regime.STICK_SLIP else 0.0
@@ -153,20 +159,21 @@ class NoisyWindow:
         if fit is None:
             few = line * FEW_SAMPLES > 1.0
             return without_cycles(None, Regime.UNDERSAMPLED if few else None), None
-        return self._found(fit, fit.noise), fit
+        return self._found(samples, fit, fit.noise), fit
 
-    def _found(self, means: CycleMeans, noise: float) -> Measures:
+    def _found(self, samples: NoisySamples, means: CycleMeans, noise: float) -> Measures:
         """Return the measures of cycles in samples with this noise, m."""
         enough, size = len(means.amplitudes) >= LEAST_CYCLES, means.cycle.amplitude
         trend = trend_under_noise(means.amplitudes, self.noise, self.step) if enough else None
         if noise < self.step / 2.0 and size < _FEW_STEPS * self.step:
             means = replace(means, errors=None)
-        moving = float(self.samples.belt[-1]) != 0.0
+        moving = float(samples.belt[-1]) != 0.0
         slow = means.cycle.velocity_amplitude < EQUILIBRIUM_SPEED * self.fastest_belt
         return means.measures(moving and slow, trend is None if enough else None, trend)
 
     def _rest(self, samples: NoisySamples, regime: Regime = Regime.EQUILIBRIUM) -> Measures:
-        needed = self.most_cycles * self.cycles[-1].period if self.cycles else 0.0
+        cycles = self.last.cycles
+        needed = self.most_cycles * cycles[-1].period if cycles else 0.0
         return rest(samples, self.noise, self._resolved, needed, regime)
 
     def _fit(self, samples: NoisySamples, starts: Sequence[float]) -> MeanCycle | None:

@@ -268,16 +268,16 @@ class SampleMeter:
         ended = self._fastest >= (1.0 - 1e-9) * self.reading.unbounded_speed
         unbounded = ended or self._unbounded_speed > limit
         self._meter.unbounded = unbounded
-        self._meter.within = self._noisy_meter.within = self.reading.within
-        few = not self.noisy and self._per_cycle < FEW_SAMPLES and self._noisy_meter.line
-        self._noisy_meter.stick_speed = self._stick_speed
+        self._meter.within = within = self.reading.within
+        window = self._noisy_meter.window(within, self._stick_speed, self._fastest_belt)
+        few = not self.noisy and self._per_cycle < FEW_SAMPLES and window.line
         self.mean_cycle = None
         if unbounded or not (self.noisy or few):
             found = self._meter.measures()
         elif few and self._per_cycle < LEAST_SAMPLES:
             found = without_cycles(None, Regime.UNDERSAMPLED)
         else:
-            found, self.mean_cycle = self._noisy_meter.measures(quick=quick)
+            found, self.mean_cycle = window.measures(quick=quick)
         self.drift.resolution = self._noisy_meter.step
         self.drift.judged = not (self.reading.varies or self._belt_varies)
         return with_drift(found, self.drift)
