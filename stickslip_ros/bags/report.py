@@ -21,7 +21,7 @@ from stickslip_ros.messages.topics import CONTROL_FORCE, JOINT_STATES
 from stickslip_ros.physics.measures.cycle_measures import Regime
 from stickslip_ros.physics.measures.feed import relative_to_feed
 from stickslip_ros.physics.measures.run_meter import RunAnalysis, RunMeter, RunObserver
-from stickslip_ros.physics.measures.sample_meter import SampleAssumptions, reading_of
+from stickslip_ros.physics.measures.sample_assumptions import SampleAssumptions, reading_of
 from stickslip_ros.physics.measures.slips import SlipMeter, SlipThreshold
 from stickslip_ros.physics.measures.timing import Timing
 from stickslip_ros.samples import ForceColumns, SampleColumns

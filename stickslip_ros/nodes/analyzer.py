@@ -71,7 +71,7 @@ from stickslip_ros.nodes.base.ros_topics import qos_profile, timed_messages
 from stickslip_ros.physics.measures.cycle_measures import trend_text
 from stickslip_ros.physics.measures.onset import OnsetWatch
 from stickslip_ros.physics.measures.run_meter import RunMeter
-from stickslip_ros.physics.measures.sample_meter import SampleAssumptions
+from stickslip_ros.physics.measures.sample_assumptions import SampleAssumptions
 from stickslip_ros.physics.measures.timing import Timing
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.samples import NO_FORCES, NO_SAMPLES, ForceColumns

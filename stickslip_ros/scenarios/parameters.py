@@ -18,7 +18,7 @@ from stickslip_ros.messages import ForceSource, TimeSource
 from stickslip_ros.messages.codec import FORCE_TYPES
 from stickslip_ros.physics.loop.controller import Controller
 from stickslip_ros.physics.loop.sampled_loop import LOCKSTEP_START, SampledLoop
-from stickslip_ros.physics.measures.sample_meter import SampleAssumptions, reading_of
+from stickslip_ros.physics.measures.sample_assumptions import SampleAssumptions, reading_of
 from stickslip_ros.physics.model.actuator import IDEAL_ACTUATOR, Actuator
 from stickslip_ros.physics.model.constants import (
     SMALLEST,

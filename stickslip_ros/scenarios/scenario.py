@@ -8,7 +8,7 @@ from typing import Any, Self
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.measures.cycle_meter import CycleMeter
 from stickslip_ros.physics.measures.noise import resolved
-from stickslip_ros.physics.measures.sample_meter import SampleAssumptions, varies
+from stickslip_ros.physics.measures.sample_assumptions import SampleAssumptions, varies
 from stickslip_ros.physics.model.control import ControlLaw
 from stickslip_ros.scenarios.keywords import (
     described,

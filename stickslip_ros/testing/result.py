@@ -9,7 +9,7 @@ from stickslip_ros.bags import Recording
 from stickslip_ros.errors import RunError
 from stickslip_ros.physics.measures.cycle_measures import Measures
 from stickslip_ros.physics.measures.run_meter import RunMeter
-from stickslip_ros.physics.measures.sample_meter import SampleAssumptions
+from stickslip_ros.physics.measures.sample_assumptions import SampleAssumptions
 from stickslip_ros.samples import ForceColumns, SampleColumns
 
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from stickslip_ros.physics.measures.sample_meter import SampleAssumptions
+from stickslip_ros.physics.measures.sample_assumptions import SampleAssumptions
 from stickslip_ros.physics.model.actuator import IDEAL_ACTUATOR, Actuator
 from stickslip_ros.physics.model.sensor import EXACT_SENSOR, MeasuredVelocity, Sensor
 from stickslip_ros.physics.motion import Motion

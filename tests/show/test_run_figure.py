@@ -19,11 +19,8 @@ from stickslip_ros.bags.report import report_of_recording
 from stickslip_ros.physics.measures.cycle_measures import Cycle, Measures, measures_of
 from stickslip_ros.physics.measures.cycle_meter import CycleMeter
 from stickslip_ros.physics.measures.run_meter import RunAnalysis
-from stickslip_ros.physics.measures.sample_meter import (
-    MeasuredMotion,
-    SampleAssumptions,
-    SampleMeter,
-)
+from stickslip_ros.physics.measures.sample_assumptions import SampleAssumptions
+from stickslip_ros.physics.measures.sample_meter import MeasuredMotion, SampleMeter
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.motion import RecordedMotion
 from stickslip_ros.samples import SampleColumns

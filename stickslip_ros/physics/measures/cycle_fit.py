@@ -106,10 +106,8 @@ def _measures(
 ) -> tuple[Cycle, Cycle]:
     """Return the measures of a shape, and their standard errors."""
     grid, period = np.linspace(0.0, fold.period, GRID, endpoint=False), fold.period
-    position, velocity = shape.value(grid), shape.value(grid, 1)
-    highest, lowest = (_refined(grid, sign * position) for sign in (1.0, -1.0))
-    fastest, slowest = (_refined(grid, sign * velocity) for sign in (1.0, -1.0))
-    at = np.array([highest, lowest, fastest, slowest])
+    courses = shape.value(grid), shape.value(grid, 1)
+    at = np.array([_refined(grid, sign * course) for course in courses for sign in (1.0, -1.0)])
     positions, velocities = shape.value(at), shape.value(at, 1)
     rows, rates = shape.rows(at, 0), shape.rows(at, 1)
     peak, peak_row, peak_error = velocities[2], rates[2], 0.0

@@ -6,6 +6,7 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.physics.measures.cycle_measures import LEAST_CYCLES
+from stickslip_ros.physics.measures.noise import rises
 from stickslip_ros.samples import SampleColumns
 from stickslip_ros.stamps import NANOSECONDS
 
@@ -37,8 +38,7 @@ def mean_feed(time: FloatArray, position: FloatArray) -> float | None:
     for _ in range(_PASSES):
         rest = np.copysign(1.0, feed) * (position - feed * time)
         rest -= rest.mean()
-        far = np.flatnonzero(np.abs(rest) > rest.std() / 2.0)
-        falls = far[1:][(rest[far[1:]] < 0.0) & (rest[far[:-1]] > 0.0)]
+        falls = rises(-rest, float(rest.std()) / 2.0)
         if len(falls) <= LEAST_CYCLES:
             return None
         parts = np.split(rest, falls)[1:-1]

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stickslip_ros.arrays import BoolArray, FloatArray, Table
+from stickslip_ros.physics.measures.noise import rises
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,9 +73,7 @@ def hunting(error: FloatArray, least: float, rate: float) -> tuple[float, float 
     """
     amplitude = float(np.ptp(error)) / 2.0
     middle = error - (error.max() + error.min()) / 2.0
-    outside = np.flatnonzero(np.abs(middle) > amplitude / 3.0)
-    side = np.sign(middle[outside])
-    rises = outside[1:][(side[1:] > 0.0) & (side[:-1] < 0.0)]
-    if amplitude <= least or len(rises) < 3:
+    rows = rises(middle, amplitude / 3.0)
+    if amplitude <= least or len(rows) < 3:
         return 0.0, None
-    return amplitude, float(rises[-1] - rises[0]) / (len(rises) - 1) / rate
+    return amplitude, float(rows[-1] - rows[0]) / (len(rows) - 1) / rate

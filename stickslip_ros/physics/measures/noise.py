@@ -4,7 +4,7 @@ from math import comb, sqrt
 
 import numpy as np
 
-from stickslip_ros.arrays import BoolArray, FloatArray
+from stickslip_ros.arrays import BoolArray, FloatArray, IntArray
 
 _ORDERS = (6, 8, 10, 12, 14)
 """Orders of the differences that suppress the motion and leave the noise."""
@@ -87,6 +87,15 @@ def medians(signal: FloatArray) -> FloatArray:
     """Return the median of each value and those beside it; the first and the last as they are."""
     middle = np.sort([signal[:-2], signal[1:-1], signal[2:]], axis=0)[1]
     return np.concatenate([signal[:1], middle, signal[1:][-1:]])
+
+
+def rises(signal: FloatArray, band: float) -> IntArray:
+    """Return the rows at which a signal rises above a band about zero from below it.
+
+    Within the band, from minus to plus `band`, it may go to and fro: a Schmitt trigger.
+    """
+    outside = np.flatnonzero(np.abs(signal) > band)
+    return outside[1:][(signal[outside[1:]] > 0.0) & (signal[outside[:-1]] < 0.0)]
 
 
 def impulses(signal: FloatArray, noise: float) -> BoolArray:

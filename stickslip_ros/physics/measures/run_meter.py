@@ -10,12 +10,8 @@ import numpy as np
 
 from stickslip_ros.arrays import BoolArray, FloatArray, IntArray
 from stickslip_ros.physics.measures.cycle_fit import MeanCycle
-from stickslip_ros.physics.measures.sample_meter import (
-    EXACT,
-    MotionObserver,
-    SampleAssumptions,
-    SampleMeter,
-)
+from stickslip_ros.physics.measures.sample_assumptions import EXACT, SampleAssumptions
+from stickslip_ros.physics.measures.sample_meter import MotionObserver, SampleMeter
 from stickslip_ros.physics.measures.timing import Timing
 from stickslip_ros.samples import ForceColumns
 from stickslip_ros.stamps import NANOSECONDS

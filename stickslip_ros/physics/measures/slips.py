@@ -1,6 +1,7 @@
 """Slip by slip: drops of a position that sticks and slips, for cycles that are not alike."""
 
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import isfinite, nan
 from typing import Any, NamedTuple
@@ -200,15 +201,11 @@ class SlipMeter:
             "count": self.count,
             "least_drop": self.threshold.drop,
             "within": self.threshold.within,
-            "regime": None,
+            "regime": regime_of(slips),
             "belt_speed": belt_speed,
         }
         for name in ("stick_time", "drop", "slip_time", "stick_velocity"):
             report[name] = _distribution(np.array(columns[name]))
-        if report["stick_time"] is not None:
-            stick, slip = (report[name]["median"] for name in ("stick_time", "slip_time"))
-            sticks = stick > _STICKING_RATIO * slip
-            report["regime"] = Regime.STICK_SLIP if sticks else Regime.PURE_SLIP
         each = {
             name: [value if isfinite(value) else None for value in values]
             for name, values in columns.items()
@@ -216,21 +213,27 @@ class SlipMeter:
         return {**report, "each": each}
 
 
+def regime_of(slips: Sequence[Slip]) -> Regime | None:
+    """Return whether a motion with these slips sticks; None where no stick is seen as a whole.
+
+    It sticks if the median time from the end of a slip to the next is 2.5 times that of a slip.
+    """
+    sticks = [slip.stick_time for slip in slips if isfinite(slip.stick_time)]
+    if not sticks:
+        return None
+    slip_time = float(np.median([slip.slip_time for slip in slips]))
+    longer = float(np.median(sticks)) > _STICKING_RATIO * slip_time
+    return Regime.STICK_SLIP if longer else Regime.PURE_SLIP
+
+
 def regime_by_slips(
     time: FloatArray, position: FloatArray, size: float, period: float
 ) -> Regime | None:
     """Return whether a motion sticks between slips of at least a `size`, m; None without two.
 
-    The `period`, s, is the mean time from slip to slip, and a quarter of it the longest slip. It
-    sticks if the median time from the end of a slip to the next is 2.5 times that of a slip.
+    The `period`, s, is the mean time from slip to slip, and a quarter of it the longest slip.
     """
-    slips = SlipMeter(SlipThreshold(size, within=period / 4.0)).feed(time, position)
-    between = [slip.stick_time for slip in slips[1:] if isfinite(slip.stick_time)]
-    if not between:
-        return None
-    slip_time = float(np.median([slip.slip_time for slip in slips]))
-    sticks = float(np.median(between)) > _STICKING_RATIO * slip_time
-    return Regime.STICK_SLIP if sticks else Regime.PURE_SLIP
+    return regime_of(SlipMeter(SlipThreshold(size, period / 4.0)).feed(time, position))
 
 
 def _distribution(values: FloatArray) -> dict[str, float] | None:

@@ -6,7 +6,8 @@ import numpy as np
 import numpy.typing as npt
 
 from stickslip_ros.physics.measures import Cycle
-from stickslip_ros.physics.measures.sample_meter import EXACT, SampleAssumptions, SampleMeter
+from stickslip_ros.physics.measures.sample_assumptions import EXACT, SampleAssumptions
+from stickslip_ros.physics.measures.sample_meter import SampleMeter
 from stickslip_ros.samples import SampleColumns
 
 

@@ -6,7 +6,7 @@ import pytest
 from benchmarks import measures_under_noise as study
 from stickslip_ros.physics.measures import Measures, Regime
 from stickslip_ros.physics.measures.noise import strongest_line, white_noise
-from stickslip_ros.physics.measures.sample_meter import UNKNOWN, SampleAssumptions
+from stickslip_ros.physics.measures.sample_assumptions import UNKNOWN, SampleAssumptions
 from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.studies.options import SettlingOptions
 from stickslip_ros.studies.settling import ControlledDrive, MotionState, settle

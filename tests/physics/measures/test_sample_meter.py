@@ -1,6 +1,5 @@
 from dataclasses import replace
 from functools import cache
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -11,12 +10,8 @@ from hypothesis import strategies as st
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.measures.cycle_measures import Regime
 from stickslip_ros.physics.measures.run_meter import RunMeter
-from stickslip_ros.physics.measures.sample_meter import (
-    UNKNOWN,
-    SampleAssumptions,
-    SampleMeter,
-    reading_of,
-)
+from stickslip_ros.physics.measures.sample_assumptions import UNKNOWN, SampleAssumptions, reading_of
+from stickslip_ros.physics.measures.sample_meter import SampleMeter
 from stickslip_ros.physics.motion.motion import Motion
 from stickslip_ros.samples import SampleColumns
 from tests.examples import examples
@@ -374,52 +369,6 @@ def test_noisy_samples_stick_near_the_velocity_of_the_belt(starts: list[int]) ->
     stick_fraction = fed(limit_cycle(), near).measures().stick_fraction
     assert expected.stick_fraction < stick_fraction < expected.stick_fraction + 0.02
     assert measures.stick_fraction == pytest.approx(stick_fraction, abs=1e-3)
-
-
-ENCODER = {"sensor.position_resolution": 1e-6, "sensor.velocity": "difference"}
-STATIC = {"friction.law": "stribeck", "belt_speed": 0.04}
-MEMORY = {"friction.law": "lugre", "belt_speed": -0.04}
-
-
-@pytest.mark.parametrize(
-    ("plant", "fastest_belt", "expected"),
-    [
-        ({}, 0.0, UNKNOWN),
-        (STATIC, 0.04, SampleAssumptions(0.0, noisy=False)),
-        ({**STATIC, **ENCODER}, 0.04, SampleAssumptions(0.0, noisy=True)),
-        ({**STATIC, "sensor.velocity_noise": 1e-6}, 0.04, SampleAssumptions(0.0, noisy=True)),
-        ({**STATIC, "sensor.velocity": "exact"}, 0.04, SampleAssumptions(0.0, noisy=False)),
-        (MEMORY, 0.0, SampleAssumptions(None, noisy=False)),
-        (MEMORY, 0.05, SampleAssumptions(5e-4, noisy=False)),
-        ({**MEMORY, **ENCODER}, 0.05, SampleAssumptions(5e-4, noisy=True)),
-    ],
-)
-def test_law_belt_and_sensor_decide(
-    plant: dict[str, Any], fastest_belt: float, expected: SampleAssumptions
-) -> None:
-    assert reading_of(plant, fastest_belt) == expected
-
-
-def test_a_stick_speed_that_is_given_is_for_samples_as_they_are() -> None:
-    assert reading_of({**STATIC, **ENCODER}, 0.04, given=1e-3) == SampleAssumptions(
-        1e-3, noisy=False
-    )
-
-
-@pytest.mark.parametrize(
-    "change",
-    [
-        {"sensor.velocity": "exactly"},
-        {"sensor.position_resolution": "fine"},
-        {"sensor.position_resolution": float("inf")},
-        {"sensor.position_resolution": -1.0},
-        {"sensor.position_noise": [1]},
-    ],
-)
-def test_whether_a_sensor_errs_that_there_cannot_be_is_found_from_the_samples(
-    change: dict[str, Any],
-) -> None:
-    assert reading_of({**STATIC, **ENCODER, **change}).noisy is None
 
 
 @pytest.mark.parametrize("stick_speed", [-1e-9, np.inf, np.nan])

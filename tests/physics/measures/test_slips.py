@@ -12,7 +12,7 @@ from stickslip_ros.bags.report import report_of_recording
 from stickslip_ros.bags.table_file import read_table
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.measures import Regime
-from stickslip_ros.physics.measures.sample_meter import SampleAssumptions
+from stickslip_ros.physics.measures.sample_assumptions import SampleAssumptions
 from stickslip_ros.physics.measures.slips import SlipMeter, SlipThreshold, regime_by_slips
 from tests.physics.measures import records
 

@@ -14,12 +14,8 @@ from hypothesis import strategies as st
 
 from benchmarks import measures_under_noise as study
 from stickslip_ros.physics.measures import Measures, Regime
-from stickslip_ros.physics.measures.sample_meter import (
-    EXACT,
-    UNKNOWN,
-    SampleAssumptions,
-    SampleMeter,
-)
+from stickslip_ros.physics.measures.sample_assumptions import EXACT, UNKNOWN, SampleAssumptions
+from stickslip_ros.physics.measures.sample_meter import SampleMeter
 from stickslip_ros.samples import SampleColumns
 from tests.examples import examples
 from tests.physics.measures.records import columns, fed, feed, milliseconds
