@@ -4,8 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.physics.loop.controller import Controller
@@ -14,7 +12,6 @@ from stickslip_ros.physics.loop.simulation import simulate_continuous, simulate_
 from stickslip_ros.physics.measures import CycleMeter
 from stickslip_ros.physics.model.control import (
     CONTROL_LAWS,
-    NO_REFERENCE,
     VelocityFeedback,
     Washout,
 )
@@ -36,38 +33,6 @@ def test_all_laws_with_equations_are_tested() -> None:
     """`test_cascade.py` has the law that feeds back two bodies."""
     found = [name for name, law in CONTROL_LAWS.items() if law().continuous is not None]
     assert {*(law.name for law in LAWS), "cascade"} == {*found}
-
-
-@laws
-@given(st.floats(1e-5, 0.5))
-def test_its_linear_form_is_that_of_its_answers(law: Law, period: float) -> None:
-    """From sample to sample, forces and states are those of finite differences."""
-    linear = law.linear_feedback(period)
-    order = len(linear.state)
-    assert linear.state.shape == (order, order)
-    assert linear.input.shape == (order, 2)
-    assert (linear.output.shape, linear.direct.shape) == ((order,), (2,))
-    rng = np.random.default_rng(1)
-    moves: FloatArray = rng.normal(size=(6, 2)) * [1e-4, 0.01]
-
-    def forces(size: float) -> FloatArray:
-        state = law.initial_state(at(*REST), NO_REFERENCE)
-        found: list[float] = []
-        for number, (x, y) in enumerate(size * moves):
-            elapsed = period if number > 0 else 0.0
-            sample = at(REST[0] + x, REST[1] + y)
-            force, state = law.respond(state, elapsed, sample, NO_REFERENCE)
-            found.append(force)
-        return np.array(found)
-
-    size = 1e-4
-    differences = (forces(size) - forces(-size)) / (2.0 * size)
-    z = np.zeros(order)
-    expected: list[float] = []
-    for move in moves:
-        expected.append(float(linear.output @ z + linear.direct @ move))
-        z = linear.state @ z + linear.input @ move
-    np.testing.assert_allclose(differences, expected, rtol=1e-6, atol=1e-6)
 
 
 @laws

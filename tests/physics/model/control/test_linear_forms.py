@@ -5,6 +5,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.physics.loop.controller import Controller, answer
@@ -42,23 +44,36 @@ LAWS = [
 ]
 
 
-@pytest.mark.parametrize("law", LAWS[1:], ids=lambda law: law.name)
-def test_the_form_is_the_derivative_of_the_answer(law: ControlLaw) -> None:
-    form, period, step = law.linear_feedback(1e-3), 1e-3, 1e-7
-    assert form is not None
-    states = len(form.state)
-    columns = []
-    for unit in step * np.eye(states + 2):
-        ends = []
-        for sign in (1.0, -1.0):
-            *state, x, y = (sign * unit).tolist()
-            sample = Sample(0, x, y, 0.0, 0.0, 0.0)
-            force, after = law.respond(tuple(state), period, sample, NO_REFERENCE)
-            ends.append(np.array([*after, force]))
-        columns.append((ends[0] - ends[1]) / (2.0 * step))
-    found = np.array(columns).T
-    expected = np.block([[form.state, form.input], [form.output[None], form.direct[None]]])
-    np.testing.assert_allclose(found, expected, rtol=1e-7, atol=1e-7 * np.abs(expected).max())
+@pytest.mark.parametrize("law", LAWS, ids=lambda law: law.name)
+@given(st.floats(1e-5, 0.5))
+def test_the_form_is_the_derivative_of_the_answers(law: ControlLaw, period: float) -> None:
+    """From sample to sample, forces and states are those of finite differences."""
+    linear = law.linear_feedback(period)
+    assert linear is not None
+    order, rest = len(linear.state), DRIVE.equilibrium_position
+    assert linear.state.shape == (order, order)
+    assert linear.input.shape == (order, 2)
+    assert (linear.output.shape, linear.direct.shape) == ((order,), (2,))
+    moves: FloatArray = np.random.default_rng(1).normal(size=(7, 2)) * [1e-4, 0.01]
+    moves[0] = 0.0  # no time has passed before the first sample
+
+    def forces(size: float) -> FloatArray:
+        state = law.initial_state(Sample(0, rest, 0.0, 0.0, 0.0, 0.0), NO_REFERENCE)
+        found: list[float] = []
+        for number, (x, y) in enumerate(size * moves):
+            elapsed = period if number > 0 else 0.0
+            sample = Sample(0, rest + x, y, 0.0, 0.0, 0.0)
+            force, state = law.respond(state, elapsed, sample, NO_REFERENCE)
+            found.append(force)
+        return np.array(found)
+
+    size = 1e-4
+    differences = (forces(size) - forces(-size)) / (2.0 * size)
+    z, expected = np.zeros(order), list[float]()
+    for move in moves:
+        expected.append(float(linear.output @ z + linear.direct @ move))
+        z = linear.state @ z + linear.input @ move
+    np.testing.assert_allclose(differences, expected, rtol=1e-6, atol=1e-6)
 
 
 def test_all_laws_with_a_linear_form_are_tested() -> None:
