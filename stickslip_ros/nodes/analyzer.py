@@ -75,6 +75,7 @@ from stickslip_ros.physics.measures.sample_assumptions import SampleAssumptions
 from stickslip_ros.physics.measures.timing import Timing
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.samples import NO_FORCES, NO_SAMPLES, ForceColumns
+from stickslip_ros.scenarios import full_name
 from stickslip_ros.scenarios.curve_file import CURVES, Pairs, read_pairs
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, AnalyzerParameters
 from stickslip_ros.stamps import END_OF_TIME, NANOSECONDS
@@ -306,7 +307,7 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
 
         What a paused plant repeats is left out: it may be from before this recording.
         """
-        plant, before = f"{self.get_namespace().rstrip('/')}/plant", self._meter.timing
+        plant, before = full_name(self.get_namespace(), "plant"), self._meter.timing
         for status in health.status:
             values = {entry.key: entry.value for entry in status.values}
             paused = values.get(STATE) in NEXT_TRANSITION

@@ -27,6 +27,7 @@ from stickslip_ros.nodes.base.process import ROS_ARGUMENTS, ros_session
 from stickslip_ros.nodes.base.spinner import Spinner, signal_handlers_kept, stop_on_signals
 from stickslip_ros.running.controller_search import ControllerSearch
 from stickslip_ros.running.run_monitor import Notify, OnSimulatedTime, RunMonitor
+from stickslip_ros.scenarios import full_name
 from stickslip_ros.scenarios.files import Scenario, parameter_file
 from stickslip_ros.scenarios.sections import section_matches
 
@@ -139,7 +140,7 @@ class _Supervisor:
             parameters[node]["wait_for"] = [other for other in nodes if other != node]
         ours = self._scenario.controller.node
         if ours in nodes:
-            self._controller = f"{self._namespace.rstrip('/')}/{ours}"
+            self._controller = full_name(self._namespace, ours)
         if self._user_controller is not None:
             nodes.remove(ours)
         try:
@@ -248,7 +249,7 @@ class _Supervisor:
             self._spinner.spin_until(setting_call(self._node, node, {"wait_for": others}).pursue)
         nodes = self._node.get_node_names_and_namespaces()
         for section in self._scenario.other_sections:
-            if not any(section_matches(section, f"{ns.rstrip('/')}/{name}") for name, ns in nodes):
+            if not any(section_matches(section, full_name(ns, name)) for name, ns in nodes):
                 self._notify(f"{self._scenario.path}: section {section} matches no node")
 
     def _await_controller(self, *, active: bool) -> str | None:

@@ -9,6 +9,7 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo, TopicEndpointTypeEnum
 
 from stickslip_ros.messages.topics import CONTROL_FORCE, JOINT_STATES
 from stickslip_ros.nodes.base.ros_topics import mismatch, qos_profile
+from stickslip_ros.scenarios import full_name
 
 DASHBOARD = "dashboard"
 """Name of a node that reads joint_states but is not meant to be a controller."""
@@ -23,8 +24,8 @@ class ControllerSearch:
         `ours` are the names, relative to the namespace, of nodes that are no candidates.
         """
         self._observer = observer
-        self._namespace = namespace.rstrip("/")
-        self._ours = {f"{self._namespace}/{node}" for node in ours}
+        self._dashboard = full_name(namespace, DASHBOARD)
+        self._ours = {full_name(namespace, node) for node in ours}
         self._joint_states = observer.resolve_topic_name(JOINT_STATES.name)
         self._control_force = observer.resolve_topic_name(CONTROL_FORCE.name)
 
@@ -51,7 +52,7 @@ class ControllerSearch:
             with suppress(NodeNameNonExistentError):  # it has left meanwhile
                 services = self._observer.get_service_names_and_types_by_node(name, namespace)
                 if any("lifecycle_msgs/srv/ChangeState" in types for _, types in services):
-                    names.append(f"{namespace.rstrip('/')}/{name}")
+                    names.append(full_name(namespace, name))
         return [name for name in names if name not in self._ours]
 
     def near_misses(self) -> Iterator[str]:
@@ -60,7 +61,7 @@ class ControllerSearch:
         readers = self._observer.get_subscriptions_info_by_topic(JOINT_STATES.name)
         writers = self._observer.get_publishers_info_by_topic(CONTROL_FORCE.name)
         reads, writes = _named(readers), _named(writers)
-        for node in sorted(reads - writes - {*self._ours, f"{self._namespace}/{DASHBOARD}"}):
+        for node in sorted(reads - writes - {*self._ours, self._dashboard}):
             yield f"{node} reads {joint_states} but does not publish {control_force}"
         for node in sorted(writes - reads - self._ours):
             yield f"{node} publishes {control_force} but does not read {joint_states}"
@@ -95,7 +96,7 @@ def _named(endpoints: Iterable[TopicEndpointInfo]) -> set[str]:
 
 
 def _full_name(info: TopicEndpointInfo) -> str:
-    return f"{info.node_namespace.rstrip('/')}/{info.node_name}"
+    return full_name(info.node_namespace, info.node_name)
 
 
 def _misfit(info: TopicEndpointInfo) -> str:

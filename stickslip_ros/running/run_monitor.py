@@ -10,6 +10,7 @@ from stickslip_ros.messages.topics import DIAGNOSTICS, RECORDED
 from stickslip_ros.nodes.base.clients import ACTIVE, NEXT_TRANSITION
 from stickslip_ros.nodes.base.managed import FAILURE, FINISHED, NEWEST_STAMP, STATE
 from stickslip_ros.nodes.base.ros_topics import qos_profile
+from stickslip_ros.scenarios import full_name
 from stickslip_ros.stamps import NANOSECONDS
 from stickslip_ros.text import number_in
 
@@ -43,7 +44,7 @@ class RunMonitor:
         self.ending = False
         """Whether the run is ending: a plant that stops then is not paused."""
         self._fail, self._notify, self._on_simulated_time = fail, notify, on_simulated_time
-        self._plant_name = f"{node.get_namespace().rstrip('/')}/plant"
+        self._plant_name = full_name(node.get_namespace(), "plant")
         self._paused = False
         self._first_recorded: int | None = None
         node.create_subscription(

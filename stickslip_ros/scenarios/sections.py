@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.files import open_regular
-from stickslip_ros.scenarios import ros_yaml
+from stickslip_ros.scenarios import full_name, ros_yaml
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
 from stickslip_ros.scenarios.ros_yaml import PARAMETERS_KEY, LineError
 from stickslip_ros.text import did_you_mean, shown
@@ -36,7 +36,7 @@ class ScenarioFile(NamedTuple):
             name
             for pattern, _ in self.sections
             for _, _, name in [pattern.rpartition("/")]
-            if "*" not in name and section_matches(pattern, f"{namespace.rstrip('/')}/{name}")
+            if "*" not in name and section_matches(pattern, full_name(namespace, name))
         }
 
     def values(
@@ -53,7 +53,7 @@ class ScenarioFile(NamedTuple):
             known = {
                 node: model.known
                 for node, model in NODE_PARAMETERS.items()
-                if section_matches(pattern, f"{namespace.rstrip('/')}/{node}")
+                if section_matches(pattern, full_name(namespace, node))
             }
             if not known and not other_nodes:
                 node = pattern.rpartition("/")[2]
@@ -87,7 +87,7 @@ def read_file(path: Path, namespace: str) -> ScenarioFile:
     base: str | None = None
     for name, parameters in _sections(path).items():
         pattern = f"/{name.removeprefix('/')}"
-        own = section_matches(pattern, f"{namespace.rstrip('/')}/{BASE_SECTION}")
+        own = section_matches(pattern, full_name(namespace, BASE_SECTION))
         if own and pattern.endswith(f"/{BASE_SECTION}"):
             base = parameters.get("base")
             if len(parameters) != 1 or not isinstance(base, str) or not base:

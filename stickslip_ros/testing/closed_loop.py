@@ -29,7 +29,7 @@ from stickslip_ros.running.bringup import node_parameters
 from stickslip_ros.running.composition import Composition
 from stickslip_ros.running.controller_search import ControllerSearch
 from stickslip_ros.running.user_controller import ControllerThread
-from stickslip_ros.scenarios import DEFAULT_NAMESPACE, LONGEST_NAMESPACE
+from stickslip_ros.scenarios import DEFAULT_NAMESPACE, LONGEST_NAMESPACE, full_name
 from stickslip_ros.scenarios.files import Scenario, load_scenario
 from stickslip_ros.scenarios.parameters import CONTROLLER_PARAMETERS
 from stickslip_ros.testing.result import Diagnostics, RunResult, result_of
@@ -373,7 +373,7 @@ class ClosedLoop:
         timeout = _PROCESS_TIMEOUT if elsewhere else _NODE_TIMEOUT
 
         def managed() -> set[str]:
-            here = f"{self.namespace.rstrip('/')}/"
+            here = full_name(self.namespace, "")
             found = {name for name in search.managed() if name.startswith(here)}
             return found - self._brought_up if elsewhere else set()
 

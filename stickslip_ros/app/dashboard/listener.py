@@ -50,6 +50,7 @@ from stickslip_ros.nodes.base.spinner import steady_clock
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.running.controller_search import DASHBOARD
 from stickslip_ros.samples import ForceColumns, SampleColumns
+from stickslip_ros.scenarios import full_name
 from stickslip_ros.scenarios.parameters import (
     CONTROLLER_PARAMETERS,
     DEFAULT_LAW,
@@ -383,7 +384,7 @@ class ListenerNode(PollingNode):
                 self._update(node, Health(SILENT, 2, "", health.figures, health.heard_at))
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
-        here = f"{self.get_namespace().rstrip('/')}/"
+        here = full_name(self.get_namespace(), "")
         for status in message.status:
             if status.name.startswith(here):
                 self._on_status(status.name.removeprefix(here), status)
@@ -448,7 +449,7 @@ class ListenerNode(PollingNode):
         return allowed
 
     def _on_parameter_event(self, event: ParameterEvent) -> None:
-        here = f"{self.get_namespace().rstrip('/')}/"
+        here = full_name(self.get_namespace(), "")
         node = event.node.removeprefix(here)
         if event.node.startswith(here) and node in self.parameters:
             changed = (*event.new_parameters, *event.changed_parameters)

@@ -21,6 +21,7 @@ from rclpy.task import Future
 from stickslip_ros.errors import RunError
 from stickslip_ros.nodes.base.process import ros_session
 from stickslip_ros.nodes.base.spinner import Spinner
+from stickslip_ros.scenarios import full_name
 
 ANSWER_TIME = 1.0
 """Time, s, for a client to match an existing service, and then to get its answer."""
@@ -257,21 +258,17 @@ def set_parameters(
                 raise NodeNotFoundError(_not_found(node, name))
         for name, call in calls.items():
             if call.wait(spinner, _ANSWER_TIME) is None:
-                raise RunError(f"the node {_full_name(node, name)} does not answer")
+                raise RunError(f"the node {full_name(node.get_namespace(), name)} does not answer")
         return {name: call.answer.result for name, call in calls.items()}
-
-
-def _full_name(node: Node, name: str) -> str:
-    return f"{node.get_namespace().rstrip('/')}/{name}"
 
 
 def _not_found(node: Node, name: str) -> str:
     elsewhere = sorted(
-        f"{namespace.rstrip('/')}/{found}"
+        full_name(namespace, found)
         for found, namespace in node.get_node_names_and_namespaces()
         if found == name
     )
-    what = f"no node {_full_name(node, name)} is running"
+    what = f"no node {full_name(node.get_namespace(), name)} is running"
     return f"{what}; running: {', '.join(elsewhere)}" if elsewhere else what
 
 

@@ -30,6 +30,7 @@ from stickslip_ros.nodes.base.ros_topics import (
 )
 from stickslip_ros.nodes.base.scheduling import schedule_process
 from stickslip_ros.nodes.base.spinner import steady_clock
+from stickslip_ros.scenarios import full_name
 
 MessageT = TypeVar("MessageT")
 ThingT = TypeVar("ThingT")
@@ -239,7 +240,7 @@ class ManagedNode(PollingNode, ParameterNode[ParametersT], ABC):
         for topic in topics:
             name = self.resolve_topic_name(topic.name)
             nodes = Counter(
-                f"{publisher.node_namespace.rstrip('/')}/{publisher.node_name}"
+                full_name(publisher.node_namespace, publisher.node_name)
                 for publisher in self.get_publishers_info_by_topic(name)
                 if publisher.topic_type == topic.type_name
             )
