@@ -4,15 +4,15 @@ It knows no clock and no messages: its user decides when to advance. The plant n
 run this same loop.
 """
 
-from collections import Counter, deque
+from collections import Counter
 from collections.abc import Callable, Iterator
 from enum import StrEnum
 from fractions import Fraction
 from itertools import count
-from math import floor, isfinite
-from random import Random
+from math import isfinite
 from typing import TYPE_CHECKING
 
+from stickslip_ros.physics.loop.forces_under_way import ForcesUnderWay
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.sensor import EXACT_SENSOR, Sensor
 from stickslip_ros.physics.model.signals import NO_SIGNAL, Signal
@@ -149,21 +149,14 @@ class SampledLoop:
         self._stamps: Iterator[int] = map(self.stamp, count())
         if self._samples == 1:  # the same numbers, counted in C
             self._stamps = count(start, self._nanoseconds)
-        # Delays in periods.
-        self._delay, self._jitter = force_delay / self.period, force_jitter / self.period
-        self._shortest_delay = whole, rest = whole_and_rest(self._delay)
-        # Whether each force acts immediately: then none is ever under way.
-        self._immediate = self._shortest_delay == (0, 0.0) and self._jitter == 0.0
-        # The only generator with a guarantee that its numbers stay the same.
-        self._random = Random(force_jitter_seed)
+        self._under_way = ForcesUnderWay(
+            force_delay / self.period, force_jitter / self.period, force_jitter_seed
+        )
+        self._immediate = self._under_way.immediate
         self._force_timeout = force_timeout
         self._hold_late = hold_late
         self._expects_control = expects_control
-        # In the order of arrival: number of the period, elapsed share of it, force, and number of
-        # the sample that it answers, -1 for no sample, as before force 0.
-        self._under_way = deque((number, rest, 0.0, -1) for number in range(whole))
         self._acting = 0.0
-        self._acting_number = -1
         self._newest: tuple[int, float] = (-1, 0.0)
         self._sent_number = -1
         self._overtaken = overtaken
@@ -287,9 +280,8 @@ class SampledLoop:
         if not isfinite(force):
             self.dropped[Verdict.NOT_FINITE] += 1
             return Verdict.NOT_FINITE
-        whole, rest = whole_and_rest(max(instant, 0.0) + self._delay)
-        self._under_way.append((self.sample_number + whole, rest, force, -1))
-        self._by_arrival = True
+        self._under_way.send_late(self.sample_number, max(instant, 0.0), force)
+        self._by_arrival, self._immediate = True, False
         self.controller_present = self._expects_control
         return Verdict.ACCEPTED
 
@@ -363,8 +355,9 @@ class SampledLoop:
             if self._immediate:
                 self._acting = force if self._limiter is None else self._limiter(force)
             else:
-                self._send(number, force)
-        if self._under_way:
+                for lost in self._under_way.send(present, number, force):
+                    self._lose(*lost)
+        if not self._immediate:
             left = (1.0 - self._deliver()) * period
         self._advance(self._acting, self.disturbance, left)
         belt_position = self.sample[4] + self._travel
@@ -405,33 +398,13 @@ class SampledLoop:
 
         In periods from the present sample on.
         """
-        under_way, number = self._under_way, self.sample_number
         now = 0.0
-        while under_way and under_way[0][0] == number:
-            _, instant, force, answered = under_way.popleft()
-            self._acting_number = max(self._acting_number, answered)
+        for instant, force in self._under_way.arriving(self.sample_number):
             if instant > now:
                 self._advance(self._acting, self.disturbance, (instant - now) * self.period)
                 now = instant
             self._acting = force if self._limiter is None else self._limiter(force)
         return now
-
-    def _send(self, answered: int, force: float) -> None:
-        """Send the force for the present sample; forces that it overtakes are lost."""
-        whole, rest = self._shortest_delay
-        number = self.sample_number
-        if self._jitter > 0.0:
-            whole, rest = whole_and_rest(self._delay + self._jitter * self._random.random())
-            lost: dict[int, float] = {}
-            while self._under_way and self._under_way[-1][:2] >= (number + whole, rest):
-                _, _, overtaken, overtaken_number = self._under_way.pop()
-                lost[overtaken_number] = overtaken
-            # A force that replaces others is under way several times.
-            left = {self._acting_number, answered, *(entry[3] for entry in self._under_way)}
-            for overtaken_number in sorted(lost.keys() - left):
-                if overtaken_number > self._acting_number:
-                    self._lose(overtaken_number, lost[overtaken_number])
-        self._under_way.append((number + whole, rest, force, answered))
 
     def _lose(self, number: int, force: float) -> None:
         self.dropped[Verdict.OVERTAKEN] += 1
@@ -518,11 +491,3 @@ def _rounded(numerator: int, denominator: int) -> int:
     whole, rest = divmod(numerator, denominator)
     excess = 2 * rest - denominator
     return whole + (excess > 0 or (excess == 0 and whole % 2))
-
-
-def whole_and_rest(delay: float) -> tuple[int, float]:
-    """Split a delay in periods into whole periods and the remainder, ignoring rounding errors."""
-    whole = round(delay)
-    if abs(delay - whole) < 1e-9:
-        return whole, 0.0
-    return floor(delay), delay - floor(delay)

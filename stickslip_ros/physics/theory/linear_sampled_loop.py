@@ -15,7 +15,7 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.loop.sampled_loop import whole_and_rest
+from stickslip_ros.physics.loop.forces_under_way import whole_and_rest
 from stickslip_ros.physics.model.constants import scaled
 from stickslip_ros.physics.model.control import ControlLaw, LinearFeedback
 from stickslip_ros.physics.model.dimensionless_drive import POSITION, SPEED
