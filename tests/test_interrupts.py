@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from stickslip_ros.interrupts import NODE_SCRIPTS
+from tests.nodes.graph import PATIENCE
 
 IMPORTED = """
 import signal, time
@@ -38,6 +39,10 @@ def test_an_interrupt_amid_an_import_comes_after_it(tmp_path: Path) -> None:
     """Within the import of a C extension it would be an ImportError."""
     (tmp_path / "slow.py").write_text(IMPORTED, encoding="utf-8")
     done = subprocess.run(
-        [sys.executable, "-c", IMPORTS], cwd=tmp_path, capture_output=True, text=True, timeout=60
+        [sys.executable, "-c", IMPORTS],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE,
     )
     assert (done.stdout, done.stderr) == ("True\n", "")

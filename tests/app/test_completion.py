@@ -9,6 +9,7 @@ import pytest
 
 from stickslip_ros.app.commands import COMMANDS
 from tests.app.conftest import Run
+from tests.nodes.graph import PATIENCE
 
 pytestmark = pytest.mark.process
 
@@ -47,7 +48,7 @@ def complete(stickslip: Run, tmp_path: Path, shell: str) -> Complete:
             cwd=tmp_path,
             capture_output=True,
             text=True,
-            timeout=30,
+            timeout=PATIENCE,
         )
         assert done.returncode == 0, done.stderr
         proposed = [line.strip() for line in done.stdout.splitlines() if line]

@@ -126,7 +126,7 @@ def test_a_file_beyond_a_limit_is_refused_in_a_sentence(
         table_of(tmp_path / "large.csv")
 
 
-@pytest.mark.timeout(30)
+@pytest.mark.timeout(120)
 def test_only_regular_files_are_read(tmp_path: Path) -> None:
     for suffix in (".csv", ".mat"):
         os.mkfifo(tmp_path / f"pipe{suffix}")

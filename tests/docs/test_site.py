@@ -13,6 +13,7 @@ import pytest
 from markdown_it import MarkdownIt
 
 from tests.docs.page import CHECKOUT, pages
+from tests.nodes.graph import PATIENCE
 
 pytestmark = [pytest.mark.long, pytest.mark.process]
 
@@ -51,7 +52,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(folder)]
     environment = os.environ | {"NO_COLOR": "1", "NO_MKDOCS_2_WARNING": "1"}
     built = subprocess.run(
-        command, cwd=CHECKOUT, env=environment, capture_output=True, text=True, timeout=280
+        command, cwd=CHECKOUT, env=environment, capture_output=True, text=True, timeout=4 * PATIENCE
     )
     assert built.returncode == 0, built.stderr
     output = [line for line in built.stderr.splitlines() if re.match("INFO|WARNING|ERROR", line)]

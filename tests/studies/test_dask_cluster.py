@@ -23,7 +23,7 @@ from stickslip_ros.studies.settling import SettlingOptions
 from stickslip_ros.studies.study import Study, sweep_study
 from tests.studies.studies import points_of, speeds
 
-PATIENCE = 60.0
+PATIENCE = 120.0
 LOCAL = "127.0.0.1"
 
 

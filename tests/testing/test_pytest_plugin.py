@@ -5,6 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.nodes.graph import PATIENCE
+
 IN_A_TEST = """
 import sys
 
@@ -37,6 +39,6 @@ def test_the_fixture_in_a_user_test(tmp_path: Path, capture: str) -> None:
     command.append(f"--capture={capture}")
     environment = os.environ | {"PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}
     finished = subprocess.run(
-        command, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=120
+        command, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=2 * PATIENCE
     )
     assert "4 passed" in finished.stdout, finished.stdout + finished.stderr

@@ -18,7 +18,7 @@ from stickslip_ros.nodes.base import machine
 from stickslip_ros.nodes.base.machine import lock_namespace, own_domain
 from stickslip_ros.nodes.base.network import prefer_prompt_middleware, this_machine_only
 from stickslip_ros.testing import ClosedLoop
-from tests.nodes.graph import wait_for
+from tests.nodes.graph import PATIENCE, wait_for
 from tests.testing import controllers
 
 HOLDER = """
@@ -56,7 +56,7 @@ def test_a_loop_meets_its_controller_whatever_ros_was_used_for_before(
     ours = this_machine_only()  # set for all tests of nodes
     here = {name: value for name, value in os.environ.items() if name not in ours}
     here["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
-    finished = subprocess.run(command, env=here, capture_output=True, text=True, timeout=60)
+    finished = subprocess.run(command, env=here, capture_output=True, text=True, timeout=PATIENCE)
     assert finished.returncode == 0, finished.stderr
     assert (int(finished.stdout) > 0) == shared_memory
 
