@@ -93,9 +93,18 @@ class Task:
         return [replace(self.drive, belt_speed=speed) for speed in self.speeds]
 
     def with_law(self, law: ControlLaw) -> Scenario:
-        """Return the scenario with the constants of its law.
+        """Return the scenario with other constants of its law.
 
-        Its belt speed is that of the scenario, or the nearest one within the range.
+        Parameters
+        ----------
+        law : ControlLaw
+            The law with the constants.
+
+        Returns
+        -------
+        Scenario
+            The changed copy. Its belt speed is that of the scenario, or the nearest one within the
+            range.
         """
         (low, high), own = self.belt_speeds, self.scenario.plant.belt_speed
         values = {name: getattr(law, name) for name in law.constants()}
