@@ -1,11 +1,8 @@
 """The friction law of Hess and Soom, for `stickslip_ros`, and how it is identified."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from math import inf
 from typing import Any, ClassVar
-
-import numpy as np
 
 from stickslip_ros.identification.laws import IdentifiedLaw
 from stickslip_ros.physics.model.constants import constant
@@ -50,12 +47,3 @@ class IdentifiedHessSoom(IdentifiedLaw):
     coordinates = "kinetic", "rise", "decay_speed", "viscous"
     unscaled = ("decay_speed",)
     smallest = "kinetic"
-
-    def terms(self, speed: Any, shape: float) -> Any:
-        """Return what multiplies F_k, D and F_v."""
-        return np.column_stack([np.ones_like(speed), 1.0 / (1.0 + (speed / shape) ** 2), speed])
-
-    def coordinates_of(self, forces: Sequence[float], shape: float) -> dict[str, float]:
-        """Return the coordinates of these forces, N, and of v_s, m/s."""
-        kinetic, rise, viscous = forces
-        return {"kinetic": kinetic, "rise": rise, "decay_speed": shape, "viscous": viscous}

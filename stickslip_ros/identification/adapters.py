@@ -48,14 +48,6 @@ class CoulombAdapter(IdentifiedLaw):
     coordinates: Sequence[str] = ("static", "viscous")
     smallest = "static"
 
-    @override
-    def terms(self, speed: FloatArray, shape: float) -> FloatArray:
-        return np.column_stack([np.ones_like(speed), speed])
-
-    @override
-    def coordinates_of(self, forces: Sequence[float], shape: float) -> dict[str, float]:
-        return dict(zip(self.coordinates, forces, strict=False))
-
 
 class StictionAdapter(CoulombAdapter):
     """Coulomb friction with stiction, of which slip tells the kinetic friction only."""
@@ -99,7 +91,7 @@ class DahlAdapter(CoulombAdapter):
 
 
 class StribeckAdapter(IdentifiedLaw):
-    """The cubic law of the paper: F = F_s - D (3 r - r^3)/2 with r = w/v_m, eq. 3."""
+    """The cubic law of the paper: F = F_m + D [1 - (3 r - r^3)/2] with r = w/v_m, eq. 3."""
 
     name = "stribeck"
     least = 0.0, 0.0
@@ -107,17 +99,6 @@ class StribeckAdapter(IdentifiedLaw):
     coordinates: Sequence[str] = ("minimum", "rise", "minimum_speed")
     unscaled: Sequence[str] = ("minimum_speed",)
     smallest = "minimum"
-
-    @override
-    def terms(self, speed: FloatArray, shape: float) -> FloatArray:
-        ratio = speed / shape
-        return np.column_stack([np.ones_like(speed), -0.5 * (3.0 * ratio - ratio**3)])
-
-    @override
-    def coordinates_of(self, forces: Sequence[float], shape: float) -> dict[str, float]:
-        static, drop = forces
-        rise = min(drop, static)
-        return {"minimum": static - rise, "rise": rise, "minimum_speed": shape}
 
 
 class ExponentialAdapter(IdentifiedLaw):
@@ -147,19 +128,8 @@ class ExponentialAdapter(IdentifiedLaw):
     }
 
     @override
-    def terms(self, speed: FloatArray, shape: float) -> FloatArray:
-        return np.column_stack([np.ones_like(speed), np.exp(-speed / shape), speed])
-
-    @override
     def coordinates_of(self, forces: Sequence[float], shape: float) -> dict[str, float]:
-        kinetic, drop, viscous = forces
-        return {
-            "kinetic": kinetic,
-            "rise": drop,
-            "decay_speed": shape,
-            "viscous": viscous,
-            "exponent": 1.0,
-        }
+        return {**super().coordinates_of(forces, shape), "exponent": 1.0}
 
     @override
     def starts(self, values: Values, fastest: float) -> Sequence[Values]:
@@ -295,6 +265,10 @@ class BristleAdapter(ExponentialAdapter):
         self.name, self.memory = name, memory
         self.by_differences = (*ExponentialAdapter.by_differences, *by_differences)
         self.coordinates = (*ExponentialAdapter.coordinates, *memory)
+
+    @override
+    def terms(self, speed: FloatArray, shape: float) -> FloatArray:
+        return EXPONENTIAL.terms(speed, shape)
 
     @override
     def starts(self, values: Values, fastest: float) -> Sequence[Values]:

@@ -1,9 +1,10 @@
 """What identification must know of a friction law."""
 
-from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from math import inf, sqrt
 from typing import Any
+
+import numpy as np
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.physics.model.constants import constants_of
@@ -38,7 +39,7 @@ REVERSE = "reverse."
 """Start of the names of coordinates of backward slip where both directions have their own."""
 
 
-class IdentifiedLaw(ABC):
+class IdentifiedLaw:
     """A friction law as identification knows it.
 
     A regression of forces takes friction in steady slip as a sum of `terms` with unknown forces;
@@ -75,13 +76,24 @@ class IdentifiedLaw(ABC):
     """Coordinates that, where all of them are free, the search replaces by others of the same
     names, in which fits are nearly linear; with their bounds, if these are not `bounds`."""
 
-    @abstractmethod
     def terms(self, speed: FloatArray, shape: float) -> FloatArray:
-        """Return the terms, rows of shape (rows, terms); `speed` is |v_r| and `shape` in m/s."""
+        """Return the terms, rows of shape (rows, terms); `speed` is |v_r| and `shape` in m/s.
 
-    @abstractmethod
+        By default a term is the friction of the law with one of the unknown forces alone, 1 N.
+        """
+        units = np.eye(len(self.least)).tolist()
+        laws = [self.friction(self.coordinates_of(unit, shape), 1.0) for unit in units]
+        return np.column_stack([-law.coefficient(speed, 1.0) for law in laws])
+
     def coordinates_of(self, forces: Sequence[float], shape: float) -> dict[str, float]:
-        """Return the coordinates of unknown forces, N, and of a shape, m/s."""
+        """Return the coordinates of unknown forces, N, and of a shape, m/s.
+
+        By default the forces are the coordinates that scale with the normal force, and what does
+        not is the shape.
+        """
+        scaled = [name for name in self.coordinates if name not in self.unscaled]
+        own = dict(zip(scaled, forces, strict=False))  # a memory is none of friction in slip
+        return own | dict.fromkeys(self.unscaled, shape)
 
     @property
     def one_way(self) -> "IdentifiedLaw":

@@ -81,7 +81,7 @@ def test_the_law_of_the_example_is_identified(
         ("linear = bad:IdentifiedLaw", "", "", "has the name None in its class and 'linear' in"),
         ("other = bad:Straight", "", "", "has the name 'linear' in its class and 'other' in its"),
         ("other = bad:Straight", "linear", "other", "has no friction law other: no package"),
-        ("linear = bad:Straight", "def terms", "def term", "does not define terms"),
+        ("linear = bad:Straight", "coordinates =", "names =", "fails when it is tried: Attri"),
         ("linear = bad:Straight", "smallest", "least_of", "fails when it is tried: AttributeErr"),
         ("linear = bad:Straight", "least = 0.0,", "least = 0.0, 0.0,", "terms of shape (4, 2) at"),
         ("linear = bad:Straight", "self.coordinates", "['static']", "without a value of slope"),
