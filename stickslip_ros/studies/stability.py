@@ -2,7 +2,8 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from math import copysign, isclose, isinf, isnan
+from math import copysign, inf, isclose, isnan
+from operator import attrgetter
 from typing import Any, NamedTuple, TypeVar, cast
 
 import numpy as np
@@ -133,18 +134,10 @@ def _omitted(plant: PlantParameters) -> str | None:
     sentences: list[str] = []
     if plant.force_jitter > 0.0:
         sentences.append("force_jitter is omitted: the delay of the force is constant here")
-    sensor, actuator, motor = plant.sensor, plant.actuator, plant.motor.sensor
-    values = {
-        "motor.sensor.position_resolution": motor.position_resolution,
-        "motor.sensor.position_noise": motor.position_noise,
-        "motor.sensor.velocity_noise": motor.velocity_noise,
-        "sensor.position_resolution": sensor.position_resolution,
-        "sensor.position_noise": sensor.position_noise,
-        "sensor.velocity_noise": sensor.velocity_noise,
-        "actuator.limit": 0.0 if isinf(actuator.limit) else actuator.limit,
-        "actuator.resolution": actuator.resolution,
-    }
-    names = [name for name, value in values.items() if value]
+    rough = ("position_resolution", "position_noise", "velocity_noise")
+    of_sensors = [f"{sensor}.{name}" for sensor in ("motor.sensor", "sensor") for name in rough]
+    nonlinear = (*of_sensors, "actuator.limit", "actuator.resolution")
+    names = [name for name in nonlinear if attrgetter(name)(plant) not in (0.0, inf)]
     if names:
         verb = "is" if len(names) == 1 else "are"
         sentences.append(f"{', '.join(names)} {verb} omitted: the loop is linear here")

@@ -12,7 +12,6 @@ import pytest
 
 from stickslip_ros.paper.figures import (
     SETTLED,
-    SETTLING,
     BifurcationFigure,
     Portrait,
     PortraitCase,
@@ -22,8 +21,7 @@ from stickslip_ros.paper.figures import (
 from stickslip_ros.physics.measures.cycle_measures import Regime
 from stickslip_ros.physics.model.friction import Coulomb, Linear
 from stickslip_ros.physics.motion.motion import Motion
-from stickslip_ros.studies.settling import ControlledDrive, MotionState, settle
-from tests.physics.drives import FEED_DRIVE, LIMIT_CYCLES, PAPER, LimitCycle
+from tests.physics.drives import LIMIT_CYCLES, PAPER, LimitCycle
 
 DECAY = 0.05
 """Beta of a slide that only slips under Coulomb friction: the belt is faster than it ever gets."""
@@ -62,33 +60,6 @@ def test_the_parameter_of_a_bifurcation_diagram_is_all_that_varies() -> None:
         }
         for name, column in varied.items():
             assert column == pytest.approx(values if name == number else [column[0]] * 5)
-
-
-def test_a_settled_motion_has_the_turning_points_of_its_drive() -> None:
-    """Of a motion that diverges there are none, and others do not depend on it."""
-    runs_away = replace(PAPER, belt_speed=0.2, friction=Linear(0.4, 0.9))
-    resting_belt = replace(PAPER, belt_speed=0.0)
-    at_rest = replace(PAPER, belt_speed=0.6)
-    cycle = next(cycle for cycle in LIMIT_CYCLES if cycle.belt_speed == 0.4)
-    drives = [PAPER, runs_away, PAPER, resting_belt, at_rest, FEED_DRIVE]
-    rest = MotionState(0.0, 0.0)
-    settled = [settle(ControlledDrive(drive), rest, SETTLING) for drive in drives]
-    first, away, again, held, rest, feed = (motion.turning_points for motion in settled)
-    assert len(first) >= 10
-    assert np.abs(first - cycle.midpoint) == pytest.approx(cycle.amplitude, abs=1e-8)
-    assert np.diff(np.sign(np.diff(first))).all()
-    assert again.tolist() == first.tolist()
-    assert len(away) == 0
-    assert set(held.tolist()) == {0.0}
-    assert rest == pytest.approx([0.4 - 0.45 * 0.6 + 0.6 * 0.6**3])
-    assert feed.max() == pytest.approx(1e-3 * first.max())  # in metres
-    assert [motion.measures.regime for motion in settled[:5]] == [
-        Regime.PURE_SLIP if cycle.stick_fraction == 0.0 else Regime.STICK_SLIP,
-        Regime.UNBOUNDED,
-        settled[0].measures.regime,
-        Regime.STUCK,
-        Regime.EQUILIBRIUM,
-    ]
 
 
 def test_over_the_belt_speed_sticking_ends_and_then_the_vibration() -> None:

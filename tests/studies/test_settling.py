@@ -3,6 +3,7 @@
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -21,7 +22,7 @@ from stickslip_ros.studies.settling import (
     SettlingOptions,
 )
 from stickslip_ros.studies.simulate import simulate
-from tests.physics.drives import FEED_DRIVE, PAPER
+from tests.physics.drives import FEED_DRIVE, LIMIT_CYCLES, PAPER
 from tests.studies.studies import EXPONENTIAL, paper
 
 REST = MotionState(0.0, 0.0)
@@ -208,6 +209,17 @@ def test_on_a_belt_at_rest_the_slide_sticks_where_friction_holds_it() -> None:
     moved = settle(ControlledDrive(replace(PAPER, belt_speed=0.0)), MotionState(3.0, 0.0))
     assert moved.measures.regime is Regime.STUCK
     assert abs(moved.end.position) < 0.4
+
+
+def test_the_turning_points_of_a_limit_cycle_and_of_an_equilibrium() -> None:
+    cycle = next(cycle for cycle in LIMIT_CYCLES if cycle.belt_speed == 0.4)
+    for drive, length in ((PAPER, 1.0), (FEED_DRIVE, 1e-3)):
+        found = settle(ControlledDrive(drive)).turning_points / length
+        assert len(found) >= 10
+        assert np.abs(found - cycle.midpoint) == pytest.approx(cycle.amplitude, abs=1e-8)
+        assert np.diff(np.sign(np.diff(found))).all()
+    rest = settle(ControlledDrive(replace(PAPER, belt_speed=0.6))).turning_points
+    assert rest == pytest.approx([0.4 - 0.45 * 0.6 + 0.6 * 0.6**3])
 
 
 def test_a_motion_may_run_away_after_the_transient() -> None:

@@ -9,7 +9,7 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations, pairwise
 from math import copysign
-from typing import Self
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -304,8 +304,7 @@ def _kinds(at_speed: _AtSpeed) -> list[bool]:
     return [cycle.stable for cycle in at_speed[1]]
 
 
-@dataclass(frozen=True)
-class _Point:
+class _Point(NamedTuple):
     """Limit cycle as a point of a branch; SI units."""
 
     belt_speed: float
@@ -406,10 +405,5 @@ def _ends(
 
 
 def _branch(points: Sequence[_Point], *, stable: bool) -> Branch:
-    return Branch(
-        belt_speeds=np.array([point.belt_speed for point in points]),
-        least=np.array([point.least for point in points]),
-        greatest=np.array([point.greatest for point in points]),
-        sticks=np.array([point.sticks for point in points], dtype=bool),
-        stable=stable,
-    )
+    belt_speeds, least, greatest, sticks = map(np.array, zip(*points, strict=True))
+    return Branch(belt_speeds, least, greatest, sticks, stable)

@@ -209,36 +209,36 @@ def test_a_held_sine_starts_from_zero() -> None:
 @pytest.mark.parametrize(
     ("make", "arguments", "refusal"),
     [
-        (ramp, (0.0, inf), "duration = inf s: must be above 0 and finite for a ramp"),
-        (ramp, (0.0, 0.0), "duration = 0.0 s: must be above 0 and finite for a ramp"),
-        (ramp, (0.0, nan), "duration = nan s: must be above 0 and finite for a ramp"),
-        (trapezoid, (0.0, inf), "duration = inf s: must be above 0 and finite for a trapezoid"),
+        (ramp, (1.0, 0.0, inf), "duration = inf s: must be above 0 and finite for a ramp"),
+        (ramp, (1.0, 0.0, 0.0), "duration = 0.0 s: must be above 0 and finite for a ramp"),
+        (ramp, (1.0, 0.0, nan), "duration = nan s: must be above 0 and finite for a ramp"),
         (
             trapezoid,
-            (0.0, 0.9, 2.0),
+            (1.0, 0.0, inf),
+            "duration = inf s: must be above 0 and finite for a trapezoid",
+        ),
+        (
+            trapezoid,
+            (1.0, 0.0, 0.9, 2.0),
             "duration = 0.9 s: must be at least 2/frequency = 1 s for a trapezoid",
         ),
-    ],
-)
-def test_refused_durations(make: Any, arguments: tuple[float, ...], refusal: str) -> None:
-    with pytest.raises(InvalidInputError) as refused:
-        make(1.0, *arguments)
-    assert str(refused.value) == refusal
-
-
-@pytest.mark.parametrize(
-    ("points", "refusal"),
-    [
-        ([], "the table has no points: must have at least one"),
-        ([(0.0, 1.0), (0.0, 2.0)], "point 2 of the table: the time must be above the one before"),
-        ([(0.0, 1.0), (nan, 2.0)], "times and values must be finite"),
+        (table, ([],), "the table has no points: must have at least one"),
         (
-            [(0.0, 0.0), (1e-300, 1e30)],
+            table,
+            ([(0.0, 1.0), (0.0, 2.0)],),
+            "point 2 of the table: the time must be above the one before",
+        ),
+        (table, ([(0.0, 1.0), (nan, 2.0)],), "times and values must be finite"),
+        (
+            table,
+            ([(0.0, 0.0), (1e-300, 1e30)],),
             "times and values rise too steeply: the slopes must be finite",
         ),
     ],
 )
-def test_refused_tables(points: list[tuple[float, float]], refusal: str) -> None:
+def test_what_makes_no_signal_is_refused(
+    make: Any, arguments: tuple[Any, ...], refusal: str
+) -> None:
     with pytest.raises(InvalidInputError) as refused:
-        table(points)
+        make(*arguments)
     assert str(refused.value) == refusal
