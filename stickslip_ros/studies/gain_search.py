@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from math import ceil, floor, inf, log10
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -12,9 +12,12 @@ from stickslip_ros.physics.model.control import ControlLaw, LinearFeedback
 from stickslip_ros.physics.model.dimensionless_drive import SPEED
 from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop
 
+_Law = TypeVar("_Law", bound=ControlLaw)
+
 _VALUED, _REFINED = 60, 40
 """Starts that are compared with the limits, and largest number of steps of a refinement."""
 _FIRST_STEP, _LAST_STEP = 1.0, 0.05
+"""Steps of a refinement, in the units of the points."""
 
 
 class Loops:
@@ -61,12 +64,12 @@ def linear_part(law: ControlLaw, loop: LinearSampledLoop) -> LinearFeedback:
 def fastest(
     loops: Loops,
     starts: FloatArray,
-    law_at: Callable[[FloatArray], ControlLaw],
-    excess: Callable[[ControlLaw], Iterable[float]] = lambda _: (),
+    law_at: Callable[[FloatArray], _Law],
+    excess: Callable[[_Law], Iterable[float]] = lambda _: (),
     *,
     ways: Sequence[Sequence[float]] | None = None,
     kept: int = 6,
-) -> ControlLaw | None:
+) -> _Law | None:
     """Return the law that first exceeds its limits least, and then damps fastest.
 
     Parameters

@@ -115,7 +115,7 @@ def with_law(scenario: Scenario, law: str, constants: Mapping[str, float]) -> Sc
     return replace(found, controller=replace(found.controller, reference=reference))
 
 
-class _Search:
+class _Rule:
     """Loops at the feeds, and the value of gains."""
 
     def __init__(self, scenario: Scenario, law: ControlLaw, goal: Goal) -> None:
@@ -225,20 +225,20 @@ def tune(scenario: Scenario, law: str, goal: Goal) -> Tuned:
     if not found.tuned:
         raise InvalidInputError(f"control law {law}: it names no gains to tune, so give them")
     start = replace(found.for_drive(scenario.plant.as_drive()), force_limit=goal.force_limit)
-    search = _Search(scenario, start, goal)
+    rule = _Rule(scenario, start, goal)
     starts = log(10.0) * np.random.default_rng(1).uniform(
         -_RANGE, _RANGE, (_STARTS, len(start.tuned))
     )
 
     def excess(law: ControlLaw) -> Iterable[float]:
-        return search.excess(search.judged(law, search.deciding)).values()
+        return rule.excess(rule.judged(law, rule.deciding)).values()
 
-    best = fastest(search.loops, starts, search.with_gains, excess)
+    best = fastest(rule.loops, starts, rule.with_gains, excess)
     if best is None:
         speeds = ", ".join(f"{feed:g}" for feed in goal.feeds)
         raise InvalidInputError(f"control law {law}: no gains make the loop stable at {speeds} m/s")
-    judged = search.judged(best, search.plants)
-    missed = search.excess(judged)
+    judged = rule.judged(best, rule.plants)
+    missed = rule.excess(judged)
     remark = f"no gains were found within the limits of {' and '.join(missed)}"
     return replace(judged, remark=remark if missed else None)
 

@@ -5,7 +5,7 @@ from copy import copy
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import exp, inf, isinf, log10
-from typing import Annotated, Self, cast
+from typing import Annotated, Self
 
 import numpy as np
 
@@ -78,15 +78,15 @@ class Candidates:
             none = Washout(rounded(self.task.drive.angular_frequency), 0.0, 0.0)
             if self.loops.slowest(none).decay_rate(none) > 0.0:
                 return none
-        best, fastest = None, 0.0
+        best, highest = None, 0.0
         for share in cubic_shares:
             cubic = share * self._cubic_coefficient
             if share > 0.0 and (cubic == 0.0 or isinf(self.task.force_limit)):
                 break
             gains = self._fastest(strength, cubic)
             decay_rate = 0.0 if gains is None else self.loops.slowest(gains).decay_rate(gains)
-            if decay_rate > fastest * 1.05:  # less is not worth a larger cubic gain
-                best, fastest = gains, decay_rate
+            if decay_rate > highest * 1.05:  # less is not worth a larger cubic gain
+                best, highest = gains, decay_rate
         return best
 
     def why_zero(self) -> str:
@@ -144,8 +144,7 @@ class Candidates:
             return Washout(corner, rounded(linear), rounded(cubic))
 
         starts = np.stack(np.meshgrid(corners, shares), axis=-1).reshape(-1, 2) / _UNITS
-        found = fastest(self.loops, starts, gains, ways=_WAYS, kept=3)
-        return cast(Washout | None, found)
+        return fastest(self.loops, starts, gains, ways=_WAYS, kept=3)
 
     def _corner_frequencies(self, count: int) -> FloatArray:
         """Return cutoff frequencies (rad/s), up to the rate: a faster filter passes nothing."""
