@@ -151,9 +151,8 @@ class HybridMotion:
         limits_steps, clocked, has_parts = system.limits_steps, self._clocked, system.has_parts
         slaves = system.slaves
         is_long = duration > LONGEST_STEP and not clocked
-        recurrence = None
-        if is_long and Detail.DERIVATIVES not in self._detail:
-            recurrence = Recurrence()
+        repeats = is_long and Detail.DERIVATIVES not in self._detail
+        recurrence, longest = Recurrence() if repeats else None, LONGEST_STEP if is_long else inf
         while now < duration:
             end, corner = duration, self._switch_time - epoch
             if corner < end:
@@ -176,11 +175,7 @@ class HybridMotion:
                 until = end - self._begun
                 if limits_steps:
                     longest = min(system.longest_step(instant), LONGEST_STEP)
-                    reached = taylor.propagate_until(until, self._steps_left, longest)
-                elif is_long:
-                    reached = taylor.propagate_until(until, self._steps_left, LONGEST_STEP)
-                else:
-                    reached = taylor.propagate_until(until, self._steps_left)
+                reached = taylor.propagate_until(until, self._steps_left, longest)
                 outcome, elapsed = reached[0].value, taylor.time
                 self._steps_left -= reached[3] + _STEPS_OF_A_PHASE
                 if outcome == NO_EVENT:
