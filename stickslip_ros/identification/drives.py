@@ -36,6 +36,8 @@ _FIRST_STEPS, _STEPS, _FINALISTS = 5, 100, 2
 """Steps of the search from each start, steps from the best ones, and their number."""
 _RESTART_LOSS_RATIO = 0.8
 """Other starts of segments must lower the squared error to this share, or the search ends."""
+_ROUNDING = 1.4
+"""Errors, in rounding errors of the encoder, up to which no other start is tried."""
 _WHITE_CORRELATION = 0.3
 """Correlation of successive errors up to which they are noise: rounding leaves some."""
 _SHAPES = (0.1, 0.3, 0.8)
@@ -235,7 +237,7 @@ class DriveTask(Task[Refinement]):
             if not is_white(fit):
                 fit = self._with_optional(fit, least_share=_OPTIONAL_GAIN)
             finished.append(fit)
-            if is_white(fit):
+            if is_white(fit) or _is_rounding(fit):
                 break
         return min(finished, key=_loss)
 
@@ -322,6 +324,17 @@ class DriveTask(Task[Refinement]):
 def is_white(fit: Refinement) -> bool:
     """Return whether the errors of a fit are noise, as far as their successive ones tell."""
     return abs(fit.correlation) < _WHITE_CORRELATION
+
+
+def _is_rounding(fit: Refinement) -> bool:
+    """Return whether the errors of positions are as small as those of the encoder.
+
+    They repeat where a slide sticks and the belt moves by whole steps of it between samples.
+    """
+    task = fit.best.task
+    step = min(each.record.resolution for each in task.predictors)
+    own = task.of_positions
+    return rms(fit.best.residual[own]) < _ROUNDING * step / sqrt(12.0) * rms(task.weight[own])
 
 
 def _errors_from_zero(fit: Refinement, name: str) -> float:
