@@ -162,10 +162,10 @@ def unpack_joint_state(data: bytes) -> Sample:
     MessageError for other bytes, and if a joint, its position or its velocity is missing.
     """
     if len(data) == _JOINT_STATE.size:
-        encapsulation, sec, nanosec, joints, count, *values = _JOINT_STATE.unpack(data)
-        x, belt, velocities, v, belt_v, efforts, effort, _ = values
-        constants = encapsulation, joints, count, velocities, efforts
-        if constants == _JOINT_STATE_CONSTANTS:
+        layout, sec, nanosec, joints, count, x, belt, velocities, v, belt_v, efforts, effort, _ = (
+            _JOINT_STATE.unpack(data)
+        )
+        if (layout, joints, count, velocities, efforts) == _JOINT_STATE_CONSTANTS:
             return Sample(sec * NANOSECONDS + nanosec, x, v, effort, belt, belt_v)
     if len(data) == _MOTOR_STATE.size:
         encapsulation, sec, nanosec, joints, count, *values = _MOTOR_STATE.unpack(data)
