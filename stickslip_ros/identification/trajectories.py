@@ -49,16 +49,13 @@ class Trajectories:
     def weight(self) -> FloatArray:
         """Weight of the error of each output; that of velocities in s."""
         return self._joined(
-            lambda record: (
-                record.weight,
-                np.where(record.lost, 0.0, record.velocity_weight),
-            )
+            lambda record: (record.weight, np.where(record.lost, 0.0, record.velocity_weight))
         )
 
     @cached_property
     def positions(self) -> FloatArray:
         """Measured positions of all segments, m."""
-        return self._joined(lambda record: (record.position,))
+        return self.measured[self.of_positions]
 
     @cached_property
     def parts(self) -> Sequence[slice]:
@@ -74,12 +71,8 @@ class Trajectories:
     @cached_property
     def of_positions(self) -> BoolArray:
         """Which rows are those of positions."""
-        return self._joined(
-            lambda record: (
-                np.ones(len(record.position)),
-                np.zeros(len(record.position)),
-            )
-        ).astype(bool)
+        of_outputs = [np.arange(each.outputs) == 0 for each in self.predictors]
+        return np.concatenate([np.repeat(of_outputs[s.record], s.count) for s in self.segments])
 
     @property
     def _counts(self) -> Sequence[int]:
