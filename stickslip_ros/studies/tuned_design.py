@@ -12,8 +12,8 @@ from stickslip_ros.studies.design import Design, Task, joined
 from stickslip_ros.studies.tuning import Goal, Tuned, tune
 
 _KINDS = ("step", "impulse")
-_PERIODS, _SHORTEST = 100.0, 2.0
-"""Duration of a check, in natural periods, and at least so many seconds."""
+_PERIODS, _SHORTEST, _WITHOUT_SPRING = 100.0, 2.0, 6.0
+"""Duration of a check, in natural periods, at least so many seconds, and without a period, s."""
 
 
 class TunedCheck(NamedTuple):
@@ -63,7 +63,9 @@ def design_by_rule(task: Task, progress: Progress = lambda _: None) -> TunedDesi
     goal = Goal.from_scenario(scenario, speeds, disturbances[0].amplitude, task.force_limit)
     tuned = tune(scenario, scenario.controller.law, goal)
     proposed = task.with_law(tuned.law)
-    duration = max(_PERIODS * task.drive.natural_period, _SHORTEST)
+    duration = _WITHOUT_SPRING
+    if task.drive.has_spring:
+        duration = max(_PERIODS * task.drive.natural_period, _SHORTEST)
     checks: list[TunedCheck] = []
     for speed in speeds:
         for each in disturbances:

@@ -36,3 +36,11 @@ def test_a_limit_that_is_too_low_is_told() -> None:
     )
     found = design_by_rule(Task.from_scenario(weak, (0.03, 0.03)))
     assert "the peak force" in (found.remark or "")
+
+
+def test_an_axis_without_a_spring_gets_gains_for_a_feed() -> None:
+    axis = load_scenario("axis", controller="pid")
+    found = design_by_rule(Task.from_scenario(axis, (0.01, 0.01)))
+    assert found.remark is None
+    assert [check.outcome.held for check in found.checks] == [True, True]
+    assert found.tuned.decay_rate > 0.0
