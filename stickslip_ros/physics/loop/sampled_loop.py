@@ -8,7 +8,6 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 from enum import StrEnum
 from fractions import Fraction
-from itertools import count
 from math import isfinite
 from typing import TYPE_CHECKING
 
@@ -146,9 +145,6 @@ class SampledLoop:
         self._start = start
         # Sample period in ns, as an exact ratio.
         self._nanoseconds, self._samples = (NANOSECONDS / Fraction(rate)).as_integer_ratio()
-        self._stamps: Iterator[int] = map(self.stamp, count())
-        if self._samples == 1:  # the same numbers, counted in C
-            self._stamps = count(start, self._nanoseconds)
         self._under_way = ForcesUnderWay(
             force_delay / self.period, force_jitter / self.period, force_jitter_seed
         )
@@ -426,7 +422,7 @@ class SampledLoop:
                 position, velocity = self._measure(number, position, velocity)
             if motor is not None and self._measure_motor is not None:
                 motor = MotorSample(*self._measure_motor(number, *motor))
-        stamp = next(self._stamps)
+        stamp = self.stamp(number)
         values = stamp, position, velocity, friction_force, belt_position, belt_speed, motor
         return tuple.__new__(Sample, values)  # half as long as the constructor
 

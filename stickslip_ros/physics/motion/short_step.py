@@ -1,7 +1,6 @@
 """Short advances of a motion that stay in one phase, as those of a sampled loop mostly do."""
 
 from collections.abc import Callable
-from math import inf
 
 import heyoka as hy
 
@@ -59,10 +58,9 @@ def short_step(
     parameters, epoch = flow.parameters, flow.epoch
     limits_steps, longest_step = system.limits_steps, system.longest_step
     places = [index for number, index in flow.inputs if number == 0]
-    has_corner = corner < inf
 
     def integrate(duration: float, force: float | None) -> bool:
-        if duration > _LONGEST_ADVANCE or (has_corner and duration >= corner - instant.time):
+        if duration > _LONGEST_ADVANCE or duration >= corner - instant.time:
             return False
         before = state.tobytes()
         if force is not None:
