@@ -157,12 +157,12 @@ class NoisyCycleMeter:
 
     def _take(self, part: NoisySamples) -> None:
         """Hold samples without impulses, which those beside them tell."""
+        self._columns.replace_last(0, part)
         if self.noise > 0.0:
-            known = 2 * _UNKNOWN
-            part = self._columns.samples[-known:].followed_by(part)
-            self._columns.replace_last(known, part[~impulses(part.position, self.noise)])
-        else:
-            self._columns.replace_last(0, part)
+            last = self._columns.samples[-len(part) - 2 * _UNKNOWN :]
+            found = impulses(last.position, self.noise)
+            if found.any():
+                self._columns.replace_last(len(last), last[~found])
 
     def _look(self) -> None:
         """Estimate the noise, and the step of an encoder, from the last samples."""
@@ -188,7 +188,7 @@ class NoisyCycleMeter:
 
     def _advance(self) -> list[Cycle]:
         """Return the cycles that the samples since the last one complete."""
-        last = self._last
+        every, last = self._columns.samples.position, self._last
         samples = last.samples
         first = 0 if self._low is None else samples.row(self._low[0])
         if len(samples) - first > _WITHOUT_CYCLES and self._count % _LOOK_INTERVAL:
@@ -197,7 +197,7 @@ class NoisyCycleMeter:
         least = max(REVERSAL * self.noise, _REVERSAL_SHARE * size)
         completed: list[Cycle] = []
         # The median of the last position takes one more.
-        for rows in reversals(self._columns.samples.position[first:-1], least):
+        for rows in reversals(every[first:-1], least):
             high, low = (first + row for row in rows)
             reach = fit_reach(samples, low, high, self.noise)
             if low + reach >= len(samples):
