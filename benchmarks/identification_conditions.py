@@ -6,7 +6,8 @@
 - `late DELAY LAG`, ms: the run `taps` of the drive of `benchmarks.identification`, whose force is
   late; the law is `stribeck`.
 
-The law is named: `benchmarks.identification` tells whether it is found.
+The law is named; of axes it is chosen, too, in some of the seeds. For drives on a spring
+`benchmarks.identification` tells whether it is found.
 """
 
 import argparse
@@ -81,6 +82,14 @@ def uneven_record(seed: int, count: int = 5000) -> Record:
     return evenly_spaced("log", np.rint(1e9 * time).astype(np.int64), columns)[0]
 
 
+def axis_of(case: str, seed: int) -> Record:
+    """Return the record of a case without a spring."""
+    kind, *numbers = case.split()
+    if kind == "uneven":
+        return uneven_record(seed)
+    return axis_record(int(numbers[0]), float(numbers[1]), seed)
+
+
 def tried(case: str, seed: int) -> tuple[dict[str, list[float]], float]:
     """Return error and standard error of each constant, and the delay, s."""
     kind, *numbers = case.split()
@@ -91,14 +100,7 @@ def tried(case: str, seed: int) -> tuple[dict[str, list[float]], float]:
         found = identify([own], "stribeck", {"normal_force": study.NORMAL_FORCE})
     else:
         true = named(*(AXIS_VALUES if kind == "axis" else (4.0, 7.0, 11.0, 7.0, 11.0)))
-        found = identify(
-            [
-                axis_record(int(numbers[0]), float(numbers[1]), seed)
-                if kind == "axis"
-                else uneven_record(seed)
-            ],
-            "coulomb",
-        )
+        found = identify([axis_of(case, seed)], "coulomb")
     errors = {
         name: [each.value - true.get(name, 0.0), each.standard_error]
         for name, each in found.fitted.items()
@@ -106,16 +108,23 @@ def tried(case: str, seed: int) -> tuple[dict[str, list[float]], float]:
     return errors, found.delay
 
 
-def summary(case: str, seeds: int) -> dict[str, Any]:
-    """Return coverage and delays over the seeds of a case."""
+def summary(case: str, seeds: int, choices: int = 0) -> dict[str, Any]:
+    """Return coverage and delays over the seeds of a case, and how often the law is chosen.
+
+    It is chosen from all laws in the first `choices` seeds, of an axis.
+    """
     trials = [tried(case, seed) for seed in range(seeds)]
     pairs = [pair for errors, _ in trials for pair in errors.values()]
+    choices = 0 if case.startswith("late") else min(choices, seeds)
+    chosen = [identify([axis_of(case, seed)]).law for seed in range(choices)]
     return {
         "case": case,
         "seeds": seeds,
         "intervals": len(pairs),
         "covered": float(np.mean([abs(error) <= study.QUANTILE * s for error, s in pairs])),
         "delays": [delay for _, delay in trials],
+        "choices": choices,
+        "right": chosen.count("coulomb"),
     }
 
 
@@ -123,9 +132,10 @@ def main() -> None:
     """Print the study as JSON."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", type=int, default=100)
+    parser.add_argument("--choices", type=int, default=20)
     parser.add_argument("--cases", nargs="*", default=CASES)
     arguments = parser.parse_args()
-    cases = [summary(case, arguments.seeds) for case in arguments.cases]
+    cases = [summary(case, arguments.seeds, arguments.choices) for case in arguments.cases]
     print(json.dumps({"cases": cases, "versions": versions()}, indent=1))
 
 

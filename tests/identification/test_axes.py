@@ -84,14 +84,19 @@ def test_rests_tell_static_friction_that_slip_does_not(static: float) -> None:
 
 
 def test_the_committed_study() -> None:
+    """Of all cases 92 to 98 % are covered; of one at least 92 %."""
     path = Path(conditions.__file__).with_suffix(".json")
     cases = json.loads(path.read_text(encoding="utf-8"))["cases"]
-    assert {case["case"] for case in cases} <= {*conditions.CASES}
+    assert {case["case"] for case in cases} == {
+        case for case in conditions.CASES if not case.startswith("late")
+    }
     for case in cases:
-        if not case["case"].startswith("late"):
-            assert case["seeds"] >= 20
-            assert case["covered"] >= 0.9, case["case"]
-            assert set(case["delays"]) == {0.0}, case["case"]
+        assert case["seeds"] >= 20
+        assert case["covered"] >= 0.92, case["case"]
+        assert set(case["delays"]) == {0.0}, case["case"]
+        assert case["right"] >= 0.95 * case["choices"] > 0.0, case["case"]
+    counts = [case["intervals"] for case in cases]
+    assert 0.92 <= np.average([case["covered"] for case in cases], weights=counts) <= 0.98
 
 
 @pytest.mark.long
