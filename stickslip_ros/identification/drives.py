@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
+from itertools import chain
 from math import inf, pi, sqrt
 from typing import Any
 
@@ -50,10 +51,12 @@ _HOPELESS_LOSS_RATIO = 4.0
 """A model whose squared error is larger than that of the best one by this factor is not fitted
 further."""
 _GIVEN_UP_LOSS_RATIO = 100.0
-"""A law whose squared error after the first steps is larger than LuGre's by this factor is given
-up."""
+"""A law whose squared error is larger by this factor is given up: than LuGre's after the first
+steps, or than that of the best law before constants are added that the records ask for."""
 _SEARCH_TIME = 0.7
 """Share of the time in which laws are searched; in the rest the best ones are fitted further."""
+_LAW_TIME = 0.25
+"""Share of what is left of it that the search of a law without a memory may take: others follow."""
 OUT_OF_TIME = "the time was over before it was fitted to the end"
 _OPTIONAL_GAIN, _OPTIONAL_ERRORS = 0.05, 4.0
 """Share of the squared error, and standard errors, for which one more constant is searched."""
@@ -64,8 +67,8 @@ _LAG_GAIN = 0.05
 """The same for a lag beside a delay, which stands for most of it."""
 _ZERO_ERRORS = 3.0
 """Standard errors by which such a constant must differ from zero."""
-_MOST_SAMPLES = 15_000
-"""Samples of a drive that are fitted: minutes of work."""
+_SEARCH_SAMPLES, _MOST_SAMPLES = 4_000, 15_000
+"""Samples of a drive in which a law is searched, and that are fitted: minutes of work."""
 _POINTS = 8
 """Number of points of friction without a law."""
 _LEAST_SHARE = 1e-9
@@ -111,26 +114,37 @@ class DriveTask(Task[Refinement]):
         much worse in the search is not fitted further.
         """
         found: list[Refinement] = []
+        near: list[Sequence[Refinement]] = []
 
         def search(own: IdentifiedLaw, name: str, **options: Any) -> None:
-            if found and self.limit.is_over:
+            if (found or near) and self.limit.is_over:
                 self.left.append(name)
                 return
             progress(name)
-            found.append(self.searched(own, **options))
+            near.append(self.searched(own, **options))
+
+        def extend() -> None:
+            least = min(map(_loss, chain(found, *near)))
+            found.extend(self.extended(fits, least) for fits in near)
+            near.clear()
 
         self.limit.begin_stage(_SEARCH_TIME)
         for each in laws:
             if not each.memory:
-                search(each, each.name, thorough=not any(map(is_white, found)))
+                self.limit.begin_part(_LAW_TIME)
+                search(each, each.name, thorough=not any(map(is_white, chain(*near))))
         if law == self.table.name:
             search(self.table, law)
+        self.limit.begin_part(1.0)
+        if near:
+            extend()
         if len(self.rows.directions) > 1 and found and not any(map(is_white, found)):
             best = min(found, key=_loss).law
             search(DirectionalAdapter(best), f"{best.name} by direction")
+            extend()
         # A memory changes the motion near sticking: it does not explain an input that is missing.
-        near = not found or (law == AUTO and min(map(_share, found)) < _MISSING_INPUT_ERROR)
-        if near and not any(map(is_white, found)):
+        explained = not found or (law == AUTO and min(map(_share, found)) < _MISSING_INPUT_ERROR)
+        if explained and not any(map(is_white, found)):
             bristles: Refinement | None = None
             for each in laws:
                 if not each.memory:
@@ -138,10 +152,12 @@ class DriveTask(Task[Refinement]):
                 if each is not DAHL and any(map(is_white, found)):
                     break
                 search(each, each.name, like=bristles)
+                extend()
                 if found[-1].law is LUGRE:
                     bristles = found[-1]
         if law == AUTO and not any(map(is_white, found)):
             search(self.table, self.table.name)
+            extend()
         return self._finished(found)
 
     def _finished(self, found: Sequence[Refinement]) -> list[Candidate[Refinement]]:
@@ -174,8 +190,8 @@ class DriveTask(Task[Refinement]):
 
     def searched(
         self, law: IdentifiedLaw, *, thorough: bool = True, like: Refinement | None = None
-    ) -> Refinement:
-        """Return a model fitted to short segments, from several starts, or from a LuGre one."""
+    ) -> Sequence[Refinement]:
+        """Return the best fits to short segments, from several starts, or from a LuGre model."""
         if like is not None:
             # The static friction of Dahl's law is the kinetic one.
             values = {**like.best.values, "static": like.best.values["kinetic"]}
@@ -187,6 +203,22 @@ class DriveTask(Task[Refinement]):
             for start in law.starts(self._start(law, each), fastest)
         ]
         return self._nearest(law, starts)
+
+    def extended(self, near: Sequence[Refinement], least: float) -> Refinement:
+        """Return the best fit of a law with the constants that the records ask for.
+
+        `near` has its fits without them, in the order in which they are tried. Where the squared
+        error of the best law is much less, `least`, they are as they are.
+        """
+        if min(map(_loss, near)) > _GIVEN_UP_LOSS_RATIO * least:
+            return min(near, key=_loss)
+        extended: list[Refinement] = []
+        for each in near:
+            fit = each if is_white(each) else self._with_optional(each, least_share=_OPTIONAL_GAIN)
+            extended.append(fit)
+            if is_white(fit) or _is_rounding(fit):
+                break
+        return min(extended, key=_loss)
 
     def _start(self, law: IdentifiedLaw, fit: Regression) -> dict[str, float]:
         """Return the coordinates that a regression gives, within their bounds."""
@@ -221,25 +253,22 @@ class DriveTask(Task[Refinement]):
 
     def _nearest(
         self, law: IdentifiedLaw, starts: Sequence[Mapping[str, float]], most: float = inf
-    ) -> Refinement:
-        """Return the best search; errors that are noise, or a larger loss than `most`, end it."""
-        short = self._trajectories(law, _SHORT_SEGMENT * self.period)
+    ) -> Sequence[Refinement]:
+        """Return the best searches; errors that are noise, or a larger loss than `most`, end it."""
+        short = self._trajectories(law, _SHORT_SEGMENT * self.period, _SEARCH_SAMPLES)
         names = [*self.free, *law.coordinates]
         names = [name for name in names if name not in (*self.friction, *law.optional)]
         tried: list[Refinement] = []
         for values in starts:
             tried.append(refine(short, names, self._known(law, values), most=_FIRST_STEPS))
             if is_white(tried[-1]) or _loss(tried[-1]) > most:
-                return tried[-1]
-        finished: list[Refinement] = []
+                return tried[-1:]
+        settled: list[Refinement] = []
         for near in sorted(tried, key=_loss)[:_FINALISTS]:
-            fit = self._settled(near.best)
-            if not is_white(fit):
-                fit = self._with_optional(fit, least_share=_OPTIONAL_GAIN)
-            finished.append(fit)
-            if is_white(fit) or _is_rounding(fit):
+            settled.append(self._settled(near.best))
+            if is_white(settled[-1]) or _is_rounding(settled[-1]):
                 break
-        return min(finished, key=_loss)
+        return settled
 
     def _settled(self, near: Errors) -> Refinement:
         """Return the best fit near other values: segments with wrong starts try others."""
@@ -286,7 +315,7 @@ class DriveTask(Task[Refinement]):
 
     def finished(self, near: Refinement) -> Candidate[Refinement]:
         """Return a fit to long segments, with the constants that the records ask for."""
-        task = self._trajectories(near.law, _LONG_SEGMENT * self.period)
+        task = self._trajectories(near.law, _LONG_SEGMENT * self.period, _MOST_SAMPLES)
         # Measured starts are too rough for motions that grow over a segment.
         begun = best_starts(task, near.best.values)
         fit = self._settled(replace(begun, names=near.best.names))
@@ -303,14 +332,14 @@ class DriveTask(Task[Refinement]):
         }
         return regress(self.rows, law, self.free, fixed, shape)
 
-    def _trajectories(self, law: IdentifiedLaw, length: float) -> Trajectories:
+    def _trajectories(self, law: IdentifiedLaw, length: float, most: int) -> Trajectories:
         segments, starts = segments_of(self.records, length)
         directions = self.rows.directions
         task = Trajectories(
             law, directions, self.predictors, segments, starts, self.normal_force, self.limit
         )
         # Of the segments of long records one of so many is used.
-        stride = -(-sum(len(each.position) for each in self.records) // _MOST_SAMPLES)
+        stride = -(-sum(len(each.position) for each in self.records) // most)
         return task.chosen(np.arange(len(segments)) % stride == 0)
 
     def _known(self, law: IdentifiedLaw, values: Mapping[str, float]) -> dict[str, float]:

@@ -14,13 +14,15 @@ import pytest
 import stickslip_ros as ss
 from benchmarks import identification as study
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.identification.drives import OUT_OF_TIME
+from stickslip_ros.identification.adapters import KNOWN_LAWS
+from stickslip_ros.identification.drives import OUT_OF_TIME, DriveTask
 from stickslip_ros.identification.filtered import filtered
 from stickslip_ros.identification.findings import Findings
 from stickslip_ros.identification.identify import identify
-from stickslip_ros.identification.laws import LAG
+from stickslip_ros.identification.laws import DELAY, LAG
 from stickslip_ros.identification.record import Record, evenly_spaced
 from stickslip_ros.identification.refinement import repetition_of
+from stickslip_ros.identification.time_limit import TimeLimit
 from stickslip_ros.identification.trajectory import Predictor, Segment
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import Coulomb, Directional, FrictionLaw, Table
@@ -63,6 +65,27 @@ def test_a_search_ends_with_the_best_so_far() -> None:
     assert found.law == "coulomb"
     assert {"stribeck", "exponential", "lugre", "table", "coulomb"} <= {*found.left}
     assert found.candidates[0].remark == OUT_OF_TIME
+
+
+def test_a_law_that_another_excels_gets_no_further_constants() -> None:
+    own = study.record("coulomb", "ramp", seed=7, duration=1.5, delay=2e-3)
+    task = DriveTask([own], {"normal_force": study.NORMAL_FORCE}, TimeLimit())
+    near = task.searched(KNOWN_LAWS["coulomb"])
+    least = near[0].best.loss
+    assert DELAY in task.extended(near, least).best.names
+    assert task.extended(near, 1e-3 * least) is near[0]
+
+
+def test_the_search_of_a_law_leaves_time_for_others() -> None:
+    own = study.record("stribeck", "taps", seed=1, duration=1.5)
+    limit = TimeLimit(600.0)
+    task = DriveTask([own], {"normal_force": study.NORMAL_FORCE}, limit)
+    limit.begin_stage(0.5)
+    limit.begin_part(1e-9)
+    task.searched(KNOWN_LAWS["coulomb"])
+    assert limit.is_over
+    limit.begin_part(1.0)
+    assert not limit.is_over
 
 
 @pytest.mark.parametrize(("delay", "lag"), [(2e-3, 0.0), (0.0, 3e-3), (1.4e-3, 1e-3)])
