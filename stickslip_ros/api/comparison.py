@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TextIO
 import numpy as np
 from typing_extensions import override
 
-from stickslip_ros.api.results import Parts, Summary, Table, TabularResult, attributes, column
+from stickslip_ros.api.page import Summary
+from stickslip_ros.api.results import Parts, Table, TabularResult, attributes, column
 from stickslip_ros.api.scenarios import ScenarioLike, as_scenario
 from stickslip_ros.api.studies import Values, axis_of
 from stickslip_ros.arrays import FloatArray

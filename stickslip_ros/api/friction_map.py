@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from typing_extensions import override
 
-from stickslip_ros.api.results import Parts, Result, Summary
+from stickslip_ros.api.page import Summary
+from stickslip_ros.api.results import Parts, Result
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.bags.table_file import table_of
 from stickslip_ros.bags.table_quantities import speed_and_force

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 from typing_extensions import override
 
-from stickslip_ros.api.results import Parts, Result, Summary
+from stickslip_ros.api.page import Summary
+from stickslip_ros.api.results import Parts, Result
 from stickslip_ros.bags.motion_reader import BagLayout
 from stickslip_ros.bags.text_table import TableFormat
 from stickslip_ros.errors import InvalidInputError

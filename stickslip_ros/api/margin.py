@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from typing_extensions import override
 
+from stickslip_ros.api.page import Summary
 from stickslip_ros.api.recordings import with_forms
-from stickslip_ros.api.results import Parts, Result, Summary
+from stickslip_ros.api.results import Parts, Result
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.identification.recordings import read_all
 from stickslip_ros.physics.measures.onset import FeedDecay, Onset, onset_of

@@ -3,13 +3,9 @@
 from collections.abc import Callable, Iterable
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 from xml.etree import ElementTree
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
-from markupsafe import Markup
-
-from stickslip_ros.api.results import Summary
 from stickslip_ros.errors import StickslipError
 from stickslip_ros.files import written
 from stickslip_ros.tables import TextTable
@@ -17,6 +13,7 @@ from stickslip_ros.text import printable
 from stickslip_ros.versions import versions
 
 if TYPE_CHECKING:
+    from markupsafe import Markup
     from matplotlib.figure import Figure
 
     from stickslip_ros.show.style import FigureStyle
@@ -30,6 +27,19 @@ _STYLES = {"wide": "paper-double", "narrow": "paper"}
 """Style of the figure by the width of the page: of paper or a screen, and of a telephone."""
 
 
+class Summary(NamedTuple):
+    """What a page says of a result beside what the result prints, and its figure."""
+
+    title: str
+    """What it is, such as "Simulated run"."""
+    subject: str
+    """What it is of: the scenario, or the recording."""
+    verdict: str
+    """The result in one sentence."""
+    parameters: Iterable[TextTable] = ()
+    """The parameters that it was made with, with their units."""
+
+
 def write_page(
     path: Path,
     summary: Summary,
@@ -41,6 +51,8 @@ def write_page(
     It is one file that asks for no other. In place of a figure that cannot be drawn it says why.
     Raises OSError if the file cannot be written.
     """
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
     figures: dict[str, Markup] = {}
     reason = ""
     try:
@@ -67,9 +79,13 @@ def write_page(
         stream.write(text)
 
 
-def _drawing(draw: "Callable[[FigureStyle], Figure]", style: str, name: str, label: str) -> Markup:
+def _drawing(
+    draw: "Callable[[FigureStyle], Figure]", style: str, name: str, label: str
+) -> "Markup":
     """Return a figure as SVG, its identifiers being those of no other figure on the page."""
     from dataclasses import replace
+
+    from markupsafe import Markup
 
     from stickslip_ros.show.style import STYLES, rendered
 

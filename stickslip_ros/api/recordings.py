@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from typing_extensions import override
 
-from stickslip_ros.api.results import Parts, Result, Summary, Table, TabularResult
+from stickslip_ros.api.page import Summary
+from stickslip_ros.api.results import Parts, Result, Table, TabularResult
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.bags.motion_reader import BagLayout
 from stickslip_ros.bags.reader import Recording

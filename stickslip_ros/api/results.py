@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TextIO
 
 import numpy as np
 
+from stickslip_ros.api.page import Summary, write_page
 from stickslip_ros.errors import RunError
 from stickslip_ros.quantities import Quantity
 from stickslip_ros.scenarios.files import Scenario
@@ -29,19 +30,6 @@ if TYPE_CHECKING:
 
 Parts = Iterable[TextTable | str]
 """Tables and sentences that a result prints as."""
-
-
-class Summary(NamedTuple):
-    """What a page says of a result beside what the result prints, and its figure."""
-
-    title: str
-    """What it is, such as "Simulated run"."""
-    subject: str
-    """What it is of: the scenario, or the recording."""
-    verdict: str
-    """The result in one sentence."""
-    parameters: Iterable[TextTable] = ()
-    """The parameters that it was made with, with their units."""
 
 
 class Result(ABC):
@@ -135,8 +123,6 @@ class Result(ABC):
         OSError
             If the file cannot be written.
         """
-        from stickslip_ros.api.page import write_page
-
         write_page(Path(path), self._summary(), self.parts(), partial(self.draw, **options))
 
     def _with_versions(self) -> dict[str, Any]:

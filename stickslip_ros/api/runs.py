@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 from typing_extensions import override
 
-from stickslip_ros.api.results import Parts, Summary, Table, TabularResult, attributes
+from stickslip_ros.api.page import Summary
+from stickslip_ros.api.results import Parts, Table, TabularResult, attributes
 from stickslip_ros.api.scenarios import ScenarioLike, as_scenario
 from stickslip_ros.physics.loop.trajectory import (
     MeasuredMotorTrajectory,

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any, TextIO
 import numpy as np
 from typing_extensions import override
 
-from stickslip_ros.api.results import Parts, Summary, Table, TabularResult, attributes
+from stickslip_ros.api.page import Summary
+from stickslip_ros.api.results import Parts, Table, TabularResult, attributes
 from stickslip_ros.api.scenarios import ScenarioLike, as_scenario
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import InvalidInputError

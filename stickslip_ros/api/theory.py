@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 from typing_extensions import override
 
-from stickslip_ros.api.results import Parts, Result, Summary, optional
+from stickslip_ros.api.page import Summary
+from stickslip_ros.api.results import Parts, Result, optional
 from stickslip_ros.api.scenarios import ScenarioLike, as_scenario
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.theory.linear_system import LinearSystem
