@@ -28,10 +28,10 @@ from rosbags.rosbag2 import Reader
 from rosbags.typesys import Stores, get_typestore
 
 from benchmarks.slices import Row, by_turns, compare_rates, show
-from stickslip_ros.bags import Recording
-from stickslip_ros.bags.definitions import message_definition
-from stickslip_ros.bags.recorder import Recorder
-from stickslip_ros.messages.codec import pack_joint_state, pack_wrench
+from stickslip_ros.record.codec import pack_joint_state, pack_wrench
+from stickslip_ros.record.definitions import message_definition
+from stickslip_ros.record.reader import Recording
+from stickslip_ros.record.recorder import Recorder
 
 ROUNDS = 60
 SAMPLES = 2000

@@ -5,7 +5,7 @@ from typing import Any
 
 import heyoka as hy
 
-from stickslip_ros.physics.model.drive import UNBOUNDED_SPEED, Drive
+from stickslip_ros.model.drive import UNBOUNDED_SPEED, Drive
 
 
 class BareMotion:

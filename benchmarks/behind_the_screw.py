@@ -18,14 +18,14 @@ from typing import Any
 
 import numpy as np
 
-from stickslip_ros.physics.loop.controller import Controller, answer
-from stickslip_ros.physics.loop.sampled_loop import LOCKSTEP_START, SampledLoop
-from stickslip_ros.physics.model.control import Cascade
-from stickslip_ros.physics.model.motor import Motor
-from stickslip_ros.physics.motion import Motion
-from stickslip_ros.physics.theory.linear import expand
-from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop
+from stickslip_ros.model.control import Cascade
+from stickslip_ros.model.motor import Motor
+from stickslip_ros.motion import Motion
+from stickslip_ros.motion.controller import Controller, answer
+from stickslip_ros.motion.sampled_loop import LOCKSTEP_START, SampledLoop
 from stickslip_ros.scenarios.files import load_scenario
+from stickslip_ros.theory.linear import expand
+from stickslip_ros.theory.linear_sampled_loop import LinearSampledLoop
 from stickslip_ros.versions import versions
 
 RATE = 1000.0

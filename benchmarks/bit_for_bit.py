@@ -18,7 +18,7 @@ from collections.abc import Callable, Generator
 from pathlib import Path
 from typing import Any
 
-from stickslip_ros.bags import Recording
+from stickslip_ros.record.reader import Recording
 from stickslip_ros.testing import ClosedLoop, own_domain
 from stickslip_ros.versions import versions
 

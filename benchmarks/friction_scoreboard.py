@@ -28,11 +28,11 @@ from typing import Any
 import numpy as np
 from scipy.integrate import DOP853, solve_ivp
 
-from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.friction import ElastoPlastic, Exponential, LuGre
-from stickslip_ros.physics.motion import Motion
+from stickslip_ros.model.drive import Drive
+from stickslip_ros.model.friction import ElastoPlastic, Exponential, LuGre
+from stickslip_ros.motion import Motion
 from stickslip_ros.versions import versions
-from tests.physics.motion.memory_reference import Array, Law, MemoryDrive
+from tests.motion.memory_reference import Array, Law, MemoryDrive
 
 TURNS = 3
 SAMPLES = 57

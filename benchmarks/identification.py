@@ -30,9 +30,9 @@ from stickslip_ros.identification.findings import Findings
 from stickslip_ros.identification.fit import QUANTILE
 from stickslip_ros.identification.identify import identify
 from stickslip_ros.identification.record import Record
-from stickslip_ros.physics.model.actuator import Actuator
-from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.friction import (
+from stickslip_ros.model.actuator import Actuator
+from stickslip_ros.model.drive import Drive
+from stickslip_ros.model.friction import (
     Coulomb,
     Exponential,
     FrictionLaw,
@@ -41,8 +41,8 @@ from stickslip_ros.physics.model.friction import (
     Stiction,
     Stribeck,
 )
-from stickslip_ros.physics.model.signals import table
-from stickslip_ros.physics.motion import Motion
+from stickslip_ros.model.signals import table
+from stickslip_ros.motion import Motion
 from stickslip_ros.versions import versions
 
 NORMAL_FORCE = 1000.0

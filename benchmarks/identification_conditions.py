@@ -19,12 +19,12 @@ from typing import Any
 import numpy as np
 
 from benchmarks import identification as study
+from stickslip_ros.identification.identified_law import DELAY, LAG
 from stickslip_ros.identification.identify import identify
-from stickslip_ros.identification.laws import DELAY, LAG
 from stickslip_ros.identification.record import Record, evenly_spaced
 from stickslip_ros.identification.servo import Servo, closed_loop
-from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.friction import Coulomb, Directional
+from stickslip_ros.model.drive import Drive
+from stickslip_ros.model.friction import Coulomb, Directional
 from stickslip_ros.versions import versions
 
 CASES = (

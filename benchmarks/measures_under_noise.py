@@ -28,10 +28,10 @@ from typing import Any
 import numpy as np
 
 import stickslip_ros as ss
-from stickslip_ros.physics.measures import Measures
-from stickslip_ros.physics.measures.sample_assumptions import SampleAssumptions
-from stickslip_ros.physics.measures.sample_meter import SampleMeter
-from stickslip_ros.physics.model.sensor import MeasuredVelocity, Sensor
+from stickslip_ros.measures import Measures
+from stickslip_ros.measures.sample_assumptions import SampleAssumptions
+from stickslip_ros.measures.sample_meter import SampleMeter
+from stickslip_ros.model.sensor import MeasuredVelocity, Sensor
 from stickslip_ros.samples import SampleColumns
 from stickslip_ros.stamps import NANOSECONDS
 from stickslip_ros.versions import versions

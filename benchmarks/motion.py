@@ -26,11 +26,11 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from benchmarks.slices import Row, by_turns, compare_times, show
-from stickslip_ros.physics.loop.controller import answer
-from stickslip_ros.physics.model.drive import UNBOUNDED_SPEED, Drive
-from stickslip_ros.physics.model.friction import Stribeck
-from stickslip_ros.physics.model.signals import Signal, ramp, sine
-from stickslip_ros.physics.motion.motion import Motion
+from stickslip_ros.model.drive import UNBOUNDED_SPEED, Drive
+from stickslip_ros.model.friction import Stribeck
+from stickslip_ros.model.signals import Signal, ramp, sine
+from stickslip_ros.motion.controller import answer
+from stickslip_ros.motion.motion import Motion
 from stickslip_ros.scenarios.files import load_scenario
 
 DAMPING, STATIC, MINIMUM, MINIMUM_SPEED = 0.02, 0.4, 0.25, 0.5

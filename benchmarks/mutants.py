@@ -25,11 +25,11 @@ from typing import NamedTuple
 
 CHECKOUT = Path(__file__).parents[1]
 PACKAGE = Path("stickslip_ros")
-ROOMS = ("physics", "model", "motion", "measures", "theory")
+ROOMS = ("model", "motion", "measures", "theory")
 FILE = Path(__file__).with_suffix(".json")
 TIERS = (
-    ("tests/physics",),
-    ("tests/studies", "tests/paper", "tests/show", "tests/scenarios", "tests/bags", "tests/app"),
+    tuple(f"tests/{room}" for room in ROOMS),
+    ("tests/studies", "tests/paper", "tests/show", "tests/scenarios", "tests/record", "tests/app"),
 )
 TIMEOUT = 600.0
 

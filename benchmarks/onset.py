@@ -23,15 +23,15 @@ import numpy as np
 
 import stickslip_ros as ss
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.physics.measures.onset import OnsetWatch, onset_of
-from stickslip_ros.physics.measures.ring_down import ring_downs
-from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.friction import Exponential, FrictionLaw, LuGre, Stribeck
-from stickslip_ros.physics.model.signals import ramp
-from stickslip_ros.physics.motion import Motion
-from stickslip_ros.physics.theory.hopf import hopf_points
+from stickslip_ros.measures.onset import OnsetWatch, onset_of
+from stickslip_ros.measures.ring_down import ring_downs
+from stickslip_ros.model.drive import Drive
+from stickslip_ros.model.friction import Exponential, FrictionLaw, LuGre, Stribeck
+from stickslip_ros.model.signals import ramp
+from stickslip_ros.motion import Motion
 from stickslip_ros.samples import SampleColumns
 from stickslip_ros.stamps import NANOSECONDS
+from stickslip_ros.theory.hopf import hopf_points
 
 LAWS = ("stribeck", "exponential", "lugre")
 MACHINES, RUNS, FIRST_SEED = 400, 100, 20_000

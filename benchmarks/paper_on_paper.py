@@ -20,20 +20,20 @@ from typing import Any
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.bags.table_file import table_of
-from stickslip_ros.bags.table_quantities import quantities_of
 from stickslip_ros.errors import RunError
-from stickslip_ros.physics.measures.cycle_measures import Regime
-from stickslip_ros.physics.measures.slips import SlipMeter, SlipThreshold
-from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.friction import (
+from stickslip_ros.measures.cycle_measures import Regime
+from stickslip_ros.measures.slips import SlipMeter, SlipThreshold
+from stickslip_ros.model.drive import Drive
+from stickslip_ros.model.friction import (
     Exponential,
     FrictionLaw,
     LuGre,
     RateState,
     Stribeck,
 )
-from stickslip_ros.physics.motion import Motion
+from stickslip_ros.motion import Motion
+from stickslip_ros.record.table_file import table_of
+from stickslip_ros.record.table_quantities import quantities_of
 from stickslip_ros.versions import versions
 
 DATA = Path(

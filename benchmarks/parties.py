@@ -25,7 +25,6 @@ from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 
-from stickslip_ros.bags.report import report_of_recording
 from stickslip_ros.nodes.analyzer import AnalyzerNode
 from stickslip_ros.nodes.base.child_process import start_child
 from stickslip_ros.nodes.base.machine import own_domain
@@ -34,6 +33,7 @@ from stickslip_ros.nodes.base.network import domain_variables
 from stickslip_ros.nodes.base.spinner import spin
 from stickslip_ros.nodes.plant import PlantNode
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
+from stickslip_ros.record.report import report_of_recording
 from stickslip_ros.scenarios.files import DEFAULT_NAMESPACE, load_scenario, parameter_file
 
 T = TypeVar("T")

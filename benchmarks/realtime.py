@@ -32,7 +32,7 @@ from sensor_msgs.msg import JointState
 from benchmarks.lateness import SLEEP_LOOP, lateness, lateness_rows, sleep_loop, times_of
 from benchmarks.parties import ObservedPlant, Slice, closed_loop, party, ros
 from benchmarks.slices import Row, by_turns, compare_times, show
-from stickslip_ros.messages.codec import unpack_header
+from stickslip_ros.record.codec import unpack_header
 from stickslip_ros.samples import Sample
 
 RATE = 1000.0

@@ -23,15 +23,15 @@ from rclpy.experimental import EventsExecutor
 from benchmarks.lateness import SLEEP_LOOP, lateness, lateness_rows, sleep_loop
 from benchmarks.parties import ROS_ARGUMENTS, ros
 from benchmarks.slices import Row, show
-from stickslip_ros.bags.recorder import Recorder
-from stickslip_ros.messages.codec import pack_joint_state, pack_wrench
-from stickslip_ros.messages.topics import CONTROL_FORCE, DEEP, JOINT_STATES
 from stickslip_ros.nodes.base.child_process import start_child
 from stickslip_ros.nodes.base.machine import own_domain
 from stickslip_ros.nodes.base.network import domain_variables
 from stickslip_ros.nodes.base.spinner import spin
 from stickslip_ros.nodes.replay import ReplayNode
 from stickslip_ros.nodes.replaying.player import Message
+from stickslip_ros.record.codec import pack_joint_state, pack_wrench
+from stickslip_ros.record.recorder import Recorder
+from stickslip_ros.record.topics import CONTROL_FORCE, DEEP, JOINT_STATES
 from stickslip_ros.scenarios import DEFAULT_NAMESPACE
 from stickslip_ros.stamps import NANOSECONDS
 

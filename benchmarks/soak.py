@@ -30,14 +30,14 @@ import numpy as np
 from numpy.typing import NDArray
 from rclpy.node import Node
 
-from stickslip_ros.bags.reader import Recording
-from stickslip_ros.messages.codec import unpack_header
-from stickslip_ros.messages.topics import JOINT_STATES, RECORDED, Topic
+from stickslip_ros.motion.motion import Motion
 from stickslip_ros.nodes.base.machine import own_domain
 from stickslip_ros.nodes.base.network import domain_variables
 from stickslip_ros.nodes.base.process import loopback_session
 from stickslip_ros.nodes.base.ros_topics import message_class, qos_profile
-from stickslip_ros.physics.motion.motion import Motion
+from stickslip_ros.record.codec import unpack_header
+from stickslip_ros.record.reader import Recording
+from stickslip_ros.record.topics import JOINT_STATES, RECORDED, Topic
 from stickslip_ros.scenarios.files import DEFAULT_NAMESPACE, load_scenario
 from stickslip_ros.scenarios.parameters import PlantParameters
 from stickslip_ros.stamps import NANOSECONDS

@@ -23,7 +23,7 @@ from statistics import median
 from benchmarks.bare import BareMotion
 from benchmarks.motion import bare_integrator
 from benchmarks.slices import Row, by_turns, compare_times, show
-from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.model.drive import Drive
 from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.studies.columns import write_csv
 from stickslip_ros.studies.plan import Axis

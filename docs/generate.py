@@ -15,14 +15,14 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-from stickslip_ros.messages.topics import TOPICS
-from stickslip_ros.physics.measures.cycle_measures import CycleMeasures, Regime
-from stickslip_ros.physics.model.constants import Parameter
-from stickslip_ros.physics.theory.closed_forms import CubicLoop
+from stickslip_ros.measures.cycle_measures import CycleMeasures, Regime
+from stickslip_ros.model.constants import Parameter
 from stickslip_ros.quantities import quantities_of
+from stickslip_ros.record.topics import TOPICS
 from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, NodeParameters, ReplayParameters
 from stickslip_ros.studies.stability import stability
+from stickslip_ros.theory.closed_forms import CubicLoop
 
 HERE = Path(__file__).parent
 PAGES = (

@@ -13,11 +13,11 @@ from typing import Any, ClassVar
 import numpy as np
 from matplotlib.figure import Figure
 
-from stickslip_ros.physics.model.constants import constant
-from stickslip_ros.physics.model.friction import FrictionLaw
-from stickslip_ros.physics.theory.hopf import hopf_points
-from stickslip_ros.physics.theory.limit_cycles import limit_cycles
+from stickslip_ros.model.constants import constant
+from stickslip_ros.model.friction import FrictionLaw
 from stickslip_ros.scenarios.files import load_scenario
+from stickslip_ros.theory.hopf import hopf_points
+from stickslip_ros.theory.limit_cycles import limit_cycles
 
 
 @dataclass(frozen=True)

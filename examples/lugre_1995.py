@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.friction import Exponential, LuGre
-from stickslip_ros.physics.motion import Motion
+from stickslip_ros.model.drive import Drive
+from stickslip_ros.model.friction import Exponential, LuGre
+from stickslip_ros.motion import Motion
 
 LAW = LuGre(
     Exponential(static=1.5, kinetic=1.0, decay_speed=1e-3, viscous=0.4, exponent=2.0),

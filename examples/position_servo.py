@@ -11,17 +11,17 @@ from typing import ClassVar
 import numpy as np
 from matplotlib.figure import Figure
 
-from stickslip_ros.physics.loop.controller import Controller
-from stickslip_ros.physics.loop.sampled_loop import SampledLoop
-from stickslip_ros.physics.loop.simulation import simulate_sampled
-from stickslip_ros.physics.loop.trajectory import TrajectoryRecorder
-from stickslip_ros.physics.measures import CycleMeter
-from stickslip_ros.physics.model.constants import constant
-from stickslip_ros.physics.model.control import ControlLaw
-from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.friction import Coulomb
-from stickslip_ros.physics.model.signals import trapezoid
-from stickslip_ros.physics.motion import RecordedMotion
+from stickslip_ros.measures import CycleMeter
+from stickslip_ros.model.constants import constant
+from stickslip_ros.model.control import ControlLaw
+from stickslip_ros.model.drive import Drive
+from stickslip_ros.model.friction import Coulomb
+from stickslip_ros.model.signals import trapezoid
+from stickslip_ros.motion import RecordedMotion
+from stickslip_ros.motion.controller import Controller
+from stickslip_ros.motion.sampled_loop import SampledLoop
+from stickslip_ros.motion.simulation import simulate_sampled
+from stickslip_ros.motion.trajectory import TrajectoryRecorder
 
 RATE, FORCE_LIMIT = 1000.0, 351.5065  # Hz, N
 

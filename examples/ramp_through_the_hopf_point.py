@@ -14,7 +14,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import stickslip_ros as ss
-from stickslip_ros.physics.loop.trajectory import Trajectory
+from stickslip_ros.motion.trajectory import Trajectory
 
 RAMP = 2500.0
 """Time in which the belt slows down, and in which it speeds up."""

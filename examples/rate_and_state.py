@@ -11,11 +11,11 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from stickslip_ros.physics.measures import CycleMeter
-from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.friction import RateState, Table
-from stickslip_ros.physics.motion import RecordedMotion
-from stickslip_ros.physics.theory.hopf import hopf_points
+from stickslip_ros.measures import CycleMeter
+from stickslip_ros.model.drive import Drive
+from stickslip_ros.model.friction import RateState, Table
+from stickslip_ros.motion import RecordedMotion
+from stickslip_ros.theory.hopf import hopf_points
 
 LAW = RateState(
     kinetic=0.6, direct_effect=0.01, evolution_effect=0.02, slip_distance=1e-5, reference_speed=1e-6

@@ -11,9 +11,9 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from stickslip_ros.bags import Recording
-from stickslip_ros.physics.loop.controller import Controller
-from stickslip_ros.physics.model.control import Washout
+from stickslip_ros.model.control import Washout
+from stickslip_ros.motion.controller import Controller
+from stickslip_ros.record.reader import Recording
 
 folder = Path(sys.argv[1] if len(sys.argv) > 1 else "build")
 folder.mkdir(parents=True, exist_ok=True)

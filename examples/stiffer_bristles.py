@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from stickslip_ros.physics.measures import CycleMeter
-from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.friction import ElastoPlastic, Exponential, FrictionLaw, LuGre
-from stickslip_ros.physics.motion import RecordedMotion
+from stickslip_ros.measures import CycleMeter
+from stickslip_ros.model.drive import Drive
+from stickslip_ros.model.friction import ElastoPlastic, Exponential, FrictionLaw, LuGre
+from stickslip_ros.motion import RecordedMotion
 
 CURVE = Exponential(static=0.4, kinetic=0.25, decay_speed=0.3)
 STIFFNESSES = 10.0 ** np.arange(2.0, 5.1, 0.5)

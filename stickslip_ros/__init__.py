@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from stickslip_ros.api.studies import Basin, Sweep, basin, sweep
     from stickslip_ros.api.theory import Stability, stability
     from stickslip_ros.errors import StickslipError
-    from stickslip_ros.physics.measures.slips import SlipThreshold
+    from stickslip_ros.measures.slips import SlipThreshold
     from stickslip_ros.scenarios.files import Scenario
 
     __version__: str
@@ -73,7 +73,7 @@ _HOMES = {
     "api.studies": ("Basin", "Sweep", "basin", "sweep"),
     "api.theory": ("Stability", "stability"),
     "errors": ("StickslipError",),
-    "physics.measures.slips": ("SlipThreshold",),
+    "measures.slips": ("SlipThreshold",),
     "scenarios.files": ("Scenario",),
 }
 

@@ -102,7 +102,7 @@ class SampleColumns(Table):
 
     Examples
     --------
-    >>> from stickslip_ros.bags import Recording
+    >>> from stickslip_ros.record.reader import Recording
     >>> with Recording("bags/reference") as recording:
     ...     states = recording.joint_states
     >>> time = (states.stamp - states.stamp[0]) * 1e-9  # s
@@ -196,7 +196,7 @@ class ForceColumns(Table):
 
     Examples
     --------
-    >>> from stickslip_ros.bags import Recording
+    >>> from stickslip_ros.record.reader import Recording
     >>> with Recording("bags/reference") as recording:
     ...     forces = recording.control_forces
     >>> len(forces) == len(forces.force)

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
-from stickslip_ros.physics.model.constants import constant
-from stickslip_ros.physics.model.control import ControlLaw
+from stickslip_ros.model.constants import constant
+from stickslip_ros.model.control import ControlLaw
 
 
 @dataclass(frozen=True)

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from math import inf
 from typing import Any, ClassVar
 
-from stickslip_ros.identification.laws import IdentifiedLaw
-from stickslip_ros.physics.model.constants import constant
-from stickslip_ros.physics.model.friction import FrictionLaw
+from stickslip_ros.identification.identified_law import IdentifiedLaw
+from stickslip_ros.model.constants import constant
+from stickslip_ros.model.friction import FrictionLaw
 
 
 @dataclass(frozen=True)

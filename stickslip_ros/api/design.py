@@ -11,8 +11,8 @@ from stickslip_ros.api.page import Summary
 from stickslip_ros.api.results import Parts, Table, TabularResult, attributes, column
 from stickslip_ros.api.scenarios import ScenarioLike, as_scenario
 from stickslip_ros.errors import InvalidInputError, RunError
-from stickslip_ros.physics.model.constants import constants_of
-from stickslip_ros.physics.model.control import ControlLaw, Washout
+from stickslip_ros.model.constants import constants_of
+from stickslip_ros.model.control import ControlLaw, Washout
 from stickslip_ros.progress import Progress
 from stickslip_ros.quantities import Quantity, number_of, quantities_of
 from stickslip_ros.scenarios.files import Scenario

@@ -11,11 +11,11 @@ from typing_extensions import override
 from stickslip_ros.api.page import Summary
 from stickslip_ros.api.results import Parts, Result
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.bags.table_file import table_of
-from stickslip_ros.bags.table_quantities import speed_and_force
-from stickslip_ros.bags.text_table import TableFormat
 from stickslip_ros.identification.fit import Estimate
 from stickslip_ros.identification.friction_map import FittedCurve, fitted_curves
+from stickslip_ros.record.table_file import table_of
+from stickslip_ros.record.table_quantities import speed_and_force
+from stickslip_ros.record.text_table import TableFormat
 from stickslip_ros.show.identification_table import constants_table
 from stickslip_ros.show.quantities import SI, Units
 

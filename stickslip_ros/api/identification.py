@@ -10,8 +10,6 @@ from typing_extensions import override
 
 from stickslip_ros.api.page import Summary
 from stickslip_ros.api.results import Parts, Result
-from stickslip_ros.bags.motion_reader import BagLayout
-from stickslip_ros.bags.text_table import TableFormat
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.identification.findings import Findings, notes_on
 from stickslip_ros.identification.fit import Estimate
@@ -19,7 +17,9 @@ from stickslip_ros.identification.identify import AUTO, AUTO_TIME, identify_reco
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.recordings import read_all, read_records
 from stickslip_ros.identification.scenario import written_scenario
-from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.model.drive import Drive
+from stickslip_ros.record.motion_reader import BagLayout
+from stickslip_ros.record.text_table import TableFormat
 from stickslip_ros.scenarios.files import Scenario, load_scenario
 from stickslip_ros.show.identification_table import identification_tables
 from stickslip_ros.show.quantities import SI, Units

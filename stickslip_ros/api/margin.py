@@ -13,8 +13,8 @@ from stickslip_ros.api.recordings import with_forms
 from stickslip_ros.api.results import Parts, Result
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.identification.recordings import read_all
-from stickslip_ros.physics.measures.onset import FeedDecay, Onset, onset_of
-from stickslip_ros.physics.measures.ring_down import RingDown, ring_downs, why_no_ring_down
+from stickslip_ros.measures.onset import FeedDecay, Onset, onset_of
+from stickslip_ros.measures.ring_down import RingDown, ring_downs, why_no_ring_down
 from stickslip_ros.quantities import quantities_of
 from stickslip_ros.show.quantities import SI, Units
 from stickslip_ros.tables import TextTable

@@ -12,17 +12,17 @@ from typing_extensions import override
 from stickslip_ros.api.page import Summary
 from stickslip_ros.api.results import Parts, Result, Table, TabularResult
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.bags.motion_reader import BagLayout
-from stickslip_ros.bags.reader import Recording
-from stickslip_ros.bags.report import report_of_recording
-from stickslip_ros.bags.table_file import is_table
-from stickslip_ros.bags.text_table import TableFormat
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.loop.trajectory import Trajectory
-from stickslip_ros.physics.measures.cycle_measures import Measures, measures_of
-from stickslip_ros.physics.measures.slips import SlipThreshold
-from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.measures.cycle_measures import Measures, measures_of
+from stickslip_ros.measures.slips import SlipThreshold
+from stickslip_ros.model.drive import Drive
+from stickslip_ros.motion.trajectory import Trajectory
 from stickslip_ros.quantities import Quantity, quantities_of
+from stickslip_ros.record.motion_reader import BagLayout
+from stickslip_ros.record.reader import Recording
+from stickslip_ros.record.report import report_of_recording
+from stickslip_ros.record.table_file import is_table
+from stickslip_ros.record.text_table import TableFormat
 from stickslip_ros.samples import NO_FORCES, NO_SAMPLES, ForceColumns, SampleColumns
 from stickslip_ros.scenarios.curve_file import CURVES, as_pairs
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, PlantParameters

@@ -10,13 +10,13 @@ from typing_extensions import override
 from stickslip_ros.api.page import Summary
 from stickslip_ros.api.results import Parts, Table, TabularResult, attributes
 from stickslip_ros.api.scenarios import ScenarioLike, as_scenario
-from stickslip_ros.physics.loop.trajectory import (
+from stickslip_ros.measures.cycle_measures import Measures
+from stickslip_ros.motion.trajectory import (
     MeasuredMotorTrajectory,
     SampleRecorder,
     Trajectory,
     TrajectoryRecorder,
 )
-from stickslip_ros.physics.measures.cycle_measures import Measures
 from stickslip_ros.progress import Progress
 from stickslip_ros.quantities import number_of, quantities_of
 from stickslip_ros.scenarios.files import Scenario

@@ -18,7 +18,7 @@ from stickslip_ros.api.results import Parts, Table, TabularResult, attributes
 from stickslip_ros.api.scenarios import ScenarioLike, as_scenario
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.measures.cycle_measures import Regime
+from stickslip_ros.measures.cycle_measures import Regime
 from stickslip_ros.quantities import Quantity, number_of
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.scenarios.keywords import described, keyword_of, parameter_of

@@ -10,11 +10,11 @@ from stickslip_ros.api.page import Summary
 from stickslip_ros.api.results import Parts, Result, optional
 from stickslip_ros.api.scenarios import ScenarioLike, as_scenario
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.theory.linear_system import LinearSystem
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.show.parameter_tables import scenario_tables
 from stickslip_ros.show.study_tables import stability_tables
 from stickslip_ros.studies import stability as stabilities
+from stickslip_ros.theory.linear_system import LinearSystem
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any, get_args
 from stickslip_ros.app.output import tell
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.files import open_regular
-from stickslip_ros.messages import ForceSource, TimeSource
 from stickslip_ros.quantities import number_of
+from stickslip_ros.record.topics import ForceSource, TimeSource
 from stickslip_ros.scenarios import DEFAULT_NAMESPACE, LONGEST_NAMESPACE
 from stickslip_ros.text import shown
 
@@ -149,8 +149,8 @@ def add_reading(parser: argparse.ArgumentParser) -> None:
 
 def reading_of(arguments: argparse.Namespace) -> dict[str, Any]:
     """Return how recordings are read, by the names that the functions of the API have for it."""
-    from stickslip_ros.bags.motion_reader import BagLayout
-    from stickslip_ros.bags.text_table import TableFormat
+    from stickslip_ros.record.motion_reader import BagLayout
+    from stickslip_ros.record.text_table import TableFormat
 
     names = [each.name for kind in (TableFormat, BagLayout) for each in fields(kind)]
     names += ["rotary", "start", "end", "namespace", "belt_speed"]
@@ -203,7 +203,7 @@ def add_bag_layout(parser: argparse.ArgumentParser) -> None:
 
 def _columns_of(text: str | None) -> dict[str, str] | None:
     """Return the columns that --columns names, by quantity."""
-    from stickslip_ros.bags.expressions import parts_of
+    from stickslip_ros.record.expressions import parts_of
 
     if text is None:
         return None
@@ -368,7 +368,7 @@ def is_program(controller: str) -> bool:
 
 def law_constants(*needed: str) -> list[str]:
     """Return NODE.PARAMETER of the constants of every control law, except those `needed`."""
-    from stickslip_ros.physics.model.control import CONTROL_LAWS
+    from stickslip_ros.model.control import CONTROL_LAWS
     from stickslip_ros.scenarios.parameters import controller_node
 
     return [

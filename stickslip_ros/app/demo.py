@@ -5,8 +5,8 @@ import sys
 from stickslip_ros.app.optional_dependencies import load_matplotlib, loading_ros
 from stickslip_ros.app.output import print_parts
 from stickslip_ros.app.run import default_bag, record
-from stickslip_ros.bags.report import report_of_recording
 from stickslip_ros.errors import StickslipError
+from stickslip_ros.record.report import report_of_recording
 from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.show.measure_table import measure_table
 

@@ -15,8 +15,8 @@ from stickslip_ros.app.output import print_json, tell
 from stickslip_ros.text import printable
 
 if TYPE_CHECKING:
-    from stickslip_ros.physics.model.control import ControlLaw
-    from stickslip_ros.physics.model.friction import FrictionLaw
+    from stickslip_ros.model.control import ControlLaw
+    from stickslip_ros.model.friction import FrictionLaw
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -31,8 +31,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> None:
     """Run the command."""
-    from stickslip_ros.physics.model.control import CONTROL_LAWS
-    from stickslip_ros.physics.model.friction import LAWS
+    from stickslip_ros.model.control import CONTROL_LAWS
+    from stickslip_ros.model.friction import LAWS
     from stickslip_ros.scenarios.files import shipped_scenarios
     from stickslip_ros.scenarios.foreign_laws import CONTROLLERS, FRICTION_LAWS
     from stickslip_ros.scenarios.friction_parameters import law_parameters

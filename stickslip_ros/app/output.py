@@ -185,7 +185,7 @@ def _print_framed(
 
 def _styles() -> dict[str, str]:
     """Return the style of each cell that is highlighted on a terminal."""
-    from stickslip_ros.physics.measures.cycle_measures import Regime
+    from stickslip_ros.measures.cycle_measures import Regime
 
     return {
         Regime.label(Regime.EQUILIBRIUM): "green",

@@ -25,7 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> None:
     """Run the command."""
-    from stickslip_ros.bags.repair import repair
+    from stickslip_ros.record.repair import repair
 
     with progress_bar(f"repairing {arguments.bag}", None) as progress:
         repaired = repair(arguments.bag, arguments.out, progress)

@@ -64,8 +64,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> None:
     """Run the command."""
     from stickslip_ros.api.recordings import Comparison, recorded_run
-    from stickslip_ros.bags.table_file import is_table
-    from stickslip_ros.physics.measures.slips import SlipThreshold
+    from stickslip_ros.measures.slips import SlipThreshold
+    from stickslip_ros.record.table_file import is_table
 
     bags: list[Path] = [*dict.fromkeys(arguments.recordings)]
     check_results(arguments)

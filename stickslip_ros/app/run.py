@@ -86,7 +86,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the command; return the exit status."""
-    from stickslip_ros.bags.recorder import check_new_bag
+    from stickslip_ros.record.recorder import check_new_bag
     from stickslip_ros.show.measure_table import measure_table, report_sentences
     from stickslip_ros.show.quantities import Units
 
@@ -146,8 +146,8 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _limit_of_machine(scenario: "Scenario", results: Mapping[str, Any]) -> list[str]:
     """Return, after a run that was not in time, what a loop that only sleeps misses here."""
+    from stickslip_ros.measures.timing import Timing
     from stickslip_ros.nodes.base.scheduling import share_missed
-    from stickslip_ros.physics.measures.timing import Timing
 
     plant = scenario.plant
     timing = Timing(*(results[name] for name in Timing._fields))
@@ -193,7 +193,7 @@ def record(
     duration = scenario.plant.duration
     total = duration if duration < float("inf") else None
     with loading_ros():
-        from stickslip_ros.running.bringup import run_nodes
+        from stickslip_ros.nodes.running.bringup import run_nodes
     with progress_bar(f"running {scenario.name}", total) as progress:
         try:
             outcome = run_nodes(
@@ -281,7 +281,7 @@ def _other_controller(arguments: argparse.Namespace) -> list[str] | None:
 
 
 def _values(bag: Path, controller: str | None, plant: Mapping[str, str]) -> dict[str, Any]:
-    from stickslip_ros.bags.report import report_of_recording
+    from stickslip_ros.record.report import report_of_recording
 
     report = report_of_recording(bag)
     return {
@@ -298,7 +298,7 @@ def _values(bag: Path, controller: str | None, plant: Mapping[str, str]) -> dict
 
 def _state_of(bag: Path) -> str:
     """Return what a failed run has left."""
-    from stickslip_ros.bags.reader import Recording
+    from stickslip_ros.record.reader import Recording
 
     try:
         with Recording(bag) as recording:

@@ -27,7 +27,7 @@ from stickslip_ros.files import written
 from stickslip_ros.studies.options import DEFAULT_PERIODS
 
 if TYPE_CHECKING:
-    from stickslip_ros.physics.loop.trajectory import SampleRecorder
+    from stickslip_ros.motion.trajectory import SampleRecorder
     from stickslip_ros.scenarios.files import Scenario
 
 _ROUNDING = 1e-9

@@ -8,14 +8,14 @@ from typing_extensions import override
 
 from stickslip_ros.arrays import FloatArray, rms
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.identification.adapters import (
+from stickslip_ros.identification.choice import Candidate, Task
+from stickslip_ros.identification.filtered import filtered
+from stickslip_ros.identification.identified_law import DELAY, IdentifiedLaw
+from stickslip_ros.identification.laws import (
     BristledTableAdapter,
     SaturatingAdapter,
     TableAdapter,
 )
-from stickslip_ros.identification.choice import Candidate, Task
-from stickslip_ros.identification.filtered import filtered
-from stickslip_ros.identification.laws import DELAY, IdentifiedLaw
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.regression import (
     LINEAR,

@@ -11,7 +11,7 @@ from typing_extensions import TypeVar
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.identification.fit import Fit
-from stickslip_ros.identification.laws import IdentifiedLaw
+from stickslip_ros.identification.identified_law import IdentifiedLaw
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.time_limit import TimeLimit
 

@@ -12,16 +12,16 @@ from typing_extensions import override
 
 from stickslip_ros.arrays import FloatArray, rms
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.identification.adapters import (
+from stickslip_ros.identification.choice import AUTO, Candidate, Task
+from stickslip_ros.identification.filtered import filtered
+from stickslip_ros.identification.identified_law import DELAY, LAG, IdentifiedLaw
+from stickslip_ros.identification.laws import (
     DAHL,
     EXPONENTIAL,
     LUGRE,
     DirectionalAdapter,
     TableAdapter,
 )
-from stickslip_ros.identification.choice import AUTO, Candidate, Task
-from stickslip_ros.identification.filtered import filtered
-from stickslip_ros.identification.laws import DELAY, LAG, IdentifiedLaw
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.refinement import Refinement
 from stickslip_ros.identification.regression import LINEAR, Regression, Rows, regress

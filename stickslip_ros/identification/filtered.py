@@ -9,7 +9,7 @@ import numpy as np
 
 from stickslip_ros.arrays import BoolArray, FloatArray
 from stickslip_ros.identification.record import Record
-from stickslip_ros.physics.measures.noise import white_noise
+from stickslip_ros.measures.noise import white_noise
 
 _CUTOFF = 100.0
 """Cutoff frequency of the low-pass, Hz; at most a tenth of the sample rate."""

@@ -17,7 +17,7 @@ from stickslip_ros.identification.record import FEWEST, Record
 from stickslip_ros.identification.rest import static_force
 from stickslip_ros.identification.servo import Servo, closed_loop
 from stickslip_ros.identification.trajectory import delayed
-from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.model.drive import Drive
 
 _STILL_SPEED = 0.02
 """Share of the fastest speed below which a slide may stick."""

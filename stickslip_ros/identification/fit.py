@@ -10,9 +10,9 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.identification.covariance import block_covariance, propagated
-from stickslip_ros.identification.laws import DELAY, IdentifiedLaw
+from stickslip_ros.identification.identified_law import DELAY, IdentifiedLaw
 from stickslip_ros.identification.record import Record
-from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.model.drive import Drive
 
 _STEP = 1e-5
 """Step of differences, as a share of the value."""

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from stickslip_ros.errors import InvalidInputError, in_words
-from stickslip_ros.identification.laws import IdentifiedLaw
-from stickslip_ros.physics.model.friction import LAWS
+from stickslip_ros.identification.identified_law import IdentifiedLaw
+from stickslip_ros.model.friction import LAWS
 from stickslip_ros.scenarios.foreign_laws import (
     FRICTION_LAWS,
     check_class,

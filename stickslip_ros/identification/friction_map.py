@@ -10,7 +10,7 @@ import numpy as np
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.identification.fit import Estimate
-from stickslip_ros.physics.model.friction import Coulomb, Exponential, FrictionLaw
+from stickslip_ros.model.friction import Coulomb, Exponential, FrictionLaw
 from stickslip_ros.text import must_be_one_of
 
 _LAWS = ("auto", "coulomb", "exponential")

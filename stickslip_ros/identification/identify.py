@@ -4,20 +4,20 @@ from collections.abc import Callable, Mapping, Sequence
 from math import inf, isfinite
 
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.identification.adapters import COMPETING, KNOWN_LAWS, TableAdapter
 from stickslip_ros.identification.axes import AXIS_LAWS, AxisTask
 from stickslip_ros.identification.choice import AUTO
 from stickslip_ros.identification.drives import DriveTask
 from stickslip_ros.identification.findings import Findings
 from stickslip_ros.identification.foreign_laws import foreign_adapter, foreign_names
-from stickslip_ros.identification.laws import DELAY, IdentifiedLaw
+from stickslip_ros.identification.identified_law import DELAY, IdentifiedLaw
+from stickslip_ros.identification.laws import COMPETING, KNOWN_LAWS, TableAdapter
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.recordings import ReadRecords
 from stickslip_ros.identification.regression import LINEAR
 from stickslip_ros.identification.servo import servo_of
 from stickslip_ros.identification.time_limit import TimeLimit
-from stickslip_ros.physics.model.constants import constants_of
-from stickslip_ros.physics.model.friction import LAWS
+from stickslip_ros.model.constants import constants_of
+from stickslip_ros.model.friction import LAWS
 from stickslip_ros.quantities import number_of
 from stickslip_ros.scenarios.keywords import described
 from stickslip_ros.text import must_be_one_of

@@ -10,7 +10,7 @@ import numpy as np
 
 from stickslip_ros.arrays import BoolArray, FloatArray, IntArray
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.measures.noise import white_noise
+from stickslip_ros.measures.noise import white_noise
 from stickslip_ros.stamps import NANOSECONDS
 
 FEWEST = 500

@@ -10,17 +10,17 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray, IntArray
-from stickslip_ros.bags.motion_reader import ANY_LAYOUT, BagLayout
-from stickslip_ros.bags.reader import Recording
-from stickslip_ros.bags.table_clock import stamps_of
-from stickslip_ros.bags.table_columns import Table
-from stickslip_ros.bags.table_file import is_table, table_of
-from stickslip_ros.bags.table_quantities import quantities_of
-from stickslip_ros.bags.text_table import ANY_FORM, TableFormat
 from stickslip_ros.errors import BagError, InvalidInputError
-from stickslip_ros.identification.laws import DELAY
+from stickslip_ros.identification.identified_law import DELAY
 from stickslip_ros.identification.record import FEWEST, Record, evenly_spaced, lagged
-from stickslip_ros.physics.model.actuator import Actuator
+from stickslip_ros.model.actuator import Actuator
+from stickslip_ros.record.motion_reader import ANY_LAYOUT, BagLayout
+from stickslip_ros.record.reader import Recording
+from stickslip_ros.record.table_clock import stamps_of
+from stickslip_ros.record.table_columns import Table
+from stickslip_ros.record.table_file import is_table, table_of
+from stickslip_ros.record.table_quantities import quantities_of
+from stickslip_ros.record.text_table import ANY_FORM, TableFormat
 from stickslip_ros.samples import ForceColumns
 from stickslip_ros.stamps import NANOSECONDS
 

@@ -11,7 +11,7 @@ from stickslip_ros.arrays import FloatArray
 from stickslip_ros.identification.covariance import block_covariance
 from stickslip_ros.identification.filtered import filtered
 from stickslip_ros.identification.fit import CURVE_POINTS, Fit, ForceErrors, Residuals
-from stickslip_ros.identification.laws import DELAY, LAG, IdentifiedLaw
+from stickslip_ros.identification.identified_law import DELAY, LAG, IdentifiedLaw
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.starts import Errors, best_starts
 from stickslip_ros.identification.trajectories import Trajectories, segments_of

@@ -9,11 +9,11 @@ from typing_extensions import override
 
 from stickslip_ros.arrays import FloatArray, IntArray, rms
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.identification.adapters import DirectionalAdapter
 from stickslip_ros.identification.covariance import BLOCKS
 from stickslip_ros.identification.filtered import Filtered, filtered
 from stickslip_ros.identification.fit import CURVE_POINTS, Fit, ForceErrors
-from stickslip_ros.identification.laws import IdentifiedLaw
+from stickslip_ros.identification.identified_law import IdentifiedLaw
+from stickslip_ros.identification.laws import DirectionalAdapter
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.trajectory import delayed, free_run
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.identification.record import Record
-from stickslip_ros.physics.measures.noise import white_noise
+from stickslip_ros.measures.noise import white_noise
 
 _STILL_SAMPLES = 20
 """Samples over which the position of a slide that rests stays."""

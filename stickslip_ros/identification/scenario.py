@@ -6,8 +6,8 @@ from typing import Any
 
 from stickslip_ros.files import written
 from stickslip_ros.identification.findings import Findings
-from stickslip_ros.identification.laws import LAG, by_group, numbers_of
-from stickslip_ros.physics.model.friction import CurveFollower, FrictionLaw, Table
+from stickslip_ros.identification.identified_law import LAG, by_group, numbers_of
+from stickslip_ros.model.friction import CurveFollower, FrictionLaw, Table
 from stickslip_ros.scenarios.files import Scenario, load_scenario
 from stickslip_ros.scenarios.template import commented_file
 

@@ -9,9 +9,9 @@ from stickslip_ros.arrays import FloatArray
 from stickslip_ros.identification.filtered import START
 from stickslip_ros.identification.record import FEWEST, Record
 from stickslip_ros.identification.trajectory import Predictor
-from stickslip_ros.physics.loop.sampled_loop import LOCKSTEP_START, SampledLoop
-from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.motion.motion import Motion
+from stickslip_ros.model.drive import Drive
+from stickslip_ros.motion.motion import Motion
+from stickslip_ros.motion.sampled_loop import LOCKSTEP_START, SampledLoop
 
 _LONGEST_DIFFERENCE = 8
 """Most samples over which the controller's velocity may be a difference."""

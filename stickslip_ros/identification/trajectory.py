@@ -10,11 +10,11 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.identification.record import Record, lagged
-from stickslip_ros.physics.model.dimensionless_drive import POSITION, SPEED
-from stickslip_ros.physics.model.drive import Drive, in_units_of
-from stickslip_ros.physics.model.signals import table
-from stickslip_ros.physics.motion.motion import Motion
-from stickslip_ros.physics.motion.variational import VariationalMotion
+from stickslip_ros.model.dimensionless_drive import POSITION, SPEED
+from stickslip_ros.model.drive import Drive, in_units_of
+from stickslip_ros.model.signals import table
+from stickslip_ros.motion.motion import Motion
+from stickslip_ros.motion.variational import VariationalMotion
 
 _FIRST = 20
 """Samples from which the velocity at the start is found."""

@@ -23,34 +23,13 @@ from rclpy.serialization import serialize_message
 from std_msgs.msg import Float64
 
 from stickslip_ros.arrays import IntArray
-from stickslip_ros.bags.motion_reader import BagLayout, MotionReader, read_forces
-from stickslip_ros.bags.recorder import Recorder, check_new_bag
 from stickslip_ros.errors import BagError, InvalidInputError, MessageError
-from stickslip_ros.messages.cdr import Messages, Refused, joined
-from stickslip_ros.messages.codec import (
-    UNSTAMPED,
-    force_layouts,
-    pack_header,
-    unpack_header,
-    wrenches_in,
-)
-from stickslip_ros.messages.topics import (
-    AMPLITUDE,
-    CONTROL_FORCE,
-    DECAY_RATE,
-    DEEP,
-    DIAGNOSTICS,
-    DROPPED_FORCE,
-    FREQUENCY,
-    JOINT_STATES,
-    ONSET_SPEED,
-    RECORDED,
-    RECORDED_IF_PUBLISHED,
-    RECORDED_TOPICS,
-    REFERENCE,
-    STICK_FRACTION,
-    Topic,
-)
+from stickslip_ros.measures.cycle_measures import trend_text
+from stickslip_ros.measures.onset import OnsetWatch
+from stickslip_ros.measures.run_meter import RunMeter
+from stickslip_ros.measures.sample_assumptions import SampleAssumptions
+from stickslip_ros.measures.timing import Timing
+from stickslip_ros.model.drive import Drive
 from stickslip_ros.nodes.base.clients import (
     ANSWER_TIME,
     NEXT_TRANSITION,
@@ -68,12 +47,33 @@ from stickslip_ros.nodes.base.managed import (
 )
 from stickslip_ros.nodes.base.process import run_node
 from stickslip_ros.nodes.base.ros_topics import qos_profile, timed_messages
-from stickslip_ros.physics.measures.cycle_measures import trend_text
-from stickslip_ros.physics.measures.onset import OnsetWatch
-from stickslip_ros.physics.measures.run_meter import RunMeter
-from stickslip_ros.physics.measures.sample_assumptions import SampleAssumptions
-from stickslip_ros.physics.measures.timing import Timing
-from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.record.cdr import Messages, Refused, joined
+from stickslip_ros.record.codec import (
+    UNSTAMPED,
+    force_layouts,
+    pack_header,
+    unpack_header,
+    wrenches_in,
+)
+from stickslip_ros.record.motion_reader import BagLayout, MotionReader, read_forces
+from stickslip_ros.record.recorder import Recorder, check_new_bag
+from stickslip_ros.record.topics import (
+    AMPLITUDE,
+    CONTROL_FORCE,
+    DECAY_RATE,
+    DEEP,
+    DIAGNOSTICS,
+    DROPPED_FORCE,
+    FREQUENCY,
+    JOINT_STATES,
+    ONSET_SPEED,
+    RECORDED,
+    RECORDED_IF_PUBLISHED,
+    RECORDED_TOPICS,
+    REFERENCE,
+    STICK_FRACTION,
+    Topic,
+)
 from stickslip_ros.samples import NO_FORCES, NO_SAMPLES, ForceColumns
 from stickslip_ros.scenarios import full_name
 from stickslip_ros.scenarios.curve_file import CURVES, Pairs, read_pairs

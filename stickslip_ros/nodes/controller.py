@@ -11,12 +11,12 @@ from rclpy.exceptions import ParameterException
 from rclpy.node import Node
 
 from stickslip_ros.errors import InvalidInputError, RunError
-from stickslip_ros.messages.codec import pack_reference, pack_wrench
-from stickslip_ros.messages.topics import CONTROL_FORCE, JOINT_STATES, REFERENCE
+from stickslip_ros.motion.controller import ReferenceSource
 from stickslip_ros.nodes.base.managed import OK, Diagnosis, ManagedNode, diagnosis
 from stickslip_ros.nodes.base.parameters import first_line
 from stickslip_ros.nodes.base.process import run_node
-from stickslip_ros.physics.loop.controller import ReferenceSource
+from stickslip_ros.record.codec import pack_reference, pack_wrench
+from stickslip_ros.record.topics import CONTROL_FORCE, JOINT_STATES, REFERENCE
 from stickslip_ros.samples import LARGEST, NO_REFERENCE, Reference, Sample
 from stickslip_ros.scenarios.parameters import (
     CONTROLLER_PARAMETERS,

@@ -12,10 +12,10 @@ from typing import Any
 from typing_extensions import override
 
 from stickslip_ros.errors import StickslipError
-from stickslip_ros.messages.topics import CONTROL_FORCE, JOINT_COMMANDS, RECORDED
+from stickslip_ros.measures.timing import Timing
+from stickslip_ros.motion.sampled_loop import SampledLoop
 from stickslip_ros.nodes.base.managed import ManagedNode
-from stickslip_ros.physics.loop.sampled_loop import SampledLoop
-from stickslip_ros.physics.measures.timing import Timing
+from stickslip_ros.record.topics import CONTROL_FORCE, JOINT_COMMANDS, RECORDED
 from stickslip_ros.samples import Sample
 from stickslip_ros.scenarios.parameters import PlantParameters
 

@@ -12,25 +12,8 @@ from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 
 from stickslip_ros.errors import InvalidInputError, MessageError
-from stickslip_ros.messages.codec import (
-    MOTOR,
-    joint_state_packer,
-    pack_wrench,
-    unpack_command,
-    unpack_wrench,
-)
-from stickslip_ros.messages.topics import (
-    APPLIED_DISTURBANCE,
-    APPLIED_FORCE,
-    CLOCK,
-    CONTROL_FORCE,
-    DISTURBANCE_FORCE,
-    DROPPED_FORCE,
-    JOINT_COMMANDS,
-    JOINT_STATES,
-    RECORDED,
-    TRUE_JOINT_STATES,
-)
+from stickslip_ros.motion.motion import Motion
+from stickslip_ros.motion.sampled_loop import LOCKSTEP_START, Verdict
 from stickslip_ros.nodes.base.managed import (
     ERROR,
     FAILURE,
@@ -44,8 +27,25 @@ from stickslip_ros.nodes.base.managed import (
 )
 from stickslip_ros.nodes.base.process import run_node
 from stickslip_ros.nodes.pacing import NO_FORCE, LockstepPacer, RealtimePacer, TimingMonitor
-from stickslip_ros.physics.loop.sampled_loop import LOCKSTEP_START, Verdict
-from stickslip_ros.physics.motion.motion import Motion
+from stickslip_ros.record.codec import (
+    MOTOR,
+    joint_state_packer,
+    pack_wrench,
+    unpack_command,
+    unpack_wrench,
+)
+from stickslip_ros.record.topics import (
+    APPLIED_DISTURBANCE,
+    APPLIED_FORCE,
+    CLOCK,
+    CONTROL_FORCE,
+    DISTURBANCE_FORCE,
+    DROPPED_FORCE,
+    JOINT_COMMANDS,
+    JOINT_STATES,
+    RECORDED,
+    TRUE_JOINT_STATES,
+)
 from stickslip_ros.samples import Sample
 from stickslip_ros.scenarios.parameters import Pace, PlantParameters
 from stickslip_ros.stamps import END_OF_TIME, NANOSECONDS

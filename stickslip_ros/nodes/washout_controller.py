@@ -3,9 +3,9 @@
 import sys
 from typing import Any
 
+from stickslip_ros.model.control import Washout
 from stickslip_ros.nodes.base.process import run_node
 from stickslip_ros.nodes.controller import ControllerNode
-from stickslip_ros.physics.model.control import Washout
 from stickslip_ros.scenarios.parameters import CONTROLLER_PARAMETERS
 
 

@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.lines import Line2D
 
+from stickslip_ros.measures.breakpoints import Breakpoints
 from stickslip_ros.paper.figures import (
     LAST_CYCLES,
     BifurcationFigure,
@@ -20,7 +21,6 @@ from stickslip_ros.paper.figures import (
     Portrait,
     PortraitFigure,
 )
-from stickslip_ros.physics.measures.breakpoints import Breakpoints
 from stickslip_ros.show.quantities import Units, typeset
 from stickslip_ros.show.study_figure import draw_section, draw_transitions, regime_handles
 from stickslip_ros.show.style import (

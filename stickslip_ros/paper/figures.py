@@ -13,13 +13,13 @@ from typing import NamedTuple
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.physics.measures.breakpoints import Breakpoints
-from stickslip_ros.physics.measures.cycle_measures import Cycle, Measures, Regime
-from stickslip_ros.physics.measures.cycle_meter import CycleMeter
-from stickslip_ros.physics.model.control import Washout
-from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.friction import Coulomb, FrictionLaw, Linear, Stribeck
-from stickslip_ros.physics.motion import RecordedMotion
+from stickslip_ros.measures.breakpoints import Breakpoints
+from stickslip_ros.measures.cycle_measures import Cycle, Measures, Regime
+from stickslip_ros.measures.cycle_meter import CycleMeter
+from stickslip_ros.model.control import Washout
+from stickslip_ros.model.drive import Drive
+from stickslip_ros.model.friction import Coulomb, FrictionLaw, Linear, Stribeck
+from stickslip_ros.motion import RecordedMotion
 from stickslip_ros.studies.options import SettlingOptions
 from stickslip_ros.studies.settling import (
     CYCLES,

@@ -6,7 +6,7 @@ from typing import Any
 
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.files import open_regular
-from stickslip_ros.physics.model.constants import LARGEST
+from stickslip_ros.model.constants import LARGEST
 from stickslip_ros.text import shown
 
 _LARGEST_FILE = 1_000_000

@@ -15,23 +15,23 @@ from typing import Any, Generic, TypeVar, cast
 import numpy as np
 
 from stickslip_ros.errors import InvalidInputError, in_words
-from stickslip_ros.physics.model.constants import (
+from stickslip_ros.model.constants import (
     LARGEST,
     SMALLEST,
     Parameter,
     constants_of,
 )
-from stickslip_ros.physics.model.control import CONTROL_LAWS, ControlLaw
-from stickslip_ros.physics.model.control.base import seen_by
-from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.friction import (
+from stickslip_ros.model.control import CONTROL_LAWS, ControlLaw
+from stickslip_ros.model.control.base import seen_by
+from stickslip_ros.model.drive import Drive
+from stickslip_ros.model.friction import (
     LAWS,
     Coulomb,
     CurveFollower,
     Directional,
     FrictionLaw,
 )
-from stickslip_ros.physics.model.symbols import numbers, with_symbols
+from stickslip_ros.model.symbols import numbers, with_symbols
 from stickslip_ros.scenarios.validation import ParameterGroup
 
 _Law = TypeVar("_Law", bound=FrictionLaw | ControlLaw)

@@ -9,14 +9,14 @@ from typing import Any, Self
 
 from typing_extensions import override
 
-from stickslip_ros.physics.model.constants import (
+from stickslip_ros.model.constants import (
     Changes,
     Parameter,
     constant,
     constants_of,
     described_by,
 )
-from stickslip_ros.physics.model.friction import (
+from stickslip_ros.model.friction import (
     LAWS,
     CurveFollower,
     Directional,

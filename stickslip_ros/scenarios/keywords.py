@@ -7,7 +7,7 @@ from sys import float_info
 from typing import Any
 
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.model.constants import Parameter
+from stickslip_ros.model.constants import Parameter
 from stickslip_ros.quantities import QUANTITY, number_of
 from stickslip_ros.scenarios import ros_yaml
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS

@@ -14,13 +14,9 @@ from typing import TYPE_CHECKING, Any, Literal, Self, get_args
 from typing_extensions import override
 
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.messages import ForceSource, TimeSource
-from stickslip_ros.messages.codec import FORCE_TYPES
-from stickslip_ros.physics.loop.controller import Controller
-from stickslip_ros.physics.loop.sampled_loop import LOCKSTEP_START, SampledLoop
-from stickslip_ros.physics.measures.sample_assumptions import SampleAssumptions, reading_of
-from stickslip_ros.physics.model.actuator import IDEAL_ACTUATOR, Actuator
-from stickslip_ros.physics.model.constants import (
+from stickslip_ros.measures.sample_assumptions import SampleAssumptions, reading_of
+from stickslip_ros.model.actuator import IDEAL_ACTUATOR, Actuator
+from stickslip_ros.model.constants import (
     SMALLEST,
     Parameter,
     at_build,
@@ -29,10 +25,14 @@ from stickslip_ros.physics.model.constants import (
     constants_of,
     parameters_of,
 )
-from stickslip_ros.physics.model.control import CONTROL_LAWS, ControlLaw
-from stickslip_ros.physics.model.drive import Drive, DriveConstants
-from stickslip_ros.physics.model.motor import Motor
-from stickslip_ros.physics.model.sensor import EXACT_SENSOR, Sensor
+from stickslip_ros.model.control import CONTROL_LAWS, ControlLaw
+from stickslip_ros.model.drive import Drive, DriveConstants
+from stickslip_ros.model.motor import Motor
+from stickslip_ros.model.sensor import EXACT_SENSOR, Sensor
+from stickslip_ros.motion.controller import Controller
+from stickslip_ros.motion.sampled_loop import LOCKSTEP_START, SampledLoop
+from stickslip_ros.record.codec import FORCE_TYPES
+from stickslip_ros.record.topics import ForceSource, TimeSource
 from stickslip_ros.scenarios import Pace
 from stickslip_ros.scenarios.curve_file import Pairs
 from stickslip_ros.scenarios.foreign_laws import CONTROLLERS
@@ -47,7 +47,7 @@ from stickslip_ros.scenarios.validation import ParameterGroup
 from stickslip_ros.text import did_you_mean, shown
 
 if TYPE_CHECKING:
-    from stickslip_ros.physics.motion.motion import Motion
+    from stickslip_ros.motion.motion import Motion
 
 _SHORTEST_TIME = 1e-3
 """Shortest time-out or period of a node, s."""

@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import Any, Self
 
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.measures.cycle_meter import CycleMeter
-from stickslip_ros.physics.measures.noise import resolved
-from stickslip_ros.physics.measures.sample_assumptions import SampleAssumptions, varies
-from stickslip_ros.physics.model.control import ControlLaw
+from stickslip_ros.measures.cycle_meter import CycleMeter
+from stickslip_ros.measures.noise import resolved
+from stickslip_ros.measures.sample_assumptions import SampleAssumptions, varies
+from stickslip_ros.model.control import ControlLaw
 from stickslip_ros.scenarios.keywords import (
     described,
     in_own_unit,

@@ -10,8 +10,8 @@ from typing import Any, Self
 from typing_extensions import override
 
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.model.constants import Changes, at_build, constant
-from stickslip_ros.physics.model.signals import NO_SIGNAL, SIGNALS, Signal, table
+from stickslip_ros.model.constants import Changes, at_build, constant
+from stickslip_ros.model.signals import NO_SIGNAL, SIGNALS, Signal, table
 from stickslip_ros.scenarios.curve_file import Pairs, read_curve
 from stickslip_ros.scenarios.validation import ParameterGroup
 

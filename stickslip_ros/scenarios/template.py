@@ -6,7 +6,7 @@ from math import isfinite
 from textwrap import wrap
 from typing import Any
 
-from stickslip_ros.physics.model.constants import Parameter
+from stickslip_ros.model.constants import Parameter
 from stickslip_ros.scenarios import ros_yaml
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, NodeParameters

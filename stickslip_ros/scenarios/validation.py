@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.model.constants import LARGEST, SMALLEST, Parameter, parameters_of
+from stickslip_ros.model.constants import LARGEST, SMALLEST, Parameter, parameters_of
 from stickslip_ros.scenarios.curve_file import Pairs
 from stickslip_ros.text import by_group, did_you_mean, shown
 

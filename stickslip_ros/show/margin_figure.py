@@ -3,7 +3,7 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from stickslip_ros.physics.measures.onset import Onset
+from stickslip_ros.measures.onset import Onset
 from stickslip_ros.show.quantities import SI, Units
 from stickslip_ros.show.style import BLUE, GREY, ORANGE, SCREEN, FigureStyle, finish, styled
 

@@ -4,8 +4,8 @@ from collections.abc import Iterator, Mapping
 from math import inf
 from typing import Any
 
-from stickslip_ros.physics.measures.cycle_measures import Measures, Regime, trend_text
-from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.measures.cycle_measures import Measures, Regime, trend_text
+from stickslip_ros.model.drive import Drive
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.show.quantities import MEASURES, NOISE, SI, SLIPS, Units
 from stickslip_ros.tables import TextTable

@@ -14,10 +14,10 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from stickslip_ros.arrays import FloatArray, IntArray
-from stickslip_ros.physics.measures.cycle_fit import MeanCycle
-from stickslip_ros.physics.measures.cycle_measures import Measures, trend_text
-from stickslip_ros.physics.measures.run_meter import RunAnalysis
-from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.measures.cycle_fit import MeanCycle
+from stickslip_ros.measures.cycle_measures import Measures, trend_text
+from stickslip_ros.measures.run_meter import RunAnalysis
+from stickslip_ros.model.drive import Drive
 from stickslip_ros.quantities import Quantity
 from stickslip_ros.show.quantities import MEASURES, SLIPS, Units
 from stickslip_ros.show.run_history import DrawnMotion, RunHistory, intervals, peaks

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import suppress
 
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.model.constants import Parameter
+from stickslip_ros.model.constants import Parameter
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, NodeParameters
 from stickslip_ros.scenarios.scenario import DEFAULT, Scenario
 from stickslip_ros.scenarios.template import own_first

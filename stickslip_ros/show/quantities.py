@@ -10,8 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.measures.cycle_measures import CycleMeasures, Measures
-from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.measures.cycle_measures import CycleMeasures, Measures
+from stickslip_ros.model.drive import Drive
 from stickslip_ros.quantities import Quantity, quantities_of
 from stickslip_ros.text import must_be_one_of, prefix_for, shown
 

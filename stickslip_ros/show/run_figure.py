@@ -15,8 +15,8 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.physics.measures.cycle_measures import Measures, measures_of
-from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.measures.cycle_measures import Measures, measures_of
+from stickslip_ros.model.drive import Drive
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.show.panels import (
     BELT,

@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip_ros.arrays import BoolArray, FloatArray, IntArray
-from stickslip_ros.physics.measures.run_meter import RunAnalysis
-from stickslip_ros.physics.measures.sample_meter import MeasuredMotion
-from stickslip_ros.physics.measures.sampling_grid import LONGEST_GAP
+from stickslip_ros.measures.run_meter import RunAnalysis
+from stickslip_ros.measures.sample_meter import MeasuredMotion
+from stickslip_ros.measures.sampling_grid import LONGEST_GAP
 from stickslip_ros.samples import LARGEST
 
 _FIRST_ROWS = 20_000

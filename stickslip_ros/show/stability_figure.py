@@ -15,9 +15,7 @@ from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 
 from stickslip_ros.arrays import BoolArray, FloatArray
-from stickslip_ros.physics.measures.cycle_measures import Regime
-from stickslip_ros.physics.theory.bifurcation_branches import BifurcationBranches, Branch
-from stickslip_ros.physics.theory.stability_map import CriticalGainCurves, StabilityMap
+from stickslip_ros.measures.cycle_measures import Regime
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.show.quantities import Units
 from stickslip_ros.show.style import (
@@ -39,6 +37,8 @@ from stickslip_ros.show.style import (
 )
 from stickslip_ros.studies.stability import bifurcation_branches, stability_map
 from stickslip_ros.studies.washout_design import WashoutDesign
+from stickslip_ros.theory.bifurcation_branches import BifurcationBranches, Branch
+from stickslip_ros.theory.stability_map import CriticalGainCurves, StabilityMap
 
 _UNSTABLE = "#E4E4E4"
 _GAINS: Any = {"color": "white", "mec": "black", "marker": "*", "ls": "", "zorder": 5.0}

@@ -6,7 +6,7 @@ from itertools import groupby, islice
 from math import log10
 from typing import Any, cast
 
-from stickslip_ros.physics.measures.cycle_measures import Regime, Trend
+from stickslip_ros.measures.cycle_measures import Regime, Trend
 from stickslip_ros.quantities import Quantity
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.show.measure_table import measure_table

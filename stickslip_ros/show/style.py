@@ -24,7 +24,7 @@ from PIL import Image
 
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.files import written
-from stickslip_ros.physics.measures.cycle_measures import Regime
+from stickslip_ros.measures.cycle_measures import Regime
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.text import printable, shown
 

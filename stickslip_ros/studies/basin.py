@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.measures.cycle_measures import Regime
+from stickslip_ros.measures.cycle_measures import Regime
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.studies.columns import Columns
 from stickslip_ros.studies.options import BASIN_OPTIONS, SettlingOptions

@@ -8,9 +8,9 @@ import numpy as np
 
 from stickslip_ros.arrays import rms
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.loop.controller import answer
-from stickslip_ros.physics.measures.holding import Trial, hunting, settling_time
-from stickslip_ros.physics.motion import Motion
+from stickslip_ros.measures.holding import Trial, hunting, settling_time
+from stickslip_ros.motion import Motion
+from stickslip_ros.motion.controller import answer
 from stickslip_ros.quantities import Quantity, number_of, quantities_of
 from stickslip_ros.scenarios.files import Scenario
 

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.physics.measures.cycle_measures import CycleMeasures
+from stickslip_ros.measures.cycle_measures import CycleMeasures
 from stickslip_ros.quantities import quantities_of
 from stickslip_ros.studies.plan import Grid, Plan
 from stickslip_ros.studies.study import COLUMNS, Point, Study

@@ -10,19 +10,19 @@ from typing import Annotated, Any
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.physics.loop.controller import Controller, answer
-from stickslip_ros.physics.loop.sampled_loop import LOCKSTEP_START, SampledLoop
-from stickslip_ros.physics.measures.cycle_measures import Measures, Regime
-from stickslip_ros.physics.measures.cycle_meter import CycleMeter
-from stickslip_ros.physics.model.control import Washout
-from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.sensor import EXACT_SENSOR, Measure, Sensor
-from stickslip_ros.physics.motion import Motion, RecordedMotion
-from stickslip_ros.physics.theory.cycle_bounds import loading_time, release_position
-from stickslip_ros.physics.theory.linear_sampled_loop import SETTLED
+from stickslip_ros.measures.cycle_measures import Measures, Regime
+from stickslip_ros.measures.cycle_meter import CycleMeter
+from stickslip_ros.model.control import Washout
+from stickslip_ros.model.drive import Drive
+from stickslip_ros.model.sensor import EXACT_SENSOR, Measure, Sensor
+from stickslip_ros.motion import Motion, RecordedMotion
+from stickslip_ros.motion.controller import Controller, answer
+from stickslip_ros.motion.sampled_loop import LOCKSTEP_START, SampledLoop
 from stickslip_ros.quantities import Quantity
 from stickslip_ros.samples import Sample
 from stickslip_ros.stamps import NANOSECONDS
+from stickslip_ros.theory.cycle_bounds import loading_time, release_position
+from stickslip_ros.theory.linear_sampled_loop import SETTLED
 
 FILTER_SETTLED = 5.0
 """Time after which the start of the filter of eq. 17 no longer matters, in 1/d."""

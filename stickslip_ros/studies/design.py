@@ -9,9 +9,9 @@ from typing import Any, Self
 import numpy as np
 
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.model.constants import LARGEST, SMALLEST
-from stickslip_ros.physics.model.control import ControlLaw, Washout
-from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.model.constants import LARGEST, SMALLEST
+from stickslip_ros.model.control import ControlLaw, Washout
+from stickslip_ros.model.drive import Drive
 from stickslip_ros.scenarios.files import Scenario, parameter_file
 from stickslip_ros.studies.options import OWN_SPEED_RANGE
 

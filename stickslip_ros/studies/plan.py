@@ -10,7 +10,7 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.model.constants import Parameter
+from stickslip_ros.model.constants import Parameter
 from stickslip_ros.quantities import number_of
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
 from stickslip_ros.studies.options import Continuation

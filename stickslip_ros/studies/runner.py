@@ -181,7 +181,7 @@ def compute_columns(
 
     Examples
     --------
-    >>> from stickslip_ros.physics.measures.cycle_measures import Regime
+    >>> from stickslip_ros.measures.cycle_measures import Regime
     >>> from stickslip_ros.scenarios.files import load_scenario
     >>> from stickslip_ros.studies.plan import Axis
     >>> from stickslip_ros.studies.study import sweep_study

@@ -10,19 +10,19 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.loop.controller import Controller, ReferenceSource, answer, no_reference
-from stickslip_ros.physics.loop.simulation import measure_block, simulate_sampled
-from stickslip_ros.physics.measures.cycle_measures import LEAST_CYCLES, RESTS, Measures, Regime
-from stickslip_ros.physics.measures.cycle_meter import CycleMeter
-from stickslip_ros.physics.measures.sample_meter import MeasuredMotion
-from stickslip_ros.physics.model.constants import constants_of
-from stickslip_ros.physics.model.control import ContinuousControl, ControlLaw
-from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.motion import RecordedMotion
-from stickslip_ros.physics.theory.cycle_bounds import loading_time, release_position
+from stickslip_ros.measures.cycle_measures import LEAST_CYCLES, RESTS, Measures, Regime
+from stickslip_ros.measures.cycle_meter import CycleMeter
+from stickslip_ros.measures.sample_meter import MeasuredMotion
+from stickslip_ros.model.constants import constants_of
+from stickslip_ros.model.control import ContinuousControl, ControlLaw
+from stickslip_ros.model.drive import Drive
+from stickslip_ros.motion import RecordedMotion
+from stickslip_ros.motion.controller import Controller, ReferenceSource, answer, no_reference
+from stickslip_ros.motion.simulation import measure_block, simulate_sampled
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.scenarios.parameters import PlantParameters
 from stickslip_ros.studies.options import DEFAULT_PERIODS, LONGEST, SettlingOptions
+from stickslip_ros.theory.cycle_bounds import loading_time, release_position
 
 CYCLES = (Regime.STICK_SLIP, Regime.PURE_SLIP)
 """Regimes of a limit cycle, which has an amplitude."""

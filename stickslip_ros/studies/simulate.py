@@ -7,16 +7,16 @@ from typing import TextIO
 from typing_extensions import override
 
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.loop.simulation import (
+from stickslip_ros.measures.cycle_measures import Measures
+from stickslip_ros.measures.run_meter import RunObserver
+from stickslip_ros.measures.sample_meter import NOT_JUDGED, SampleMeter
+from stickslip_ros.motion import RecordedMotion
+from stickslip_ros.motion.simulation import (
     MotionTracer,
     simulate_continuous,
     simulate_sampled,
 )
-from stickslip_ros.physics.loop.trajectory import SampleRecorder
-from stickslip_ros.physics.measures.cycle_measures import Measures
-from stickslip_ros.physics.measures.run_meter import RunObserver
-from stickslip_ros.physics.measures.sample_meter import NOT_JUDGED, SampleMeter
-from stickslip_ros.physics.motion import RecordedMotion
+from stickslip_ros.motion.trajectory import SampleRecorder
 from stickslip_ros.progress import Progress
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.stamps import END_OF_TIME, NANOSECONDS

@@ -9,45 +9,45 @@ from typing import Any, NamedTuple, TypeVar, cast
 import numpy as np
 
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.model.actuator import IDEAL_ACTUATOR
-from stickslip_ros.physics.model.control import ControlLaw
-from stickslip_ros.physics.model.dimensionless_drive import POSITION, SPEED
-from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.theory.bifurcation_branches import BifurcationBranches
-from stickslip_ros.physics.theory.closed_forms import CubicLoop
-from stickslip_ros.physics.theory.critical_gains import (
+from stickslip_ros.model.actuator import IDEAL_ACTUATOR
+from stickslip_ros.model.control import ControlLaw
+from stickslip_ros.model.dimensionless_drive import POSITION, SPEED
+from stickslip_ros.model.drive import Drive
+from stickslip_ros.scenarios.files import Scenario
+from stickslip_ros.scenarios.parameters import PlantParameters
+from stickslip_ros.text import quantity
+from stickslip_ros.theory.bifurcation_branches import BifurcationBranches
+from stickslip_ros.theory.closed_forms import CubicLoop
+from stickslip_ros.theory.critical_gains import (
     critical_gains,
     limit_cycle_from_hopf,
     why_no_linear_gain,
 )
-from stickslip_ros.physics.theory.gain_intervals import gains_of, why_no_gains
-from stickslip_ros.physics.theory.hopf import HopfPoint, hopf_points
-from stickslip_ros.physics.theory.limit_cycles import limit_cycle_of_run, limit_cycles
-from stickslip_ros.physics.theory.linear import Expansion, expand
-from stickslip_ros.physics.theory.linear_sampled_loop import (
+from stickslip_ros.theory.gain_intervals import gains_of, why_no_gains
+from stickslip_ros.theory.hopf import HopfPoint, hopf_points
+from stickslip_ros.theory.limit_cycles import limit_cycle_of_run, limit_cycles
+from stickslip_ros.theory.linear import Expansion, expand
+from stickslip_ros.theory.linear_sampled_loop import (
     LONGEST_DELAY,
     LinearSampledLoop,
     not_linear,
     why_no_linear_loop,
 )
-from stickslip_ros.physics.theory.linear_system import (
+from stickslip_ros.theory.linear_system import (
     LinearSystem,
     continuous_system,
     sampled_system,
 )
-from stickslip_ros.physics.theory.requirements import (
+from stickslip_ros.theory.requirements import (
     AUTONOMOUS,
     ONE_MASS,
     SMOOTH,
     NotCoveredError,
     require,
 )
-from stickslip_ros.physics.theory.shooting import LimitCycle
-from stickslip_ros.physics.theory.stability_map import CriticalGainCurves, StabilityMap
-from stickslip_ros.physics.theory.sticking import sticking_onset
-from stickslip_ros.scenarios.files import Scenario
-from stickslip_ros.scenarios.parameters import PlantParameters
-from stickslip_ros.text import quantity
+from stickslip_ros.theory.shooting import LimitCycle
+from stickslip_ros.theory.stability_map import CriticalGainCurves, StabilityMap
+from stickslip_ros.theory.sticking import sticking_onset
 
 _Found = TypeVar("_Found")
 

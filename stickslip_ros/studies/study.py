@@ -11,7 +11,7 @@ from typing import Any, Generic, NamedTuple, Self, TypeVar
 from typing_extensions import override
 
 from stickslip_ros.errors import InvalidInputError, StickslipError
-from stickslip_ros.physics.measures.cycle_measures import (
+from stickslip_ros.measures.cycle_measures import (
     EQUILIBRIUM_SPEED,
     Measures,
     Regime,

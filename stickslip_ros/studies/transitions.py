@@ -10,13 +10,13 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import StickslipError
-from stickslip_ros.physics.model.functions import zero_between
-from stickslip_ros.physics.theory.linear import expand, hurwitz_determinants
-from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop
-from stickslip_ros.physics.theory.sticking import release_margin
+from stickslip_ros.model.functions import zero_between
 from stickslip_ros.studies.plan import Axis
 from stickslip_ros.studies.settling import ControlledDrive
 from stickslip_ros.studies.study import Study
+from stickslip_ros.theory.linear import expand, hurwitz_determinants
+from stickslip_ros.theory.linear_sampled_loop import LinearSampledLoop
+from stickslip_ros.theory.sticking import release_margin
 
 _Margin = Callable[[ControlledDrive], float]
 

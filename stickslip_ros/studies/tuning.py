@@ -14,17 +14,17 @@ import numpy.typing as npt
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.model.constants import constants_of
-from stickslip_ros.physics.model.control import ControlLaw
-from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.theory.linear import jacobians
-from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop, why_no_linear_loop
-from stickslip_ros.physics.theory.linear_system import sampled_system
-from stickslip_ros.physics.theory.loop_response import LoopResponse, PlantResponse
-from stickslip_ros.physics.theory.requirements import AUTONOMOUS, STATIC, require
+from stickslip_ros.model.constants import constants_of
+from stickslip_ros.model.control import ControlLaw
+from stickslip_ros.model.drive import Drive
 from stickslip_ros.quantities import Quantity, quantities_of
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.studies.gain_search import Loops, fastest, linear_part, rounded
+from stickslip_ros.theory.linear import jacobians
+from stickslip_ros.theory.linear_sampled_loop import LinearSampledLoop, why_no_linear_loop
+from stickslip_ros.theory.linear_system import sampled_system
+from stickslip_ros.theory.loop_response import LoopResponse, PlantResponse
+from stickslip_ros.theory.requirements import AUTONOMOUS, STATIC, require
 
 _STARTS = 300
 """Random gains from which the search starts."""

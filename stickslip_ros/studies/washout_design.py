@@ -12,15 +12,9 @@ from typing import Annotated
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.physics.measures.cycle_measures import Regime
-from stickslip_ros.physics.model.control import Washout
-from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.theory.linear_sampled_loop import (
-    LinearSampledLoop,
-    settling_time,
-    why_no_linear_loop,
-)
-from stickslip_ros.physics.theory.stability_map import StabilityMap
+from stickslip_ros.measures.cycle_measures import Regime
+from stickslip_ros.model.control import Washout
+from stickslip_ros.model.drive import Drive
 from stickslip_ros.progress import Progress
 from stickslip_ros.quantities import Quantity
 from stickslip_ros.studies.controller_trial import FILTER_SETTLED, Bench, Outcome, Rest, Vibration
@@ -35,6 +29,12 @@ from stickslip_ros.studies.washout_search import (
     little_margin,
     margins,
 )
+from stickslip_ros.theory.linear_sampled_loop import (
+    LinearSampledLoop,
+    settling_time,
+    why_no_linear_loop,
+)
+from stickslip_ros.theory.stability_map import StabilityMap
 
 _SHARE_OF_VIBRATIONS = 0.1
 """Approximate share of the work that goes into the vibrations without control."""

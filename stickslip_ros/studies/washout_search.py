@@ -10,15 +10,15 @@ from typing import Annotated, Self
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.physics.model.control import Washout
-from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.functions import zero_between
-from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop, why_no_linear_loop
+from stickslip_ros.model.control import Washout
+from stickslip_ros.model.drive import Drive
+from stickslip_ros.model.functions import zero_between
 from stickslip_ros.quantities import Quantity
 from stickslip_ros.studies.controller_trial import Vibration
 from stickslip_ros.studies.design import Task
 from stickslip_ros.studies.gain_search import Loops, fastest, rounded
 from stickslip_ros.studies.stability import hopf_distance, hopf_ratio, number_text
+from stickslip_ros.theory.linear_sampled_loop import LinearSampledLoop, why_no_linear_loop
 
 CUBIC_SHARES = (0.0, 0.125, 0.25, 0.5)
 """Cubic gains to try, as shares of the friction law's own cubic coefficient.

@@ -16,7 +16,6 @@ from rclpy.exceptions import InvalidNamespaceException
 from rclpy.node import Node
 from rclpy.validate_namespace import validate_namespace
 
-from stickslip_ros.bags.recorder import check_new_bag
 from stickslip_ros.errors import InvalidInputError, RunError
 from stickslip_ros.nodes.analyzer import VERDICT_TIME
 from stickslip_ros.nodes.base.child_process import ChildProcesses, how_it_ended
@@ -25,10 +24,11 @@ from stickslip_ros.nodes.base.machine import own_domain
 from stickslip_ros.nodes.base.managed import ERROR
 from stickslip_ros.nodes.base.network import domain_variables
 from stickslip_ros.nodes.base.process import loopback_session
-from stickslip_ros.running.bringup import node_parameters
-from stickslip_ros.running.composition import Composition
-from stickslip_ros.running.controller_search import ControllerSearch
-from stickslip_ros.running.user_controller import ControllerThread
+from stickslip_ros.nodes.running.bringup import node_parameters
+from stickslip_ros.nodes.running.composition import Composition
+from stickslip_ros.nodes.running.controller_search import ControllerSearch
+from stickslip_ros.nodes.running.user_controller import ControllerThread
+from stickslip_ros.record.recorder import check_new_bag
 from stickslip_ros.scenarios import DEFAULT_NAMESPACE, LONGEST_NAMESPACE, full_name
 from stickslip_ros.scenarios.files import Scenario, load_scenario
 from stickslip_ros.scenarios.parameters import CONTROLLER_PARAMETERS

@@ -5,11 +5,11 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.bags import Recording
 from stickslip_ros.errors import RunError
-from stickslip_ros.physics.measures.cycle_measures import Measures
-from stickslip_ros.physics.measures.run_meter import RunMeter
-from stickslip_ros.physics.measures.sample_assumptions import SampleAssumptions
+from stickslip_ros.measures.cycle_measures import Measures
+from stickslip_ros.measures.run_meter import RunMeter
+from stickslip_ros.measures.sample_assumptions import SampleAssumptions
+from stickslip_ros.record.reader import Recording
 from stickslip_ros.samples import ForceColumns, SampleColumns
 
 

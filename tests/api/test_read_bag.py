@@ -7,9 +7,9 @@ import pytest
 from matplotlib.figure import Figure
 
 import stickslip_ros as ss
-from stickslip_ros.bags.reader import Recording
-from stickslip_ros.bags.report import report_of_recording
 from stickslip_ros.errors import BagError, InvalidInputError
+from stickslip_ros.record.reader import Recording
+from stickslip_ros.record.report import report_of_recording
 
 REFERENCE = Path(__file__).parents[2] / "bags" / "reference"
 

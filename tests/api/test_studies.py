@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 import stickslip_ros as ss
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.measures.cycle_measures import Regime
+from stickslip_ros.measures.cycle_measures import Regime
 from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.studies.basin import Basins
 from stickslip_ros.studies.plan import Axis

@@ -14,7 +14,7 @@ import pytest
 from stickslip_ros.app.main import main
 from stickslip_ros.nodes.base.machine import port
 from tests.app.conftest import Run
-from tests.bags.runs import STAMPS, record
+from tests.record.runs import STAMPS, record
 
 TWO = "has sections for the controllers washout_controller and velocity_feedback_controller: name "
 FREE = "needs a spring: the drive has stiffness = 0 N/m"

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from stickslip_ros.bags.report import report_of_recording
+from stickslip_ros.record.report import report_of_recording
 from tests.nodes.graph import PATIENCE
 
 pytestmark = pytest.mark.process

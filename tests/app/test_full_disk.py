@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from tests.app.conftest import Run
-from tests.bags.runs import full_disk
+from tests.record.runs import full_disk
 
 _OLD = b"a figure of before"
 

@@ -14,9 +14,9 @@ import pytest
 
 import stickslip_ros as ss
 from stickslip_ros.errors import RunError
-from stickslip_ros.physics.model.constants import constant
-from stickslip_ros.physics.model.control import CONTROL_LAWS, ControlLaw, VelocityFeedback
-from stickslip_ros.physics.model.control.base import LinearFeedback
+from stickslip_ros.model.constants import constant
+from stickslip_ros.model.control import CONTROL_LAWS, ControlLaw, VelocityFeedback
+from stickslip_ros.model.control.base import LinearFeedback
 from stickslip_ros.scenarios.parameters import (
     CONTROLLER_PARAMETERS,
     NODE_PARAMETERS,

@@ -10,8 +10,8 @@ import stickslip_ros as ss
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.identification import scenario
 from tests.app.conftest import REFERENCE, Run
-from tests.bags.runs import full_disk
 from tests.identification.axis_record import record
+from tests.record.runs import full_disk
 
 _COLUMNS = "time=t,position=x,force=u*2,reference=r"
 _BY_NAME = dict(each.split("=") for each in _COLUMNS.split(","))

@@ -12,7 +12,7 @@ import pytest
 from stickslip_ros.scenarios.foreign_laws import CONTROLLERS
 from tests.app.conftest import Run, RunOfItsOwn
 from tests.docs.page import CHECKOUT
-from tests.physics.motion.dop853 import Curve, Dop853Drive, none
+from tests.motion.dop853 import Curve, Dop853Drive, none
 from tests.scenarios.foreign_laws import BRAKE, FALLING, write_example, write_package
 
 pytestmark = pytest.mark.process

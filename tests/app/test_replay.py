@@ -3,7 +3,7 @@
 import signal
 from pathlib import Path
 
-from stickslip_ros.messages.topics import CONTROL_FORCE, JOINT_STATES
+from stickslip_ros.record.topics import CONTROL_FORCE, JOINT_STATES
 from tests.app.conftest import Start, ended
 from tests.nodes.graph import Graph
 from tests.nodes.runs import FORCES, STATES, messages_of, record_states

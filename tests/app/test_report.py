@@ -7,11 +7,11 @@ import pytest
 from geometry_msgs.msg import WrenchStamped
 from PIL import Image
 
-from stickslip_ros.bags.recorder import Recorder
-from stickslip_ros.messages.codec import pack_joint_state
+from stickslip_ros.record.codec import pack_joint_state
+from stickslip_ros.record.recorder import Recorder
 from stickslip_ros.testing import ClosedLoop
 from tests.app.conftest import REFERENCE, Run
-from tests.bags.runs import STAMPS, STATES, motion, record
+from tests.record.runs import STAMPS, STATES, motion, record
 from tests.testing.controllers import WithoutArguments
 
 

@@ -11,12 +11,12 @@ from diagnostic_msgs.msg import DiagnosticArray
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 
-from stickslip_ros.bags.reader import Recording
-from stickslip_ros.messages.topics import DIAGNOSTICS
 from stickslip_ros.nodes.base.managed import STATE
+from stickslip_ros.record.reader import Recording
+from stickslip_ros.record.topics import DIAGNOSTICS
 from tests.app.conftest import Run, Start, ended
+from tests.drives import LIMIT_CYCLES
 from tests.nodes.graph import PATIENCE, Graph, wait_for
-from tests.physics.drives import LIMIT_CYCLES
 
 
 def test_figures_from_samples_are_those_of_the_limit_cycle(stickslip: Run) -> None:

@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
 
-from stickslip_ros.bags.reader import Recording
-from stickslip_ros.messages.topics import DIAGNOSTICS
+from stickslip_ros.record.reader import Recording
+from stickslip_ros.record.topics import DIAGNOSTICS
 from tests.app.conftest import Run, Start, ended
 from tests.app.test_run import children, command, is_complete, is_running, wait_for_samples
 from tests.nodes.graph import Graph, wait_for
@@ -221,7 +221,7 @@ def test_a_controller_that_dies_ends_the_run(
 def test_a_controller_that_never_closes_the_loop(
     stickslip: Run, install: Install, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("stickslip_ros.running.bringup._READY_TIMEOUT", 10.0)
+    monkeypatch.setattr("stickslip_ros.nodes.running.bringup._READY_TIMEOUT", 10.0)
     done = stickslip("run", "paper", "--controller", install(damper("ForceOnly")))
     assert done.returncode == 1
     assert "my_controllers/damper was not ready within 10 s" in done.stderr

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from stickslip_ros.bags.reader import Recording
+from stickslip_ros.record.reader import Recording
 from tests.app.conftest import REFERENCE, Run, Start, ended
 from tests.app.test_run import children, command, is_complete, is_running, wait_for_samples
 from tests.nodes.graph import PATIENCE, wait_for
@@ -50,7 +50,7 @@ def test_the_bag_of_a_killed_analyzer_is_reported_and_can_be_repaired(
 def test_a_plant_that_gives_up_is_reported_and_its_bag_is_closed(
     stickslip: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("stickslip_ros.physics.motion.hybrid_motion._SPARE_STEPS", 10_000)
+    monkeypatch.setattr("stickslip_ros.motion.hybrid_motion._SPARE_STEPS", 10_000)
     stiff = ("--composed", "--bag", "bag", "-p", "plant.damping=1e12")
     done = stickslip("run", "paper", *stiff)
     assert done.returncode == 1

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from stickslip_ros.bags.reader import Recording
+from stickslip_ros.record.reader import Recording
 from tests.app.conftest import Run
 
 SLIPS = "-p plant.friction.slip_distance=1e-5 -p plant.friction.evolution_effect=0.03"

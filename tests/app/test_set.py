@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from stickslip_ros.bags import Recording
+from stickslip_ros.record.reader import Recording
 from tests.app.conftest import Run, Start
 from tests.nodes.graph import PATIENCE
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from stickslip_ros.bags.reader import Recording
+from stickslip_ros.record.reader import Recording
 from stickslip_ros.testing import own_domain
 from tests.app.conftest import Run, Start
 from tests.app.test_run import wait_for_samples

@@ -9,7 +9,7 @@ import pytest
 
 import stickslip_ros as ss
 from tests.app.conftest import Run
-from tests.physics.drives import LIMIT_CYCLES
+from tests.drives import LIMIT_CYCLES
 
 RUNNING_AWAY = "-p plant.friction.law=linear -p plant.friction.slope=0.9 -p plant.belt_speed=0.2"
 
@@ -110,7 +110,7 @@ def test_the_file_has_the_trajectory_to_the_last_digit(
 def test_a_run_that_fails_leaves_no_file(
     stickslip: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("stickslip_ros.physics.motion.hybrid_motion._SPARE_STEPS", 10_000)
+    monkeypatch.setattr("stickslip_ros.motion.hybrid_motion._SPARE_STEPS", 10_000)
     stiff = ("-p", "plant.damping=1e9", "--continuous-control")
     done = stickslip("simulate", "paper", *stiff, "--out", "run.csv")
     assert done.returncode == 1

@@ -12,7 +12,12 @@ import pytest
 import yaml
 from sensor_msgs.msg import JointState
 
-from stickslip_ros.messages.topics import (
+from stickslip_ros.measures.cycle_measures import Regime
+from stickslip_ros.nodes.analyzer import AnalyzerNode
+from stickslip_ros.nodes.base.network import this_machine_only
+from stickslip_ros.nodes.plant import PlantNode
+from stickslip_ros.nodes.washout_controller import WashoutControllerNode
+from stickslip_ros.record.topics import (
     AMPLITUDE,
     APPLIED_DISTURBANCE,
     CONTROL_FORCE,
@@ -21,11 +26,6 @@ from stickslip_ros.messages.topics import (
     JOINT_STATES,
     STICK_FRACTION,
 )
-from stickslip_ros.nodes.analyzer import AnalyzerNode
-from stickslip_ros.nodes.base.network import this_machine_only
-from stickslip_ros.nodes.plant import PlantNode
-from stickslip_ros.nodes.washout_controller import WashoutControllerNode
-from stickslip_ros.physics.measures.cycle_measures import Regime
 from stickslip_ros.scenarios.files import DEFAULT_NAMESPACE, load_scenario
 from stickslip_ros.testing import own_domain
 from tests.nodes.graph import Graph

@@ -12,8 +12,8 @@ from rclpy.node import Node
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
 
-from stickslip_ros.messages.codec import BELT, SLIDE, pack_joint_state, pack_wrench
 from stickslip_ros.nodes.base.process import loopback_session
+from stickslip_ros.record.codec import BELT, SLIDE, pack_joint_state, pack_wrench
 from stickslip_ros.testing import own_domain
 
 CONFIG = Path(__file__).parents[2] / "config"

@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from stickslip_ros.physics.model.constants import constants_of
+from stickslip_ros.model.constants import constants_of
 from tests.docs.page import CHECKOUT, public_names
 
 _SECTION = re.compile(r"^Parameters\n-+\n(.*?)(?=^\w+\n-+$|\Z)", re.MULTILINE | re.DOTALL)

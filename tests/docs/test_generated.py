@@ -10,10 +10,10 @@ from types import ModuleType
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
 
-from stickslip_ros.messages.topics import DIAGNOSTICS
 from stickslip_ros.nodes.analyzer import AnalyzerNode
 from stickslip_ros.nodes.plant import PlantNode
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
+from stickslip_ros.record.topics import DIAGNOSTICS
 from tests.nodes.conftest import domain, graph  # noqa: F401 - fixtures used here
 from tests.nodes.graph import Graph
 

@@ -50,7 +50,7 @@ def test_the_files_that_the_theory_names_exist() -> None:
     named = {s for s in spans("docs/theory.md") if re.search(r"\.py$|\w/$", s)}
     assert "model/equations.py" in named
     for path in named:
-        room = "" if path.startswith("stickslip_ros/") else "stickslip_ros/physics"
+        room = "" if path.startswith("stickslip_ros/") else "stickslip_ros"
         assert (CHECKOUT / room / path).exists(), path
 
 

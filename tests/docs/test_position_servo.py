@@ -8,7 +8,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from stickslip_ros.physics.loop.controller import Controller
+from stickslip_ros.motion.controller import Controller
 from stickslip_ros.samples import Sample
 from tests.docs.page import CHECKOUT
 

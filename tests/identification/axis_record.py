@@ -6,8 +6,8 @@ import numpy as np
 
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.servo import Servo, closed_loop
-from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.friction import Coulomb, Directional, FrictionLaw, Table
+from stickslip_ros.model.drive import Drive
+from stickslip_ros.model.friction import Coulomb, Directional, FrictionLaw, Table
 
 SERVO = Servo(position_gain=1.2e6, velocity_gain=9e3, difference_samples=2, limit=float("inf"))
 COULOMB = Directional(Coulomb(static=20.0, viscous=150.0), Coulomb(static=25.0, viscous=200.0))

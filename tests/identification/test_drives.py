@@ -14,20 +14,20 @@ import pytest
 import stickslip_ros as ss
 from benchmarks import identification as study
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.identification.adapters import KNOWN_LAWS
 from stickslip_ros.identification.drives import OUT_OF_TIME, DriveTask
 from stickslip_ros.identification.filtered import filtered
 from stickslip_ros.identification.findings import Findings
+from stickslip_ros.identification.identified_law import DELAY, LAG
 from stickslip_ros.identification.identify import identify
-from stickslip_ros.identification.laws import DELAY, LAG
+from stickslip_ros.identification.laws import KNOWN_LAWS
 from stickslip_ros.identification.record import Record, evenly_spaced
 from stickslip_ros.identification.refinement import repetition_of
 from stickslip_ros.identification.time_limit import TimeLimit
 from stickslip_ros.identification.trajectory import Predictor, Segment
-from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.friction import Coulomb, Directional, FrictionLaw, Table
-from stickslip_ros.physics.model.signals import table
-from stickslip_ros.physics.motion import Motion
+from stickslip_ros.model.drive import Drive
+from stickslip_ros.model.friction import Coulomb, Directional, FrictionLaw, Table
+from stickslip_ros.model.signals import table
+from stickslip_ros.motion import Motion
 from stickslip_ros.show.identification_table import identification_tables
 from tests.identification.axis_record import record as axis_record
 

@@ -10,16 +10,16 @@ import pytest
 
 from benchmarks import identification as study
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.identification.adapters import KNOWN_LAWS
 from stickslip_ros.identification.foreign_laws import GROUP, foreign_adapter, try_adapter
 from stickslip_ros.identification.identify import identify
-from stickslip_ros.physics.model.friction import LAWS
+from stickslip_ros.identification.laws import KNOWN_LAWS
+from stickslip_ros.model.friction import LAWS
 from stickslip_ros.scenarios.foreign_laws import add_laws_of_other_packages
 from tests.scenarios.foreign_laws import write_example, write_package
 
 _ADAPTER = """
 import numpy as np
-from stickslip_ros.identification.laws import IdentifiedLaw
+from stickslip_ros.identification.identified_law import IdentifiedLaw
 
 class Straight(IdentifiedLaw):
     name = "linear"

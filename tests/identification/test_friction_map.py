@@ -6,7 +6,7 @@ import pytest
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.identification.friction_map import fitted_curves
-from stickslip_ros.physics.model.friction import Exponential
+from stickslip_ros.model.friction import Exponential
 
 SPEED = np.geomspace(0.001, 0.2, 20)
 VELOCITY = np.concatenate([-SPEED[::-1], SPEED])

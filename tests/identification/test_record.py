@@ -5,15 +5,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from stickslip_ros.bags.table_columns import Table
-from stickslip_ros.bags.text_table import TableFormat
 from stickslip_ros.errors import BagError, InvalidInputError
 from stickslip_ros.identification import recordings as module
 from stickslip_ros.identification.record import Record, evenly_spaced
 from stickslip_ros.identification.recordings import read_all, read_records
-from stickslip_ros.messages.codec import pack_joint_state, pack_reference, pack_wrench
+from stickslip_ros.record.codec import pack_joint_state, pack_reference, pack_wrench
+from stickslip_ros.record.table_columns import Table
+from stickslip_ros.record.text_table import TableFormat
 from stickslip_ros.samples import Reference
-from tests.bags.runs import FORCES, STATES, write_bag
+from tests.record.runs import FORCES, STATES, write_bag
 
 
 def _columns(time: np.ndarray) -> dict[str, np.ndarray]:

@@ -15,10 +15,10 @@ from rclpy.publisher import Publisher
 from rclpy.signals import SignalHandlerOptions
 from rclpy.subscription import Subscription
 
-from stickslip_ros.messages.topics import DIAGNOSTICS
 from stickslip_ros.nodes.base.managed import ManagedNode
 from stickslip_ros.nodes.base.ros_topics import message_class, qos_profile
 from stickslip_ros.nodes.base.spinner import Spinner
+from stickslip_ros.record.topics import DIAGNOSTICS
 
 PATIENCE = 120.0
 """How long a test waits, s, for what should happen at once on an idle machine."""

@@ -3,14 +3,14 @@
 from pathlib import Path
 from typing import Any
 
-from stickslip_ros.bags.reader import Recording
-from stickslip_ros.messages.codec import pack_joint_state, pack_wrench
 from stickslip_ros.nodes.analyzer import AnalyzerNode
 from stickslip_ros.nodes.plant import PlantNode
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
+from stickslip_ros.record.codec import pack_joint_state, pack_wrench
+from stickslip_ros.record.reader import Recording
 from stickslip_ros.testing import own_domain
-from tests.bags.runs import write_bag
 from tests.nodes.graph import Graph
+from tests.record.runs import write_bag
 
 SECOND = 1_000_000_000
 STATES = "/test/joint_states"

@@ -3,8 +3,8 @@
 import time
 from itertools import pairwise
 
-from stickslip_ros.messages.codec import unpack_header
-from stickslip_ros.messages.topics import JOINT_STATES
+from stickslip_ros.record.codec import unpack_header
+from stickslip_ros.record.topics import JOINT_STATES
 from tests.nodes.graph import Graph
 
 

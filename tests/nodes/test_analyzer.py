@@ -18,11 +18,16 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, Float64MultiArray
 
 from stickslip_ros.api.recordings import recorded_drive
-from stickslip_ros.bags.reader import Recording
-from stickslip_ros.bags.recorder import Recorder
-from stickslip_ros.bags.report import report_of_recording
-from stickslip_ros.messages.codec import joint_state_columns, pack_joint_state, pack_wrench
-from stickslip_ros.messages.topics import (
+from stickslip_ros.nodes.analyzer import AnalyzerNode
+from stickslip_ros.nodes.base.managed import ERROR, WARN
+from stickslip_ros.nodes.base.ros_topics import qos_profile
+from stickslip_ros.nodes.plant import PlantNode
+from stickslip_ros.nodes.washout_controller import WashoutControllerNode
+from stickslip_ros.record.codec import joint_state_columns, pack_joint_state, pack_wrench
+from stickslip_ros.record.reader import Recording
+from stickslip_ros.record.recorder import Recorder
+from stickslip_ros.record.report import report_of_recording
+from stickslip_ros.record.topics import (
     AMPLITUDE,
     CONTROL_FORCE,
     DECAY_RATE,
@@ -32,14 +37,9 @@ from stickslip_ros.messages.topics import (
     RECORDED,
     STICK_FRACTION,
 )
-from stickslip_ros.nodes.analyzer import AnalyzerNode
-from stickslip_ros.nodes.base.managed import ERROR, WARN
-from stickslip_ros.nodes.base.ros_topics import qos_profile
-from stickslip_ros.nodes.plant import PlantNode
-from stickslip_ros.nodes.washout_controller import WashoutControllerNode
 from stickslip_ros.stamps import NANOSECONDS
-from tests.bags.runs import full_disk
 from tests.nodes.graph import PATIENCE, Graph
+from tests.record.runs import full_disk
 
 _FIGURES = r"stick_slip: amplitude \d+\.?\d* mm, frequency \d+\.?\d* mHz, stick fraction 0\.\d{1,3}"
 

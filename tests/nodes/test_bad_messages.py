@@ -14,9 +14,12 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 
-from stickslip_ros.bags.report import report_of_recording
 from stickslip_ros.errors import BagError
-from stickslip_ros.messages.codec import (
+from stickslip_ros.nodes.analyzer import AnalyzerNode
+from stickslip_ros.nodes.base.managed import OK, WARN
+from stickslip_ros.nodes.plant import PlantNode
+from stickslip_ros.nodes.washout_controller import WashoutControllerNode
+from stickslip_ros.record.codec import (
     pack_header,
     pack_joint_state,
     pack_wrench,
@@ -24,7 +27,8 @@ from stickslip_ros.messages.codec import (
     unpack_wrench,
     wrench_columns,
 )
-from stickslip_ros.messages.topics import (
+from stickslip_ros.record.report import report_of_recording
+from stickslip_ros.record.topics import (
     APPLIED_DISTURBANCE,
     CONTROL_FORCE,
     DIAGNOSTICS,
@@ -32,10 +36,6 @@ from stickslip_ros.messages.topics import (
     JOINT_STATES,
     RECORDED,
 )
-from stickslip_ros.nodes.analyzer import AnalyzerNode
-from stickslip_ros.nodes.base.managed import OK, WARN
-from stickslip_ros.nodes.plant import PlantNode
-from stickslip_ros.nodes.washout_controller import WashoutControllerNode
 from tests.nodes.graph import PATIENCE, Graph
 from tests.nodes.processes import Processes
 from tests.nodes.runs import start_loop

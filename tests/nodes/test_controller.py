@@ -11,15 +11,15 @@ import pytest
 from rclpy.duration import Duration
 from rclpy.parameter import Parameter
 
-from stickslip_ros.bags.reader import Recording
-from stickslip_ros.messages.codec import pack_joint_state, pack_reference, unpack_wrench
-from stickslip_ros.messages.topics import CONTROL_FORCE, JOINT_STATES, REFERENCE
+from stickslip_ros.model.constants import constant
+from stickslip_ros.model.control import CONTROL_LAWS, ControlLaw
+from stickslip_ros.model.control.base import State
+from stickslip_ros.model.signals import ramp
 from stickslip_ros.nodes.analyzer import AnalyzerNode
 from stickslip_ros.nodes.controller import ControllerNode
-from stickslip_ros.physics.model.constants import constant
-from stickslip_ros.physics.model.control import CONTROL_LAWS, ControlLaw
-from stickslip_ros.physics.model.control.base import State
-from stickslip_ros.physics.model.signals import ramp
+from stickslip_ros.record.codec import pack_joint_state, pack_reference, unpack_wrench
+from stickslip_ros.record.reader import Recording
+from stickslip_ros.record.topics import CONTROL_FORCE, JOINT_STATES, REFERENCE
 from stickslip_ros.samples import Reference, Sample
 from stickslip_ros.scenarios.parameters import (
     CONTROLLER_PARAMETERS,

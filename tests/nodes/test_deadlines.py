@@ -7,16 +7,16 @@ from threading import Event, Lock
 import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
 
-from stickslip_ros.bags.report import report_of_recording
-from stickslip_ros.messages.codec import pack_wrench, unpack_header
-from stickslip_ros.messages.topics import CONTROL_FORCE, JOINT_STATES
+from stickslip_ros.motion.motion import Motion
+from stickslip_ros.motion.sampled_loop import SampledLoop
 from stickslip_ros.nodes import pacing
 from stickslip_ros.nodes.analyzer import AnalyzerNode
 from stickslip_ros.nodes.base.managed import STATE
 from stickslip_ros.nodes.pacing import RealtimePacer, TimingMonitor
 from stickslip_ros.nodes.plant import PlantNode
-from stickslip_ros.physics.loop.sampled_loop import SampledLoop
-from stickslip_ros.physics.motion.motion import Motion
+from stickslip_ros.record.codec import pack_wrench, unpack_header
+from stickslip_ros.record.report import report_of_recording
+from stickslip_ros.record.topics import CONTROL_FORCE, JOINT_STATES
 from stickslip_ros.samples import Sample
 from stickslip_ros.scenarios.parameters import PlantParameters
 from tests.nodes.graph import PATIENCE, Graph

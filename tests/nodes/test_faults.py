@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 from stickslip_ros.arrays import IntArray
-from stickslip_ros.bags.reader import Recording
-from stickslip_ros.bags.report import report_of_recording
 from stickslip_ros.errors import BagError
-from stickslip_ros.messages.codec import unpack_header
-from stickslip_ros.messages.topics import CONTROL_FORCE, JOINT_STATES, RECORDED, Topic
+from stickslip_ros.record.codec import unpack_header
+from stickslip_ros.record.reader import Recording
+from stickslip_ros.record.report import report_of_recording
+from stickslip_ros.record.topics import CONTROL_FORCE, JOINT_STATES, RECORDED, Topic
 from tests.nodes.graph import PATIENCE, Graph, wait_for
 from tests.nodes.processes import Processes
 from tests.nodes.samples import Samples

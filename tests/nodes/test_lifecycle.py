@@ -8,12 +8,12 @@ from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from rclpy.parameter import Parameter
 
-from stickslip_ros.bags.reader import Recording
-from stickslip_ros.messages.topics import CONTROL_FORCE, DISTURBANCE_FORCE, JOINT_STATES, RECORDED
 from stickslip_ros.nodes.analyzer import AnalyzerNode
 from stickslip_ros.nodes.base.managed import ManagedNode
 from stickslip_ros.nodes.plant import PlantNode
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
+from stickslip_ros.record.reader import Recording
+from stickslip_ros.record.topics import CONTROL_FORCE, DISTURBANCE_FORCE, JOINT_STATES, RECORDED
 from tests.nodes.graph import Graph
 
 ROUND = {

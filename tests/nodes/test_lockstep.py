@@ -7,11 +7,11 @@ from typing import Any
 
 import pytest
 
-from stickslip_ros.messages.codec import pack_wrench, unpack_header
-from stickslip_ros.messages.topics import CONTROL_FORCE
 from stickslip_ros.nodes.base.managed import WARN
 from stickslip_ros.nodes.plant import PlantNode
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
+from stickslip_ros.record.codec import pack_wrench, unpack_header
+from stickslip_ros.record.topics import CONTROL_FORCE
 from tests.nodes.graph import Graph
 from tests.nodes.processes import Processes
 from tests.nodes.samples import Samples

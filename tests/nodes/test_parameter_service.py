@@ -21,14 +21,14 @@ from rcl_interfaces.srv import (
 from rclpy.parameter import Parameter as RosParameter
 from rclpy.parameter import parameter_dict_from_yaml_file, parameter_value_to_python
 
-from stickslip_ros.messages.codec import joint_state_columns
-from stickslip_ros.messages.topics import JOINT_STATES
+from stickslip_ros.model.constants import Changes
 from stickslip_ros.nodes.analyzer import AnalyzerNode
 from stickslip_ros.nodes.base.managed import ERROR, ManagedNode
 from stickslip_ros.nodes.plant import PlantNode
 from stickslip_ros.nodes.replay import ReplayNode
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
-from stickslip_ros.physics.model.constants import Changes
+from stickslip_ros.record.codec import joint_state_columns
+from stickslip_ros.record.topics import JOINT_STATES
 from tests.nodes.graph import Graph
 from tests.scenarios import values
 from tests.scenarios.values import CONFLICTS, MODELS, UNKNOWN, bad_values, good_values
@@ -256,7 +256,7 @@ def test_what_is_set_while_inactive_acts_when_it_is_activated(graph: Graph) -> N
 def test_a_motion_that_has_become_too_stiff_pauses_the_plant(
     graph: Graph, pace: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("stickslip_ros.physics.motion.hybrid_motion._SPARE_STEPS", 1000)
+    monkeypatch.setattr("stickslip_ros.motion.hybrid_motion._SPARE_STEPS", 1000)
     heard = graph.listen(JOINT_STATES, raw=True)
     plant = graph.add(PlantNode, pace=pace, expects_control=False, wait_for=["observer"])
     graph.wait_until(lambda: plant.active and heard, "samples come")

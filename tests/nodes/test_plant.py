@@ -8,13 +8,18 @@ from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
 from std_srvs.srv import Trigger
 
-from stickslip_ros.messages.codec import (
+from stickslip_ros.motion.controller import answer
+from stickslip_ros.motion.motion import Motion
+from stickslip_ros.motion.sampled_loop import SampledLoop
+from stickslip_ros.nodes.plant import PlantNode
+from stickslip_ros.nodes.washout_controller import WashoutControllerNode
+from stickslip_ros.record.codec import (
     joint_state_columns,
     pack_header,
     pack_wrench,
     unpack_wrench,
 )
-from stickslip_ros.messages.topics import (
+from stickslip_ros.record.topics import (
     APPLIED_DISTURBANCE,
     CONTROL_FORCE,
     DISTURBANCE_FORCE,
@@ -22,11 +27,6 @@ from stickslip_ros.messages.topics import (
     JOINT_STATES,
     RECORDED,
 )
-from stickslip_ros.nodes.plant import PlantNode
-from stickslip_ros.nodes.washout_controller import WashoutControllerNode
-from stickslip_ros.physics.loop.controller import answer
-from stickslip_ros.physics.loop.sampled_loop import SampledLoop
-from stickslip_ros.physics.motion.motion import Motion
 from stickslip_ros.scenarios.parameters import CONTROLLER_PARAMETERS, PlantParameters
 from tests.nodes.graph import Graph
 

@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 from stickslip_ros import nodes
-from stickslip_ros.bags.reader import Recording
-from stickslip_ros.messages.topics import JOINT_STATES
+from stickslip_ros.record.reader import Recording
+from stickslip_ros.record.topics import JOINT_STATES
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, ReplayParameters
 from tests.nodes.graph import PATIENCE, Graph
 from tests.nodes.processes import Processes

@@ -11,9 +11,9 @@ from threading import Lock
 import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
 
+from stickslip_ros.motion.motion import Motion
+from stickslip_ros.motion.sampled_loop import SampledLoop
 from stickslip_ros.nodes.pacing import RealtimePacer
-from stickslip_ros.physics.loop.sampled_loop import SampledLoop
-from stickslip_ros.physics.motion.motion import Motion
 from stickslip_ros.scenarios.parameters import PlantParameters
 from tests.nodes.graph import Graph
 from tests.nodes.processes import Processes

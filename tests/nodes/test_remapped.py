@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from stickslip_ros.bags.reader import Recording
+from stickslip_ros.record.reader import Recording
 from tests.nodes.graph import Graph
 from tests.nodes.runs import close_the_loop
 

@@ -5,9 +5,9 @@ from pathlib import Path
 import pytest
 from std_srvs.srv import Trigger
 
-from stickslip_ros.messages.codec import unpack_header
-from stickslip_ros.messages.topics import CLOCK, CONTROL_FORCE, JOINT_STATES
 from stickslip_ros.nodes.replay import ReplayNode
+from stickslip_ros.record.codec import unpack_header
+from stickslip_ros.record.topics import CLOCK, CONTROL_FORCE, JOINT_STATES
 from tests.nodes.graph import Graph
 from tests.nodes.runs import FORCES, STATES, messages_of, record_states
 

@@ -10,9 +10,9 @@ import yaml
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 
-from stickslip_ros.messages.codec import joint_state_columns
-from stickslip_ros.messages.topics import CLOCK, JOINT_COMMANDS, JOINT_STATES
 from stickslip_ros.nodes.plant import PlantNode
+from stickslip_ros.record.codec import joint_state_columns
+from stickslip_ros.record.topics import CLOCK, JOINT_COMMANDS, JOINT_STATES
 from stickslip_ros.samples import SampleColumns
 from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.scenarios.parameters import PlantParameters

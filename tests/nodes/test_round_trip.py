@@ -6,9 +6,9 @@ from typing import Any
 
 import pytest
 
-from stickslip_ros.bags.report import report_of_recording
 from stickslip_ros.nodes.analyzer import AnalyzerNode
 from stickslip_ros.nodes.replay import ReplayNode
+from stickslip_ros.record.report import report_of_recording
 from tests.nodes.graph import Graph
 from tests.nodes.runs import messages_of, record_run
 

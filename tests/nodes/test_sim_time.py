@@ -7,11 +7,11 @@ from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from stickslip_ros.messages.codec import unpack_header
-from stickslip_ros.messages.topics import JOINT_STATES
 from stickslip_ros.nodes.plant import PlantNode
+from stickslip_ros.nodes.running.user_controller import ControllerThread
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
-from stickslip_ros.running.user_controller import ControllerThread
+from stickslip_ros.record.codec import unpack_header
+from stickslip_ros.record.topics import JOINT_STATES
 from tests.nodes.graph import Graph
 
 SHORT, LONG = 0.1, 0.25

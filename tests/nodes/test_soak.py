@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from benchmarks.soak import lines, soak
-from stickslip_ros.messages.topics import JOINT_STATES
+from stickslip_ros.record.topics import JOINT_STATES
 
 SECONDS, WARM_UP = 20.0, 10.0
 GROWTH = 2e6

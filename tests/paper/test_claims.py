@@ -11,6 +11,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from stickslip_ros.measures.cycle_measures import Regime
+from stickslip_ros.model.friction import Linear
 from stickslip_ros.paper.claims import (
     CHAPTERS,
     CLAIMS,
@@ -35,9 +37,7 @@ from stickslip_ros.paper.figures import (
     portrait_of,
     unit_drive,
 )
-from stickslip_ros.physics.measures.cycle_measures import Regime
-from stickslip_ros.physics.model.friction import Linear
-from stickslip_ros.physics.theory.hopf import first_lyapunov_coefficient
+from stickslip_ros.theory.hopf import first_lyapunov_coefficient
 
 HOLDS, CORRECTED, FAILS = Verdict.HOLDS, Verdict.CORRECTED, Verdict.FAILS
 

@@ -8,6 +8,7 @@ import numpy.typing as npt
 import pytest
 from PIL import Image
 
+from stickslip_ros.model.friction import Linear
 from stickslip_ros.paper.drawing import paper_figure, save_paper_figure
 from stickslip_ros.paper.figures import (
     Panel,
@@ -16,10 +17,9 @@ from stickslip_ros.paper.figures import (
     compute_figure,
     portrait_of,
 )
-from stickslip_ros.physics.model.friction import Linear
 from stickslip_ros.show.style import BLUE, GREEN, ORANGE, STYLES
+from tests.drives import PAPER
 from tests.paper.test_figures import over_belt_speed
-from tests.physics.drives import PAPER
 from tests.show.texts import faults, in_styles, legend_texts
 
 STICKS = PortraitCase("it sticks", replace(PAPER, belt_speed=0.2), duration=100.0)

@@ -10,6 +10,9 @@ from math import log, sqrt
 import numpy as np
 import pytest
 
+from stickslip_ros.measures.cycle_measures import Regime
+from stickslip_ros.model.friction import Coulomb, Linear
+from stickslip_ros.motion.motion import Motion
 from stickslip_ros.paper.figures import (
     SETTLED,
     BifurcationFigure,
@@ -18,10 +21,7 @@ from stickslip_ros.paper.figures import (
     compute_figure,
     portrait_of,
 )
-from stickslip_ros.physics.measures.cycle_measures import Regime
-from stickslip_ros.physics.model.friction import Coulomb, Linear
-from stickslip_ros.physics.motion.motion import Motion
-from tests.physics.drives import LIMIT_CYCLES, PAPER, LimitCycle
+from tests.drives import LIMIT_CYCLES, PAPER, LimitCycle
 
 DECAY = 0.05
 """Beta of a slide that only slips under Coulomb friction: the belt is faster than it ever gets."""

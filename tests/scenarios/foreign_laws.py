@@ -13,8 +13,8 @@ FALLING = '''
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from stickslip_ros.physics.model.constants import constant
-from stickslip_ros.physics.model.friction import FrictionLaw
+from stickslip_ros.model.constants import constant
+from stickslip_ros.model.friction import FrictionLaw
 
 
 @dataclass(frozen=True)
@@ -39,8 +39,8 @@ BRAKE = '''
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from stickslip_ros.physics.model.constants import constant
-from stickslip_ros.physics.model.control import ControlLaw
+from stickslip_ros.model.constants import constant
+from stickslip_ros.model.control import ControlLaw
 
 
 @dataclass(frozen=True)

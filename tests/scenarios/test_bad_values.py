@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.model.constants import Parameter
+from stickslip_ros.model.constants import Parameter
 from stickslip_ros.scenarios.files import load_scenario, parameter_file
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, NodeParameters
 from tests.scenarios.files import refusal, scenario_file

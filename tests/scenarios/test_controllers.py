@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.model.control import VelocityFeedback
+from stickslip_ros.model.control import VelocityFeedback
 from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.scenarios.parameters import CONTROLLER_PARAMETERS
 from stickslip_ros.studies.plan import Axis

@@ -13,9 +13,9 @@ import pytest
 
 from stickslip_ros import scenarios
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.model.control import CONTROL_LAWS
-from stickslip_ros.physics.model.friction import LAWS, Directional, Linear, Table
-from stickslip_ros.physics.motion import Motion
+from stickslip_ros.model.control import CONTROL_LAWS
+from stickslip_ros.model.friction import LAWS, Directional, Linear, Table
+from stickslip_ros.motion import Motion
 from stickslip_ros.scenarios import friction_parameters, parameters
 from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.scenarios.foreign_laws import (
@@ -322,7 +322,7 @@ def test_values_for_which_a_law_fails_are_refused_with_their_names(install: Inst
 @pytest.mark.parametrize(
     ("name", "place", "reason"),
     [
-        ("coulomb", "foreign:Falling", "has the name of another law, stickslip_ros.physics.model."),
+        ("coulomb", "foreign:Falling", "has the name of another law, stickslip_ros.model."),
         ("dry-run", "foreign:Falling", "has the name 'dry-run': must be of letters, digits and _"),
         ("falling", "absent:Falling", "cannot be imported: ModuleNotFoundError: No module named"),
         ("falling", "foreign", "is no class derived from FrictionLaw"),

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.model.constants import constants_of
-from stickslip_ros.physics.model.friction import LAWS, Directional, Exponential, Stribeck, Table
+from stickslip_ros.model.constants import constants_of
+from stickslip_ros.model.friction import LAWS, Directional, Exponential, Stribeck, Table
 from stickslip_ros.scenarios.files import load_scenario, parameter_file
 from stickslip_ros.scenarios.parameters import PlantParameters
 from stickslip_ros.scenarios.template import commented_file, scenario_schema

@@ -8,8 +8,8 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.model.constants import Changes, Parameter
-from stickslip_ros.physics.model.friction import LAWS
+from stickslip_ros.model.constants import Changes, Parameter
+from stickslip_ros.model.friction import LAWS
 from stickslip_ros.scenarios.parameters import (
     NODE_PARAMETERS,
     ControllerParameters,

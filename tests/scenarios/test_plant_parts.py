@@ -2,10 +2,10 @@
 
 import pytest
 
-from stickslip_ros.physics.measures.sample_assumptions import SampleAssumptions
-from stickslip_ros.physics.model.actuator import IDEAL_ACTUATOR, Actuator
-from stickslip_ros.physics.model.sensor import EXACT_SENSOR, MeasuredVelocity, Sensor
-from stickslip_ros.physics.motion import Motion
+from stickslip_ros.measures.sample_assumptions import SampleAssumptions
+from stickslip_ros.model.actuator import IDEAL_ACTUATOR, Actuator
+from stickslip_ros.model.sensor import EXACT_SENSOR, MeasuredVelocity, Sensor
+from stickslip_ros.motion import Motion
 from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.scenarios.parameters import PlantParameters
 from tests.scenarios.files import refusal

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.model.signals import (
+from stickslip_ros.model.signals import (
     NO_SIGNAL,
     impulse,
     ramp,

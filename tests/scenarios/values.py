@@ -5,7 +5,7 @@ import struct
 from math import inf, nan
 from typing import Any
 
-from stickslip_ros.physics.model.constants import Parameter
+from stickslip_ros.model.constants import Parameter
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, ReplayParameters
 
 MODELS = {**NODE_PARAMETERS, "replay": ReplayParameters()}

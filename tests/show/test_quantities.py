@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from stickslip_ros.show.quantities import Units, typeset
-from tests.physics.drives import FEED_DRIVE, PAPER
+from tests.drives import FEED_DRIVE, PAPER
 
 SI = Units.for_drive(FEED_DRIVE)
 

@@ -14,20 +14,20 @@ from matplotlib.figure import Figure
 
 import stickslip_ros as ss
 from benchmarks.measures_under_noise import motion
-from stickslip_ros.bags import Recording
-from stickslip_ros.bags.report import report_of_recording
-from stickslip_ros.physics.measures.cycle_measures import Cycle, Measures, measures_of
-from stickslip_ros.physics.measures.cycle_meter import CycleMeter
-from stickslip_ros.physics.measures.run_meter import RunAnalysis
-from stickslip_ros.physics.measures.sample_assumptions import SampleAssumptions
-from stickslip_ros.physics.measures.sample_meter import MeasuredMotion, SampleMeter
-from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.motion import RecordedMotion
+from stickslip_ros.measures.cycle_measures import Cycle, Measures, measures_of
+from stickslip_ros.measures.cycle_meter import CycleMeter
+from stickslip_ros.measures.run_meter import RunAnalysis
+from stickslip_ros.measures.sample_assumptions import SampleAssumptions
+from stickslip_ros.measures.sample_meter import MeasuredMotion, SampleMeter
+from stickslip_ros.model.drive import Drive
+from stickslip_ros.motion import RecordedMotion
+from stickslip_ros.record.reader import Recording
+from stickslip_ros.record.report import report_of_recording
 from stickslip_ros.samples import SampleColumns
 from stickslip_ros.show.run_figure import LAST_CYCLES, DrawnRun, run_figure
 from stickslip_ros.show.run_history import RunHistory
 from stickslip_ros.show.style import SCREEN, STYLES, FigureStyle, save
-from tests.physics.drives import FEED_DRIVE, PAPER
+from tests.drives import FEED_DRIVE, PAPER
 from tests.show.texts import faults, in_styles, legend_texts
 
 # Old versions of matplotlib call names that its parser of formulas has deprecated since.

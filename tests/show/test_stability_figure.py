@@ -9,18 +9,18 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from stickslip_ros.physics.model.control import Washout
-from stickslip_ros.physics.model.friction import Exponential
-from stickslip_ros.physics.theory.bifurcation_branches import BifurcationBranches
-from stickslip_ros.physics.theory.closed_forms import CubicLoop
-from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop
-from stickslip_ros.physics.theory.stability_map import CriticalGainCurves, StabilityMap
+from stickslip_ros.model.control import Washout
+from stickslip_ros.model.friction import Exponential
 from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.show.stability_figure import branches_figure, design_figure, stability_figure
 from stickslip_ros.show.style import STYLES
 from stickslip_ros.studies.design import Task
 from stickslip_ros.studies.washout_design import WashoutDesign, design_washout
-from tests.physics.drives import FEED_DRIVE, PAPER
+from stickslip_ros.theory.bifurcation_branches import BifurcationBranches
+from stickslip_ros.theory.closed_forms import CubicLoop
+from stickslip_ros.theory.linear_sampled_loop import LinearSampledLoop
+from stickslip_ros.theory.stability_map import CriticalGainCurves, StabilityMap
+from tests.drives import FEED_DRIVE, PAPER
 from tests.show.texts import faults, in_styles, legend_texts
 
 GAINS = Washout(20.0, -3000.0, 0.0)

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
-from stickslip_ros.physics.measures.cycle_measures import Regime
+from stickslip_ros.measures.cycle_measures import Regime
 from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.show import study_figure
 from stickslip_ros.show.quantities import Units

@@ -10,8 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.measures.cycle_measures import Regime
-from stickslip_ros.physics.theory.critical_gains import critical_gains
+from stickslip_ros.measures.cycle_measures import Regime
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.studies.basin import (
     POSITION,
@@ -25,6 +24,7 @@ from stickslip_ros.studies.plan import Axis, Continuation, Grid, Plan, RandomSam
 from stickslip_ros.studies.runner import compute_columns
 from stickslip_ros.studies.settling import SettlingOptions
 from stickslip_ros.studies.study import Point
+from stickslip_ros.theory.critical_gains import critical_gains
 from tests.studies.studies import EXPONENTIAL, free, paper
 
 PUBLISHED = {

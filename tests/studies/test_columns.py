@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from stickslip_ros.physics.measures.cycle_measures import Regime
+from stickslip_ros.measures.cycle_measures import Regime
 from stickslip_ros.studies.columns import Columns, json_entries, write_csv
 from stickslip_ros.studies.plan import Axis, Continuation, Grid, RandomSample
 from stickslip_ros.studies.runner import compute_columns

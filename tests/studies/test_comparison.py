@@ -9,7 +9,7 @@ import pytest
 
 import stickslip_ros as ss
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.model.control import VelocityFeedback
+from stickslip_ros.model.control import VelocityFeedback
 from stickslip_ros.scenarios.files import Scenario, load_scenario
 from stickslip_ros.studies.case_outcome import Disturbance, simulate_case
 from stickslip_ros.studies.comparison import Cases, Comparison, Outcomes, compared, drawn

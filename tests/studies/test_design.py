@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.model.control import Washout
+from stickslip_ros.model.control import Washout
 from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.studies.design import Design, Task
 from tests.scenarios.files import scenario_file

@@ -60,7 +60,7 @@ arguments = {
 @pytest.fixture(autouse=True, scope="module")
 def _little_patience() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("stickslip_ros.physics.motion.hybrid_motion._SPARE_STEPS", 10_000)
+        patch.setattr("stickslip_ros.motion.hybrid_motion._SPARE_STEPS", 10_000)
         yield
 
 

@@ -9,9 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from stickslip_ros.errors import InvalidInputError, RunError
-from stickslip_ros.physics.measures.cycle_measures import Regime
-from stickslip_ros.physics.model.control import Washout
-from stickslip_ros.physics.model.friction import Coulomb, Exponential, Linear, LuGre
+from stickslip_ros.measures.cycle_measures import Regime
+from stickslip_ros.model.control import Washout
+from stickslip_ros.model.friction import Coulomb, Exponential, Linear, LuGre
 from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.studies import settling
 from stickslip_ros.studies.settling import (
@@ -22,7 +22,7 @@ from stickslip_ros.studies.settling import (
     SettlingOptions,
 )
 from stickslip_ros.studies.simulate import simulate
-from tests.physics.drives import FEED_DRIVE, LIMIT_CYCLES, PAPER
+from tests.drives import FEED_DRIVE, LIMIT_CYCLES, PAPER
 from tests.studies.studies import EXPONENTIAL, paper
 
 REST = MotionState(0.0, 0.0)
@@ -122,7 +122,7 @@ def _found(case: ControlledDrive, start: MotionState) -> object:
 def alone() -> list[object]:
     """Results of the mixed cases, of every kind, when their integrators are new."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("stickslip_ros.physics.motion.hybrid_motion._SPARE_STEPS", 1000)
+        patch.setattr("stickslip_ros.motion.hybrid_motion._SPARE_STEPS", 1000)
         alone = [_found(*mixed) for mixed in MIXED]
     regimes = {found.measures.regime for found in alone if isinstance(found, Settled)}
     assert regimes >= {Regime.STICK_SLIP, Regime.STUCK, Regime.UNBOUNDED, Regime.PURE_SLIP}
@@ -135,7 +135,7 @@ def alone() -> list[object]:
 @settings(max_examples=4)
 def test_what_was_followed_before_changes_no_bit(alone: list[object], order: list[int]) -> None:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("stickslip_ros.physics.motion.hybrid_motion._SPARE_STEPS", 1000)
+        patch.setattr("stickslip_ros.motion.hybrid_motion._SPARE_STEPS", 1000)
         for number in order:
             assert _found(*MIXED[number]) == alone[number]
 

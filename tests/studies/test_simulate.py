@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from stickslip_ros.arrays import BoolArray, FloatArray
-from stickslip_ros.physics.measures.sample_meter import MeasuredMotion
+from stickslip_ros.measures.sample_meter import MeasuredMotion
 from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.studies.simulate import simulate
 

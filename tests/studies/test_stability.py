@@ -4,12 +4,9 @@ from dataclasses import replace
 
 import pytest
 
-from stickslip_ros.physics.model.control import CONTROL_LAWS
-from stickslip_ros.physics.model.friction import Coulomb
-from stickslip_ros.physics.model.signals import sine
-from stickslip_ros.physics.theory.hopf import hopf_points
-from stickslip_ros.physics.theory.linear import expand
-from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop
+from stickslip_ros.model.control import CONTROL_LAWS
+from stickslip_ros.model.friction import Coulomb
+from stickslip_ros.model.signals import sine
 from stickslip_ros.scenarios.files import Scenario, load_scenario
 from stickslip_ros.scenarios.parameters import ControllerParameters
 from stickslip_ros.show.study_tables import stability_tables
@@ -21,8 +18,11 @@ from stickslip_ros.studies.stability import (
     stability,
     why_no_figure,
 )
-from tests.physics.drives import FEED_DRIVE, PAPER
-from tests.physics.parts import Switching
+from stickslip_ros.theory.hopf import hopf_points
+from stickslip_ros.theory.linear import expand
+from stickslip_ros.theory.linear_sampled_loop import LinearSampledLoop
+from tests.drives import FEED_DRIVE, PAPER
+from tests.parts import Switching
 
 ONLY = "this exists for the washout law only, and the control law is velocity_feedback"
 GAINS = ("critical_linear_gain", "first_lyapunov_coefficient", "critical_cubic_gain")

@@ -10,7 +10,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.measures.cycle_measures import Regime
+from stickslip_ros.measures.cycle_measures import Regime
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.studies.plan import Axis, Continuation, Grid
 from stickslip_ros.studies.runner import compute_columns
@@ -38,8 +38,8 @@ MIXED = [
 
 @pytest.fixture(autouse=True)
 def _little_patience(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("stickslip_ros.physics.motion.hybrid_motion._SPARE_STEPS", 1000)
-    monkeypatch.setattr("stickslip_ros.physics.motion.hybrid_motion.STEPS_PER_UNIT", 100)
+    monkeypatch.setattr("stickslip_ros.motion.hybrid_motion._SPARE_STEPS", 1000)
+    monkeypatch.setattr("stickslip_ros.motion.hybrid_motion.STEPS_PER_UNIT", 100)
 
 
 def points(study: Study) -> list[Point]:

@@ -3,11 +3,11 @@
 import pytest
 
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.measures.cycle_measures import Regime
-from stickslip_ros.physics.theory.critical_gains import critical_gains
+from stickslip_ros.measures.cycle_measures import Regime
 from stickslip_ros.studies.plan import Axis
 from stickslip_ros.studies.runner import compute_columns
 from stickslip_ros.studies.study import sweep_study
+from stickslip_ros.theory.critical_gains import critical_gains
 from tests.studies.studies import free, paper
 
 SPEED = Axis("plant.belt_speed", 0.2, 0.4, 3)

@@ -6,10 +6,7 @@ from math import isnan, sqrt
 import numpy as np
 import pytest
 
-from stickslip_ros.physics.model.friction import Exponential
-from stickslip_ros.physics.theory.linear import expand, hurwitz_determinants
-from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop
-from stickslip_ros.physics.theory.sticking import sticking_onset
+from stickslip_ros.model.friction import Exponential
 from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.studies.plan import Axis, Grid
 from stickslip_ros.studies.settling import ControlledDrive
@@ -23,8 +20,11 @@ from stickslip_ros.studies.transitions import (
     transition_map,
     transitions,
 )
-from tests.physics.drives import PAPER
-from tests.physics.parts import Switching
+from stickslip_ros.theory.linear import expand, hurwitz_determinants
+from stickslip_ros.theory.linear_sampled_loop import LinearSampledLoop
+from stickslip_ros.theory.sticking import sticking_onset
+from tests.drives import PAPER
+from tests.parts import Switching
 from tests.studies.studies import CYCLE_LOST_SPEED, EXPONENTIAL, HOPF_SPEED
 
 FREE = "plant.expects_control=false"

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop
 from stickslip_ros.scenarios.files import Scenario, load_scenario
 from stickslip_ros.studies.tuning import Goal, tune
+from stickslip_ros.theory.linear_sampled_loop import LinearSampledLoop
 
 FEEDS = (0.01, 0.04)
 

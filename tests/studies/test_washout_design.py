@@ -9,22 +9,22 @@ from typing import Any
 import numpy as np
 import pytest
 
-from stickslip_ros.physics.loop.controller import Controller
-from stickslip_ros.physics.loop.sampled_loop import LOCKSTEP_START, SampledLoop
-from stickslip_ros.physics.loop.simulation import simulate_sampled
-from stickslip_ros.physics.measures.cycle_measures import Measures, Regime
-from stickslip_ros.physics.measures.cycle_meter import CycleMeter
-from stickslip_ros.physics.model.control import Washout
-from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.friction import Coulomb
-from stickslip_ros.physics.motion import RecordedMotion
-from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop
+from stickslip_ros.measures.cycle_measures import Measures, Regime
+from stickslip_ros.measures.cycle_meter import CycleMeter
+from stickslip_ros.model.control import Washout
+from stickslip_ros.model.drive import Drive
+from stickslip_ros.model.friction import Coulomb
+from stickslip_ros.motion import RecordedMotion
+from stickslip_ros.motion.controller import Controller
+from stickslip_ros.motion.sampled_loop import LOCKSTEP_START, SampledLoop
+from stickslip_ros.motion.simulation import simulate_sampled
 from stickslip_ros.samples import Sample
 from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.studies.design import Task
 from stickslip_ros.studies.washout_design import WashoutDesign, design_washout
 from stickslip_ros.studies.washout_search import margins
-from tests.physics.drives import FEED_DRIVE
+from stickslip_ros.theory.linear_sampled_loop import LinearSampledLoop
+from tests.drives import FEED_DRIVE
 
 
 def task(

@@ -18,12 +18,12 @@ from rclpy.node import Node
 from rclpy.qos import qos_profile_sensor_data
 from sensor_msgs.msg import JointState
 
-from stickslip_ros.bags import Recording
-from stickslip_ros.bags.recorder import Recorder
 from stickslip_ros.errors import BagError, InvalidInputError, RunError
+from stickslip_ros.motion.motion import Motion
+from stickslip_ros.motion.sampled_loop import LOCKSTEP_START, SampledLoop
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
-from stickslip_ros.physics.loop.sampled_loop import LOCKSTEP_START, SampledLoop
-from stickslip_ros.physics.motion.motion import Motion
+from stickslip_ros.record.reader import Recording
+from stickslip_ros.record.recorder import Recorder
 from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.testing import ClosedLoop, RunResult
 from tests.nodes.graph import PATIENCE

@@ -15,9 +15,9 @@ from nicegui.events import GenericEventArguments
 from stickslip_ros.app.dashboard.elements import call, named, table
 from stickslip_ros.app.dashboard.listener import Answer, ListenerNode
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.model.constants import SMALLEST, Changes, Parameter, constants_of
-from stickslip_ros.physics.model.control import CONTROL_LAWS, ControlLaw
-from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.model.constants import SMALLEST, Changes, Parameter, constants_of
+from stickslip_ros.model.control import CONTROL_LAWS, ControlLaw
+from stickslip_ros.model.drive import Drive
 from stickslip_ros.quantities import number_of
 from stickslip_ros.scenarios.keywords import described
 from stickslip_ros.scenarios.parameters import (

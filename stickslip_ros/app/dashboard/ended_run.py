@@ -9,9 +9,9 @@ from nicegui import ui
 
 from stickslip_ros.app.dashboard.elements import heading, show_commands
 from stickslip_ros.app.dashboard.listener import ListenerNode
-from stickslip_ros.bags.report import report_of_recording
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.files import open_regular
+from stickslip_ros.record.report import report_of_recording
 from stickslip_ros.show.measure_table import measure_table
 from stickslip_ros.show.quantities import MEASURES
 from stickslip_ros.text import printable

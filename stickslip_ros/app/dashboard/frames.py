@@ -10,8 +10,8 @@ import orjson
 
 from stickslip_ros.app.dashboard.listener import ListenerNode
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.messages.topics import AMPLITUDE, FREQUENCY, STICK_FRACTION
-from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.model.drive import Drive
+from stickslip_ros.record.topics import AMPLITUDE, FREQUENCY, STICK_FRACTION
 from stickslip_ros.samples import ForceColumns, SampleColumns
 from stickslip_ros.show.live_trace import Line, LiveTrace
 from stickslip_ros.show.quantities import Units

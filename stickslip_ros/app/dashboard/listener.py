@@ -25,18 +25,7 @@ from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
 
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.messages.codec import joint_state_columns, pack_wrench, wrench_columns
-from stickslip_ros.messages.topics import (
-    AMPLITUDE,
-    CONTROL_FORCE,
-    DIAGNOSTICS,
-    DISTURBANCE_FORCE,
-    DROPPED_FORCE,
-    FREQUENCY,
-    JOINT_STATES,
-    STICK_FRACTION,
-    Topic,
-)
+from stickslip_ros.model.drive import Drive
 from stickslip_ros.nodes.base.clients import (
     OnAnswer,
     ServiceCall,
@@ -47,8 +36,19 @@ from stickslip_ros.nodes.base.clients import (
 from stickslip_ros.nodes.base.managed import FIRST_STAMP, STATE
 from stickslip_ros.nodes.base.ros_topics import PollingNode, qos_profile, waiting_messages
 from stickslip_ros.nodes.base.spinner import steady_clock
-from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.running.controller_search import DASHBOARD
+from stickslip_ros.nodes.running.controller_search import DASHBOARD
+from stickslip_ros.record.codec import joint_state_columns, pack_wrench, wrench_columns
+from stickslip_ros.record.topics import (
+    AMPLITUDE,
+    CONTROL_FORCE,
+    DIAGNOSTICS,
+    DISTURBANCE_FORCE,
+    DROPPED_FORCE,
+    FREQUENCY,
+    JOINT_STATES,
+    STICK_FRACTION,
+    Topic,
+)
 from stickslip_ros.samples import ForceColumns, SampleColumns
 from stickslip_ros.scenarios import full_name
 from stickslip_ros.scenarios.parameters import (

@@ -39,10 +39,10 @@ from stickslip_ros.app.dashboard.frames import PERIODS, Frames
 from stickslip_ros.app.dashboard.listener import ABSENT, SILENT, Health, ListenerNode
 from stickslip_ros.app.dashboard.theory import Theory
 from stickslip_ros.app.dashboard.theory_panel import TheoryPanel
-from stickslip_ros.messages.topics import AMPLITUDE, FREQUENCY, STICK_FRACTION
-from stickslip_ros.physics.measures.cycle_measures import RESTS, Regime
-from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.measures.cycle_measures import RESTS, Regime
+from stickslip_ros.model.drive import Drive
 from stickslip_ros.quantities import number_of
+from stickslip_ros.record.topics import AMPLITUDE, FREQUENCY, STICK_FRACTION
 from stickslip_ros.scenarios.parameters import controller_node
 from stickslip_ros.show.quantities import MEASURES, Units
 from stickslip_ros.show.style import BLUE, GREEN, GREY, ORANGE, REGIMES, SKY_BLUE

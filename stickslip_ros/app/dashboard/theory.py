@@ -16,13 +16,13 @@ import numpy as np
 from stickslip_ros.app.dashboard.listener import ListenerNode
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import InvalidInputError, StickslipError
+from stickslip_ros.model.drive import Drive
 from stickslip_ros.nodes.base.child_process import end_with
-from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.theory.bifurcation_branches import BifurcationBranches
-from stickslip_ros.physics.theory.gain_intervals import gains_of, why_no_gains
-from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop, why_no_linear_loop
-from stickslip_ros.physics.theory.stability_map import StabilityMap
 from stickslip_ros.scenarios.parameters import CONTROLLER_PARAMETERS, PlantParameters
+from stickslip_ros.theory.bifurcation_branches import BifurcationBranches
+from stickslip_ros.theory.gain_intervals import gains_of, why_no_gains
+from stickslip_ros.theory.linear_sampled_loop import LinearSampledLoop, why_no_linear_loop
+from stickslip_ros.theory.stability_map import StabilityMap
 
 Values = Mapping[str, Any]
 """Parameters of a node by flat name."""

@@ -17,12 +17,12 @@ from stickslip_ros.app.dashboard.charts import (
 )
 from stickslip_ros.app.dashboard.theory import Decay, FrictionCurve
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.physics.model.control import Washout
-from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.theory.bifurcation_branches import BifurcationBranches, Branch
-from stickslip_ros.physics.theory.stability_map import StabilityMap
+from stickslip_ros.model.control import Washout
+from stickslip_ros.model.drive import Drive
 from stickslip_ros.show.quantities import Units
 from stickslip_ros.show.style import BLUE, GREEN, GREY, ORANGE, SKY_BLUE
+from stickslip_ros.theory.bifurcation_branches import BifurcationBranches, Branch
+from stickslip_ros.theory.stability_map import StabilityMap
 
 Options = dict[str, Any]
 

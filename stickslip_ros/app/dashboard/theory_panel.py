@@ -22,12 +22,12 @@ from stickslip_ros.app.dashboard.theory_charts import (
     stability_chart,
 )
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.model.control import Washout
-from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.theory.gain_intervals import gains_of
-from stickslip_ros.physics.theory.linear_sampled_loop import settling_time
+from stickslip_ros.model.control import Washout
+from stickslip_ros.model.drive import Drive
 from stickslip_ros.scenarios.parameters import CONTROLLER_PARAMETERS, controller_node
 from stickslip_ros.show.quantities import Units
+from stickslip_ros.theory.gain_intervals import gains_of
+from stickslip_ros.theory.linear_sampled_loop import settling_time
 
 _CHARTS = (
     ("map", stability_map, "Stability over the gains", "limit of stability over the gains"),

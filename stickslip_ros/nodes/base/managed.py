@@ -19,7 +19,6 @@ from rclpy.task import Future
 from rclpy.timer import Timer
 
 from stickslip_ros.errors import BagError, InvalidInputError, StickslipError
-from stickslip_ros.messages.topics import DIAGNOSTICS, RECORDED, Topic
 from stickslip_ros.nodes.base.parameters import ParameterNode, ParametersT
 from stickslip_ros.nodes.base.ros_topics import (
     PollingNode,
@@ -30,6 +29,7 @@ from stickslip_ros.nodes.base.ros_topics import (
 )
 from stickslip_ros.nodes.base.scheduling import schedule_process
 from stickslip_ros.nodes.base.spinner import steady_clock
+from stickslip_ros.record.topics import DIAGNOSTICS, RECORDED, Topic
 from stickslip_ros.scenarios import full_name
 
 MessageT = TypeVar("MessageT")

@@ -16,8 +16,8 @@ from rclpy.lifecycle import LifecycleNode
 from rclpy.parameter import Parameter
 
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.model.constants import Changes
-from stickslip_ros.physics.model.constants import Parameter as ModelParameter
+from stickslip_ros.model.constants import Changes
+from stickslip_ros.model.constants import Parameter as ModelParameter
 from stickslip_ros.scenarios import LONGEST_NAMESPACE
 from stickslip_ros.scenarios.parameters import NodeParameters
 from stickslip_ros.scenarios.ros_yaml import number_in

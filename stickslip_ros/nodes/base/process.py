@@ -17,6 +17,7 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
 from stickslip_ros.errors import InvalidInputError, StickslipError
+from stickslip_ros.model.constants import Changes
 from stickslip_ros.nodes.base.child_process import die_with_parent
 from stickslip_ros.nodes.base.machine import (
     FIRST_PROCESS,
@@ -36,7 +37,6 @@ from stickslip_ros.nodes.base.network import (
 )
 from stickslip_ros.nodes.base.parameters import first_line
 from stickslip_ros.nodes.base.spinner import Spinner, spin, stop_on_signals
-from stickslip_ros.physics.model.constants import Changes
 from stickslip_ros.scenarios.parameters import NodeParameters
 from stickslip_ros.scenarios.sections import read_file, section_matches
 from stickslip_ros.standard_streams import open_closed_streams

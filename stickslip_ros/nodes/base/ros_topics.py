@@ -18,7 +18,7 @@ from rclpy.qos import (
 from rclpy.subscription import Subscription
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
-from stickslip_ros.messages.topics import Topic
+from stickslip_ros.record.topics import Topic
 
 
 def qos_profile(

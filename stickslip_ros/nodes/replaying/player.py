@@ -6,8 +6,8 @@ from contextlib import suppress
 from threading import Condition, Thread
 
 from stickslip_ros.errors import MessageError, RunError, StickslipError
-from stickslip_ros.messages.codec import unpack_header
 from stickslip_ros.nodes.pacing import FlowWindow, Sleeper
+from stickslip_ros.record.codec import unpack_header
 from stickslip_ros.stamps import NANOSECONDS
 
 JITTER = NANOSECONDS

@@ -19,15 +19,15 @@ from rclpy.qos import (
 )
 from rclpy.validate_full_topic_name import validate_full_topic_name
 
-from stickslip_ros.bags.definitions import message_definition
-from stickslip_ros.bags.metadata import offered_profiles
-from stickslip_ros.bags.motion_reader import ANY_LAYOUT, BagLayout
-from stickslip_ros.bags.reader import Recording
 from stickslip_ros.errors import BagError, InvalidInputError
-from stickslip_ros.messages.codec import pack_joint_state, pack_wrench
-from stickslip_ros.messages.topics import CLOCK, CONTROL_FORCE, DEEP, JOINT_STATES, RECORDED
 from stickslip_ros.nodes.base.ros_topics import message_class
 from stickslip_ros.nodes.replaying.player import JITTER, Message, Timeline
+from stickslip_ros.record.codec import pack_joint_state, pack_wrench
+from stickslip_ros.record.definitions import message_definition
+from stickslip_ros.record.metadata import offered_profiles
+from stickslip_ros.record.motion_reader import ANY_LAYOUT, BagLayout
+from stickslip_ros.record.reader import Recording
+from stickslip_ros.record.topics import CLOCK, CONTROL_FORCE, DEEP, JOINT_STATES, RECORDED
 from stickslip_ros.scenarios.parameters import ReplayParameters
 from stickslip_ros.stamps import NANOSECONDS
 from stickslip_ros.text import printable

@@ -7,6 +7,8 @@ from math import sqrt
 
 import numpy as np
 
+from stickslip_ros.measures.cycle_measures import Regime
+from stickslip_ros.model.functions import zero_between
 from stickslip_ros.paper.claims.paper_values import (
     DAMPING,
     PRINTED_HOPF_SPEED,
@@ -23,10 +25,8 @@ from stickslip_ros.paper.claims.paper_values import (
 )
 from stickslip_ros.paper.claims.verdict import Computations, Evidence, Formula, Number, Observation
 from stickslip_ros.paper.figures import STRIBECK, BifurcationFigure, unit_drive
-from stickslip_ros.physics.measures.cycle_measures import Regime
-from stickslip_ros.physics.model.functions import zero_between
-from stickslip_ros.physics.theory.hopf import hopf_points
 from stickslip_ros.studies.settling import CYCLES
+from stickslip_ros.theory.hopf import hopf_points
 
 computes = Computations()
 

@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from stickslip_ros.arrays import FloatArray
+from stickslip_ros.model.dimensionless_drive import SPEED
 from stickslip_ros.paper.claims.paper_values import (
     DAMPING,
     FILTER,
@@ -30,9 +31,8 @@ from stickslip_ros.paper.claims.paper_values import (
     number_for_both,
 )
 from stickslip_ros.paper.claims.verdict import Computations, Evidence, Formula, Number, Observation
-from stickslip_ros.physics.model.dimensionless_drive import SPEED
-from stickslip_ros.physics.theory.hopf import first_lyapunov_coefficient
-from stickslip_ros.physics.theory.linear import Expansion
+from stickslip_ros.theory.hopf import first_lyapunov_coefficient
+from stickslip_ros.theory.linear import Expansion
 
 computes = Computations()
 

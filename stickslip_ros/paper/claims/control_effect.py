@@ -5,6 +5,9 @@ from math import log
 
 import numpy as np
 
+from stickslip_ros.measures.cycle_measures import Regime
+from stickslip_ros.model.control import Washout
+from stickslip_ros.motion import Motion
 from stickslip_ros.paper.claims.paper_values import (
     DAMPING,
     FASTER,
@@ -31,11 +34,8 @@ from stickslip_ros.paper.claims.paper_values import (
 )
 from stickslip_ros.paper.claims.verdict import Computations, Evidence, Number, Observation
 from stickslip_ros.paper.figures import STRIBECK, unit_drive
-from stickslip_ros.physics.measures.cycle_measures import Regime
-from stickslip_ros.physics.model.control import Washout
-from stickslip_ros.physics.motion import Motion
-from stickslip_ros.physics.theory.hopf import hopf_points
 from stickslip_ros.studies.settling import CYCLES
+from stickslip_ros.theory.hopf import hopf_points
 
 computes = Computations()
 

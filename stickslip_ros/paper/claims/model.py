@@ -4,6 +4,10 @@ from math import isclose, sqrt
 
 import numpy as np
 
+from stickslip_ros.measures.cycle_measures import Regime
+from stickslip_ros.model.drive import Drive
+from stickslip_ros.model.friction import Stribeck
+from stickslip_ros.model.functions import zero_between
 from stickslip_ros.paper.claims.paper_values import (
     DAMPING,
     FASTER,
@@ -19,10 +23,6 @@ from stickslip_ros.paper.claims.paper_values import (
 )
 from stickslip_ros.paper.claims.verdict import Computations, Evidence, Formula, Number, Observation
 from stickslip_ros.paper.figures import STRIBECK, unit_drive
-from stickslip_ros.physics.measures.cycle_measures import Regime
-from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.friction import Stribeck
-from stickslip_ros.physics.model.functions import zero_between
 
 computes = Computations()
 

@@ -13,25 +13,25 @@ import numpy as np
 import numpy.typing as npt
 
 from stickslip_ros.arrays import FloatArray
+from stickslip_ros.measures.cycle_measures import Regime
+from stickslip_ros.model.control import Washout
+from stickslip_ros.model.drive import Drive
+from stickslip_ros.model.drive_system import SLIP
+from stickslip_ros.model.friction import FrictionLaw
+from stickslip_ros.model.functions import zero_between
+from stickslip_ros.model.hybrid import Mode
+from stickslip_ros.model.plain_drive import drive_system
+from stickslip_ros.motion import Motion, RecordedMotion
+from stickslip_ros.motion.compiled_flow import flow_rates, parameter_values
 from stickslip_ros.paper.claims.verdict import Formula, Number
 from stickslip_ros.paper.figures import Portrait, unit_drive
-from stickslip_ros.physics.measures.cycle_measures import Regime
-from stickslip_ros.physics.model.control import Washout
-from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.drive_system import SLIP
-from stickslip_ros.physics.model.friction import FrictionLaw
-from stickslip_ros.physics.model.functions import zero_between
-from stickslip_ros.physics.model.hybrid import Mode
-from stickslip_ros.physics.model.plain_drive import drive_system
-from stickslip_ros.physics.motion import Motion, RecordedMotion
-from stickslip_ros.physics.motion.compiled_flow import flow_rates, parameter_values
-from stickslip_ros.physics.theory.critical_gains import CriticalGains, critical_gains
-from stickslip_ros.physics.theory.cycle_bounds import follow, release_position
-from stickslip_ros.physics.theory.hopf import HopfPoint, hopf_points
-from stickslip_ros.physics.theory.limit_cycles import limit_cycle_of_run, limit_cycles
-from stickslip_ros.physics.theory.linear import Expansion, expand
-from stickslip_ros.physics.theory.shooting import LimitCycle
-from stickslip_ros.physics.theory.sticking import StickingOnset, sticking_onset
+from stickslip_ros.theory.critical_gains import CriticalGains, critical_gains
+from stickslip_ros.theory.cycle_bounds import follow, release_position
+from stickslip_ros.theory.hopf import HopfPoint, hopf_points
+from stickslip_ros.theory.limit_cycles import limit_cycle_of_run, limit_cycles
+from stickslip_ros.theory.linear import Expansion, expand
+from stickslip_ros.theory.shooting import LimitCycle
+from stickslip_ros.theory.sticking import StickingOnset, sticking_onset
 
 _T = TypeVar("_T")
 

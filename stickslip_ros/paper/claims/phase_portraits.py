@@ -7,6 +7,10 @@ from math import sqrt
 
 import numpy as np
 
+from stickslip_ros.measures.cycle_measures import Regime
+from stickslip_ros.model.drive import Drive
+from stickslip_ros.model.friction import Coulomb, Linear, Stribeck
+from stickslip_ros.model.functions import zero_between
 from stickslip_ros.paper.claims.paper_values import (
     FASTER,
     PRINTED_HOPF_SPEED,
@@ -32,12 +36,8 @@ from stickslip_ros.paper.claims.paper_values import (
 )
 from stickslip_ros.paper.claims.verdict import Computations, Evidence, Number, Observation
 from stickslip_ros.paper.figures import PRINTED_SLOPE, STRIBECK, TANGENT_SLOPE, Portrait, unit_drive
-from stickslip_ros.physics.measures.cycle_measures import Regime
-from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.friction import Coulomb, Linear, Stribeck
-from stickslip_ros.physics.model.functions import zero_between
-from stickslip_ros.physics.theory.hopf import hopf_points
-from stickslip_ros.physics.theory.limit_cycles import limit_cycle_of_run, limit_cycles
+from stickslip_ros.theory.hopf import hopf_points
+from stickslip_ros.theory.limit_cycles import limit_cycle_of_run, limit_cycles
 
 computes = Computations()
 

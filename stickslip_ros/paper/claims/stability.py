@@ -5,6 +5,8 @@ from math import log
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray
+from stickslip_ros.measures.cycle_measures import Regime
+from stickslip_ros.motion import RecordedMotion
 from stickslip_ros.paper.claims.paper_values import (
     BELT_SPEEDS,
     DAMPING,
@@ -27,8 +29,6 @@ from stickslip_ros.paper.claims.paper_values import (
 )
 from stickslip_ros.paper.claims.verdict import Computations, Evidence, Formula, Number, Observation
 from stickslip_ros.paper.figures import STRIBECK, unit_drive
-from stickslip_ros.physics.measures.cycle_measures import Regime
-from stickslip_ros.physics.motion import RecordedMotion
 
 computes = Computations()
 

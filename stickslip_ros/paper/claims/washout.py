@@ -6,6 +6,8 @@ from dataclasses import replace
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray
+from stickslip_ros.model.control import Washout
+from stickslip_ros.model.functions import zero_between
 from stickslip_ros.paper.claims.paper_values import (
     BELT_SPEEDS,
     DAMPING,
@@ -29,10 +31,8 @@ from stickslip_ros.paper.claims.paper_values import (
 )
 from stickslip_ros.paper.claims.verdict import Computations, Evidence, Formula, Number, Observation
 from stickslip_ros.paper.figures import unit_drive
-from stickslip_ros.physics.model.control import Washout
-from stickslip_ros.physics.model.functions import zero_between
-from stickslip_ros.physics.theory.hopf import crossing_speed, hopf_points
-from stickslip_ros.physics.theory.linear import hurwitz_determinants
+from stickslip_ros.theory.hopf import crossing_speed, hopf_points
+from stickslip_ros.theory.linear import hurwitz_determinants
 
 computes = Computations()
 

@@ -12,7 +12,7 @@ import pytest
 
 from stickslip_ros.app.dashboard.ended_run import EndedRun
 from stickslip_ros.app.dashboard.listener import Health
-from tests.bags.runs import STAMPS, record
+from tests.record.runs import STAMPS, record
 
 SECRET = b"secret"
 FILE = "bag_0.mcap"

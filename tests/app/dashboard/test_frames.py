@@ -11,7 +11,7 @@ import pytest
 
 from stickslip_ros.app.dashboard.frames import PERIODS, Frames
 from stickslip_ros.app.dashboard.listener import Event
-from stickslip_ros.messages.topics import AMPLITUDE, FREQUENCY, STICK_FRACTION
+from stickslip_ros.record.topics import AMPLITUDE, FREQUENCY, STICK_FRACTION
 from stickslip_ros.samples import ForceColumns, SampleColumns
 from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.scenarios.parameters import PlantParameters

@@ -12,17 +12,17 @@ from rclpy.parameter import Parameter
 from stickslip_ros.app.dashboard import listener as listener_module
 from stickslip_ros.app.dashboard.listener import ABSENT, SILENT, Answer, Health, ListenerNode
 from stickslip_ros.app.dashboard.theory import Theory
-from stickslip_ros.messages.topics import (
+from stickslip_ros.nodes.analyzer import AnalyzerNode
+from stickslip_ros.nodes.controller import ControllerNode
+from stickslip_ros.nodes.plant import PlantNode
+from stickslip_ros.nodes.washout_controller import WashoutControllerNode
+from stickslip_ros.record.topics import (
     AMPLITUDE,
     APPLIED_DISTURBANCE,
     DIAGNOSTICS,
     FREQUENCY,
     STICK_FRACTION,
 )
-from stickslip_ros.nodes.analyzer import AnalyzerNode
-from stickslip_ros.nodes.controller import ControllerNode
-from stickslip_ros.nodes.plant import PlantNode
-from stickslip_ros.nodes.washout_controller import WashoutControllerNode
 from stickslip_ros.samples import ForceColumns, SampleColumns
 from stickslip_ros.scenarios.files import load_scenario
 from tests.nodes.graph import Graph

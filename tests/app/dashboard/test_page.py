@@ -17,7 +17,7 @@ import pytest
 from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Browser, Locator, Page, expect
 
-from stickslip_ros.bags.reader import Recording
+from stickslip_ros.record.reader import Recording
 from tests.app.browser import headless_browser
 from tests.app.conftest import Start
 from tests.nodes.conftest import processes  # noqa: F401 - a fixture used here

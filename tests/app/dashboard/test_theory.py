@@ -30,7 +30,7 @@ from stickslip_ros.app.dashboard.theory_charts import (
     stability_chart,
 )
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.model.control import Washout
+from stickslip_ros.model.control import Washout
 from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.scenarios.keywords import described
 from stickslip_ros.scenarios.parameters import CONTROLLER_PARAMETERS

@@ -5,9 +5,9 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray
 from std_msgs.msg import Float64
 
-from stickslip_ros.messages.codec import pack_header
-from stickslip_ros.messages.topics import AMPLITUDE, DIAGNOSTICS, RECORDED
 from stickslip_ros.nodes.base.managed import OK, WARN, ManagedNode
+from stickslip_ros.record.codec import pack_header
+from stickslip_ros.record.topics import AMPLITUDE, DIAGNOSTICS, RECORDED
 from stickslip_ros.scenarios.parameters import NodeParameters
 from tests.nodes.graph import Graph
 

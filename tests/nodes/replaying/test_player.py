@@ -9,9 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from stickslip_ros.errors import BagError, RunError
-from stickslip_ros.messages.codec import pack_header
 from stickslip_ros.nodes.pacing import FlowWindow
 from stickslip_ros.nodes.replaying.player import JITTER, Message, Player, Timeline
+from stickslip_ros.record.codec import pack_header
 from tests.nodes.graph import PATIENCE, wait_for
 
 SECOND = 1_000_000_000

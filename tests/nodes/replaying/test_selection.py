@@ -15,10 +15,7 @@ from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 
-from stickslip_ros.bags.recorder import offered_qos
 from stickslip_ros.errors import BagError, InvalidInputError
-from stickslip_ros.messages.codec import pack_header, unpack_joint_state, unpack_wrench
-from stickslip_ros.messages.topics import DEEP, JOINT_STATES
 from stickslip_ros.nodes.base.ros_topics import qos_profile
 from stickslip_ros.nodes.replaying.player import JITTER
 from stickslip_ros.nodes.replaying.selection import (
@@ -26,8 +23,11 @@ from stickslip_ros.nodes.replaying.selection import (
     installed_message_class,
     recorded_profile,
 )
+from stickslip_ros.record.codec import pack_header, unpack_joint_state, unpack_wrench
+from stickslip_ros.record.recorder import offered_qos
+from stickslip_ros.record.topics import DEEP, JOINT_STATES
 from stickslip_ros.scenarios.parameters import ReplayParameters
-from tests.bags.runs import foreign_file, write_bag
+from tests.record.runs import foreign_file, write_bag
 
 SECOND = 1_000_000_000
 STATES = "/drive/joint_states"

@@ -1,0 +1,241 @@
+"""What identification must know of a friction law."""
+
+from collections.abc import Mapping, Sequence
+from math import inf, sqrt
+from typing import Any
+
+import numpy as np
+
+from stickslip_ros.arrays import FloatArray
+from stickslip_ros.model.constants import constants_of
+from stickslip_ros.model.drive import Drive
+from stickslip_ros.model.friction import (
+    LAWS,
+    CurveFollower,
+    Directional,
+    FrictionLaw,
+    Table,
+)
+
+Values = Mapping[str, float]
+"""Values of coordinates by name, SI units."""
+
+_LEAST_SHARE = 1e-9
+"""Smallest constant that must be above zero, as a share of the friction or of other forces."""
+LEAST_RISE = 1e-3
+"""Smallest force from which a search starts, as a share of the static friction."""
+_SEARCH_FACTOR = 30.0
+"""Factor by which the search may leave the mass and the stiffness that it starts from; viscous
+friction up to which it goes, in static friction at the fastest speed."""
+_LARGEST_STIFFNESS = 3000.0
+"""Largest stiffness of the bristles, in stiffnesses of the spring."""
+_SLOWEST_SHAPE, _FASTEST_SHAPE = 0.01, 10.0
+"""Shapes of a curve that records may tell, in fastest speeds."""
+DELAY = "force_delay"
+"""Name of the constant that is not one of the drive: the time until a force acts, s."""
+LAG = "actuator.time_constant"
+"""Name of the time constant of the lag of the force, s."""
+REVERSE = "reverse."
+"""Start of the names of coordinates of backward slip where both directions have their own."""
+
+
+class IdentifiedLaw:
+    """A friction law as identification knows it.
+
+    A regression of forces takes friction in steady slip as a sum of `terms` with unknown forces;
+    it may have one shape, a speed, in which it is not linear. A search of trajectories has
+    `coordinates` with simple bounds. They are in newtons: the normal force only scales friction.
+    The static coefficient has in its place its `rise` above the smaller one.
+    """
+
+    name: str
+    """Name of the friction law."""
+    least: Sequence[float]
+    """Smallest value of each unknown force: 0 or minus infinity."""
+    shaped: bool = False
+    """Whether there is a shape."""
+    least_shape: float = 0.25
+    """Smallest shape that records tell, in their slowest speeds."""
+    deflection: float = 0.0
+    """Path over which friction follows a change of direction or speed, m; 0: immediately."""
+    coordinates: Sequence[str]
+    """Names of the coordinates: those of the constants, and `rise` for `static`."""
+    unscaled: Sequence[str] = ()
+    """Coordinates that do not scale with the normal force, such as speeds."""
+    smallest: str
+    """Coordinate of the smallest friction."""
+    memory: Sequence[str] = ()
+    """Coordinates of the memory of the law."""
+    of_slip: bool = True
+    """Whether friction in slip tells all constants."""
+    optional: Sequence[str] = ()
+    """Coordinates that are fitted only if the records ask for them."""
+    by_differences: Sequence[str] = ()
+    """Coordinates on which the motion depends other than by its equations."""
+    straightened: Mapping[str, tuple[float, float] | None] = {}
+    """Coordinates that, where all of them are free, the search replaces by others of the same
+    names, in which fits are nearly linear; with their bounds, if these are not `bounds`."""
+
+    def terms(self, speed: FloatArray, shape: float) -> FloatArray:
+        """Return the terms, rows of shape (rows, terms); `speed` is |v_r| and `shape` in m/s.
+
+        By default a term is the friction of the law with one of the unknown forces alone, 1 N.
+        """
+        units = np.eye(len(self.least)).tolist()
+        laws = [self.friction(self.coordinates_of(unit, shape), 1.0) for unit in units]
+        return np.column_stack([-law.coefficient(speed, 1.0) for law in laws])
+
+    def coordinates_of(self, forces: Sequence[float], shape: float) -> dict[str, float]:
+        """Return the coordinates of unknown forces, N, and of a shape, m/s.
+
+        By default the forces are the coordinates that scale with the normal force, and what does
+        not is the shape.
+        """
+        scaled = [name for name in self.coordinates if name not in self.unscaled]
+        own = dict(zip(scaled, forces, strict=False))  # a memory is none of friction in slip
+        return own | dict.fromkeys(self.unscaled, shape)
+
+    @property
+    def one_way(self) -> "IdentifiedLaw":
+        """The law of each direction of slip."""
+        return self
+
+    def curve_speeds(self, recorded: FloatArray) -> FloatArray:
+        """Return the speeds of the points that stand for a curve, m/s, by default the recorded."""
+        return recorded
+
+    def joined(self, directions: Sequence[Values]) -> dict[str, float]:
+        """Return the coordinates of one direction, or of forward and backward slip."""
+        first, *others = directions
+        return {**first, **{REVERSE + name: each[name] for each in others for name in each}}
+
+    def start(self, values: Values, smallest: float) -> dict[str, float]:
+        """Return coordinates from which a search can start: inside of their bounds.
+
+        `smallest` is the smallest static friction, N.
+        """
+        found = dict(values)
+        if "rise" in found:
+            least = LEAST_RISE * max(self.static_force(found), smallest)
+            static = max(self.static_force(found), least)
+            found["rise"] = min(max(found["rise"], least), static - least)
+            found[self.smallest] = static - found["rise"]
+        else:
+            found[self.smallest] = max(found[self.smallest], smallest)
+        if "viscous" in found:
+            # A law without viscous friction has other equations, not a derivative by it.
+            found["viscous"] = found["viscous"] or _LEAST_SHARE * found[self.smallest]
+        return found
+
+    def starts(self, values: Values, fastest: float) -> Sequence[Values]:
+        """Return the coordinates from which searches of trajectories start.
+
+        `values` are those of a regression, with the mass and the stiffness; the fastest speed is
+        that of `bounds`.
+        """
+        return [values]
+
+    def static_force(self, values: Values) -> float:
+        """Return the static friction, N."""
+        rise = values["rise"] if "rise" in self.coordinates else 0.0
+        return values[self.smallest] + rise
+
+    def friction(self, values: Values, normal_force: float) -> FrictionLaw:
+        """Return the law of coordinates."""
+        kind: Any = LAWS[self.name]
+        own = {"static": self.static_force(values) / normal_force}
+        for name in self.coordinates:
+            if name != "rise":
+                own[name] = values[name] / (1.0 if name in self.unscaled else normal_force)
+        return kind(**own)
+
+    def drive(self, values: Values, normal_force: float, belt_speed: float = 0.0) -> Drive:
+        """Return the drive of coordinates."""
+        return Drive(
+            mass=values["mass"],
+            damping=values["damping"],
+            stiffness=values["stiffness"],
+            normal_force=normal_force,
+            belt_speed=belt_speed,
+            friction=self.friction(values, normal_force),
+            bias_force=values["bias_force"],
+        )
+
+    def constants(self, values: Values, normal_force: float) -> dict[str, float]:
+        """Return the parameters of the plant by flat name that coordinates stand for.
+
+        A table has none. Of a law that is followed a few deflections are tried: its constants
+        have no error, and are left out.
+        """
+        own = {*self.coordinates, DELAY}
+        found = {name: value for name, value in values.items() if name not in own}
+        if self.deflection > 0.0:
+            return found
+        for group, law in by_group(self.friction(values, normal_force)).items():
+            found |= {group + name: value for name, value in numbers_of(law).items()}
+        return found
+
+    @property
+    def fixable(self) -> Sequence[str]:
+        """The coordinates that can be given: they are constants of the law."""
+        return [name for name in self.coordinates if name in constants_of(LAWS[self.name])]
+
+    def bounds(self, name: str, values: Values, fastest: float) -> tuple[float, float]:
+        """Return the smallest and the largest value of a coordinate in the search from `values` on.
+
+        The fastest speed is that relative to the belt in the records, m/s: what friction does at a
+        hundredth of it or far above it, they do not tell.
+        """
+        static = self.static_force(values)
+        if name in ("mass", "stiffness"):
+            return values[name] / _SEARCH_FACTOR, values[name] * _SEARCH_FACTOR
+        if name in (DELAY, LAG):
+            longest = sqrt(values["mass"] / values["stiffness"])
+            return -longest if name == DELAY else 0.0, longest
+        if name == "bias_force":
+            return -inf, inf
+        if name == "viscous":
+            return -_SEARCH_FACTOR * static / fastest, _SEARCH_FACTOR * static / fastest
+        if name == "bristle_stiffness":
+            return values["stiffness"], _LARGEST_STIFFNESS * values["stiffness"]
+        if name == "bristle_damping":
+            return 0.0, _LARGEST_STIFFNESS * static / fastest
+        if name.endswith("_speed"):
+            return _SLOWEST_SHAPE * fastest, _FASTEST_SHAPE * fastest
+        return 0.0 if name in ("rise", "damping") else _LEAST_SHARE * static, inf
+
+    def size(self, name: str, values: Values, fastest: float) -> float:
+        """Return a typical size of a coordinate of the law, from which differences are made."""
+        static = self.static_force(values)
+        if name.endswith("_speed"):
+            return fastest
+        if name in ("viscous", "bristle_damping"):
+            return static / fastest
+        if name in self.unscaled:
+            return abs(values[name])
+        return values["stiffness"] if name == "bristle_stiffness" else static
+
+    def to_search(self, values: Values, fastest: float) -> dict[str, float]:
+        """Return the coordinates with those in place that `straightened` names."""
+        return dict(values)
+
+    def from_search(self, found: Values, fastest: float) -> dict[str, float]:
+        """Return the coordinates of `to_search`, which may be ones that the law refuses."""
+        return dict(found)
+
+
+def by_group(law: FrictionLaw) -> Mapping[str, FrictionLaw]:
+    """Return a law by its group of parameters, or two that differ between the directions."""
+    if isinstance(law, Directional):
+        return {"friction.": law.forward, "friction.reverse.": law.reverse}
+    return {"friction.": law}
+
+
+def numbers_of(law: FrictionLaw) -> dict[str, float]:
+    """Return the constants of a law that are one number, those of the curve that it follows too."""
+    if isinstance(law, Table):
+        return {}
+    own = {name: getattr(law, name) for name in constants_of(type(law))}
+    if isinstance(law, CurveFollower):
+        own |= numbers_of(law.curve)
+    return {name: value for name, value in own.items() if isinstance(value, int | float)}

@@ -1,0 +1,333 @@
+"""Cycles of a motion from its breakpoints, and their measures, in constant memory."""
+
+from collections import deque
+from collections.abc import Sequence
+from functools import reduce
+from itertools import pairwise
+from typing import NamedTuple, Self
+
+import numpy as np
+
+from stickslip_ros.measures.breakpoints import Breakpoints
+from stickslip_ros.measures.cycle_measures import (
+    EQUILIBRIUM_SPEED,
+    LEAST_CYCLES,
+    STALE_PERIODS,
+    STEADY_CHANGE_UNDER_NOISE,
+    Cycle,
+    CycleMeans,
+    Measures,
+    Regime,
+    Trend,
+    with_drift,
+    without_cycles,
+)
+from stickslip_ros.measures.drift import Drift
+
+STEADY_CHANGE = 1e-3
+"""Largest relative difference between the amplitudes of the measured cycles of a steady motion."""
+
+GRAZING_FRACTION = 1e-8
+"""Stick fraction up to which a cycle counts as touching the belt speed without sticking.
+
+The stick fraction grows with the root of the distance from grazing; this value is the effect of
+rounding the belt speed.
+"""
+
+_NOISE = 1e-9
+"""Speeds below this share of the belt speed, or of the highest speed so far, are rounding."""
+
+
+class _Stretch(NamedTuple):
+    """Ends, extremes and stick time of a part of a motion."""
+
+    start: float
+    end: float
+    lowest: float
+    highest: float
+    slowest: float
+    fastest: float
+    stick_time: float
+
+    @classmethod
+    def between(cls, breakpoints: Breakpoints, first: int, last: int) -> Self:
+        """Return the part from one breakpoint to another."""
+        # Stretches are short: lists take a fraction of the time of arrays.
+        time = breakpoints.time[first : last + 1]
+        position = breakpoints.position[first : last + 1].tolist()
+        velocity = breakpoints.velocity[first : last + 1].tolist()
+        stuck = breakpoints.sticking[first + 1 : last + 1]
+        return cls(
+            float(time[0]),
+            float(time[-1]),
+            min(position),
+            max(position),
+            min(velocity),
+            max(velocity),
+            float(np.diff(time)[stuck].sum()) if stuck.any() else 0.0,
+        )
+
+    def followed_by(self, later: "_Stretch") -> "_Stretch":
+        return _Stretch(
+            self.start,
+            later.end,
+            min(self.lowest, later.lowest),
+            max(self.highest, later.highest),
+            min(self.slowest, later.slowest),
+            max(self.fastest, later.fastest),
+            self.stick_time + later.stick_time,
+        )
+
+    @property
+    def duration(self) -> float:
+        return self.end - self.start
+
+    def as_cycle(self) -> Cycle:
+        stick_fraction = self.stick_time / self.duration
+        return Cycle(
+            amplitude=(self.highest - self.lowest) / 2.0,
+            velocity_amplitude=(self.fastest - self.slowest) / 2.0,
+            midpoint=(self.highest + self.lowest) / 2.0,
+            period=self.duration,
+            frequency=1.0 / self.duration,
+            stick_fraction=stick_fraction if stick_fraction > GRAZING_FRACTION else 0.0,
+        )
+
+
+class CycleMeter:
+    """Measures a motion, fed in blocks of breakpoints of any length, in constant memory.
+
+    Parameters
+    ----------
+    window : int
+        Largest number of cycles to average over: the last ones.
+
+    Examples
+    --------
+    The limit cycle of a drive:
+
+    >>> from stickslip_ros.measures import CycleMeter
+    >>> from stickslip_ros.model.drive import Drive
+    >>> from stickslip_ros.model.friction import Stribeck
+    >>> from stickslip_ros.motion import RecordedMotion
+    >>> drive = Drive(mass=100.0, damping=200.0, stiffness=1e6, normal_force=1000.0,
+    ...               belt_speed=0.04, friction=Stribeck(0.4, 0.25, 0.05))
+    >>> motion = RecordedMotion(drive, position=0.0, velocity=0.0)
+    >>> motion.advance(5.0)
+    >>> meter = CycleMeter(window=20)
+    >>> cycles = meter.feed(motion.take_breakpoints(), drive.belt_speed)
+    >>> measures = meter.measures()
+    >>> measures.regime.value, round(1e6 * measures.amplitude, 1)
+    ('stick_slip', 434.1)
+    """
+
+    def __init__(self, window: int) -> None:
+        self.drift = Drift()
+        """Trends of the run, for its user to feed."""
+        self.within = 0.0
+        """Range, m, in which a slide counts as held."""
+        self.unbounded = False
+        """Whether the motion is reported as one that diverges."""
+        self._cycles: deque[Cycle] = deque(maxlen=window)
+        self._amplitudes: deque[float] = deque(maxlen=max(window, LEAST_CYCLES))
+        self._belt_speed = self._fastest_belt = 0.0
+        self._fastest = 0.0
+        self.ends: list[float] = []
+        """Time, s, at which each cycle ended that `feed` returned last."""
+        self.interrupt()
+
+    def interrupt(self) -> None:
+        """Drop the current cycle: the next breakpoint does not continue the motion so far."""
+        self._last = Breakpoints.empty()
+        self._direction = 0.0
+        self._open: _Stretch | None = None
+        self._whole = False
+        self._recent: list[_Stretch] = []
+        self._sticking_since: float | None = None
+
+    def feed(
+        self, breakpoints: Breakpoints, belt_speed: float, fastest_belt: float | None = None
+    ) -> list[Cycle]:
+        """Add the breakpoints that follow.
+
+        Parameters
+        ----------
+        breakpoints : Breakpoints
+            Breakpoints that continue the motion, in SI units.
+        belt_speed : float
+            Belt speed at the last of them, m/s.
+        fastest_belt : float, optional
+            Largest absolute belt speed of the motion, m/s, the scale of its speeds. By default the
+            belt speed is constant.
+
+        Returns
+        -------
+        list of Cycle
+            Cycles completed by these breakpoints.
+        """
+        self.ends = []
+        if len(breakpoints) == 0:
+            return []
+        self._belt_speed = belt_speed
+        self._fastest_belt = abs(belt_speed) if fastest_belt is None else fastest_belt
+        breakpoints, last = self._last.followed_by(breakpoints), 0
+        if self._open is None:
+            self._open = _Stretch.between(breakpoints, 0, 0)
+        completed: list[Cycle] = []
+        for edge in self._upward_crossings(breakpoints):
+            self._open = self._open.followed_by(_Stretch.between(breakpoints, last, edge))
+            if self._whole and self._open.duration > 0.0:
+                completed.append(self._open.as_cycle())
+                self.ends.append(self._open.end)
+            self._open = _Stretch.between(breakpoints, edge, edge)
+            self._whole = True
+            self._recent = []
+            last = edge
+        self._cycles.extend(completed)
+        self._amplitudes.extend(cycle.amplitude for cycle in completed)
+        end = _Stretch.between(breakpoints, last, len(breakpoints) - 1)
+        self._open = self._open.followed_by(end)
+        self._follow_recent(breakpoints, last)
+        self._follow_sticking(breakpoints)
+        self._last = breakpoints[len(breakpoints) - 1 :]
+        return completed
+
+    def measures(self) -> Measures:
+        """Return the means over the last whole cycles.
+
+        Returns
+        -------
+        Measures
+            Measures in SI units.
+        """
+        if self.unbounded:
+            return without_cycles(None, Regime.UNBOUNDED, steady=True)
+        return with_drift(self._measures(), self.drift)
+
+    def _measures(self) -> Measures:
+        period = self._cycles[-1].period if self._cycles else 0.0
+        now = self._open.end if self._open else 0.0
+        since = self._sticking_since
+        if self._belt_speed == 0.0 and since is not None and now - since >= period:
+            steady = True if self._lasts(now - since) else None
+            return without_cycles(self._recent_motion(), Regime.STUCK, steady=steady)
+        since_turn = self._open.duration if self._open else 0.0
+        held = self._held(since_turn > STALE_PERIODS * period) if self.within else None
+        if held is not None:
+            # What rounding leaves of a motion may grow over a few cycles by chance.
+            enough = len(self._amplitudes) > 2 * LEAST_CYCLES
+            trend = _trend(self._amplitudes, True, STEADY_CHANGE) if enough else None
+            return without_cycles(held, Regime.HELD, steady=trend is None, trend=trend)
+        if not self._cycles or since_turn > STALE_PERIODS * period:
+            recent = self._recent_motion()
+            if (
+                recent is None
+                or recent.velocity_amplitude >= self._equilibrium_speed
+                or recent.stick_fraction > 0.0  # it sticks to a slow belt
+            ):
+                return without_cycles(None, None)
+            steady = True if self._lasts(since_turn) else None
+            return without_cycles(recent, Regime.EQUILIBRIUM, steady=steady)
+        means = CycleMeans.over(self._cycles)
+        resting = means.cycle.velocity_amplitude < self._equilibrium_speed
+        share = STEADY_CHANGE
+        if self.drift.resolution > 0.0:  # what the sensor tells differs from cycle to cycle
+            share = max(STEADY_CHANGE_UNDER_NOISE, self.drift.resolution / max(self._amplitudes))
+        trend = _trend(self._amplitudes, resting, share)
+        steady = trend is None if len(self._amplitudes) >= LEAST_CYCLES else None
+        return means.measures(resting, steady, trend)
+
+    def _held(self, at_rest: bool) -> Cycle | None:
+        """Return the motion of three cycles and since, or only since; None beyond `within`."""
+        recent = self._recent_motion()
+        motions = [] if at_rest else list(self._cycles)[-LEAST_CYCLES:]
+        motions += [] if recent is None else [recent]
+        if not motions or (not self._cycles and motions[0].stick_fraction > 0.0):
+            return None
+        highest = max(motion.midpoint + motion.amplitude for motion in motions)
+        lowest = min(motion.midpoint - motion.amplitude for motion in motions)
+        middle, half = (highest + lowest) / 2.0, (highest - lowest) / 2.0
+        fastest = max(motion.velocity_amplitude for motion in motions)
+        held = Cycle(half, fastest, middle, 0.0, 0.0, 0.0)
+        return held if highest - lowest <= self.within else None
+
+    def _lasts(self, rest: float) -> bool:
+        """Return whether a rest of this duration (s) has lasted for a window of the last cycles."""
+        window = self._cycles.maxlen or 0
+        return not self._cycles or rest >= window * self._cycles[-1].period
+
+    @property
+    def _equilibrium_speed(self) -> float:
+        if self._belt_speed == 0.0:
+            return 0.0
+        return EQUILIBRIUM_SPEED * self._fastest_belt
+
+    def _upward_crossings(self, breakpoints: Breakpoints) -> list[int]:
+        """Return the breakpoints at which the velocity changes from negative to positive."""
+        speed = np.abs(breakpoints.velocity)
+        self._fastest = max(self._fastest, float(speed.max()))
+        moving = np.flatnonzero(speed > _NOISE * max(self._fastest, self._fastest_belt))
+        if len(moving) == 0:
+            return []
+        directions = np.concatenate([[self._direction], np.sign(breakpoints.velocity[moving])])
+        self._direction = float(directions[-1])
+        rising = moving[(directions[:-1] < 0.0) & (directions[1:] > 0.0)]
+        before = np.maximum(rising - 1, 0)
+        return np.where(speed[before] <= speed[rising], before, rising).tolist()
+
+    def _follow_recent(self, breakpoints: Breakpoints, row: int) -> None:
+        """Keep the extremes of at least the last half of the stretch since the last crossing.
+
+        Once the stretch is longer than the last cycle, everything before the last doubling is
+        dropped whenever it doubles again.
+        """
+        assert self._open is not None
+        if not self._recent:
+            self._recent = [_Stretch.between(breakpoints, row, row)]
+        last = len(breakpoints) - 1
+        earliest = self._open.start + (self._cycles[-1].period if self._cycles else 0.0)
+        while row < last:
+            current = self._recent[-1]
+            due = max(2.0 * current.start - self._open.start, earliest)
+            side = "left" if due > current.start else "right"
+            doubled = row + 1 + int(np.searchsorted(breakpoints.time[row + 1 :], due, side))
+            part = _Stretch.between(breakpoints, row, min(doubled, last))
+            self._recent[-1] = current.followed_by(part)
+            if doubled <= last:
+                self._recent = [self._recent[-1], _Stretch.between(breakpoints, doubled, doubled)]
+            row = doubled
+
+    def _recent_motion(self) -> Cycle | None:
+        """Return the latest part of a stretch without crossings, as if it were a cycle."""
+        if not self._recent or self._recent[0].duration <= 0.0:
+            return None
+        return reduce(_Stretch.followed_by, self._recent).as_cycle()
+
+    def _follow_sticking(self, breakpoints: Breakpoints) -> None:
+        slipping = np.flatnonzero(~breakpoints.sticking[1:])
+        if len(breakpoints) > 1 and not breakpoints.sticking[-1]:
+            self._sticking_since = None
+        elif len(slipping) > 0 or self._sticking_since is None:
+            row = int(slipping[-1]) + 1 if len(slipping) > 0 else 0
+            self._sticking_since = float(breakpoints.time[row]) if len(breakpoints) > 1 else None
+
+
+def _trend(amplitudes: Sequence[float], resting: bool, share: float) -> Trend | None:
+    """Return the change of the amplitude from cycle to cycle; None without one or with few cycles.
+
+    Around a slide that is `resting` only growth from each cycle to the next counts: otherwise it is
+    still settling, or the measured amplitude is noise.
+    """
+    if len(amplitudes) < LEAST_CYCLES:
+        return None
+    first, last = amplitudes[0], amplitudes[-1]
+    grows = last - first > share * first
+    if resting:
+        monotone = all(before < after for before, after in pairwise(amplitudes))
+        return Trend.GROWING if grows and monotone else None
+    largest = max(amplitudes)
+    if largest - min(amplitudes) <= share * largest:
+        return None
+    if grows:
+        return Trend.GROWING
+    return Trend.DECAYING if first - last > share * first else Trend.VARYING

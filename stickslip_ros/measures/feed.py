@@ -1,0 +1,76 @@
+"""The mean feed of a slide that advances on a guide at rest, such as the table of a machine."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from stickslip_ros.arrays import FloatArray
+from stickslip_ros.measures.cycle_measures import LEAST_CYCLES
+from stickslip_ros.measures.noise import rises
+from stickslip_ros.samples import SampleColumns
+from stickslip_ros.stamps import NANOSECONDS
+
+_PASSES = 4
+"""Passes in which the feed is corrected."""
+_BACK_SHARE = 1.1
+"""Largest distance that a cycle covers beside the feed, in advances per cycle; it is less than one
+for a slide that does not go back."""
+
+
+def mean_feed(time: FloatArray, position: FloatArray) -> float | None:
+    """Return the mean velocity of a slide that advances in cycles, m/s; None for other motions.
+
+    It is that over whole cycles: the position less the feed has the same extremes in each of them.
+    A cycle ends where this position falls below its mean by half its standard deviation after it
+    was as far above it. There must be three or more, and they must not go back.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from stickslip_ros.measures.feed import mean_feed
+    >>> time = np.arange(0.0, 5.3, 0.001)
+    >>> round(mean_feed(time, np.floor(time) + np.minimum(5.0 * (time % 1.0), 1.0)), 6)
+    1.0
+    """
+    if len(time) < 2 or not time[-1] > time[0]:
+        return None
+    feed = float((position[-1] - position[0]) / (time[-1] - time[0]))
+    for _ in range(_PASSES):
+        rest = np.copysign(1.0, feed) * (position - feed * time)
+        rest -= rest.mean()
+        falls = rises(-rest, float(rest.std()) / 2.0)
+        if len(falls) <= LEAST_CYCLES:
+            return None
+        parts = np.split(rest, falls)[1:-1]
+        covered = float(np.median([np.ptp(part) for part in parts]))
+        lasting = float(time[falls[-1]] - time[falls[0]]) / len(parts)
+        if covered > _BACK_SHARE * abs(feed) * lasting:
+            return None
+        slopes: list[float] = []
+        for extreme in (np.argmax, np.argmin):
+            rows = falls[:-1] + [int(extreme(part)) for part in parts]
+            at = time[rows] - time[rows].mean()
+            slopes.append(float(at @ rest[rows] / (at @ at)))
+        feed += float(np.copysign(1.0, feed)) * sum(slopes) / 2.0
+    return feed
+
+
+def relative_to_feed(samples: SampleColumns) -> tuple[SampleColumns, float]:
+    """Return samples relative to the mean feed, if there is one, and the feed, m/s; 0 without.
+
+    Position and velocity are less those of the feed, and the guide moves against it as a belt does.
+    """
+    known = samples[samples.is_valid]
+    if not len(known) or known.belt_velocity.any():
+        return samples, 0.0
+    time = (samples.stamp - samples.stamp[0]) / NANOSECONDS
+    feed = mean_feed(time[samples.is_valid], known.position)
+    if feed is None:
+        return samples, 0.0
+    moved = replace(
+        samples,
+        position=samples.position - feed * time,
+        velocity=samples.velocity - feed,
+        belt_velocity=samples.belt_velocity - feed,
+    )
+    return moved, feed

@@ -1,0 +1,231 @@
+"""Cycles and measures of positions with noise as they come, in bounded memory."""
+
+from collections import deque
+from math import inf
+
+import numpy as np
+
+from stickslip_ros.arrays import FloatArray
+from stickslip_ros.measures.cycle_measures import LEAST_CYCLES, Cycle
+from stickslip_ros.measures.noise import (
+    PRECISION,
+    encoder_step,
+    impulses,
+    medians,
+    white_noise,
+)
+from stickslip_ros.measures.noisy_window import REVERSAL, LastCycles, NoisyWindow
+from stickslip_ros.measures.single_cycles import (
+    NoisySamples,
+    Point,
+    cycle_between,
+    fit_reach,
+    reversals,
+    vertex,
+)
+
+_REVERSAL_SHARE = 0.1
+"""Least size of a reversal, as a share of the last cycle."""
+_BATCH = 32
+"""Number of samples after which cycles are looked for; in long ones, after `_LOOK_INTERVAL`."""
+_LOOK_INTERVAL = 512
+"""Number of samples after which the noise is estimated again."""
+_FIRST_LOOK = 128
+"""Number of samples after which the noise is estimated first."""
+_LOOK_LENGTH = 2048
+"""Number of samples from which the noise is estimated."""
+_MOST_SAMPLES = 400_000
+"""Number of samples up to which the cycles of a window are kept."""
+_WITHOUT_CYCLES = 8192
+"""Number of samples that are kept before the first cycle."""
+_MARGIN = 64
+"""Number of samples that are kept before the window, for the fits at its start."""
+_ROUNDING_SHARE = 1e-7
+"""Noise below this share of the motion is rounding, or an imperfection of the estimate."""
+_UNKNOWN = 2
+"""Number of the last samples that may still be impulses."""
+
+
+class _Columns:
+    """Samples as columns that grow at the end and are cut at both ends."""
+
+    def __init__(self) -> None:
+        self._table, self._rows = np.empty((4, 0)), slice(0, 0)
+
+    def __len__(self) -> int:
+        return self._rows.stop - self._rows.start
+
+    @property
+    def samples(self) -> NoisySamples:
+        return NoisySamples(*self._table[:, self._rows])
+
+    def replace_last(self, rows: int, samples: NoisySamples) -> None:
+        """Put samples in place of the last rows."""
+        start, stop = self._rows.start, max(self._rows.stop - rows, self._rows.start)
+        end = stop + len(samples)
+        if end > self._table.shape[1]:
+            table = np.empty((4, 2 * (end - start) + 1024))
+            table[:, : stop - start] = self._table[:, start:stop]
+            self._table, start, stop, end = table, 0, stop - start, end - start
+        self._table[:, stop:end] = list(vars(samples).values())
+        self._rows = slice(start, end)
+
+    def drop_first(self, rows: int) -> None:
+        self._rows = slice(self._rows.start + rows, self._rows.stop)
+
+
+class NoisyCycleMeter:
+    """Measures positions with noise, fed in blocks of samples of any length.
+
+    It keeps a window, the samples of the last cycles at most, and calls functions of it: those of
+    `single_cycles` as cycles end, those of `noise` now and then, and `NoisyWindow.measures` when
+    the measures are asked for.
+
+    The noise is found from the positions. Velocities are used for one purpose: to tell whether they
+    have noise.
+    """
+
+    def __init__(self, window: int) -> None:
+        self._most_cycles = window
+        self.noise = 0.0
+        """Standard deviation of the noise of the positions, m, as far as it is known."""
+        self.noisy = False
+        """Whether positions or velocities have noise."""
+        self.step = 0.0
+        """Step of the positions, m, that they are multiples of; 0 as long as none is found."""
+        self.ends: list[float] = []
+        """Time, s, at which each cycle ended that `feed` returned last."""
+        self._count = 0
+        self._before: LastCycles | None = None
+        self._begin()
+
+    def _begin(self) -> None:
+        self._columns = _Columns()
+        self._cycles: deque[Cycle] = deque(maxlen=self._most_cycles)
+        self._starts: deque[float] = deque(maxlen=self._most_cycles + 1)
+        self._low: tuple[float, Point] | None = None
+        """Time of the lowest sample at the end of the last cycle, and the vertex there."""
+
+    @property
+    def held(self) -> int:
+        """Number of samples that are held."""
+        return len(self._columns)
+
+    def interrupt(self) -> None:
+        """Drop the current cycle: the next sample does not continue the motion so far."""
+        if len(self._cycles) >= (1 if self._before is None else LEAST_CYCLES):
+            # The cycles so far are the window until there are enough others.
+            self._before = self._last
+        self._begin()
+
+    def feed(
+        self, time: FloatArray, position: FloatArray, velocity: FloatArray, belt: FloatArray
+    ) -> list[Cycle]:
+        """Add the samples that follow (s, m, m/s); return the cycles that they complete."""
+        self.ends = []
+        completed: list[Cycle] = []
+        new = NoisySamples(time, position, velocity, belt)
+        while len(new) > 0:
+            due = _BATCH - self._count % _BATCH
+            part, new = new[:due], new[due:]
+            self._count += len(part)
+            self._take(part)
+            if self._count % _LOOK_INTERVAL == 0 or self._count == _FIRST_LOOK:
+                self._look()
+            # Always at the same samples: what is found must not depend on the blocks.
+            if self._count % _BATCH == 0 and self._count >= _FIRST_LOOK:
+                completed += self._advance()
+        return completed
+
+    def window(self, within: float, stick_speed: float, fastest_belt: float) -> NoisyWindow:
+        """Return the window of the last cycles, with these of its fields."""
+        return NoisyWindow(
+            self._last,
+            self._before,
+            most_cycles=self._most_cycles,
+            run=self._count,
+            noise=self.noise,
+            step=self.step,
+            within=within,
+            stick_speed=stick_speed,
+            fastest_belt=fastest_belt,
+        )
+
+    @property
+    def _last(self) -> LastCycles:
+        return LastCycles(self._columns.samples[:-_UNKNOWN], self._cycles, self._starts)
+
+    def _take(self, part: NoisySamples) -> None:
+        """Hold samples without impulses, which those beside them tell."""
+        self._columns.replace_last(0, part)
+        if self.noise > 0.0:
+            last = self._columns.samples[-len(part) - 2 * _UNKNOWN :]
+            found = impulses(last.position, self.noise)
+            if found.any():
+                self._columns.replace_last(len(last), last[~found])
+
+    def _look(self) -> None:
+        """Estimate the noise, and the step of an encoder, from the last samples."""
+        recent = self._columns.samples[:-_UNKNOWN][-_LOOK_LENGTH:]
+        position, belt, count = recent.position, recent.belt, len(recent)
+        if count < 3:
+            return
+        noise, step = white_noise(position), encoder_step(position)
+        moved = float(np.ptp(medians(position)))
+        if noise > max(_ROUNDING_SHARE * moved, PRECISION * float(np.abs(position).max())):
+            self.noise, self.noisy = noise, True
+        if step > 0.0:
+            self.step = min(self.step or inf, step)
+            # Steps that divide the travel of a sample leave no noise where it is looked for. One
+            # step from each sample to the next is a uniform motion, as of a slide that sticks.
+            uniform = np.ptp(position) > (count - 1.5) * step
+            uniform = uniform and float(np.abs(np.diff(position)).max()) < 1.5 * step
+            self.noisy |= self.step > _ROUNDING_SHARE * moved and not uniform
+        fastest = float(np.abs(recent.velocity).max())
+        of_velocity = white_noise(recent.velocity)
+        if of_velocity > max(_ROUNDING_SHARE * fastest, PRECISION * float(np.abs(belt).max())):
+            self.noisy = True
+
+    def _advance(self) -> list[Cycle]:
+        """Return the cycles that the samples since the last one complete."""
+        every, last = self._columns.samples.position, self._last
+        samples = last.samples
+        first = 0 if self._low is None else samples.row(self._low[0])
+        if len(samples) - first > _WITHOUT_CYCLES and self._count % _LOOK_INTERVAL:
+            return []
+        size = 2.0 * self._cycles[-1].amplitude if self._cycles and not last.resting else 0.0
+        least = max(REVERSAL * self.noise, _REVERSAL_SHARE * size)
+        completed: list[Cycle] = []
+        # The median of the last position takes one more.
+        for rows in reversals(every[first:-1], least):
+            high, low = (first + row for row in rows)
+            reach = fit_reach(samples, low, high, self.noise)
+            if low + reach >= len(samples):
+                break  # samples for the fit are missing
+            start, end = self._low, vertex(samples, low, reach)
+            self._low = float(samples.time[low]), end
+            cycle = start and cycle_between(samples, start[1], end, high, self.noise)
+            if start is None or cycle is None:
+                continue
+            if not self._cycles:
+                self._starts.append(start[1].time)
+            self._starts.append(end.time)
+            self._cycles.append(cycle)
+            self.ends.append(end.time)
+            completed.append(cycle)
+        self._trim(samples)
+        return completed
+
+    def _trim(self, samples: NoisySamples) -> None:
+        """Drop the samples before the window."""
+        row = len(samples) - _WITHOUT_CYCLES
+        if self._low is not None:
+            row = samples.row(self._starts[0] if self._starts else self._low[0])
+        row = min(max(row, len(samples) - _MOST_SAMPLES) - _MARGIN, len(samples) - _LOOK_LENGTH)
+        if row <= 0:
+            return
+        self._columns.drop_first(row)
+        while self._starts and self._starts[0] < samples.time[row]:
+            self._starts.popleft()
+            if self._cycles:
+                self._cycles.popleft()

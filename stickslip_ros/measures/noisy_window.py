@@ -1,0 +1,244 @@
+"""The measures of a window of samples with noise, as functions of it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import sqrt
+from typing import NamedTuple
+
+import numpy as np
+
+from stickslip_ros.arrays import FloatArray
+from stickslip_ros.measures.cycle_fit import MeanCycle, fit_mean_cycle
+from stickslip_ros.measures.cycle_measures import (
+    EQUILIBRIUM_SPEED,
+    LEAST_CYCLES,
+    STALE_PERIODS,
+    STEADY_CHANGE_UNDER_NOISE,
+    Cycle,
+    CycleMeans,
+    Measures,
+    Regime,
+    Trend,
+    without_cycles,
+)
+from stickslip_ros.measures.noise import (
+    FEW_SAMPLES,
+    FEWEST_SAMPLES,
+    LEAST_SAMPLES,
+    PRECISION,
+    resolved,
+    strongest_line,
+)
+from stickslip_ros.measures.single_cycles import NoisySamples
+from stickslip_ros.measures.slips import regime_by_slips
+
+REVERSAL = 8.0
+"""Least size of a reversal, in standard deviations of the noise."""
+_FEW_STEPS = 25.0
+"""Amplitude, in steps of an encoder without noise, below which the errors are not known."""
+_SHORTEST, _LONGEST = 128, 2048
+"""Least and largest number of samples of the last part of a run, unless its cycles are longer."""
+_QUANTUM = 1.73
+"""Resolution of an encoder with a noise of half of it, in standard deviations of the two."""
+_SLIP_SHARE = 0.1
+"""Share of the belt speed by which a slide at rest may seem to move."""
+
+
+class LastCycles(NamedTuple):
+    """The last cycles of a part of a run without a gap, with their samples; SI units."""
+
+    samples: NoisySamples
+    cycles: Sequence[Cycle]
+    starts: Sequence[float]
+    """Start of each cycle, and the end of the last, s."""
+
+    @property
+    def resting(self) -> bool:
+        """Whether no reversal has come for several periods."""
+        if not self.cycles or len(self.samples) == 0:
+            return False
+        since = float(self.samples.time[-1]) - self.starts[-1]
+        return since > STALE_PERIODS * self.cycles[-1].period
+
+
+@dataclass(frozen=True)
+class NoisyWindow:
+    """The last cycles of a run, and what is known of it and of its sensor; SI units."""
+
+    last: LastCycles
+    before: LastCycles | None
+    """Those before a gap, which count until there are enough others; None without."""
+    most_cycles: int
+    """Number of cycles that a window has if the run is long enough."""
+    run: int
+    """Number of samples of the run so far."""
+    noise: float
+    """Standard deviation of the noise of the positions, m."""
+    step: float
+    """Step of the positions, m; 0 without one."""
+    within: float
+    """Range in which a slide is held as far as its actuator can, m."""
+    stick_speed: float
+    """Relative speed up to which a slide sticks whose friction has a memory, m/s; else 0."""
+    fastest_belt: float
+    """Largest speed of the belt in the run, m/s."""
+
+    @property
+    def _recent(self) -> NoisySamples:
+        """Samples of the last part of the run, of several cycles if there are any."""
+        samples, cycles, _ = self.last
+        row = len(samples) - min(max(self.run // 4, _SHORTEST), _LONGEST)
+        if cycles and 2.0 * cycles[-1].amplitude > self._resolved:
+            # What seems to be a last cycle may have ended by noise, long after.
+            period = min(cycle.period for cycle in cycles)
+            row = min(row, samples.row(float(samples.time[-1]) - LEAST_CYCLES * period))
+        return samples[max(row, 0) :]
+
+    @property
+    def line(self) -> float | None:
+        """Frequency of the line in the spectrum of the last positions, see `strongest_line`."""
+        position = self._recent.position
+        # An encoder that rounds a steady motion has lines, too.
+        if len(position) < FEWEST_SAMPLES:
+            return None
+        flat = position - np.linspace(position[0], position[-1], len(position))
+        least = max(self._resolved, PRECISION * float(np.abs(position).max()))
+        return strongest_line(flat) if np.ptp(flat) > least else None
+
+    def measures(self, *, quick: bool = False) -> tuple[Measures, MeanCycle | None]:
+        """Return the measures, and the mean cycle if the cycles are alike.
+
+        Where the reversals do not show cycles, a line of the spectrum may. With `quick`, means over
+        single cycles will do.
+        """
+        recent, resting, part = self._recent, self.last.resting, self.last
+        # Few samples after a gap tell less than the cycles before it.
+        enough = len(recent) >= (1 if self.before is None else FEWEST_SAMPLES)
+        if enough and 0.0 < self._resolved >= float(np.ptp(recent.position)):
+            return self._rest(recent, Regime.HELD), None
+        if len(part.cycles) < LEAST_CYCLES and self.before is not None and not resting:
+            part = self.before
+        line = self.line
+        resting |= not part.cycles
+        if line is not None and (resting or line * FEW_SAMPLES > 1.0):
+            return self._by_line(recent, line)
+        if resting:
+            # The second half of what has come since the last cycle.
+            samples = part.samples
+            first = samples.row(part.starts[-1]) if part.cycles else 0
+            return self._rest(samples[(first + len(samples)) // 2 :]), None
+        fit = None if quick else self._fit(part.samples, part.starts)
+        if fit is not None:
+            return self._found(part.samples, fit, fit.noise), fit
+        return self._unlike(part, by_slips=not quick), None
+
+    def _unlike(self, part: LastCycles, *, by_slips: bool) -> Measures:
+        """Return the measures of cycles that are not alike, whose slips tell whether it sticks."""
+        # Half of the cycles: a single one may seem to stick for a moment.
+        means = CycleMeans.over(part.cycles, 0.5)
+        found = self._found(part.samples, means, self.noise)
+        if not by_slips or found.regime not in (Regime.STICK_SLIP, Regime.PURE_SLIP):
+            return found
+        samples = part.samples[part.samples.row(part.starts[0]) :]
+        sign = -1.0 if float(samples.belt[-1]) < 0.0 else 1.0
+        size = max(means.cycle.amplitude / 2.0, REVERSAL * max(self.noise, self.step))
+        regime = regime_by_slips(samples.time, sign * samples.position, size, means.cycle.period)
+        if regime in (None, found.regime):
+            return found
+        share = None if regime is Regime.STICK_SLIP else 0.0
+        return replace(found, regime=regime, stick_fraction=share)
+
+    def _by_line(self, samples: NoisySamples, line: float) -> tuple[Measures, MeanCycle | None]:
+        """Return the measures of the cycles that a line of the spectrum shows."""
+        if line * LEAST_SAMPLES > 1.0:
+            return without_cycles(None, Regime.UNDERSAMPLED), None
+        time = samples.time
+        period = float(time[-1] - time[0]) / (len(time) - 1) / line
+        cycles = min(int(float(time[-1] - time[0]) / period), self.most_cycles)
+        fit = self._fit(samples, (time[-1] - period * np.arange(cycles, -1.0, -1.0)).tolist())
+        if fit is None:
+            few = line * FEW_SAMPLES > 1.0
+            return without_cycles(None, Regime.UNDERSAMPLED if few else None), None
+        return self._found(samples, fit, fit.noise), fit
+
+    def _found(self, samples: NoisySamples, means: CycleMeans, noise: float) -> Measures:
+        """Return the measures of cycles in samples with this noise, m."""
+        enough, size = len(means.amplitudes) >= LEAST_CYCLES, means.cycle.amplitude
+        trend = trend_under_noise(means.amplitudes, self.noise, self.step) if enough else None
+        if noise < self.step / 2.0 and size < _FEW_STEPS * self.step:
+            means = replace(means, errors=None)
+        moving = float(samples.belt[-1]) != 0.0
+        slow = means.cycle.velocity_amplitude < EQUILIBRIUM_SPEED * self.fastest_belt
+        return means.measures(moving and slow, trend is None if enough else None, trend)
+
+    def _rest(self, samples: NoisySamples, regime: Regime = Regime.EQUILIBRIUM) -> Measures:
+        cycles = self.last.cycles
+        needed = self.most_cycles * cycles[-1].period if cycles else 0.0
+        return rest(samples, self.noise, self._resolved, needed, regime)
+
+    def _fit(self, samples: NoisySamples, starts: Sequence[float]) -> MeanCycle | None:
+        if len(starts) <= LEAST_CYCLES:
+            return None
+        part = samples[samples.row(starts[0]) : samples.row(starts[-1])]
+        belt, told = float(np.median(part.belt)), (self.noise, self.step, self.stick_speed)
+        if float(np.ptp(part.belt)) > 1e-6 * abs(belt):
+            return None
+        with np.errstate(over="ignore", invalid="ignore"):  # squares of very large positions
+            return fit_mean_cycle(part.time, part.position, belt, np.array(starts), *told)
+
+    @property
+    def _resolved(self) -> float:
+        """Range of positions, m, within which the sensor or the actuator resolves no motion."""
+        return max(resolved(self.step, self.noise), self.within)
+
+
+def trend_under_noise(amplitudes: FloatArray, noise: float, step: float) -> Trend | None:
+    """Return the change of the amplitude over a window of cycles; None without one.
+
+    The line of least squares through the amplitudes shows growth and decay, their range a change to
+    and fro; half of what is never to be called steady counts, as the estimate has noise, too.
+    """
+    mean = float(np.mean(amplitudes))
+    least = max(STEADY_CHANGE_UNDER_NOISE * mean, _QUANTUM * noise, step)
+    order = np.linspace(-0.5, 0.5, len(amplitudes))
+    change = float(order @ (amplitudes - mean) / (order @ order))
+    if abs(change) > least / 2.0:
+        return Trend.GROWING if change > 0.0 else Trend.DECAYING
+    return Trend.VARYING if float(np.ptp(amplitudes)) > 0.8 * least else None
+
+
+def rest(
+    samples: NoisySamples, noise: float, resolved: float, needed: float, regime: Regime
+) -> Measures:
+    """Return the measures of a motion without cycles, steady once it lasts for `needed` s.
+
+    The amplitude is that of a sine whose variance is what that of the positions exceeds the noise
+    by. A slide that moves on by more than is `resolved`, m, by a line through the positions, or
+    to and fro from sample to sample, has no regime.
+    """
+    none = without_cycles(None, None)
+    if len(samples) < 8:
+        return none
+    time = samples.time - samples.time[0]
+    belt_speed = abs(float(samples.belt[-1]))
+    slope = float(np.polyfit(time, samples.position - samples.position[0], 1)[0])
+    spread = float(np.std(samples.position))
+    far = max(resolved, REVERSAL * noise, PRECISION * abs(samples.position[0]))
+    if abs(slope) > _SLIP_SHARE * belt_speed and abs(slope) * float(time[-1]) > far:
+        return none
+    amplitude = sqrt(2.0 * max(spread**2 - noise**2, 0.0))
+    speed = float(np.std(np.diff(samples.position))) * (len(time) - 1) / max(float(time[-1]), 1e-9)
+    if amplitude > far and speed > _SLIP_SHARE * belt_speed > 0.0:
+        return none
+    at_rest = Cycle(
+        amplitude=amplitude,
+        velocity_amplitude=0.0,
+        midpoint=float(np.mean(samples.position)),
+        period=0.0,
+        frequency=0.0,
+        stick_fraction=0.0 if belt_speed > 0.0 else 1.0,
+    )
+    regime = regime if belt_speed > 0.0 else Regime.STUCK
+    steady = float(time[-1]) * 2.0 >= needed or regime is Regime.HELD or None
+    found = without_cycles(at_rest, regime, steady=steady)
+    return replace(found, velocity_amplitude=None)  # the positions do not tell it

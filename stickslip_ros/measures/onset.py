@@ -1,0 +1,287 @@
+"""The belt speed at which vibration starts, extrapolated from the decay of ring-downs."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import exp, inf, sqrt
+from typing import Annotated, NamedTuple
+
+import numpy as np
+
+from stickslip_ros.arrays import FloatArray
+from stickslip_ros.measures.ring_down import RingDown, ring_downs
+from stickslip_ros.model.friction import Exponential, FrictionLaw, RateState, Stribeck
+from stickslip_ros.quantities import Quantity
+from stickslip_ros.samples import NO_SAMPLES, SampleColumns
+from stickslip_ros.stamps import NANOSECONDS
+from stickslip_ros.text import quantity
+
+_SAME_SPEED, _LEAST_RANGE = 1.005, 1.03
+"""Largest ratio of belt speeds that are one feed; least ratio of the fastest to the slowest."""
+_SYSTEMATIC, _SCATTER = 0.003, 4.0
+"""Systematic error of a decay rate, as a share of it; chi^2 by degrees of freedom up to which decay
+rates count as having larger errors."""
+_INTERVAL, _RISES, _REJECTED = 3.84, 10.8, 0.01
+"""Chi^2 of the ends of a 95 % interval beyond the least, and by which a constant decay must be
+worse (0.1 %); probability below which a family is rejected."""
+_ONSETS, _SHAPES = np.geomspace(0.1, 1.0 - 1e-4, 1000), np.geomspace(0.1, 5.0, 120)
+"""Onsets, and speeds in a friction law, that are tried, in slowest feeds; what is compatible with
+the lowest onset has no lower limit."""
+_WIDE, _AWAY = 0.1, 1.05
+"""Length of an interval, in onsets, from which another run is advised; its feed, in upper limits,
+at least."""
+_FAMILIES: Mapping[str, tuple[FrictionLaw, str, int]] = {
+    "stribeck": (Stribeck(1.0, 0.0, 1.0), "", 2),
+    "exponential, exponent 1": (Exponential(1.0, 0.0), "decay_speed", 3),
+    "exponential, exponent 2": (Exponential(1.0, 0.0, exponent=2.0), "decay_speed", 3),
+    "rate_state": (RateState(1.0, 1.0, 2.0), "", 2),
+}
+"""Families of friction laws: a law, any multiple of which is in it; the constant that may have any
+value; number of constants of the decay rate, of which viscous damping is one."""
+_WINDOW, _LONG = 8, 4
+"""Time that a watch keeps, and length of a ring-down that need not have ended, in its pauses."""
+_MOST_KEPT, _MOST_SAMPLES = 300, 100_000
+"""Number of ring-downs and of samples that it keeps at most."""
+
+
+@dataclass(frozen=True)
+class FeedDecay:
+    """Decay rate and frequency at one belt speed: means of ring-downs, with standard errors; SI."""
+
+    belt_speed: Annotated[float, Quantity("belt speed", "m/s")]
+    decay_rate: Annotated[float, Quantity("decay rate", "1/s")]
+    decay_error: Annotated[float, Quantity("standard error", "1/s")]
+    frequency: Annotated[float, Quantity("frequency", "Hz")]
+    frequency_error: Annotated[float, Quantity("standard error", "Hz")]
+    ring_downs: Annotated[int, Quantity("ring-downs")]
+
+
+class FamilyOnset(NamedTuple):
+    """The fit of one family of friction laws; without one the onset is infinite, m/s.
+
+    A family is rejected where the probability of a chi^2 as large is below 1 %. `decay_rate`
+    returns that at belt speeds, 1/s and m/s.
+    """
+
+    onset_speed: float
+    chi_square: float
+    probability: float
+    rejected: bool
+    decay_rate: Callable[[FloatArray], FloatArray]
+
+
+@dataclass(frozen=True)
+class Onset:
+    """The belt speed at which the equilibrium becomes unstable, and what it was found from."""
+
+    feeds: Sequence[FeedDecay]
+    """Decay by belt speed, in order."""
+    families: Mapping[str, FamilyOnset]
+    """Families of friction that were fitted, by name; empty where nothing can be told."""
+    speed: float | None = None
+    """Onset, m/s: mean of the families that are not rejected, by their likelihood (Akaike 1974)."""
+    lower: float | None = None
+    upper: float | None = None
+    """Ends of the 95 % interval, the union over these families, m/s; there may be only `upper`."""
+    advice: str = ""
+    """What cannot be told, and which run would tell it; empty if there is nothing to say."""
+
+
+def mean_decays(ring_downs: Sequence[RingDown]) -> list[FeedDecay]:
+    """Return the mean decay of ring-downs at equal belt speeds, in order of the belt speed."""
+    groups: list[list[RingDown]] = []
+    for each in sorted(ring_downs, key=lambda found: found.belt_speed):
+        if not groups or each.belt_speed > _SAME_SPEED * groups[-1][0].belt_speed:
+            groups.append([])
+        groups[-1].append(each)
+    found: list[FeedDecay] = []
+    for group in groups:
+        decay = _mean([(each.decay_rate, each.decay_error) for each in group])
+        frequency = _mean([(each.frequency, each.frequency_error) for each in group])
+        speed = float(np.mean([each.belt_speed for each in group]))
+        found.append(FeedDecay(speed, *decay, *frequency, len(group)))
+    return found
+
+
+def _mean(values: Sequence[tuple[float, float]]) -> tuple[float, float]:
+    """Return the weighted mean of values with errors, and its error.
+
+    Equal taps have equal errors of rounding, which no mean reduces: what the values scatter less
+    than by their errors is common to all.
+    """
+    value, error = np.array(values).T
+    weight, count = error**-2.0, len(value)
+    total = float(weight.sum())
+    mean, variance = float(weight @ value) / total, count / total
+    if count < 3:
+        return mean, sqrt(variance)
+    scatter = float(weight @ (value - mean) ** 2) / total * count / (count - 1.0)
+    share = float(weight @ weight) / total**2
+    return mean, sqrt(max(variance - scatter, 0.0) + scatter * share * (1.0 + 2.0 / count))
+
+
+def onset_of(ring_downs: Sequence[RingDown], length: str = "m") -> Onset:
+    """Return the belt speed at which the decay of ring-downs falls to zero.
+
+    A slide of mass m in steady slip decays at the rate (c + F'(v_b))/(2 m), where F is the friction
+    force: each family of laws gives a curve of few constants over the belt speed v_b, which is
+    extrapolated. Of all families that the data do not reject the union of the intervals counts.
+    The ring-downs are of one machine and direction; `length` is the unit of their positions.
+    """
+    feeds = [each for each in mean_decays(ring_downs) if each.decay_rate > 0.0]
+    if not feeds:
+        return Onset(feeds, {}, advice="no ring-down decays: there is nothing to extrapolate")
+    slowest, unit = feeds[0].belt_speed, f"{length}/s"
+    if feeds[-1].belt_speed < _LEAST_RANGE * slowest:
+        run = f"a run at another feed, such as {quantity(0.9 * slowest, unit)}"
+        return Onset(feeds, {}, advice=f"one feed tells no onset: {run}, would tell it")
+    values = [(each.belt_speed, each.decay_rate, each.decay_error) for each in feeds]
+    speed, rate, error = np.array(values).T
+    weight = 1.0 / (error**2 + (_SYSTEMATIC * rate) ** 2)
+    constant = float(weight @ (rate - weight @ rate / weight.sum()) ** 2)
+    fits = {name: _fit(speed, rate, weight, *family) for name, family in _FAMILIES.items()}
+    families = {name: found for name, (found, _) in fits.items()}
+    least = min(each.chi_square for each in families.values())
+    if constant - least < _RISES:
+        runs = f"runs below {quantity(slowest, unit)}, nearer the onset, or larger taps"
+        advice = f"the decay does not rise with the feed by more than its errors: {runs} would tell"
+        return Onset(feeds, {}, advice=advice)
+    kept = [name for name, each in families.items() if not each.rejected]
+    excess = least / max(len(feeds) - 3, 1)
+    if not kept and excess < _SCATTER:
+        factor = 1.1 * sqrt(max(excess, 1.0))
+        wider = [replace(each, decay_error=factor * each.decay_error) for each in ring_downs]
+        return onset_of(wider, length)
+    if not kept:
+        runs = "runs at the same load, temperature and position"
+        advice = f"no family of friction fits the decay: {runs} would tell whether friction changes"
+        return Onset(feeds, families, advice=advice)
+    possible = [fits[name][1] <= families[name].chi_square + _INTERVAL for name in kept]
+    rows = np.flatnonzero(np.any(possible, axis=0))
+    # The ends are between two of the speeds that are tried.
+    ends = max(rows[0] - 1, 0), min(rows[-1] + 1, len(_ONSETS) - 1)
+    lower, upper = (float(_ONSETS[row] * slowest) for row in ends)
+    following = max(_AWAY * upper, (upper + slowest) / 2.0)
+    near = following > 0.97 * slowest
+    what, at = ("more or larger taps", slowest) if near else ("a run", following)
+    run = f"{what} at {quantity(at, unit)} would tell"
+    if rows[0] == 0:
+        advice = f"only an upper limit of the onset is known: {run} the onset"
+        return Onset(feeds, families, upper=upper, advice=advice)
+    likely = [exp((least - families[n].chi_square) / 2.0 - _FAMILIES[n][2]) for n in kept]
+    weights = np.array(likely)
+    found = float(weights @ [families[name].onset_speed for name in kept] / weights.sum())
+    advice = f"{run} it more exactly" if upper - lower > _WIDE * found else ""
+    return Onset(feeds, families, found, lower, upper, advice)
+
+
+def _fit(
+    speed: FloatArray,
+    rate: FloatArray,
+    weight: FloatArray,
+    law: FrictionLaw,
+    shape: str,
+    count: int,
+) -> tuple[FamilyOnset, FloatArray]:
+    """Return the best fit of a family, and the least chi^2 for each onset.
+
+    The decay rate is B (F'(v) - F'(onset)) with B > 0. F' must rise from the onset on, which is the
+    highest belt speed of zero decay.
+    """
+    from scipy.special import gammaincc  # takes long to import
+
+    onsets, shapes = _ONSETS * speed[0], _SHAPES[:, np.newaxis] * speed[0]
+    laws = replace(law, **{shape: shapes}) if shape else law
+    at_speed, at_onset = (np.atleast_2d(_slope(laws, each)) for each in (speed, onsets))
+    later = np.minimum.accumulate(at_onset[:, ::-1], axis=1)[:, ::-1]
+    allowed = (at_onset <= later) & (at_onset < at_speed.min(axis=1, keepdims=True))
+    own, onset = at_speed - at_speed[:, :1], at_onset - at_speed[:, :1]
+    squares = (own**2 @ weight)[:, np.newaxis] - 2.0 * onset * (own @ weight)[:, np.newaxis]
+    squares += onset**2 * float(weight.sum())
+    projected = (own @ (weight * rate))[:, np.newaxis] - onset * float(weight @ rate)
+    usable = allowed & (projected > 0.0) & (squares > 0.0)
+    factor = np.divide(projected, squares, out=np.zeros_like(squares), where=usable)
+    left = np.maximum(float(weight @ rate**2) - factor * projected, 0.0)
+    chi_square = np.where(usable, left, inf)
+    row, column = np.unravel_index(int(np.argmin(chi_square)), chi_square.shape)
+    least, size = float(chi_square[row, column]), float(factor[row, column])
+    best, zero = replace(law, **{shape: shapes[row]}) if shape else law, onsets[column : column + 1]
+    degrees, known = len(rate) - count, least < inf
+    chance = float(gammaincc(degrees / 2.0, least / 2.0)) if degrees > 0 else float(known)
+
+    def decay_rate(belt_speed: FloatArray) -> FloatArray:
+        return size * (_slope(best, belt_speed) - _slope(best, zero))
+
+    at = float(zero[0]) if known else inf
+    return FamilyOnset(at, least, chance, chance < _REJECTED, decay_rate), chi_square.min(axis=0)
+
+
+def _slope(law: FrictionLaw, speed: FloatArray) -> FloatArray:
+    """Return the change of steady friction with the belt speed, s/m."""
+    step = 1e-4 * speed
+    found: FloatArray = (law.at_rest(speed + step) - law.at_rest(speed - step)) / (2.0 * step)
+    return found
+
+
+class OnsetWatch:
+    """Follows the onset of a running machine by the ring-downs in its last seconds.
+
+    The pause between its looks, 1 s, must not be shorter than the period of the vibration.
+    """
+
+    def __init__(self) -> None:
+        self.ring_downs: list[RingDown] = []
+        self.onset = Onset([], {})
+        self.pause = 1.0
+        """Time between two looks, s."""
+        self._kept, self._looks, self._after = NO_SAMPLES, 0, -inf
+
+    def feed(self, samples: SampleColumns) -> list[RingDown]:
+        """Add samples, in blocks of any length; return the ring-downs that have ended with them."""
+        samples = samples[samples.is_valid]
+        looks = np.append(self._looks, samples.stamp // round(self.pause * NANOSECONDS))
+        found: list[RingDown] = []
+        first, self._looks = 0, int(looks[-1])
+        for edge in np.flatnonzero(np.diff(looks)).tolist():
+            self._kept = self._kept.followed_by(samples[first:edge])
+            found, first = [*found, *self._look()], edge
+        self._kept = self._kept.followed_by(samples[first:])[-_MOST_SAMPLES:]
+        if found:
+            self.ring_downs = [*self.ring_downs, *found][-_MOST_KEPT:]
+            self.onset = onset_of(self.ring_downs)
+        return found
+
+    def _look(self) -> list[RingDown]:
+        kept = self._kept
+        steps = np.diff(kept.stamp)
+        usual = float(np.median(steps)) if len(steps) else 0.0
+        gaps = np.flatnonzero((steps <= 0) | (steps > 1.5 * usual))
+        kept = kept[int(gaps[-1]) + 1 :] if len(gaps) else kept
+        if usual <= 0.0:
+            return []
+        first = kept.stamp[-1] - round(_WINDOW * self.pause * NANOSECONDS)
+        self._kept = kept = kept[kept.stamp > first]
+        origin, now = kept.stamp[[0, -1]] / NANOSECONDS
+        period = usual / NANOSECONDS
+        after = self._after - origin if self._after < now else -inf  # a clock may be set back
+        seen = ring_downs(kept.position, kept.belt_velocity, period, after)
+        ended = now - origin - 2.0 * period
+        long = _LONG * self.pause
+        found = [each for each in seen if each.end < ended or each.end - each.start > long]
+        self._after = origin + found[-1].end if found else self._after
+        return found
+
+    def status(self, margin: float) -> tuple[str, bool]:
+        """Return decay, onset and feed as text, and whether the feed is too near the onset.
+
+        It is unless a share `margin` of the feed is above the upper limit of the onset.
+        """
+        if not self.ring_downs:
+            return "", False
+        own, feed = self.onset, float(abs(self._kept.belt_velocity[-1]))
+        text = f"decay {self.ring_downs[-1].decay_rate:.2g} 1/s, "
+        if own.speed and own.lower and own.upper:
+            half = 500.0 * (own.upper - own.lower)
+            text += f"onset {1e3 * own.speed:.3g} +- {half:.2g} mm/s, "
+        elif own.upper:
+            text += f"onset below {1e3 * own.upper:.3g} mm/s, "
+        return f"{text}feed {1e3 * feed:.3g} mm/s", (own.upper or 0.0) > (1.0 - margin) * feed

@@ -1,0 +1,304 @@
+"""The measures of a motion from its samples."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import inf
+from typing import Protocol
+
+import numpy as np
+
+from stickslip_ros.arrays import BoolArray, FloatArray
+from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.measures.breakpoints import (
+    STICK_SHARE,
+    Breakpoints,
+    breakpoints_from_samples,
+)
+from stickslip_ros.measures.cycle_fit import MeanCycle
+from stickslip_ros.measures.cycle_measures import (
+    UNBOUNDED_BELT_SPEEDS,
+    Cycle,
+    Measures,
+    Regime,
+    with_drift,
+    without_cycles,
+)
+from stickslip_ros.measures.cycle_meter import CycleMeter
+from stickslip_ros.measures.drift import Drift
+from stickslip_ros.measures.noise import FEW_SAMPLES, LEAST_SAMPLES
+from stickslip_ros.measures.noisy_meter import NoisyCycleMeter
+from stickslip_ros.measures.sample_assumptions import EXACT, SampleAssumptions
+from stickslip_ros.measures.sampling_grid import LONGEST_GAP, SamplingGrid
+from stickslip_ros.samples import SampleColumns
+from stickslip_ros.stamps import NANOSECONDS
+from stickslip_ros.text import quantity
+
+_LASTING_SAMPLES = 4
+"""Number of fast samples in one direction that are no impulse of a noisy record."""
+_LEAST_ERRORS, _LEAST_SHARE = 4.0, 1e-3
+"""Difference between the velocities of stick and belt, in standard errors and in belt speeds, above
+which they disagree."""
+
+
+NOT_JUDGED = "belt, load, disturbance or reference vary: a drift is not judged"
+"""Note on measures that do not say whether they drift."""
+
+
+@dataclass(frozen=True)
+class MeasuredMotion:
+    """Breakpoints that continue a motion, and the cycles measured with them."""
+
+    breakpoints: Breakpoints
+    belt_velocity: FloatArray
+    """Velocity of the belt at each breakpoint, m/s."""
+    cycles: Sequence[Cycle]
+    """Cycles completed by these breakpoints."""
+    cycle_ends: Sequence[float]
+    """Time at which each of these cycles ended, s."""
+    longest_step: float = inf
+    """Longest time between two breakpoints, s, over which the motion between them is known."""
+
+
+class MotionObserver(Protocol):
+    """Receives a motion as it is measured; times in s from the start of the run, SI units."""
+
+    def take_motion(self, motion: MeasuredMotion) -> None:
+        """Receive the motion that follows."""
+        ...
+
+
+class SampleMeter:
+    """Measures a motion from its samples, fed in blocks of columns of any length.
+
+    A gap of a whole number of sample periods, up to ten million, is a loss. Any other gap, and a
+    stamp that goes back, starts a new segment and is not a loss. Stamps on no grid, for example
+    those read from a clock, are measured, too: then a gap of up to ten periods is a loss, and a
+    longer one starts a new segment.
+    """
+
+    def __init__(
+        self,
+        window: int,
+        observer: MotionObserver | None = None,
+        *,
+        reading: SampleAssumptions = EXACT,
+    ) -> None:
+        """Average over the last `window` cycles at most; an `observer` receives the motion.
+
+        `reading` says how the samples are to be read, and may change as more is known of them.
+        Raises InvalidInputError if its stick speed is negative or not finite.
+        """
+        speed = reading.stick_speed
+        if speed is not None and not 0.0 <= speed < inf:
+            raise InvalidInputError(
+                f"stick_speed = {speed} is invalid: must be finite and at least 0 (m/s)"
+            )
+        self.reading = reading
+        self.origin = 0
+        """Stamp of time zero for the observer, ns."""
+        self.samples = 0
+        """Number of samples so far."""
+        self.steps_back = 0
+        """Number of samples whose stamp is not later than the previous one."""
+        self.mean_cycle: MeanCycle | None = None
+        """Fit of the last `measures`; None for exact samples and cycles that are not alike."""
+        self._observer = observer
+        self._grid = SamplingGrid()
+        self._meter = CycleMeter(window)
+        self._noisy_meter = NoisyCycleMeter(window)
+        self.drift = Drift()
+        """Trends of the run; those of the control force are for its user to feed."""
+        self._last: SampleColumns | None = None
+        self._elapsed = 0
+        self._fastest_belt = self._fastest_slip = self._fastest = 0.0
+        self._belt_varies = False
+        self._per_cycle = inf  # samples of the last cycle of exact samples
+        # Highest speed above the limit at its sample: a belt that starts to move is slow at first.
+        self._unbounded_speed = 0.0
+
+    def feed(self, samples: SampleColumns) -> list[Cycle]:
+        """Add the samples that follow; return the cycles completed by them.
+
+        Samples that are not valid, see `SampleColumns.is_valid`, count as lost.
+        """
+        is_valid = samples.is_valid
+        if not is_valid.all():
+            samples = samples[is_valid]
+        self.samples += len(samples)
+        if self._last is not None:
+            samples = self._last.followed_by(samples)
+        if len(samples) == 0:
+            return []
+        self.steps_back += np.count_nonzero(samples.stamp[1:] <= samples.stamp[:-1])
+        cycles: list[Cycle] = []
+        segments = self._grid.segments(samples.stamp)
+        ends = [*(segment.start for segment in segments[1:]), len(samples)]
+        for (start, jittered), end in zip(segments, ends, strict=True):
+            segment = samples[start:end]
+            self._look_for_unbounded(segment)
+            if len(segment) == 1 and end < len(samples):
+                continue  # a single sample is no motion, and there may be very many of them
+            if start > 0:
+                self._meter.interrupt()
+                self._noisy_meter.interrupt()
+                self._last = None
+            cycles += self._feed_segment(segment, jittered)
+        self._last = samples[-1:]
+        return cycles
+
+    @property
+    def lost_samples(self) -> int:
+        """Number of missing samples, from the stamps."""
+        return self._grid.lost
+
+    @property
+    def duration(self) -> float:
+        """Simulated time covered, s."""
+        return self._elapsed * 1e-9
+
+    @property
+    def noisy(self) -> bool:
+        """Whether the samples have noise, as far as it is known."""
+        given = self.reading.noisy
+        return self._noisy_meter.noisy if given is None else given
+
+    @property
+    def position_noise(self) -> float | None:
+        """Standard deviation of the noise of the positions, m; None for exact samples."""
+        return self._noisy_meter.noise if self.noisy else None
+
+    @property
+    def held(self) -> int:
+        """Number of samples that are held for the fits under noise."""
+        return self._noisy_meter.held
+
+    def measures(self, *, quick: bool = False) -> Measures:
+        """Return the means over the last whole cycles.
+
+        With `quick`, cycles under noise are measured one by one instead of together, which takes a
+        thousandth of the time and is less accurate.
+        """
+        limit = UNBOUNDED_BELT_SPEEDS * self._fastest_belt
+        # The last sample of a plant whose motion diverges has just that speed.
+        ended = self._fastest >= (1.0 - 1e-9) * self.reading.unbounded_speed
+        unbounded = ended or self._unbounded_speed > limit
+        self._meter.unbounded = unbounded
+        self._meter.within = within = self.reading.within
+        window = self._noisy_meter.window(within, self._stick_speed, self._fastest_belt)
+        few = not self.noisy and self._per_cycle < FEW_SAMPLES and window.line
+        self.mean_cycle = None
+        if unbounded or not (self.noisy or few):
+            found = self._meter.measures()
+        elif few and self._per_cycle < LEAST_SAMPLES:
+            found = without_cycles(None, Regime.UNDERSAMPLED)
+        else:
+            found, self.mean_cycle = window.measures(quick=quick)
+        self.drift.resolution = self._noisy_meter.step
+        self.drift.judged = not (self.reading.varies or self._belt_varies)
+        return with_drift(found, self.drift)
+
+    def notes(self, measures: Measures) -> list[str]:
+        """Return sentences that say why these measures, its last ones, may be wrong."""
+        notes: list[str] = []
+        if self.steps_back:
+            notes.append(
+                f"the stamp of {self.steps_back} of {self.samples} samples is not later than "
+                "the one before, and the motion is cut there: the plant was restarted, or the "
+                "samples of several plants are mixed"
+            )
+        step = self.drift.resolution
+        if step and measures.amplitude and measures.cycles > 2 and measures.errors is None:
+            notes.append(
+                f"the amplitude is only {measures.amplitude / step:.2g} steps of the encoder: the "
+                "standard errors are not known"
+            )
+        if measures.stick_fraction is None and measures.regime is Regime.STICK_SLIP:
+            notes.append(
+                "the cycles are not alike: by their slips the slide sticks, for how long is not "
+                "known from single cycles (see --slips)"
+            )
+        mean, belt = self.mean_cycle, self._last.belt_velocity[-1] if self._last else 0.0
+        if mean is not None and mean.stick_velocity is not None and not self._stick_speed:
+            velocity, error = mean.stick_velocity
+            if abs(velocity - belt) > _LEAST_ERRORS * error + _LEAST_SHARE * abs(belt):
+                notes.append(
+                    f"the slide sticks at {quantity(velocity, 'm/s')} (standard error "
+                    f"{quantity(error, 'm/s')}), not at the speed of the belt, "
+                    f"{quantity(belt, 'm/s')}: one of them has another scale, or the positions "
+                    "drift; the stick is that at the former"
+                )
+        return notes if self.drift.judged else [*notes, NOT_JUDGED]
+
+    def _feed_segment(self, samples: SampleColumns, jittered: bool) -> list[Cycle]:
+        stamp = samples.stamp
+        time = (stamp - stamp[0] + float(self._elapsed)) * 1e-9
+        self._elapsed += int(stamp[-1] - stamp[0])
+        new, belt = slice(0 if self._last is None else 1, None), samples.belt_velocity
+        self.drift.position.feed(time[new], samples.position[new])
+        slip = np.abs(samples.velocity - belt)
+        self._fastest_slip = max(self._fastest_slip, float(slip.max()))
+        given, breakpoints, cycles = self.reading.noisy, None, list[Cycle]()
+        if not given or self._observer is not None:
+            with np.errstate(over="ignore", invalid="ignore"):
+                breakpoints = breakpoints_from_samples(
+                    time,
+                    samples.position,
+                    samples.velocity,
+                    belt,
+                    stick_speed=self._stick_speed,
+                    exact_times=not jittered,
+                )
+            if self._last is not None:
+                breakpoints = breakpoints[1:]  # the first sample was fed with the previous block
+            cycles = self._meter.feed(breakpoints, float(belt[-1]), self._fastest_belt)
+            if cycles and len(time) > 1:
+                self._per_cycle = cycles[-1].period / float(np.median(np.diff(time)))
+        if given is not False or self._per_cycle < FEW_SAMPLES:
+            under_noise = self._noisy_meter.feed(
+                time[new], samples.position[new], samples.velocity[new], belt[new]
+            )
+            cycles = under_noise if self.noisy else cycles
+        ends = (self._noisy_meter if self.noisy else self._meter).ends
+        self.drift.feed_cycles(ends, cycles)
+        if self._observer is not None and breakpoints is not None:
+            observed = (stamp - self.origin) / NANOSECONDS
+            # Rounding may put a breakpoint after the last sample.
+            rows = np.minimum(np.searchsorted(time, breakpoints.time), len(time) - 1)
+            known = LONGEST_GAP * float(np.median(np.diff(observed))) if len(observed) > 1 else inf
+            self._observer.take_motion(
+                MeasuredMotion(
+                    replace(breakpoints, time=np.interp(breakpoints.time, time, observed)),
+                    belt[rows],
+                    cycles,
+                    (np.array(ends) + (observed[0] - time[0])).tolist(),
+                    known,
+                )
+            )
+        return cycles
+
+    @property
+    def _stick_speed(self) -> float:
+        given = self.reading.stick_speed
+        return STICK_SHARE * (self._fastest_belt or self._fastest_slip) if given is None else given
+
+    def _look_for_unbounded(self, samples: SampleColumns) -> None:
+        belt_speed = np.abs(samples.belt_velocity)
+        self._belt_varies |= bool(np.ptp(belt_speed) > 1e-6 * belt_speed[0])
+        np.maximum.accumulate(np.maximum(belt_speed, self._fastest_belt), out=belt_speed)
+        self._fastest_belt = float(belt_speed[-1])
+        speed = np.abs(samples.velocity)
+        self._fastest = max(self._fastest, float(speed.max()))
+        fast = (speed > UNBOUNDED_BELT_SPEEDS * belt_speed) & (belt_speed > 0.0)
+        if self.noisy:
+            fast &= _lasting(fast, np.sign(samples.velocity))
+        if fast.any():
+            self._unbounded_speed = max(self._unbounded_speed, float(speed[fast].max()))
+
+
+def _lasting(fast: BoolArray, direction: FloatArray) -> BoolArray:
+    """Return which fast samples end several fast ones in one direction: impulses go back."""
+    lasting = fast.copy()
+    for lag in range(1, _LASTING_SAMPLES):
+        lasting[lag:] &= fast[:-lag] & (direction[lag:] == direction[:-lag])
+        lasting[:lag] = False
+    return lasting

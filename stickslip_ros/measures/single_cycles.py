@@ -1,0 +1,166 @@
+"""Single cycles of positions with noise: reversals, and what is measured between them."""
+
+from dataclasses import dataclass
+from math import isfinite, nan, pi, sqrt
+from typing import NamedTuple
+
+import numpy as np
+
+from stickslip_ros.arrays import FloatArray, Table
+from stickslip_ros.measures.cycle_measures import Cycle
+from stickslip_ros.measures.noise import medians
+
+_PASSING_SHARE = 1.15
+"""Share of the belt speed beyond which a slide has passed the belt; calibrations err by less."""
+_LEAST_STICK = 0.03
+"""Stick fraction up to which a single cycle counts as one without a stick."""
+
+
+@dataclass
+class NoisySamples(Table):
+    """Columns of samples without impulses; SI units."""
+
+    time: FloatArray
+    position: FloatArray
+    velocity: FloatArray
+    belt: FloatArray
+
+    def row(self, time: float) -> int:
+        """Return the first row that is not earlier than a time, s."""
+        return int(np.searchsorted(self.time, time))
+
+
+class Point(NamedTuple):
+    """A position at an instant."""
+
+    time: float
+    position: float
+
+
+def reversals(position: FloatArray, least: float) -> list[tuple[int, int]]:
+    """Return the rows of each highest position and of the lowest after it, by their way back.
+
+    An extreme is one from which the positions go back by more than `least`; what goes back by less
+    is noise. They are the peaks with this prominence of `scipy.signal.find_peaks`, of medians over
+    three positions, in which impulses do not count; the start counts as a lowest position, and the
+    last position only for the median beside it.
+    """
+    course, rows = medians(position)[:-1], [0]
+    while True:
+        rest = course[rows[-1] :]
+        back = np.maximum.accumulate(rest) - rest > least
+        if not back.any():
+            return list(zip(rows[1::2], rows[2::2], strict=False))
+        rows.append(rows[-1] + int(np.argmax(rest[: int(np.argmax(back))])))
+        course = -course
+
+
+def fit_reach(samples: NoisySamples, low: int, high: int, noise: float) -> int:
+    """Return the number of samples on each side of an extreme to which a parabola is fitted.
+
+    The rows are those of a lowest and of a highest point. The reach grows with the fifth root of
+    the noise, where the curve's departure from a parabola and the noise err alike.
+    """
+    size = abs(float(samples.position[high] - samples.position[low]))
+    share = np.clip(1.2 * (2.0 * noise / size) ** 0.2, 0.1, 0.6) if size > 0.0 else 0.1
+    return max(int(share * abs(high - low) / pi), 2)
+
+
+def vertex(samples: NoisySamples, at: int, reach: int) -> Point:
+    """Return the highest or lowest point near a row, of the parabola through `reach` beside it."""
+    rows = slice(max(at - reach, 0), at + reach + 1)
+    time, position = samples.time[rows], samples.position[rows]
+    centre, scale = float(samples.time[at]), float(time[-1] - time[0])
+    if len(time) < 5 or scale <= 0.0:
+        return Point(centre, float(samples.position[at]))
+    u = (time - centre) / scale
+    base = float(position[0])
+    powers = np.array([u * u, u, np.ones(len(u))]).T  # np.polyfit takes three times as long
+    bend, slope, level = np.linalg.lstsq(powers, position - base, rcond=None)[0].tolist()
+    if bend == 0.0:
+        return Point(centre, float(samples.position[at]))
+    at_vertex = float(np.clip(-slope / (2.0 * bend), u[0], u[-1]))
+    height = float(level + at_vertex * (slope + at_vertex * bend))
+    return Point(centre + at_vertex * scale, base + height)
+
+
+def cycle_between(
+    samples: NoisySamples, start: Point, end: Point, high: int, noise: float
+) -> Cycle | None:
+    """Return the cycle between two lowest points, with its highest sample at the row `high`.
+
+    Displacements are those of the fitted extremes; velocities, and the stick by them, are slopes of
+    parabolas through as many samples (Savitzky and Golay, 1964). None without a period.
+    """
+    period = end.time - start.time
+    if period <= 0.0:
+        return None
+    first, last = samples.row(start.time), samples.row(end.time)
+    lowest = (start.position + end.position) / 2.0
+    reach = fit_reach(samples, first, high, noise)
+    highest = vertex(samples, high, reach).position
+    around = samples[max(first - reach, 0) : last + reach]
+    slowest, fastest, stick_time = _velocities(around, reach, noise)
+    return Cycle(
+        amplitude=(highest - lowest) / 2.0,
+        velocity_amplitude=(fastest - slowest) / 2.0,
+        midpoint=(highest + lowest) / 2.0,
+        period=period,
+        frequency=1.0 / period,
+        stick_fraction=stick_time / period if stick_time > _LEAST_STICK * period else 0.0,
+    )
+
+
+def _velocities(samples: NoisySamples, reach: int, noise: float) -> tuple[float, float, float]:
+    """Return lowest and highest velocity, m/s, of one cycle, and its stick time, s."""
+    time, position = samples.time, samples.position
+    if len(time) < 2 * reach + 3:
+        if len(time) == 0:
+            return 0.0, 0.0, 0.0
+        return float(samples.velocity.min()), float(samples.velocity.max()), 0.0
+    # The slope of the parabola through the samples within reach.
+    lags = np.arange(-reach, reach + 1)
+    step = float(time[-1] - time[0]) / (len(time) - 1)
+    slopes = np.convolve(position, -lags / (lags @ lags), "valid") / step
+    at = time[reach : len(time) - reach]
+    belt = float(np.median(samples.belt))
+    sign = -1.0 if belt < 0.0 else 1.0
+    error = noise / (step * sqrt(lags @ lags))
+    stick_time = _stick_time(at, sign * slopes, abs(belt), error)
+    return float(slopes.min()), float(slopes.max()), stick_time
+
+
+def _stick_time(time: FloatArray, velocity: FloatArray, belt_speed: float, error: float) -> float:
+    """Return for how long the velocity is that of the belt, s, from crossings below it.
+
+    The relative speed is linear in time before the landing and quadratic after the departure: the
+    edges follow from the crossings of two thresholds each. `error` is the standard error of the
+    velocities.
+    """
+    margin = max(0.1 * belt_speed, 4.0 * error)
+    if 4.0 * margin >= belt_speed + abs(float(velocity.min())):
+        return 0.0
+    # A slide that passes the belt and moves on does not stick.
+    riding = np.flatnonzero(np.abs(velocity - belt_speed) < margin)
+    highest = float(velocity.max())
+    near = belt_speed - margin / 2.0 <= highest <= _PASSING_SHARE * belt_speed + 2.0 * error
+    if not near or len(riding) == 0:
+        return 0.0
+    first, last = int(riding[0]), int(riding[-1])
+    before = time[: first + 1], velocity[: first + 1]
+    after = time[last:][::-1], velocity[last:][::-1]
+    landed, landing, departing, departed = (
+        _rise(*part, belt_speed - margins * margin)
+        for part, margins in ((before, 1.0), (before, 2.0), (after, 1.0), (after, 4.0))
+    )
+    stick_time = (2.0 * departing - departed) - (2.0 * landed - landing)
+    return max(stick_time, 0.0) if isfinite(stick_time) else 0.0
+
+
+def _rise(time: FloatArray, velocity: FloatArray, threshold: float) -> float:
+    """Return when the velocity last rises through a threshold; NaN where it does not."""
+    rows = np.flatnonzero(velocity[:-1] < threshold)
+    if len(rows) == 0:
+        return nan
+    pair = slice(int(rows[-1]), int(rows[-1]) + 2)
+    return float(np.interp(threshold, velocity[pair], time[pair]))

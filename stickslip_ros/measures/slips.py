@@ -1,0 +1,251 @@
+"""Slip by slip: drops of a position that sticks and slips, for cycles that are not alike."""
+
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import isfinite, nan
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from stickslip_ros.arrays import FloatArray
+from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.measures.cycle_measures import Regime
+from stickslip_ros.measures.drift import fit_line
+
+_MEDIAN = 5
+"""Number of samples of the median that suppresses impulses."""
+_STICKING_RATIO = 2.5
+"""Time from a slip to the next, in slip times, from which a motion sticks; in a sine it is two."""
+_LEAST_SAMPLES = 8
+"""Number of samples for the fit of a stick."""
+_PART = 4096
+"""Number of samples that are searched at once."""
+_MOST_SAMPLES, _MOST_SLIPS = 2_000_000, 100_000
+"""Numbers of samples and of slips that are kept."""
+_QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
+
+
+class Slip(NamedTuple):
+    """One stick and the slip that ends it."""
+
+    time: float
+    """Start of the slip, a tenth of the drop, s."""
+    stick_time: float
+    """Duration of the stick before, s; NaN where it is not recorded as a whole."""
+    drop: float
+    """Displacement by which the slide goes back, m."""
+    slip_time: float
+    """Duration of the slip, s."""
+    stick_velocity: float
+    """Velocity during the first half of the stick, m/s, by a straight line."""
+    stick_velocity_error: float
+    """Its standard error, m/s."""
+
+
+@dataclass(frozen=True)
+class SlipThreshold:
+    """Least size of a slip of a slide that sticks and slips.
+
+    Parameters
+    ----------
+    drop : float
+        Displacement, m, by which the slide goes back by more.
+    within : float
+        Time, s, in which it does.
+
+    Raises
+    ------
+    InvalidInputError
+        If one of them is not above 0 and finite.
+
+    Examples
+    --------
+    A slip of more than 0.1 mm within 50 ms:
+
+    >>> from stickslip_ros.measures.slips import SlipThreshold
+    >>> SlipThreshold(1e-4, within=0.05)
+    SlipThreshold(drop=0.0001, within=0.05)
+    """
+
+    drop: float
+    within: float = 0.1
+
+    def __post_init__(self) -> None:
+        for name, value, unit in (("drop", self.drop, "m"), ("within", self.within, "s")):
+            if not 0.0 < value < float("inf"):
+                raise InvalidInputError(f"{name} = {value} is invalid: must be above 0 ({unit})")
+
+
+def slips_in(
+    time: FloatArray, position: FloatArray, drop: float, span: int, landing: int | None = None
+) -> list[tuple[Slip, int]]:
+    """Return the slips that positions (m) at times (s) complete, and the row at which each ends.
+
+    A slip is a drop of more than `drop` (m) within `span` samples, of medians over five samples. It
+    ends at the lowest position before a rise by half of it, or before `span` samples without a
+    lower one. Its duration is that from a tenth to nine tenths of the drop, the transition duration
+    of IEEE Std 181.
+
+    They are looked for from the `landing` on, the row at which a stick begins; without one, from
+    the start on, and when the first stick began is not known.
+    """
+    from scipy.ndimage import maximum_filter1d, median_filter  # takes long to import
+
+    # The last medians are not known yet.
+    smooth = median_filter(position, _MEDIAN, mode="nearest")[: -(_MEDIAN // 2)]
+    before = maximum_filter1d(smooth, span + 1, origin=span // 2, mode="nearest")
+    found: list[tuple[Slip, int]] = []
+    while True:
+        begin = landing or 0
+        highest = before[begin:].copy()
+        since = smooth[begin : begin + span]
+        highest[: len(since)] = np.maximum.accumulate(since)
+        low = smooth[begin:] < highest - drop
+        if not low.any():
+            return found
+        start = begin + int(np.argmax(low))
+        fall = smooth[start:]
+        lowest = np.minimum.accumulate(fall)
+        rows = np.arange(len(fall))
+        last = np.maximum.accumulate(np.where(fall <= lowest, rows, 0))
+        first = np.maximum.accumulate(np.where(np.diff(lowest, prepend=np.inf) < 0.0, rows, 0))
+        rests = last - first > span  # a slide on a guide at rest does not move at all
+        over = rests | (fall > lowest + drop / 2.0) | (rows - last > span)
+        if not over.any():
+            return found
+        end = int(np.argmax(over))
+        bottom = start + int(first[end] if rests[end] else last[end])
+        top = max(start - span, begin)
+        top += int(np.argmax(smooth[top : start + 1]))
+        found.append((_slip(time, smooth, top, bottom, landing), bottom))
+        landing = bottom
+
+
+def _slip(time: FloatArray, smooth: FloatArray, top: int, bottom: int, landing: int | None) -> Slip:
+    """Return the slip between two rows, with the stick since the landing if it is long enough."""
+    tenth = (smooth[top] - smooth[bottom]) / 10.0
+    rows = smooth[top : bottom + 1]
+    start = top + int(np.flatnonzero(rows >= smooth[top] - tenth)[-1])
+    end = top + int(np.flatnonzero(rows <= smooth[bottom] + tenth)[0])
+    stick_time = slope = error = nan
+    if landing is not None and start - landing >= _LEAST_SAMPLES:
+        stick_time = float(time[start] - time[landing])
+        # Before a slip the contact creeps.
+        half = slice(landing, (landing + start) // 2 + 1)
+        slope, error = fit_line(time[half] - float(time[half].mean()), smooth[half])
+    return Slip(
+        time=float(time[start]),
+        stick_time=stick_time,
+        drop=float(smooth[top] - smooth[bottom]),
+        slip_time=float(time[end] - time[start]),
+        stick_velocity=slope,
+        stick_velocity_error=error,
+    )
+
+
+class SlipMeter:
+    """Finds slips in positions, fed in blocks of any length; the belt moves forward.
+
+    It keeps the samples since the last slip, and calls `slips_in`.
+    """
+
+    def __init__(self, threshold: SlipThreshold) -> None:
+        self.threshold = threshold
+        self._slips: deque[Slip] = deque(maxlen=_MOST_SLIPS)
+        self.count = 0
+        """Number of slips."""
+        self._begin()
+
+    def _begin(self) -> None:
+        self._time, self._position = np.empty(0), np.empty(0)
+        self._span = 0
+        self._landing: int | None = None
+
+    def feed(self, time: FloatArray, position: FloatArray) -> list[Slip]:
+        """Add the samples that follow, in s and m; return the slips that they complete."""
+        found: list[Slip] = []
+        for first in range(0, len(time), _PART):
+            self._time = np.append(self._time, time[first : first + _PART])
+            self._position = np.append(self._position, position[first : first + _PART])
+            if len(self._time) > 2 * _MEDIAN:
+                found += self._find()
+            if len(self._time) > _MOST_SAMPLES:
+                self._begin()
+        self._slips.extend(found)
+        self.count += len(found)
+        return found
+
+    def _find(self) -> list[Slip]:
+        time = self._time
+        if self._span == 0:
+            step = float(time[_MEDIAN * 2] - time[0]) / (_MEDIAN * 2)
+            span = min(self.threshold.within / step, _MOST_SAMPLES) if step > 0.0 else 1
+            self._span = max(round(span), 1)
+        found = slips_in(time, self._position, self.threshold.drop, self._span, self._landing)
+        if found:
+            # What is found must not depend on the blocks: the filters reach back.
+            kept = max(found[-1][1] - self._span - _MEDIAN, 0)
+            self._time, self._position = time[kept:], self._position[kept:]
+            self._landing = found[-1][1] - kept
+        return [slip for slip, _ in found]
+
+    def report(self, belt_speed: float) -> dict[str, Any]:
+        """Return `count`, threshold, `regime`, distributions and each slip, for JSON; SI units.
+
+        The belt speed is for the share of the sticks' velocity; 0 if it is not known.
+        """
+        slips = list(self._slips)
+        columns = {name: [slip[k] for slip in slips] for k, name in enumerate(Slip._fields)}
+        report: dict[str, Any] = {
+            "count": self.count,
+            "least_drop": self.threshold.drop,
+            "within": self.threshold.within,
+            "regime": regime_of(slips),
+            "belt_speed": belt_speed,
+        }
+        for name in ("stick_time", "drop", "slip_time", "stick_velocity"):
+            report[name] = _distribution(np.array(columns[name]))
+        each = {
+            name: [value if isfinite(value) else None for value in values]
+            for name, values in columns.items()
+        }
+        return {**report, "each": each}
+
+
+def regime_of(slips: Sequence[Slip]) -> Regime | None:
+    """Return whether a motion with these slips sticks; None where no stick is seen as a whole.
+
+    It sticks if the median time from the end of a slip to the next is 2.5 times that of a slip.
+    """
+    sticks = [slip.stick_time for slip in slips if isfinite(slip.stick_time)]
+    if not sticks:
+        return None
+    slip_time = float(np.median([slip.slip_time for slip in slips]))
+    longer = float(np.median(sticks)) > _STICKING_RATIO * slip_time
+    return Regime.STICK_SLIP if longer else Regime.PURE_SLIP
+
+
+def regime_by_slips(
+    time: FloatArray, position: FloatArray, size: float, period: float
+) -> Regime | None:
+    """Return whether a motion sticks between slips of at least a `size`, m; None without two.
+
+    The `period`, s, is the mean time from slip to slip, and a quarter of it the longest slip.
+    """
+    return regime_of(SlipMeter(SlipThreshold(size, period / 4.0)).feed(time, position))
+
+
+def _distribution(values: FloatArray) -> dict[str, float] | None:
+    values = values[np.isfinite(values)]
+    if len(values) == 0:
+        return None
+    quantiles = np.quantile(values, _QUANTILES).tolist()
+    named = dict(zip(("q05", "q25", "median", "q75", "q95"), quantiles, strict=True))
+    spread = float(np.std(values, ddof=1)) if len(values) > 1 else 0.0
+    return {
+        "mean": float(np.mean(values)),
+        "standard_error": spread / len(values) ** 0.5,
+        "standard_deviation": spread,
+        **named,
+    }

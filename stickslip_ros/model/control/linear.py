@@ -1,0 +1,39 @@
+"""The linear form of a law, from the law itself: what it answers to each unit alone."""
+
+from dataclasses import replace
+from math import inf
+
+import numpy as np
+
+from stickslip_ros.model.control.base import ControlLaw, LinearFeedback
+from stickslip_ros.samples import NO_REFERENCE, Sample
+
+
+def superposed(law: ControlLaw, states: int, period: float) -> LinearFeedback:
+    """Return the linear form of a law that is linear while its force is not limited.
+
+    Parameters
+    ----------
+    law : ControlLaw
+        Law whose force and next state are linear in state, displacement and velocity.
+    states : int
+        Number of its states.
+    period : float
+        Sample period, s.
+
+    Returns
+    -------
+    LinearFeedback
+        The law before each sample, without limit and reference.
+    """
+    free = replace(law, force_limit=inf)
+    columns: list[list[float]] = []
+    for unit in np.eye(states + 2).tolist():
+        position, velocity = unit[states:]
+        sample = Sample(0, position, velocity, 0.0, 0.0, 0.0)
+        force, state = free.respond(tuple(unit[:states]), period, sample, NO_REFERENCE)
+        columns.append([*state, force])
+    matrix = np.array(columns).T
+    return LinearFeedback(
+        matrix[:-1, :states], matrix[:-1, states:], matrix[-1, :states], matrix[-1, states:]
+    )

@@ -1,0 +1,129 @@
+"""A drive whose motor has dry friction: it slips on the guide, or sticks to it.
+
+The modes of the drive are the products of those of the slide and those of the motor. The switch of
+the motor is sgn(X' - v_belt), 0 while it sticks.
+"""
+
+from dataclasses import replace
+from functools import partial
+from math import copysign, ulp
+
+from stickslip_ros.model.control import ContinuousControl
+from stickslip_ros.model.creeping_drive import CreepingDrive
+from stickslip_ros.model.dimensionless_drive import POSITION, SPEED
+from stickslip_ros.model.drive import Drive
+from stickslip_ros.model.drive_system import SLIP, SMALLEST_STEP, STICK, DriveSystem
+from stickslip_ros.model.hybrid import Flow, Guard, Instant, Mode, with_switches
+
+
+class MotorFrictionSystem(DriveSystem):
+    """Drive with a motor that may stick. What a guard of one body changes, the other may feel."""
+
+    def __init__(self, drive: Drive, control: ContinuousControl | None = None) -> None:
+        super().__init__(drive, control)
+        self.has_parts = True
+        assert self.drive.motor is not None
+        self._holding_force = float(self.drive.motor.friction)
+        self._x, self._y = self.motor_states.start, self.motor_states.start + 1
+
+    def flow(self, name: str) -> Flow:
+        """Return a flow; its last guards: the motor reaches the guide, slips backward, forward.
+
+        Each is a constant while the motor is in another mode.
+        """
+        flow, kind, parts = super().flow(name), type(self), self._expressions
+        assert parts.drive.motor is not None
+        (sign,) = parts.switches.motor
+        slips, friction = sign * sign, parts.drive.motor.friction
+        speed = flow.slaved.get(SPEED, parts.speed)
+        held, (_, motor_speed) = parts.motor_held(speed), self.symbols.state[self.motor_states]
+        sticks = 1.0 - slips
+        guards = (
+            Guard(sticks + sign * (motor_speed - parts.belt_speed), kind.motor_reaches_guide),
+            Guard(slips + sticks * (friction - held), partial(kind.release_motor, sign=-1.0)),
+            Guard(slips + sticks * (friction + held), partial(kind.release_motor, sign=1.0)),
+        )
+        return replace(flow, guards=(*flow.guards, *guards))
+
+    def motor_reaches_guide(self, mode: Mode, instant: Instant) -> Mode:
+        """Let the motor stick, or slip on in either direction."""
+        instant.state[self._y] = self.belt_speed(mode, instant.time)
+        return self._with_motor(mode, self._resting_sign(mode, instant))
+
+    def release_motor(self, mode: Mode, instant: Instant, *, sign: float) -> Mode:
+        """Let the motor slip in a direction, where the force on it exceeds its dry friction."""
+        return self._with_motor(mode, sign)
+
+    def settled(self, mode: Mode | None, instant: Instant) -> Mode:
+        """Return the mode that continues, or starts, of both bodies."""
+        settled = super().settled(mode, instant)
+        follow = self._motor_after_jump if mode is None else self._motor_settled
+        return follow(settled, instant)
+
+    def switch_inputs(self, mode: Mode, instant: Instant) -> Mode:
+        """Return the mode after the corners and steps of the signals up to an instant."""
+        return self._motor_after_jump(super().switch_inputs(mode, instant), instant)
+
+    def apply_pending_guards(self, mode: Mode, instant: Instant) -> Mode:
+        """Return the mode after all guards that rounding has put behind, of both bodies."""
+        mode = super().apply_pending_guards(mode, instant)
+        if mode.flow == SLIP:
+            relative_speed = instant.state[SPEED] - self.belt_speed(mode, instant.time)
+            if mode.switches[0] * relative_speed < 0.0:
+                mode = self.reach_belt(mode, instant)
+        elif mode.flow == STICK:
+            mode = self._resting(mode, instant)
+        return self._motor_settled(mode, instant)
+
+    def nudge_off_guard(self, mode: Mode, instant: Instant) -> None:
+        """Move both bodies, by rounding errors, off guards on which they start."""
+        super().nudge_off_guard(mode, instant)
+        state, sign = instant.state, self._motor_sign(mode)
+        belt_speed = self.belt_speed(mode, instant.time)
+        if sign != 0.0 and state[self._y] != belt_speed:
+            return
+        held, limit = self.motor_held(mode, instant), self._holding_force
+        size = abs(state[POSITION]) + abs(state[self._x]) + abs(held) + limit
+        margin = 8.0 * ulp(size + abs(self.control_force(instant)))
+        # A motor ahead needs less friction.
+        if sign == 0.0:
+            if abs(held) > limit - margin:
+                state[self._x] -= copysign(margin, held)
+            return
+        if -sign * held < limit + margin:
+            state[self._x] -= sign * margin
+        state[self._y] = belt_speed + sign * max(ulp(belt_speed), ulp(1.0))
+
+    def _motor_after_jump(self, mode: Mode, instant: Instant) -> Mode:
+        """Return the mode where the speed of the guide, or the state, may have jumped."""
+        belt_speed = self.belt_speed(mode, instant.time)
+        relative_speed = instant.state[self._y] - belt_speed
+        if abs(relative_speed) > SMALLEST_STEP:
+            return self._with_motor(mode, copysign(1.0, relative_speed))
+        instant.state[self._y] = belt_speed
+        return self._with_motor(mode, self._resting_sign(mode, instant))
+
+    def _motor_settled(self, mode: Mode, instant: Instant) -> Mode:
+        sign, belt_speed = self._motor_sign(mode), self.belt_speed(mode, instant.time)
+        if sign * (instant.state[self._y] - belt_speed) > 0.0:
+            return mode
+        instant.state[self._y] = belt_speed  # without the rounding of the integration
+        found = self._resting_sign(mode, instant)
+        return mode if found == sign else self._with_motor(mode, found)
+
+    def _resting_sign(self, mode: Mode, instant: Instant) -> float:
+        """Return the switch of a motor that has the speed of the guide."""
+        held = self.motor_held(mode, instant)
+        if abs(held) <= self._holding_force:
+            return 0.0
+        return -copysign(1.0, held)
+
+    def _motor_sign(self, mode: Mode) -> float:
+        return mode.switches[self._parts.motor.start]
+
+    def _with_motor(self, mode: Mode, sign: float) -> Mode:
+        return with_switches(mode, self._parts.motor.start, (sign,))
+
+
+class CreepingMotorFrictionSystem(MotorFrictionSystem, CreepingDrive):
+    """The same with a slide that creeps."""

@@ -1,0 +1,179 @@
+"""The sensor between the motion and its samples."""
+
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from itertools import count
+from typing import Any, Self
+
+import numpy as np
+
+from stickslip_ros.model.constants import at_rest, constants_of
+
+Measure = Callable[[int, float, float], tuple[float, float]]
+"""Returns the measured position (m) and velocity (m/s) for the number of a sample, and its true
+position and velocity. It is called once for each sample, in order."""
+
+LONGEST_DIFFERENCE = 300
+"""Largest number of samples of a difference; the order of the sampled loop grows with it."""
+
+_BLOCK = 1024
+"""Number of deviates that are made at once."""
+_WORD = 2**32
+_MOST_STEPS = 2.0**53
+"""Number of steps from which on floats are coarser than the steps."""
+
+
+class MeasuredVelocity(StrEnum):
+    """Source of the measured velocity."""
+
+    EXACT = "exact"
+    DIFFERENCE = "difference"
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """The sensor of the slide: an encoder, and the source of the velocity. By default it is exact.
+
+    The measured position is the true one with noise, rounded to the resolution, half to even. The
+    velocity is exact, with noise if asked, or the difference of measured positions over n samples,
+    (p_k - p_(k-n)) / (n T); over fewer at the start and after a reset, and 0 at the first sample.
+    Noise is normally distributed and independent from sample to sample; that of sample n depends on
+    seed and n only. The state of the belt is known.
+
+    Examples
+    --------
+    An encoder of 1 um:
+
+    >>> from stickslip_ros.model.sensor import MeasuredVelocity, Sensor
+    >>> sensor = Sensor(position_resolution=1e-6, velocity=MeasuredVelocity.DIFFERENCE)
+    >>> measure = sensor.start(period=1e-3)
+    >>> [round(measure(n, 0.02 * n * 1e-3 + 3e-7, 0.02)[1], 6) for n in range(3)]
+    [0.0, 0.02, 0.02]
+    """
+
+    position_resolution: float = at_rest(
+        0.0, "Step of the measured position; 0 for none.", "m", at_least=0.0
+    )
+    position_noise: float = at_rest(
+        0.0, "Standard deviation of the noise of the position.", "m", at_least=0.0
+    )
+    velocity: MeasuredVelocity = at_rest(
+        MeasuredVelocity.EXACT, "Velocity: the true one, or the difference of measured positions."
+    )
+    difference_samples: int = at_rest(
+        1,
+        "Number of samples that a difference spans.",
+        at_least=1,
+        at_most=LONGEST_DIFFERENCE,
+        whole=True,
+    )
+    velocity_noise: float = at_rest(
+        0.0, "Standard deviation of the noise of an exact velocity.", "m/s", at_least=0.0
+    )
+    seed: int = at_rest(0, "Seed of the noise.", at_least=0, whole=True)
+
+    @property
+    def exact(self) -> bool:
+        """Whether measured samples are the true ones."""
+        rough = self.position_resolution or self.position_noise or self.velocity_noise
+        return not rough and not self.spans
+
+    @property
+    def spans(self) -> int:
+        """Number of samples that the difference for the velocity spans; 0 without one."""
+        return self.difference_samples if self.velocity is MeasuredVelocity.DIFFERENCE else 0
+
+    @classmethod
+    def from_values(cls, values: Mapping[str, Any]) -> Self:
+        """Return a sensor from values by name, as a recording or a scenario has them.
+
+        Parameters
+        ----------
+        values : mapping
+            Values of some constants; those of others are ignored.
+
+        Returns
+        -------
+        Sensor
+            Sensor with the defaults for what is not given.
+        """
+        known = {name: values[name] for name in constants_of(cls) if name in values}
+        if "velocity" in known:
+            known["velocity"] = MeasuredVelocity(known["velocity"])
+        return cls(**known)
+
+    def refusal(self) -> str | None:
+        """Return why the constants do not fit together, as a sentence, or None."""
+        if self.spans and self.velocity_noise:
+            return (
+                f"velocity_noise = {self.velocity_noise} m/s must be 0 with velocity = "
+                f"{self.velocity}, which has the noise of the positions"
+            )
+        return None
+
+    def start(self, period: float) -> Measure | None:
+        """Return what measures a segment of samples, or what follows a reset.
+
+        Parameters
+        ----------
+        period : float
+            Sample period, s.
+
+        Returns
+        -------
+        callable or None
+            See `Measure`; None for an exact sensor.
+        """
+        if self.exact:
+            return None
+        resolution = self.position_resolution
+        of_position = _Noise(self.position_noise, self.seed, 0) if self.position_noise else None
+        of_velocity = _Noise(self.velocity_noise, self.seed, 1) if self.velocity_noise else None
+        positions = deque[float](maxlen=self.spans + 1) if self.spans else None
+
+        # Without calls or objects that could be avoided: it is a part of each sample.
+        def measure(number: int, position: float, velocity: float) -> tuple[float, float]:
+            if of_position is not None:
+                position += next(of_position.upcoming or of_position.start(number))
+            if resolution:
+                steps = position / resolution
+                if -_MOST_STEPS < steps < _MOST_STEPS:
+                    position = round(steps) * resolution
+            if positions is not None:
+                positions.append(position)
+                spanned = len(positions) - 1
+                velocity = (position - positions[0]) / (spanned * period) if spanned else 0.0
+            elif of_velocity is not None:
+                velocity += next(of_velocity.upcoming or of_velocity.start(number))
+            return position, velocity
+
+        return measure
+
+
+class _Noise:
+    """Normal deviates, each of which depends on the seed and the number of the sample only."""
+
+    def __init__(self, deviation: float, seed: int, kind: int) -> None:
+        self._deviation = deviation
+        self._key = seed % _WORD, seed // _WORD, kind
+        self.upcoming: Iterator[float] | None = None
+        """Deviates of the next sample and those that follow, once it is known."""
+
+    def start(self, number: int) -> Iterator[float]:
+        """Return the deviates from a sample on."""
+        self.upcoming = self._from(number)
+        return self.upcoming
+
+    def _from(self, number: int) -> Iterator[float]:
+        first, place = divmod(number, _BLOCK)
+        for block in count(first):
+            # The only normal deviates of numpy with a guarantee that they stay the same.
+            random = np.random.RandomState([*self._key, block % _WORD, block // _WORD])
+            yield from (self._deviation * random.standard_normal(_BLOCK))[place:].tolist()
+            place = 0
+
+
+EXACT_SENSOR = Sensor()
+"""The sensor that measures exactly."""

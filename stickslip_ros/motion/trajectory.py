@@ -1,0 +1,184 @@
+"""The trajectory of a simulated run: the motion and its forces at the samples."""
+
+from abc import ABC, abstractmethod
+from array import array
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated
+
+import numpy as np
+
+from stickslip_ros.arrays import FloatArray, Table
+from stickslip_ros.quantities import Quantity, quantities_of
+from stickslip_ros.samples import Sample
+
+if TYPE_CHECKING:
+    from stickslip_ros.motion.motion import Motion
+
+_ROUNDING = 1e-6
+"""Share of a period by which a sample may be missed for rounding."""
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory(Table):
+    """The motion at the samples t = n/rate; arrays of shape (samples,), true values.
+
+    `len(trajectory)` is the number of samples, `trajectory[rows]` has some of them.
+    """
+
+    time: Annotated[FloatArray, Quantity("time", "s")]
+    """Time since the start of the run, s."""
+    position: Annotated[FloatArray, Quantity("displacement", "m")]
+    """Displacement of the slide, m."""
+    velocity: Annotated[FloatArray, Quantity("velocity", "m/s")]
+    """Velocity of the slide, m/s."""
+    friction_force: Annotated[FloatArray, Quantity("friction force", "N")]
+    """Friction force on the slide, N, under the force held up to the sample."""
+    control_force: Annotated[FloatArray, Quantity("control force", "N")]
+    """Answer of the controller to the sample, N; 0 without a controller."""
+    belt_position: Annotated[FloatArray, Quantity("belt displacement", "m")]
+    """Displacement of the belt, m."""
+    belt_velocity: Annotated[FloatArray, Quantity("belt velocity", "m/s")]
+    """Velocity of the belt, m/s."""
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredTrajectory(Trajectory):
+    """A trajectory with what a sensor tells of it."""
+
+    measured_position: Annotated[FloatArray, Quantity("measured displacement", "m")]
+    """Measured displacement of the slide, m."""
+    measured_velocity: Annotated[FloatArray, Quantity("measured velocity", "m/s")]
+    """Measured velocity of the slide, m/s."""
+
+
+@dataclass(frozen=True, eq=False)
+class MotorTrajectory(Trajectory):
+    """A trajectory of a drive with a motor of finite mass."""
+
+    motor_position: Annotated[FloatArray, Quantity("motor displacement", "m")]
+    """Displacement of the motor, m."""
+    motor_velocity: Annotated[FloatArray, Quantity("motor velocity", "m/s")]
+    """Velocity of the motor, m/s."""
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredMotorTrajectory(MeasuredTrajectory):
+    """The same with what the sensors of slide and motor tell of it."""
+
+    motor_position: Annotated[FloatArray, Quantity("motor displacement", "m")]
+    """Displacement of the motor, m."""
+    motor_velocity: Annotated[FloatArray, Quantity("motor velocity", "m/s")]
+    """Velocity of the motor, m/s."""
+    measured_motor_position: Annotated[FloatArray, Quantity("measured motor displacement", "m")]
+    """Measured displacement of the motor, m."""
+    measured_motor_velocity: Annotated[FloatArray, Quantity("measured motor velocity", "m/s")]
+    """Measured velocity of the motor, m/s."""
+
+
+_KINDS = {
+    (False, False): Trajectory,
+    (True, False): MeasuredTrajectory,
+    (False, True): MotorTrajectory,
+    (True, True): MeasuredMotorTrajectory,
+}
+"""Trajectories by whether they have what sensors tell, and a motor."""
+
+
+class SampleRecorder(ABC):
+    """Receives the samples of a run as they come, and keeps each one or every nth."""
+
+    def __init__(
+        self, rate: float, every: int = 1, *, measured: bool = False, motor: bool = False
+    ) -> None:
+        """Keep one in `every` samples; they are taken `rate` (Hz) times per second.
+
+        With `measured` also what a sensor tells, and with `motor` also the motion of the motor.
+        """
+        self._rate, self._every, self._measured = rate, every, measured
+        self._with_motor = motor
+        self._number = 0
+        """Number of the next sample."""
+        self._now = 0.0
+
+    @abstractmethod
+    def keep(self, row: tuple[float, ...]) -> None:
+        """Keep the values of one sample, in the order of `quantities`."""
+
+    @property
+    def quantities(self) -> Mapping[str, Quantity]:
+        """Label and unit of each column."""
+        return quantities_of(self._kind)
+
+    @property
+    def _kind(self) -> type[Trajectory]:
+        return _KINDS[self._measured, self._with_motor]
+
+    def take(self, sample: Sample, control_force: float, measured: Sample | None = None) -> None:
+        """Receive the next sample, and the control force (N) that answers it.
+
+        `measured` is the sample as a sensor tells it.
+        """
+        number = self._number
+        if number % self._every == 0:
+            _, position, velocity, friction_force, belt, belt_speed, motor = sample
+            told = measured or sample
+            row = number / self._rate, position, velocity, friction_force, control_force, belt
+            row += belt_speed, *(told[1:3] if self._measured else ())
+            if self._with_motor:
+                assert motor is not None
+                row += *motor, *((told.motor or motor) if self._measured else ())
+            self.keep(row)
+        self._number = number + 1
+
+    def sampling(
+        self, motion: "Motion", advance: Callable[[float], None]
+    ) -> Callable[[float], None]:
+        """Return an `advance` (s) of a motion without sampled loop that stops to take samples."""
+
+        def advance_and_take(duration: float) -> None:
+            end = self._now + duration
+            while self._now < end and not motion.unbounded:
+                self.take_due(motion)
+                stop = min(self._number / self._rate, end)
+                advance(stop - self._now)
+                self._now = stop
+
+        return advance_and_take
+
+    def take_due(self, motion: "Motion") -> None:
+        """Keep the sample that is due at the present instant of such a motion, if one is."""
+        number = self._number
+        if number - self._now * self._rate > _ROUNDING:
+            return
+        drive = motion.drive
+        travel = drive.belt.integral(0.0, number / self._rate)
+        sample = Sample(
+            0,
+            motion.position,
+            motion.velocity,
+            motion.friction_force,
+            drive.belt_speed * number / self._rate + travel,
+            motion.belt_speed,
+            motion.motor,
+        )
+        self.take(sample, motion.applied_force)
+
+
+class TrajectoryRecorder(SampleRecorder):
+    """Keeps the samples of a run in memory."""
+
+    def __init__(
+        self, rate: float, every: int = 1, *, measured: bool = False, motor: bool = False
+    ) -> None:
+        """Keep samples as `SampleRecorder` does."""
+        super().__init__(rate, every, measured=measured, motor=motor)
+        self._values = array("d")
+
+    def keep(self, row: tuple[float, ...]) -> None:
+        """Keep the values of one sample."""
+        self._values.extend(row)
+
+    def trajectory(self) -> Trajectory:
+        """Return the samples so far."""
+        return self._kind(*np.array(self._values).reshape(-1, len(self.quantities)).T.copy())

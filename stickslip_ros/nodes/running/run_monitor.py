@@ -1,0 +1,87 @@
+"""Progress and state of a run, from what its nodes publish."""
+
+from collections.abc import Callable
+
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.node import Node
+from std_msgs.msg import Header
+
+from stickslip_ros.nodes.base.clients import ACTIVE, NEXT_TRANSITION
+from stickslip_ros.nodes.base.managed import FAILURE, FINISHED, NEWEST_STAMP, STATE
+from stickslip_ros.nodes.base.ros_topics import qos_profile
+from stickslip_ros.record.topics import DIAGNOSTICS, RECORDED
+from stickslip_ros.scenarios import full_name
+from stickslip_ros.stamps import NANOSECONDS
+from stickslip_ros.text import number_in
+
+OnSimulatedTime = Callable[[float], None]
+"""Called repeatedly with the simulated time so far, s."""
+
+Notify = Callable[[str], None]
+"""Called with messages to the user, one sentence each."""
+
+
+class RunMonitor:
+    """Subscribes to the plant's diagnostics and to the progress of the recording."""
+
+    def __init__(
+        self,
+        node: Node,
+        *,
+        fail: Callable[[str], None],
+        notify: Notify,
+        on_simulated_time: OnSimulatedTime,
+    ) -> None:
+        """Subscribe through a node in the run's namespace; call `fail` if the plant fails."""
+        self.plant: dict[str, str] = {}
+        """The plant's last values, as in its diagnostics."""
+        self.finished = False
+        """Whether the plant has reached its end, or was ended from outside."""
+        self.plant_stopped = False
+        """Whether the plant is no longer active and has published its last values."""
+        self.newest_recorded = 0
+        """Stamp of the newest sample that the analyzer has received, ns."""
+        self.ending = False
+        """Whether the run is ending: a plant that stops then is not paused."""
+        self._fail, self._notify, self._on_simulated_time = fail, notify, on_simulated_time
+        self._plant_name = full_name(node.get_namespace(), "plant")
+        self._paused = False
+        self._first_recorded: int | None = None
+        node.create_subscription(
+            DiagnosticArray, DIAGNOSTICS.name, self._on_diagnostics, qos_profile(DIAGNOSTICS)
+        )
+        node.create_subscription(Header, RECORDED.name, self._on_recorded, qos_profile(RECORDED))
+
+    @property
+    def unrecorded(self) -> float:
+        """Time from the newest sample that the analyzer has received to the plant's last, s."""
+        return (number_in(self.plant.get(NEWEST_STAMP, "")) - self.newest_recorded) * 1e-9
+
+    def _on_diagnostics(self, message: DiagnosticArray) -> None:
+        for status in message.status:
+            if status.name == self._plant_name:
+                self.plant = {entry.key: entry.value for entry in status.values}
+                self._follow_plant(self.plant.get(STATE))
+
+    def _follow_plant(self, state: str | None) -> None:
+        if FAILURE in self.plant:
+            self._fail(f"the plant could not continue: {self.plant[FAILURE]}")
+        if state == ACTIVE:
+            if self._paused:
+                self._notify("the plant continues")
+            self._paused = self.plant_stopped = False
+        elif NEWEST_STAMP in self.plant:
+            self.plant_stopped = True
+            if self.plant.get(FINISHED) == str(True) or state == "finalized":
+                self.finished = True
+            elif state in NEXT_TRANSITION and not (self._paused or self.ending):
+                self._paused = True
+                self._notify(
+                    "the plant is paused: activate it to continue, or end the run with Ctrl-C"
+                )
+
+    def _on_recorded(self, message: Header) -> None:
+        self.newest_recorded = message.stamp.sec * NANOSECONDS + message.stamp.nanosec
+        if self._first_recorded is None:
+            self._first_recorded = self.newest_recorded
+        self._on_simulated_time((self.newest_recorded - self._first_recorded) * 1e-9)

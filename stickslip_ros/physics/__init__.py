@@ -1,1 +1,0 @@
-"""Physics: model, motion, measures, sampled loop and theory. No ROS, no files, no clock."""

@@ -1,1 +1,0 @@
-"""The sampled loop, its control law, and the simulation of both."""

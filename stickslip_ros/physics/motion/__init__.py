@@ -1,5 +1,0 @@
-"""The motion of a drive, integrated to machine precision."""
-
-from stickslip_ros.physics.motion.motion import Motion, RecordedMotion
-
-__all__ = ["Motion", "RecordedMotion"]

@@ -1,0 +1,1 @@
+"""What is recorded: topics, messages, bags and tables, without a ROS graph."""

@@ -1,0 +1,201 @@
+"""The files of a bag: a directory of MCAP files in rosbag2's layout, or one such file."""
+
+import os
+import re
+import tempfile
+from collections import deque
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, closing
+from pathlib import Path
+from typing import Self
+
+from stickslip_ros.errors import BagError
+from stickslip_ros.record.chunk import MessageBlock
+from stickslip_ros.record.compression import unpack_file
+from stickslip_ros.record.mcap_file import McapFile
+from stickslip_ros.record.metadata import metadata_faults
+from stickslip_ros.text import printable
+
+_PACKED_SUFFIX = ".mcap.zstd"
+"""Suffix of the files that rosbag2 compressed as a whole."""
+
+
+class BagFiles:
+    """The files of a bag that is open for reading; a context manager that closes it.
+
+    Raises BagError if `path` is not a bag, or a bag that is not stored as MCAP.
+    """
+
+    def __init__(self, path: Path | str) -> None:
+        """Open the files of a bag directory, or one MCAP file."""
+        self.path = Path(path)
+        """The bag directory, or the file."""
+        self._unreadable: list[str] = []
+        paths = _mcap_files(self.path)
+        with ExitStack() as opened:
+            files = self._readable_files([_unpacked(path, opened) for path in paths])
+            self.files = [opened.enter_context(closing(file)) for file in files]
+            """The MCAP files in order, without those that cannot be read."""
+            self._opened = opened.pop_all()
+        self._metadata_faults = metadata_faults(self.path, paths) if self.path.is_dir() else []
+        self.topics = {
+            channel.topic: file.schemas[channel.schema_id].name
+            for file in self.files
+            for channel in file.channels.values()
+            if channel.schema_id in file.schemas
+        }
+        """Types by name, such as `sensor_msgs/msg/JointState` by `/feed_drive/joint_states`."""
+
+    @property
+    def damage(self) -> list[str]:
+        """Sentences on an incomplete end and damaged files; further reading may find more."""
+        of_files = (sentence for file in self.files for sentence in file.damage)
+        return [*map(printable, (*self._metadata_faults, *self._unreadable, *of_files))]
+
+    def message_blocks(self, *topics: str) -> Iterator[tuple[MessageBlock, dict[int, str]]]:
+        """Yield the messages of these topics chunk by chunk, and the topic of each channel."""
+        for file in self.files:
+            channels = file.channels.items()
+            topic_of = {number: each.topic for number, each in channels if each.topic in topics}
+            for block in file.blocks(topic_of):
+                yield block, topic_of
+
+    def messages(self, *topics: str) -> Iterator[tuple[str, int, bytes]]:
+        """Yield the serialized messages of some topics in file order.
+
+        Parameters
+        ----------
+        *topics : str
+            Full names, such as `/feed_drive/joint_states`.
+
+        Yields
+        ------
+        topic : str
+            Full name of the topic.
+        log_time : int
+            ns.
+        data : bytes
+            The message, serialized as CDR.
+
+        Raises
+        ------
+        BagError
+            If the operating system fails to read the bag.
+        """
+        for block, topic_of in self.message_blocks(*topics):
+            columns = (block.channel, block.log_time, block.begin, block.end)
+            for channel, stamp, begin, end in zip(*(c.tolist() for c in columns), strict=True):
+                yield topic_of[channel], stamp, block.data[begin:end]
+
+    def offered_qos(self, topic: str) -> str:
+        """Return the QoS profiles that the recorded publishers of a topic offered.
+
+        Parameters
+        ----------
+        topic : str
+            Full name, such as `/feed_drive/joint_states`.
+
+        Returns
+        -------
+        str
+            rosbag2's YAML, a list with one profile for each publisher; empty if unknown.
+        """
+        found = [
+            channel.metadata.get("offered_qos_profiles", "")
+            for file in self.files
+            for channel in file.channels.values()
+            if channel.topic == topic
+        ]
+        return next(filter(None, found), "")
+
+    def metadata(self, name: str) -> dict[str, str] | None:
+        """Return the last metadata table of a name in the bag.
+
+        Parameters
+        ----------
+        name : str
+            Name of the MCAP metadata record, such as `stickslip_ros/analyzer`.
+
+        Returns
+        -------
+        dict or None
+            The table, strings by strings; None if the bag has none of this name.
+        """
+        last = deque((table for file in self.files for table in file.tables(name)), maxlen=1)
+        return last[0].metadata if last else None
+
+    def attachment(self, name: str) -> bytes | None:
+        """Return the last attached file of a name in the bag.
+
+        Parameters
+        ----------
+        name : str
+            Name of the attachment.
+
+        Returns
+        -------
+        bytes or None
+            The content of the file; None if the bag has none of this name.
+        """
+        attachments = (found for file in self.files for found in file.attachments(name))
+        last = deque(attachments, maxlen=1)
+        return last[0].data if last else None
+
+    def close(self) -> None:
+        """Close the files."""
+        self._opened.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self.close()
+
+    def _readable_files(self, paths: Sequence[Path]) -> Iterator[McapFile]:
+        """Open the files; raise BagError if none can be read, otherwise list those that cannot."""
+        errors: list[BagError] = []
+        for path in paths:
+            try:
+                yield McapFile(path)
+            except BagError as error:
+                errors.append(error)
+        if len(errors) == len(paths):
+            raise errors[0]
+        self._unreadable = [str(error) for error in errors]
+
+
+def _mcap_files(path: Path) -> list[Path]:
+    """Return the files of a bag in the order in which they were recorded."""
+    if not os.path.exists(path):
+        raise BagError(f"the bag {path} does not exist")
+    files, sqlite = [path], path.suffix == ".db3"
+    if path.is_dir():
+        files = sorted([*path.glob("*.mcap"), *path.glob(f"*{_PACKED_SUFFIX}")], key=_place_in_bag)
+        sqlite = not files and any(path.glob("*.db3"))
+    if sqlite:
+        raise BagError(
+            f"the bag {path} is stored as sqlite3, and only MCAP can be read; "
+            "convert it with `ros2 bag convert`"
+        )
+    if not files:
+        raise BagError(f"the directory {path} is not a bag: it holds no .mcap file")
+    return files
+
+
+def _unpacked(path: Path, opened: ExitStack) -> Path:
+    """Return a file as MCAP; unpack one that rosbag2 compressed as a whole until the bag closes."""
+    if not path.name.endswith(_PACKED_SUFFIX):
+        return path
+    directory = opened.enter_context(tempfile.TemporaryDirectory(prefix="stickslip_ros_"))
+    unpacked = Path(directory, path.name.removesuffix(".zstd"))
+    try:
+        unpack_file(path, unpacked)
+    except OSError as error:
+        raise BagError(f"the file {path} cannot be unpacked: {error.strerror}") from error
+    return unpacked
+
+
+def _place_in_bag(file: Path) -> tuple[int, str]:
+    """Sort `bag_2.mcap` before `bag_10.mcap`, as rosbag2 numbers the files of a bag it splits."""
+    number = re.search(r"_(\d+)\.mcap", file.name)
+    return (int(number[1]) if number else 0), file.name

@@ -1,0 +1,91 @@
+"""The columns of a table in a file, whatever its format."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Generator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from stickslip_ros.errors import BagError, InvalidInputError
+from stickslip_ros.record.expressions import Expression, listed
+
+_OWN_COLUMNS = {
+    "time": ("time",),
+    "position": ("measured_position", "position"),
+    "velocity": ("measured_velocity", "velocity"),
+    "force": ("control_force",),
+    "belt_velocity": ("belt_velocity",),
+    "friction_force": ("friction_force",),
+}
+"""Columns of the files that `stickslip simulate --out` writes; the first one that exists."""
+
+
+class Table(ABC):
+    """A table of a file: what its columns are, and how they are read."""
+
+    path: Path
+    columns: Mapping[str, int]
+    """Places of the columns by name; a column has several names, such as `x` and `#2`."""
+    names: Sequence[str]
+    """Name of each column; empty if it has none."""
+    units: Sequence[str]
+    """Units that the table has for its columns; empty where it has none."""
+
+    @property
+    def notes(self) -> Sequence[str]:
+        """Sentences on how the file was read so far."""
+        return ()
+
+    @abstractmethod
+    def read(self, places: Sequence[int]) -> list[Any]:
+        """Return columns as arrays of shape (rows,), or of a constant (1,).
+
+        Cells without a number are NaN. Raises OSError and ValueError.
+        """
+
+    @abstractmethod
+    def line(self, row: int) -> str:
+        """Return where a row is in the file, for a message."""
+
+    def has(self, text: str) -> bool:
+        """Return whether the table has all columns of an expression."""
+        try:
+            Expression.read(self.path, text, self.columns)
+        except InvalidInputError:
+            return False
+        return True
+
+    def name(self, place: int) -> str:
+        """Return the name of a column for a message."""
+        names = (name for name, each in self.columns.items() if each == place and name[:1] != "#")
+        return f"column {next(names, f'#{place + 1}')}"
+
+    @property
+    def own_columns(self) -> dict[str, str]:
+        """Columns by quantity of a table that `stickslip simulate --out` has written.
+
+        Raises InvalidInputError for another one.
+        """
+        own = {
+            quantity: next((name for name in names if name in self.columns), "")
+            for quantity, names in _OWN_COLUMNS.items()
+        }
+        if not own["time"] or not own["position"]:
+            raise InvalidInputError(
+                f"{self.path} has the columns {listed(self.columns)}, and not those of "
+                "`stickslip simulate --out`: say what they are, as in --columns "
+                "time=t,position=x,force=u*2.5"
+            )
+        return {quantity: name for quantity, name in own.items() if name}
+
+
+@contextmanager
+def reading_file(path: Path) -> Generator[None]:
+    """Turn what a file raises that cannot be read into BagError."""
+    try:
+        yield
+    except (OSError, ValueError, OverflowError, MemoryError) as error:
+        if isinstance(error, InvalidInputError):
+            raise
+        reason = getattr(error, "strerror", None) or str(error).strip() or type(error).__name__
+        raise BagError(f"{path}: the file cannot be read: {reason}") from None

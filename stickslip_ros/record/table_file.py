@@ -1,0 +1,178 @@
+"""Recordings of machines as tables: CSV files, and MAT files of MATLAB."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from math import nan
+from pathlib import Path
+
+import numpy as np
+
+from stickslip_ros.arrays import FloatArray
+from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.files import open_regular
+from stickslip_ros.record.mat_file import is_mat, vectors_of
+from stickslip_ros.record.reader import RunBlock
+from stickslip_ros.record.table_clock import stamps_of
+from stickslip_ros.record.table_columns import Table, reading_file
+from stickslip_ros.record.table_quantities import Quantities, differences, quantities_of
+from stickslip_ros.record.text_table import ANY_FORM, TableFormat, TextTable
+from stickslip_ros.record.units import unit_of
+from stickslip_ros.samples import ForceColumns, SampleColumns
+
+TABLE_SUFFIXES = (".csv", ".mat", ".txt", ".dat", ".tsv", ".log", ".asc")
+"""Ends of the names of files that are tables, whatever they hold."""
+
+_BAG_SUFFIXES = (".mcap", ".db3")
+_MCAP = b"\x89MCAP"
+
+_MOST_NUMBERS = 1 << 24
+"""Numbers of a MAT file."""
+
+
+class MatTable(Table):
+    """The vectors of a MAT file."""
+
+    def __init__(self, path: Path, vectors: Mapping[str, FloatArray]) -> None:
+        """Take the vectors by name."""
+        self.path, self.names, self.units = path, [*vectors], [*map(unit_of, vectors)]
+        self.columns = {name: place for place, name in enumerate(vectors)}
+        self._vectors = [*vectors.values()]
+
+    def read(self, places: Sequence[int]) -> list[FloatArray]:
+        """Return vectors by their places."""
+        return [self._vectors[place] for place in places]
+
+    def line(self, row: int) -> str:
+        """Return the number of a row, for a message."""
+        return f"row {row + 1}"
+
+
+def is_table(path: Path) -> bool:
+    """Return whether a path names a table rather than a bag: by its end or its first bytes."""
+    if path.suffix.lower() in TABLE_SUFFIXES:
+        return True
+    if not path.is_file() or any(each in _BAG_SUFFIXES for each in path.suffixes):
+        return False
+    with reading_file(path), open_regular(path) as stream:
+        return not stream.read(len(_MCAP)).startswith(_MCAP)
+
+
+def table_of(path: Path, form: TableFormat = ANY_FORM) -> Table:
+    """Return the table in a text or MAT file; raises BagError."""
+    with reading_file(path), open_regular(path) as stream:
+        if not is_mat(path, stream):
+            return TextTable(path, form)
+        vectors = vectors_of(stream, _MOST_NUMBERS)
+        if not vectors:
+            raise ValueError("it has no column")
+        return MatTable(path, vectors)
+
+
+@dataclass(frozen=True)
+class TableRecording:
+    """A recording from a table, in SI units; it is read as a `Recording` is, in one block."""
+
+    samples: SampleColumns
+    """The motion; time zero is the stamp 0."""
+    forces: ForceColumns
+    """Control force at each sample; empty if the table has none."""
+    velocity_estimated: bool
+    """Whether the velocities are estimated from the positions."""
+    notes: tuple[str, ...]
+    """Sentences on what the table does not have."""
+    of_another_machine = True
+    """A table counts as recorded by another machine."""
+    dropped_known = False
+    """A table does not tell which forces did not act."""
+
+    @property
+    def topics(self) -> dict[str, str]:
+        """A table has none."""
+        return {}
+
+    @property
+    def missing(self) -> list[str]:
+        """A table that can be read is complete."""
+        return []
+
+    def blocks(self, least: int = 1) -> Iterator[RunBlock]:
+        """Yield the samples, the forces and no dropped forces."""
+        yield RunBlock(self.samples, self.forces, self.forces[:0])
+
+    def metadata(self, name: str) -> dict[str, str] | None:
+        """Return None: a table has no metadata."""
+        return None
+
+
+def read_table(
+    path: Path,
+    columns: Mapping[str, str] | None = None,
+    belt_speed: float | None = None,
+    form: TableFormat = ANY_FORM,
+) -> TableRecording:
+    r"""Read a recording from a table: a text such as a CSV file, or a MAT file.
+
+    `columns` has, for some of `QUANTITIES`, an `Expression` of columns and numbers in SI units. A
+    column by itself is converted, if the table has its unit. By default the file is one of
+    `stickslip simulate --out`. A `belt_speed` is in place of a column. A velocity that is not given
+    is the difference of the positions beside each sample. A belt whose velocity is not given is at
+    rest. `form` is what is known of the form of a text.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from tempfile import TemporaryDirectory
+    >>> from stickslip_ros.record.table_file import read_table
+    >>> with TemporaryDirectory() as folder:
+    ...     path = Path(folder, "log.csv")
+    ...     _ = path.write_text("t;x [mm]\n0;1\n0,001;3\n")
+    ...     recording = read_table(path, {"time": "t", "position": "x"})
+    >>> recording.samples.stamp.tolist(), recording.samples.position.tolist()
+    ([0, 1000000], [0.001, 0.003])
+    """
+    return _recording(path, quantities_of(table_of(path, form), columns, belt_speed))
+
+
+def _recording(path: Path, found: Quantities) -> TableRecording:
+    values, notes = found.values, [*found.notes]
+    time, position = values["time"], values["position"]
+    stamp = stamps_of(path, time)
+    present = np.isfinite(position)
+    unknown, rest = np.full(len(time), nan), np.zeros(len(time))
+    velocity = values.get("velocity", unknown)
+    lacking = present & ~np.isfinite(velocity)
+    if "velocity" not in values:
+        notes.append("the velocity is not recorded: it is the difference of the positions")
+    elif lacking.any():
+        notes.append(
+            f"{np.count_nonzero(lacking)} rows have a position and no velocity: it is the "
+            "difference of the positions"
+        )
+    if "belt_velocity" not in values:
+        notes.append("the belt velocity is not recorded: the belt counts as at rest")
+    if lacking.all():
+        velocity = differences(time, position)
+    elif lacking.any():
+        by_position = np.full(len(time), nan)
+        by_position[present] = differences(time[present], position[present])
+        velocity = np.where(lacking, by_position, velocity)
+    samples = SampleColumns(
+        stamp,
+        position,
+        velocity,
+        values.get("friction_force", unknown),
+        unknown,
+        values.get("belt_velocity", rest),
+        *(unknown, unknown),
+    )
+    if not samples.is_valid.any():
+        empty = [name for name, value in values.items() if not np.isfinite(value[present]).any()]
+        raise InvalidInputError(
+            f"{path}: no row gives a sample: no position has a number of {' and '.join(empty)} "
+            "beside it"
+        )
+    forces = ForceColumns(stamp[:0], rest[:0])
+    if "force" in values:
+        forces = ForceColumns(stamp, values["force"])
+    estimated = 2 * np.count_nonzero(lacking) > np.count_nonzero(present)
+    return TableRecording(samples, forces, bool(estimated), tuple(notes))

@@ -1,0 +1,397 @@
+"""Quantities of a run in the columns of a table: expressions, units, times, faults."""
+
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from math import nan
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from stickslip_ros.arrays import BoolArray, FloatArray, IntArray, windows
+from stickslip_ros.errors import BagError, InvalidInputError
+from stickslip_ros.record.expressions import Expression
+from stickslip_ros.record.faults import Jumps, shift_note, velocity_fault
+from stickslip_ros.record.table_clock import even_times
+from stickslip_ros.record.table_columns import Table, reading_file
+from stickslip_ros.record.units import NO_UNITS, unit_factor
+from stickslip_ros.samples import LARGEST
+from stickslip_ros.text import must_be_one_of
+
+QUANTITIES = (
+    "time",
+    "position",
+    "velocity",
+    "force",
+    "belt_velocity",
+    "friction_force",
+    "disturbance",
+    "reference",
+)
+"""Quantities of a run that a table may have; time and position it must have."""
+
+_UNITS = {"time": "s", "position": "m", "reference": "m", "velocity": "m/s", "belt_velocity": "m/s"}
+"""Units of quantities; the others are forces."""
+_ROTARY = {"m": "rad", "m/s": "rad/s", "N": "N m"}
+_FORCES = ("force", "disturbance", "friction_force")
+"""Quantities that hold until the next value."""
+_MERGED_SHARE, _BETWEEN_SHARE = 0.3, 0.05
+"""Share of the rows with a position that lack another quantity, from which it was recorded between
+them; fewest of its values, as a share of the positions."""
+_NUMBER = re.compile(r"_?\d*$")
+"""What the names of several columns of times differ by: Time_1 and Time_2."""
+
+
+class Quantities(NamedTuple):
+    """What a table has of a run."""
+
+    values: dict[str, FloatArray]
+    """Quantities, arrays of shape (rows,); the time is s from the first row."""
+    notes: list[str]
+    """Sentences on how the table was read, and on what it lacks."""
+
+
+def quantities_of(
+    table: Table,
+    columns: Mapping[str, str] | None = None,
+    belt_speed: float | None = None,
+) -> Quantities:
+    """Return the quantities that a table has.
+
+    `columns` and `belt_speed` are those of `read_table`. Rows whose time is not finite are left
+    out. Values that a measure would overflow with are NaN (above 1e100) or zero (below 1e-100).
+    Columns with times of their own, and those of rows between the positions, are brought to the
+    times of the positions: forces hold, other values are interpolated. Raises BagError if the file
+    cannot be read, and InvalidInputError if it has not what is asked for, or no sample.
+    """
+    columns = table.own_columns if columns is None else columns
+    if belt_speed is not None:
+        columns = {**columns, "belt_velocity": repr(float(belt_speed))}
+    asked = _asked(table, columns, ("time", "position"))
+    clock = asked["time"].places
+    if not clock:
+        raise InvalidInputError(f"{table.path}: time = {columns['time']} must be a column")
+    clocks = {name: _clocks(table, clock, each) for name, each in asked.items()}
+    cells = _Cells.of(table, asked, clock, *clocks.values())
+    notes = cells.notes
+    times, rows = cells.times(clock, clocks.values())
+    time = _picked(times[clock], rows)
+    _check_order(table, time, rows)
+    values: dict[str, FloatArray] = {}
+    for name in [name for name in asked if name != "time"]:
+        value, own = cells.value(name), times[clocks[name]]
+        if own is times[clock] or np.array_equal(own, times[clock], equal_nan=True):
+            values[name] = _picked(
+                value if value.shape == own.shape else np.full(own.shape, value), rows
+            )
+        else:
+            values[name] = _at(time, own, value, hold=name in _FORCES)
+            notes.append(f"{name} has times of its own, those of column #{clocks[name][0] + 1}")
+    present = np.isfinite(values["position"])
+    if not present.any():
+        text = asked["position"].text
+        raise InvalidInputError(f"{table.path}: no row has a time and a position, {text}")
+    for name in [name for name in values if name not in ("position", "velocity")]:
+        values[name], note = _merged(name, time, values[name], present)
+        notes += note
+    values["time"], note = even_times(time)
+    notes += note
+    notes += _without_lost_positions(cells, values, rows)
+    if "velocity" in values:
+        notes += _without_lost_velocities(table, values, rows)
+    return Quantities(values, notes)
+
+
+def speed_and_force(table: Table, columns: Mapping[str, str]) -> Quantities:
+    """Return the quantities of a table of tests at constant speeds: pairs of velocity and force.
+
+    `columns` has both, and errors are those of `quantities_of`.
+    """
+    asked = _asked(table, columns, ("velocity", "force"))
+    cells = _Cells.of(table, asked, asked["velocity"].places)
+    return Quantities({name: np.atleast_1d(cells.value(name)) for name in asked}, cells.notes)
+
+
+def differences(time: FloatArray, position: FloatArray) -> FloatArray:
+    """Return the velocity at each time, by the positions on both sides; NaN where time stands."""
+    velocity = np.zeros(len(time))
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        for part in windows(len(time), 2):  # of a long array at once takes four times as long
+            at, moved = time[part], position[part]
+            velocity[part][1:-1] = (moved[2:] - moved[:-2]) / (at[2:] - at[:-2])
+        if len(time) > 1:
+            for place, (before, after) in {0: (0, 1), -1: (-2, -1)}.items():
+                moved, lasting = (each[after] - each[before] for each in (position, time))
+                velocity[place] = moved / lasting
+    return velocity
+
+
+@dataclass(frozen=True)
+class _Cells:
+    """The cells of the columns in expressions, and what converts the values of these."""
+
+    table: Table
+    asked: Mapping[str, Expression]
+    columns: Mapping[int, Any]
+    """By place."""
+    factors: Mapping[str, float]
+    """By quantity."""
+    notes: list[str]
+
+    @classmethod
+    def of(
+        cls,
+        table: Table,
+        asked: Mapping[str, Expression],
+        leading: Sequence[int],
+        *others: Sequence[int],
+    ) -> "_Cells":
+        """Read the columns of expressions, and other ones.
+
+        The length of the table is that of the leading ones; others of another length are refused.
+        """
+        places = [each.places for each in asked.values()]
+        used = sorted({place for each in (*places, *others) for place in each})
+        with reading_file(table.path):
+            columns = dict(zip(used, table.read(used), strict=True))
+        rows = max((len(columns[place]) for place in leading), default=0)
+        if not rows:
+            raise BagError(f"{table.path}: the file cannot be read: it has no rows")
+        for place, column in columns.items():
+            if len(column) not in (1, rows):
+                raise InvalidInputError(
+                    f"{table.path}: {table.name(place)} has {len(column)} numbers and "
+                    f"{table.name(leading[0])} {rows}: columns must have the same length"
+                )
+        notes = [*table.notes, *_lost_cells(table, columns, asked)]
+        factors: dict[str, float] = {}
+        for name, each in asked.items():
+            factors[name], note = _factor(table, name, each)
+            notes += note
+        return cls(table, asked, columns, factors, notes)
+
+    def value(self, name: str) -> FloatArray:
+        """Return a quantity, or its only value, in SI units."""
+        asked, factor = self.asked[name], self.factors[name]
+        value = asked.value([np.asarray(self.columns[place], float) for place in asked.places])
+        return _measurable(value if factor == 1.0 else value * factor)
+
+    def times(
+        self, clock: tuple[int, ...], others: Iterable[tuple[int, ...]]
+    ) -> tuple[dict[tuple[int, ...], FloatArray], range | IntArray]:
+        """Return times by columns, s from the first of the clock, and the rows that have one."""
+        asked, factor = self.asked["time"], self.factors["time"]
+        found = {
+            places: _times(asked, [self.columns[place] for place in places])
+            for places in dict.fromkeys((clock, *others))
+        }
+        known = np.isfinite(found[clock])
+        rows = range(len(known)) if known.all() else np.flatnonzero(known)
+        if not len(rows):
+            raise InvalidInputError(f"{self.table.path}: no time is a finite number")
+        first = found[clock][rows[0]]
+        for places, each in found.items():
+            since = each - first if first else each
+            found[places] = np.asarray(since if factor == 1.0 else since * factor, float)
+        return found, rows
+
+
+def _asked(
+    table: Table, columns: Mapping[str, str], needed: Sequence[str]
+) -> dict[str, Expression]:
+    """Return the expression of each quantity; refuse what is no quantity, or not enough."""
+    for name in columns:
+        if name not in QUANTITIES:
+            raise InvalidInputError(f"column {name} is invalid: {must_be_one_of(name, QUANTITIES)}")
+    lacking = [name for name in needed if name not in columns]
+    if lacking:
+        pairs = "; pairs of velocity and force are read by identify --map" * (
+            {"velocity", "force"} == {*columns}
+        )
+        raise InvalidInputError(
+            f"{table.path}: no column is given for {' and '.join(lacking)}{pairs}"
+        )
+    return {
+        name: Expression.read(table.path, text, table.columns) for name, text in columns.items()
+    }
+
+
+def _clocks(table: Table, clock: tuple[int, ...], asked: Expression) -> tuple[int, ...]:
+    """Return the columns of the times of an expression.
+
+    They are those of the time or, if this is one column, the last one before a column that is named
+    like it, such as Time_2 after Time_1.
+    """
+    stems, first = [_NUMBER.sub("", name) for name in table.names], clock[0]
+    if len(clock) > 1 or not stems[first]:
+        return clock
+    alike = [place for place, stem in enumerate(stems) if stem == stems[first]]
+    own = {
+        max((each for each in alike if each < place and place not in alike), default=first)
+        for place in asked.places
+    }
+    return tuple(own) if len(own) == 1 and alike[0] == first else clock
+
+
+def _times(clock: Expression, cells: Sequence[Any]) -> Any:
+    """Return the times that a table has, in its unit."""
+    counts = len(cells) > 1 or cells[0].dtype.kind == "i"
+    exact = np.longdouble if counts else float  # a float has no digits for ns since 1970
+    return clock.value([np.asarray(each, exact) for each in cells])
+
+
+def _check_order(table: Table, time: FloatArray, rows: range | IntArray) -> None:
+    """Refuse times that go back."""
+    back = np.flatnonzero(time[1:] < time[:-1])
+    if len(back):
+        raise InvalidInputError(
+            f"{table.path}: the time goes back {len(back)} times, the first time at "
+            f"{table.line(int(rows[back[0] + 1]))}: rows must be in the order of time; a counter "
+            "that wraps is time=unwrap(column, turn)"
+        )
+
+
+def _lost_cells(
+    table: Table, cells: Mapping[int, Any], asked: Mapping[str, Expression]
+) -> Iterator[str]:
+    """Yield sentences on cells that are left out."""
+    for place in dict.fromkeys(place for each in asked.values() for place in each.places):
+        column = cells[place]
+        if column.min() >= -LARGEST and column.max() <= LARGEST:
+            continue
+        bad = np.flatnonzero(~(np.abs(column) <= LARGEST))
+        value = column[bad[0]]
+        yield (
+            f"{table.name(place)} has no number in {len(bad)} of {len(column)} rows"
+            f"{f', or one as large as {value:.3g}' if np.isfinite(value) else ''}; the first "
+            f"is {table.line(int(bad[0]))}"
+        )
+
+
+def _factor(table: Table, kind: str, asked: Expression) -> tuple[float, list[str]]:
+    """Return what converts a column by itself to SI units, and sentences that say so."""
+    if not asked.bare or table.units[asked.places[0]].lower() in NO_UNITS:
+        return 1.0, []
+    given, unit = table.units[asked.places[0]], _UNITS.get(kind, "N")
+    name = f"{kind}, {table.name(asked.places[0])},"
+    factor = unit_factor(given, unit)
+    if factor is not None:
+        return factor, [] if factor == 1.0 else [f"{name} is in {given}, and converted to {unit}"]
+    rotary = _ROTARY.get(unit, unit)
+    factor = unit_factor(given, rotary)
+    if factor is not None:
+        return factor, [
+            f"{name} is in {given}: what is in {unit} is in {rotary}, as --rotary shows"
+        ]
+    return 1.0, [f"{name} is in {given}, which is no unit of {kind}: it is taken as {unit}"]
+
+
+def _measurable(values: FloatArray) -> FloatArray:
+    """Return values with NaN for those above 1e100, and zero for those below 1e-100."""
+    found = np.atleast_1d(values)
+    for part in windows(len(found)):
+        size = np.abs(found[part])
+        small = (size < 1.0 / LARGEST) & (size > 0.0)
+        if small.any() or not np.all(size <= LARGEST):
+            size = np.abs(found)
+            small = (size < 1.0 / LARGEST) & (size > 0.0)
+            return np.where(size <= LARGEST, np.where(small, 0.0, found), nan)
+    return found
+
+
+def _picked(values: FloatArray, rows: range | IntArray) -> FloatArray:
+    """Return the values of some rows, or of all, which is a range."""
+    return values if isinstance(rows, range) else values[rows]
+
+
+def _without_lost_positions(
+    cells: _Cells, values: dict[str, FloatArray], rows: range | IntArray
+) -> Iterator[str]:
+    """Leave out positions that no motion makes; yield sentences on them.
+
+    Raises InvalidInputError if the positions are those of a counter that wraps.
+    """
+    table, factor = cells.table, cells.factors["position"]
+    position, time = values["position"], values["time"]
+    present = np.isfinite(position)
+    found: range | IntArray = range(len(position))
+    if not present.all():
+        found = np.flatnonzero(present)
+    jumps = Jumps(_picked(position, found))
+
+    def line(row: Any) -> str:
+        return table.line(int(rows[found[row]]))
+
+    wrap = jumps.wrap()
+    if wrap is not None:
+        turn = f"{wrap.turn / factor:.10g}"
+        text = f"unwrap({cells.asked['position'].text}, {turn})"
+        raise InvalidInputError(
+            f"{table.path}: the position jumps {len(wrap.rows)} times by {turn}, the "
+            f"first time at {line(wrap.rows[0])}, as of a counter that wraps: position="
+            f"{text}{'' if factor == 1.0 else f'*{factor:g}'}"
+        )
+    lost = jumps.dropouts()
+    if len(lost):
+        values["position"] = position = position.copy()
+        position[lost if isinstance(found, range) else found[lost]] = nan
+        yield (
+            "the position jumps away and back, as no motion does, in "
+            f"{len(lost)} rows, the first is {line(lost[0])}: they are left out"
+        )
+    for row, size in jumps.shifts():
+        yield shift_note(size, f"at {line(row)}, {time[found[row]]:.6g} s after the first row")
+
+
+def _without_lost_velocities(
+    table: Table, values: dict[str, FloatArray], rows: range | IntArray
+) -> Iterator[str]:
+    """Leave out velocities that contradict the others or the positions; yield sentences on them."""
+    position, velocity = values["position"], values["velocity"]
+    both = np.flatnonzero(np.isfinite(position) & np.isfinite(velocity))
+    time, position, own = values["time"][both], position[both], velocity[both]
+    spikes = np.zeros(len(both), np.bool_)
+    spikes[Jumps(own).dropouts()] = True
+    if spikes.any():
+        between = np.interp(time, time[~spikes], own[~spikes])
+        by_position = differences(time, position)
+        spikes &= np.abs(own - by_position) > np.abs(between - by_position)
+    fault = velocity_fault(time[~spikes], position[~spikes], own[~spikes])
+    if fault is not None:
+        values["velocity"] = np.full(len(velocity), nan)
+        yield f"the velocity {fault}: it is left out"
+    elif spikes.any():
+        lost = both[spikes]
+        values["velocity"] = velocity = velocity.copy()
+        velocity[lost] = nan
+        yield (
+            "the velocity jumps away and back, as the positions do not, in "
+            f"{len(lost)} rows, the first is {table.line(int(rows[lost[0]]))}: they are left out"
+        )
+
+
+def _at(at: FloatArray, time: FloatArray, values: FloatArray, *, hold: bool) -> FloatArray:
+    """Return values that are known at some times at others: held, or interpolated."""
+    known = np.isfinite(time) & np.isfinite(values)
+    if not known.any():
+        return np.full(len(at), nan)
+    time, values = time[known], values[known]
+    if not hold:
+        return np.interp(at, time, values, left=nan, right=nan)
+    last = np.searchsorted(time, at, "right") - 1
+    return np.where(last >= 0, values[last], nan)
+
+
+def _merged(
+    name: str, time: FloatArray, values: FloatArray, present: BoolArray
+) -> tuple[FloatArray, list[str]]:
+    """Return a quantity at the rows with a position also where most of these lack it."""
+    known = np.isfinite(values)
+    lacking = 1.0 - np.mean(known[present])
+    few = np.count_nonzero(known) < _BETWEEN_SHARE * np.count_nonzero(present)
+    if lacking <= _MERGED_SHARE or few:
+        return values, []
+    hold = name in _FORCES
+    note = f"{lacking:.0%} of the rows with a position have no {name}: it is "
+    note += "held" if hold else "interpolated"
+    return np.where(known, values, _at(time, time, values, hold=hold)), [note]

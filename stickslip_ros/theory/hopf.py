@@ -1,0 +1,219 @@
+"""Hopf bifurcations over the belt speed: points, crossing speeds and Lyapunov coefficients."""
+
+from dataclasses import dataclass, replace
+from math import nan
+from typing import Any, Self
+
+import numpy as np
+import numpy.typing as npt
+
+from stickslip_ros.arrays import FloatArray
+from stickslip_ros.model.control import ContinuousControl
+from stickslip_ros.model.dimensionless_drive import SPEED
+from stickslip_ros.model.drive import Drive
+from stickslip_ros.model.functions import zero_between
+from stickslip_ros.theory.linear import Expansion, expand, hurwitz_determinants, jacobians
+from stickslip_ros.theory.requirements import (
+    AUTONOMOUS,
+    SMOOTH,
+    SPRING,
+    SYMMETRIC,
+    require,
+    require_position_loop,
+)
+
+_BELT_SPEEDS = np.geomspace(1e-6, 1e3, 4001)
+"""Dimensionless belt speeds, half a percent apart, between which sign changes are searched for."""
+
+
+_ON_AXIS = 1e-6
+"""Share of its frequency up to which the growth of a pair is rounding."""
+
+
+@dataclass(frozen=True)
+class HopfPoint:
+    """Belt speed at which a pair of eigenvalues crosses the imaginary axis."""
+
+    belt_speed: float
+    """Belt speed, m/s, above zero if friction is the same in both directions.
+
+    There is then a mirrored point at the opposite speed.
+    """
+    angular_frequency: float
+    """Imaginary part of the pair, rad/s: the frequency of the vibration that starts here."""
+    crossing_speed: float
+    """Rate of change of the pair's real part with the belt speed, 1/s per m/s; eq. 11 and 22."""
+    first_lyapunov_coefficient: float
+    """sigma, dimensionless; see the function `first_lyapunov_coefficient`.
+
+    It is nan where friction has no second derivative, as that of the elasto-plastic law.
+    """
+
+    @property
+    def supercritical(self) -> bool:
+        """Whether a stable vibration is known to start here with a small amplitude."""
+        return self.first_lyapunov_coefficient < 0.0
+
+
+@dataclass(frozen=True)
+class ComplexPair:
+    """The complex pair of eigenvalues that decays slowest, or grows fastest."""
+
+    growth: float
+    """Real part."""
+    frequency: float
+    """Imaginary part, above zero."""
+    right: npt.NDArray[np.complex128]
+    """q with A q = (growth + i frequency) q."""
+    left: npt.NDArray[np.complex128]
+    """p with A^T p = (growth - i frequency) p, and p* q = 1."""
+
+    @classmethod
+    def from_expansion(cls, expansion: Expansion) -> Self | None:
+        """Return the pair of the Jacobian; None if its eigenvalues are real."""
+        decomposed: Any = np.linalg.eig(expansion.jacobian)
+        values, right = decomposed
+        upper = int(np.argmax(np.where(values.imag > 0.0, values.real, -np.inf)))
+        if values[upper].imag <= 0.0:
+            return None
+        left = np.linalg.inv(right)[upper].conj()
+        value = complex(values[upper])
+        return cls(value.real, value.imag, right[:, upper], left)
+
+
+def hopf_points(drive: Drive, control: ContinuousControl | None = None) -> list[HopfPoint]:
+    """Return the Hopf points over the belt speed.
+
+    It covers every friction law, at constant belt speed and normal force. The search covers belt
+    speeds from 1e-6 to 1e3 N/sqrt(k m). It may miss two points closer than half a percent. If
+    friction differs between the directions, the points are those of the direction of the belt.
+
+    Parameters
+    ----------
+    drive : Drive
+        Drive in SI units; of its belt speed at most the sign is used.
+    control : ContinuousControl, optional
+        Continuous control in SI units, such as that of eq. 19. By default the loop is open.
+
+    Returns
+    -------
+    list of HopfPoint
+        Points in SI units, in order of the belt speed.
+
+    Raises
+    ------
+    InvalidInputError
+        If belt or load follow a signal, or the drive has no spring.
+
+    Examples
+    --------
+    The system of the paper:
+
+    >>> from stickslip_ros.model.drive import Drive
+    >>> from stickslip_ros.model.friction import Stribeck
+    >>> from stickslip_ros.theory.hopf import hopf_points
+    >>> drive = Drive(mass=1.0, damping=0.02, stiffness=1.0, normal_force=1.0,
+    ...               belt_speed=0.4, friction=Stribeck(0.4, 0.25, 0.5))
+    >>> (point,) = hopf_points(drive)
+    >>> round(point.belt_speed, 6), point.supercritical
+    (0.488763, True)
+    """
+    require("the search for Hopf points", drive, SPRING, AUTONOMOUS)
+    require_position_loop("the search for Hopf points", drive, control)
+    smooth = SMOOTH.lack(drive) is None
+    mirrored = SYMMETRIC.lack(drive) is None
+    belt_speeds = _BELT_SPEEDS if mirrored or drive.belt_speed >= 0.0 else -_BELT_SPEEDS
+    margins = _hopf_margins(drive, control, belt_speeds)
+    before = np.flatnonzero(np.sign(margins[:-1]) * np.sign(margins[1:]) < 0.0)
+    points: list[HopfPoint] = []
+    for row in before:
+        speed = zero_between(
+            lambda v: float(_hopf_margins(drive, control, np.array([v]))[0]),
+            float(belt_speeds[row]),
+            float(belt_speeds[row + 1]),
+        )
+        at_point = replace(drive, belt_speed=speed * drive.speed_scale)
+        expansion = expand(at_point, control)
+        assert expansion is not None
+        crossing, sigma = crossing_speed(expansion), first_lyapunov_coefficient(expansion)
+        if crossing is None or sigma is None or not _crosses(expansion):
+            continue
+        points.append(
+            HopfPoint(
+                belt_speed=at_point.belt_speed,
+                angular_frequency=float(expansion.eigenvalues[0].imag) * drive.angular_frequency,
+                crossing_speed=crossing * drive.angular_frequency / drive.speed_scale,
+                first_lyapunov_coefficient=sigma if smooth else nan,
+            )
+        )
+    return points
+
+
+def first_lyapunov_coefficient(expansion: Expansion) -> float | None:
+    """Return sigma of r' = alpha r + sigma r^3, r the amplitude of the dimensionless speed.
+
+    By projection onto the critical eigenvectors, for any order n: Kuznetsov, Elements of Applied
+    Bifurcation Theory, section 5.4. His coefficient is that of the amplitude along the eigenvector
+    and is divided by the frequency.
+
+    Parameters
+    ----------
+    expansion : Expansion
+        Expansion at a Hopf point.
+
+    Returns
+    -------
+    float or None
+        sigma, dimensionless; below zero the Hopf point is supercritical. None if all eigenvalues
+        are real.
+    """
+    jacobian, quadratic, cubic = expansion.jacobian, expansion.quadratic, expansion.cubic
+    pair = ComplexPair.from_expansion(expansion)
+    if pair is None:
+        return None
+    frequency, q, p = pair.frequency, pair.right, pair.left
+    conjugate = q.conj()
+    mean = np.linalg.solve(jacobian, np.einsum("ijk,j,k", quadratic, q, conjugate))
+    double = np.linalg.solve(
+        2j * frequency * np.eye(len(jacobian)) - jacobian, np.einsum("ijk,j,k", quadratic, q, q)
+    )
+    projected = p.conj() @ (
+        np.einsum("ijkl,j,k,l", cubic, q, q, conjugate)
+        - 2.0 * np.einsum("ijk,j,k", quadratic, q, mean)
+        + np.einsum("ijk,j,k", quadratic, conjugate, double)
+    )
+    return float(projected.real / (8.0 * abs(q[SPEED]) ** 2))
+
+
+def crossing_speed(expansion: Expansion) -> float | None:
+    """Return d Re(l)/d v0 of the complex pair l, eq. 11 and 22.
+
+    Parameters
+    ----------
+    expansion : Expansion
+        Expansion at the belt speed v0.
+
+    Returns
+    -------
+    float or None
+        Slope, dimensionless; None if all eigenvalues are real.
+    """
+    pair = ComplexPair.from_expansion(expansion)
+    if pair is None:
+        return None
+    return float((pair.left.conj() @ expansion.jacobian_by_belt_speed @ pair.right).real)
+
+
+def _crosses(expansion: Expansion) -> bool:
+    """Return whether a complex pair is on the imaginary axis, to rounding.
+
+    Otherwise two real eigenvalues have opposite signs, or the margin is rounding.
+    """
+    values = expansion.eigenvalues[expansion.eigenvalues.imag > 0.0]
+    return bool(np.any(np.abs(values.real) < _ON_AXIS * np.abs(values.imag)))
+
+
+def _hopf_margins(
+    drive: Drive, control: ContinuousControl | None, belt_speeds: FloatArray
+) -> FloatArray:
+    return hurwitz_determinants(jacobians(drive, control, belt_speeds))[:, -1]

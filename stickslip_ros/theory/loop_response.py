@@ -1,0 +1,166 @@
+"""Frequency response of the sampled loop: margins, sensitivity, and the force that it needs."""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from math import ceil, log2, pi
+from typing import Self
+
+import numpy as np
+import numpy.typing as npt
+
+from stickslip_ros.arrays import FloatArray
+from stickslip_ros.model.control import ControlLaw, LinearFeedback, VelocityFeedback
+from stickslip_ros.model.control.base import MOTOR, TABLE
+from stickslip_ros.model.dimensionless_drive import POSITION, SPEED
+from stickslip_ros.theory.linear_sampled_loop import LinearSampledLoop
+
+_PERIODS = 40.0
+"""Natural periods that the response to a step covers, at least."""
+
+ComplexArray = npt.NDArray[np.complex128]
+
+
+@dataclass(frozen=True, eq=False)
+class PlantResponse:
+    """Response of drive, hold, delay and sensor to force, at the n frequencies of a step."""
+
+    loop: LinearSampledLoop
+    """The loop without its law."""
+    frequency: FloatArray
+    """Angular frequencies, rad/s, equally spaced up to that of half the rate; shape (n,)."""
+    by_control: ComplexArray
+    """Displacement, m/N, and velocity, m/(N s), that a law sees by control force; those of a motor
+    follow; shape (n, 2) or (n, 4)."""
+    by_disturbance: ComplexArray
+    """The same by a disturbance force on the slide."""
+
+    @classmethod
+    def of(cls, loop: LinearSampledLoop) -> Self:
+        """Return the response of a loop."""
+        drive, spans = loop.drive, loop.difference_samples
+        whole, rest = loop.delay
+        short = replace(loop, force_delay=rest / loop.rate)  # whole periods are a factor
+        count = 1 << max(ceil(log2(_PERIODS * min(drive.natural_period, 0.2) * loop.rate)), 11)
+        turns = (np.arange(count // 2) + 0.5) / count  # no frequency 0: a free motor drifts
+        z = np.exp(2j * pi * turns)
+        body = TABLE if drive.motor is None else MOTOR
+        once, twice = (
+            short.transition_matrix(VelocityFeedback(0.0, gain, feedback=body))
+            for gain in (1.0, 2.0)
+        )
+        open_loop, effect = 2.0 * once - twice, twice - once
+        order = len(open_loop)
+        seen = POSITION if drive.motor is None else len(loop.jacobian) - 2
+        # What a newton does to the state until the next sample.
+        forces = np.zeros((order, 2))
+        forces[:, 0] = effect[:, seen] / drive.length_scale
+        forces[: len(loop.disturbed), 1] = loop.disturbed / drive.normal_force
+        states = np.linalg.solve(z[:, None, None] * np.eye(order) - open_loop, forces)
+        rows = [states[:, POSITION] * drive.length_scale, states[:, SPEED] * drive.speed_scale]
+        if spans:
+            rows[1] = rows[0] * ((1.0 - z**-spans) * loop.rate / spans)[:, None]
+        if drive.motor is not None:
+            rows.append(states[:, seen] * drive.length_scale)
+            rows.append(states[:, seen + 1] * drive.speed_scale)
+        found: ComplexArray = np.stack(rows, axis=1).astype(np.complex128)
+        delayed = found[..., 0] * (z**-whole)[:, None]
+        return cls(loop, 2.0 * pi * turns * loop.rate, delayed, found[..., 1])
+
+
+@dataclass(frozen=True, eq=False)
+class LoopResponse:
+    """Response of a stable loop with a law; arrays of shape (n,)."""
+
+    plant: PlantResponse
+    """Response without the law."""
+    feedback: LinearFeedback
+    """The law, linear."""
+
+    @cached_property
+    def law(self) -> ComplexArray:
+        """Force by what the law sees, N/m and N s/m; shape (n, 2) or (n, 4)."""
+        form, z = self.feedback, np.exp(1j * self.plant.frequency / self.plant.loop.rate)
+        found = np.broadcast_to(form.direct.astype(complex), (len(z), len(form.direct)))
+        if len(form.state):
+            states = z[:, None, None] * np.eye(len(form.state)) - form.state
+            found = found + form.output @ np.linalg.solve(states, form.input.astype(complex))
+        count = self.plant.by_control.shape[1]  # two for each body that there is
+        padded = np.pad(found, ((0, 0), (0, max(count - found.shape[1], 0))))
+        return padded[:, :count].astype(np.complex128)
+
+    @cached_property
+    def open_loop(self) -> ComplexArray:
+        """Loop transfer function L, which is unstable at -1."""
+        return -(self.law * self.plant.by_control).sum(axis=1)
+
+    @property
+    def sensitivity(self) -> ComplexArray:
+        """Sensitivity S = 1/(1 + L)."""
+        return 1.0 / (1.0 + self.open_loop)
+
+    @property
+    def sensitivity_peak(self) -> float:
+        """Largest magnitude of the sensitivity."""
+        return float(np.abs(self.sensitivity).max())
+
+    @property
+    def phase_margin(self) -> float | None:
+        """Smallest angle between L and -1 where |L| = 1, rad; None if |L| never is."""
+        angles = [abs(margin) for margin, _ in self._crossings()]
+        return min(angles, default=None)
+
+    @property
+    def delay_margin(self) -> float | None:
+        """Smallest delay, s, that turns L to -1 where |L| = 1; None if there is none."""
+        delays = [margin % (2.0 * pi) / frequency for margin, frequency in self._crossings()]
+        return min(delays, default=None)
+
+    @property
+    def gain_margins(self) -> tuple[float | None, float | None]:
+        """Largest factor below 1 and smallest above 1 of the force that make L = -1, or None."""
+        values = self.open_loop
+        imaginary, real = values.imag, values.real
+        rows = np.flatnonzero((imaginary[1:] * imaginary[:-1] <= 0.0) & (real[1:] < 0.0))
+        share = imaginary[rows] / (imaginary[rows] - imaginary[rows + 1] + 1e-300)
+        crossed = real[rows] + share * (real[rows + 1] - real[rows])
+        factors = [*(-1.0 / crossed[crossed < 0.0]).tolist()]
+        below = [factor for factor in factors if factor < 1.0]
+        above = [factor for factor in factors if factor > 1.0]
+        return max(below, default=None), min(above, default=None)
+
+    def _crossings(self) -> list[tuple[float, float]]:
+        """Return pi + arg L, rad, and the frequency, rad/s, wherever |L| = 1."""
+        size, frequency = np.log(np.abs(self.open_loop) + 1e-300), self.plant.frequency
+        rows = np.flatnonzero(size[1:] * size[:-1] < 0.0)
+        share = size[rows] / (size[rows] - size[rows + 1])
+        angle = np.unwrap(np.angle(self.open_loop))
+        angles = angle[rows] + share * (angle[rows + 1] - angle[rows])
+        frequencies = frequency[rows] + share * (frequency[rows + 1] - frequency[rows])
+        margins = (angles + 2.0 * pi) % (2.0 * pi) - pi
+        return list(zip(margins.tolist(), frequencies.tolist(), strict=True))
+
+    def step_response(self) -> FloatArray:
+        """Return the control force after a step of 1 N of the disturbance, at the samples."""
+        by_step = self.sensitivity * (self.law * self.plant.by_disturbance).sum(axis=1)
+        count = 2 * len(by_step)
+        step = np.repeat([1.0, -1.0], count)  # the step of a square wave of long period
+        spectrum = np.zeros(count + 1, dtype=complex)
+        spectrum[1::2] = by_step * np.fft.rfft(step)[1::2]
+        found = np.fft.irfft(spectrum, 2 * count)[:count]
+        return (found + found[-1]) / 2.0
+
+    def noise_force(self, noise: float) -> float:
+        """Return the rms force, N, by white noise of the measured position with this rms, m."""
+        spans, z = self.plant.loop.difference_samples, self.plant.frequency
+        by_noise = self.law[:, 0].copy()
+        if spans:
+            delay = np.exp(-1j * spans * z / self.plant.loop.rate)
+            by_noise += self.law[:, 1] * (1.0 - delay) * self.plant.loop.rate / spans
+        size = np.abs(by_noise * self.sensitivity)
+        return noise * float(np.sqrt(np.mean(size * size)))
+
+
+def loop_response(loop: LinearSampledLoop, law: ControlLaw) -> LoopResponse | None:
+    """Return the response of a loop with a law; None if the law has no linear part."""
+    feedback = law.linear_part(1.0 / loop.rate)
+    return None if feedback is None else LoopResponse(PlantResponse.of(loop), feedback)

@@ -1,0 +1,83 @@
+"""Stability of the sampled loop over its gains, and over rate and delay."""
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+
+from stickslip_ros.arrays import FloatArray
+from stickslip_ros.model.control import Washout
+from stickslip_ros.model.drive import Drive
+from stickslip_ros.model.sensor import EXACT_SENSOR, Sensor
+from stickslip_ros.theory.critical_gains import critical_gains
+from stickslip_ros.theory.gain_intervals import nearest_to_zero
+from stickslip_ros.theory.linear_sampled_loop import LinearSampledLoop
+
+
+@dataclass(frozen=True)
+class StabilityMap:
+    """Decay rates of a loop over cutoff frequency and linear gain, around given gains; SI units."""
+
+    loop: LinearSampledLoop
+    gains: Washout
+    """Gains at the centre of the map."""
+    corner_frequencies: FloatArray
+    """rad/s, shape (m,)."""
+    linear_gains: FloatArray
+    """N s/m, shape (n,); their range includes zero."""
+    decay_rates: FloatArray
+    """1/s, shape (m, n); above zero where the loop is stable. Approximate for a long delay."""
+    continuous: FloatArray
+    """Critical linear gain without sampling and delay, shape (m,); NaN if there is none."""
+
+    @classmethod
+    def around(cls, loop: LinearSampledLoop, gains: Washout, points: int = 81) -> Self:
+        """Return the map around `gains` (SI units) with this number of points along each axis."""
+        corners = np.geomspace(0.1 * gains.corner_frequency, 10.0 * gains.corner_frequency, points)
+        continuous = np.full(points, np.nan)
+        for row, corner_frequency in enumerate(corners):
+            critical = critical_gains(loop.drive, Washout(float(corner_frequency), 0.0, 0.0))
+            if critical is not None:
+                continuous[row] = critical.linear
+        needed = loop.critical_linear_gain(gains.corner_frequency) or 0.0
+        far = 2.0 * (
+            gains.linear_gain or needed or -loop.drive.normal_force / loop.drive.speed_scale
+        )
+        linear = np.sort(np.linspace(far, -0.25 * far, points))
+        decay_rates = loop.coarsened().decay_rates(corners, linear)
+        return cls(loop, gains, corners, linear, decay_rates, continuous)
+
+
+@dataclass(frozen=True)
+class CriticalGainCurves:
+    """Critical linear gain over rate and delay of a sampled loop; SI units."""
+
+    rates: FloatArray
+    """Hz, shape (m,)."""
+    force_delays: FloatArray
+    """s, shape (n,)."""
+    linear_gains: FloatArray
+    """See `LinearSampledLoop.critical_linear_gain`, N s/m; (m, n), NaN if there is none."""
+    other_ends: FloatArray
+    """Other ends of the stable intervals that these gains end, N s/m; (m, n)."""
+
+    @classmethod
+    def over(
+        cls,
+        drive: Drive,
+        corner_frequency: float,
+        rates: FloatArray,
+        force_delays: FloatArray,
+        sensor: Sensor = EXACT_SENSOR,
+    ) -> Self:
+        """Return the curves of a drive for this cutoff frequency (rad/s)."""
+        ends = np.full((2, len(rates), len(force_delays)), np.nan)
+        for row, rate in enumerate(rates.tolist()):
+            for column, force_delay in enumerate(force_delays.tolist()):
+                loop = LinearSampledLoop.from_drive(drive, rate, force_delay, sensor)
+                intervals = loop.stable_linear_gains(corner_frequency) if loop else []
+                if intervals:
+                    interval = nearest_to_zero(intervals)
+                    order = 1 if interval[0] == interval.critical else -1
+                    ends[:, row, column] = interval[::order]
+        return cls(rates, force_delays, *ends)

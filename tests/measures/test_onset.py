@@ -1,0 +1,170 @@
+"""The onset of vibration from decay rates: against the Hopf points of the theory."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import stickslip_ros as ss
+from benchmarks.onset import summary, tapped, tried
+from stickslip_ros.measures.onset import OnsetWatch, mean_decays, onset_of
+from stickslip_ros.measures.ring_down import RingDown
+from stickslip_ros.model.drive import Drive
+from stickslip_ros.model.friction import Exponential, FrictionLaw, LuGre, Stribeck
+from stickslip_ros.model.signals import ramp
+from stickslip_ros.samples import NO_SAMPLES, SampleColumns
+from stickslip_ros.stamps import NANOSECONDS
+from stickslip_ros.theory.hopf import hopf_points
+from stickslip_ros.theory.linear import expand
+
+LAWS: dict[str, FrictionLaw] = {
+    "stribeck": Stribeck(0.31, 0.22, 0.043),
+    "exponential, exponent 1": Exponential(0.33, 0.21, 0.021),
+    "exponential, exponent 2": Exponential(0.3, 0.24, 0.034, 0.0, 2.0),
+    "lugre": LuGre(Exponential(0.33, 0.21, 0.021), bristle_stiffness=30_000.0),
+}
+
+
+def drive_with(friction: FrictionLaw) -> Drive:
+    return Drive(
+        mass=83.0,
+        damping=410.0,
+        stiffness=7.3e5,
+        normal_force=900.0,
+        belt_speed=0.05,
+        friction=friction,
+    )
+
+
+def decaying(
+    drive: Drive, ratios: tuple[float, ...], share: float = 0.005, seed: int = 0
+) -> tuple[list[RingDown], float]:
+    """Return five ring-downs at each feed, with an error that is a share, and the Hopf speed."""
+    hopf = max(point.belt_speed for point in hopf_points(drive))
+    random = np.random.default_rng(seed)
+    found: list[RingDown] = []
+    for speed in (ratio * hopf for ratio in ratios):
+        expansion = expand(replace(drive, belt_speed=speed))
+        assert expansion is not None
+        pair = expansion.eigenvalues[expansion.eigenvalues.imag > 0.0][0] * drive.angular_frequency
+        rate, frequency = -pair.real, pair.imag / (2.0 * np.pi)
+        for _ in range(5):
+            own = rate * (1.0 + share * random.standard_normal())
+            found.append(RingDown(0.0, 1.0, speed, own, share * rate, frequency, 1e-3, 1e-5))
+    return found, hopf
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_the_interval_contains_the_hopf_speed(name: str) -> None:
+    for seed in range(10):
+        own, hopf = decaying(drive_with(LAWS[name]), (1.2, 1.3, 1.4, 1.5), seed=seed)
+        onset = onset_of(own)
+        assert onset.speed is not None
+        assert onset.lower is not None
+        assert onset.upper is not None
+        assert onset.lower <= hopf <= onset.upper
+        assert onset.lower <= onset.speed <= onset.upper
+        assert name == "lugre" or not onset.families[name].rejected
+        assert onset.speed == pytest.approx(hopf, rel=0.06)
+
+
+def test_a_family_that_fits_gives_the_decay_at_any_feed() -> None:
+    own, hopf = decaying(drive_with(LAWS["stribeck"]), (1.1, 1.2, 1.4), share=1e-6)
+    family = onset_of(own).families["stribeck"]
+    assert family.onset_speed == pytest.approx(hopf, rel=2e-3)
+    rates = family.decay_rate(np.array([each.belt_speed for each in own]))
+    assert rates == pytest.approx([each.decay_rate for each in own], rel=2e-2)
+
+
+def test_families_that_do_not_fit_are_rejected() -> None:
+    own, _ = decaying(drive_with(LAWS["exponential, exponent 1"]), (1.05, 1.2, 1.5, 1.9))
+    onset = onset_of(own)
+    assert {name for name, each in onset.families.items() if each.rejected} >= {"stribeck"}
+    rates = [1.0, 3.0, 0.5, 4.0]
+    mixed = [
+        RingDown(0.0, 1.0, speed, rate, 0.01, 16.0, 1e-3, 1e-5)
+        for speed, rate in zip((0.04, 0.05, 0.06, 0.07), rates, strict=True)
+    ]
+    onset = onset_of(mixed)
+    assert onset.speed is None
+    assert "no family of friction fits" in onset.advice
+
+
+def test_what_tells_nothing_gives_a_sentence() -> None:
+    own, hopf = decaying(drive_with(LAWS["stribeck"]), (1.2,))
+    assert "no ring-down decays" in onset_of([]).advice
+    onset = onset_of(own)
+    assert onset.upper is None
+    assert "one feed tells no onset" in onset.advice
+    same = [*own, *(replace(each, belt_speed=1.3 * hopf) for each in own)]
+    assert "does not rise with the feed" in onset_of(same).advice
+    assert "rad/s" in onset_of(own, "rad").advice
+
+
+def test_far_from_the_onset_only_an_upper_limit_is_told() -> None:
+    own, hopf = decaying(drive_with(LAWS["exponential, exponent 1"]), (1.6, 1.8, 2.0), share=0.02)
+    onset = onset_of(own)
+    assert onset.speed is None
+    assert onset.upper is not None
+    assert onset.upper > hopf
+    assert "only an upper limit" in onset.advice
+    assert "a run at" in onset.advice or "taps at" in onset.advice
+
+
+def test_errors_that_are_common_to_equal_taps_are_not_averaged_out() -> None:
+    equal = [RingDown(0.0, 1.0, 0.05, 2.0, 0.1, 16.0, 1e-3, 1e-5)] * 10
+    (mean,) = mean_decays(equal)
+    assert mean.decay_error == pytest.approx(0.1)
+    random = np.random.default_rng(1)
+    scattered = [replace(each, decay_rate=2.0 + 0.1 * random.standard_normal()) for each in equal]
+    (mean,) = mean_decays(scattered)
+    assert 0.02 < mean.decay_error < 0.08
+    assert mean.ring_downs == 10
+
+
+def test_a_watch_warns_near_the_onset_however_samples_are_divided() -> None:
+    """The feed of feed_drive falls from 58 to 51 mm/s; the onset is at 48.9 mm/s."""
+    texts: set[str] = set()
+    drive = ss.scenario("feed_drive", expects_control=False).plant.as_drive()
+    drive = replace(drive, belt_speed=0.058, belt=ramp(-0.007, 0.0, 14.0))
+    position, belt = tapped(drive, 1e-5, 5e-7, 14.5, np.random.default_rng(1))
+    count, unknown = len(position), np.full(len(position), np.nan)
+    stamp = 1_000_000 * np.arange(count) + NANOSECONDS
+    samples = SampleColumns(stamp, position, np.zeros(count), unknown, unknown, belt)
+    for block in (100, 777, 9000, count):
+        watch = OnsetWatch()
+        found = [
+            each for k in range(0, count, block) for each in watch.feed(samples[k : k + block])
+        ]
+        assert len(found) > 8
+        assert found == watch.ring_downs
+        text, near = watch.status(margin=0.1)
+        texts.add(text)
+        assert near
+        assert not watch.status(margin=0.01)[1]
+    (text,) = texts
+    assert re.fullmatch(r"decay \S+ 1/s, onset 4\S+ \+- \S+ mm/s, feed 51 mm/s", text)
+    again = samples[:5000]
+    assert watch.feed(again)  # the clock is set back
+    slowly = replace(samples, stamp=100 * stamp, belt_velocity=belt / 100.0)
+    watch = OnsetWatch()
+    watch.pause = 100.0 * drive.natural_period
+    assert watch.feed(slowly)
+    assert watch.status(margin=0.1)[1]
+
+
+def test_a_watch_without_ring_downs_says_nothing() -> None:
+    watch = OnsetWatch()
+    assert watch.feed(NO_SAMPLES) == []
+    assert watch.status(margin=0.1) == ("", False)
+
+
+@pytest.mark.long
+def test_machines_of_three_laws_are_covered() -> None:
+    """A part of the study in benchmarks/onset.py."""
+    rows = [tried(seed) for seed in range(30)]
+    found = summary(rows)
+    assert found["covered"] >= 0.92
+    assert found["near_answers"] == found["near"]
+    assert found["near_median_error"] <= 0.03

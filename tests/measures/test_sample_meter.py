@@ -1,0 +1,392 @@
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.measures.cycle_measures import Regime
+from stickslip_ros.measures.run_meter import RunMeter
+from stickslip_ros.measures.sample_assumptions import UNKNOWN, SampleAssumptions, reading_of
+from stickslip_ros.measures.sample_meter import SampleMeter
+from stickslip_ros.motion.motion import Motion
+from stickslip_ros.samples import SampleColumns
+from tests.drives import LIMIT_CYCLES, PAPER
+from tests.examples import examples
+from tests.measures.records import columns, fed, feed, milliseconds
+
+SECOND = 10**9
+
+
+def later(samples: SampleColumns, nanoseconds: int) -> SampleColumns:
+    return replace(samples, stamp=samples.stamp + nanoseconds)
+
+
+@cache
+def limit_cycle(belt_speed: float = 0.2) -> SampleColumns:
+    """The paper's drive at 100 Hz from 1 s on, on its limit cycle."""
+    drive = replace(PAPER, belt_speed=belt_speed)
+    motion = Motion(drive, 0.0, 0.0)
+    motion.advance(1000.0)
+    rows = [(motion.position, motion.velocity)]
+    for _ in range(7000):
+        motion.advance(0.01)
+        rows.append((motion.position, motion.velocity))
+    position, velocity = np.array(rows).T
+    return columns(stamps(100, len(rows)), position, velocity, np.full(len(rows), belt_speed))
+
+
+def stamps(rate: int, count: int, start: int = SECOND) -> npt.NDArray[np.int64]:
+    return np.array([start + (n * SECOND + rate // 2) // rate for n in range(count)])
+
+
+def still(stamp: npt.NDArray[np.int64]) -> SampleColumns:
+    """A slide that rests while the belt moves, at those stamps."""
+    rest = np.zeros(len(stamp))
+    return columns(stamp, rest, rest, rest + 1.0)
+
+
+def test_measures_of_a_limit_cycle() -> None:
+    meter = SampleMeter(window=20)
+    cycles = meter.feed(limit_cycle())
+    measures = meter.measures()
+    (expected,) = (cycle for cycle in LIMIT_CYCLES if cycle.belt_speed == 0.2)
+    assert len(cycles) == measures.cycles == 9  # of 7.07 s in 70 s
+    assert measures.regime is Regime.STICK_SLIP
+    assert measures.amplitude == pytest.approx(expected.amplitude, rel=1e-8)
+    assert measures.velocity_amplitude == pytest.approx(expected.velocity_amplitude, rel=1e-8)
+    assert measures.midpoint == pytest.approx(expected.midpoint, rel=1e-8)
+    assert measures.period == pytest.approx(expected.period, rel=1e-8)
+    assert measures.stick_fraction == pytest.approx(expected.stick_fraction, abs=1e-5)
+    assert meter.samples == 7001
+    assert meter.lost_samples == 0
+    assert meter.duration == pytest.approx(70.0, rel=1e-15)
+
+
+@examples(quick=20, thorough=100)
+@given(st.lists(st.integers(1, 7000), max_size=12).map(sorted))
+def test_the_size_of_the_blocks_does_not_matter(starts: list[int]) -> None:
+    whole, in_blocks = SampleMeter(window=20), SampleMeter(window=20)
+    expected = whole.feed(limit_cycle())
+    cycles = feed(in_blocks, limit_cycle(), starts)
+    assert len(cycles) == len(expected)
+    for cycle, expected_cycle in zip(cycles, expected, strict=True):
+        # Time is counted from the start of a block; adding it up rounds.
+        assert vars(cycle) == pytest.approx(vars(expected_cycle), rel=1e-9)
+    assert in_blocks.samples == whole.samples
+    assert in_blocks.lost_samples == 0
+    assert in_blocks.duration == whole.duration
+
+
+# 3, 7 and 30 Hz have periods that are no whole number of nanoseconds.
+rates = st.sampled_from([3, 7, 30, 100, 1000, 100_000])
+
+
+@given(rates, st.sets(st.integers(2, 198)), st.lists(st.integers(2, 200), max_size=5).map(sorted))
+def test_what_is_lost_is_counted_exactly(rate: int, lost: set[int], starts: list[int]) -> None:
+    """From the stamps alone; the first two samples came, so that the period is known."""
+    kept = np.array([n for n in range(200) if n not in lost])
+    samples = still(stamps(rate, 200))[kept]
+    meter = SampleMeter(window=20)
+    for start, end in zip([0, *starts], [*starts, 200], strict=True):
+        meter.feed(samples[(kept >= start) & (kept < end)])
+    assert meter.samples == len(kept)
+    assert meter.lost_samples == len(lost)
+
+
+def test_a_loss_at_the_start_is_counted_once_the_period_is_known() -> None:
+    meter = fed(still(stamps(1000, 10))[np.array([0, 2])])
+    meter.feed(still(stamps(1000, 10))[np.array([3, 4, 5])])
+    assert meter.lost_samples == 1
+
+
+def test_measures_bridge_what_was_lost() -> None:
+    samples = limit_cycle()
+    kept = np.random.default_rng(1).random(len(samples.stamp)) > 0.1
+    kept[:2] = True
+    whole, holed = fed(samples), fed(samples[kept])
+    assert holed.lost_samples == np.count_nonzero(~kept[: np.flatnonzero(kept)[-1]])
+    expected, measures = whole.measures(), holed.measures()
+    assert measures.cycles == expected.cycles
+    assert measures.amplitude == pytest.approx(expected.amplitude, rel=1e-6)
+    assert measures.period == pytest.approx(expected.period, rel=1e-6)
+    assert measures.stick_fraction == pytest.approx(expected.stick_fraction, abs=1e-3)
+
+
+@pytest.mark.parametrize(("late", "lost"), [(0.0, 300), (0.2, 0)])
+def test_no_cycle_spans_a_long_gap(late: float, lost: int) -> None:
+    """On no grid it starts a new segment."""
+    samples = read_late(limit_cycle(), late)
+    meter = fed(samples[:3000])
+    cycles = meter.feed(samples[3300:7001])
+    assert meter.lost_samples == lost
+    assert meter.duration == pytest.approx(67.0, abs=0.1)
+    assert [cycle.period for cycle in cycles] == pytest.approx(
+        [7.06772953] * len(cycles), rel=1e-3 if late else 1e-6
+    )
+
+
+@pytest.mark.parametrize("gap", [1.2345678, 60.00004, 700.0005, 86400.0003])
+def test_a_new_segment_is_no_loss(gap: float) -> None:
+    """The gap is no whole number of periods of 1 ms, as after a pause in real time."""
+    first = still(stamps(1000, 5000))
+    meter = fed(first)
+    meter.feed(later(first, 4_999_000_000 + round(gap * SECOND)))
+    assert meter.samples == 10_000
+    assert meter.lost_samples == 0
+    assert meter.duration == pytest.approx(2 * 4.999, rel=1e-15)
+
+
+@pytest.mark.parametrize(("rates", "blocks"), [((100, 1000), 1), ((1000, 100), 2), ((100, 150), 1)])
+def test_a_new_segment_may_have_another_rate(rates: tuple[int, int], blocks: int) -> None:
+    first = still(stamps(rates[0], 100))
+    second = still(stamps(rates[1], 100, start=int(first.stamp[-1]) + 1_234_567_800))
+    meter = fed(first.followed_by(second), starts=[100] if blocks == 2 else [])
+    assert meter.samples == 200
+    assert meter.lost_samples == 0
+
+
+@pytest.mark.parametrize("blocks", [1, 2])
+def test_stamps_that_go_back_start_a_new_segment(blocks: int) -> None:
+    samples = limit_cycle()
+    twice = samples[:5000].followed_by(samples[1000:6000])
+    meter = SampleMeter(window=20)
+    cycles = feed(meter, twice, [5000] if blocks == 2 else [])
+    assert meter.samples == 10_000
+    assert meter.lost_samples == 0
+    assert [cycle.period for cycle in cycles] == pytest.approx([7.06772953] * len(cycles), rel=1e-6)
+    assert len(cycles) >= 10
+
+
+@pytest.mark.parametrize("column", ["position", "velocity", "belt_velocity"])
+def test_rows_that_are_not_finite_are_lost(column: str) -> None:
+    samples = limit_cycle()
+    values = getattr(samples, column).copy()
+    values[[10, 500, 501, 3000]] = [np.nan, np.inf, -np.inf, np.nan]
+    meter = SampleMeter(window=20)
+    cycles = meter.feed(replace(samples, **{column: values}))
+    assert meter.samples == 6997
+    assert meter.lost_samples == 4
+    assert len(cycles) == 9
+    assert np.isfinite([list(vars(cycle).values()) for cycle in cycles]).all()
+
+
+@pytest.mark.parametrize(("speed", "regime"), [(999.0, None), (1001.0, Regime.UNBOUNDED)])
+def test_a_thousand_belt_speeds_are_running_away(speed: float, regime: Regime | None) -> None:
+    samples = replace(still(stamps(100, 3)), velocity=np.array([0.0, -speed, speed]))
+    meter = fed(samples)
+    assert meter.measures().regime is regime
+
+
+def test_a_plant_that_has_ended_a_diverging_motion_is_told_on_a_fast_belt_too() -> None:
+    """On a belt of 5 m/s a thousand belt speeds are more than the plant lets the slide reach."""
+    drive = {"mass": 100.0, "stiffness": 1e6, "normal_force": 1000.0}  # 0.1 m/s is its scale
+    velocity = np.concatenate([np.zeros(20), np.geomspace(0.1, 100.0, 10)])
+    samples = replace(still(stamps(100, 30)), velocity=velocity, belt_velocity=np.full(30, 5.0))
+    meter = SampleMeter(window=20, reading=reading_of(drive))
+    meter.feed(samples)
+    assert meter.measures().regime is Regime.UNBOUNDED
+    assert fed(samples).measures().regime is not Regime.UNBOUNDED
+    assert reading_of(drive | {"mass": -1.0}).unbounded_speed == float("inf")
+
+
+def read_late(samples: SampleColumns, latest: float, seed: int = 1) -> SampleColumns:
+    """With stamps of a clock that is read late, by the share `latest` of a period at most."""
+    period = int(samples.stamp[1] - samples.stamp[0])
+    late = np.random.default_rng(seed).random(len(samples.stamp)) * latest * period
+    return replace(samples, stamp=samples.stamp + late.astype(np.int64))
+
+
+@examples(quick=15, thorough=100)
+@given(
+    st.sampled_from([2e-6, 1e-3, 0.2, 0.7]),
+    st.integers(0, 100),
+    st.lists(st.integers(1, 7000), max_size=5).map(sorted),
+)
+def test_jittered_stamps_are_measured(latest: float, seed: int, starts: list[int]) -> None:
+    """However they are cut into blocks."""
+    samples = read_late(limit_cycle(), latest, seed)
+    whole, in_blocks = SampleMeter(window=20), SampleMeter(window=20)
+    cycles = whole.feed(samples)
+    measures, expected = whole.measures(), fed(limit_cycle()).measures()
+    assert measures.cycles == expected.cycles
+    assert measures.amplitude == pytest.approx(expected.amplitude, rel=1e-4)
+    assert measures.velocity_amplitude == pytest.approx(expected.velocity_amplitude, rel=1e-4)
+    assert measures.period == pytest.approx(expected.period, rel=1e-3)
+    assert measures.stick_fraction == pytest.approx(expected.stick_fraction, abs=2e-3)
+    same = feed(in_blocks, samples, starts)
+    assert len(same) == len(cycles)
+    for cycle, expected_cycle in zip(same, cycles, strict=True):
+        assert vars(cycle) == pytest.approx(vars(expected_cycle), rel=1e-9)
+    assert in_blocks.lost_samples == whole.lost_samples
+    assert in_blocks.duration == whole.duration
+
+
+def test_states_that_were_really_taken_at_jittered_stamps_are_measured() -> None:
+    samples = read_late(still(stamps(100, 7001)), 0.5)
+    time = samples.stamp * 1e-9
+    samples = replace(samples, position=np.sin(time), velocity=np.cos(time))
+    meter = fed(samples)
+    measures = meter.measures()
+    assert meter.lost_samples == 0
+    assert measures.cycles == 10
+    assert measures.amplitude == pytest.approx(1.0, rel=1e-4)
+    assert measures.velocity_amplitude == pytest.approx(1.0, rel=1e-4)
+    assert measures.period == pytest.approx(2.0 * np.pi, rel=1e-6)
+
+
+@given(st.sets(st.integers(50, 198)), st.integers(0, 100))
+def test_what_is_lost_of_jittered_samples_is_counted(lost: set[int], seed: int) -> None:
+    lost = {number for number in lost if number % 10}  # never over the longest gap
+    kept = np.array([number for number in range(200) if number not in lost])
+    meter = fed(read_late(still(stamps(1000, 200)), 0.2, seed)[kept])
+    assert meter.samples == len(kept)
+    assert meter.lost_samples == len(lost)
+
+
+def test_many_samples_off_every_grid_take_no_longer_than_on_one() -> None:
+    """With time that grew as the square of their number this would take minutes."""
+    time = 1e-3 * np.arange(200_000)
+    samples = columns(stamps(1000, len(time)), np.sin(time), np.cos(time), np.full(len(time), 2.0))
+    meter = fed(read_late(samples, 0.2))
+    assert meter.lost_samples == 0
+    assert meter.measures().cycles == 20
+
+
+def test_many_segments_in_one_block_take_time_in_proportion() -> None:
+    """Each looks only a little ahead: seen from every one to the end it would be 4e8 steps."""
+    meter = fed(still(np.full(20_000, SECOND)))
+    assert meter.samples == 20_000
+    assert meter.lost_samples == 0
+    assert meter.duration == 0.0
+
+
+@pytest.mark.parametrize(
+    ("number", "wild"), [(0, 0), (1, (2**31 - 1) * SECOND), (3000, 0), (7000, (2**31 - 1) * SECOND)]
+)
+def test_a_stamp_of_another_time_is_no_loss(number: int, wild: int) -> None:
+    samples = later(limit_cycle(), 1_700_000_000 * SECOND)
+    samples.stamp[number] = wild
+    meter = fed(samples)
+    assert meter.samples == 7001
+    assert meter.lost_samples == 0
+    assert meter.duration == pytest.approx(70.0, abs=0.03)
+    assert meter.measures().cycles >= 8
+
+
+def test_time_that_adds_up_beyond_all_stamps_is_no_error() -> None:
+    days = still(np.arange(0, 2**31, 86_400 // 2) * SECOND)
+    meter = SampleMeter(window=20)
+    for _ in range(6):
+        meter.feed(days)
+    assert meter.duration > 2**63 / SECOND
+
+
+@pytest.mark.filterwarnings("error", "ignore::ResourceWarning")
+@pytest.mark.parametrize("column", ["position", "velocity", "belt_velocity"])
+@pytest.mark.parametrize(("value", "latest"), [(1e308, 0.0), (-1e100, 0.2), (5e-324, 0.0)])
+def test_no_value_overflows(column: str, value: float, latest: float) -> None:
+    samples = read_late(limit_cycle(), latest)
+    values = getattr(samples, column).copy()
+    values[100:7000:3] = value
+    meter = fed(replace(samples, **{column: values}))
+    measured = meter.measures().as_dict().values()
+    assert np.isfinite([figure for figure in measured if isinstance(figure, float)]).all()
+    too_large = abs(value) > 1e100
+    assert meter.samples == 7001 - too_large * len(values[100:7000:3])
+    assert meter.lost_samples == 7001 - meter.samples
+
+
+def test_a_leap_onto_the_belt_hides_no_extremes() -> None:
+    samples = replace(
+        still(stamps(10, 4)),
+        position=np.array([0.0, -0.1, 0.2, 0.22]),
+        velocity=np.array([-1.0, -1.0, 0.2, 0.2]),
+        belt_velocity=np.full(4, 0.2),
+    )
+    meter = SampleMeter(window=20)
+    cycles = feed(meter, samples.followed_by(later(samples, 400_000_000)), [4])
+    assert [cycle.amplitude for cycle in cycles] == pytest.approx([0.16], rel=1e-3)
+
+
+@pytest.mark.filterwarnings("error", "ignore::ResourceWarning")
+@given(
+    st.lists(
+        st.tuples(
+            st.one_of(st.integers(0, 10**12), st.integers(-(2**61), 2**61)),
+            st.floats(),
+            st.floats(),
+            st.floats(),
+        ),
+        max_size=60,
+    ),
+    st.integers(1, 60),
+)
+def test_no_samples_are_an_error(rows: list[tuple[int, float, float, float]], size: int) -> None:
+    meter = SampleMeter(window=20)
+    for first in range(0, len(rows), size):
+        stamp, *values = zip(*rows[first : first + size], strict=True)
+        meter.feed(columns(np.array(stamp), *map(np.array, values)))
+    measured = meter.measures().as_dict().values()
+    assert np.isfinite([figure for figure in measured if isinstance(figure, float)]).all()
+
+
+@pytest.mark.parametrize("size", [1, 7, 400])
+def test_two_publishers_on_one_topic_are_noted(size: int) -> None:
+    stamp = stamps(100, 200)
+    both = still(np.stack([stamp, stamp - SECOND // 2]).T.ravel())
+    meter = RunMeter(window=20)
+    for first in range(0, len(both.stamp), size):
+        meter.motion.feed(both[first : first + size])
+    (note,) = meter.report()["notes"]
+    assert "200 of 400 samples" in note
+    assert "the samples of several plants are mixed" in note
+
+
+def noisy(samples: SampleColumns, error: float) -> SampleColumns:
+    """With velocities that are wrong by `error` at most."""
+    errors = np.random.default_rng(1).uniform(-error, error, len(samples))
+    return replace(samples, velocity=samples.velocity + errors)
+
+
+@examples(quick=10, thorough=100)
+@given(st.lists(st.integers(1, 7000), max_size=5).map(sorted))
+def test_noisy_samples_stick_near_the_velocity_of_the_belt(starts: list[int]) -> None:
+    """However they are cut into blocks."""
+    samples = noisy(limit_cycle(), 3e-4)
+    assert fed(samples).measures().regime is Regime.PURE_SLIP
+    near = SampleAssumptions(1e-3)
+    measures = fed(samples, near, starts).measures()
+    (expected,) = (cycle for cycle in LIMIT_CYCLES if cycle.belt_speed == 0.2)
+    assert measures.cycles == 9
+    assert measures.regime is Regime.STICK_SLIP
+    assert measures.amplitude == pytest.approx(expected.amplitude, rel=1e-4)
+    assert measures.period == pytest.approx(expected.period, rel=1e-3)
+    # The slide leaves the belt slowly and is near its velocity for some time.
+    stick_fraction = fed(limit_cycle(), near).measures().stick_fraction
+    assert expected.stick_fraction < stick_fraction < expected.stick_fraction + 0.02
+    assert measures.stick_fraction == pytest.approx(stick_fraction, abs=1e-3)
+
+
+@pytest.mark.parametrize("stick_speed", [-1e-9, np.inf, np.nan])
+def test_a_stick_speed_that_is_none_is_refused(stick_speed: float) -> None:
+    with pytest.raises(InvalidInputError, match=r"stick_speed = .* must be finite"):
+        SampleMeter(20, reading=SampleAssumptions(stick_speed))
+
+
+def test_exact_samples_of_a_slide_that_sticks_are_no_steps_of_an_encoder() -> None:
+    """All positions of the first look are as far apart: the slide moves with the belt."""
+    stick, slip, amplitude = 0.4, 0.2, 2e-3
+    time = 1e-3 * np.arange(3000)
+    phase = (time + 0.1) % (stick + slip)
+    sticks = phase < stick
+    turned = np.pi * (phase - stick) / slip
+    position = np.where(sticks, 0.01 * (phase - 0.2), amplitude * np.cos(turned))
+    velocity = np.where(sticks, 0.01, -amplitude * np.pi / slip * np.sin(turned))
+    meter = RunMeter(20, reading=UNKNOWN)
+    meter.motion.feed(columns(milliseconds(3000), position, velocity, 0.01))
+    assert not meter.motion.noisy
+    assert meter.motion.measures().stick_fraction == pytest.approx(stick / (stick + slip), abs=2e-3)

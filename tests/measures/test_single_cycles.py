@@ -1,0 +1,105 @@
+"""Single cycles of positions with noise: their extremes, and what is measured between them."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
+from scipy.signal import find_peaks
+
+from stickslip_ros.measures import Regime
+from stickslip_ros.measures.noise import medians
+from stickslip_ros.measures.noisy_window import rest
+from stickslip_ros.measures.single_cycles import (
+    NoisySamples,
+    Point,
+    cycle_between,
+    fit_reach,
+    reversals,
+    vertex,
+)
+
+
+def samples(position: np.ndarray, step: float = 1e-3, belt: float = 0.04) -> NoisySamples:
+    time = np.arange(len(position)) * step
+    return NoisySamples(time, position, np.gradient(position, step), time * 0.0 + belt)
+
+
+@given(st.integers(0, 10_000), st.floats(0.5, 4.0), st.integers(10, 300))
+@example(250, 1.0, 207)
+def test_reversals_are_the_peaks_of_this_prominence(seed: int, least: float, count: int) -> None:
+    """Of the medians, two of which may be alike: by their heights, from a highest one on.
+
+    Of two alike, with no way back between them, SciPy counts both.
+    """
+    random = np.random.default_rng(seed)
+    position = np.cumsum(random.standard_normal(count))
+    course = medians(position)[:-1]
+    lows = np.array([low for _, low in reversals(position, least)], int)
+    expected, _ = find_peaks(-course, prominence=least)
+    expected = expected[expected >= lows.min(initial=count)]
+    alike = [
+        course[before] == course[after] and np.ptp(course[before : after + 1]) <= least
+        for before, after in pairwise(expected)
+    ]
+    expected = np.delete(expected, 1 + np.flatnonzero(alike))
+    assert course[lows].tolist() == course[expected].tolist()
+    for high, low in reversals(position, least):
+        assert course[high] - course[low] > least
+
+
+@pytest.mark.parametrize(("amplitude", "regime"), [(150e-6, None), (1e-9, Regime.EQUILIBRIUM)])
+def test_a_motion_of_few_samples_per_cycle_is_no_rest(
+    amplitude: float, regime: Regime | None
+) -> None:
+    moving = samples(amplitude * np.sin(2.0 * np.pi * np.arange(200) / 6.7), step=0.01)
+    assert rest(moving, 1e-6, 0.0, 0.0, Regime.EQUILIBRIUM).regime is regime
+
+
+@given(st.floats(0.2, 0.8), st.floats(-100.0, 100.0), st.integers(3, 9))
+def test_the_vertex_of_a_parabola_is_found_between_its_samples(
+    share: float, bend: float, reach: int
+) -> None:
+    time = (np.arange(21) - 10.0 - share) * 1e-3
+    found = vertex(samples(0.5 + bend * time**2), 10, reach)
+    assert found.time == pytest.approx(0.010 + share * 1e-3, abs=1e-9 if abs(bend) > 1e-3 else 1.0)
+    assert found.position == pytest.approx(0.5, abs=1e-9)
+
+
+def test_a_fit_reaches_further_the_more_noise_there_is() -> None:
+    """A share of 1.2 (2 s/h)^(1/5) of the 50 samples from low to high over pi, 0.1 to 0.6."""
+    moving = samples(-np.cos(np.pi * np.arange(101) / 50.0))
+    reaches = [fit_reach(moving, 0, 50, noise) for noise in (0.0, 1e-3, 1.0)]
+    assert reaches == [2, int(1.2 * 1e-3**0.2 * 50.0 / np.pi), int(0.6 * 50.0 / np.pi)]
+    assert fit_reach(moving, 0, 0, 1.0) == 2
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("fraction", [0.3, 0.5])
+def test_a_single_cycle_of_a_stick_and_half_a_sine_is_measured(
+    sign: float, fraction: float
+) -> None:
+    """It rides at the speed of the belt, then slips back with a relative speed of 1 - cos.
+
+    The edges found assume that the relative speed falls linearly at the landing.
+    """
+    period, belt, step = 0.2, 0.04, 1e-3
+    ride, slip = fraction * period, (1.0 - fraction) * period
+    time = np.arange(401) * step
+    phase = (time - 0.05) % period
+    back = belt * period / slip * (slip / (2.0 * np.pi))
+    after = np.maximum(phase - ride, 0.0)
+    turn = 2.0 * np.pi * after / slip
+    position = belt * phase - belt * period / slip * after + back * np.sin(turn)
+    record = samples(sign * position, step, sign * belt)
+    lows = np.flatnonzero(np.diff(np.sign(np.diff(sign * position))) > 0) + 1
+    start, end = (Point(time[row], sign * position[row]) for row in lows[:2])
+    between = slice(lows[0], lows[1])
+    high = int(lows[0] + np.argmax(sign * position[between]))
+    cycle = cycle_between(record, start, end, high, 1e-9)
+    assert cycle is not None
+    assert cycle.period == pytest.approx(period, abs=2e-3)
+    assert cycle.amplitude == pytest.approx(np.ptp(position) / 2.0, rel=0.05)
+    assert cycle.velocity_amplitude > belt
+    assert cycle.stick_fraction == pytest.approx(fraction, abs=0.12)

@@ -1,0 +1,80 @@
+from collections.abc import Sequence
+from dataclasses import replace
+from math import exp, isfinite
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.linalg import expm
+
+from stickslip_ros.model.control import Washout
+from stickslip_ros.motion.controller import Controller
+from stickslip_ros.samples import Sample
+
+SECOND = 10**9
+UNIT_GAIN = Washout(corner_frequency=2.0, linear_gain=1.0, cubic_gain=0.0)
+"""Its force is the filter's output."""
+
+measurements = st.lists(
+    st.tuples(st.integers(1, 2 * SECOND), st.floats(-2.0, 2.0)), min_size=1, max_size=20
+)
+
+
+def at(stamp: int, velocity: float) -> Sample:
+    return Sample(stamp, 0.0, velocity, 0.0, 0.0, 0.0)
+
+
+def filtered(corner_frequency: float, steps: Sequence[tuple[int, float]]) -> list[float]:
+    """V = y - d w with w' = y - d w from rest, each y held until the next one.
+
+    The pair (w, y) with y' = 0 is linear: its matrix exponential takes it from one to the next.
+    """
+    matrix = np.array([[-corner_frequency, 1.0], [0.0, 0.0]])
+    state = np.array([steps[0][1] / corner_frequency, steps[0][1]])
+    outputs = []
+    for number, (step, speed) in enumerate(steps):
+        if number > 0:
+            state = expm(matrix * step * 1e-9) @ state
+        state[1] = speed
+        outputs.append(float(speed - corner_frequency * state[0]))
+    return outputs
+
+
+@given(st.floats(0.01, 100.0), measurements)
+def test_the_filter_is_exact_for_held_measurements(
+    corner_frequency: float, steps: list[tuple[int, float]]
+) -> None:
+    washout = Controller(replace(UNIT_GAIN, corner_frequency=corner_frequency))
+    stamp = 0
+    answers = []
+    for step, speed in steps:
+        stamp += step
+        answers.append(washout.answer(at(stamp, speed)))
+    assert answers == pytest.approx(filtered(corner_frequency, steps), rel=1e-9, abs=1e-11)
+
+
+def test_the_force_is_linear_plus_cubic() -> None:
+    washout = Controller(Washout(2.0, linear_gain=-3.0, cubic_gain=-5.0))
+    washout.answer(at(SECOND, 0.0))
+    # A step of 0.4, half a second later: the output is 0.4 at once.
+    assert washout.answer(at(SECOND * 3 // 2, 0.4)) == pytest.approx(-3.0 * 0.4 - 5.0 * 0.4**3)
+    # And has fallen by exp(-2 0.25) another quarter of a second later.
+    output = 0.4 * exp(-0.5)
+    force = -3.0 * output - 5.0 * output**3
+    assert washout.answer(at(SECOND * 7 // 4, 0.4)) == pytest.approx(force, rel=1e-14)
+
+
+@given(
+    st.lists(
+        st.tuples(st.integers(-(2**61), 2**61), st.floats(-1e100, 1e100)), min_size=1, max_size=20
+    ),
+    st.floats(1e-300, 1e300),
+)
+def test_no_stamp_and_no_speed_leaves_it_with_a_filter_that_is_not_finite(
+    steps: list[tuple[int, float]], corner_frequency: float
+) -> None:
+    washout = Controller(Washout(corner_frequency, -1.0, 0.0))
+    for stamp, speed in steps:
+        force = washout.answer(at(stamp, speed))
+        assert force is None or isfinite(force)

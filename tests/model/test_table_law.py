@@ -1,0 +1,115 @@
+"""A law given by a table: its points, its shape, its motion and its theory."""
+
+from dataclasses import replace
+from math import inf, nan
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from stickslip_ros.model.friction import Table
+from stickslip_ros.model.plain_drive import drive_system
+from stickslip_ros.motion import Motion
+from tests.drives import PAPER
+
+LAW = Table(((0.0, 0.4), (0.1, 0.3), (0.3, 0.32), (0.5, 0.25)))
+
+
+@st.composite
+def tables(draw: st.DrawFn) -> Table:
+    steps = draw(st.lists(st.floats(1e-3, 1.0), min_size=0, max_size=8))
+    values = draw(st.lists(st.floats(0.0, 1.0), min_size=len(steps) + 1, max_size=len(steps) + 1))
+    speeds = np.cumsum([0.0, *steps]).tolist()
+    return Table(tuple(zip(speeds, values, strict=True)))
+
+
+@given(tables())
+def test_a_table_is_exact_at_its_points(law: Table) -> None:
+    assert law.refusal() is None
+    for speed, value in law.points:
+        assert law.coefficient(speed, 1.0) == pytest.approx(-value, rel=1e-14, abs=1e-15)
+        assert law.coefficient(-speed, -1.0) == pytest.approx(value, rel=1e-14, abs=1e-15)
+    assert law.static == law.points[0][1]
+    assert law.limits == (law.static, law.static)
+
+
+@given(tables(), st.floats(0.0, 10.0))
+def test_a_table_stays_between_its_neighbors(law: Table, speed: float) -> None:
+    speeds, values = np.array(law.points).T
+    after = int(np.searchsorted(speeds, speed))
+    around = values[max(after - 1, 0) : after + 1]
+    found = -float(law.coefficient(speed, 1.0))
+    assert around.min() - 1e-14 <= found <= around.max() + 1e-14
+
+
+@given(tables())
+def test_the_slope_is_continuous(law: Table) -> None:
+    for speed, _ in law.points[1:]:
+        below = law.switches_after(0, 1.0, law.switches_at(speed, 1.0, ()))
+        above = law.switches_at(speed, 1.0, ())
+        slopes = [
+            c1 + (speed - lower) * (2.0 * c2 + (speed - lower) * 3.0 * c3)
+            for lower, _, _, _, _, c1, c2, c3 in (below, above)
+        ]
+        assert slopes[0] == pytest.approx(slopes[1], rel=1e-9, abs=1e-9)
+
+
+@given(tables(), st.floats(0.0, 10.0))
+def test_a_piece_leads_to_its_neighbors(law: Table, speed: float) -> None:
+    piece = law.switches_at(speed, 1.0, ())
+    lower, upper, first, last, *_ = piece
+    assert min(law.margins(speed, 1.0, (), piece)) >= 0.0
+    if not last:
+        assert law.switches_after(1, 1.0, piece) == law.switches_at(upper, 1.0, ())
+        assert law.switches_after(0, 1.0, law.switches_after(1, 1.0, piece)) == piece
+    if not first:
+        assert law.switches_after(0, 1.0, piece)[1] == lower
+
+
+def test_it_is_constant_beyond_the_last_point() -> None:
+    assert LAW.coefficient(0.5, 1.0) == LAW.coefficient(50.0, 1.0) == -0.25
+    lower, _, _, last, *cubic = LAW.switches_at(50.0, 1.0, ())
+    assert (lower, last, cubic) == (0.5, 1.0, [0.25, 0.0, 0.0, 0.0])
+
+
+def test_a_scaled_table_has_scaled_speeds() -> None:
+    assert LAW.scaled(0.5).points == ((0.0, 0.4), (0.2, 0.3), (0.6, 0.32), (1.0, 0.25))
+
+
+@pytest.mark.parametrize(
+    ("points", "refusal"),
+    [
+        ((), "the table has no points: must have at least one"),
+        (((0.1, 0.4),), "point 1 of the table: the speed must be 0"),
+        (((nan, 0.4),), "point 1 of the table: the speed must be 0"),
+        (
+            ((0.0, 0.4), (0.2, 0.3), (0.2, 0.2)),
+            "point 3 of the table: the speed must be finite and above the one before",
+        ),
+        (
+            ((0.0, 0.4), (inf, 0.3)),
+            "point 2 of the table: the speed must be finite and above the one before",
+        ),
+        (
+            ((0.0, 0.4), (0.1, nan)),
+            "point 2 of the table: the coefficient must be a finite number at least 0",
+        ),
+    ],
+)
+def test_points_that_make_no_table_are_refused(points: Any, refusal: str) -> None:
+    assert Table(points).refusal() == refusal
+
+
+def test_a_table_is_compiled_once_for_every_table() -> None:
+    """And each has its own limit of sticking."""
+    structures = {drive_system(replace(PAPER, friction=law)).structure for law in TWO}
+    assert len(structures) == 1
+    for law in TWO:
+        motion = Motion(replace(PAPER, friction=law), 0.0, 0.4)
+        motion.advance(law.static / 0.4)
+        assert motion.position == pytest.approx(law.static - 0.02 * 0.4, rel=0.05)
+
+
+TWO = [Table(((0.0, 0.4), (0.5, 0.3))), Table(((0.0, 0.8), (0.1, 0.5), (0.5, 0.3)))]

@@ -1,0 +1,49 @@
+"""benchmarks/agreement.json: what `python -m benchmarks.agreement` has found."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from benchmarks import agreement
+from benchmarks.agreement import Case, cases, compared, report, table
+from tests.motion.random_drives import KINDS, LAWS, PLACES
+
+FOUND: dict[str, Any] = json.loads(
+    (Path(agreement.__file__).parent / "agreement.json").read_text(encoding="utf-8")
+)
+
+
+def test_thirty_drives_of_each_law_and_each_course_agree() -> None:
+    assert set(FOUND["by_law_and_kind"]) == {f"{law}, {kind}" for law in LAWS for kind in KINDS}
+    assert set(FOUND["by_place"]) == set(PLACES)
+    for row in [*FOUND["by_law_and_kind"].values(), *FOUND["by_place"].values()]:
+        assert row["drives"] >= 30
+        assert row["agree"] == row["compared"]
+        assert max(row["worst_error"], row["worst_event_error"]) < FOUND["required"] == 1e-7
+    assert FOUND["differing"] == []
+    uncompared = FOUND["all"]["drives"] - FOUND["all"]["compared"]
+    assert len(FOUND["reference_not_accurate"]) == uncompared < 0.01 * FOUND["all"]["drives"]
+
+
+def test_each_place_and_direction_has_its_share() -> None:
+    chosen = cases(agreement.DRIVES)
+    assert len(chosen) == FOUND["all"]["drives"]
+    for place in PLACES:
+        own = [case for case in chosen if case.place == place]
+        assert {(case.kind, case.law, case.seed % 2) for case in own} == {
+            (kind, law, odd) for kind in KINDS for law in LAWS for odd in (0, 1)
+        }
+
+
+def test_what_differs_is_listed_and_what_has_no_accurate_reference_does_not_count() -> None:
+    result = compared(Case("stribeck", "step", "belt", 0))
+    assert result.agrees
+    different = replace(result, error=2e-7)
+    inaccurate = replace(result, error=1.0, reference_error=1e-6)
+    found = report([result, different, inaccurate])
+    row = found["all"]
+    assert (row["drives"], row["compared"], row["agree"]) == (3, 2, 1)
+    assert [each["error"] for each in found["differing"]] == [2e-7]
+    assert len(found["reference_not_accurate"]) == 1
+    assert "differing: " in table(found)

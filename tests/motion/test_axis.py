@@ -1,0 +1,179 @@
+"""An axis on a guide: no spring holds the slide, and forces alone move it."""
+
+from dataclasses import replace
+from math import expm1, inf, log, log1p, nextafter
+
+import numpy as np
+import pytest
+
+from stickslip_ros.model import signals
+from stickslip_ros.model.drive import Drive
+from stickslip_ros.model.friction import Coulomb, Directional, Exponential
+from stickslip_ros.motion import Motion
+from stickslip_ros.motion.sampled_loop import SampledLoop
+from tests.drives import FEED_DRIVE
+from tests.motion.dop853 import (
+    Curve,
+    Dop853Drive,
+    Signal,
+    exponential,
+    level,
+    none,
+    sine,
+)
+
+# Of Janot, Gautier, Brunot, 2019: friction in N over 1000 N, and an offset.
+AXIS = Drive(
+    mass=95.154,
+    damping=0.0,
+    stiffness=0.0,
+    normal_force=1000.0,
+    belt_speed=0.0,
+    friction=Directional(
+        Coulomb(static=0.020144, viscous=0.1667061), Coulomb(static=0.0206277, viscous=0.2404236)
+    ),
+    bias_force=3.1648,
+)
+FORWARD, BACKWARD = (20.144, 166.7061), (20.6277, 240.4236)
+"""Coulomb friction (N) and viscous friction (N s/m) of either direction."""
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_push_dies_out_as_the_closed_form_says(sign: float) -> None:
+    """From s v0 to rest by m v' = -s (F + V s v) + bias."""
+    motion, start, speed = Motion(AXIS, 0.01, sign * 0.3), 0.01, 0.3
+    coulomb, viscous = FORWARD if sign > 0.0 else BACKWARD
+    net, rate = coulomb - sign * AXIS.bias_force, viscous / AXIS.mass
+    stop = log1p(viscous * speed / net) / rate
+    motion.advance(0.5 * stop)
+    decayed = (speed + net / viscous) * (-expm1(-rate * 0.5 * stop))
+    assert motion.velocity == pytest.approx(sign * (speed - decayed), rel=1e-13)
+    path = decayed / rate - net / viscous * 0.5 * stop
+    assert motion.position == pytest.approx(start + sign * path, rel=1e-13)
+    motion.advance(stop)
+    assert motion.sticking
+    assert motion.velocity == 0.0
+    path = (speed - net / viscous * log(1.0 + viscous * speed / net)) / rate
+    assert motion.position == pytest.approx(start + sign * path, rel=1e-13)
+
+
+def test_it_breaks_loose_at_its_static_friction_in_either_direction() -> None:
+    for sign, (coulomb, _) in ((1.0, FORWARD), (-1.0, BACKWARD)):
+        for share in (1.0 - 1e-12, 1.0 + 1e-12):
+            motion = Motion(AXIS, 0.2, 0.0)
+            motion.force = sign * share * coulomb - AXIS.bias_force
+            motion.advance(1.0)
+            assert motion.sticking == (share < 1.0)
+            assert (motion.position == 0.2) == (share < 1.0)
+
+
+@pytest.mark.parametrize("law", [Coulomb(0.02), Exponential(0.02, 0.01, 0.1, 0.0)])
+def test_a_force_that_is_just_too_large_does_not_stop_the_run(law: Coulomb | Exponential) -> None:
+    motion = Motion(replace(AXIS, friction=law, bias_force=0.0), 0.1, 0.0)
+    for _ in range(100):
+        motion.force = nextafter(20.0, inf)
+        motion.advance(1.0)
+        motion.force = 20.0
+        motion.advance(1.0)
+    assert motion.position >= 0.1
+
+
+HELD = [
+    AXIS,
+    replace(AXIS, friction=Exponential(0.03, 0.02, 0.01, 0.1), damping=20.0),
+    replace(AXIS, load=signals.sine(amplitude=50.0, frequency=3.0)),
+    replace(FEED_DRIVE, belt_speed=0.0),
+    replace(FEED_DRIVE, belt_speed=0.0, bias_force=-40.0),
+]
+"""The last ones have a spring."""
+HOUR = 3600.0  # s
+
+
+def break_away(drive: Drive, sign: float, position: float) -> float:
+    """Return the control force (N) with 0.9 of the least friction that holds the slide."""
+    forward, backward = drive.friction.limits
+    limit = (forward if sign > 0.0 else backward) * (drive.normal_force + drive.load.bounds[0])
+    return sign * 0.9 * limit + drive.stiffness * position - drive.bias_force
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("drive", HELD)
+def test_stick_is_stick(drive: Drive, sign: float) -> None:
+    """An hour at 0.9 of the break-away force: no drift at all, in one step and in many."""
+    start = 0.1 * sign
+    for steps in (1, 100):
+        motion = Motion(drive, start, 0.0)
+        motion.force = break_away(drive, sign, start)
+        before = motion.position
+        assert before == pytest.approx(start, rel=1e-15)
+        for _ in range(steps):
+            motion.advance(HOUR / steps)
+        assert motion.sticking
+        assert (motion.position, motion.velocity) == (before, 0.0)
+
+
+@pytest.mark.parametrize("drive", HELD)
+def test_stick_is_stick_in_the_sampled_loop(drive: Drive) -> None:
+    force = break_away(drive, 1.0, 0.1)
+    loop = SampledLoop(Motion(drive, 0.1, 0.0), rate=5.0, start=0, force_delay=0.07)
+    assert loop.offer(loop.sample.stamp, force)
+    loop.advance()  # up to its arrival the first force is zero: the slide may move
+    for _ in range(10):
+        loop.offer(loop.sample.stamp, force)
+        sample = loop.advance()
+    loop.reset(0.1, 0.0)
+    loop.offer(loop.sample.stamp, force)
+    first = sample = loop.advance()
+    for _ in range(round(HOUR * 5.0)):
+        loop.offer(sample.stamp, force)
+        sample = loop.advance()
+        assert (sample.position, sample.velocity) == (first.position, 0.0)
+    assert sample.stamp - first.stamp == HOUR * 1_000_000_000
+
+
+STEP = 0.05  # s
+
+
+@pytest.mark.parametrize("belt_moves", [False, True])
+@pytest.mark.parametrize("seed", range(3))
+def test_random_axes_move_as_another_integrator_says(seed: int, belt_moves: bool) -> None:
+    """Random masses, laws and held forces; with a belt and a load that swing too."""
+    rng = np.random.default_rng([seed, belt_moves])
+    mass, normal = (10.0 ** rng.uniform(-1.0, 3.0, 2)).tolist()
+    unit = normal / mass  # acceleration at a coefficient of one
+    damping, bias = 0.2 * mass * rng.random(), 0.1 * normal * rng.uniform(-1.0, 1.0)
+    laws: list[Exponential] = []
+    curves: list[Curve] = []
+    for _ in range(2):
+        static, kinetic = sorted(rng.uniform(0.2, 0.6, 2).tolist(), reverse=True)
+        decay, viscous = unit * rng.uniform(0.05, 0.3), rng.uniform(0.0, 0.3) / unit
+        laws.append(Exponential(static, kinetic, decay, viscous))
+        curves.append(exponential(static, kinetic, decay, viscous, 1.0))
+    swing, weight = (0.3 * unit, 0.2 * normal) if belt_moves else (0.0, 0.0)
+    drive = Drive(
+        mass, damping, 0.0, normal, 0.0, Directional(*laws), bias_force=bias,
+        **({"belt": signals.sine(swing, frequency=0.4), "load": signals.sine(weight, frequency=1.3)}
+        if belt_moves else {}),
+    )  # fmt: skip
+    forces = np.repeat(normal * rng.uniform(-0.9, 0.9, 30), rng.integers(5, 20, 30)).tolist()
+    start = 0.2 * unit * rng.uniform(-1.0, 1.0)
+    times = STEP * np.arange(len(forces) + 1)
+    held = [
+        level(time, force + bias) for time, force in zip([-inf, *times[1:]], forces, strict=False)
+    ]
+    belt = sine(swing, 0.0, inf, 0.4) if belt_moves else none()
+    load = sine(weight, 0.0, inf, 1.3) if belt_moves else none()
+    other = Dop853Drive(
+        mass, damping, 0.0, *curves, belt, load.plus(normal), Signal(held), longest_step=0.02
+    )
+    solution = other.run(0.1, start, times)
+    expected = np.column_stack([solution.position, solution.velocity])[1:]
+    motion, found = Motion(drive, 0.1, start), list[tuple[float, float]]()
+    for force in forces:
+        motion.force = force
+        motion.advance(STEP)
+        found.append((motion.position, motion.velocity))
+    sticks = np.array(found)[:, 1] == 0.0
+    assert belt_moves or 0.02 < np.mean(sticks) < 0.98
+    scale = np.abs(expected).max(axis=0)
+    assert np.array(found) / scale == pytest.approx(expected / scale, abs=1e-9)

@@ -1,0 +1,66 @@
+"""Motions of laws with a memory against scipy: stored references, and what the study has found.
+
+`python -m benchmarks.memory_agreement` makes both files.
+"""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from benchmarks import memory_agreement
+from benchmarks.memory_agreement import REQUIRED, Result, compared, report
+from tests.motion.random_memory_drives import LAWS, STORED_EVERY, random_memory_drive
+
+FOUND: dict[str, Any] = json.loads(
+    (Path(memory_agreement.__file__).parent / "memory_agreement.json").read_text(encoding="utf-8")
+)
+STORED: dict[str, dict[str, Any]] = json.loads(
+    Path(__file__).with_name("memory_references.json").read_text(encoding="utf-8")
+)
+
+
+@pytest.mark.parametrize(
+    ("law", "seed"),
+    [
+        pytest.param(law, seed, marks=[pytest.mark.long] * (number > 1))
+        for law, seeds in STORED.items()
+        for number, seed in enumerate(seeds)
+    ],
+)
+def test_a_motion_is_that_of_its_reference(law: str, seed: str) -> None:
+    drive = random_memory_drive(law, int(seed))
+    found = drive.motion()[::STORED_EVERY]
+    assert drive.error(found, np.array(STORED[law][seed])) < REQUIRED[law]
+
+
+def test_there_are_references_of_every_law() -> None:
+    assert {law: len(seeds) for law, seeds in STORED.items()} == dict.fromkeys(LAWS, 5)
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_thirty_drives_of_each_law_agree(law: str) -> None:
+    row = FOUND["by_law"][law]
+    assert row["drives"] >= 30
+    assert row["compared"] >= 0.8 * row["drives"]
+    assert row["agree"] == row["compared"]
+    assert row["worst_error"] < row["required"] == REQUIRED[law]
+    assert row["median_time_ratio"] > row["least_time_ratio"] > 1.0
+    assert FOUND["differing"] == []
+
+
+def test_what_differs_is_listed_and_what_has_no_reference_does_not_count() -> None:
+    result, states = compared(("dahl", 0))
+    assert result.agrees
+    assert len(states) == 27
+    different = replace(result, error=2e-8)
+    inaccurate = Result("dahl", 1, error=1.0, reference_error=1e-6)
+    others = [Result(law, 0, 0.0, 0.0, 2.0) for law in LAWS[1:]]
+    found = report([result, different, inaccurate, *others])
+    row = found["by_law"]["dahl"]
+    assert (row["drives"], row["compared"], row["agree"]) == (3, 2, 1)
+    assert [each["error"] for each in found["differing"]] == [2e-8]
+    assert [each["seed"] for each in found["reference_not_accurate"]] == [1]

@@ -1,0 +1,99 @@
+"""A motion with and without its recurrence."""
+
+from collections.abc import Generator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from stickslip_ros.model.control import Washout
+from stickslip_ros.model.drive import Drive
+from stickslip_ros.model.hybrid import Mode
+from stickslip_ros.motion import RecordedMotion, hybrid_motion
+from stickslip_ros.motion.recurrence import Recurrence
+from tests.drives import PAPER
+from tests.examples import examples
+from tests.motion import random_drives, random_memory_drives
+
+
+def drive_of(law: str, seed: int) -> Drive:
+    """Return a random drive whose belt has a constant speed."""
+    if law in random_drives.LAWS:
+        return random_drives.drive_of_place(seed, law, "step", "disturbance").drive
+    return random_memory_drives.random_memory_drive(law, seed).drive
+
+
+class Unknown(Recurrence):
+    """Knows no phase: all are integrated."""
+
+    def is_known(self, mode: Any, state: Any, duration: Any, kept: Any) -> bool:
+        return False
+
+
+@contextmanager
+def integrating_all() -> Generator[None]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(hybrid_motion, "Recurrence", Unknown)
+        yield
+
+
+def motion_of(drive: Drive, control: Washout | None) -> RecordedMotion:
+    """Return the motion after long advances, of which two are recorded."""
+    motion = RecordedMotion(drive, 0.0, 0.0, control)
+    motion.recording = False
+    period = drive.natural_period
+    motion.advance(60.0 * period)
+    motion.recording = True
+    motion.advance(30.0 * period)
+    motion.advance(13.37 * period)
+    return motion
+
+
+@given(
+    st.sampled_from([*random_drives.LAWS, *random_memory_drives.LAWS]),
+    st.integers(0, 1000),
+    st.none() | st.tuples(st.floats(0.1, 2.0), st.floats(-0.5, 0.2)),
+)
+@examples(quick=30, thorough=300)
+def test_what_recurs_is_equal_to_the_last_bit(
+    law: str, seed: int, gains: tuple[float, float] | None
+) -> None:
+    drive, control = drive_of(law, seed), None
+    if gains is not None:
+        corner, gain = gains
+        scale = drive.normal_force / drive.speed_scale
+        control = Washout(corner * drive.angular_frequency, gain * scale).continuous
+    one = motion_of(drive, control)
+    with integrating_all():
+        other = motion_of(drive, control)
+    assert (one.position, one.velocity, one.sticking) == (
+        other.position,
+        other.velocity,
+        other.sticking,
+    )
+    assert (one.memory, one.control_state) == (other.memory, other.control_state)
+    found, known = one.take_breakpoints(), other.take_breakpoints()
+    for name in ("time", "position", "velocity", "sticking"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(known, name))
+
+
+def test_a_settled_cycle_is_not_integrated_again() -> None:
+    motion = RecordedMotion(PAPER, 0.0, 0.0)
+    motion.recording = False
+    motion.advance(100.0)
+    entered = list[Mode]()
+    enter = motion._enter
+
+    def counting(mode: Mode) -> None:
+        entered.append(mode)
+        enter(mode)
+
+    motion._enter = counting
+    motion.advance(1000.0)
+    known = len(entered)
+    with integrating_all():
+        motion.advance(1000.0)
+    assert 10 * known < 2 * (len(entered) - known)

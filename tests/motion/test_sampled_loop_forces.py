@@ -1,0 +1,235 @@
+"""Which forces a loop accepts, and which force acts if none has arrived."""
+
+from math import inf, isfinite, nan
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from stickslip_ros.motion.motion import Motion
+from stickslip_ros.motion.sampled_loop import SampledLoop, Verdict
+from tests.drives import PAPER
+
+SECOND = 10**9
+PERIOD = SECOND // 100
+MOTION = Motion(PAPER, 0.0, 0.0)
+paces = pytest.mark.parametrize("realtime", [False, True], ids=["lockstep", "realtime"])
+
+
+class Loop(SampledLoop):
+    """At 100 Hz from 1 s on; `acting` is the force under which it advanced last."""
+
+    def __init__(self, realtime: bool = False, **options: Any) -> None:
+        self.motion = Motion(PAPER, 0.0, 0.0)
+        super().__init__(self.motion, 100.0, SECOND, hold_late=realtime, **options)
+
+    @property
+    def acting(self) -> float:
+        return self.motion.force
+
+    def answer(self, number: int, force: float) -> Verdict:
+        return self.offer(SECOND + number * PERIOD, force)
+
+    def advance_by(self, samples: int) -> None:
+        for _ in range(samples):
+            self.advance()
+
+
+@paces
+def test_a_force_acts_from_its_sample_to_the_next(realtime: bool) -> None:
+    loop, hand = Loop(realtime), Motion(PAPER, 0.0, 0.0)
+    for number, force in enumerate([0.5, -2.0, 0.0, 1.25]):
+        assert not loop.answered
+        assert loop.answer(number, force) is Verdict.ACCEPTED
+        assert loop.answered
+        hand.force = force
+        hand.advance(0.01)
+        sample = loop.advance()
+        assert (sample.position, sample.velocity) == (hand.position, hand.velocity)
+    assert loop.late_forces == 0
+    assert not loop.dropped
+
+
+@paces
+@pytest.mark.parametrize(
+    ("stamp", "force", "verdict"),
+    [
+        (SECOND + 5 * PERIOD, nan, Verdict.NOT_FINITE),
+        (SECOND + 5 * PERIOD, inf, Verdict.NOT_FINITE),
+        (SECOND + 5 * PERIOD, -inf, Verdict.NOT_FINITE),
+        (0, 1.0, Verdict.NO_STAMP),
+        (SECOND + 6 * PERIOD, 1.0, Verdict.UNKNOWN_STAMP),
+        (SECOND + 5 * PERIOD + 1, 1.0, Verdict.UNKNOWN_STAMP),
+        (SECOND + 5 * PERIOD - 1, 1.0, Verdict.UNKNOWN_STAMP),
+        (SECOND - PERIOD, 1.0, Verdict.UNKNOWN_STAMP),
+        (-SECOND, 1.0, Verdict.UNKNOWN_STAMP),
+        (2**62, 1.0, Verdict.UNKNOWN_STAMP),
+        (SECOND + 3 * PERIOD, 1.0, Verdict.ANSWERED),
+    ],
+)
+def test_a_bad_force_is_dropped(realtime: bool, stamp: int, force: float, verdict: Verdict) -> None:
+    """At sample 5, with an answer to sample 3."""
+    loop = Loop(realtime)
+    loop.advance_by(3)
+    loop.answer(3, 0.25)
+    loop.advance_by(2)
+    assert loop.offer(stamp, force) is verdict
+    assert loop.offer(stamp, force) is verdict
+    assert dict(loop.dropped) == {verdict: 2}
+    assert not loop.answered
+    # It leaves no trace.
+    assert loop.answer(5, 0.75) is Verdict.ACCEPTED
+    loop.advance()
+    assert loop.acting == 0.75
+
+
+def test_lockstep_takes_no_answer_to_a_sample_that_has_passed() -> None:
+    loop = Loop()
+    loop.advance_by(2)
+    assert loop.answer(1, 0.5) is Verdict.TOO_LATE
+    assert dict(loop.dropped) == {Verdict.TOO_LATE: 1}
+    loop.advance()
+    assert loop.acting == 0.0
+
+
+def test_a_late_force_that_a_newer_one_replaces_before_it_acts_is_told() -> None:
+    told: list[tuple[int, float]] = []
+    loop = Loop(realtime=True, overtaken=lambda *force: told.append(force))
+    loop.answer(0, 0.5)
+    loop.advance_by(3)
+    for number, force in ((1, 1.5), (2, 2.5), (3, 3.5)):
+        assert loop.answer(number, force) is Verdict.ACCEPTED
+    loop.advance()
+    assert loop.acting == 3.5
+    assert told == [(SECOND + PERIOD, 1.5), (SECOND + 2 * PERIOD, 2.5)]
+    assert dict(loop.dropped) == {Verdict.OVERTAKEN: 2}
+
+
+def test_lockstep_goes_on_without_force_where_none_comes() -> None:
+    loop = Loop()
+    loop.answer(0, 0.5)
+    loop.advance()
+    assert (loop.acting, loop.late_forces) == (0.5, 0)
+    loop.advance()
+    assert (loop.acting, loop.late_forces) == (0.0, 1)
+    loop.advance()
+    assert (loop.acting, loop.late_forces) == (0.0, 2)
+
+
+def test_lockstep_hopes_for_an_answer_until_one_fails_to_come() -> None:
+    loop = Loop()
+    assert loop.controller_present
+    loop.answer(0, 0.5)
+    loop.advance()
+    assert loop.controller_present
+    loop.advance()
+    assert not loop.controller_present
+    loop.advance()
+    assert not loop.controller_present
+
+
+@pytest.mark.parametrize("late", [False, True])
+def test_lockstep_takes_its_controller_back(late: bool) -> None:
+    """By an answer, also by one that comes too late: the next one may be in time."""
+    loop = Loop()
+    loop.advance_by(3)
+    assert not loop.controller_present
+    assert loop.answer(2 if late else 3, 0.5) is (Verdict.TOO_LATE if late else Verdict.ACCEPTED)
+    assert loop.controller_present
+
+
+@pytest.mark.parametrize(
+    ("stamp", "force"), [(SECOND + 3 * PERIOD, nan), (0, 1.0), (SECOND + 1, 1.0)]
+)
+def test_a_bad_force_does_not_bring_the_controller_back(stamp: int, force: float) -> None:
+    loop = Loop()
+    loop.advance_by(3)
+    loop.offer(stamp, force)
+    assert not loop.controller_present
+
+
+def test_realtime_holds_the_newest_force_and_counts_what_is_late() -> None:
+    loop = Loop(realtime=True)
+    loop.advance()
+    assert (loop.acting, loop.late_forces) == (0.0, 1)
+    loop.answer(1, 0.5)
+    loop.advance()
+    assert (loop.acting, loop.late_forces) == (0.5, 1)
+    loop.advance_by(2)
+    assert (loop.acting, loop.late_forces) == (0.5, 3)
+
+
+def test_realtime_takes_a_late_answer_if_it_is_the_newest() -> None:
+    loop = Loop(realtime=True)
+    loop.advance_by(5)
+    assert loop.answer(3, 0.5) is Verdict.ACCEPTED
+    assert loop.answer(2, 0.75) is Verdict.ANSWERED
+    assert not loop.answered
+    loop.advance()
+    assert (loop.acting, loop.late_forces) == (0.5, 6)
+    assert loop.answer(5, -0.25) is Verdict.ACCEPTED
+    loop.advance()
+    assert (loop.acting, loop.late_forces) == (-0.25, 7)
+
+
+def test_realtime_gives_a_force_up_that_is_too_old() -> None:
+    """With a time-out of 30 ms the answer to sample 0 is held for samples 1, 2 and 3."""
+    loop = Loop(realtime=True, force_timeout=0.03)
+    loop.answer(0, 0.5)
+    acting = []
+    for _ in range(6):
+        loop.advance()
+        acting.append(loop.acting)
+    assert acting == [0.5, 0.5, 0.5, 0.5, 0.0, 0.0]
+    assert loop.late_forces == 5
+    assert loop.answer(5, 0.25) is Verdict.ACCEPTED
+    loop.advance()
+    assert loop.acting == 0.25
+
+
+@paces
+def test_nothing_is_late_where_no_control_is_expected(realtime: bool) -> None:
+    loop = Loop(realtime, expects_control=False)
+    assert not loop.controller_present
+    loop.advance_by(5)
+    assert loop.late_forces == 0
+    assert not loop.controller_present
+    # A stranger's force is taken all the same, and nobody waits for the next one.
+    assert loop.answer(5, 0.5) is Verdict.ACCEPTED
+    loop.advance()
+    assert loop.acting == 0.5
+    assert not loop.controller_present
+    loop.advance()
+    assert loop.late_forces == 0
+
+
+offers = st.tuples(
+    st.one_of(
+        st.integers(-3, 12).map(lambda number: SECOND + number * PERIOD),
+        st.integers(-(2**62), 2**62),
+    ),
+    st.floats(),
+)
+
+
+@pytest.mark.parametrize("realtime", [False, True])
+@given(st.lists(st.one_of(st.none(), offers), max_size=30))
+def test_whatever_is_offered_every_sample_is_finite(
+    realtime: bool, events: list[tuple[int, float] | None]
+) -> None:
+    MOTION.restart(0.0, 0.0)
+    told: list[tuple[int, float]] = []
+    loop = SampledLoop(
+        MOTION, 100.0, SECOND, hold_late=realtime, overtaken=lambda *force: told.append(force)
+    )
+    taken = 0
+    for event in events:
+        if event is None:
+            assert all(isfinite(figure) for figure in loop.advance()[:-1])
+        else:
+            taken += loop.offer(*event) is Verdict.ACCEPTED
+    offered = sum(event is not None for event in events)
+    overtaken = loop.dropped[Verdict.OVERTAKEN]
+    assert taken + loop.dropped.total() - overtaken == offered
+    assert overtaken == len(told)

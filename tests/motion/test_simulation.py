@@ -1,0 +1,126 @@
+"""The closed loop: sampled as the nodes do it, and continuous as in the paper."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from stickslip_ros.measures.cycle_measures import Measures, Regime
+from stickslip_ros.measures.cycle_meter import CycleMeter
+from stickslip_ros.model.control import Washout
+from stickslip_ros.model.drive import Drive
+from stickslip_ros.model.friction import Linear
+from stickslip_ros.motion import Motion, RecordedMotion
+from stickslip_ros.motion.controller import Controller
+from stickslip_ros.motion.sampled_loop import SampledLoop
+from stickslip_ros.motion.simulation import simulate_continuous, simulate_sampled
+from tests.drives import LIMIT_CYCLES, PAPER
+
+SECOND = 10**9
+Simulate = Callable[..., tuple[Measures, Motion]]
+PAPER_GAINS = Washout(corner_frequency=2.0, linear_gain=-1.0, cubic_gain=-1.0)
+
+
+def sampled(
+    washout: Washout | None,
+    duration: float,
+    rate: float = 100.0,
+    drive: Drive = PAPER,
+    position: float = 0.0,
+) -> tuple[Measures, Motion]:
+    motion = RecordedMotion(drive, position, 0.0)
+    loop = SampledLoop(motion, rate, SECOND)
+    controller = Controller(washout) if washout is not None else None
+    return simulate_sampled(loop, motion, controller, duration, CycleMeter(20)), motion
+
+
+def continuous(
+    washout: Washout | None,
+    duration: float,
+    drive: Drive = PAPER,
+    position: float = 0.0,
+) -> tuple[Measures, Motion]:
+    motion = RecordedMotion(drive, position, 0.0, washout)
+    return simulate_continuous(motion, washout, duration, CycleMeter(20)), motion
+
+
+@pytest.mark.parametrize("simulate", [sampled, continuous])
+def test_without_control_it_is_the_motion_alone(simulate: Simulate) -> None:
+    measures, motion = simulate(None, 400.0)
+    alone = Motion(PAPER, 0.0, 0.0)
+    alone.advance(400.0)
+    assert motion.position == pytest.approx(alone.position, abs=1e-10)
+    assert motion.velocity == pytest.approx(alone.velocity, abs=1e-10)
+    (cycle,) = (cycle for cycle in LIMIT_CYCLES if cycle.belt_speed == 0.4)
+    assert measures.regime is Regime.STICK_SLIP
+    assert measures.cycles == 20
+    assert measures.amplitude == pytest.approx(cycle.amplitude, rel=1e-8)
+    assert measures.period == pytest.approx(cycle.period, rel=1e-8)
+    assert measures.stick_fraction == pytest.approx(cycle.stick_fraction, abs=1e-8)
+
+
+@pytest.mark.parametrize("simulate", [sampled, continuous])
+def test_enough_gain_brings_the_slide_to_rest(simulate: Simulate) -> None:
+    measures, motion = simulate(replace(PAPER_GAINS, linear_gain=-1.5), 500.0)
+    assert measures.regime is Regime.EQUILIBRIUM
+    # The filter leaves the equilibrium where it is: mu(-0.4).
+    assert motion.position == pytest.approx(0.2584, abs=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("corner_frequency", "linear_gain", "rests"),
+    [(2.0, -1.0, True), (0.2, -0.13, False)],
+)
+def test_the_critical_gain_of_the_continuous_loop(
+    corner_frequency: float, linear_gain: float, rests: bool
+) -> None:
+    """By Routh and Hurwitz it is -0.935 at d = 2 and -0.148 at d = 0.2."""
+    washout = Washout(corner_frequency, linear_gain, cubic_gain=0.0)
+    # Next to the equilibrium, so that it grows if it does.
+    measures, motion = continuous(washout, 2000.0, position=0.2584 + 0.01)
+    swing = abs(motion.position - 0.2584) + abs(motion.velocity)
+    if rests:
+        assert measures.regime is Regime.EQUILIBRIUM
+        assert swing < 1e-3
+    else:
+        assert measures.regime in (Regime.STICK_SLIP, Regime.PURE_SLIP)
+        assert swing > 0.02
+
+
+def test_the_controller_is_switched_on_after_a_while() -> None:
+    washout = replace(PAPER_GAINS, start_after=30.0)
+    for simulate in (sampled, continuous):
+        _, before = simulate(washout, 30.0)
+        alone = Motion(PAPER, 0.0, 0.0)
+        alone.advance(30.0)
+        assert before.position == pytest.approx(alone.position, abs=1e-10)
+        _, after = simulate(washout, 35.0)
+        alone.advance(5.0)
+        assert abs(after.position - alone.position) > 1e-2
+
+
+@pytest.mark.parametrize("simulate", [sampled, continuous])
+def test_a_motion_that_runs_away_ends_early_as_unbounded(simulate: Simulate) -> None:
+    drive = replace(PAPER, friction=Linear(static=0.4, slope=0.9))
+    measures, motion = simulate(None, 1e4, drive=drive)
+    assert motion.unbounded
+    assert measures.regime is Regime.UNBOUNDED
+    assert measures.frequency is None
+
+
+@pytest.mark.parametrize("simulate", [sampled, continuous])
+def test_progress_rises_to_one(simulate: Simulate) -> None:
+    shares: list[float] = []
+    control = PAPER_GAINS if simulate is continuous else None
+    motion = RecordedMotion(PAPER, 0.0, 0.0, control)
+    if simulate is sampled:
+        loop = SampledLoop(motion, 100.0, SECOND)
+        simulate_sampled(
+            loop, motion, Controller(PAPER_GAINS), 100.0, CycleMeter(20), shares.append
+        )
+    else:
+        simulate_continuous(motion, PAPER_GAINS, 300.0, CycleMeter(20), shares.append)
+    assert len(shares) > 3
+    assert np.all(np.diff(shares) > 0.0)
+    assert shares[-1] == pytest.approx(1.0)

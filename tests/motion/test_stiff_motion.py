@@ -1,0 +1,76 @@
+"""A motion that would take too long is refused after bounded work."""
+
+from dataclasses import replace
+
+import pytest
+
+from stickslip_ros.errors import RunError
+from stickslip_ros.motion import Motion, RecordedMotion
+from stickslip_ros.motion.variational import ShootingMotion, TooStiffError
+from tests.drives import PAPER
+
+STIFF = replace(PAPER, damping=1e9)
+
+
+@pytest.fixture(autouse=True)
+def _little_patience(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("stickslip_ros.motion.hybrid_motion._SPARE_STEPS", 1000)
+
+
+def test_it_is_refused() -> None:
+    motion = Motion(STIFF, 0.0, 0.0)
+    with pytest.raises(RunError, match="too stiff"):
+        motion.advance(0.1)
+    assert not motion.unbounded
+
+
+def test_with_another_drive_it_goes_on_where_it_was() -> None:
+    motion = Motion(PAPER, 0.3, 0.1)
+    motion.drive = STIFF
+    with pytest.raises(RunError):
+        motion.advance(0.1)
+    position, velocity = motion.position, motion.velocity
+    motion.drive = PAPER
+    assert motion.position == position
+    assert motion.velocity == pytest.approx(velocity, rel=1e-12)
+    motion.advance(1.0)
+    fresh = Motion(PAPER, position, velocity)
+    fresh.advance(1.0)
+    assert motion.position == pytest.approx(fresh.position, rel=1e-9)
+
+
+def test_a_long_motion_that_is_not_stiff_is_followed_to_its_end() -> None:
+    motion = Motion(PAPER, 0.0, 0.0)
+    motion.advance(20_000.0)
+    assert not motion.unbounded
+
+
+def test_a_stick_however_long_is_followed_to_its_end() -> None:
+    motion = Motion(replace(PAPER, belt_speed=1e-20), 0.0, 1e-20)
+    motion.advance(1e19)
+    assert motion.sticking
+    assert motion.position == pytest.approx(0.1)
+
+
+def test_theory_takes_it_for_too_stiff() -> None:
+    motion = ShootingMotion(STIFF)
+    with pytest.raises(TooStiffError):
+        motion.advance(0.1)
+
+
+def test_after_a_restart_nothing_of_a_refused_motion_is_recorded(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    motion = RecordedMotion(replace(PAPER, belt_speed=1.0), 0.1, 0.0)
+    for budget, steps in (("STEPS_PER_UNIT", 0.01), ("STEPS_PER_ADVANCE", 10)):
+        monkeypatch.setattr(f"stickslip_ros.motion.hybrid_motion.{budget}", steps)
+    motion._steps_left = 0
+    with pytest.raises(RunError):
+        motion.advance(100.0)
+    monkeypatch.undo()
+    fresh = RecordedMotion(PAPER, 0.0, 0.0)
+    motion.take_breakpoints()
+    motion = RecordedMotion(PAPER, 0.0, 0.0)  # it borrows what the refused motion has given back
+    for one in (motion, fresh):
+        one.advance(5.0)
+    assert motion.take_breakpoints().time.tolist() == fresh.take_breakpoints().time.tolist()

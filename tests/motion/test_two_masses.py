@@ -1,0 +1,172 @@
+"""Slide and motor against the independent solution of `two_masses`, and the balance of energy."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from stickslip_ros.model.drive import Drive
+from stickslip_ros.model.friction import Coulomb, Dahl, Exponential, FrictionLaw, LuGre
+from stickslip_ros.model.motor import Motor
+from stickslip_ros.model.signals import NO_SIGNAL, step
+from stickslip_ros.motion import Motion
+from tests.motion.two_masses import Array, Bristles, Curve, Piece, TwoMasses
+
+PIECES, SAMPLES = 10, 8
+LAWS = ("coulomb", "exponential", "lugre", "dahl")
+
+
+def random_drive(seed: int, law: str) -> tuple[TwoMasses, Drive]:
+    """A drive with forces that change every half period, and its independent solution."""
+    random = np.random.default_rng([seed, LAWS.index(law)])
+    mass, stiffness, normal = 10.0 ** random.uniform([0, 4, 2], [2, 6, 3])
+    own = mass * 10.0 ** random.uniform(-1, 1)
+    omega = (stiffness * (1 / mass + 1 / own)) ** 0.5
+    critical = (stiffness * mass) ** 0.5
+    static = random.uniform(0.2, 0.5)
+    kinetic = static if law in ("coulomb", "dahl") else static * random.uniform(0.5, 0.9)
+    speed = normal / critical
+    belt = random.choice([0.0, 0.3, -0.4, 0.8]) * speed
+    curve = Curve(static, kinetic, random.uniform(0.2, 0.5) * speed)
+    friction: FrictionLaw
+    described: Curve | Bristles = curve
+    if law == "coulomb":
+        friction = Coulomb(static=static, viscous=0.0)
+    elif law == "exponential":
+        friction = Exponential(
+            static=static, kinetic=kinetic, decay_speed=curve.decay, viscous=0.0, exponent=1.0
+        )
+    else:
+        bristles = random.uniform(20.0, 60.0) * stiffness / normal
+        damping = 0.0 if law == "dahl" else 0.1 * critical / normal
+        described = Bristles(curve, bristles, damping)
+        if law == "dahl":
+            friction = Dahl(static=static, bristle_stiffness=bristles)
+        else:
+            steady = Exponential(
+                static=static, kinetic=kinetic, decay_speed=curve.decay, viscous=0.0, exponent=1.0
+            )
+            friction = LuGre(
+                curve=steady, bristle_stiffness=bristles, bristle_damping=damping
+            )  # fmt: skip
+    motor = Motor(
+        mass=own,
+        damping=random.uniform(0.0, 0.1) * critical,
+        friction=random.choice([0.0, 0.1, 0.4]) * normal,
+    )
+    jump = random.choice([0.0, 0.3]) * speed
+    length = np.pi / omega
+    ends = length * np.arange(1, PIECES + 1)
+    forces = (
+        normal * random.uniform(-1.0, 1.0, (PIECES, 2)) * random.choice([0.2, 1.0], (PIECES, 1))
+    )
+    pieces = [
+        Piece(end, *force, belt + (jump if number >= PIECES // 2 else 0.0))
+        for number, (end, force) in enumerate(zip(ends.tolist(), forces.tolist(), strict=True))
+    ]
+    damping, guide = random.uniform(0.0, 0.1, 2) * critical
+    independent = TwoMasses(
+        mass, damping, stiffness, guide, normal, own, motor.damping, motor.friction, described,
+        pieces,
+    )  # fmt: skip
+    drive = Drive(
+        mass, damping, stiffness, normal, belt, friction=friction, motor=motor,
+        guide_damping=guide,
+        belt=step(jump, start=PIECES // 2 * length) if jump else NO_SIGNAL,
+    )  # fmt: skip
+    return independent, drive
+
+
+def states_of(motion: Motion) -> list[float]:
+    assert motion.motor is not None
+    memory = motion.memory or (0.0,)
+    return [motion.position, motion.velocity, *motion.motor, *memory]
+
+
+def motion_of(drive: Drive, pieces: list[Piece], times: Array) -> Array:
+    """The package's states at times."""
+    motion, now, found = Motion(drive, 0.0, 0.0), 0.0, []
+    remaining = list(pieces)
+    for time in times.tolist():
+        while remaining and remaining[0].end < time:
+            motion.advance(remaining[0].end - now)
+            now = remaining.pop(0).end
+        motion.set_forces(remaining[0].motor_force, remaining[0].slide_force)
+        motion.advance(time - now)
+        now = time
+        found.append(states_of(motion))
+    return np.array(found)
+
+
+def times_of(pieces: list[Piece]) -> Array:
+    starts = np.array([0.0, *(piece.end for piece in pieces)])
+    parts = (np.arange(SAMPLES) + 0.5) / SAMPLES
+    return (starts[:-1, None] + np.diff(starts)[:, None] * parts).ravel()
+
+
+def error(seed: int, law: str) -> tuple[float, TwoMasses]:
+    """The largest difference of a state, in its range."""
+    independent, drive = random_drive(seed, law)
+    times = times_of(independent.pieces)
+    expected, found = independent.run(times), motion_of(drive, independent.pieces, times)
+    compared = 5 if isinstance(independent.law, Bristles) else 4
+    ranges = np.maximum(np.ptp(expected, axis=0)[:compared], 1e-6 * drive.length_scale)
+    return float((np.abs(found - expected)[:, :compared] / ranges).max()), independent
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_a_random_drive_moves_as_the_independent_solution(seed: int, law: str) -> None:
+    found, _ = error(seed, law)
+    assert found < 1e-8
+
+
+def imbalance(seed: int, law: str) -> float:
+    """Energy that the motion has at its end without having got it, in the largest that it has.
+
+    Powers are integrated by Gauss and Legendre's rule between the events, where they are smooth.
+    """
+    independent, drive = random_drive(seed, law)
+    pieces, motor = list(independent.pieces), drive.motor
+    assert motor is not None
+    independent.run(np.array([pieces[-1].end]))
+    stops = np.union1d([piece.end for piece in pieces], independent.events).tolist()
+    nodes, weights = np.polynomial.legendre.leggauss(12)
+    motion, now, work, largest = Motion(drive, 0.0, 0.0), 0.0, 0.0, 0.0
+    for start, stop in zip([0.0, *stops], stops, strict=False):
+        piece = next(each for each in pieces if start < each.end)
+        motion.set_forces(piece.motor_force, piece.slide_force)
+        edges = np.linspace(start, stop, 1 + max(1, round(8 * (stop - start) / pieces[0].end)))
+        for left, right in pairwise(edges.tolist()):
+            for node, weight in zip(nodes.tolist(), weights.tolist(), strict=True):
+                instant = left + (right - left) * (node + 1.0) / 2.0
+                motion.advance(instant - now)
+                now = instant
+                work += weight * (right - left) / 2.0 * power(motion, drive, piece)
+            motion.advance(right - now)
+            now, largest = right, max(largest, energy(motion, drive))
+    return abs(energy(motion, drive) - work) / largest
+
+
+def energy(motion: Motion, drive: Drive) -> float:
+    x, y, far, rate, _ = states_of(motion)
+    assert drive.motor is not None
+    kinetic = drive.mass * y * y + drive.motor.mass * rate * rate
+    return 0.5 * (kinetic + drive.stiffness * (x - far) ** 2)
+
+
+def power(motion: Motion, drive: Drive, piece: Piece) -> float:
+    """What friction, dampers and inputs give to both bodies, W."""
+    (x, y, far, rate, _), motor = states_of(motion), drive.motor
+    assert motor is not None
+    v, w = y - motion.belt_speed, rate - motion.belt_speed
+    held = -drive.stiffness * (x - far) - drive.damping * (y - rate) - piece.motor_force
+    dry = held if abs(w) < 1e-13 * drive.speed_scale else -np.sign(w) * motor.friction
+    on_slide = motion.friction_force - drive.guide_damping * v + piece.slide_force
+    on_motor = float(dry) - motor.damping * w + piece.motor_force
+    return on_slide * y + on_motor * rate - drive.damping * (y - rate) ** 2
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_energy_is_balanced(law: str) -> None:
+    assert imbalance(3, law) < 1e-9

@@ -1,0 +1,240 @@
+"""Tables of other machines as recordings: CSV and MAT files, and what is refused of them."""
+
+import tracemalloc
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.io import savemat
+
+from stickslip_ros.errors import BagError, InvalidInputError
+from stickslip_ros.measures.slips import SlipThreshold
+from stickslip_ros.record.report import report_of_recording
+from stickslip_ros.record.table_file import is_table, read_table
+
+TIME = np.arange(2001) * 1e-3
+POSITION = 1e-4 * np.sin(20.0 * np.pi * TIME)
+VELOCITY = 2e-3 * np.pi * np.cos(20.0 * np.pi * TIME)
+COLUMNS = {"time": "t", "position": "x", "velocity": "v", "force": "u*2.5", "belt_velocity": "0.04"}
+
+
+def csv_of(path: Path, separator: str = ",", **columns: Any) -> Path:
+    lines = [separator.join(columns)]
+    lines += [separator.join(map(repr, row)) for row in zip(*columns.values(), strict=True)]
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return path
+
+
+def lists(**columns: Any) -> dict[str, list[float]]:
+    return {name: np.asarray(values).tolist() for name, values in columns.items()}
+
+
+@pytest.mark.parametrize("separator", [",", ";", "\t"])
+def test_a_csv_file_is_read_to_the_last_digit(tmp_path: Path, separator: str) -> None:
+    table = lists(t=TIME + 5.0, x=POSITION, v=VELOCITY, u=POSITION * 1e6, unused=TIME)
+    recording = read_table(csv_of(tmp_path / "log.csv", separator, **table), COLUMNS)
+    samples, forces = recording.samples, recording.forces
+    assert samples.stamp.tolist() == [1_000_000 * number for number in range(2001)]
+    assert samples.position.tolist() == POSITION.tolist()
+    assert samples.velocity.tolist() == VELOCITY.tolist()
+    assert samples.belt_velocity.tolist() == [0.04] * 2001
+    assert forces.force.tolist() == (POSITION * 1e6 * 2.5).tolist()
+    note = {";": "semicolons as separators", "\t": "tabs as separators"}.get(separator)
+    assert recording.notes == (() if note is None else (f"the table is read with {note}",))
+
+
+@pytest.mark.process
+def test_a_mat_file_gives_the_same_up_to_a_limit(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    most = 4 * len(TIME) + 1 + 9
+    monkeypatch.setattr("stickslip_ros.record.table_file._MOST_NUMBERS", most)
+    path = tmp_path / "log.mat"
+    table = {"t": TIME[:, None], "x": POSITION[None, :], "v": VELOCITY, "u": POSITION, "gain": 1e6}
+    savemat(path, {**table, "name": "a machine", "other": np.eye(3)})
+    recording = read_table(path, {**COLUMNS, "force": "u*gain*2.5"})
+    assert recording.samples.position.tolist() == POSITION.tolist()
+    assert recording.forces.force == pytest.approx(POSITION * 2.5e6, rel=1e-15)
+    savemat(path, {"t": TIME, "pos_mm": POSITION * 1e3})
+    recording = read_table(path, {"time": "t", "position": "pos_mm"})
+    assert recording.samples.position == pytest.approx(POSITION, rel=1e-15)
+    savemat(path, {**table, "name": "a machine", "other": np.eye(3)})
+    monkeypatch.setattr("stickslip_ros.record.table_file._MOST_NUMBERS", most - 1)
+    with pytest.raises(BagError, match=f"it has more than {most - 1} numbers"):
+        read_table(path, COLUMNS)
+
+
+def test_a_report_of_a_table_has_the_measures(tmp_path: Path) -> None:
+    table = lists(t=TIME, x=POSITION, v=VELOCITY, u=np.ones(2001))
+    path = csv_of(tmp_path / "log.csv", **table)
+    report = report_of_recording(path, COLUMNS)
+    assert report["amplitude"] == pytest.approx(1e-4, rel=1e-9)
+    assert report["period"] == pytest.approx(0.1, rel=1e-9)
+    assert report["regime"] == "pure_slip"
+    assert report["peak_force"] == 2.5
+    assert (report["complete"], report["missing"], report["notes"]) == (True, [], [])
+    part = report_of_recording(path, COLUMNS, start=0.5, end=1.0)
+    assert (part["samples"], part["duration"]) == (500, pytest.approx(0.499))
+    slow = report_of_recording(path, {**COLUMNS, "belt_velocity": "0.0"}, stick_speed=1e-3)
+    assert slow["stick_fraction"] > 0.05
+
+
+def test_a_velocity_that_is_missing_is_a_difference(tmp_path: Path) -> None:
+    path = csv_of(tmp_path / "log.csv", **lists(t=TIME, x=POSITION))
+    recording = read_table(path, {"time": "t", "position": "x"})
+    assert recording.samples.velocity[1:-1] == pytest.approx(VELOCITY[1:-1], abs=1e-5)
+    assert [note.partition(" is")[0] for note in recording.notes] == [
+        "the velocity",
+        "the belt velocity",
+    ]
+    report = report_of_recording(path, {"time": "t", "position": "x"})
+    assert report["amplitude"] == pytest.approx(1e-4, rel=1e-3)
+    assert report["notes"] == list(recording.notes)
+
+
+def test_cells_and_times_that_are_no_numbers_are_left_out(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text("t,x\n0,1\n,2\n0.2,\n0.3,nan\n0.4,5\n")
+    recording = read_table(path, {"time": "t", "position": "x"})
+    assert recording.samples.stamp.tolist() == [0, 200_000_000, 300_000_000, 400_000_000]
+    assert np.isnan(recording.samples.position).tolist() == [False, True, True, False]
+    assert recording.samples.is_valid.tolist()[1:3] == [False, False]
+
+
+def test_times_that_repeat_and_velocities_that_are_missing_are_noted(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    time = (np.arange(40.0) + 0.3 * np.sin(np.arange(40.0))).tolist()
+    lines = [f"{t},{10 * t},{10 if number % 4 else ''}" for number, t in enumerate(time)]
+    path.write_text("\n".join(["t,x,v", *lines, lines[-1]]) + "\n")
+    recording = read_table(path, {"time": "t", "position": "x", "velocity": "v"})
+    assert recording.samples.velocity == pytest.approx(np.full(41, 10.0))
+    for note in (
+        "1 of 41 rows have the time of the row before",
+        "10 rows have a position and no velocity: it is the difference of the positions",
+    ):
+        assert note in recording.notes
+
+
+def test_only_tables_are_tables() -> None:
+    names = ("a/log.CSV", "log.mat", "log.txt", "bags/reference", "reference_0.mcap", "log")
+    assert [is_table(Path(name)) for name in names] == [True, True, True, False, False, False]
+
+
+def test_a_file_without_a_known_end_is_a_table_unless_it_is_a_bag(tmp_path: Path) -> None:
+    for name, content in (("log", b"t,x\n0,1\n"), ("bag", b"\x89MCAP0\r\n")):
+        (tmp_path / name).write_bytes(content)
+    assert [is_table(tmp_path / name) for name in ("log", "bag")] == [True, False]
+
+
+def test_columns_that_make_no_recording_are_refused(tmp_path: Path) -> None:
+    path = csv_of(tmp_path / "log.csv", **lists(t=TIME, x=POSITION, v=VELOCITY))
+    refusals: list[tuple[dict[str, str] | None, str]] = [
+        ({"time": "t", "position": "y"}, "has no column 'y'"),
+        ({"time": "t", "position": "x*"}, "the expression 'x*' is invalid"),
+        ({"time": "t", "position": "y/2"}, "has no column 'y'"),
+        ({"time": "t", "position": "nan"}, "no row has a time and a position"),
+        ({"time": "t"}, "no column is given for position"),
+        ({"time": "3", "position": "x"}, "time = 3 must be a column"),
+        ({"time": "t", "position": "x", "speed": "v"}, "column speed is invalid"),
+        ({"time": "t*1e12", "position": "x"}, "differ by more than 9e+09 s"),
+        (
+            {"time": "1-t", "position": "x"},
+            "the time goes back 2000 times, the first time at line 3",
+        ),
+        ({"time": "t*nan", "position": "x"}, "no time is a finite number"),
+        (None, "not those of `stickslip simulate --out`"),
+    ]
+    for columns, sentence in refusals:
+        with pytest.raises(InvalidInputError) as refused:
+            read_table(path, columns)
+        assert sentence in str(refused.value)
+        assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("suffix", "contents"),
+    [
+        (".csv", [b"", b"t\n1\n", b"t,x\n", b"t,x\n1,2,3\n1,2,3\n", b"\xff\xfe\0t,x"]),
+        pytest.param(
+            ".mat",
+            [b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM" + bytes(400)],
+            marks=pytest.mark.process,
+        ),
+    ],
+)
+def test_a_file_that_is_no_table_is_refused(
+    tmp_path: Path, suffix: str, contents: list[bytes]
+) -> None:
+    path = tmp_path / f"log{suffix}"
+    with pytest.raises(BagError, match="No such file"):
+        read_table(path)
+    for content in contents:
+        path.write_bytes(content)
+        with pytest.raises(BagError) as refused:
+            read_table(path, {"time": "t", "position": "x"})
+        assert str(path) in str(refused.value)
+        assert "\n" not in str(refused.value)
+
+
+def stairs(rate: float, duration: float) -> tuple[Any, Any]:
+    """A table of 10 kg that follows 10 mm/s on 4000 N/m, friction 29.43 N and 19.62 N."""
+    speed, frequency, reach = 0.01, 20.0, 9.81 / 4000.0
+    stick = 2.0 * reach / speed
+    slip = (2.0 * np.pi - 2.0 * np.arctan(reach * frequency / speed)) / frequency
+    time = np.arange(round(duration * rate)) / rate
+    since = (time + 0.1) % (stick + slip)
+    angle = frequency * (since - stick)
+    slipping = reach * np.cos(angle) + speed / frequency * np.sin(angle)
+    behind = np.where(since < stick, speed * since - reach, slipping)
+    return time, speed * time - behind
+
+
+def test_a_long_table_takes_little_more_memory_than_its_columns(tmp_path: Path) -> None:
+    rows = 200_000
+    path = tmp_path / "log.csv"
+    time = 1e-3 * np.arange(rows)
+    np.savetxt(path, np.column_stack([time, np.sin(time)]), "%.3f", ",", header="t,x", comments="")
+    tracemalloc.start()
+    recording = read_table(path, {"time": "t", "position": "x"})
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert len(recording.samples) == rows
+    assert peak < 8 * 10 * rows
+
+
+def test_a_table_on_a_guide_at_rest_has_the_measures_of_its_stick_slip(tmp_path: Path) -> None:
+    time, position = stairs(500.0, 6.0)
+    path = csv_of(tmp_path / "log.csv", **lists(t=time, x=position))
+    report = report_of_recording(
+        path, {"time": "t", "position": "x"}, slips=SlipThreshold(1e-3, within=0.1)
+    )
+    assert report["regime"] == "stick_slip"
+    assert report["amplitude"] == pytest.approx(2.50295e-3, rel=0.01)
+    assert report["frequency"] == pytest.approx(1.497698, rel=1e-4)
+    assert report["stick_fraction"] == pytest.approx(0.734621, abs=0.01)
+    assert report["slips"]["drop"]["median"] == pytest.approx(6.677e-3, rel=0.01)
+    notes = report["notes"]
+    assert any("advances at 10 mm/s on a guide at rest" in note for note in notes)
+    assert any("6.677 mm in a cycle" in note for note in notes)
+    assert any("the slips are rises" in note for note in notes)
+
+
+@pytest.mark.parametrize(
+    ("rate", "step", "reason"),
+    [
+        (500.0, 1e-3, "2.6 steps of the encoder in the amplitude"),
+        (8.0, 1e-6, "5.4 samples per cycle"),
+    ],
+)
+def test_coarse_data_do_not_tell_whether_it_sticks(
+    tmp_path: Path, rate: float, step: float, reason: str
+) -> None:
+    time, position = stairs(rate, 6.0 if rate > 100.0 else 30.0)
+    rounded = np.round((position if rate < 100.0 else 0.01 * time - position) / step) * step
+    path = csv_of(tmp_path / "log.csv", **lists(t=time, x=rounded))
+    belt = {"belt_velocity": "0.01"} if rate > 100.0 else {}
+    report = report_of_recording(path, {"time": "t", "position": "x", **belt})
+    assert (report["regime"], report["stick_fraction"]) == (None, None)
+    assert report["amplitude"] == pytest.approx(2.5e-3, rel=0.15)
+    assert f"the regime is not known: {reason} do not tell whether it sticks" in report["notes"]

@@ -1,0 +1,230 @@
+"""The forms of tables as text: each is found, read to the last digit, and said."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from stickslip_ros.errors import BagError, InvalidInputError
+from stickslip_ros.record.table_file import TableRecording, read_table
+from stickslip_ros.record.text_table import ANY_FORM, TableFormat
+
+TIME = np.arange(200) * 5e-4
+POSITION = np.round(1e-3 * np.sin(40.0 * TIME), 9)
+
+
+def rows(separator: str = ",", comma: bool = False, quote: str = "", last: str = "") -> str:
+    cells = zip([f"{each:.4f}" for each in TIME], [f"{each:.9f}" for each in POSITION], strict=True)
+    lines = [separator.join(f"{quote}{cell}{quote}" for cell in row) + last for row in cells]
+    text = "\n".join(lines) + "\n"
+    return text.replace(".", ",") if comma else text
+
+
+def read(
+    folder: Path, text: str | bytes, time: str, position: str, form: TableFormat = ANY_FORM
+) -> TableRecording:
+    path = folder / "log.txt"
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    return read_table(path, {"time": time, "position": position}, 0.01, form)
+
+
+@pytest.mark.parametrize(
+    ("text", "time", "position"),
+    [
+        ("t,x\n" + rows(), "t", "x"),
+        ("t;x\n" + rows(";", comma=True), "t", "x"),
+        ("t\tx\n" + rows("\t", comma=True), "t", "x"),
+        ("t x\n" + rows("  ", comma=True), "t", "x"),
+        ("t|x\n" + rows("|"), "t", "x"),
+        ("t,x\n" + rows(",", quote='"'), "t", "x"),
+        ("t,x\n" + rows(";", True, '"').replace(";", ","), "t", "x"),
+        ("t;x;\n" + rows(";", last=";"), "t", "x"),
+        ("t;x\n" + rows(";", last=";"), "t", "x"),
+        ("t, x\n" + rows(", "), "t", "x"),
+        ("# t x\n" + rows(" "), "t", "x"),
+        (rows(), "#1", "#2"),
+        ("Rate;2000\nOperator: A, B; C\n\nt;x\ns;m\n" + rows(";", comma=True), "t", "x"),
+        ("Start\t13\n\nName\tPos\nUnit\tm\n\n" + rows("\t"), "#1", "Pos"),
+        ("t [s];x [m]\n" + rows(";"), "t", "x"),
+        ("cmd-x,x\n" + rows(), "cmd-x", "x"),
+        (("t;µ\n" + rows(";")).encode("cp1252"), "t", "µ"),
+        (("t;x\n" + rows(";")).encode("utf-16"), "t", "x"),
+        (("t;x\n" + rows(";")).encode("utf-16-le"), "t", "x"),
+        (("t;x\r\n" + rows(";").replace("\n", "\r\n")).encode("utf-8-sig"), "t", "x"),
+    ],
+)  # fmt: skip
+def test_the_form_of_a_table_is_found(
+    tmp_path: Path, text: str | bytes, time: str, position: str
+) -> None:
+    samples = read(tmp_path, text, time, position).samples
+    assert samples.stamp.tolist() == [500_000 * number for number in range(200)]
+    assert samples.position.tolist() == POSITION.tolist()
+
+
+@pytest.mark.parametrize(
+    ("before", "sentence"),
+    [
+        ("x [mm]", "position, column x [mm], is in mm, and converted to m"),
+        ("x_mm", "position, column x_mm, is in mm, and converted to m"),
+        ("x (deg)", "position, column x (deg), is in deg: what is in m is in rad"),
+        ("x [inc]", "position, column x [inc], is in inc, which is no unit of position"),
+    ],
+)
+def test_a_unit_is_used_for_a_column_by_itself_and_said(
+    tmp_path: Path, before: str, sentence: str
+) -> None:
+    text = f"t,{before}\n" + rows()
+    found = read(tmp_path, text, "t", before)
+    assert any(sentence in note for note in found.notes)
+    scale = {"x [mm]": 1e-3, "x_mm": 1e-3, "x (deg)": np.pi / 180.0}.get(before, 1.0)
+    assert found.samples.position == pytest.approx(POSITION * scale)
+    as_said = read(tmp_path, text, "t", f"'{before}'*1.0")
+    assert as_said.samples.position.tolist() == POSITION.tolist()
+
+
+def test_units_below_the_names_are_used(tmp_path: Path) -> None:
+    text = "Zeit;Weg\nms;mm ±1 µm\n" + "".join(f"{n / 2:g};{n}\n" for n in range(50))
+    found = read(tmp_path, text.replace(".", ","), "Zeit", "Weg")
+    assert found.samples.stamp.tolist() == [500_000 * number for number in range(50)]
+    assert found.samples.position == pytest.approx(1e-3 * np.arange(50.0))
+    assert "semicolons as separators, decimal commas, units in line 2" in found.notes[0]
+
+
+@pytest.mark.parametrize(
+    "form",
+    [
+        "2026-06-01T10:00:{:06.3f}",
+        "2026-06-01 10:00:{:06.3f}Z",
+        "2026-06-01T10:00:{:06.3f}+02:00",
+        "01.06.2026 10:00:{:06.3f}",
+        "10:00:{:06.3f}",
+    ],
+)
+@pytest.mark.parametrize("separator", [",", ";"])
+def test_times_of_the_clock_are_seconds(tmp_path: Path, form: str, separator: str) -> None:
+    lines = [f"{form.format(number * 1e-3)}{separator}{number}" for number in range(50)]
+    text = f"t{separator}x\n" + "\n".join(lines)
+    if separator == ";":
+        text = text.replace(".0", ",0") if form[2] != "." else text
+    samples = read(tmp_path, text, "t", "x").samples
+    assert samples.stamp.tolist() == [1_000_000 * number for number in range(50)]
+
+
+def test_a_clock_goes_on_at_midnight(tmp_path: Path) -> None:
+    text = "t,x\n23:59:59.8,1\n23:59:59.9,2\n00:00:00.0,3\n00:00:00.1,4\n"
+    stamps = read(tmp_path, text, "t", "x").samples.stamp
+    assert stamps.tolist() == [100_000_000 * number for number in range(4)]
+
+
+def test_seconds_and_nanoseconds_lose_nothing(tmp_path: Path) -> None:
+    ns = 1_700_000_000_123_456_789 + 1_000_003 * np.arange(2000)
+    lines = [f"{each // 10**9},{each % 10**9},{each},1" for each in ns.tolist()]
+    text = "sec,nanosec,stamp,x\n" + "\n".join(lines)
+    for time in ("sec+nanosec*1e-9", "stamp*1e-9"):
+        assert read(tmp_path, text, time, "x").samples.stamp.tolist() == (ns - ns[0]).tolist()
+
+
+def test_times_that_are_rounded_are_taken_as_even(tmp_path: Path) -> None:
+    for period, name in ((5e-4, "500 µs"), (1.5e-3, "1.5 ms")):
+        lines = [f"{period * n + 1e-9:.3f},{n}" for n in range(500) if not 200 <= n < 240]
+        found = read(tmp_path, "t,x\n" + "\n".join(lines), "t", "x")
+        assert any("rounded to 1 ms" in note and name in note for note in found.notes)
+        steps = np.diff(found.samples.stamp[:200])
+        assert np.abs(steps - period * 1e9).max() <= 1
+
+
+def test_gaps_and_lost_rows_are_no_rounding(tmp_path: Path) -> None:
+    for lost in ({300}, {*range(200, 260)}, {*range(7, 500, 60)}):
+        lines = [f"{1e-3 * n:.3f},{n}" for n in range(500) if n not in lost]
+        found = read(tmp_path, "t,x\n" + "\n".join(lines), "t", "x")
+        assert set(found.samples.stamp.tolist()) == {10**6 * n for n in range(500)} - {
+            10**6 * n for n in lost
+        }
+
+
+def test_rounded_times_of_an_uneven_clock_are_said(tmp_path: Path) -> None:
+    time = np.cumsum(np.random.default_rng(1).uniform(2e-3, 8e-3, 500))
+    for digits, said in ((3, True), (6, False)):
+        lines = [f"{each:.{digits}f},{each}" for each in time.tolist()]
+        notes = read(tmp_path, "t,x\n" + "\n".join(lines), "t", "x").notes
+        assert any("the times are multiples of 1 ms" in note for note in notes) == said
+        assert any("velocities err by 20%" in note for note in notes) == said
+
+
+def test_a_table_that_gives_no_sample_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "log.csv").write_text("t,x,b\n0,1,\n1,2,\n2,,3\n")
+    with pytest.raises(InvalidInputError, match="no position has a number of belt_velocity"):
+        read_table(tmp_path / "log.csv", {"time": "t", "position": "x", "belt_velocity": "b"})
+
+
+def test_a_channel_has_times_of_its_own(tmp_path: Path) -> None:
+    lines = [f"{n},{n},{n + 0.5},{10 * n}" for n in range(20)]
+    path = tmp_path / "log.csv"
+    path.write_text("Name,Pos,Name,F\n" + "\n".join(lines))
+    found = read_table(path, {"time": "Name", "position": "Pos", "force": "F"})
+    assert found.forces.force[1:].tolist() == [10.0 * n for n in range(19)]
+    assert any("times of its own" in note for note in found.notes)
+
+
+def test_rows_between_those_of_the_positions_count(tmp_path: Path) -> None:
+    lines = [f"{n * 1e-3:.3f},{n if n % 2 else ''},{'' if n % 2 else -n}" for n in range(100)]
+    path = tmp_path / "log.csv"
+    path.write_text("t,x,u\n" + "\n".join(lines))
+    found = read_table(path, {"time": "t", "position": "x", "force": "u"})
+    valid = found.samples[found.samples.is_valid]
+    assert valid.velocity == pytest.approx(np.full(50, 1000.0))
+    assert found.forces.force[1::2].tolist() == [-2.0 * n for n in range(50)]
+    belt = read_table(path, {"time": "t", "position": "x", "belt_velocity": "u"}).samples
+    assert belt.belt_velocity[1:98:2] == pytest.approx(-np.arange(1.0, 98.0, 2.0))
+
+
+def test_a_table_is_longer_than_what_is_looked_at_first(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("stickslip_ros.record.text_table._HEAD", 500)
+    assert len(read(tmp_path, "t,x\n" + rows(), "t", "x").samples) == 200
+    monkeypatch.setattr("stickslip_ros.record.text_table._LARGEST", 600)
+    with pytest.raises(BagError, match="it has more than 600 bytes"):
+        read(tmp_path, "t,x\n" + rows(), "t", "x")
+
+
+def test_what_is_left_out_is_counted_and_its_first_line_named(tmp_path: Path) -> None:
+    text = "t;x\n\n0;1\n1;2\n\n2;a\n3;1e160\n4;5;6\n5;7\n6;8\n7;9\n8;9\n9;9\n10;9\n11;9\n"
+    found = read(tmp_path, text, "t", "x")
+    assert "column x has no number in 2 of 11 rows; the first is line 6" in found.notes[2]
+    assert "1 lines have more cells than the others" in found.notes[1]
+    assert "line 8" in found.notes[1]
+
+
+@pytest.mark.parametrize(
+    ("text", "form", "position"),
+    [
+        ("a;b\n0;1.000\n1;2.000\n", TableFormat(decimal=","), [1000.0, 2000.0]),
+        ('a,b\n0,"1,000"\n1,"2,000"\n', TableFormat(decimal="."), [1000.0, 2000.0]),
+        ('a,b\n0,"1,000.5"\n1,"2"\n', TableFormat(), [1000.5, 2.0]),
+        ("a;b\n0;1.000,5\n1;2,0\n", TableFormat(), [1000.5, 2.0]),
+        ("0;0\n1;1\na;b\n0;5\n1;6\n", TableFormat(skip=2), [5.0, 6.0]),
+        ("a;b\n0;5\n1;6\n".encode("cp037"), TableFormat(encoding="cp037"), [5.0, 6.0]),
+    ],
+)
+def test_what_is_said_of_the_form_is_used(
+    tmp_path: Path, text: str | bytes, form: TableFormat, position: list[float]
+) -> None:
+    assert read(tmp_path, text, "a", "b", form).samples.position.tolist() == position
+
+
+def test_what_is_no_table_is_refused_with_the_options(tmp_path: Path) -> None:
+    texts = ("only words\nand more\n", "1\n2\n3\n", b"\0\1\2\3" * 100)
+    for text in texts:
+        with pytest.raises(BagError, match="encoding"):
+            read(tmp_path, text, "t", "x")
+    refusals: list[tuple[dict[str, Any], str]] = [
+        ({"decimal": "x"}, "must be . or ,"),
+        ({"skip": -1}, "must be at least 0"),
+        ({"encoding": "nothing"}, "must be one of Python's"),
+        ({"encoding": "hex"}, "must be one of Python's"),
+    ]
+    for options, sentence in refusals:
+        with pytest.raises(InvalidInputError, match=sentence):
+            TableFormat(**options)

@@ -1,0 +1,122 @@
+"""The critical gains of the washout controller, and the limit cycle that starts there."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+
+from stickslip_ros.measures.cycle_measures import Regime
+from stickslip_ros.model.control import Washout
+from stickslip_ros.model.drive import Drive
+from stickslip_ros.model.friction import Exponential, Linear
+from stickslip_ros.motion.variational import ShootingMotion
+from stickslip_ros.theory.closed_forms import CubicLoop
+from stickslip_ros.theory.critical_gains import critical_gains, limit_cycle_from_hopf
+from stickslip_ros.theory.limit_cycles import limit_cycle_of_run
+from stickslip_ros.theory.linear import expand
+from tests.drives import PAPER, settled
+from tests.theory.test_hopf import cubic_drives
+
+
+@given(cubic_drives, st.floats(0.05, 5.0), st.floats(-10.0, 10.0))
+def test_the_general_theory_agrees_with_the_closed_forms(
+    drive: Drive, corner_frequency: float, cubic: float
+) -> None:
+    force, speed = drive.normal_force, drive.speed_scale
+    gains = Washout(corner_frequency * drive.angular_frequency, 0.0, cubic * force / speed**3)
+    forms = CubicLoop.from_drive(drive)
+    expected = forms.critical_linear_gain(corner_frequency)
+    critical = critical_gains(drive, gains)
+    # Next to where no gain stabilises any more, everything is steep.
+    assume(abs(1.0 - forms.trace * corner_frequency) > 0.1)
+    if expected is None:
+        assert critical is None
+        return
+    scale = 1.0 + abs(expected)
+    assert critical.linear * speed / force == pytest.approx(expected, abs=1e-12 * scale)
+    sigma = forms.critical_lyapunov_coefficient(corner_frequency, cubic)
+    cubic_gain = forms.critical_cubic_gain(corner_frequency)
+    assert critical.first_lyapunov_coefficient == pytest.approx(sigma, rel=1e-9, abs=1e-12)
+    # The cubic gain acts on what the filter lets through, next to nothing at a high corner.
+    assert critical.cubic * speed**3 / force == pytest.approx(cubic_gain, rel=1e-9, abs=1e-12)
+
+
+@pytest.mark.parametrize("law", [PAPER.friction, Exponential(0.4, 0.25, 0.2, 0.01)])
+def test_the_pair_is_on_the_axis_at_the_critical_gain(law: Exponential) -> None:
+    drive = replace(PAPER, friction=law)
+    gains = Washout(0.5, 0.0, 0.0)
+    critical = critical_gains(drive, gains)
+    for offset, stable in ((-1e-3, True), (1e-3, False)):
+        expansion = expand(drive, replace(gains, linear_gain=critical.linear + offset))
+        assert expansion.stable is stable
+        assert bool(expansion.eigenvalues[0].real < 0.0) is stable
+    at_gain = expand(drive, replace(gains, linear_gain=critical.linear))
+    assert abs(at_gain.eigenvalues[0].real) < 1e-14
+    assert critical.cubic is not None
+    neutral = critical_gains(drive, replace(gains, cubic_gain=critical.cubic))
+    assert abs(neutral.first_lyapunov_coefficient) < 1e-13
+
+
+@pytest.mark.parametrize(("slope", "corner_frequency"), [(0.82, 1.25), (0.32, 1.0 / 0.3)])
+def test_no_gain_stabilises_at_the_very_end(slope: float, corner_frequency: float) -> None:
+    drive = replace(PAPER, friction=Linear(0.4, slope))  # p d = 1 but for rounding
+    assert critical_gains(drive, Washout(corner_frequency, 0.0, -1.0)) is None
+
+
+def test_no_gain_stabilises_where_the_filter_passes_too_little() -> None:
+    drive = replace(PAPER, belt_speed=0.2)  # p = 0.358
+    too_fast = Washout(3.0, 0.0, 0.0)
+    assert critical_gains(drive, too_fast) is None
+    for linear in (-1e3, -10.0, -1.0, 0.0, 1.0, 1e3):
+        expansion = expand(drive, replace(too_fast, linear_gain=linear))
+        assert not expansion.stable
+    assert critical_gains(replace(PAPER, belt_speed=0.0), too_fast) is None
+
+
+SUBCRITICAL = Washout(0.2, -0.16, 2.0)
+"""Beyond the critical gain (-0.148), with more cubic gain than the critical one (0.649)."""
+
+
+def ends_in(gains: Washout, position: float, filter_state: float) -> Regime | None:
+    """Final motion of the loop from there; the slide rests at the start."""
+    motion = ShootingMotion(PAPER, gains)
+    motion.start(np.array([position, 0.0, filter_state]))
+    return settled(motion, 300.0, 20.0, window=10).regime
+
+
+def test_an_unstable_cycle_separates_rest_from_vibration() -> None:
+    critical = critical_gains(PAPER, SUBCRITICAL)
+    assert critical.first_lyapunov_coefficient > 0.0
+    cycle = limit_cycle_from_hopf(PAPER, SUBCRITICAL)
+    assert cycle.multipliers[0].real > 1.0
+    assert not cycle.stable
+    distance = PAPER.equilibrium_position - cycle.position
+    for factor, regime in ((0.99, Regime.EQUILIBRIUM), (1.01, Regime.STICK_SLIP)):
+        start = PAPER.equilibrium_position - factor * distance
+        assert ends_in(SUBCRITICAL, start, factor * cycle.filter_state) is regime
+    outer = limit_cycle_of_run(PAPER, 0.0, control=SUBCRITICAL)
+    assert outer.stable
+    assert outer.position < cycle.position
+
+
+@pytest.mark.parametrize("corner_frequency", [0.2, 2.0])
+def test_a_stable_cycle_is_the_one_that_a_run_leads_to(corner_frequency: float) -> None:
+    critical = critical_gains(PAPER, Washout(corner_frequency, 0.0, -1.0))
+    gains = Washout(corner_frequency, 0.8 * critical.linear, -1.0)
+    cycle, by_run = (
+        limit_cycle_from_hopf(PAPER, gains),
+        limit_cycle_of_run(PAPER, 0.0, control=gains),
+    )
+    assert cycle.stable
+    assert cycle.position == pytest.approx(by_run.position, rel=1e-9)
+    assert cycle.period == pytest.approx(by_run.period, rel=1e-9)
+
+
+def test_none_on_the_other_side_of_the_critical_gain() -> None:
+    assert limit_cycle_from_hopf(PAPER, Washout(2.0, -1.0, 0.0)) is None
+    assert limit_cycle_from_hopf(PAPER, replace(SUBCRITICAL, linear_gain=-0.13)) is None
+    assert limit_cycle_from_hopf(PAPER, Washout(10.0, -1.0, 0.0)) is None
+    resting = replace(PAPER, belt_speed=0.0)
+    assert limit_cycle_from_hopf(resting, SUBCRITICAL) is None

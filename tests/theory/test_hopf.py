@@ -1,0 +1,129 @@
+"""Hopf points against the paper, closed forms and the motion."""
+
+from dataclasses import replace
+from math import sqrt
+
+import numpy as np
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+
+from stickslip_ros.model.control import Washout
+from stickslip_ros.model.drive import Drive
+from stickslip_ros.model.friction import Coulomb, Exponential, Linear, Stribeck
+from stickslip_ros.motion import RecordedMotion
+from stickslip_ros.theory.closed_forms import CubicLoop
+from stickslip_ros.theory.critical_gains import critical_gains
+from stickslip_ros.theory.hopf import hopf_points
+from stickslip_ros.theory.linear import expand, hurwitz_determinants, jacobians
+from tests.drives import PAPER, settled
+
+cubic_drives = st.builds(
+    lambda mass, stiffness, normal_force, damping, belt_speed, static, drop, speed: Drive(
+        mass=mass,
+        damping=damping * sqrt(stiffness * mass),
+        stiffness=stiffness,
+        normal_force=normal_force,
+        belt_speed=belt_speed * normal_force / sqrt(stiffness * mass),
+        friction=Stribeck(
+            static, static * (1.0 - drop), speed * normal_force / sqrt(stiffness * mass)
+        ),
+    ),
+    mass=st.floats(0.1, 1e3),
+    stiffness=st.floats(0.1, 1e6),
+    normal_force=st.floats(0.1, 1e4),
+    damping=st.floats(0.0, 0.5),
+    belt_speed=st.floats(0.05, 1.0),
+    static=st.floats(0.1, 1.0),
+    drop=st.floats(0.1, 1.0),
+    speed=st.floats(0.2, 1.0),
+)
+
+
+@pytest.mark.parametrize(("damping", "speed"), [(0.01, sqrt(0.44 / 1.8)), (0.02, 0.48876261)])
+def test_hopf_speed_of_the_paper(damping: float, speed: float) -> None:
+    (point,) = hopf_points(replace(PAPER, damping=damping))
+    assert point.belt_speed == pytest.approx(speed, rel=1e-8)
+    assert point.angular_frequency == pytest.approx(1.0, rel=1e-12)
+    assert point.crossing_speed == pytest.approx(-1.8 * speed, rel=1e-8)
+    assert point.first_lyapunov_coefficient == pytest.approx(-0.225, rel=1e-12)
+    assert point.supercritical
+
+
+@given(cubic_drives)
+def test_the_general_theory_agrees_with_the_closed_forms(drive: Drive) -> None:
+    cubic = CubicLoop.from_drive(drive)
+    expansion = expand(drive)
+    assert expansion.equilibrium[0] == pytest.approx(cubic.equilibrium, rel=1e-12, abs=1e-12)
+    assert expansion.jacobian[1, 1] == pytest.approx(cubic.trace, rel=1e-12, abs=1e-12)
+    assume(cubic.hopf_speed is None or cubic.hopf_speed > 1e-5)  # lower ones are not looked for
+    points = hopf_points(drive)
+    assert (cubic.hopf_speed is None) == (points == [])
+    for point in points:
+        speed = point.belt_speed / drive.speed_scale
+        crossing = point.crossing_speed * drive.speed_scale / drive.angular_frequency
+        assert speed == pytest.approx(cubic.hopf_speed, rel=1e-12)
+        assert crossing == pytest.approx(cubic.crossing_speed, rel=1e-12)
+        sigma = point.first_lyapunov_coefficient
+        assert sigma == pytest.approx(cubic.first_lyapunov_coefficient, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    "law", [Coulomb(0.4), Linear(0.4, 0.45), Linear(0.4, -0.1), Stribeck(0.4, 0.4, 0.5)]
+)
+def test_laws_of_constant_slope_have_no_hopf_speed(law: Linear) -> None:
+    assert hopf_points(replace(PAPER, friction=law)) == []
+
+
+def test_the_exponential_law_is_subcritical() -> None:
+    law = Exponential(0.4, 0.25, 0.2, 0.0)
+    (point,) = hopf_points(replace(PAPER, friction=law))
+    # 0.15 exp(-v/0.2) / 0.2 = 0.02, and the third derivative there is 0.02 / 0.2^2.
+    assert 0.75 * 2.718281828459045 ** (-point.belt_speed / 0.2) == pytest.approx(0.02, rel=1e-12)
+    assert point.first_lyapunov_coefficient == pytest.approx(0.02 / 0.04 / 16.0, rel=1e-12)
+    assert not point.supercritical
+
+
+def test_real_eigenvalues_of_opposite_sign_are_no_hopf_point() -> None:
+    gains = Washout(10.0, 15.0, 0.0)
+    speeds = np.geomspace(1e-3, 10.0, 2001)
+    margins = hurwitz_determinants(jacobians(PAPER, gains, speeds))[:, -1]
+    assert np.count_nonzero(np.diff(np.sign(margins))) == 2
+    (point,) = hopf_points(PAPER, gains)
+    expansion = expand(replace(PAPER, belt_speed=point.belt_speed), gains)
+    pair = [value for value in expansion.eigenvalues if value.imag > 0.0]
+    assert [abs(value.real) < 1e-10 for value in pair] == [True]
+
+
+def speed_amplitude(drive: Drive, gains: Washout | None, periods: int) -> float:
+    motion = RecordedMotion(drive, 0.0, 0.0, control=gains)
+    expansion = expand(drive)
+    motion.restart(expansion.equilibrium[0] * drive.length_scale, 0.03 * drive.speed_scale)
+    amplitude = settled(motion, periods - 100, 100, window=20).velocity_amplitude
+    return amplitude / drive.speed_scale
+
+
+def test_the_coefficient_is_that_of_the_motion_in_the_open_loop() -> None:
+    (point,) = hopf_points(PAPER)
+    distance = 1e-3
+    alpha = -point.crossing_speed * distance
+    drive = replace(PAPER, belt_speed=point.belt_speed - distance)
+    amplitude = speed_amplitude(drive, None, 6000)
+    # r' = alpha r + sigma r^3 vanishes at r, up to the next order in the distance.
+    assert amplitude**2 == pytest.approx(-alpha / point.first_lyapunov_coefficient, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("corner_frequency", "cubic", "excess"),
+    [pytest.param(0.2, 0.0, 4e-4, marks=pytest.mark.long), (2.0, -3.0, 4e-3)],
+)
+def test_the_coefficient_is_that_of_the_motion_in_the_closed_loop(
+    corner_frequency: float, cubic: float, excess: float
+) -> None:
+    gains = Washout(corner_frequency, 0.0, cubic)
+    critical = critical_gains(PAPER, gains)
+    above = replace(gains, linear_gain=critical.linear + excess)
+    expansion = expand(PAPER, above)
+    alpha = float(expansion.eigenvalues[0].real)
+    amplitude = speed_amplitude(PAPER, above, 12000)
+    assert amplitude**2 == pytest.approx(-alpha / critical.first_lyapunov_coefficient, rel=0.01)

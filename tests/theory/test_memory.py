@@ -1,0 +1,215 @@
+"""Theory of drives whose friction has a memory, against formulas and against the motion itself."""
+
+from dataclasses import replace
+from math import sqrt
+
+import numpy as np
+import pytest
+
+from stickslip_ros.measures import CycleMeter
+from stickslip_ros.model.control import Washout
+from stickslip_ros.model.dimensionless_drive import POSITION, SPEED
+from stickslip_ros.model.drive import Drive
+from stickslip_ros.model.drive_system import SLIP
+from stickslip_ros.model.friction import (
+    Dahl,
+    ElastoPlastic,
+    Exponential,
+    FrictionLaw,
+    LuGre,
+    MaxwellSlip,
+    RateState,
+)
+from stickslip_ros.model.hybrid import Mode
+from stickslip_ros.model.plain_drive import drive_system
+from stickslip_ros.motion import RecordedMotion
+from stickslip_ros.motion.compiled_flow import parameter_values
+from stickslip_ros.theory.critical_gains import critical_gains, limit_cycle_from_hopf
+from stickslip_ros.theory.hopf import hopf_points
+from stickslip_ros.theory.limit_cycles import limit_cycles
+from stickslip_ros.theory.linear import equilibria, expand
+from stickslip_ros.theory.shooting import LimitCycle, shoot
+
+CURVE = Exponential(static=0.4, kinetic=0.25, decay_speed=0.02)
+FEED = Drive(100.0, 200.0, 1e6, 1000.0, 0.04, LuGre(CURVE, 1e5, 100.0))
+"""The slide of a machine tool, with bristles of 4 um."""
+MAXWELL_SLIP = replace(FEED, friction=MaxwellSlip(CURVE, 1e5, 3, 1000.0))
+ELASTO_PLASTIC = replace(FEED, friction=ElastoPlastic(CURVE, 1e5, 100.0))
+CREEPING = Drive(1.0, 0.05, 1.0, 1.0, 0.03, RateState(0.3, 0.005, 0.02, 1e-4, 1e-6))
+GAINS = Washout(20.0, linear_gain=-3000.0, cubic_gain=0.0)
+
+LAWS = [
+    FEED.friction,
+    ELASTO_PLASTIC.friction,
+    MAXWELL_SLIP.friction,
+    Dahl(0.4, 1e5),
+    RateState(0.3, 0.01, 0.03, 1e-4, 1e-6),
+]
+
+
+@pytest.mark.parametrize("law", LAWS, ids=lambda law: law.name)
+def test_the_jacobian_is_the_derivative_of_the_motion(law: FrictionLaw) -> None:
+    """A small deviation from the equilibrium moves as the matrix exponential says."""
+    drive = replace(FEED, friction=law)
+    expansion = expand(drive)
+    rest, scales = expansion.equilibrium, drive.scales
+    units = np.array(
+        [
+            drive.length_scale,
+            drive.speed_scale,
+            *(1.0 / scales.factor(u) for u in law.states.values()),
+        ]
+    )
+    time, size = 2e-3, 1e-4
+    values, vectors = np.linalg.eig(expansion.jacobian)
+    grown = np.exp(values * time * drive.angular_frequency)
+    expected = (vectors * grown @ np.linalg.inv(vectors)).real
+    # An element that slips would stick if the test made it slower.
+    for column in (0,) if isinstance(law, MaxwellSlip) else (0, 1):
+        ends: list[np.ndarray] = []
+        for sign in (1.0, -1.0):
+            x, y, *memory = ((rest + sign * size * np.eye(len(rest))[column]) * units).tolist()
+            motion = RecordedMotion(drive, x, y)
+            motion.restart(x, y, memory)
+            motion.advance(time)
+            ends.append(np.array([motion.position, motion.velocity]) / units[:2])
+        found = (ends[0] - ends[1]) / (2.0 * size)
+        np.testing.assert_allclose(found, expected[:2, column], rtol=2e-4, atol=2e-4)
+
+
+@pytest.mark.parametrize("damping", [0.0, 0.2])
+def test_the_critical_stiffness_of_rate_and_state(damping: float) -> None:
+    """Rice and Ruina, J. Appl. Mech. 50, 1983: k_c = (N (b-a) - c V)/L (1 + m V^2/((N a + c V) L)).
+
+    Without damping it is N (b-a)/L (1 + m V^2/(N a L)).
+    """
+    a, b, length = 0.01, 0.03, 1e-4
+    law = RateState(0.6, a, b, length, 1e-6)
+    drive = Drive(2.0, damping, 350.0, 1.5, 0.01, law)
+    point, *others = hopf_points(drive)
+    speed, drag = point.belt_speed, damping * point.belt_speed
+    inertia = drive.mass * speed**2 / ((drive.normal_force * a + drag) * length)
+    critical = (drive.normal_force * (b - a) - drag) / length * (1.0 + inertia)
+    assert critical == pytest.approx(drive.stiffness, rel=1e-6)
+    # Where damping balances the friction that falls, fast slip becomes stable again.
+    balance = [drive.normal_force * (b - a) / damping] if damping else []
+    assert [each.belt_speed for each in others] == pytest.approx(balance, rel=1e-3)
+    slower = expand(replace(drive, belt_speed=0.99 * speed))
+    faster = expand(replace(drive, belt_speed=1.01 * speed))
+    assert (slower.stable, faster.stable) == (True, False)
+
+
+def test_stiff_bristles_have_the_hopf_speed_of_the_curve() -> None:
+    (static,) = hopf_points(replace(FEED, friction=CURVE))
+    *_, point = hopf_points(replace(FEED, friction=LuGre(CURVE, 1e8, sqrt(1e8 / 10.0))))
+    assert point.belt_speed == pytest.approx(static.belt_speed, rel=1e-4)
+    assert point.crossing_speed == pytest.approx(static.crossing_speed, rel=1e-3)
+    assert point.first_lyapunov_coefficient == pytest.approx(
+        static.first_lyapunov_coefficient, rel=1e-2
+    )
+
+
+@pytest.mark.parametrize("corner_frequency", [20.0, 1000.0])
+@pytest.mark.parametrize("law", LAWS[:3], ids=lambda law: law.name)
+def test_the_critical_gain_divides_stable_from_unstable(
+    law: FrictionLaw, corner_frequency: float
+) -> None:
+    drive, gains = replace(FEED, friction=law), replace(GAINS, corner_frequency=corner_frequency)
+    found = critical_gains(drive, gains)
+    for ratio, stable in ((1.0 + 1e-7, True), (1.0 - 1e-7, False)):
+        expansion = expand(drive, replace(gains, linear_gain=ratio * found.linear))
+        assert bool(np.all(expansion.eigenvalues.real < 0.0)) is stable
+
+
+def cycle_by_simulation(drive: Drive, duration: float) -> tuple[float, float, float]:
+    motion = RecordedMotion(drive, 0.0, 0.0)
+    motion.recording = False
+    motion.advance(duration)
+    motion.recording = True
+    motion.take_breakpoints()
+    motion.advance(duration)
+    meter = CycleMeter(10)
+    meter.feed(motion.take_breakpoints(), drive.belt_speed)
+    measures = meter.measures()
+    return measures.amplitude, measures.period, measures.stick_fraction
+
+
+@pytest.mark.parametrize(
+    "drive",
+    [
+        FEED,
+        *(pytest.param(each, marks=pytest.mark.long) for each in (ELASTO_PLASTIC, MAXWELL_SLIP)),
+    ],
+    ids=lambda drive: drive.friction.name,
+)
+def test_the_stable_cycle_is_that_of_a_long_run(drive: Drive) -> None:
+    cycles = [cycle for cycle in limit_cycles(drive) if cycle.stable]
+    assert len(cycles) == 1
+    amplitude, period, fraction = cycle_by_simulation(drive, 3.0)
+    measures = cycles[0].measures
+    assert (measures.amplitude, measures.period) == pytest.approx((amplitude, period), rel=1e-9)
+    assert measures.stick_fraction == pytest.approx(fraction, rel=1e-6)
+
+
+def by_differences(drive: Drive, cycle: LimitCycle) -> float:
+    """The derivative of the next turning point by this one: the dominant multiplier."""
+    ends: list[float] = []
+    size = 1e-5 * cycle.measures.amplitude
+    for sign in (1.0, -1.0):
+        motion = RecordedMotion(drive, cycle.position + sign * size, 0.0)
+        motion.restart(cycle.position + sign * size, 0.0, cycle.memory)
+        motion.take_breakpoints()
+        motion.advance(1.4 * cycle.period)
+        points = motion.take_breakpoints()
+        turns = np.flatnonzero((points.velocity == 0.0) & (points.time > 0.7 * cycle.period))
+        rising = points.position[turns][points.velocity[np.minimum(turns + 1, len(points) - 1)] > 0]
+        ends.append(float(rising[0]))
+    return (ends[0] - ends[1]) / (2.0 * size)
+
+
+def test_the_multiplier_of_an_unstable_cycle() -> None:
+    """The vibration starts subcritically: just above the Hopf speed there are two cycles."""
+    *_, point = hopf_points(FEED)
+    drive = replace(FEED, belt_speed=1.02 * point.belt_speed)
+    unstable, stable = limit_cycles(drive)
+    assert stable.stable
+    assert not unstable.stable
+    assert abs(unstable.multipliers[0]) > 1.0
+    assert by_differences(drive, unstable) == pytest.approx(unstable.multipliers[0].real, rel=1e-3)
+
+
+def test_a_cycle_that_creeps() -> None:
+    cycles = [cycle for cycle in limit_cycles(CREEPING) if cycle.stable]
+    assert len(cycles) == 1
+    amplitude, period, _ = cycle_by_simulation(CREEPING, 300.0)
+    measures = cycles[0].measures
+    assert (measures.amplitude, measures.period) == pytest.approx((amplitude, period), rel=1e-8)
+    multiplier = cycles[0].multipliers[0].real
+    assert by_differences(CREEPING, cycles[0]) == pytest.approx(multiplier, abs=1e-4)
+
+
+def test_the_equilibrium_of_a_creeping_slide_has_no_speed() -> None:
+    system = drive_system(CREEPING)
+    mode = Mode(SLIP, (-1.0,))  # rounding of the speed, which differs by processor, has a sign
+    parameters = parameter_values(system, mode, [0.0] * len(system.inputs))
+    state = equilibria(system, parameters[:, np.newaxis])
+    assert state[SPEED, 0] == 0.0
+    assert state[POSITION, 0] != 0.0
+
+
+def test_a_cycle_from_the_hopf_point_of_the_gain() -> None:
+    critical = critical_gains(FEED, GAINS)
+    assert critical.first_lyapunov_coefficient > 0.0
+    gains = replace(GAINS, linear_gain=1.01 * critical.linear)
+    cycle = limit_cycle_from_hopf(FEED, gains)
+    assert not cycle.stable
+    again = shoot(
+        FEED,
+        cycle.position,
+        cycle.period,
+        control=gains,
+        filter_state=cycle.filter_states,
+        memory=cycle.memory,
+    )
+    assert again.position == pytest.approx(cycle.position, rel=1e-9)
+    assert len(cycle.multipliers) == 3
