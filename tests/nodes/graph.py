@@ -47,8 +47,8 @@ class Graph:
             domain_id=domain,
             signal_handler_options=SignalHandlerOptions.NO,
         )
-        self._spinner = Spinner(self.context)
-        self.executor = self._spinner.executor
+        self.spinner = Spinner(self.context)
+        self.executor = self.spinner.executor
         self._nodes: list[Any] = []
         self.observer = Node("observer", context=self.context, namespace="/test")
         self.adopt(self.observer)
@@ -62,16 +62,16 @@ class Graph:
     def adopt(self, node: Node) -> None:
         """Add a node that exists already."""
         self._nodes.append(node)
-        self._spinner.add(node)
+        self.spinner.add(node)
 
     def wait_until(self, condition: Callable[[], object], what: str) -> None:
         """Run the nodes until the condition holds; fail with `what` if it does not in time."""
-        holds = self._spinner.spin_until(lambda: bool(condition()), PATIENCE)
+        holds = self.spinner.spin_until(lambda: bool(condition()), PATIENCE)
         assert holds, f"waited {PATIENCE} s in vain: {what}"
 
     def run_for(self, seconds: float) -> None:
         """Run the nodes for so long, of wall time."""
-        self._spinner.spin_for(seconds)
+        self.spinner.spin_for(seconds)
 
     def call(
         self, kind: Any, name: str, request: Any, enough: Callable[[], object] = lambda: False
@@ -83,9 +83,9 @@ class Graph:
         """
         for _ in range(_ATTEMPTS):
             client = self.observer.create_client(kind, name)
-            self._spinner.spin_until(client.service_is_ready, PATIENCE / _ATTEMPTS)
+            self.spinner.spin_until(client.service_is_ready, PATIENCE / _ATTEMPTS)
             answer = client.call_async(request)
-            self._spinner.spin_until(
+            self.spinner.spin_until(
                 lambda a=answer: bool(a.done() or enough()), PATIENCE / _ATTEMPTS
             )
             self.observer.destroy_client(client)
@@ -135,5 +135,5 @@ class Graph:
 
     def close(self) -> None:
         """Take everything down."""
-        self._spinner.close()
+        self.spinner.close()
         rclpy.shutdown(context=self.context)

@@ -47,6 +47,9 @@ _DISCOVERY_TIME = 5.0
 
 _ANSWER_TIME = 10.0
 
+_PATIENCE = 15.0
+"""Wall time, s, without an answer or an effect after which a transition is requested again."""
+
 OnAnswer = Callable[[Any], None]
 """Called with the answer of a service."""
 
@@ -170,6 +173,9 @@ class LifecycleClient:
         self._get_state = ServiceCall(node, GetState, f"{name}/get_state")
         # No second request: it would be invalid while the transition is in progress.
         self._change_state = ServiceCall(node, ChangeState, f"{name}/change_state", answer_time=inf)
+        self._undecided: int | None = None
+        """Transition that was requested and of which it is not known whether it was made."""
+        self._patience_ends = inf
 
     def state(self) -> str:
         """Return the name of the node's state, empty if it does not answer."""
@@ -179,25 +185,31 @@ class LifecycleClient:
     def change_state(self, transition: int) -> bool:
         """Request a transition; return whether the node has made it.
 
-        If the last request was not answered, it is repeated only in a state that shows that it had
-        no effect: the answer may be lost, or the transition still in progress.
+        A request that is not answered in time may still have its effect, and then a second one is
+        invalid: further calls look for its answer or its effect, and repeat it only after 15 s.
         """
-        if self._change_state.sent and self._change_state.answer is None:
-            state = self.state()
-            if state == _STATE_AFTER[transition] or state not in NEXT_TRANSITION:
-                return state == _STATE_AFTER[transition]
-        self._change_state.ask(self._spinner, transition_request(transition), self._timeout)
-        return self.changed
+        change = self._change_state
+        if (
+            transition != self._undecided
+            or not change.sent
+            or time.monotonic() > self._patience_ends
+        ):
+            self.start_change(transition)
+            change.wait(self._spinner, self._timeout)
+        # The answer may be lost, or arrive while the state is asked for.
+        made = change.answer is None and self.state() == _STATE_AFTER[transition]
+        if change.answer is not None:
+            made = change.answer.success
+        elif not made:
+            self._patience_ends = min(self._patience_ends, time.monotonic() + _PATIENCE)
+            return False
+        self._undecided = None
+        return made
 
     def start_change(self, transition: int) -> None:
         """Request a transition and do not wait for the answer: see `change_ended`."""
+        self._undecided, self._patience_ends = transition, inf
         self._change_state.start(transition_request(transition))
-
-    @property
-    def changed(self) -> bool:
-        """Whether the node has made the last transition requested."""
-        answer = self._change_state.answer
-        return answer is not None and answer.success
 
     def change_ended(self) -> bool:
         """Send the request if that is due; return whether it was answered."""
@@ -213,7 +225,8 @@ class LifecycleClient:
         asked: list[str] = []
         while (state := self.state()) != ACTIVE:
             check()
-            if state in asked or state == "finalized":
+            refused = state in asked and self._undecided is None
+            if refused or state == "finalized":
                 done = _PARTICIPLE[asked[-1]] if asked else "brought up"
                 raise RunError(f"the controller {self.name} could not be {done}; see its log")
             if time.monotonic() >= deadline:

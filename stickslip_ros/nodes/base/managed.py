@@ -19,7 +19,7 @@ from rclpy.task import Future
 from rclpy.timer import Timer
 
 from stickslip_ros.errors import BagError, InvalidInputError, StickslipError
-from stickslip_ros.nodes.base.parameters import ParameterNode, ParametersT
+from stickslip_ros.nodes.base.parameters import ParameterNode, ParametersT, first_line
 from stickslip_ros.nodes.base.ros_topics import (
     PollingNode,
     matching_readers,
@@ -117,6 +117,8 @@ class ManagedNode(PollingNode, ParameterNode[ParametersT], ABC):
         """Publisher whose topic recorders subscribe to last; None if they read only one."""
         self._last_refusal = ""
         self._waiting = False
+        for service in self.services:  # those of rclpy
+            service.callback = partial(self._answer, service.callback)
         self._diagnostics = self.create_publisher(
             DiagnosticArray, DIAGNOSTICS.name, qos_profile(DIAGNOSTICS)
         )
@@ -290,6 +292,17 @@ class ManagedNode(PollingNode, ParameterNode[ParametersT], ABC):
     def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Disconnect, to start again."""
         return self._transition(self._disconnect)
+
+    def _answer(self, callback: Callable[[Any, Any], Any], request: Any, response: Any) -> Any:
+        """Answer also a request that rclpy cannot serve, such as a transition from another state.
+
+        After an exception it would answer neither this request nor, until more come, later ones.
+        """
+        try:
+            return callback(request, response)
+        except Exception as error:
+            self.get_logger().error(f"a request is refused: {first_line(error)}")
+            return response
 
     def _stop_and_tell(self) -> None:
         try:

@@ -130,7 +130,7 @@ def spin(executor: Executor, until: Future) -> None:
     while not until.done():
         try:
             executor.spin_until_future_complete(until, timeout_sec=0.2)
-        except Exception as error:  # an invalid request from outside ends here, too
+        except Exception as error:
             get_logger("stickslip_ros").error(f"{type(error).__name__}: {error}")
 
 

@@ -212,10 +212,7 @@ class _Supervisor:
             self._take_through(node, Transition.TRANSITION_ACTIVATE)
 
     def _configure(self, nodes: Iterable[str]) -> None:
-        """Configure all nodes at the same time.
-
-        Then look again at those that were not ready for it, or whose answer was lost.
-        """
+        """Configure all nodes at the same time."""
         clients = [self._client(node) for node in nodes]
         for client in clients:
             client.start_change(Transition.TRANSITION_CONFIGURE)
@@ -223,11 +220,10 @@ class _Supervisor:
             lambda: not [client for client in clients if not client.change_ended()], _ANSWER_TIMEOUT
         )
         for client in clients:
-            if not client.changed:
-                self._take_through(client.name, Transition.TRANSITION_CONFIGURE)
+            self._take_through(client.name, Transition.TRANSITION_CONFIGURE)
 
     def _take_through(self, node: str, transition: int) -> None:
-        """Take a node through a transition; repeat the request until the node is ready for it."""
+        """Take a node through a transition; repeat the request while the node refuses it."""
         ready = self._spinner.spin_until(
             lambda: self._change_state(node, transition), _READY_TIMEOUT, period=0.02
         )
@@ -335,7 +331,7 @@ class _Supervisor:
                 return
 
     def _deactivate(self, node: str) -> None:
-        """Deactivate a node if it is active: rclpy does not answer an invalid request."""
+        """Deactivate a node if it is active; a user's may not answer an invalid request."""
         state = self._client(node).state()
         if state == ACTIVE:
             self._change_state(node, Transition.TRANSITION_DEACTIVATE)

@@ -5,6 +5,7 @@ from typing import Any
 
 import pytest
 from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState, GetState
 from rclpy.client import Client
 from rclpy.node import Node
 from std_srvs.srv import Trigger
@@ -51,11 +52,74 @@ def test_the_state_replaces_an_answer_that_is_lost(
             take(call, pending)
 
     monkeypatch.setattr(ServiceCall, "_take", lose_the_first)
-    assert not client.change_state(CONFIGURE)
-    assert [answer.success for answer in lost] == [True]
     assert client.change_state(CONFIGURE)
+    assert [answer.success for answer in lost] == [True]
     assert client.change_state(ACTIVATE)
     assert client.state() == "active"
+
+
+class _Slow:
+    """A managed node that tells its state at once and takes requests of transitions when told to.
+
+    What is sent before then is on its way.
+    """
+
+    def __init__(self, graph: Graph) -> None:
+        self.requests: list[int] = []
+        self.state = "unconfigured"
+        self._graph = graph
+        self._prompt = Node("prompt", context=graph.context, namespace="/test")
+        self._prompt.create_service(GetState, "slow/get_state", self._tell)
+        self._late = Node("late", context=graph.context, namespace="/test")
+        self._late.create_service(ChangeState, "slow/change_state", self._change)
+        graph.adopt(self._prompt)
+
+    def take_requests(self) -> None:
+        self._graph.adopt(self._late)
+        self._graph.wait_until(lambda: self.requests, "the first request")
+
+    def _tell(self, _: GetState.Request, response: GetState.Response) -> GetState.Response:
+        response.current_state.label = self.state
+        return response
+
+    def _change(
+        self, request: ChangeState.Request, response: ChangeState.Response
+    ) -> ChangeState.Response:
+        self.requests.append(request.transition.id)
+        response.success = True
+        self.state = "inactive"
+        return response
+
+
+@pytest.fixture
+def slow(graph: Graph) -> _Slow:
+    return _Slow(graph)
+
+
+def test_a_request_on_its_way_is_not_repeated_and_a_late_answer_counts(
+    graph: Graph, slow: _Slow
+) -> None:
+    client = LifecycleClient(graph.spinner, graph.observer, "slow", 0.5)
+    client.start_change(CONFIGURE)
+    graph.wait_until(lambda: client.change_ended() or client._change_state.sent, "it is sent")
+    assert not [True for _ in range(3) if client.change_state(CONFIGURE)]
+    slow.take_requests()
+    graph.wait_until(client.change_ended, "the answer")
+    slow.state = "unconfigured"  # whoever asks for the state did so before
+    assert client.change_state(CONFIGURE)
+    assert slow.requests == [CONFIGURE]
+
+
+def test_a_transition_that_is_still_without_effect_is_requested_again(
+    graph: Graph, slow: _Slow, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("stickslip_ros.nodes.base.clients._PATIENCE", 0.0)
+    client = LifecycleClient(graph.spinner, graph.observer, "slow", 0.5)
+    assert not client.change_state(CONFIGURE)
+    assert not client.change_state(CONFIGURE)
+    slow.take_requests()
+    graph.wait_until(lambda: len(slow.requests) == 2, "both requests")
+    assert client.change_state(CONFIGURE)
 
 
 def answer_once(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:

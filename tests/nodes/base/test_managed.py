@@ -3,6 +3,8 @@
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState
 from std_msgs.msg import Float64
 
 from stickslip_ros.nodes.base.managed import OK, WARN, ManagedNode
@@ -76,3 +78,21 @@ def test_kept_resources_are_destroyed_at_clean_up(graph: Graph) -> None:
     node.trigger_cleanup()
     assert node.thing.destroyed
     assert not [s for s in node.subscriptions if s.topic_name.endswith(RECORDED.name)]
+
+
+def test_an_invalid_transition_is_answered_and_so_are_the_requests_behind_it(graph: Graph) -> None:
+    node = graph.add(Listener, autostart=False)
+    client = graph.observer.create_client(ChangeState, "listener/change_state")
+    graph.wait_until(client.service_is_ready, "the service is found")
+    unknown = 99
+    transitions = (
+        Transition.TRANSITION_CONFIGURE,
+        Transition.TRANSITION_CONFIGURE,
+        unknown,
+        Transition.TRANSITION_ACTIVATE,
+    )
+    requests = [ChangeState.Request(transition=Transition(id=number)) for number in transitions]
+    answers = [client.call_async(request) for request in requests]
+    graph.wait_until(lambda: all(answer.done() for answer in answers), "each is answered")
+    assert [answer.result().success for answer in answers] == [True, False, False, True]
+    assert node.active
