@@ -30,6 +30,7 @@ from stickslip_ros.identification.findings import Findings
 from stickslip_ros.identification.fit import QUANTILE
 from stickslip_ros.identification.identify import identify
 from stickslip_ros.identification.record import Record
+from stickslip_ros.identification.sentences import unidentified
 from stickslip_ros.model.actuator import Actuator
 from stickslip_ros.model.drive import Drive
 from stickslip_ros.model.friction import (
@@ -162,9 +163,10 @@ def tried(law: str, kind: str, seed: int) -> dict[str, Any]:
     begun = time.process_time()
     name = law if law in ASKED else AUTO
     found: Findings = identify([record(law, kind, seed)], name, known, time_limit=inf)
+    untold = unidentified(found)
     result: dict[str, Any] = {
         "law": found.law,
-        "told": "friction.law" not in found.unidentified,
+        "told": "friction.law" not in untold,
         "seconds": time.process_time() - begun,
     }
     if found.law == law:
@@ -172,7 +174,7 @@ def tried(law: str, kind: str, seed: int) -> dict[str, Any]:
         result["errors"] = {
             name: [each.value - true[name], each.standard_error]
             for name, each in found.fitted.items()
-            if name in true and name not in found.unidentified
+            if name in true and name not in untold
         }
     return result
 

@@ -11,7 +11,8 @@ from typing_extensions import override
 from stickslip_ros.api.page import Summary
 from stickslip_ros.api.results import Parts, Result
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.identification.findings import Findings, notes_on
+from stickslip_ros.identification import sentences
+from stickslip_ros.identification.findings import Findings
 from stickslip_ros.identification.fit import Estimate
 from stickslip_ros.identification.identify import AUTO, AUTO_TIME, identify_recordings
 from stickslip_ros.identification.record import Record
@@ -54,10 +55,11 @@ class Model(Result):
         """Value, standard error and 95 % interval by parameter, such as `plant.mass`; SI units."""
         return {f"plant.{name}": each for name, each in self.findings.fitted.items()}
 
-    @property
+    @cached_property
     def unidentified(self) -> dict[str, str]:
         """Why a parameter is not identifiable, and the run that would identify it, by parameter."""
-        return {f"plant.{name}": why for name, why in self.findings.unidentified.items()}
+        found = sentences.unidentified(self.findings)
+        return {f"plant.{name}": why for name, why in found.items()}
 
     @property
     def drive(self) -> Drive:
@@ -146,8 +148,8 @@ class Model(Result):
 
     @property
     def _notes(self) -> list[str]:
-        others = (notes_on(self.findings, record) for record in self.predicted.values())
-        return [*self.findings.notes, *(note for notes in others for note in notes)]
+        others = (sentences.notes_on(self.findings, record) for record in self.predicted.values())
+        return [*sentences.notes(self.findings), *(note for notes in others for note in notes)]
 
     @override
     def _entries(self) -> dict[str, Any]:
@@ -174,7 +176,7 @@ class Model(Result):
             **self.predictions[""],
             "candidates": [
                 {
-                    "law": each.law,
+                    "law": each.law.name,
                     "constants": each.size,
                     "held_out_error": each.error,
                     "by_direction": each.by_direction,

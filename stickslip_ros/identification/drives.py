@@ -8,11 +8,10 @@ from math import inf, pi, sqrt
 from typing import Any
 
 import numpy as np
-from typing_extensions import override
 
 from stickslip_ros.arrays import FloatArray, rms
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.identification.choice import AUTO, Candidate, Task
+from stickslip_ros.identification.choice import AUTO
 from stickslip_ros.identification.filtered import filtered
 from stickslip_ros.identification.identified_law import DELAY, LAG, IdentifiedLaw
 from stickslip_ros.identification.laws import (
@@ -58,6 +57,7 @@ _SEARCH_TIME = 0.7
 _LAW_TIME = 0.25
 """Share of what is left of it that the search of a law without a memory may take: others follow."""
 OUT_OF_TIME = "the time was over before it was fitted to the end"
+_HOPELESS = "much worse in the search: not fitted further"
 _OPTIONAL_GAIN, _OPTIONAL_ERRORS = 0.05, 4.0
 """Share of the squared error, and standard errors, for which one more constant is searched."""
 _CLEAR_GAIN = 0.5
@@ -77,13 +77,15 @@ OPTIONAL = ("damping", "bias_force", DELAY, LAG)
 """Constants that are fitted only if the record asks for them."""
 
 
-class DriveTask(Task[Refinement]):
+class DriveTask:
     """Records of a drive on a spring, with what is known of it."""
 
     def __init__(
         self, records: Sequence[Record], fixed: Mapping[str, float], limit: TimeLimit
     ) -> None:
-        super().__init__(records, limit)
+        self.records, self.limit = records, limit
+        self.left: list[str] = []
+        """Laws that were not fitted to the end, because the time was over."""
         self.normal_force = fixed.get("normal_force", 1.0)
         self.fixed = {name: fixed[name] for name in (*LINEAR, DELAY) if name in fixed}
         self.friction = {
@@ -103,10 +105,9 @@ class DriveTask(Task[Refinement]):
         self.rows = Rows.of(parts, None)
         self.predictors = [Predictor(record) for record in records]
 
-    @override
     def candidates(
         self, law: str, laws: Sequence[IdentifiedLaw], progress: Callable[[str], None]
-    ) -> list[Candidate[Refinement]]:
+    ) -> list[Refinement]:
         """Return the fits of the laws that compete, or of the one that is asked for, fitted first.
 
         Laws without a memory are searched first. Those with a memory follow if the errors of the
@@ -160,18 +161,15 @@ class DriveTask(Task[Refinement]):
             extend()
         return self._finished(found)
 
-    def _finished(self, found: Sequence[Refinement]) -> list[Candidate[Refinement]]:
+    def _finished(self, found: Sequence[Refinement]) -> list[Refinement]:
         """Return searched models fitted further, the better ones first, as far as time allows."""
         least = min(map(_loss, found))
         near = [each for each in found if _loss(each) <= _HOPELESS_LOSS_RATIO * least]
-        candidates = {
-            each: Candidate(each, each.best.losses, "much worse in the search: not fitted further")
-            for each in found
-        }
+        finished = {each: _remarked(each, _HOPELESS) for each in found}
         for number, each in enumerate(sorted(near, key=_loss)):
             self.limit.begin_stage(1.0 / (len(near) - number))
-            candidates[each] = self.finished(each)
-        return [*candidates.values()]
+            finished[each] = self.finished(each)
+        return [*finished.values()]
 
     @cached_property
     def constants(self) -> Mapping[str, float]:
@@ -313,18 +311,18 @@ class DriveTask(Task[Refinement]):
             fit = refine(task, free, {**best.values, DELAY: 0.0}, best.starts, most=_STEPS)
         return fit
 
-    def finished(self, near: Refinement) -> Candidate[Refinement]:
+    def finished(self, near: Refinement) -> Refinement:
         """Return a fit to long segments, with the constants that the records ask for."""
         task = self._trajectories(near.law, _LONG_SEGMENT * self.period, _MOST_SAMPLES)
         # Measured starts are too rough for motions that grow over a segment.
         begun = best_starts(task, near.best.values)
         fit = self._settled(replace(begun, names=near.best.names))
         fit = self._with_optional(fit, least_share=0.0)
-        held_out = _held_out(fit)
+        validated = replace(fit, held_out=_held_out(fit))
         if not self.limit.is_over:
-            return Candidate(fit, held_out)
+            return validated
         self.left.append(fit.law.name)
-        return Candidate(fit, fit.best.losses, OUT_OF_TIME)
+        return _remarked(fit, OUT_OF_TIME)
 
     def _regression(self, law: IdentifiedLaw, shape: float | None = None) -> Regression:
         fixed = {name: 0.0 for name in LINEAR if name not in self.free} | {
@@ -380,6 +378,11 @@ def _share(fit: Refinement) -> float:
 
 def _loss(fit: Refinement) -> float:
     return fit.best.loss
+
+
+def _remarked(fit: Refinement, remark: str) -> Refinement:
+    """Return a fit that is out of the choice, with its errors in the segments that it is for."""
+    return replace(fit, held_out=fit.best.losses, remark=remark)
 
 
 def _held_out(fit: Refinement) -> FloatArray:

@@ -2,8 +2,9 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
+from math import inf, sqrt
 from typing import Any, ClassVar
 
 import numpy as np
@@ -82,9 +83,15 @@ class ForceErrors(Residuals):
     """Known force, N."""
 
 
+@dataclass(frozen=True, eq=False)
 class Fit(ABC):
     """A drive fitted to records: by a regression of forces, or by its trajectories."""
 
+    held_out: FloatArray = field(default_factory=lambda: np.empty(0), kw_only=True)
+    """Mean square of the error in each part that was held out, N^2 of forces or m^2 of positions;
+    empty if none was."""
+    remark: str = field(default="", kw_only=True)
+    """Restriction of the model, or reason why it is out of the choice of a law."""
     has_spring: ClassVar[bool]
     """Whether the drive has a spring."""
     least_gain: ClassVar[float] = 0.0
@@ -145,6 +152,27 @@ class Fit(ABC):
     @abstractmethod
     def free_run(self, record: Record) -> FloatArray:
         """Return the positions in a run through a whole record, m; see `Findings.free_run`."""
+
+    @property
+    def size(self) -> int:
+        """Number of fitted constants."""
+        return len(self.point) + (self.law.deflection > 0.0)
+
+    @property
+    def by_direction(self) -> bool:
+        """Whether a law on a spring has constants of its own in each direction."""
+        return self.has_spring and self.law.one_way is not self.law
+
+    @property
+    def label(self) -> str:
+        """Name of the law, and whether it is by direction."""
+        return f"{self.law.name} by direction" if self.by_direction else self.law.name
+
+    @property
+    def error(self) -> float:
+        """Validation error: rms of what is held out, as a share of the scale."""
+        known = len(self.held_out) and self.scale > 0.0
+        return sqrt(float(np.mean(self.held_out))) / self.scale if known else inf
 
     @property
     def used(self) -> float:

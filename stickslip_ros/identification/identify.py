@@ -5,16 +5,16 @@ from math import inf, isfinite
 
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.identification.axes import AXIS_LAWS, AxisTask
-from stickslip_ros.identification.choice import AUTO
+from stickslip_ros.identification.choice import AUTO, choose
 from stickslip_ros.identification.drives import DriveTask
 from stickslip_ros.identification.findings import Findings
 from stickslip_ros.identification.foreign_laws import foreign_adapter, foreign_names
+from stickslip_ros.identification.free_runs import adjusted
 from stickslip_ros.identification.identified_law import DELAY, IdentifiedLaw
 from stickslip_ros.identification.laws import COMPETING, KNOWN_LAWS, TableAdapter
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.recordings import ReadRecords
-from stickslip_ros.identification.regression import LINEAR
-from stickslip_ros.identification.servo import servo_of
+from stickslip_ros.identification.regression import LINEAR, Regression
 from stickslip_ros.identification.time_limit import TimeLimit
 from stickslip_ros.model.constants import constants_of
 from stickslip_ros.model.friction import LAWS
@@ -130,15 +130,13 @@ def identify(
         raise InvalidInputError(f"time limit {time_limit:g} s is invalid: must be above 0 s")
     limit = TimeLimit(_FITTING_SHARE * time_limit if law == AUTO else inf)
     task = (DriveTask if spring else AxisTask)(records, fixed, limit)
-    servos = [servo_of(record) for record in records]
-    return Findings(
-        records,
-        *task.chosen(law, laws, progress),
-        fixed.get("normal_force", 1.0),
-        fixed,
-        next((servo for servo in servos if servo is not None), None),
-        task.left,
-    )
+    candidates = task.candidates(law, laws, progress)
+    in_choice = [each for each in candidates if law != AUTO or not each.remark]
+    chosen, as_good = choose(in_choice or candidates)
+    if isinstance(chosen, Regression):
+        chosen.require("mass")
+        chosen = adjusted(chosen, records) if chosen.law.name == TableAdapter.name else chosen
+    return Findings(records, candidates, chosen, as_good, fixed, task.left)
 
 
 def _laws(law: str) -> Sequence[IdentifiedLaw]:

@@ -272,9 +272,8 @@ class Regression(Fit):
         least = _LEAST_ERROR * self.scale / max(rms(self.residual), np.finfo(float).tiny)
         return np.hstack(columns), self.residual * max(least, 1.0), 0
 
-    @cached_property
-    def held_out(self) -> FloatArray:
-        """Mean square of the residual in each block, N^2, fitted without it; shape (blocks,)."""
+    def validated(self) -> "Regression":
+        """Return the same with its errors in blocks of time that are held out one by one."""
         design, wanted = self.system
         losses = np.empty(BLOCKS)
         for block in range(BLOCKS):
@@ -282,7 +281,7 @@ class Regression(Fit):
             values = solve(design[~held], wanted[~held], self.least)
             own = wanted[held] - design[held] @ values
             losses[block] = np.mean(own * own)
-        return losses
+        return replace(self, held_out=losses)
 
     @property
     def least(self) -> FloatArray:

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from stickslip_ros.identification.choice import Candidate
 from stickslip_ros.identification.findings import Findings
-from stickslip_ros.identification.fit import QUANTILE, Estimate
+from stickslip_ros.identification.fit import QUANTILE, Estimate, Fit
+from stickslip_ros.identification.sentences import unidentified
 from stickslip_ros.scenarios.parameters import PlantParameters
 from stickslip_ros.show.quantities import PREDICTIONS, SI, Units
 from stickslip_ros.tables import TextTable
@@ -51,7 +51,7 @@ def identification_tables(
     yield from notes
     for first, second, share in found.correlations:
         yield f"plant.{first} and plant.{second} are correlated, {share:.3f}"
-    for name, why in found.unidentified.items():
+    for name, why in unidentified(found).items():
         yield f"plant.{name} is not identifiable: {why}"
 
 
@@ -101,7 +101,7 @@ def _curve(found: Findings, units: Units) -> TextTable:
     return TextTable("friction", ["slip", "speed", "force", "+- (95 %)"], rows)
 
 
-def _verdict(found: Findings, candidate: Candidate) -> str:
+def _verdict(found: Findings, candidate: Fit) -> str:
     if candidate.label == found.chosen.label:
         return "chosen"
     if candidate.remark:

@@ -9,12 +9,13 @@ import pytest
 
 from benchmarks import identification_conditions as conditions
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.identification.findings import Findings, notes_on
+from stickslip_ros.identification.findings import Findings
 from stickslip_ros.identification.identify import identify
 from stickslip_ros.identification.laws import SaturatingAdapter
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.regression import regress
 from stickslip_ros.identification.rest import static_force
+from stickslip_ros.identification.sentences import notes, notes_on, unidentified
 from stickslip_ros.identification.servo import closed_loop, servo_of
 from stickslip_ros.identification.trajectory import Predictor, free_run
 from stickslip_ros.model.friction import Coulomb, Stiction
@@ -40,7 +41,7 @@ def test_the_constants_of_coulomb_friction_by_direction(coulomb: Findings) -> No
     for name, value in true.items():
         assert coulomb.fitted[name].value == pytest.approx(value, rel=0.02), name
     assert coulomb.force_error(coulomb.records[0]) < 0.02
-    assert {"damping", "bias_force", "normal_force"} <= coulomb.unidentified.keys()
+    assert {"damping", "bias_force", "normal_force"} <= unidentified(coulomb).keys()
 
 
 @pytest.mark.parametrize("case", ["axis 250 0", "axis 500 0.5", "axis 1000 0.8", "uneven"])
@@ -79,7 +80,7 @@ def test_rests_tell_static_friction_that_slip_does_not(static: float) -> None:
         assert low <= static <= high <= low + 3.0
     found = identify([own], "coulomb", {"force_delay": 0.0})
     assert found.fitted["friction.static"].value == pytest.approx(17.0, rel=0.01)
-    said = found.unidentified.get("friction.static", "")
+    said = unidentified(found).get("friction.static", "")
     assert said.count("where the law has 17 N") == (2 if static > 17.0 else 0)
 
 
@@ -112,7 +113,7 @@ def test_what_is_known_is_not_fitted(coulomb: Findings) -> None:
     scaled = identify([record("coulomb")], "coulomb", fixed)
     ratio = coulomb.fitted["friction.static"].value / scaled.fitted["friction.static"].value
     assert ratio == pytest.approx(50.0, rel=0.01)
-    assert "normal_force" not in scaled.unidentified
+    assert "normal_force" not in unidentified(scaled)
     assert "mass" not in scaled.fitted
     assert scaled.drive.mass == 95.0
 
@@ -121,7 +122,7 @@ def test_what_is_known_is_not_fitted(coulomb: Findings) -> None:
 def test_the_law_is_chosen_by_held_out_parts() -> None:
     found = identify([record("saturating", duration=5.0)])
     assert found.law == "table"
-    errors = {each.law: each.error for each in found.candidates}
+    errors = {each.law.name: each.error for each in found.candidates}
     assert errors["table"] < 0.7 * errors["coulomb"]
     curve = found.friction(0)
     true = -np.array([float(SATURATING.coefficient(w, 1.0)) for w in curve.speed.tolist()])
@@ -180,7 +181,7 @@ def test_what_is_refused() -> None:
 def test_the_choice_of_a_law_ends_with_the_best_so_far() -> None:
     found = identify([record("coulomb", 4.0)], time_limit=1e-3)
     assert found.law == "coulomb"
-    assert any("stribeck, exponential, table, lugre; more time is" in each for each in found.notes)
+    assert any("stribeck, exponential, table, lugre; more time is" in each for each in notes(found))
     with pytest.raises(InvalidInputError, match="time limit 0 s is invalid: must be above 0 s"):
         identify([record("coulomb", 4.0)], time_limit=0.0)
 
@@ -192,7 +193,7 @@ def test_an_encoder_that_drops_out_leaves_no_traceback() -> None:
     for place in random.integers(100, len(position) - 100, 12).tolist():
         position[place : place + int(random.integers(1, 6))] = 0.0
     found = identify([replace(own, position=position)], "table", {"force_delay": 0.0})
-    assert any("does not describe the recordings" in note for note in found.notes)
+    assert any("does not describe the recordings" in note for note in notes(found))
     assert found.check(own)["force_error"] > 0.1
 
 
@@ -254,7 +255,7 @@ def test_a_controller_is_found_beside_forces_that_are_added_to_it() -> None:
 def test_a_curve_does_not_rise_far_below_the_slowest_speed() -> None:
     """A rise there is one with the force at rest: neither would be told."""
     found = identify([record("coulomb", duration=6.0)], "table", {"force_delay": 0.0})
-    fit = found.chosen.fit
+    fit = found.chosen
     curve = SaturatingAdapter(fit.rows.curve_speeds)
     saturating = regress(fit.rows, curve, fit.free, fit.fixed)
     assert (saturating.shapes >= 0.999 * np.quantile(fit.rows.speeds, 0.02)).all()

@@ -5,23 +5,23 @@ from typing import Any
 
 import numpy as np
 
-from stickslip_ros.identification.choice import Candidate, choose
+from stickslip_ros.identification.choice import choose
+from stickslip_ros.identification.fit import Fit
 
 
 def candidate(
     name: str, errors: list[float], variances: list[float], least_gain: float = 0.0
-) -> Candidate:
+) -> Fit:
     """Return a fit with an error in each block, a share, and variances of its constants."""
-    law = SimpleNamespace(name=name, deflection=0.0)
-    fit: Any = SimpleNamespace(
-        law=law,
-        point=variances,
+    found: Any = SimpleNamespace(
+        label=name,
+        size=len(variances),
         covariance=np.diag(variances),
-        has_spring=False,
-        scale=1.0,
         least_gain=least_gain,
+        held_out=np.square(errors),
+        error=float(np.sqrt(np.mean(np.square(errors)))),
     )
-    return Candidate(fit, np.square(errors))
+    return found
 
 
 def test_the_simplest_within_the_error_is_chosen() -> None:
@@ -39,7 +39,7 @@ def test_a_gain_that_is_that_of_the_filters_is_none() -> None:
     for least_gain, name in ((0.0, "table"), (3e-3, "coulomb")):
         best = candidate("table", [0.0113, 0.0114] * 3, [1.0] * 9, least_gain)
         plain = candidate("coulomb", [0.0135, 0.0136] * 3, [1.0] * 5, least_gain)
-        assert choose([plain, best])[0].law == name
+        assert choose([plain, best])[0].label == name
 
 
 def test_a_law_with_constants_that_are_not_told_is_not_chosen() -> None:

@@ -22,6 +22,7 @@ from stickslip_ros.identification.identify import identify
 from stickslip_ros.identification.laws import KNOWN_LAWS
 from stickslip_ros.identification.record import Record, evenly_spaced
 from stickslip_ros.identification.refinement import repetition_of
+from stickslip_ros.identification.sentences import notes, unidentified
 from stickslip_ros.identification.time_limit import TimeLimit
 from stickslip_ros.identification.trajectory import Predictor, Segment
 from stickslip_ros.model.drive import Drive
@@ -48,7 +49,7 @@ def check_constants(found: Findings, true: Mapping[str, float]) -> None:
     for name, each in found.fitted.items():
         assert abs(each.value - true[name]) < _FAR * each.standard_error, name
         assert each.standard_error < 0.05 * max(abs(true[name]), 1e-3), name
-    assert found.notes == []
+    assert notes(found) == []
 
 
 def test_constants_are_within_their_errors() -> None:
@@ -124,7 +125,7 @@ def test_static_above_kinetic_friction_is_recovered() -> None:
     for name, each in found.fitted.items():
         assert abs(each.value - true[name]) < _FAR * each.standard_error, name
     assert found.fitted["friction.static"].standard_error < 1e-3
-    assert "fit alike" in moving.unidentified["friction.static"]
+    assert "fit alike" in unidentified(moving)["friction.static"]
 
 
 @pytest.mark.long
@@ -158,8 +159,8 @@ def test_rate_and_state_friction_is_recovered() -> None:
 def test_what_stick_slip_at_one_belt_speed_tells(stick: Findings) -> None:
     """A slide on a belt that moves forward slips backward."""
     check_constants(stick, study.truth("stribeck", "stick"))
-    assert "several belt speeds" in stick.unidentified["damping"]
-    assert "both directions" in stick.unidentified["bias_force"]
+    assert "several belt speeds" in unidentified(stick)["damping"]
+    assert "both directions" in unidentified(stick)["bias_force"]
     assert stick.directions == [-1.0]
 
 
@@ -193,8 +194,8 @@ def test_records_that_no_drive_has_made_are_noted() -> None:
     own = study.record("stribeck", "stick", 1, 2.0)
     wrong = replace(own, position=1e3 * own.position, belt_velocity=0.0 * own.belt_velocity)
     found = identify([wrong], "coulomb", fixed={"mass": 100.0, "stiffness": 1e6})
-    assert "does not describe the recordings" in found.notes[0]
-    assert "check the units of time" in found.notes[-1]
+    assert "does not describe the recordings" in notes(found)[0]
+    assert "check the units of time" in notes(found)[-1]
 
 
 def test_what_no_motion_depends_on_is_not_told() -> None:
@@ -202,8 +203,8 @@ def test_what_no_motion_depends_on_is_not_told() -> None:
     own = study.record("stribeck", "stick", 1, 2.0)
     found = identify([own], "coulomb", {"mass": 1e5})
     assert np.isinf(found.fitted["stiffness"].standard_error)
-    assert "one of many values that fit alike" in found.unidentified["stiffness"]
-    tables = identification_tables(found, found.check(own), [], found.notes)
+    assert "one of many values that fit alike" in unidentified(found)["stiffness"]
+    tables = identification_tables(found, found.check(own), [], notes(found))
     shown = "\n".join(str([*each.rows]) for each in tables if not isinstance(each, str))
     assert "unbounded" in shown
     assert "inf" not in shown
@@ -219,13 +220,13 @@ def test_sticking_that_the_filter_blurs_is_seen() -> None:
         position = run.to_pandas()["position"].to_numpy()
         own = Record("log", 1.0 / 150.0, position, np.full(len(position), belt_speed))
         found = identify([own], "stribeck", {"mass": 100.0})
-        assert ("friction.static" in found.unidentified) is not stuck
+        assert ("friction.static" in unidentified(found)) is not stuck
 
 
 def test_a_missing_input_is_noted() -> None:
     own = study.record("coulomb", "ramp", 1, 2.0)
     half = replace(own, disturbance=np.where(np.arange(2000) < 1000, own.disturbance, 0.0))
-    assert "an input may be missing" in identify([half], "coulomb").notes[0]
+    assert "an input may be missing" in notes(identify([half], "coulomb"))[0]
 
 
 def test_what_is_refused() -> None:
@@ -263,7 +264,7 @@ def test_friction_by_direction() -> None:
     assert [each.label for each in found.candidates] == ["coulomb", "coulomb by direction"]
     assert found.chosen.by_direction
     assert found.directions == [1.0, -1.0]
-    assert "by direction" in found.unidentified["bias_force"]
+    assert "by direction" in unidentified(found)["bias_force"]
     for number, (group, each) in enumerate(
         (("friction.", law.forward), ("friction.reverse.", law.reverse))
     ):
@@ -280,7 +281,7 @@ def test_friction_by_direction() -> None:
 def test_friction_that_is_alike_in_both_directions_has_one_law() -> None:
     alike = identify([reversing(Coulomb(static=0.3, viscous=0.8))], "coulomb", {"damping": 0.0})
     assert not alike.chosen.by_direction
-    assert "bias_force" not in alike.unidentified
+    assert "bias_force" not in unidentified(alike)
 
 
 def reversing(law: FrictionLaw) -> Record:
@@ -329,11 +330,11 @@ def test_a_measured_velocity_tells_more() -> None:
 @pytest.mark.long
 def test_laws_that_the_record_cannot_tell_apart_are_named() -> None:
     found = identify([study.record("stribeck", "narrow", 1, 2.5)], fixed={"normal_force": 1000.0})
-    assert "predict held-out parts alike" in found.unidentified["friction.law"]
-    assert "run with relative speeds from rest" in found.unidentified["friction.law"]
+    assert "predict held-out parts alike" in unidentified(found)["friction.law"]
+    assert "run with relative speeds from rest" in unidentified(found)["friction.law"]
     told = identify([study.record("stribeck", "taps", 1, 2.5)], fixed={"normal_force": 1000.0})
     assert told.law == "stribeck"
-    assert "friction.law" not in told.unidentified
+    assert "friction.law" not in unidentified(told)
 
 
 def test_errors_that_repeat_are_noted() -> None:
@@ -353,7 +354,7 @@ def test_only_errors_of_positions_are_compared() -> None:
     own = study.record("coulomb", "ramp", 1, 2.0)
     velocity = np.gradient(own.position, own.period)
     velocity += 1e-3 * np.random.default_rng(0).normal(size=len(velocity))
-    best = identify([replace(own, velocity=velocity)], "coulomb").chosen.fit.best
+    best = identify([replace(own, velocity=velocity)], "coulomb").chosen.best
     assert 2 * np.count_nonzero(best.task.of_positions) == len(best.residual)
     first = best.task.segments[0]
     positions = own.position[first.start : first.start + first.count]
@@ -367,7 +368,7 @@ def test_missing_samples_are_not_measured() -> None:
     stamp = np.rint(1e9 * own.period * np.arange(len(position))).astype(np.int64)
     columns = {"position": position, "belt_velocity": own.belt_velocity}
     found = identify(evenly_spaced("log", stamp, columns), "stribeck", {"mass": study.MASS})
-    assert "33 % of the samples of log are missing" in found.notes[0]
+    assert "33 % of the samples of log are missing" in notes(found)[0]
     true = study.truth("stribeck", "stick")
     for name in ("stiffness", "friction.minimum_speed"):
         estimate = found.fitted[name]
@@ -378,7 +379,7 @@ def test_missing_samples_are_not_measured() -> None:
 def test_long_recordings_are_used_in_parts() -> None:
     own = study.record("coulomb", "taps", 1, duration=32.0)
     found = identify([own], "coulomb", {"normal_force": study.NORMAL_FORCE})
-    assert "of the samples were used" in found.notes[0]
+    assert "of the samples were used" in notes(found)[0]
     assert found.fitted["mass"].value == pytest.approx(study.MASS, rel=1e-3)
 
 
