@@ -66,15 +66,15 @@ class Expressions:
         self._of_control = state[system.control_states]
         self._lagging = state[system.actuator_states]
         self._of_motor = state[system.motor_states]
-        self._guide_damping = drive.guide_damping if system.has_guide_damping else None
+        self._has_guide_damping = system.has_guide_damping
 
     def reaction(self, speed: Any) -> Any:
         """Return the reaction of the slide at a speed of it."""
         stretch, rate = stretched(self._position, speed, self._of_motor)
         force = self._inputs[1] if self._of_motor else self._control_force(speed)
         found = equations.reaction(self.drive, stretch, rate, force)
-        if self._guide_damping is not None:
-            found += self._guide_damping * (speed - self.belt_speed)
+        if self._has_guide_damping:
+            found += equations.guide_reaction(self.drive, speed - self.belt_speed)
         return found
 
     def _control_force(self, speed: Any) -> Any:
@@ -276,7 +276,7 @@ class DimensionlessDrive(HybridSystem):
             return held
         if self.has_guide_damping:
             relative_speed = instant.state[SPEED] - self.belt_speed(mode, instant.time)
-            held += self.drive.guide_damping * relative_speed
+            held += equations.guide_reaction(self.drive, relative_speed)
         return held + self.drive.mass * self.belt_acceleration(mode, instant)
 
     def motor_held(self, mode: Mode, instant: Instant) -> float:

@@ -19,6 +19,11 @@ def reaction(drive: Drive, stretch: Any, stretch_rate: Any, force: Any) -> Any:
     return drive.stiffness * stretch + drive.damping * stretch_rate - force - drive.bias_force
 
 
+def guide_reaction(drive: Drive, relative_speed: Any) -> Any:
+    """Return c_g (x' - v_belt), what viscous friction of the guide adds to h."""
+    return drive.guide_damping * relative_speed
+
+
 def motor_reaction(
     drive: Drive, motor: Motor, stretch: Any, stretch_rate: Any, relative_speed: Any, force: Any
 ) -> Any:

@@ -17,7 +17,7 @@ from stickslip_ros.measures.breakpoints import Breakpoints
 from stickslip_ros.model.control import ContinuousControl
 from stickslip_ros.model.control.base import seen_by
 from stickslip_ros.model.drive import UNBOUNDED_SPEED, Drive
-from stickslip_ros.model.equations import acceleration, reaction
+from stickslip_ros.model.equations import acceleration, guide_reaction, reaction
 from stickslip_ros.model.friction import SteadyPart
 from stickslip_ros.motion.motion import RecordedMotion
 from stickslip_ros.theory.requirements import (
@@ -164,7 +164,7 @@ def _net_force(drive: Drive) -> tuple[FloatArray, FloatArray]:
     speed = relative_speed + belt_speed
     friction: Any = law.coefficient(relative_speed, np.sign(relative_speed))
     at_rest = float(law.at_rest(belt_speed))
-    damped = -unit.guide_damping * speed
+    damped = -guide_reaction(unit, speed)
     held = reaction(unit, at_rest + unit.bias_force, speed, damped)
     force = acceleration(unit, friction, held)
     terms = np.abs(friction) + abs(at_rest) + np.abs(held - at_rest)
