@@ -76,20 +76,20 @@ def _bifurcation(figure: BifurcationFigure, *, style: FigureStyle) -> Figure:
     drawn = style.figure(8.0, 5.5, narrow=1.25)
     style.set_title(drawn, *figure.title.split(": "))
     above, below = drawn.subplots(2, 1, sharex=True, height_ratios=(3.0, 1.0))
-    regimes = np.array([measures.regime for measures in figure.measures], dtype=object)
-    draw_section(above, figure.values, regimes, [s.turning_points for s in figure.settled])
-    handles = regime_handles(regimes)
+    columns = figure.columns
+    draw_section(above, figure.values, columns.regime, columns.turning_points)
+    handles = regime_handles(columns.regime)
     unstable = figure.unstable_equilibria
     if np.isfinite(unstable).any():
         dashed: Any = {"color": GREEN, "lw": 1.2, "ls": (0, (4.0, 2.0))}
         above.plot(figure.values, unstable, **dashed)
         handles.append(Line2D([], [], **dashed, label="unstable equilibrium"))
     above.set_ylabel(_UNITS.named("turning points"))
-    stick = [np.nan if m.stick_fraction is None else m.stick_fraction for m in figure.measures]
+    stick = columns.stick_fraction
     below.plot(figure.values, stick, color=ORANGE, lw=1.5)
     below.set_ylabel("stick fraction")
     below.set_ylim(0.0, max(1.05 * float(np.nanmax(stick, initial=0.0)), _LEAST_STICK_FRACTION))
-    below.set_xlabel(typeset(figure.parameter))
+    below.set_xlabel(typeset(figure.plan.label))
     below.margins(x=0.01)
     marks = {transition_label(name): [value] for name, value in figure.transitions.items()}
     handles += draw_transitions((above, below), marks, lambda values: f"{values[0]:.5g}")

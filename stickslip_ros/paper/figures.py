@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from stickslip_ros.arrays import FloatArray
+from stickslip_ros.arrays import BoolArray, FloatArray
 from stickslip_ros.measures.breakpoints import Breakpoints
 from stickslip_ros.measures.cycle_measures import Cycle, Measures, Regime
 from stickslip_ros.measures.cycle_meter import CycleMeter
@@ -20,21 +20,14 @@ from stickslip_ros.model.control import Washout
 from stickslip_ros.model.drive import Drive
 from stickslip_ros.model.friction import Coulomb, FrictionLaw, Linear, Stribeck
 from stickslip_ros.motion import RecordedMotion
+from stickslip_ros.scenarios.files import load_scenario
+from stickslip_ros.studies.columns import Columns
 from stickslip_ros.studies.options import SettlingOptions
-from stickslip_ros.studies.settling import (
-    CYCLES,
-    ControlledDrive,
-    MotionState,
-    Settled,
-    settle,
-)
-from stickslip_ros.studies.transitions import (
-    HOPF_POINT,
-    STICKING_LIMIT,
-    hopf_margin,
-    sign_changes,
-    stick_margin,
-)
+from stickslip_ros.studies.plan import ListedAxis
+from stickslip_ros.studies.runner import compute_columns
+from stickslip_ros.studies.settling import CYCLES, ControlledDrive
+from stickslip_ros.studies.study import Study, sweep_study
+from stickslip_ros.studies.transitions import hopf_margin, transitions
 
 STRIBECK = Stribeck(static=0.4, minimum=0.25, minimum_speed=0.5)
 """The paper's friction law with the paper's constants."""
@@ -107,6 +100,12 @@ class Portrait:
         return self.case.drive
 
     @property
+    def amplitude(self) -> float:
+        """The final displacement amplitude, zero at rest."""
+        at_rest = self.measures.regime is Regime.EQUILIBRIUM
+        return 0.0 if at_rest else self.measures.amplitude or 0.0
+
+    @property
     def runs_away(self) -> bool:
         """Whether the motion diverges."""
         return self.measures.regime is Regime.UNBOUNDED
@@ -140,55 +139,103 @@ class Portrait:
         return float(np.interp(speed, speeds[samples], self.trajectory.time[samples]))
 
 
+class Portraits(tuple[Portrait, ...]):
+    """Some portraits, and a quantity of each."""
+
+    __slots__ = ()
+
+    @property
+    def belt_speeds(self) -> list[float]:
+        """The belt speeds."""
+        return [each.drive.belt_speed for each in self]
+
+    @property
+    def regimes(self) -> list[Regime | None]:
+        """The final regimes."""
+        return [each.measures.regime for each in self]
+
+    @property
+    def amplitudes(self) -> list[float]:
+        """The final displacement amplitudes, zero at rest."""
+        return [each.amplitude for each in self]
+
+    @property
+    def stick_fractions(self) -> list[float]:
+        """The stick fractions of the vibrating motions."""
+        return [each.measures.stick_fraction or 0.0 for each in self if each.vibrates]
+
+    def between(self, low: float, high: float) -> "Portraits":
+        """Return those with a belt speed above `low` and below `high`."""
+        return Portraits(each for each in self if low < each.drive.belt_speed < high)
+
+
+@dataclass(frozen=True)
+class BifurcationPlan:
+    """What a bifurcation diagram varies."""
+
+    title: str
+    label: str
+    """Name and symbol of the quantity on the axis."""
+    ends: tuple[float, float]
+    """Its first and last value."""
+    parameter: str
+    """Parameter of a scenario that it determines."""
+    belt_speed: float = 0.4
+    to_parameter: Callable[[float], float] = float
+    """Returns the parameter for a value of the quantity."""
+    from_parameter: Callable[[float], float] = float
+    """Returns the quantity for a value of the parameter."""
+
+
 @dataclass(frozen=True)
 class BifurcationFigure:
-    """A figure of one bifurcation diagram; its motions are computed when first asked for."""
+    """A figure of one bifurcation diagram: a sweep, computed when it is first needed."""
 
     number: int
     values: FloatArray
-    """Value of the varied parameter for each drive."""
+    """Values of the quantity on the axis of the figure."""
+
+    @property
+    def plan(self) -> "BifurcationPlan":
+        """What is varied."""
+        return _BIFURCATIONS[self.number]
 
     @property
     def title(self) -> str:
         """Title of the figure."""
-        return _BIFURCATIONS[self.number].title
+        return self.plan.title
 
-    @property
-    def parameter(self) -> str:
-        """Name and symbol of the varied parameter."""
-        return _BIFURCATIONS[self.number].parameter
+    @cached_property
+    def study(self) -> Study:
+        """The sweep over the parameter of the drive that the quantity determines."""
+        scenario = load_scenario("paper").changed(
+            {"plant.expects_control": False, "plant.belt_speed": self.plan.belt_speed}
+        )
+        listed = tuple(map(self.plan.to_parameter, self.values.tolist()))
+        axis = ListedAxis(self.plan.parameter, listed[0], listed[-1], len(listed), listed=listed)
+        return sweep_study(scenario, [axis], settling=SETTLING)
+
+    @cached_property
+    def columns(self) -> Columns:
+        """The motion that each drive settles on from rest at X = 0."""
+        return compute_columns(self.study)
 
     @cached_property
     def drives(self) -> list[Drive]:
-        """The drive for each value."""
-        return [_BIFURCATIONS[self.number].drive(value) for value in self.values.tolist()]
-
-    @cached_property
-    def settled(self) -> list[Settled]:
-        """The motion that each drive settles on from rest at X = 0."""
-        rest = MotionState(0.0, 0.0)
-        return [settle(ControlledDrive(drive), rest, SETTLING) for drive in self.drives]
-
-    @cached_property
-    def measures(self) -> list[Measures]:
-        """The measures of each motion."""
-        return [motion.measures for motion in self.settled]
+        """The drive of each value."""
+        return [self.study.case(row)[0].drive for row in range(len(self.values))]
 
     @property
-    def vibrating(self) -> list[bool]:
+    def vibrating(self) -> BoolArray:
         """Whether each drive ends in a limit cycle."""
-        return [measures.regime in CYCLES for measures in self.measures]
+        return np.array([regime in CYCLES for regime in self.columns.regime])
 
     @property
     def transitions(self) -> dict[str, float]:
-        """The values of the parameter at the transitions that the diagram shows, by name."""
-        drive, values = _BIFURCATIONS[self.number].drive, self.values.tolist()
-        found: dict[str, float] = {}
-        for name, margin in ((HOPF_POINT, hopf_margin), (STICKING_LIMIT, stick_margin)):
-            places = [*sign_changes(lambda x, of=margin: of(ControlledDrive(drive(x))), values)]
-            if places:
-                found[name] = places[-1]
-        return found
+        """The values of the quantity at the transitions that the diagram shows, by name."""
+        (axis,) = self.study.plan.axes
+        found = transitions(self.study, axis)
+        return {name: self.plan.from_parameter(places[-1]) for name, places in found.items()}
 
     @property
     def unstable_equilibria(self) -> FloatArray:
@@ -198,13 +245,12 @@ class BifurcationFigure:
         return np.where(np.less(margins, 0.0), rest, np.nan)
 
 
-@dataclass(frozen=True)
-class Panel:
+class Panel(NamedTuple):
     """A group of phase portraits."""
 
     title: str
     """The parameters that they share."""
-    portraits: tuple[Portrait, ...]
+    portraits: Portraits
 
 
 @dataclass(frozen=True)
@@ -216,9 +262,9 @@ class PortraitFigure:
     panels: tuple[Panel, ...]
 
     @property
-    def portraits(self) -> tuple[Portrait, ...]:
+    def portraits(self) -> Portraits:
         """The portraits of all panels, in order."""
-        return tuple(portrait for panel in self.panels for portrait in panel.portraits)
+        return Portraits(portrait for panel in self.panels for portrait in panel.portraits)
 
 
 PaperFigure = BifurcationFigure | PortraitFigure
@@ -230,10 +276,9 @@ def compute_figure(number: int, *, points: int = POINTS) -> PaperFigure:
     `points` is the number of drives in a bifurcation diagram.
     """
     if number in _BIFURCATIONS:
-        plan = _BIFURCATIONS[number]
-        return BifurcationFigure(number, np.linspace(plan.start, plan.end, points))
+        return BifurcationFigure(number, np.linspace(*_BIFURCATIONS[number].ends, points))
     title, panels = _PORTRAITS[number]
-    computed = (Panel(name, tuple(map(portrait_of, cases))) for name, cases in panels.items())
+    computed = (Panel(name, Portraits(map(portrait_of, cases))) for name, cases in panels.items())
     return PortraitFigure(number, title, tuple(computed))
 
 
@@ -281,15 +326,6 @@ def _first_rise(trajectory: Breakpoints) -> float:
     return float(trajectory.time[rise])
 
 
-@dataclass(frozen=True)
-class _Bifurcation:
-    title: str
-    parameter: str
-    start: float
-    end: float
-    drive: Callable[[float], Drive]
-
-
 def _cases(
     parameter: str,
     values: Sequence[float],
@@ -333,34 +369,36 @@ _LONG_DURATION = 3000.0
 _DRIVE = "drive of the paper, no control"
 
 _BIFURCATIONS = {
-    2: _Bifurcation(
+    2: BifurcationPlan(
         f"Bifurcation diagram over the belt speed, {_DRIVE}: β = 0.01",
         "belt speed v0",
-        0.0,
-        1.0,
-        unit_drive,
+        (0.0, 1.0),
+        "plant.belt_speed",
     ),
-    3: _Bifurcation(
+    3: BifurcationPlan(
         f"Bifurcation diagram over the damping, {_DRIVE}: v0 = 0.477",
         "damping β (the coefficient of X' is 2β)",
-        0.0,
-        0.05,
-        lambda beta: unit_drive(0.477, damping=2.0 * beta),
+        (0.0, 0.05),
+        "plant.damping",
+        0.477,
+        lambda beta: 2.0 * beta,
+        lambda damping: damping / 2.0,
     ),
-    4: _Bifurcation(
+    4: BifurcationPlan(
         f"Bifurcation diagram over the stiffness, {_DRIVE}: v0 = 0.2, β = 0.01",
         "stiffness γ (at fixed scales)",
+        (0.2, 5.0),
+        "plant.stiffness",
         0.2,
-        5.0,
-        lambda stiffness: unit_drive(0.2, stiffness=stiffness),
     ),
-    5: _Bifurcation(
+    5: BifurcationPlan(
         f"Bifurcation diagram over the ratio of friction coefficients, {_DRIVE}: "
         "v0 = 0.4, β = 0.01, μs = 0.4",
         "ratio of static to smallest kinetic coefficient, μs / μm",
-        1.0,
-        2.0,
-        lambda ratio: unit_drive(0.4, friction=_stribeck(STRIBECK.static / ratio)),
+        (1.0, 2.0),
+        "plant.friction.minimum",
+        to_parameter=lambda ratio: STRIBECK.static / ratio,
+        from_parameter=lambda minimum: STRIBECK.static / minimum,
     ),
 }
 

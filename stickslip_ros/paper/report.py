@@ -122,6 +122,6 @@ def _caption(figure: PaperFigure) -> str:
         return (
             f"{figure.title}. Turning points of the motion from rest after "
             f"{SETTLING.transient:g} natural periods, for {len(figure.values)} values of "
-            f"the {figure.parameter} from {start:g} to {end:g}."
+            f"the {figure.plan.label} from {start:g} to {end:g}."
         )
     return f"{figure.title}."

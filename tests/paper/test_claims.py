@@ -23,7 +23,7 @@ from stickslip_ros.paper.claims import (
     Verdict,
 )
 from stickslip_ros.paper.claims.coefficients import Nonlinearity, samples
-from stickslip_ros.paper.claims.paper_values import FILTER, arrivals, expansion, hopf_point
+from stickslip_ros.paper.claims.paper_values import FILTER, OPEN, Loop, at
 from stickslip_ros.paper.claims.verdict import Formula, Number, Observation, Result, agrees
 from stickslip_ros.paper.figures import (
     NUMBERS,
@@ -34,6 +34,7 @@ from stickslip_ros.paper.figures import (
     PaperFigure,
     PortraitCase,
     PortraitFigure,
+    Portraits,
     portrait_of,
     unit_drive,
 )
@@ -195,8 +196,8 @@ def test_verdict_on_a_statement() -> None:
 
 
 def test_words_of_a_row_contain_the_values_of_its_function() -> None:
-    result = Observation(True, some=[0.123456, 2.0], z=1.0 - 2.0j, point=hopf_point(), n=3)
-    words = "{some} or {some:.1f}, {z}, {point.angular_frequency:.2f}, {n}, {STUDIED_SPEED:g}"
+    result = Observation(True, some=[0.123456, 2.0], z=1.0 - 2.0j, n=3)
+    words = "{some} or {some:.1f}, {z}, {OPEN.hopf.angular_frequency:.2f}, {n}, {STUDIED_SPEED:g}"
     finding = judged(result, None, words)
     assert finding.computed == "0.1235, 2 or 0.1, 2.0, 1.0000 - 2.0000 i, 1.00, 3, 0.49"
     assert finding.remark == finding.computed
@@ -216,8 +217,8 @@ def test_the_coefficients_make_up_the_first_lyapunov_coefficient() -> None:
 
 
 def test_the_nonlinearity_of_the_open_loop() -> None:
-    speed = hopf_point().belt_speed
-    q = Nonlinearity.at(expansion(speed))
+    speed = OPEN.hopf.belt_speed
+    q = Nonlinearity.at(at(speed).expansion)
     assert q.g20 == pytest.approx(-0.9j * speed, rel=1e-9)
     assert q.g11 == pytest.approx(0.9j * speed, rel=1e-9)
     assert q.cubic == pytest.approx(-0.45, rel=1e-9)
@@ -227,7 +228,7 @@ def test_the_nonlinearity_of_the_open_loop() -> None:
 def test_the_nonlinearity_of_the_closed_loop(cubic: float) -> None:
     d, p = 2.0, 0.43 - 1.8 * 0.4**2
     gains = replace(FILTER, linear_gain=d - p - d / (1.0 - p * d), cubic_gain=cubic)
-    at_critical_gain = expansion(0.4, gains=gains)
+    at_critical_gain = at(0.4, gains=gains).expansion
     q = Nonlinearity.at(at_critical_gain)
     assert q.frequency == pytest.approx(np.sqrt(1.0 - p * d), rel=1e-9)
     assert sigma_of_coefficients(q) == pytest.approx(
@@ -261,7 +262,7 @@ def test_under_the_printed_slope_the_stick_fraction_rises_with_the_damping_and_f
     drives = [unit_drive(0.2, damping=2.0 * beta, friction=law) for beta in betas]
     ends = [portrait_of(PortraitCase("", d)).measures.stick_fraction for d in drives]
     assert ends == sorted(ends[:4]) + sorted(ends[4:], reverse=True)
-    assert [len(arrivals(drive)) for drive in drives] == [2, 2, 2, 1, 1, 1]
+    assert [len(Loop(drive).arrivals) for drive in drives] == [2, 2, 2, 1, 1, 1]
 
 
 def test_verdicts_survive_ten_times_the_range() -> None:
@@ -272,7 +273,7 @@ def test_verdicts_survive_ten_times_the_range() -> None:
     assert verdict("fig-4-influence", stiffnesses).verdict is CORRECTED
     minima = (0.001, 0.01, 0.1, 0.25, 0.37, 0.39, 0.399)
     drives = [unit_drive(0.4, friction=replace(STRIBECK, minimum=m)) for m in minima]
-    gaps = tuple(portrait_of(PortraitCase("", drive)) for drive in drives)
+    gaps = Portraits(portrait_of(PortraitCase("", drive)) for drive in drives)
     figure = PortraitFigure(11, "", (Panel("", gaps),))
     assert verdict("fig-11-amplitude", figure).verdict is HOLDS
     wide = {

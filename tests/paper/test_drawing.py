@@ -14,6 +14,7 @@ from stickslip_ros.paper.figures import (
     Panel,
     PortraitCase,
     PortraitFigure,
+    Portraits,
     compute_figure,
     portrait_of,
 )
@@ -31,7 +32,7 @@ WIDTHS = {"screen": None, "paper": 85.0 / 25.4, "paper-double": 180.0 / 25.4}
 
 
 def figure_of(*panels: list[PortraitCase]) -> PortraitFigure:
-    drawn = tuple(Panel("panel", tuple(map(portrait_of, cases))) for cases in panels)
+    drawn = tuple(Panel("panel", Portraits(map(portrait_of, cases))) for cases in panels)
     return PortraitFigure(99, "a title", drawn)
 
 

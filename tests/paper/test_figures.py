@@ -45,7 +45,7 @@ def portraits(number: int) -> list[list[Portrait]]:
 
 
 def regimes(figure: BifurcationFigure) -> list[Regime | None]:
-    return [measures.regime for measures in figure.measures]
+    return figure.columns.regime.tolist()
 
 
 def test_the_parameter_of_a_bifurcation_diagram_is_all_that_varies() -> None:

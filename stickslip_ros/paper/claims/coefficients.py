@@ -20,13 +20,13 @@ from stickslip_ros.model.dimensionless_drive import SPEED
 from stickslip_ros.paper.claims.paper_values import (
     DAMPING,
     FILTER,
+    OPEN,
     PRINTED_HOPF_SPEED,
     STUDIED_SPEED,
     TAKEN_DAMPING,
+    at,
     critical,
-    expansion,
     for_both,
-    hopf_point,
     known,
     number_for_both,
 )
@@ -157,13 +157,13 @@ def samples(order: int) -> list[Nonlinearity]:
 
 def _at_hopf_point(damping: float) -> Nonlinearity:
     """Return the nonlinearity of the open loop at v_b1."""
-    return Nonlinearity.at(expansion(hopf_point(damping).belt_speed, damping))
+    return Nonlinearity.at(at(at(1.0, damping).hopf.belt_speed, damping).expansion)
 
 
 def _at_critical_gain(damping: float, cubic: float = 0.0) -> Nonlinearity:
     """Return the nonlinearity at the belt speed and the critical gain of section 4.1."""
     gains = replace(FILTER, linear_gain=critical(STUDIED_SPEED, damping).linear, cubic_gain=cubic)
-    return Nonlinearity.at(expansion(STUDIED_SPEED, damping, gains))
+    return Nonlinearity.at(at(STUDIED_SPEED, damping, gains).expansion)
 
 
 def _on_samples(
@@ -253,7 +253,7 @@ def _(_: Evidence) -> Formula:
 
 
 computes["eq-15-value"] = lambda _: Number(
-    known(first_lyapunov_coefficient(expansion(hopf_point().belt_speed)))
+    known(first_lyapunov_coefficient(at(OPEN.hopf.belt_speed).expansion))
 )
 computes["eq-15-imaginary"] = lambda _: number_for_both(
     lambda damping: ((q := _at_hopf_point(damping)).g20 * q.g11).real / 2.0

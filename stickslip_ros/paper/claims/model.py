@@ -4,6 +4,7 @@ from math import isclose, sqrt
 
 import numpy as np
 
+from stickslip_ros.arrays import FloatArray
 from stickslip_ros.measures.cycle_measures import Regime
 from stickslip_ros.model.drive import Drive
 from stickslip_ros.model.friction import Stribeck
@@ -11,18 +12,15 @@ from stickslip_ros.model.functions import zero_between
 from stickslip_ros.paper.claims.paper_values import (
     DAMPING,
     FASTER,
+    OPEN,
     STATES,
-    cycles,
-    exact_onset,
-    hopf_point,
-    only_rest_at,
-    rates,
+    Loop,
+    at,
     slip_friction,
     time_dependent,
-    trace,
 )
 from stickslip_ros.paper.claims.verdict import Computations, Evidence, Formula, Number, Observation
-from stickslip_ros.paper.figures import STRIBECK, unit_drive
+from stickslip_ros.paper.figures import STRIBECK
 
 computes = Computations()
 
@@ -44,11 +42,10 @@ def _kinetic(speed: float) -> float:
     return float(-STRIBECK.coefficient(speed, 1.0))
 
 
-def _smallest_kinetic() -> tuple[float, float]:
-    """Return the smallest kinetic coefficient, and its relative speed."""
+def _smallest_at() -> float:
+    """Return the relative speed of the smallest kinetic coefficient."""
     # Without damping the trace is the friction's slope at the belt's speed.
-    speed = zero_between(lambda v: trace(v, 0.0), 1e-3, _LARGEST_SPEED)
-    return _kinetic(speed), speed
+    return zero_between(lambda v: at(v, 0.0).trace, 1e-3, _LARGEST_SPEED)
 
 
 computes["normal-vibration"] = lambda _: Observation(
@@ -63,17 +60,15 @@ def _(_: Evidence) -> Formula:
     friction = drive.normal_force * slip_friction(drive.friction, speed - drive.belt_speed)
     acceleration = (friction - drive.damping * speed - drive.stiffness * position) / drive.mass
     scale = drive.angular_frequency * drive.speed_scale
-    return Formula(acceleration / scale, rates(drive, STATES[:2])[1])
+    return Formula(acceleration / scale, Loop(drive).rates(STATES[:2])[1])
 
 
 @computes("eq-2")
 def _(_: Evidence) -> Formula:
     law = _SLIDE.dimensionless.friction
     coefficient = slip_friction(law, STATES[1] - _SLIDE.belt_speed / _SLIDE.speed_scale)
-    return Formula(
-        coefficient - _SLIDE.damping_coefficient * STATES[1] - STATES[0],
-        rates(_SLIDE, STATES[:2])[1],
-    )
+    printed = coefficient - _SLIDE.damping_coefficient * STATES[1] - STATES[0]
+    return Formula(printed, Loop(_SLIDE).rates(STATES[:2])[1])
 
 
 @computes("scales")
@@ -87,21 +82,16 @@ def _(_: Evidence) -> Formula:
 @computes("scaled-damping")
 def _(_: Evidence) -> Formula:
     read = _SLIDE.damping * sqrt(_SLIDE.stiffness / _SLIDE.mass) / _SLIDE.stiffness
-    return Formula(
-        None,
-        _SLIDE.damping_coefficient,
-        {"With omega, which is not defined, read as omega_0": read},
-        slide=_SLIDE.damping_coefficient,
-    )
+    corrections = {"With omega, which is not defined, read as omega_0": read}
+    return Formula(None, _SLIDE.damping_coefficient, corrections, slide=_SLIDE)
 
 
 @computes("scaled-belt-speed")
 def _(_: Evidence) -> Formula:
     length = _SLIDE.normal_force / _SLIDE.stiffness
     read = _SLIDE.belt_speed / (sqrt(_SLIDE.stiffness / _SLIDE.mass) * length)
-    return Formula(
-        None, _SLIDE.dimensionless.belt_speed, {"With L, which is not defined, read as N/k": read}
-    )
+    corrections = {"With L, which is not defined, read as N/k": read}
+    return Formula(None, _SLIDE.dimensionless.belt_speed, corrections)
 
 
 computes["excitation-frequency"] = lambda _: Observation(
@@ -121,29 +111,25 @@ def _(_: Evidence) -> Formula:
 
 
 computes["static-coefficient"] = lambda _: Number(_kinetic(0.0))
-computes["smallest-coefficient"] = lambda _: Number(_smallest_kinetic()[0])
-computes["smallest-at"] = lambda _: Number(_smallest_kinetic()[1])
+computes["smallest-coefficient"] = lambda _: Number(_kinetic(_smallest_at()))
+computes["smallest-at"] = lambda _: Number(_smallest_at())
 
 
 @computes("names-of-coefficients")
 def _(_: Evidence) -> Observation:
-    break_away, (smallest, _speed) = _kinetic(0.0), _smallest_kinetic()
-    return Observation(
-        isclose(STRIBECK.static, smallest, rel_tol=1e-6),
-        isclose(STRIBECK.static, break_away, rel_tol=1e-6)
-        and isclose(STRIBECK.minimum, smallest, rel_tol=1e-6),
-        break_away=break_away,
-        smallest=smallest,
-        law=STRIBECK,
-    )
+    break_away, smallest = _kinetic(0.0), _kinetic(_smallest_at())
+    named = isclose(STRIBECK.static, smallest, rel_tol=1e-6)
+    exchanged = isclose(STRIBECK.static, break_away, rel_tol=1e-6)
+    exchanged &= isclose(STRIBECK.minimum, smallest, rel_tol=1e-6)
+    return Observation(named, exchanged, break_away=break_away, smallest=smallest, law=STRIBECK)
 
 
 @computes("eq-3-range")
 def _(evidence: Evidence) -> Observation:
-    smallest_at = _smallest_kinetic()[1]
+    smallest_at = _smallest_at()
     end = zero_between(lambda v: _kinetic(v) - STRIBECK.static, smallest_at, _LARGEST_SPEED)
     # A slide that sticks reaches the belt's speed, and its speed spans twice the amplitude.
-    fastest = 2.0 * (cycles(exact_onset() * (1.0 - 1e-6))[0].measures.velocity_amplitude or 0.0)
+    fastest = 2.0 * at(OPEN.exact_onset * (1.0 - 1e-6)).speed_amplitude
     highest = float(evidence.bifurcation(2).values.max())
     return Observation(
         end >= max(fastest, highest),
@@ -155,28 +141,21 @@ def _(evidence: Evidence) -> Observation:
     )
 
 
-computes["eq-4"] = lambda _: Formula(rates(unit_drive(0.4), STATES[:2])[0], STATES[1])
+computes["eq-4"] = lambda _: Formula(at(0.4).rates(STATES[:2])[0], STATES[1])
 
 
-@computes("eq-5")
-def _(_: Evidence) -> Formula:
+def _eq_5() -> FloatArray:
+    """Return X2' of eq. 5 at the tested states."""
     friction = slip_friction(STRIBECK, STATES[1] - 0.4)
-    printed = [STATES[1], -DAMPING * STATES[1] - STATES[0] + friction]
-    return Formula(printed, rates(unit_drive(0.4), STATES[:2]))
+    return friction - DAMPING * STATES[1] - STATES[0]
 
 
-@computes("eq-5-origin")
-def _(_: Evidence) -> Formula:
-    law = slip_friction(STRIBECK, STATES[1] - 0.4)
-    return Formula(
-        law,
-        rates(unit_drive(0.4), STATES[:2])[1],
-        {
-            "With eq. 2, which contains eq. 3, in place of eq. 3": law
-            - DAMPING * STATES[1]
-            - STATES[0]
-        },
-    )
+computes["eq-5"] = lambda _: Formula([STATES[1], _eq_5()], at(0.4).rates(STATES[:2]))
+computes["eq-5-origin"] = lambda _: Formula(
+    slip_friction(STRIBECK, STATES[1] - 0.4),
+    at(0.4).rates(STATES[:2])[1],
+    {"With eq. 2, which contains eq. 3, in place of eq. 3": _eq_5()},
+)
 
 
 @computes("eq-5-stick")
@@ -184,32 +163,26 @@ def _(evidence: Evidence) -> Observation:
     portrait = evidence.portraits(6).portraits[0]
     cycle = portrait.last_cycles
     reaction = cycle.position[cycle.stuck] + DAMPING * portrait.drive.belt_speed
-    least, most = float(reaction.min()), float(reaction.max())
-    limit = STRIBECK.static
+    needed, rounding = float(np.abs(reaction).max()), 1e-9
     return Observation(
-        max(abs(least), abs(most)) < 1e-9,
-        max(abs(least), abs(most)) <= limit * (1.0 + 1e-9),
-        least=least,
-        most=most,
-        portrait=portrait,
-        limit=limit,
+        needed < rounding,
+        needed <= STRIBECK.static * (1.0 + rounding),
+        least=float(reaction.min()),
+        most=float(reaction.max()),
+        drive=portrait.drive,
     )
 
 
 @computes("rest-at-high-speed")
 def _(evidence: Evidence) -> Observation:
     figure = evidence.bifurcation(2)
-    fast = [
-        (measures, drive)
-        for measures, drive in zip(figure.measures, figure.drives, strict=True)
-        if drive.belt_speed > 1.05 * hopf_point().belt_speed
-    ]
-    resting = [measures.regime is Regime.EQUILIBRIUM for measures, _ in fast]
-    off = max(abs((m.midpoint or 0.0) / drive.equilibrium_position - 1.0) for m, drive in fast)
+    fast = figure.values > 1.05 * OPEN.hopf.belt_speed
+    resting = figure.columns.regime[fast] == Regime.EQUILIBRIUM
+    rest = [drive.equilibrium_position for drive in figure.drives]
+    off = np.abs(figure.columns.midpoint / rest - 1.0)[fast].max()
     return Observation(
-        all(resting) and off < 1e-4 and only_rest_at(FASTER),
+        all(resting) and off < 1e-4 and all(at(speed).only_rests for speed in FASTER),
         resting=sum(resting),
-        total=len(fast),
-        hopf=hopf_point(),
-        off=off,
+        total=len(resting),
+        off=float(off),
     )

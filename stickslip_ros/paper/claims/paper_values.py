@@ -1,11 +1,11 @@
-"""Reference values for the claims, at the paper's parameters, and summaries of values in words.
+"""The loop of the paper and what its equations tell of it, and constants, for the claims.
 
 Everything is dimensionless, for the unit drive of `figures`.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
-from functools import cache
+from dataclasses import dataclass, replace
+from functools import cache, cached_property
 from itertools import pairwise
 from typing import Any, TypeVar
 
@@ -13,7 +13,6 @@ import numpy as np
 import numpy.typing as npt
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.measures.cycle_measures import Regime
 from stickslip_ros.model.control import Washout
 from stickslip_ros.model.drive import Drive
 from stickslip_ros.model.drive_system import SLIP
@@ -24,7 +23,7 @@ from stickslip_ros.model.plain_drive import drive_system
 from stickslip_ros.motion import Motion, RecordedMotion
 from stickslip_ros.motion.compiled_flow import flow_rates, parameter_values
 from stickslip_ros.paper.claims.verdict import Formula, Number
-from stickslip_ros.paper.figures import Portrait, unit_drive
+from stickslip_ros.paper.figures import STRIBECK, unit_drive
 from stickslip_ros.theory.critical_gains import CriticalGains, critical_gains
 from stickslip_ros.theory.cycle_bounds import follow, release_position
 from stickslip_ros.theory.hopf import HopfPoint, hopf_points
@@ -49,6 +48,9 @@ PRINTED_HOPF_SPEED = 0.4944
 
 PRINTED_GAIN = -0.0395
 """Critical linear gain of eq. 21."""
+
+PRINTED_ONSET = 0.4372
+"""v_b0 of section 3.2."""
 
 STUDIED_SPEED = 0.49
 """The belt speed of section 4.1, which eq. 20 to 30 use."""
@@ -78,28 +80,150 @@ def known(value: _T | None) -> _T:
     return value
 
 
-def expansion(
-    belt_speed: float, damping: float = DAMPING, gains: Washout | None = None
-) -> Expansion:
-    """Return the derivatives of the right-hand side at the equilibrium."""
-    return known(expand(unit_drive(belt_speed, damping=damping), gains))
+@dataclass(frozen=True)
+class Loop:
+    """A drive, open or with a washout filter, and what its equations tell."""
 
+    drive: Drive
+    gains: Washout | None = None
 
-def trace(belt_speed: float, damping: float = DAMPING) -> float:
-    """Return p of eq. 8."""
-    return trace_of(unit_drive(belt_speed, damping=damping))
+    @cached_property
+    def expansion(self) -> Expansion:
+        """Derivatives of the right-hand side at the equilibrium."""
+        return known(expand(self.drive, self.gains))
 
+    @property
+    def stable(self) -> bool:
+        """Whether the equilibrium is stable."""
+        return bool(self.expansion.stable)
 
-def trace_of(drive: Drive) -> float:
-    """Return p of any drive; above zero the equilibrium is unstable."""
-    return float(np.trace(known(expand(drive)).jacobian))
+    @property
+    def eigenvalues(self) -> npt.NDArray[np.complex128]:
+        """Eigenvalues at the equilibrium, that of the pair with positive frequency first."""
+        return self.expansion.eigenvalues
+
+    @property
+    def equilibrium(self) -> float:
+        """Displacement at the equilibrium."""
+        return float(self.expansion.equilibrium[0])
+
+    @property
+    def trace(self) -> float:
+        """Trace of the Jacobian: without a filter p of eq. 8, unstable above zero."""
+        return float(np.trace(self.expansion.jacobian))
+
+    @cached_property
+    def hopf(self) -> HopfPoint:
+        """The last Hopf point over the belt speed."""
+        return hopf_points(self.drive, self.gains)[-1]
+
+    @cached_property
+    def onset(self) -> StickingOnset:
+        """The belt speed below which the slide sticks."""
+        return sticking_onset(self.drive)
+
+    @property
+    def exact_onset(self) -> float:
+        """The stick-slip onset speed of the motion itself."""
+        return known(self.onset.exact)
+
+    @property
+    def approximate_onset(self) -> float:
+        """The stick-slip onset speed by averaging."""
+        return known(self.onset.approximate)
+
+    @cached_property
+    def cycles(self) -> tuple[LimitCycle, ...]:
+        """All limit cycles of the open loop, stable or not."""
+        return tuple(limit_cycles(self.drive))
+
+    @property
+    def amplitudes(self) -> list[float]:
+        """Displacement amplitudes of the limit cycles."""
+        return [cycle.measures.amplitude or 0.0 for cycle in self.cycles]
+
+    @property
+    def speed_amplitude(self) -> float:
+        """Speed amplitude of the least limit cycle."""
+        return self.cycles[0].measures.velocity_amplitude or 0.0
+
+    @property
+    def stick_fraction(self) -> float:
+        """Stick fraction of the least limit cycle."""
+        return self.cycles[0].measures.stick_fraction or 0.0
+
+    @property
+    def multipliers(self) -> list[float]:
+        """Magnitude of the largest Floquet multiplier of each limit cycle."""
+        return [abs(cycle.multipliers[0]) for cycle in self.cycles]
+
+    @property
+    def only_rests(self) -> bool:
+        """Whether the equilibrium is stable and there is no limit cycle."""
+        return self.stable and not self.cycles
+
+    @property
+    def from_rest(self) -> LimitCycle | None:
+        """The limit cycle that the motion from rest at X = 0 leads to."""
+        return limit_cycle_of_run(self.drive, 0.0, control=self.gains)
+
+    @property
+    def final_amplitude(self) -> float:
+        """The amplitude of that cycle, zero if there is none."""
+        cycle = self.from_rest
+        return 0.0 if cycle is None else cycle.measures.amplitude or 0.0
+
+    @property
+    def bounded(self) -> bool:
+        """Whether the motion from rest at X = 0 does not diverge."""
+        motion = Motion(self.drive, 0.0, 0.0)
+        motion.advance(600.0)  # a diverging motion has diverged by then
+        return not motion.unbounded
+
+    @property
+    def arrivals(self) -> list[float]:
+        """Reactions k x + c v0 with which a slide reaches the belt's speed.
+
+        They start after the release and end with the first one that friction can hold.
+        """
+        drive = self.drive
+        motion = RecordedMotion(drive, release_position(drive), drive.belt_speed)
+        motion.take_breakpoints()
+        *_, breakpoints = follow(motion)
+        arrived = np.abs(breakpoints.velocity - drive.belt_speed) <= _ROUNDING * drive.belt_speed
+        arrived &= np.logical_or.accumulate(breakpoints.velocity < 0.0) & ~breakpoints.sticking
+        reactions = drive.stiffness * breakpoints.position[arrived]
+        reactions += drive.damping * drive.belt_speed
+        held = np.flatnonzero(np.abs(reactions) <= drive.normal_force * drive.friction.static)
+        return reactions[: int(held[0]) + 1 if len(held) > 0 else None].tolist()
+
+    def rates(self, states: FloatArray) -> FloatArray:
+        """Return the derivatives by time of dimensionless states (n, m) of a slipping slide.
+
+        n is 2, or 3 with a filter, for eq. 5 and eq. 19.
+        """
+        system = drive_system(self.drive, self.gains)
+        signs = np.sign(states[1] - system.drive.belt_speed)
+        modes = [parameter_values(system, Mode(SLIP, (sign,)), (0.0,)) for sign in signs.tolist()]
+        return flow_rates(system, SLIP).at(states, np.array(modes).T)[0]
 
 
 @cache
-def hopf_point(damping: float = DAMPING) -> HopfPoint:
-    """Return the Hopf point over the belt speed."""
-    (point,) = hopf_points(unit_drive(1.0, damping=damping))
-    return point
+def at(
+    belt_speed: float,
+    damping: float = DAMPING,
+    gains: Washout | None = None,
+    *,
+    stiffness: float = 1.0,
+    friction: FrictionLaw = STRIBECK,
+) -> Loop:
+    """Return the loop of the unit drive at a belt speed, by default open."""
+    drive = unit_drive(belt_speed, damping=damping, stiffness=stiffness, friction=friction)
+    return Loop(drive, gains)
+
+
+OPEN, TAKEN = at(1.0), at(1.0, TAKEN_DAMPING)
+"""The open loops with the damping of eq. 5 and with that of eq. 8, for results over belt speeds."""
 
 
 def printed_trace(belt_speeds: FloatArray) -> FloatArray:
@@ -109,7 +233,7 @@ def printed_trace(belt_speeds: FloatArray) -> FloatArray:
 
 def critical_beta(belt_speed: float) -> float:
     """Return the beta of eq. 5 above which the equilibrium is stable, p = 0."""
-    return trace(belt_speed, 0.0) / 2.0
+    return at(belt_speed, 0.0).trace / 2.0
 
 
 def for_both(compute: Callable[[float], _T]) -> tuple[_T, _T]:
@@ -136,93 +260,21 @@ def formula_for_both(
 
 def overdamped_from() -> float:
     """Return the belt speed above which the eigenvalues are real, p = -2."""
-    return zero_between(lambda speed: trace(speed) + 2.0, hopf_point().belt_speed, 2.0)
+    return zero_between(lambda speed: at(speed).trace + 2.0, OPEN.hopf.belt_speed, 2.0)
 
 
 @cache
-def onset(damping: float = DAMPING, stiffness: float = 1.0) -> StickingOnset:
-    """Return the belt speed below which the slide sticks."""
-    return sticking_onset(unit_drive(1.0, damping=damping, stiffness=stiffness))
-
-
-def exact_onset(damping: float = DAMPING, stiffness: float = 1.0) -> float:
-    """Return the stick-slip onset speed of the motion itself."""
-    return known(onset(damping, stiffness).exact)
-
-
-def approximate_onset(damping: float = DAMPING) -> float:
-    """Return the stick-slip onset speed by averaging."""
-    return known(onset(damping).approximate)
-
-
-@cache
-def cycles(
-    belt_speed: float, damping: float = DAMPING, stiffness: float = 1.0
-) -> tuple[LimitCycle, ...]:
-    """Return all limit cycles of the open loop, stable or not."""
-    return tuple(limit_cycles(unit_drive(belt_speed, damping=damping, stiffness=stiffness)))
-
-
-def only_rest_at(belt_speeds: Sequence[float]) -> bool:
-    """Return whether at each speed the equilibrium is stable and there is no limit cycle."""
-    return all(expansion(speed).stable and not cycles(speed) for speed in belt_speeds)
-
-
-@cache
-def critical(belt_speed: float, damping: float, corner_frequency: float = 2.0) -> CriticalGains:
+def critical(
+    belt_speed: float, damping: float = DAMPING, corner_frequency: float = 2.0
+) -> CriticalGains:
     """Return the critical gains of the loop without a cubic gain."""
     gains = replace(FILTER, corner_frequency=corner_frequency)
     return known(critical_gains(unit_drive(belt_speed, damping=damping), gains))
 
 
-def controlled_amplitude(belt_speed: float, gains: Washout, damping: float = DAMPING) -> float:
-    """Return the amplitude of the limit cycle that the motion from rest at X = 0 leads to."""
-    cycle = limit_cycle_of_run(unit_drive(belt_speed, damping=damping), 0.0, control=gains)
-    return 0.0 if cycle is None else cycle.measures.amplitude or 0.0
-
-
-def arrivals(drive: Drive) -> list[float]:
-    """Return the reactions k x + c v0 with which a slide reaches the belt's speed.
-
-    They start after the release and end with the first one that friction can hold.
-    """
-    motion = RecordedMotion(drive, release_position(drive), drive.belt_speed)
-    motion.take_breakpoints()
-    *_, breakpoints = follow(motion)
-    arrived = np.abs(breakpoints.velocity - drive.belt_speed) <= _ROUNDING * drive.belt_speed
-    arrived &= np.logical_or.accumulate(breakpoints.velocity < 0.0) & ~breakpoints.sticking
-    reactions = drive.stiffness * breakpoints.position[arrived] + drive.damping * drive.belt_speed
-    held = np.flatnonzero(np.abs(reactions) <= drive.normal_force * drive.friction.static)
-    return reactions[: int(held[0]) + 1 if len(held) > 0 else None].tolist()
-
-
-def stays(drive: Drive) -> bool:
-    """Return whether the motion from rest at X = 0 does not diverge."""
-    motion = Motion(drive, 0.0, 0.0)
-    motion.advance(600.0)  # a diverging motion has diverged by then
-    return not motion.unbounded
-
-
-def amplitudes(belt_speed: float, damping: float = DAMPING) -> list[float]:
-    """Return the displacement amplitudes of the limit cycles."""
-    found = [cycle.measures.amplitude for cycle in cycles(belt_speed, damping)]
-    return [amplitude for amplitude in found if amplitude is not None]
-
-
 def slip_friction(law: FrictionLaw, relative_speed: FloatArray) -> FloatArray:
     """Return the friction coefficients at relative speeds of either sign."""
     return law.coefficient(relative_speed, np.sign(relative_speed))
-
-
-def rates(drive: Drive, states: FloatArray, gains: Washout | None = None) -> FloatArray:
-    """Return the derivatives by time of dimensionless states (n, m) of a slipping slide.
-
-    n is 2, or 3 with `gains` (SI), for eq. 5 and eq. 19.
-    """
-    system = drive_system(drive, gains)
-    signs = np.sign(states[1] - system.drive.belt_speed)
-    modes = [parameter_values(system, Mode(SLIP, (sign,)), (0.0,)) for sign in signs.tolist()]
-    return flow_rates(system, SLIP).at(states, np.array(modes).T)[0]
 
 
 def time_dependent() -> bool:
@@ -246,24 +298,3 @@ def border(holds: Callable[[float], bool], low: float, high: float) -> float:
 def listed(values: Sequence[float]) -> str:
     """Return the values as a list in words."""
     return ", ".join(f"{value:.4g}" for value in values)
-
-
-def belt_speeds(portraits: Sequence[Portrait]) -> str:
-    """Return the belt speeds of the motions as a list in words."""
-    return listed([portrait.drive.belt_speed for portrait in portraits])
-
-
-def regimes(portraits: Sequence[Portrait]) -> list[Regime | None]:
-    """Return the final regime of each motion."""
-    return [portrait.measures.regime for portrait in portraits]
-
-
-def amplitude(portrait: Portrait) -> float:
-    """Return the final displacement amplitude of a motion, zero at rest."""
-    at_rest = portrait.measures.regime is Regime.EQUILIBRIUM
-    return 0.0 if at_rest else portrait.measures.amplitude or 0.0
-
-
-def stick_fractions(portraits: Sequence[Portrait]) -> list[float]:
-    """Return the stick fractions of the vibrating motions."""
-    return [each.measures.stick_fraction or 0.0 for each in portraits if each.vibrates]

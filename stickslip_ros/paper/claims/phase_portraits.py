@@ -1,6 +1,6 @@
 """Sections 3.2 to 3.5: the phase portraits, Fig. 6 to 11."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from itertools import groupby
 from math import sqrt
@@ -8,358 +8,286 @@ from math import sqrt
 import numpy as np
 
 from stickslip_ros.measures.cycle_measures import Regime
-from stickslip_ros.model.drive import Drive
 from stickslip_ros.model.friction import Coulomb, Linear, Stribeck
 from stickslip_ros.model.functions import zero_between
 from stickslip_ros.paper.claims.paper_values import (
     FASTER,
+    OPEN,
     PRINTED_HOPF_SPEED,
+    PRINTED_ONSET,
     SLOWER,
-    amplitude,
-    approximate_onset,
-    arrivals,
-    belt_speeds,
+    Loop,
+    at,
     border,
     critical_beta,
-    cycles,
-    exact_onset,
-    expansion,
     falling,
-    hopf_point,
-    only_rest_at,
     overdamped_from,
-    regimes,
-    stays,
-    stick_fractions,
-    trace,
-    trace_of,
 )
 from stickslip_ros.paper.claims.verdict import Computations, Evidence, Number, Observation
-from stickslip_ros.paper.figures import PRINTED_SLOPE, STRIBECK, TANGENT_SLOPE, Portrait, unit_drive
-from stickslip_ros.theory.hopf import hopf_points
-from stickslip_ros.theory.limit_cycles import limit_cycle_of_run, limit_cycles
+from stickslip_ros.paper.figures import PRINTED_SLOPE, STRIBECK, TANGENT_SLOPE, Portraits
 
 computes = Computations()
 
-_PRINTED_ONSET = 0.4372
-"""The printed v_b0."""
+_TANGENT, _PRINTED = (Linear(STRIBECK.static, slope) for slope in (TANGENT_SLOPE, PRINTED_SLOPE))
+"""The linear laws of Fig. 9."""
 
 
-def _stick_falls(portraits: Sequence[Portrait]) -> bool:
-    return falling([fraction for fraction in stick_fractions(portraits) if fraction > 0.0])
+def _stick_falls(portraits: Portraits) -> bool:
+    return falling([fraction for fraction in portraits.stick_fractions if fraction > 0.0])
 
 
-def _of_speed(evidence: Evidence, low: float, high: float) -> list[Portrait]:
-    """Return the motions of Fig. 6 whose belt speed is between `low` and `high`."""
-    return [p for p in evidence.portraits(6).portraits if low < p.drive.belt_speed < high]
+def _above_hopf(evidence: Evidence) -> Portraits:
+    """Return the motions of Fig. 6 with a stable equilibrium."""
+    return evidence.portraits(6).portraits.between(OPEN.hopf.belt_speed, 9.0)
 
 
 @computes("fig-6-rest")
 def _(evidence: Evidence) -> Observation:
-    above = _of_speed(evidence, hopf_point().belt_speed, 9.0)
+    above = _above_hopf(evidence)
     off = max(abs((p.least_relative_speed or 0.0) / p.drive.belt_speed - 1.0) for p in above)
-    return Observation(
-        set(regimes(above)) == {Regime.EQUILIBRIUM} and off < 1e-3 and only_rest_at(FASTER),
-        speeds=belt_speeds(above),
-        off=off,
-    )
+    rest = {*above.regimes} == {Regime.EQUILIBRIUM} and all(at(v).only_rests for v in FASTER)
+    return Observation(rest and off < 1e-3, above=above, off=off)
 
 
 @computes("fig-6-settling")
 def _(evidence: Evidence) -> Observation:
-    above = _of_speed(evidence, hopf_point().belt_speed, 9.0)
+    above = _above_hopf(evidence)
     times = [portrait.settling_time or 0.0 for portrait in above]
     overdamped = overdamped_from()
-    speeds = np.linspace(hopf_point().belt_speed, overdamped, 20).tolist()
+    speeds = np.linspace(OPEN.hopf.belt_speed, overdamped, 20).tolist()
     near, beyond = (
-        [float(expansion(v).eigenvalues[0].real) for v in tried]
+        [-float(at(v).eigenvalues[0].real) for v in tried]
         for tried in (speeds, (overdamped, 1.5, 2.0))
     )
-    rises = falling(times) and falling(near)
+    rises = falling(times) and falling(near[::-1])
     return Observation(
-        rises and falling(beyond),
+        rises and falling(beyond[::-1]),
         rises,
         times=times,
         overdamped=overdamped,
-        decay=-beyond[0],
-        faster_decay=-beyond[1],
-        fastest_decay=-beyond[2],
-        speeds=belt_speeds(above),
+        decay_rates=beyond,
+        above=above,
     )
 
 
 @computes("fig-6-unstable")
 def _(evidence: Evidence) -> Observation:
-    below = _of_speed(evidence, 0.0, hopf_point().belt_speed)
-    return Observation(
-        all(portrait.vibrates for portrait in below),
-        speeds=belt_speeds(below),
-        sizes=[amplitude(portrait) for portrait in below],
-    )
+    below = evidence.portraits(6).portraits.between(0.0, OPEN.hopf.belt_speed)
+    return Observation(all(portrait.vibrates for portrait in below), below=below)
 
 
 @computes("fig-6-pure-slip")
 def _(evidence: Evidence) -> Observation:
-    between = _of_speed(evidence, exact_onset(), hopf_point().belt_speed)
+    between = evidence.portraits(6).portraits.between(OPEN.exact_onset, OPEN.hopf.belt_speed)
     least = [portrait.least_relative_speed or 0.0 for portrait in between]
-    return Observation(
-        set(regimes(between)) == {Regime.PURE_SLIP} and min(least) > 0.0,
-        least=least,
-        speeds=belt_speeds(between),
-    )
+    slips = {*between.regimes} == {Regime.PURE_SLIP}
+    return Observation(slips and min(least) > 0.0, least=least, between=between)
 
 
 @computes("fig-6-no-cycle")
 def _(_: Evidence) -> Observation:
-    found = cycles(0.45)
-    return Observation(
-        not found,
-        count=len(found),
-        sizes=[cycle.measures.amplitude or 0.0 for cycle in found],
-        periods=[cycle.period for cycle in found],
-        multipliers=[abs(cycle.multipliers[0]) for cycle in found],
-    )
+    found = at(0.45).cycles
+    periods = [cycle.period for cycle in found]
+    return Observation(not found, count=len(found), loop=at(0.45), periods=periods)
 
 
 @computes("fig-6-stick-slip")
 def _(evidence: Evidence) -> Observation:
-    below = _of_speed(evidence, 0.0, exact_onset())
-    fractions = stick_fractions(below)
-    slower = [cycles(speed)[0].measures.stick_fraction or 0.0 for speed in SLOWER]
-    return Observation(
-        set(regimes(below)) == {Regime.STICK_SLIP}
-        and max(portrait.least_relative_speed or 0.0 for portrait in below) == 0.0
-        and min(slower) > 0.0,
-        fractions=fractions,
-        speeds=belt_speeds(below),
-        slower=slower,
-    )
+    below = evidence.portraits(6).portraits.between(0.0, OPEN.exact_onset)
+    slower = [at(speed).stick_fraction for speed in SLOWER]
+    touch = max(portrait.least_relative_speed or 0.0 for portrait in below) == 0.0
+    sticks = {*below.regimes} == {Regime.STICK_SLIP}
+    return Observation(sticks and touch and min(slower) > 0.0, below=below, slower=slower)
 
 
 computes["vb0"] = lambda _: Number(
-    exact_onset(), {"By averaging, an approximation": approximate_onset()}
+    OPEN.exact_onset, {"By averaging, an approximation": OPEN.approximate_onset}
 )
 
 
 @computes("vb0-and-vb1")
 def _(_: Evidence) -> Observation:
-    def damping(speed: float, belt_speed: Callable[[float], float]) -> float:
-        return zero_between(lambda damping: belt_speed(damping) - speed, 0.0, 0.1)
+    def damping(printed: float, belt_speed: Callable[[Loop], float]) -> float:
+        """Return the damping with which the loop has the printed speed."""
+        return zero_between(lambda damping: belt_speed(at(1.0, damping)) - printed, 0.0, 0.1)
 
-    of_hopf = damping(PRINTED_HOPF_SPEED, lambda d: hopf_point(d).belt_speed)
-    of_onset = damping(_PRINTED_ONSET, approximate_onset)
-    of_exact = damping(_PRINTED_ONSET, exact_onset)
+    of_hopf = damping(PRINTED_HOPF_SPEED, lambda loop: loop.hopf.belt_speed)
+    of_onset = damping(PRINTED_ONSET, lambda loop: loop.approximate_onset)
+    of_exact = damping(PRINTED_ONSET, lambda loop: loop.exact_onset)
     rounding = 2e-4  # of the printed speeds, times the slopes of the damping over them
     apart = min(abs(of_hopf - of_onset), abs(of_hopf - of_exact))
-    return Observation(
-        apart < rounding,
-        of_hopf=of_hopf,
-        of_onset=of_onset,
-        printed_onset=_PRINTED_ONSET,
-        of_exact=of_exact,
-    )
+    return Observation(apart < rounding, of_hopf=of_hopf, of_onset=of_onset, of_exact=of_exact)
 
 
 @computes("grazing")
 def _(_: Evidence) -> Observation:
-    speed = exact_onset()
-    fractions = [
-        cycles(speed * factor)[0].measures.stick_fraction or 0.0
-        for factor in (1.0 - 1e-4, 1.0 + 1e-4)
-    ]
-    return Observation(fractions[0] > 0.0 == fractions[1], speed=speed, fractions=fractions)
+    factors = (1.0 - 1e-4, 1.0 + 1e-4)
+    fractions = [at(OPEN.exact_onset * factor).stick_fraction for factor in factors]
+    return Observation(fractions[0] > 0.0 == fractions[1], fractions=fractions)
 
 
 @computes("damping-cures")
 def _(evidence: Evidence) -> Observation:
     most = evidence.portraits(7).portraits[-1]
     critical = critical_beta(most.drive.belt_speed)
-    return Observation(
-        most.measures.regime is Regime.EQUILIBRIUM
-        and critical < most.drive.damping_coefficient / 2.0,
-        critical=critical,
-        most=most,
-    )
+    rests = most.measures.regime is Regime.EQUILIBRIUM
+    enough = critical < most.drive.damping_coefficient / 2.0
+    return Observation(rests and enough, critical=critical, most=most)
 
 
 @computes("critical-speed-of-damping")
 def _(_: Evidence) -> Observation:
     betas = (0.0, 0.01, 0.05, 0.1)
-    true = [hopf_point(2.0 * beta).belt_speed for beta in betas]
+    true = [at(1.0, 2.0 * beta).hopf.belt_speed for beta in betas]
     once, twice = ([sqrt((0.45 - n * beta) / 1.8) for beta in betas] for n in (1.0, 2.0))
-    return Observation(
-        bool(np.allclose(once, true, rtol=1e-9)),
-        bool(np.allclose(twice, true, rtol=1e-9)),
-        true=true,
-        once=once,
-        betas=betas,
-    )
+    same = [bool(np.allclose(printed, true, rtol=1e-9)) for printed in (once, twice)]
+    return Observation(*same, true=true, once=once, betas=betas)
 
 
 @computes("fig-7-stick", 7)
 @computes("fig-10-stick", 10)
 def _(evidence: Evidence, figure: int) -> Observation:
     portraits = evidence.portraits(7).portraits if figure == 7 else _of_stiffnesses(evidence)
-    return Observation(
-        _stick_falls(portraits),
-        fractions=stick_fractions(portraits),
-        belt_speed=portraits[0].drive.belt_speed,
-        stiffnesses=[portrait.drive.stiffness for portrait in portraits],
-    )
+    stiffnesses = [portrait.drive.stiffness for portrait in portraits]
+    return Observation(_stick_falls(portraits), portraits=portraits, stiffnesses=stiffnesses)
 
 
 @computes("fig-7-order", 7)
 @computes("fig-11-order", 11)
 def _(evidence: Evidence, figure: int) -> Observation:
     portraits = evidence.portraits(figure).portraits
-    stages = [stage for stage, _ in groupby(regimes(portraits))]
+    stages = [stage for stage, _ in groupby(portraits.regimes)]
     labels = [f"{p.case.label}: {p.measures.regime}" for p in portraits]
     expected = [Regime.STICK_SLIP, Regime.PURE_SLIP, Regime.EQUILIBRIUM]
     return Observation(stages == expected, outcome="; ".join(labels))
 
 
-computes["linear-slope"] = lambda _: Number(
-    trace(1e-9, 0.0), share=trace(1e-9, 0.0) / PRINTED_SLOPE
-)
+@computes("linear-slope")
+def _(_: Evidence) -> Number:
+    slope = at(1e-9, 0.0).trace
+    return Number(slope, share=slope / PRINTED_SLOPE)
 
 
 @computes("fig-8")
 def _(evidence: Evidence) -> Observation:
     portraits = evidence.portraits(8).portraits
-    damped = [portrait for portrait in portraits if portrait.drive.damping > 0.0]
+    damped = Portraits(portrait for portrait in portraits if portrait.drive.damping > 0.0)
     undamped = [portrait for portrait in portraits if portrait.drive.damping == 0.0]
-    ranges = [(p.measures.amplitude or 0.0) / p.drive.belt_speed for p in undamped]
     betas, speeds = (0.001, 1.0), (0.02, 0.2, 2.0)
     law = Coulomb(STRIBECK.static)
-    drives = [unit_drive(v, damping=2.0 * beta, friction=law) for beta in betas for v in speeds]
-    found = [cycle for drive in drives for cycle in limit_cycles(drive)]
+    loops = [at(v, 2.0 * beta, friction=law) for beta in betas for v in speeds]
+    count = sum(len(loop.cycles) for loop in loops)
     return Observation(
-        set(regimes(damped)) == {Regime.EQUILIBRIUM} and not found,
-        resting=regimes(damped).count(Regime.EQUILIBRIUM),
+        {*damped.regimes} == {Regime.EQUILIBRIUM} and not count,
+        resting=damped.regimes.count(Regime.EQUILIBRIUM),
         total=len(damped),
-        ranges=ranges,
+        ranges=[portrait.amplitude / portrait.drive.belt_speed for portrait in undamped],
         speeds=speeds,
         betas=betas,
-        count=len(found),
+        count=count,
     )
 
 
 @computes("fig-9-vibration")
 def _(evidence: Evidence) -> Observation:
     # the tangent slope, and the printed one at two belt speeds
-    tangent, printed, slow = evidence.portraits(9).panels
-    least = [panel.portraits[0] for panel in (tangent, printed, slow)]
-    vibrates = [portrait.vibrates for portrait in least]
-    laws = [Linear(STRIBECK.static, slope) for slope in (PRINTED_SLOPE, TANGENT_SLOPE)]
+    tangent, printed, slow = (panel.portraits[0] for panel in evidence.portraits(9).panels)
     fastest = [
-        border(lambda v, law=law: stays(unit_drive(v, friction=law)), 0.01, 2.0) for law in laws
+        border(lambda v, law=law: at(v, friction=law).bounded, 0.01, 2.0)
+        for law in (_PRINTED, _TANGENT)
     ]
-    passes = least[1].time_beyond(10.0)
+    bounded = tangent.vibrates and slow.vibrates
     return Observation(
-        all(vibrates),
-        vibrates[0] and vibrates[2],
-        least=least,
+        bounded and printed.vibrates,
+        bounded,
+        least=printed,
         fastest=fastest,
-        passes=passes or 0.0,
+        passes=printed.time_beyond(10.0) or 0.0,
     )
 
 
 @computes("fig-9-stick")
 def _(evidence: Evidence) -> Observation:
-    panels = evidence.portraits(9).panels
-    tangent, printed, slow = (stick_fractions(panel.portraits) for panel in panels)
-    belt_speed = panels[1].portraits[0].drive.belt_speed
+    tangent, printed, slow = (panel.portraits for panel in evidence.portraits(9).panels)
 
-    def drive(beta: float) -> Drive:
-        law = Linear(STRIBECK.static, PRINTED_SLOPE)
-        return unit_drive(belt_speed, damping=2.0 * beta, friction=law)
+    def loop(beta: float) -> Loop:
+        return at(printed[0].drive.belt_speed, 2.0 * beta, friction=_PRINTED)
 
-    gentle = zero_between(lambda beta: arrivals(drive(beta))[0] + STRIBECK.static, 0.1, 0.3)
-    bounded = border(lambda beta: not stays(drive(beta)), 0.0, gentle)
+    gentle = zero_between(lambda beta: loop(beta).arrivals[0] + STRIBECK.static, 0.1, 0.3)
     betas = np.linspace(0.1, gentle, 4).tolist()
-    runs = [limit_cycle_of_run(drive(beta), 0.0) for beta in betas]
-    overrunning = [run.measures.stick_fraction or 0.0 for run in runs if run is not None]
+    runs = [loop(beta).from_rest for beta in betas]
+    falls = _stick_falls(tangent) and _stick_falls(slow)
     return Observation(
-        all(_stick_falls(panel.portraits) for panel in panels),
-        all(_stick_falls(panel.portraits) for panel in (panels[0], panels[2])),
-        printed=printed,
+        falls and _stick_falls(printed),
+        falls,
         tangent=tangent,
-        panels=panels,
+        printed=printed,
         slow=slow,
-        belt_speed=belt_speed,
         gentle=gentle,
-        overrunning=overrunning,
+        overrunning=[run.measures.stick_fraction or 0.0 for run in runs if run is not None],
         betas=betas,
-        bounded=bounded,
+        bounded=border(lambda beta: not loop(beta).bounded, 0.0, gentle),
     )
 
 
 @computes("falling-slope")
 def _(evidence: Evidence) -> Observation:
-    laws = (Coulomb(STRIBECK.static), Linear(STRIBECK.static, TANGENT_SLOPE))
-    traces = [trace_of(unit_drive(0.2, friction=law)) for law in laws]
+    traces = [at(0.2, friction=law).trace for law in (Coulomb(STRIBECK.static), _TANGENT)]
     flat = [p.vibrates for p in evidence.portraits(8).portraits if p.drive.damping > 0.0]
-    falls = evidence.portraits(9).panels[0].portraits[0].vibrates
-    return Observation(
-        traces[0] < 0.0 < traces[1] and falls and not any(flat),
-        traces=traces,
-    )
+    falls = evidence.portraits(9).portraits[0].vibrates
+    return Observation(traces[0] < 0.0 < traces[1] and falls and not any(flat), traces=traces)
 
 
 @computes("stiffness-stability")
 def _(_: Evidence) -> Observation:
     stiffnesses = (0.5, 1.0, 2.0, 10.0, 50.0)
-    speeds = [hopf_points(unit_drive(0.2, stiffness=k))[0].belt_speed for k in stiffnesses]
+    speeds = [at(0.2, stiffness=stiffness).hopf.belt_speed for stiffness in stiffnesses]
     return Observation(falling(speeds), speeds=speeds, stiffnesses=stiffnesses)
 
 
-def _of_stiffnesses(evidence: Evidence) -> list[Portrait]:
+def _of_stiffnesses(evidence: Evidence) -> Portraits:
     """Return the motions of Fig. 10 at v0 = 0.2."""
     usual, stiff, _ = evidence.portraits(10).panels
-    return [*usual.portraits, *stiff.portraits]
+    return Portraits([*usual.portraits, *stiff.portraits])
 
 
 @computes("fig-10-end")
 def _(_: Evidence) -> Observation:
     def beyond_friction(stiffness: float, arrival: int) -> float:
         """Return the excess over friction of a slide that reaches the belt's speed."""
-        return abs(arrivals(unit_drive(0.2, stiffness=stiffness))[arrival]) - STRIBECK.static
+        return abs(at(0.2, stiffness=stiffness).arrivals[arrival]) - STRIBECK.static
 
-    overruns = zero_between(lambda stiffness: beyond_friction(stiffness, 0), 1.0, 100.0)
     never = zero_between(lambda stiffness: beyond_friction(stiffness, 1), 100.0, 10_000.0)
-    stiffer = [never * factor for factor in (1.01, 10.0, 100.0)]
-    found = [cycle for stiffness in stiffer for cycle in cycles(0.2, stiffness=stiffness)]
-    less = [cycles(0.2, stiffness=never / factor)[0] for factor in (1.01, 10.0, 100.0)]
+    factors = (1.01, 10.0, 100.0)
+    stiffer = [never * factor for factor in factors]
+    found = [cycle for stiffness in stiffer for cycle in at(0.2, stiffness=stiffness).cycles]
+    less = [at(0.2, stiffness=never / factor).cycles[0] for factor in factors]
     return Observation(
         [cycle.measures.regime for cycle in found] == [Regime.PURE_SLIP] * len(stiffer)
         and all(cycle.stable for cycle in found)
         and all(cycle.measures.regime is Regime.STICK_SLIP for cycle in less),
         never=never,
-        overruns=overruns,
+        overruns=zero_between(lambda stiffness: beyond_friction(stiffness, 0), 1.0, 100.0),
         stiffer=stiffer,
-        onset=exact_onset(),
-        stiff_onset=exact_onset(stiffness=2.0),
-        stiffest_onset=exact_onset(stiffness=50.0),
+        stiff=at(1.0, stiffness=2.0),
+        stiffest=at(1.0, stiffness=50.0),
     )
 
 
 @computes("fig-10-size")
 def _(evidence: Evidence) -> Observation:
     portraits = _of_stiffnesses(evidence)
-    sizes = [amplitude(portrait) for portrait in portraits]
     speeds = [portrait.measures.velocity_amplitude or 0.0 for portrait in portraits]
-    return Observation(falling(sizes) and falling(speeds), sizes=sizes, speeds=speeds)
+    falls = falling(portraits.amplitudes) and falling(speeds)
+    return Observation(falls, portraits=portraits, speeds=speeds)
 
 
 @computes("fig-11-amplitude")
 def _(evidence: Evidence) -> Observation:
-    sizes = [amplitude(portrait) for portrait in evidence.portraits(11).portraits]
-    at_rest = sizes.count(0.0)
-    return Observation(
-        falling(sizes[: len(sizes) - at_rest]) and not any(sizes[len(sizes) - at_rest :]),
-        sizes=sizes,
-        gaps=_gaps(evidence),
-    )
+    sizes = evidence.portraits(11).portraits.amplitudes
+    first_rest = len(sizes) - sizes.count(0.0)
+    falls = falling(sizes[:first_rest]) and not any(sizes[first_rest:])
+    return Observation(falls, sizes=sizes, gaps=_gaps(evidence))
 
 
 @computes("fig-11-stick")
@@ -367,20 +295,20 @@ def _(evidence: Evidence) -> Observation:
     portraits = evidence.portraits(11).portraits
     belt_speed, minima = 0.15, (0.1, 0.02, 0.001)
 
-    def drive(minimum: float) -> Drive:
-        return unit_drive(belt_speed, friction=replace(STRIBECK, minimum=minimum))
+    def loop(minimum: float) -> Loop:
+        return at(belt_speed, friction=replace(STRIBECK, minimum=minimum))
 
-    fractions = [limit_cycles(drive(m))[0].measures.stick_fraction or 0.0 for m in minima]
-    overruns = zero_between(lambda m: arrivals(drive(m))[0] + STRIBECK.static, 0.001, 0.1)
+    fractions = [loop(minimum).stick_fraction for minimum in minima]
+    falls = _stick_falls(portraits)
     return Observation(
-        _stick_falls(portraits) and falling(fractions[::-1]),
-        _stick_falls(portraits),
-        found=stick_fractions(portraits),
+        falls and falling(fractions[::-1]),
+        falls,
+        portraits=portraits,
         gaps=_gaps(evidence),
         fractions=fractions,
         minima=minima,
         belt_speed=belt_speed,
-        overruns=overruns,
+        overruns=zero_between(lambda m: loop(m).arrivals[0] + STRIBECK.static, 0.001, 0.1),
     )
 
 

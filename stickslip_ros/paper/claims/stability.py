@@ -11,60 +11,60 @@ from stickslip_ros.paper.claims.paper_values import (
     BELT_SPEEDS,
     DAMPING,
     FASTER,
+    OPEN,
     PRINTED_HOPF_SPEED,
     SLOWER,
     STATES,
     STUDIED_SPEED,
+    TAKEN,
     TAKEN_DAMPING,
     TAKEN_FOR_DAMPING,
-    cycles,
-    expansion,
+    at,
     formula_for_both,
-    hopf_point,
     number_for_both,
     overdamped_from,
     printed_trace,
-    rates,
-    trace,
 )
 from stickslip_ros.paper.claims.verdict import Computations, Evidence, Formula, Number, Observation
-from stickslip_ros.paper.figures import STRIBECK, unit_drive
+from stickslip_ros.paper.figures import STRIBECK
 
 computes = Computations()
+
+_LOOPS = [at(speed) for speed in BELT_SPEEDS.tolist()]
+"""The open loops at which formulas are evaluated."""
+
+_PRINTED_POSITIONS = 0.4 - 0.45 * BELT_SPEEDS + 0.6 * BELT_SPEEDS**3
+"""Displacements at the equilibrium as printed, eq. 6."""
 
 
 def _third_order() -> float:
     """Return the coefficient of X2^3 in X2'."""
-    return float(expansion(1.0).cubic[1, 1, 1, 1]) / 6.0
+    return float(at(1.0).expansion.cubic[1, 1, 1, 1]) / 6.0
 
 
 def _growth(damping: float = DAMPING) -> tuple[float, float]:
     """Return the coefficients c and e of the trace p = c - e v0^2, fitted to the Jacobian's."""
-    traces = [trace(speed, damping) for speed in BELT_SPEEDS]
+    traces = [at(speed, damping).trace for speed in BELT_SPEEDS]
     slope, constant = np.polyfit(BELT_SPEEDS**2, traces, 1)
     return float(constant), float(-slope)
 
 
 def _jacobians(damping: float) -> FloatArray:
-    return np.array([expansion(speed, damping).jacobian for speed in BELT_SPEEDS])
+    return np.array([at(speed, damping).expansion.jacobian for speed in BELT_SPEEDS])
 
 
 computes["linear-coefficient"] = lambda _: Number(_growth(0.0)[0])
 computes["cubic-coefficient"] = lambda _: Number(-_third_order())
-computes["eq-6-speed"] = lambda _: Formula(
-    0.0, [expansion(speed).equilibrium[1] for speed in BELT_SPEEDS]
-)
+computes["eq-6-speed"] = lambda _: Formula(0.0, [loop.expansion.equilibrium[1] for loop in _LOOPS])
 
 
 @computes("eq-6-position")
 def _(_: Evidence) -> Formula:
-    positions = np.array([expansion(speed).equilibrium[0] for speed in BELT_SPEEDS])
-    accelerations = [
-        abs(float(rates(unit_drive(speed), np.array([[x], [0.0]]))[1, 0]))
-        for speed, x in zip(BELT_SPEEDS.tolist(), positions, strict=True)
-    ]
+    rates = [loop.rates(np.array([[loop.equilibrium], [0.0]])) for loop in _LOOPS]
     return Formula(
-        0.4 - 0.45 * BELT_SPEEDS + 0.6 * BELT_SPEEDS**3, positions, acceleration=max(accelerations)
+        _PRINTED_POSITIONS,
+        [loop.equilibrium for loop in _LOOPS],
+        acceleration=float(np.abs(rates)[:, 1].max()),
     )
 
 
@@ -77,30 +77,26 @@ def _(_: Evidence) -> Formula:
     def printed(last: float) -> FloatArray:
         return -0.45 * speed + 0.6 * (speed**3 + 3.0 * speed * belt_speed**2 - last * speed**2)
 
-    return Formula(
-        printed(3.0),
-        at_rest - friction,
-        {"With the factor v0 in the last term": printed(3.0 * belt_speed)},
-    )
+    corrections = {"With the factor v0 in the last term": printed(3.0 * belt_speed)}
+    return Formula(printed(3.0), at_rest - friction, corrections)
 
 
 computes["eq-6-first"] = lambda _: Formula(
-    0.0, np.concatenate([expansion(0.4).quadratic[0].ravel(), expansion(0.4).cubic[0].ravel()])
+    0.0, [*at(0.4).expansion.quadratic[0].ravel(), *at(0.4).expansion.cubic[0].ravel()]
 )
 
 
 @computes("first-approximation")
 def _(_: Evidence) -> Observation:
-    drive = unit_drive(0.45)
-    motion = RecordedMotion(drive, expansion(0.45).equilibrium[0] - 1e-6, 0.0)
-    motion.advance(20.0 * drive.natural_period)
+    loop = at(0.45)
+    motion = RecordedMotion(loop.drive, loop.equilibrium - 1e-6, 0.0)
+    motion.advance(20.0 * loop.drive.natural_period)
     breakpoints = motion.take_breakpoints()
     turns = np.flatnonzero((breakpoints.velocity[:-1] == 0.0) & (breakpoints.velocity[1:] > 0.0))
-    distance = expansion(0.45).equilibrium[0] - breakpoints.position[turns]
-    growth = log(distance[-1] / distance[0]) / float(
-        breakpoints.time[turns[-1]] - breakpoints.time[turns[0]]
-    )
-    expected = float(expansion(0.45).eigenvalues[0].real)
+    first, last = turns[[0, -1]]
+    distance, time = loop.equilibrium - breakpoints.position, breakpoints.time
+    growth = log(distance[last] / distance[first]) / float(time[last] - time[first])
+    expected = loop.eigenvalues[0].real
     return Observation(
         abs(growth / expected - 1.0) < 1e-3, growth=growth, expected=expected, cycles=len(turns) - 1
     )
@@ -111,27 +107,22 @@ def _(_: Evidence) -> Formula:
     jacobians = _jacobians(DAMPING)
     structure = jacobians.copy()
     structure[:, 0] = [0.0, 1.0]
-    return Formula(
-        np.zeros_like(jacobians),
-        jacobians,
-        {"Without the = 0, with first row (0, 1) as printed,": structure},
-    )
+    corrections = {"Without the = 0, with first row (0, 1) as printed,": structure}
+    return Formula(np.zeros_like(jacobians), jacobians, corrections)
 
 
 @computes("eq-7-place")
 def _(_: Evidence) -> Formula:
-    drive, step = unit_drive(0.4), 1e-4
+    loop, step = at(0.4), 1e-4
 
     def jacobian(position: float) -> FloatArray:
         ahead, behind = (
-            rates(drive, np.array([[position, 0.0], [0.0, 0.0]]) + change * np.eye(2))
+            loop.rates(np.array([[position, 0.0], [0.0, 0.0]]) + change * np.eye(2))
             for change in (step, -step)
         )
-        return (ahead - behind) / (2.0 * step)
+        return np.round((ahead - behind) / (2.0 * step), 6)
 
-    return Formula(
-        np.round(jacobian(0.0), 6), np.round(jacobian(float(expansion(0.4).equilibrium[0])), 6)
-    )
+    return Formula(jacobian(0.0), jacobian(loop.equilibrium))
 
 
 computes["eq-8-constant"] = lambda _: number_for_both(lambda damping: _growth(damping)[0])
@@ -140,61 +131,51 @@ computes["eq-8-square"] = lambda _: Number(_growth()[1])
 
 @computes("eq-8-matrix")
 def _(_: Evidence) -> Formula:
-    p, eigenvalue = trace(0.4), 0.3
+    p, eigenvalue = at(0.4).trace, 0.3
     return Formula(
         [[eigenvalue, 1.0], [-1.0, eigenvalue - p]],
-        eigenvalue * np.eye(2) - expansion(0.4).jacobian,
+        eigenvalue * np.eye(2) - at(0.4).expansion.jacobian,
         {"With the signs of 1 and -1 exchanged": [[eigenvalue, -1.0], [1.0, eigenvalue - p]]},
     )
 
 
 computes["eq-8-polynomial"] = lambda _: Formula(
-    [[1.0, -trace(speed), 1.0] for speed in BELT_SPEEDS],
-    [np.poly(expansion(speed).jacobian) for speed in BELT_SPEEDS],
+    [[1.0, -loop.trace, 1.0] for loop in _LOOPS],
+    [np.poly(loop.expansion.jacobian) for loop in _LOOPS],
 )
 
 
 @computes("hurwitz")
 def _(_: Evidence) -> Observation:
-    speed = hopf_point().belt_speed
-    below, above = (bool(expansion(speed * factor).stable) for factor in (0.999, 1.001))
-    p = trace(speed)
-    return Observation(abs(p) < 1e-12 and above and not below, p=abs(p), speed=speed)
+    speed = OPEN.hopf.belt_speed
+    p = abs(at(speed).trace)
+    return Observation(p < 1e-12 and at(speed * 1.001).stable and not at(speed * 0.999).stable, p=p)
 
 
-computes["vb1"] = lambda _: number_for_both(
-    lambda damping: hopf_point(damping).belt_speed, hopf=hopf_point()
-)
+computes["vb1"] = lambda _: number_for_both(lambda damping: at(1.0, damping).hopf.belt_speed)
 
 
 @computes("vb1-supercritical")
 def _(_: Evidence) -> Observation:
-    sigma = hopf_point().first_lyapunov_coefficient
-    just_below = cycles(hopf_point().belt_speed - 2e-3)
-    return Observation(
-        sigma < 0.0
-        and [cycle.stable for cycle in just_below] == [True]
-        and not cycles(hopf_point().belt_speed + 2e-3),
-        sigma=sigma,
-        count=len(just_below),
-        multiplier=abs(just_below[0].multipliers[0]),
-    )
+    below, above = (at(OPEN.hopf.belt_speed + off) for off in (-2e-3, 2e-3))
+    ends = [cycle.stable for cycle in below.cycles] == [True] and not above.cycles
+    return Observation(OPEN.hopf.supercritical and ends, below=below, count=len(below.cycles))
 
 
 computes["eq-9-matrix"] = lambda _: formula_for_both(
     np.array([[[0.0, 1.0], [-1.0, p]] for p in printed_trace(BELT_SPEEDS)]), _jacobians
 )
-computes["eq-9-square"] = lambda _: Number(float(expansion(1.0).quadratic[1, 1, 1]) / 2.0)
+computes["eq-9-square"] = lambda _: Number(float(at(1.0).expansion.quadratic[1, 1, 1]) / 2.0)
 computes["eq-9-cube"] = lambda _: Number(_third_order())
 
 
 @computes("eq-9-jordan")
 def _(_: Evidence) -> Observation:
     def defect(belt_speed: float) -> float:
-        matrix = expansion(belt_speed).jacobian
+        matrix = at(belt_speed).expansion.jacobian
         return float(abs(matrix[0, 0] - matrix[1, 1]) + abs(matrix[0, 1] + matrix[1, 0]))
 
-    at_hopf, elsewhere = defect(hopf_point().belt_speed), defect(0.4)
+    at_hopf, elsewhere = defect(OPEN.hopf.belt_speed), defect(0.4)
     return Observation(
         max(at_hopf, elsewhere) < 1e-9, at_hopf < 1e-9, elsewhere=elsewhere, at_hopf=at_hopf
     )
@@ -202,146 +183,115 @@ def _(_: Evidence) -> Observation:
 
 @computes("eq-9-equilibrium")
 def _(_: Evidence) -> Formula:
-    position = 0.4 - 0.45 * BELT_SPEEDS + 0.6 * BELT_SPEEDS**3
-    printed = np.array([np.zeros_like(position), position])
-    return Formula(
-        printed,
-        np.array([expansion(speed).equilibrium for speed in BELT_SPEEDS]).T,
-        {"With the two exchanged": printed[::-1]},
-    )
+    printed = np.array([np.zeros_like(_PRINTED_POSITIONS), _PRINTED_POSITIONS])
+    true = np.array([loop.expansion.equilibrium for loop in _LOOPS]).T
+    return Formula(printed, true, {"With the two exchanged": printed[::-1]})
 
 
 computes["eq-10-real"] = lambda _: formula_for_both(
     printed_trace(BELT_SPEEDS) / 2.0,
-    lambda damping: [expansion(v, damping).eigenvalues.real.mean() for v in BELT_SPEEDS],
+    lambda damping: [at(v, damping).eigenvalues.real.mean() for v in BELT_SPEEDS],
     overdamped=overdamped_from(),
 )
 
 
 @computes("eq-10-imaginary")
 def _(_: Evidence) -> Formula:
-    speeds = [*BELT_SPEEDS.tolist(), *FASTER]
-    radicands = np.array([trace(speed) ** 2 - 4.0 for speed in speeds])
-    halves = np.array([np.ptp(expansion(speed).eigenvalues.real) for speed in speeds]) / 2.0
-    frequencies = np.array([np.ptp(expansion(speed).eigenvalues.imag) for speed in speeds]) / 2.0
+    loops = [*_LOOPS, *map(at, FASTER)]
+    radicands = np.array([loop.trace**2 - 4.0 for loop in loops])
+    values = np.array([loop.eigenvalues for loop in loops])
+    roots = np.emath.sqrt(radicands) / 2.0
     return Formula(
-        None if np.any(radicands < 0.0) else np.sqrt(radicands) / 2.0,
-        halves + 1j * frequencies,
-        {
-            "With alpha +- i beta and beta = sqrt(4 - p^2) / 2 where p^2 < 4": np.emath.sqrt(
-                radicands
-            )
-            / 2.0
-        },
+        None if np.any(radicands < 0.0) else roots,
+        (np.ptp(values.real, axis=1) + 1j * np.ptp(values.imag, axis=1)) / 2.0,
+        {"With alpha +- i beta and beta = sqrt(4 - p^2) / 2 where p^2 < 4": roots},
         overdamped=overdamped_from(),
         least=radicands.min(),
-        fastest=max(speeds),
+        fastest=max(loop.drive.belt_speed for loop in loops),
     )
 
 
 @computes("eq-11-value")
 def _(_: Evidence) -> Number:
     step, speed = 1e-5, PRINTED_HOPF_SPEED
-    change = trace(speed + step, TAKEN_DAMPING) - trace(speed - step, TAKEN_DAMPING)
-    doubled = change / (2.0 * step)
-    return Number(
-        hopf_point().crossing_speed,
-        {
-            TAKEN_FOR_DAMPING: hopf_point(TAKEN_DAMPING).crossing_speed,
-            "With p' in place of p'/2, at v0 = 0.4944": doubled,
-        },
-        taken=hopf_point(TAKEN_DAMPING),
-    )
+    ahead, behind = (at(speed + off, TAKEN_DAMPING).trace for off in (step, -step))
+    corrections = {
+        TAKEN_FOR_DAMPING: TAKEN.hopf.crossing_speed,
+        "With p' in place of p'/2, at v0 = 0.4944": (ahead - behind) / (2.0 * step),
+    }
+    return Number(OPEN.hopf.crossing_speed, corrections)
 
 
-computes["eq-11-sign"] = lambda _: Observation(hopf_point().crossing_speed < 0.0, hopf=hopf_point())
+computes["eq-11-sign"] = lambda _: Observation(OPEN.hopf.crossing_speed < 0.0)
 
 
 @computes("stable-below")
 def _(_: Evidence) -> Observation:
-    speeds = (*SLOWER, 0.2, 0.4, 0.45, 0.48)
-    found = [cycles(speed) for speed in speeds]
+    loops = [at(speed) for speed in (*SLOWER, 0.2, 0.4, 0.45, 0.48)]
     below = all(
-        len(here) == 1 and here[0].stable and not expansion(speed).stable
-        for speed, here in zip(speeds, found, strict=True)
+        len(loop.cycles) == 1 and loop.cycles[0].stable and not loop.stable for loop in loops
     )
+    outcome = f"one stable cycle at each of {len(loops)} belt speeds" if below else "other cycles"
     return Observation(
-        below and not expansion(STUDIED_SPEED).stable,
+        below and not at(STUDIED_SPEED).stable,
         below,
-        outcome=f"one stable cycle at each of {len(speeds)} belt speeds"
-        if below
-        else "other cycles",
-        cycles=len(cycles(STUDIED_SPEED)),
-        multiplier=max(abs(here[0].multipliers[0]) for here in found),
+        outcome=outcome,
+        cycles=len(at(STUDIED_SPEED).cycles),
+        multiplier=max(loop.multipliers[0] for loop in loops),
     )
 
 
 @computes("low-conditions", 0.45, 1.0)
 @computes("high-conditions", 0.495, -1.0)
 def _(_: Evidence, belt_speed: float, sign: float) -> Observation:
-    matrix = expansion(belt_speed).jacobian
-    p, q = float(np.trace(matrix)), float(np.linalg.det(matrix))
+    p, q = at(belt_speed).trace, float(np.linalg.det(at(belt_speed).expansion.jacobian))
     discriminant = p**2 - 4.0 * q
     return Observation(p * sign > 0.0 and discriminant < 0.0, p=p, discriminant=discriminant, q=q)
 
 
 @computes("low-focus")
 def _(_: Evidence) -> Observation:
-    upper = expansion(0.45).eigenvalues[0]
+    upper = at(0.45).eigenvalues[0]
     return Observation(upper.real > 0.0 and upper.imag > 0.0, upper=upper)
 
 
 @computes("low-cycle")
 def _(evidence: Evidence) -> Observation:
-    (portrait,) = [p for p in evidence.portraits(6).portraits if p.drive.belt_speed == 0.45]
-    (cycle,) = cycles(0.45)
-    run, shot = portrait.measures.amplitude or 0.0, cycle.measures.amplitude or 0.0
-    return Observation(
-        cycle.stable and abs(run - shot) < 1e-6,
-        run=run,
-        shot=shot,
-        multiplier=abs(cycle.multipliers[0]),
-    )
+    (portrait,) = evidence.portraits(6).portraits.between(0.44, 0.46)
+    (cycle,), (shot,) = at(0.45).cycles, at(0.45).amplitudes
+    same = abs(portrait.amplitude - shot) < 1e-6
+    return Observation(cycle.stable and same, run=portrait.amplitude, loop=at(0.45))
 
 
 @computes("two-kinds")
 def _(evidence: Evidence) -> Observation:
-    measures = evidence.bifurcation(2).measures
-    speeds = evidence.bifurcation(2).values
-    kinds = {
-        regime: [float(v) for v, m in zip(speeds, measures, strict=True) if m.regime is regime]
-        for regime in (Regime.STICK_SLIP, Regime.PURE_SLIP)
-    }
-    others = {m.regime for m in measures} - {*kinds, Regime.EQUILIBRIUM, Regime.STUCK}
-    return Observation(
-        all(kinds.values()) and not others,
-        outcome=", ".join(
-            f"{regime} at {len(found)} belt speeds" for regime, found in kinds.items()
-        ),
-        fastest=max(kinds[Regime.STICK_SLIP], default=0.0),
-    )
+    figure = evidence.bifurcation(2)
+    regimes = figure.columns.regime
+    kinds = (Regime.STICK_SLIP, Regime.PURE_SLIP)
+    counts = [int(np.sum(regimes == kind)) for kind in kinds]
+    others = {*regimes} - {*kinds, Regime.EQUILIBRIUM, Regime.STUCK}
+    outcome = ", ".join(f"{kind} at {n} belt speeds" for kind, n in zip(kinds, counts, strict=True))
+    fastest = figure.values[regimes == Regime.STICK_SLIP].max(initial=0.0)
+    return Observation(all(counts) and not others, outcome=outcome, fastest=fastest)
 
 
 @computes("high-focus")
 def _(_: Evidence) -> Observation:
-    upper = expansion(0.495).eigenvalues[0]
-    taken = expansion(0.495, TAKEN_DAMPING).eigenvalues[0]
+    upper, taken = (at(0.495, damping).eigenvalues[0] for damping in (DAMPING, TAKEN_DAMPING))
+    settling, settling_taken = (log(100.0) / -each.real for each in (upper, taken))
     return Observation(
-        upper.real < 0.0 < upper.imag,
-        upper=upper,
-        settling=log(100.0) / -upper.real,
-        settling_taken=log(100.0) / -taken.real,
+        upper.real < 0.0 < upper.imag, upper=upper, settling=settling, settling_taken=settling_taken
     )
 
 
 @computes("high-rest")
 def _(evidence: Evidence) -> Observation:
-    (portrait,) = [p for p in evidence.portraits(6).portraits if p.drive.belt_speed == 0.495]
-    midpoint, amplitude = portrait.measures.midpoint or 0.0, portrait.measures.amplitude or 0.0
+    (portrait,) = evidence.portraits(6).portraits.between(0.49, 0.5)
+    midpoint, swing = portrait.measures.midpoint or 0.0, portrait.measures.amplitude or 0.0
     equilibrium = portrait.drive.equilibrium_position
     return Observation(
-        amplitude < 1e-4 and abs(midpoint) < 1e-4,
-        amplitude < 1e-4 and abs(midpoint - equilibrium) < 1e-4,
+        swing < 1e-4 and abs(midpoint) < 1e-4,
+        swing < 1e-4 and abs(midpoint - equilibrium) < 1e-4,
         midpoint=midpoint,
         equilibrium=equilibrium,
     )

@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.model.control import Washout
 from stickslip_ros.model.functions import zero_between
 from stickslip_ros.paper.claims.paper_values import (
     BELT_SPEEDS,
@@ -18,115 +17,98 @@ from stickslip_ros.paper.claims.paper_values import (
     STUDIED_SPEED,
     TAKEN_DAMPING,
     TAKEN_FOR_DAMPING,
+    at,
     critical,
-    expansion,
     falling,
     for_both,
     formula_for_both,
     known,
     number_for_both,
     printed_trace,
-    rates,
-    trace,
 )
 from stickslip_ros.paper.claims.verdict import Computations, Evidence, Formula, Number, Observation
-from stickslip_ros.paper.figures import unit_drive
-from stickslip_ros.theory.hopf import crossing_speed, hopf_points
+from stickslip_ros.theory.hopf import crossing_speed
 from stickslip_ros.theory.linear import hurwitz_determinants
 
 computes = Computations()
 
-_SOME_GAINS = replace(FILTER, linear_gain=-0.3, cubic_gain=-2.0)
+_GAINS = replace(FILTER, linear_gain=-0.3, cubic_gain=-2.0)
+
+_WITHOUT, _WITH_FILTER = at(STUDIED_SPEED), at(STUDIED_SPEED, gains=_GAINS)
+"""The loop of section 4.1, open and with some gains."""
+
+_AT_PRINTED_GAIN = replace(FILTER, linear_gain=PRINTED_GAIN)
+
+_FAR = STATES * np.where(np.arange(STATES.shape[1]) % 2, 10.0, 1.0)
+_X, _Y, _W = _FAR[0], STUDIED_SPEED - np.abs(_FAR[1]), _FAR[2]
+"""Deviations from the equilibrium, up to ten, with the slide slower than the belt.
+
+Half of them are of the order of one.
+"""
+
+_V = _Y - FILTER.corner_frequency * _W
+"""The filter output v = y - d w there, eq. 19."""
+
+_CONTROL = _GAINS.linear_gain * _V + _GAINS.cubic_gain * _V**3
+"""The control u = k1 v + k2 v^3 there, eq. 18."""
+
+
+def _friction(last: float) -> FloatArray:
+    """Return F of eq. 6 and 16 there, with a factor in the last term."""
+    return -0.45 * _Y + 0.6 * (_Y**3 + 3.0 * _Y * STUDIED_SPEED**2 - last * _Y**2)
+
+
+def _open_rates() -> FloatArray:
+    return _WITHOUT.rates(np.array([_X + _WITHOUT.equilibrium, _Y]))
+
+
+def _closed_rates() -> FloatArray:
+    return _WITH_FILTER.rates(np.array([_X + _WITHOUT.equilibrium, _Y, _W]))
 
 
 @computes("eq-16-linear")
 def _(_: Evidence) -> Observation:
-    found = expansion(STUDIED_SPEED)
+    found = _WITHOUT.expansion
     square, cube = found.quadratic[1, 1, 1] / 2.0, found.cubic[1, 1, 1, 1] / 6.0
     return Observation(max(abs(square), abs(cube)) < 1e-9, square=square, cube=cube)
 
 
-def _slow_states() -> FloatArray:
-    """Return deviations from the equilibrium, up to ten, with the slide slower than the belt.
-
-    Half of them are of the order of one.
-    """
-    states = STATES * np.where(np.arange(STATES.shape[1]) % 2, 10.0, 1.0)
-    states[1] = STUDIED_SPEED - np.abs(states[1])
-    return states
-
-
-def _friction(speed: FloatArray, last: float) -> FloatArray:
-    """Return F of eq. 6 and 16 at the belt speed of section 4.1, with a factor in the last term."""
-    cubes = speed**3 + 3.0 * speed * STUDIED_SPEED**2 - last * speed**2
-    return -0.45 * speed + 0.6 * cubes
-
-
-def _loop_rates(gains: Washout | None) -> FloatArray:
-    states = _slow_states()
-    states[0] += expansion(STUDIED_SPEED).equilibrium[0]
-    return rates(unit_drive(STUDIED_SPEED), states if gains else states[:2], gains)
-
-
 @computes("eq-16")
 def _(_: Evidence) -> Formula:
-    x, y, _w = _slow_states()
     printed, corrected = (
-        -_friction(y, last) - DAMPING * y - x for last in (3.0, 3.0 * STUDIED_SPEED)
+        -_friction(last) - DAMPING * _Y - _X for last in (3.0, 3.0 * STUDIED_SPEED)
     )
-    return Formula(
-        printed, _loop_rates(None)[1], {"With the factor v0 in the last term of F": corrected}
-    )
+    corrections = {"With the factor v0 in the last term of F": corrected}
+    return Formula(printed, _open_rates()[1], corrections)
 
 
-@computes("eq-17")
-def _(_: Evidence) -> Formula:
-    _x, y, w = _slow_states()
-    moved = expansion(STUDIED_SPEED, gains=_SOME_GAINS).equilibrium[0]
-    moved -= expansion(STUDIED_SPEED).equilibrium[0]
-    return Formula(
-        y - _SOME_GAINS.corner_frequency * w, _loop_rates(_SOME_GAINS)[2], moved=abs(moved)
-    )
-
-
-@computes("eq-18")
-def _(_: Evidence) -> Formula:
-    _x, y, w = _slow_states()
-    v = y - _SOME_GAINS.corner_frequency * w
-    return Formula(
-        None,
-        _loop_rates(_SOME_GAINS)[1] - _loop_rates(None)[1],
-        {
-            "With v, which is not defined, read as y - d w as in eq. 19": _SOME_GAINS.linear_gain
-            * v
-            + _SOME_GAINS.cubic_gain * v**3
-        },
-    )
+computes["eq-17"] = lambda _: Formula(
+    _V, _closed_rates()[2], moved=abs(_WITH_FILTER.equilibrium - _WITHOUT.equilibrium)
+)
+computes["eq-18"] = lambda _: Formula(
+    None,
+    _closed_rates()[1] - _open_rates()[1],
+    {"With v, which is not defined, read as y - d w as in eq. 19": _CONTROL},
+)
 
 
 @computes("eq-18-linear")
 def _(_: Evidence) -> Observation:
-    gains = (0.0, -0.1, -0.3)
+    gains = (0.0, -0.1, _GAINS.linear_gain)
 
     def speeds(cubic: float) -> list[float]:
         loops = [replace(FILTER, linear_gain=linear, cubic_gain=cubic) for linear in gains]
-        return [hopf_points(unit_drive(0.4), loop)[-1].belt_speed for loop in loops]
+        return [at(0.4, gains=loop).hopf.belt_speed for loop in loops]
 
-    without, with_cubic = speeds(0.0), speeds(-5.0)
-    return Observation(
-        falling(without) and bool(np.allclose(without, with_cubic, rtol=1e-12)),
-        without=without,
-        gains=gains,
-    )
+    without = speeds(0.0)
+    same = bool(np.allclose(without, speeds(-5.0), rtol=1e-12))
+    return Observation(falling(without) and same, without=without, gains=gains)
 
 
 @computes("eq-19")
 def _(_: Evidence) -> Formula:
-    x, y, w = _slow_states()
-    v = y - _SOME_GAINS.corner_frequency * w
-    force = _SOME_GAINS.linear_gain * v + _SOME_GAINS.cubic_gain * v**3
-    friction = _friction(y, 3.0 * STUDIED_SPEED)
-    return Formula([y, -friction - DAMPING * y - x + force, v], _loop_rates(_SOME_GAINS))
+    acceleration = -_friction(3.0 * STUDIED_SPEED) - DAMPING * _Y - _X + _CONTROL
+    return Formula([_Y, acceleration, _V], _closed_rates())
 
 
 def _printed_jacobian(p: float, linear: float) -> FloatArray:
@@ -134,10 +116,11 @@ def _printed_jacobian(p: float, linear: float) -> FloatArray:
 
 
 computes["eq-20"] = lambda _: Formula(
-    _printed_jacobian(trace(STUDIED_SPEED), _SOME_GAINS.linear_gain),
-    expansion(STUDIED_SPEED, gains=_SOME_GAINS).jacobian,
+    _printed_jacobian(_WITHOUT.trace, _GAINS.linear_gain), _WITH_FILTER.expansion.jacobian
 )
-computes["eq-20-trace"] = lambda _: number_for_both(lambda damping: trace(STUDIED_SPEED, damping))
+computes["eq-20-trace"] = lambda _: number_for_both(
+    lambda damping: at(STUDIED_SPEED, damping).trace
+)
 
 
 _EQ_21: dict[int, Callable[[FloatArray, float], FloatArray]] = {
@@ -155,16 +138,16 @@ def _(_: Evidence, order: int) -> Formula:
     """Compare a coefficient of eq. 21, over belt speeds, with that of the loop's Jacobian."""
 
     def coefficients(damping: float) -> list[float]:
-        expansions = (expansion(speed, damping, _SOME_GAINS) for speed in BELT_SPEEDS.tolist())
-        return [np.poly(found.jacobian)[order] for found in expansions]
+        loops = (at(speed, damping, _GAINS) for speed in BELT_SPEEDS.tolist())
+        return [np.poly(loop.expansion.jacobian)[order] for loop in loops]
 
-    p = trace(STUDIED_SPEED, TAKEN_DAMPING)
+    p = at(STUDIED_SPEED, TAKEN_DAMPING).trace
     # c1 c2 - c3 = 0 with c1 = 2 - p - k1, c2 = 2 k1 - p - 1, c3 = 2, a square in k1
     discriminant = (5.0 - p) ** 2 - 8.0 * (2.0 + (2.0 - p) * (p + 1.0))
     return formula_for_both(
-        _EQ_21[order](printed_trace(BELT_SPEEDS), _SOME_GAINS.linear_gain),
+        _EQ_21[order](printed_trace(BELT_SPEEDS), _GAINS.linear_gain),
         coefficients,
-        c2=np.poly(_printed_jacobian(p, _SOME_GAINS.linear_gain))[2],
+        c2=np.poly(_printed_jacobian(p, _GAINS.linear_gain))[2],
         root="no" if discriminant < 0.0 else "a",
         discriminant=discriminant,
     )
@@ -173,15 +156,11 @@ def _(_: Evidence, order: int) -> Formula:
 @computes("eq-21-condition")
 def _(_: Evidence) -> Observation:
     gain = critical(STUDIED_SPEED, TAKEN_DAMPING).linear
-    c1, c2, c3 = np.poly(_printed_jacobian(trace(STUDIED_SPEED, TAKEN_DAMPING), gain))[1:]
-    found = expansion(STUDIED_SPEED, TAKEN_DAMPING, replace(FILTER, linear_gain=gain)).eigenvalues
-    return Observation(
-        abs(c1 * c2 - c3) < 1e-9 and abs(found[0].real) < 1e-9,
-        defect=abs(c1 * c2 - c3),
-        gain=gain,
-        real=abs(found[0].real),
-        found=found,
-    )
+    p = at(STUDIED_SPEED, TAKEN_DAMPING).trace
+    c1, c2, c3 = np.poly(_printed_jacobian(p, gain))[1:]
+    pair = at(STUDIED_SPEED, TAKEN_DAMPING, replace(FILTER, linear_gain=gain)).eigenvalues[0]
+    defect, real = abs(c1 * c2 - c3), abs(pair.real)
+    return Observation(max(defect, real) < 1e-9, defect=defect, gain=gain, real=real, pair=pair)
 
 
 @computes("eq-21-gain")
@@ -191,31 +170,29 @@ def _(_: Evidence) -> Number:
         lambda k1: float(hurwitz_determinants(_printed_jacobian(p, k1))[-1]), -0.5, 0.5
     )
     exact = critical(STUDIED_SPEED, TAKEN_DAMPING).linear
-    return Number(
-        critical(STUDIED_SPEED, DAMPING).linear,
-        {
-            TAKEN_FOR_DAMPING: exact,
-            f"{TAKEN_FOR_DAMPING}, and p rounded to {p:g}": rounded,
-        },
-        exact=exact,
-    )
+    corrections = {
+        TAKEN_FOR_DAMPING: exact,
+        f"{TAKEN_FOR_DAMPING}, and p rounded to {p:g}": rounded,
+    }
+    return Number(critical(STUDIED_SPEED).linear, corrections, exact=exact)
 
 
 @computes("eq-22-roots")
 def _(_: Evidence) -> Observation:
-    gains = replace(FILTER, linear_gain=PRINTED_GAIN)
-    pair, _conjugate, real = expansion(STUDIED_SPEED, TAKEN_DAMPING, gains).eigenvalues
+    pair, _conjugate, real = at(STUDIED_SPEED, TAKEN_DAMPING, _AT_PRINTED_GAIN).eigenvalues
     return Observation(pair.imag > 0.0 and real.imag == 0.0, pair=pair, real=real)
 
 
 @computes("eq-22-alpha")
 def _(_: Evidence) -> Formula:
-    gains = replace(FILTER, linear_gain=PRINTED_GAIN)
-    found = [expansion(speed, TAKEN_DAMPING, gains).eigenvalues for speed in BELT_SPEEDS.tolist()]
+    loops = [at(speed, TAKEN_DAMPING, _AT_PRINTED_GAIN) for speed in BELT_SPEEDS.tolist()]
     printed = -(1.5995 + 1.8 * BELT_SPEEDS**2)
-    off = np.abs(printed - [values.sum().real for values in found]).max()
-    at_studied = expansion(STUDIED_SPEED, TAKEN_DAMPING, gains).eigenvalues[0].real
-    return Formula(printed, [values[0].real for values in found], off=off, at_studied=at_studied)
+    return Formula(
+        printed,
+        [loop.eigenvalues[0].real for loop in loops],
+        off=np.abs(printed - [loop.trace for loop in loops]).max(),
+        loop=at(STUDIED_SPEED, TAKEN_DAMPING, _AT_PRINTED_GAIN),
+    )
 
 
 computes["eq-22-value"] = lambda _: number_for_both(_crossing)
@@ -223,13 +200,11 @@ computes["eq-22-value"] = lambda _: number_for_both(_crossing)
 
 def _crossing(damping: float) -> float:
     gains = replace(FILTER, linear_gain=critical(STUDIED_SPEED, damping).linear)
-    return known(crossing_speed(expansion(STUDIED_SPEED, damping, gains)))
+    return known(crossing_speed(at(STUDIED_SPEED, damping, gains).expansion))
 
 
-@computes("eq-11-product", PRINTED_HOPF_SPEED)
-@computes("eq-22-product", STUDIED_SPEED)
-def _(_: Evidence, speed: float) -> Number:
-    return Number(-3.6 * speed)
+computes["eq-11-product"] = lambda _: Number(-3.6 * PRINTED_HOPF_SPEED)
+computes["eq-22-product"] = lambda _: Number(-3.6 * STUDIED_SPEED)
 
 
 @computes("eq-22-sign")
