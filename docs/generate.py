@@ -8,6 +8,8 @@ import ast
 import inspect
 import json
 import re
+from argparse import Action
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import pairwise
 from math import isinf
@@ -43,16 +45,36 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 
 def parameters() -> Iterator[str]:
-    """Yield a table for what every node has, and one for each node."""
+    """Yield a table for what every node has, what controllers share, and what each node has."""
     common = NodeParameters()
-    models = {"every node": common, **NODE_PARAMETERS, "replay": ReplayParameters()}
-    for node, model in models.items():
-        own = [p for p in model.known.values() if model is common or p.name not in common.known]
-        yield f"## {node}\n"
-        yield table(
-            ["parameter", "unit", "default", "allowed", "can be changed", "meaning"],
-            [_parameter_row(parameter) for parameter in own],
-        )
+    models = {**NODE_PARAMETERS, "replay": ReplayParameters()}
+    rows = {
+        node: [_parameter_row(p) for p in _listed(model) if p.name not in common.known]
+        for node, model in models.items()
+    }
+    laws = [own for node, own in rows.items() if node.endswith("_controller")]
+    every = [row for row in laws[0] if all(row in own for own in laws)]
+    tracked = {row[0]: row for own in laws for row in own if row[0].startswith("`reference.")}
+    shared = [*every, *tracked.values()]
+    tables = {
+        "every node": [_parameter_row(p) for p in _listed(common)],
+        "every controller": every,
+        "every controller that tracks a reference": [*tracked.values()],
+        **{node: [row for row in own if row not in shared] for node, own in rows.items()},
+    }
+    for title, own in tables.items():
+        yield f"## {title}\n"
+        yield table(["parameter", "unit", "default", "allowed", "can be changed", "meaning"], own)
+        if title == "plant":
+            names = ", ".join(f"`{name}`" for name in models[title].known if ".reverse." in name)
+            yield f"Of the other direction, by default as forward: {names}.\n"
+
+
+def _listed(model: NodeParameters) -> Iterator[Parameter]:
+    """Yield the parameters with a row of their own: neither those as forward nor the law."""
+    for parameter in model.known.values():
+        if ".reverse." not in parameter.name and parameter.name != "law":
+            yield parameter
 
 
 def _parameter_row(parameter: Parameter) -> list[str]:
@@ -75,42 +97,76 @@ def _parameter_row(parameter: Parameter) -> list[str]:
 
 
 def commands() -> Iterator[str]:
-    """Yield every command by group, with its arguments and options."""
+    """Yield what several commands share, and every command by group."""
     from stickslip_ros.app.commands import COMMANDS, EXAMPLES
 
+    rows = {name: _arguments(name) for name in COMMANDS}
+    count = Counter(tuple(row) for own in rows.values() for row in own)
+    # Of an option with several meanings, the most frequent one is shared.
+    often = {_first(row): [*row] for row, uses in reversed(count.most_common()) if uses >= SHARED}
+    shared = sorted(often.values())
+    yield "## Arguments of several commands\n"
+    yield table(["argument", "meaning"], shared)
     groups = dict.fromkeys(group for group, _ in COMMANDS.values())
     for group in groups:
         yield f"## {group}\n"
         for name, (own_group, line) in COMMANDS.items():
             if own_group == group:
-                yield from _command(name, line, EXAMPLES.get(name, f"stickslip {name}"))
+                yield from _command(name, line, rows[name], shared)
+                yield f"Example: `{EXAMPLES.get(name, f'stickslip {name}')}`\n"
 
 
-def _command(name: str, line: str, example: str) -> Iterator[str]:
+SHARED = 3
+"""Number of commands from which on an argument is described once for all of them."""
+
+
+def _arguments(command: str) -> list[list[str]]:
+    """Return a row for each argument and option of a command."""
+    from stickslip_ros.app.commands import command_parser
+
+    parser = command_parser(command)
+    formatter = parser._get_formatter()
+    rows: list[list[str]] = []
+    for action in parser._actions:
+        if action.dest not in ("help", "quiet"):
+            values = f" {_value(action)}" if action.nargs != 0 else ""
+            names = [f"`{option}{values}`" for option in action.option_strings]
+            meaning = formatter._expand_help(action).replace("|", "\\|")
+            rows.append([", ".join(names or [f"`{_value(action)}`"]), meaning])
+    return rows
+
+
+def _first(row: Sequence[str]) -> str:
+    """Return the name of an argument, without its value."""
+    return row[0].strip("`").split()[0].strip("`,")
+
+
+def _value(action: Action) -> str:
+    return str(action.metavar or f"{{{','.join(action.choices or ())}}}")
+
+
+def _command(name: str, line: str, rows: list[list[str]], shared: list[list[str]]) -> Iterator[str]:
     from stickslip_ros.app.commands import command_parser
 
     parser = command_parser(name)
-    formatter = parser._get_formatter()
     positional: list[str] = []
-    rows: list[list[str]] = []
     for action in parser._actions:
-        value = str(action.metavar or f"{{{','.join(action.choices or ())}}}")
+        value = _value(action)
         if not action.option_strings:
             positional.append(f"{value} [{value} ...]" if action.nargs == "+" else value)
-        values = "" if action.nargs == 0 else f" {value}"
-        names = [f"`{option}{values}`" for option in action.option_strings] or [f"`{value}`"]
-        if action.required and action.option_strings:
-            positional.append(f"{action.option_strings[0]}{values}")
-        if action.dest not in ("help", "quiet"):
-            rows.append([", ".join(names), formatter._expand_help(action).replace("|", "\\|")])
+        elif action.required:
+            positional.append(f"{action.option_strings[0]} {value}")
     yield f"### {name}\n"
     usage = ["stickslip", name, *positional, *(["[OPTION ...]"] if rows else [])]
     yield f"`{' '.join(usage)}`\n"
     description = " ".join((parser.description or line).split())
     yield f"{description[0].upper()}{description[1:].rstrip('.')}.\n"
-    if rows:
-        yield table(["argument", "meaning"], rows)
-    yield f"Example: `{example}`\n"
+    own = [row for row in rows if row not in shared]
+    if own:
+        yield table(["argument", "meaning"], own)
+    names = [f"`{_first(row)}`" for row in rows if row in shared]
+    if names:
+        yield f"Also: {', '.join(names)}.\n"
 
 
 def topics() -> Iterator[str]:
