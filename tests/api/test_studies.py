@@ -74,6 +74,7 @@ def test_a_sweep_over_whole_numbers() -> None:
     assert found.to_xarray()["friction_elements"].to_numpy().tolist() == [1, 2, 3, 4]
     assert found.transitions == {}
     assert "4 points" in repr(found)
+    assert isinstance(found.plot(), Figure)
 
 
 @pytest.mark.parametrize("carry", [None, "both"])

@@ -23,6 +23,9 @@ COLUMNS = "time=t,position=x,force=u"
 LOG = f"log.csv --columns {COLUMNS}"
 LOOSE = "feed_drive -p plant.stiffness=0"
 SPEEDS = "paper --no-control --over plant.belt_speed=0.2:0.6:5"
+PAIRS = "log.csv --columns velocity=x,force=u"
+WASHOUT = "feed_drive --controllers washout"
+FAST = "a belt speed of 30 m/s is refused: more than 10 times 0.1 m/s ... add --yes"
 LAW = "feed_drive -p plant.friction.law="
 
 REFUSED: Mapping[str, Mapping[str, str]] = {
@@ -38,6 +41,10 @@ REFUSED: Mapping[str, Mapping[str, str]] = {
         "paper --duration 1e9 --plot run.jpg": "--plot run.jpg: must end in one of .png",
         "paper --size 6x4": "--size 6x4: needs --plot FILE, which is not given",
         "paper --out run.txt": "--out run.txt: must end in .csv",
+        "paper --html page.txt": "must end in",
+        "paper --html no/page.html": "there is no directory",
+        "feed_drive -p plant.belt_speed=-30": FAST,
+        "feed_drive -p plant.belt.kind=sine -p plant.belt.amplitude=29.96": FAST,
         "paper --duration 1e9 --out there.csv": f"--out there.csv: {PLACE}",
         "paper --out none/run.csv": "--out none/run.csv: there is no directory none",
         "feed_drive --out run.csv --every 0.0015": (
@@ -63,6 +70,7 @@ REFUSED: Mapping[str, Mapping[str, str]] = {
         "paper --namespace 'a b'": "--namespace 'a b'",
         f"paper --namespace {230 * 'n'}": "has 231 characters, and must have at most 200",
         "paper --bag .": "exists already",
+        "feed_drive -p plant.belt_speed=30": FAST,
         "paper --controller stickslip/x": "no package stickslip ... mean stickslip_ros?",
         "paper --controller nosuch/x": "no package nosuch in ... AMENT_PREFIX_PATH",
         "paper --controller stickslip_ros/damper": "no executable damper ... plant_node, ",
@@ -115,6 +123,8 @@ REFUSED: Mapping[str, Mapping[str, str]] = {
     "sweep": {
         "two.yaml --over plant.belt_speed=0.2:0.3:2": TWO,
         "paper --over belt_speed=1:2:3": "belt_speed: must be a parameter of plant or washout",
+        "feed_drive --over plant.belt_speed=2:30:20": FAST,
+        "feed_drive --over plant.damping=0:30:20 --over plant.belt_speed=-30:2:20": FAST,
         f"{SPEEDS} --colour amplitude": "is for maps, of two parameters",
         f"{SPEEDS} --out table.txt": "--out table.txt: must end in one of .csv, .json",
         f"{SPEEDS} --out there.csv": f"--out there.csv: {PLACE}",
@@ -128,12 +138,14 @@ REFUSED: Mapping[str, Mapping[str, str]] = {
     "basin": {
         "axis": "without a spring no range of starts follows from the drive",
         "two.yaml --sample 2 --position=0:1 --velocity=0:1": TWO,
+        "feed_drive -p plant.belt_speed=30": FAST,
         "paper --seed 1": "--seed 1: is for a random --sample",
         "paper --plot basin.txt": "--plot basin.txt: must end in one of",
     },
     "stability": {
         "axis": FREE,
         "two.yaml": TWO,
+        "feed_drive -p plant.belt_speed=30": FAST,
         "paper --plot map.txt": "--plot map.txt ... .png",
         "paper --plot map.png -p plant.belt_speed=0.0": "map.png ... the belt rests",
         "paper --plot map.png --no-control -p plant.friction.reverse.static=0.5": (
@@ -143,17 +155,29 @@ REFUSED: Mapping[str, Mapping[str, str]] = {
     },
     "design": {
         f"{LOOSE} --belt-speed 0.02:0.04": FREE,
+        "feed_drive --belt-speed 2:30": FAST,
         "feed_drive --belt-speed slow": "--belt-speed = 'slow' ... a number in m/s",
         "feed_drive --belt-speed 1:2:3": "--belt-speed '1:2:3' ... LOW:HIGH",
         "feed_drive --no-control": "plant.expects_control",
         "feed_drive --out there.csv": PLACE,
         "feed_drive --out /proc/gains.yaml": "--out /proc/gains.yaml: cannot be written",
     },
+    "compare": {
+        "feed_drive --controllers washuot": "did you mean washout?",
+        f"{WASHOUT} --disturbances bump": "disturbance bump: must be none",
+        f"{WASHOUT} --over plant.mas=1:2:3": "did you mean plant.mass",
+        f"{WASHOUT} --out cases.txt": "must end in one of .csv, .json",
+    },
     "identify": {
         "none.csv": "the file cannot be read",
         "log.csv": "say what they are",
         f"heading.csv --columns {COLUMNS}": "the file cannot be read: it has no rows",
         f"text.csv --columns {COLUMNS}": "text.csv: no row has a time and a position, x",
+        PAIRS: "pairs of velocity and force are read by identify --map",
+        "log.csv --map": "no column is given for velocity and force",
+        f"{PAIRS} --map --fix plant.mass=3": "--fix: a map has friction only",
+        f"{PAIRS} --map --check log.csv": "--check: a map has friction only",
+        f"{PAIRS} --map --out x.yaml": "--out: a map has friction only",
         f"{LOG} --fix mass=3": "did you mean plant.mass? must be",
         f"{LOG} --from 99": "from 99 s on: it lasts 0.999 s",
         f"{LOG} --out a.txt": "must end in .yaml",
@@ -222,19 +246,15 @@ def contents(directory: Path) -> dict[Path, bytes]:
     return {path: path.read_bytes() if path.is_file() else b"" for path in directory.rglob("*")}
 
 
-def test_a_name_with_its_ending_finds_what_ships(stickslip: Run) -> None:
-    done = stickslip("simulate", "feed_drive.yaml", "--duration", "0.1", "--json")
-    assert '"name": "feed_drive"' in done.stdout
-
-
-def test_an_existing_bag_is_left_as_it_is(stickslip: Run, tmp_path: Path) -> None:
-    bag = tmp_path / "bag"
-    bag.mkdir()
-    (bag / "precious").write_text("data")
-    done = stickslip("run", "paper", "--bag", "bag", "--duration", "1")
-    assert done.returncode == 2
-    assert "exists already" in done.stderr
-    assert [file.name for file in tmp_path.rglob("*")] == ["bag", "precious"]
+def test_a_fast_belt_that_is_meant_is_taken(stickslip: Run) -> None:
+    for scenario in (
+        "feed_drive -p plant.belt_speed=1",
+        "feed_drive -p plant.belt_speed=30 --yes",
+        "feed_drive -p plant.belt_speed=30 -p plant.friction.minimum_speed=3",
+        "paper -p plant.belt_speed=10",
+    ):
+        done = stickslip("simulate", *scenario.split(), "--no-control", "--duration", "0.1")
+        assert done.returncode == 0, done.stderr
 
 
 @pytest.mark.parametrize("command", ["run paper", "replay bag"])

@@ -31,16 +31,3 @@ def test_json_has_the_ranks_with_their_constants_and_the_cases(stickslip: Run) -
     assert {rank["law"] for rank in found["ranks"]} == {"washout", "velocity_feedback"}
     assert found["ranks"][0]["constants"]["force_limit"] is None
     assert len(found["cases"]["held"]) == 4
-
-
-def test_mistakes_are_one_sentence(stickslip: Run) -> None:
-    for options, message in (
-        (("--controllers", "washuot"), "did you mean washout?"),
-        (("--controllers", "washout", "--disturbances", "bump"), "disturbance bump: must be none"),
-        (("--controllers", "washout", "--over", "plant.mas=1:2:3"), "did you mean plant.mass"),
-        (("--controllers", "washout", "--out", "cases.txt"), "must end in one of .csv, .json"),
-    ):
-        done = stickslip("compare", "feed_drive", *options)
-        assert done.returncode == 2
-        assert message in done.stderr
-        assert "Traceback" not in done.stderr

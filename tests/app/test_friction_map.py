@@ -35,16 +35,3 @@ def test_a_map_gives_friction_alone(table: Path, stickslip: Run, tmp_path: Path)
     truth = {"static": 30.0, "kinetic": 20.0, "viscous": 60.0, "decay_speed": 0.01}
     named = {f"plant.friction.{name}": value for name, value in truth.items()}
     assert constants == pytest.approx(named, rel=1e-4)
-
-
-def test_what_a_map_has_not_is_refused(table: Path, stickslip: Run) -> None:
-    pairs = ("identify", str(table), "--columns", COLUMNS)
-    done = stickslip(*pairs)
-    assert done.returncode == 2
-    assert "pairs of velocity and force are read by identify --map" in done.stderr
-    for option in (("--fix", "plant.mass=3"), ("--check", str(table)), ("--out", "x.yaml")):
-        done = stickslip(*pairs, "--map", *option)
-        assert done.returncode == 2
-        assert f"{option[0]}: a map has friction only" in done.stderr
-    done = stickslip("identify", str(table), "--map")
-    assert "no column is given for velocity and force" in done.stderr

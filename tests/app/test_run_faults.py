@@ -78,14 +78,26 @@ def test_a_bag_is_closed_when_another_node_dies(
     assert is_complete(tmp_path / "bag")
 
 
-@pytest.mark.skipif(signal.getsignal(signal.SIGHUP) is signal.SIG_IGN, reason="as under nohup")
-@pytest.mark.parametrize("flags", [("--composed",), pytest.param((), marks=pytest.mark.long)])
-def test_a_terminal_that_is_closed_closes_the_bag(
-    start_stickslip: Start, tmp_path: Path, flags: tuple[str, ...]
+IN_PROCESSES, COMPOSED = (), ("--composed",)
+IGNORED = signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
+
+
+@pytest.mark.parametrize(
+    ("number", "flags"),
+    [
+        (signal.SIGINT, IN_PROCESSES),
+        (signal.SIGHUP, COMPOSED),
+        pytest.param(signal.SIGHUP, IN_PROCESSES, marks=pytest.mark.long),
+    ],
+)
+def test_ctrl_c_or_a_terminal_that_is_closed_closes_the_bag(
+    start_stickslip: Start, tmp_path: Path, number: signal.Signals, flags: tuple[str, ...]
 ) -> None:
+    if number == signal.SIGHUP and IGNORED:
+        pytest.skip("as under nohup")
     process = start_stickslip(*RUN, "--json", *flags)
     wait_for_samples(process, tmp_path / "bag")
-    output, _ = ended(process, 130, signal.SIGHUP)
+    output, _ = ended(process, 130, number)
     assert json.loads(output)["report"]["complete"]
 
 

@@ -9,20 +9,8 @@ import pytest
 
 import stickslip_ros as ss
 from tests.app.conftest import Run
-from tests.drives import LIMIT_CYCLES
 
 RUNNING_AWAY = "-p plant.friction.law=linear -p plant.friction.slope=0.9 -p plant.belt_speed=0.2"
-
-
-def test_a_reference_limit_cycle(stickslip: Run) -> None:
-    known = LIMIT_CYCLES[0]
-    speed = ("-p", f"plant.belt_speed={-known.belt_speed}", "-p", "plant.rate=10")
-    found = stickslip.json("simulate", "paper", "--no-control", *speed, "--duration", "150")
-    assert found["regime"] == "stick_slip"
-    assert found["stick_fraction"] == pytest.approx(known.stick_fraction, abs=1e-6)
-    assert found["midpoint"] == pytest.approx(-known.midpoint, abs=1e-7)
-    for name in ("amplitude", "velocity_amplitude", "period"):
-        assert found[name] == pytest.approx(getattr(known, name), abs=1e-7)
 
 
 @pytest.mark.parametrize(
