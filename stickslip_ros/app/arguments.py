@@ -15,7 +15,7 @@ from stickslip_ros.app.output import tell
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.files import open_regular
 from stickslip_ros.quantities import number_of
-from stickslip_ros.record.topics import ForceSource, TimeSource
+from stickslip_ros.record import ForceSource, TimeSource
 from stickslip_ros.scenarios import DEFAULT_NAMESPACE, LONGEST_NAMESPACE
 from stickslip_ros.text import shown
 

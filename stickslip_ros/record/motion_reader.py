@@ -12,6 +12,7 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray, IntArray
 from stickslip_ros.errors import BagError, InvalidInputError, MessageError
+from stickslip_ros.record import ForceSource, TimeSource
 from stickslip_ros.record.cdr import Layout, Messages, Refused, decode
 from stickslip_ros.record.codec import (
     BELT,
@@ -21,7 +22,6 @@ from stickslip_ros.record.codec import (
     joint_state_layout,
 )
 from stickslip_ros.record.faults import MOST_SHIFTS, Jumps, shift_note
-from stickslip_ros.record.topics import ForceSource, TimeSource
 from stickslip_ros.samples import ForceColumns, SampleColumns
 from stickslip_ros.stamps import NANOSECONDS
 from stickslip_ros.text import must_be_one_of, printable, quantity, shown

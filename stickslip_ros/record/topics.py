@@ -5,7 +5,7 @@ Names are relative to the namespace.
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Generic, Literal, TypeVar
+from typing import Any, Generic, TypeVar
 
 from stickslip_ros.record.codec import (
     unpack_header,
@@ -15,11 +15,6 @@ from stickslip_ros.record.codec import (
 )
 
 MessageT = TypeVar("MessageT")
-
-TimeSource = Literal["header", "log"]
-"""Time of a message: the stamp in it, or when it was recorded."""
-ForceSource = Literal["topic", "effort"]
-"""Force of another machine: that of a topic, or the effort of the joint."""
 
 DEEP = 4_900
 """Messages queued for a reader that falls behind; above 5,000, Fast DDS delays the writer."""

@@ -31,8 +31,8 @@ from stickslip_ros.model.motor import Motor
 from stickslip_ros.model.sensor import EXACT_SENSOR, Sensor
 from stickslip_ros.motion.controller import Controller
 from stickslip_ros.motion.sampled_loop import LOCKSTEP_START, SampledLoop
+from stickslip_ros.record import ForceSource, TimeSource
 from stickslip_ros.record.codec import FORCE_TYPES
-from stickslip_ros.record.topics import ForceSource, TimeSource
 from stickslip_ros.scenarios import Pace
 from stickslip_ros.scenarios.curve_file import Pairs
 from stickslip_ros.scenarios.foreign_laws import CONTROLLERS

@@ -2,8 +2,6 @@
 
 import ast
 import importlib.metadata
-import subprocess
-import sys
 from importlib import import_module
 from pathlib import Path
 
@@ -12,22 +10,6 @@ import pytest
 import stickslip_ros as ss
 
 SOURCE = Path(__file__).parents[2]
-
-
-def loaded_after(code: str) -> set[str]:
-    """Return the packages that a fresh process has loaded after running `code`."""
-    script = f"{code}\nimport sys; print(*{{name.partition('.')[0] for name in sys.modules}})"
-    done = subprocess.run(
-        [sys.executable, "-c", script], cwd=SOURCE, capture_output=True, text=True, check=True
-    )
-    return set(done.stdout.split())
-
-
-@pytest.mark.process
-def test_results_load_what_draws_and_tabulates_when_asked() -> None:
-    loaded = loaded_after("import stickslip_ros as ss; ss.simulate('paper', duration=1)")
-    assert not {"matplotlib", "rclpy", "pandas", "xarray"} & loaded
-    assert "heyoka" in loaded
 
 
 def test_a_type_checker_sees_the_same_names_from_the_same_places() -> None:

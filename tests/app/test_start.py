@@ -18,10 +18,12 @@ HEAVY = {
     "matplotlib",
     "mcap",
     "numpy",
+    "pandas",
     "pint",
     "rclpy",
     "rich",
     "scipy",
+    "xarray",
     "yaml",
 }
 """Packages that take long to import, each more than a tenth of what Python itself takes."""
@@ -75,28 +77,44 @@ def test_help_and_version_load_nothing_heavy() -> None:
 
 
 @pytest.mark.parametrize(
-    ("arguments", "needed"),
+    ("code", "arguments", "needed"),
     [
-        (("simulate", "paper", "--duration", "1"), INTEGRATING),
-        (("report", "bags/reference"), READING),
+        (MAIN, "simulate paper --duration 1", INTEGRATING),
+        (MAIN, "report bags/reference", READING),
+        ("import stickslip_ros as ss; ss.simulate('paper', duration=1)", "", INTEGRATING),
     ],
 )
-def test_a_short_command_loads_what_it_computes_with(
-    arguments: tuple[str, ...], needed: set[str]
+def test_what_is_short_loads_what_it_computes_with(
+    code: str, arguments: str, needed: set[str]
 ) -> None:
-    assert loaded(MAIN, *arguments) - {"rich"} == needed
+    assert loaded(code, *arguments.split()) - {"rich"} == needed
 
 
-@pytest.mark.parametrize("module", ["nodes.analyzer", "nodes.controller", "running.bringup"])
-def test_what_has_no_motion_loads_no_integrator(module: str) -> None:
-    assert loaded(f"import stickslip_ros.{module}") & {"heyoka", "matplotlib", "scipy"} == set()
+def test_what_has_no_motion_loads_no_integrator() -> None:
+    nodes = ("analyzer", "controller", "running.bringup")
+    modules = ", ".join(f"stickslip_ros.nodes.{name}" for name in nodes)
+    assert loaded(f"import {modules}") & {"heyoka", "matplotlib", "scipy"} == set()
 
 
-def test_a_run_says_what_it_starts_before_it_loads_ros(tmp_path: Path) -> None:
-    without_ros = f"sys.modules['rclpy'] = None; {MAIN}"
+def without(package: str, *arguments: str) -> subprocess.CompletedProcess[str]:
+    """Run a command as where a package is not installed."""
+    return start(f"sys.modules[{package!r}] = None; {MAIN}", *arguments)
+
+
+def test_a_run_says_what_it_starts_before_it_loads_ros_and_names_it(tmp_path: Path) -> None:
     bag = str(tmp_path / "bag")
-    done = start(without_ros, "run", "paper", "--duration", "5", "--bag", bag, "--json")
+    done = without("rclpy", "run", "paper", "--duration", "5", "--bag", bag, "--json")
     assert done.returncode == 1
     started = "paper: lockstep, duration 5; starting the nodes in processes of their own"
     assert done.stderr.startswith(f"{started}; recording to {bag}")
     assert done.stdout == ""
+    assert "needs ROS 2, of which rclpy is not installed" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize("command", ["dashboard", "run paper --dashboard"])
+def test_what_the_dashboard_needs_is_named(command: str) -> None:
+    done = without("nicegui", *command.split())
+    assert done.returncode == 1
+    assert "pip install 'stickslip_ros[dashboard]'" in done.stderr
+    assert "Traceback" not in done.stderr
