@@ -106,4 +106,4 @@ def _no_process_unless_marked(
 @pytest.fixture
 def coarse_maps(monkeypatch: pytest.MonkeyPatch) -> None:
     """Compute the transitions of a map at fewer places than its picture would want."""
-    monkeypatch.setattr("stickslip_ros.studies.transitions._MAP_POINTS", 20)
+    monkeypatch.setattr("stickslip_ros.studies.transitions._MAP_POINTS", 8)

@@ -106,11 +106,6 @@ class NoisyCycleMeter:
         self._low: tuple[float, Point] | None = None
         """Time of the lowest sample at the end of the last cycle, and the vertex there."""
 
-    @property
-    def held(self) -> int:
-        """Number of samples that are held."""
-        return len(self._columns)
-
     def interrupt(self) -> None:
         """Drop the current cycle: the next sample does not continue the motion so far."""
         if len(self._cycles) >= (1 if self._before is None else LEAST_CYCLES):

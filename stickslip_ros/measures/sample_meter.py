@@ -167,11 +167,6 @@ class SampleMeter:
         """Standard deviation of the noise of the positions, m; None for exact samples."""
         return self._noisy_meter.noise if self.noisy else None
 
-    @property
-    def held(self) -> int:
-        """Number of samples that are held for the fits under noise."""
-        return self._noisy_meter.held
-
     def measures(self, *, quick: bool = False) -> Measures:
         """Return the means over the last whole cycles.
 

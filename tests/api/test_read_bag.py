@@ -7,7 +7,7 @@ import pytest
 from matplotlib.figure import Figure
 
 import stickslip_ros as ss
-from stickslip_ros.errors import BagError, InvalidInputError
+from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.record.reader import Recording
 from stickslip_ros.record.report import report_of_recording
 
@@ -63,8 +63,3 @@ def test_it_prints_and_plots(found: ss.RecordedRun) -> None:
     assert "325.8 µm" in repr(found)
     assert "325.8 µm" in found._repr_html_()  # pyright: ignore
     assert isinstance(found.plot(), Figure)
-
-
-def test_what_is_no_bag_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(BagError, match="does not exist"):
-        ss.read_bag(tmp_path / "none")

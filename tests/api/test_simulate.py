@@ -1,6 +1,5 @@
 """Simulated runs: trajectory, measures, figure and tables."""
 
-import json
 import sys
 
 import numpy as np
@@ -28,11 +27,7 @@ def feed_run() -> ss.Run:
     return ss.simulate(ss.scenario("feed_drive", start_after=0.1, belt_speed=0.03), duration=1.0)
 
 
-def test_twice_the_same_as_without_a_trajectory_and_as_the_command(
-    feed_run: ss.Run, capsys: pytest.CaptureFixture[str]
-) -> None:
-    from stickslip_ros.app.main import main
-
+def test_twice_the_same_and_as_without_a_trajectory(feed_run: ss.Run) -> None:
     other = ss.simulate(feed_run.scenario, duration=1.0)
     assert feed_run.measures == other.measures == simulate(feed_run.scenario, 1.0)
     assert list(vars(feed_run.trajectory)) == COLUMNS
@@ -40,12 +35,6 @@ def test_twice_the_same_as_without_a_trajectory_and_as_the_command(
         ours = getattr(feed_run.trajectory, column)
         assert ours.dtype == float
         assert np.array_equal(ours, getattr(other.trajectory, column))
-    overrides = ["-p", "washout_controller.start_after=0.1", "-p", "plant.belt_speed=0.03"]
-    with pytest.raises(SystemExit):
-        main(["simulate", "feed_drive", "--duration", "1", *overrides, "--json"])
-    printed = json.loads(capsys.readouterr().out)
-    measures = feed_run.measures.as_dict()
-    assert {name: printed[name] for name in measures} == measures
 
 
 def test_continuous_control_is_sampled_at_the_same_instants() -> None:

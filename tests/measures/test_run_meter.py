@@ -51,13 +51,6 @@ def test_what_was_sent_and_what_acted_are_measured_apart() -> None:
     assert report["dropped_forces"] == 2
 
 
-def test_without_forces_there_is_neither_peak_nor_rest() -> None:
-    meter = ForceMeter()
-    meter.feed(ForceColumns(np.array([], dtype=np.int64), np.array([])))
-    assert meter.peak_force is None
-    assert meter.resting_force is None
-
-
 @given(
     st.lists(st.tuples(st.integers(-3, 9), st.sampled_from([-3.0, -1.0, 0.0, 1.0, 2.0, np.nan]))),
     st.lists(st.integers(0, 60)),

@@ -66,21 +66,6 @@ def test_measures_of_a_limit_cycle() -> None:
     assert meter.duration == pytest.approx(70.0, rel=1e-15)
 
 
-@examples(quick=20, thorough=100)
-@given(st.lists(st.integers(1, 7000), max_size=12).map(sorted))
-def test_the_size_of_the_blocks_does_not_matter(starts: list[int]) -> None:
-    whole, in_blocks = SampleMeter(window=20), SampleMeter(window=20)
-    expected = whole.feed(limit_cycle())
-    cycles = feed(in_blocks, limit_cycle(), starts)
-    assert len(cycles) == len(expected)
-    for cycle, expected_cycle in zip(cycles, expected, strict=True):
-        # Time is counted from the start of a block; adding it up rounds.
-        assert vars(cycle) == pytest.approx(vars(expected_cycle), rel=1e-9)
-    assert in_blocks.samples == whole.samples
-    assert in_blocks.lost_samples == 0
-    assert in_blocks.duration == whole.duration
-
-
 # 3, 7 and 30 Hz have periods that are no whole number of nanoseconds.
 rates = st.sampled_from([3, 7, 30, 100, 1000, 100_000])
 
@@ -161,11 +146,12 @@ def test_stamps_that_go_back_start_a_new_segment(blocks: int) -> None:
     assert len(cycles) >= 10
 
 
+@pytest.mark.filterwarnings("error", "ignore::ResourceWarning")
 @pytest.mark.parametrize("column", ["position", "velocity", "belt_velocity"])
-def test_rows_that_are_not_finite_are_lost(column: str) -> None:
+def test_rows_that_are_not_finite_or_too_large_are_lost(column: str) -> None:
     samples = limit_cycle()
     values = getattr(samples, column).copy()
-    values[[10, 500, 501, 3000]] = [np.nan, np.inf, -np.inf, np.nan]
+    values[[10, 500, 501, 3000]] = [np.nan, np.inf, -1e308, 1.1e100]
     meter = SampleMeter(window=20)
     cycles = meter.feed(replace(samples, **{column: values}))
     assert meter.samples == 6997
@@ -200,13 +186,13 @@ def read_late(samples: SampleColumns, latest: float, seed: int = 1) -> SampleCol
     return replace(samples, stamp=samples.stamp + late.astype(np.int64))
 
 
-@examples(quick=15, thorough=100)
+@examples(quick=20, thorough=100)
 @given(
-    st.sampled_from([2e-6, 1e-3, 0.2, 0.7]),
+    st.sampled_from([0.0, 2e-6, 1e-3, 0.2, 0.7]),
     st.integers(0, 100),
     st.lists(st.integers(1, 7000), max_size=5).map(sorted),
 )
-def test_jittered_stamps_are_measured(latest: float, seed: int, starts: list[int]) -> None:
+def test_even_and_jittered_stamps_are_measured(latest: float, seed: int, starts: list[int]) -> None:
     """However they are cut into blocks."""
     samples = read_late(limit_cycle(), latest, seed)
     whole, in_blocks = SampleMeter(window=20), SampleMeter(window=20)
@@ -220,7 +206,9 @@ def test_jittered_stamps_are_measured(latest: float, seed: int, starts: list[int
     same = feed(in_blocks, samples, starts)
     assert len(same) == len(cycles)
     for cycle, expected_cycle in zip(same, cycles, strict=True):
+        # Time is counted from the start of a block; adding it up rounds.
         assert vars(cycle) == pytest.approx(vars(expected_cycle), rel=1e-9)
+    assert in_blocks.samples == whole.samples
     assert in_blocks.lost_samples == whole.lost_samples
     assert in_blocks.duration == whole.duration
 
@@ -283,21 +271,6 @@ def test_time_that_adds_up_beyond_all_stamps_is_no_error() -> None:
     for _ in range(6):
         meter.feed(days)
     assert meter.duration > 2**63 / SECOND
-
-
-@pytest.mark.filterwarnings("error", "ignore::ResourceWarning")
-@pytest.mark.parametrize("column", ["position", "velocity", "belt_velocity"])
-@pytest.mark.parametrize(("value", "latest"), [(1e308, 0.0), (-1e100, 0.2), (5e-324, 0.0)])
-def test_no_value_overflows(column: str, value: float, latest: float) -> None:
-    samples = read_late(limit_cycle(), latest)
-    values = getattr(samples, column).copy()
-    values[100:7000:3] = value
-    meter = fed(replace(samples, **{column: values}))
-    measured = meter.measures().as_dict().values()
-    assert np.isfinite([figure for figure in measured if isinstance(figure, float)]).all()
-    too_large = abs(value) > 1e100
-    assert meter.samples == 7001 - too_large * len(values[100:7000:3])
-    assert meter.lost_samples == 7001 - meter.samples
 
 
 def test_a_leap_onto_the_belt_hides_no_extremes() -> None:

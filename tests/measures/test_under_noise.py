@@ -4,6 +4,7 @@ benchmarks/measures_under_noise.json has 200 seeds for each case; here are five 
 """
 
 import json
+import pickle
 from dataclasses import replace
 from pathlib import Path
 
@@ -265,13 +266,13 @@ def test_a_slide_that_is_held_before_a_gap_may_have_few_samples_after_it() -> No
 
 
 def test_the_memory_is_bounded() -> None:
-    """A window has 1300 samples; twice as many are held at most, and a little."""
+    """Less is kept than of one block of 8000 rows of five numbers."""
     meter = SampleMeter(20, reading=NOISY)
-    record, held = samples(noise=1e-6, count=8000), []
+    record, sizes = samples(noise=1e-6, count=8000), list[int]()
     for repeat in range(4):
         meter.feed(replace(record, stamp=record.stamp + repeat * 8_000_000_000))
-        held.append(meter.held)
-    assert max(held) < 4000
+        sizes.append(len(pickle.dumps(meter)))
+    assert max(sizes) < 8000 * 5 * 8
 
 
 def test_below_three_cycles_nothing_is_said_of_steadiness_and_errors() -> None:

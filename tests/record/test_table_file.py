@@ -152,31 +152,6 @@ def test_columns_that_make_no_recording_are_refused(tmp_path: Path) -> None:
         assert "\n" not in str(refused.value)
 
 
-@pytest.mark.parametrize(
-    ("suffix", "contents"),
-    [
-        (".csv", [b"", b"t\n1\n", b"t,x\n", b"t,x\n1,2,3\n1,2,3\n", b"\xff\xfe\0t,x"]),
-        pytest.param(
-            ".mat",
-            [b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM" + bytes(400)],
-            marks=pytest.mark.process,
-        ),
-    ],
-)
-def test_a_file_that_is_no_table_is_refused(
-    tmp_path: Path, suffix: str, contents: list[bytes]
-) -> None:
-    path = tmp_path / f"log{suffix}"
-    with pytest.raises(BagError, match="No such file"):
-        read_table(path)
-    for content in contents:
-        path.write_bytes(content)
-        with pytest.raises(BagError) as refused:
-            read_table(path, {"time": "t", "position": "x"})
-        assert str(path) in str(refused.value)
-        assert "\n" not in str(refused.value)
-
-
 def stairs(rate: float, duration: float) -> tuple[Any, Any]:
     """A table of 10 kg that follows 10 mm/s on 4000 N/m, friction 29.43 N and 19.62 N."""
     speed, frequency, reach = 0.01, 20.0, 9.81 / 4000.0

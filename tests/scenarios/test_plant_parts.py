@@ -43,17 +43,11 @@ def test_constants_that_do_not_fit_together_are_refused() -> None:
 
 def test_the_samples_of_a_sensor_that_errs_are_read_as_noisy() -> None:
     encoder = ["plant.sensor.position_resolution=1e-6", "plant.sensor.velocity=difference"]
-    assert load_scenario("feed_drive", []).reading == SampleAssumptions(
-        0.0, noisy=False, unbounded_speed=100.0
-    )
-    assert load_scenario("feed_drive", encoder).reading == SampleAssumptions(
-        0.0, noisy=True, unbounded_speed=100.0
-    )
-    given = [*encoder, "analyzer.stick_speed=0.001"]
-    assert load_scenario("feed_drive", given).reading == SampleAssumptions(
-        0.001, noisy=False, unbounded_speed=100.0
-    )
-    memory = [*encoder, "plant.friction.law=dahl"]
-    assert load_scenario("feed_drive", memory).reading == SampleAssumptions(
-        pytest.approx(4e-4), noisy=True, unbounded_speed=100.0
-    )
+    for overrides, stick_speed, noisy in (
+        ([], 0.0, False),
+        (encoder, 0.0, True),
+        ([*encoder, "analyzer.stick_speed=0.001"], 0.001, False),
+        ([*encoder, "plant.friction.law=dahl"], pytest.approx(4e-4), True),
+    ):
+        expected = SampleAssumptions(stick_speed, noisy=noisy, unbounded_speed=100.0)
+        assert load_scenario("feed_drive", overrides).reading == expected

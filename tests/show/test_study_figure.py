@@ -24,23 +24,13 @@ from stickslip_ros.studies.runner import compute_columns
 from stickslip_ros.studies.settling import SettlingOptions
 from stickslip_ros.studies.study import Study
 from tests.show.texts import faults, in_styles, legend_texts
+from tests.studies.studies import EXPONENTIAL
 
-
-@pytest.fixture(autouse=True)
-def _coarse_maps(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("stickslip_ros.studies.transitions._MAP_POINTS", 8)
+pytestmark = pytest.mark.usefixtures("coarse_maps")
 
 
 FREE = "plant.expects_control=false"
 LINEAR = "plant.friction.law=linear"
-HYSTERESIS = (
-    FREE,
-    "plant.friction.law=exponential",
-    "plant.friction.static=1.0",
-    "plant.friction.kinetic=0.5",
-    "plant.friction.decay_speed=0.5",
-    "plant.damping=0.1",
-)
 
 SHADED = "up and down differ (hysteresis)"
 
@@ -99,7 +89,7 @@ def test_a_diagram_names_axes_regimes_and_transitions() -> None:
 
 def test_where_up_and_down_differ_a_diagram_is_shaded() -> None:
     over = "plant.belt_speed=0.8:2.2:15"
-    both_ways = swept(over, overrides=HYSTERESIS, carry=Continuation.BOTH)
+    both_ways = swept(over, overrides=EXPONENTIAL, carry=Continuation.BOTH)
     figure = diagram_figure(*both_ways, style=STYLES["paper-double"])
     assert faults(figure) == []
     legend = legend_texts(figure)
@@ -183,7 +173,7 @@ def test_a_map_carried_both_ways_has_two_panels() -> None:
     found = swept(
         "plant.damping=0.08:0.1:2",
         "plant.belt_speed=0.8:2.2:8",
-        overrides=HYSTERESIS,
+        overrides=EXPONENTIAL,
         carry=Continuation.BOTH,
     )
     up, down = map_figure(*found).axes

@@ -212,12 +212,3 @@ def test_by_default_starts_reach_beyond_the_vibration(overrides: Sequence[str]) 
     drive = scenario.plant.as_drive()
     assert position.value(1) == pytest.approx(drive.equilibrium_position, abs=1e-12)
     assert velocity.value(1) == 0.0
-
-
-@pytest.mark.long
-def test_the_share_of_a_grid_is_that_of_a_finer_one_by_another_method() -> None:
-    scenario = free(*EXPONENTIAL, "plant.belt_speed=1.5")
-    # Each start is the middle of its part of the range.
-    position, velocity = Axis(POSITION, -1.9375, 1.9375, 32), Axis(VELOCITY, 0.0625, 1.9375, 16)
-    basins = basins_of(scenario, Grid((position, velocity)))
-    assert share(basins, Regime.STICK_SLIP) == pytest.approx(0.6929, abs=0.015)

@@ -6,8 +6,7 @@ import signal
 import subprocess
 import sys
 import threading
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import distributed
@@ -21,17 +20,10 @@ from stickslip_ros.studies.plan import Axis, Continuation
 from stickslip_ros.studies.runner import WorkersDiedError, dask_executor, run
 from stickslip_ros.studies.settling import SettlingOptions
 from stickslip_ros.studies.study import Study, sweep_study
+from tests.nodes.graph import PATIENCE, wait_for
 from tests.studies.studies import points_of, speeds
 
-PATIENCE = 120.0
 LOCAL = "127.0.0.1"
-
-
-def wait_until(condition: Callable[[], bool], what: str) -> None:
-    deadline = time.monotonic() + PATIENCE
-    while not condition():
-        assert time.monotonic() < deadline, what
-        time.sleep(0.05)
 
 
 class Cluster:
@@ -42,7 +34,7 @@ class Cluster:
         self.processes: list[subprocess.Popen[bytes]] = []
         file = directory / "scheduler.json"
         self._start("scheduler", "--host", LOCAL, "--port", "0", "--scheduler-file", str(file))
-        wait_until(lambda: file.exists() and file.stat().st_size > 0, "no scheduler")
+        wait_for(lambda: file.exists() and file.stat().st_size > 0, "the scheduler")
         self.address = str(json.loads(file.read_text())["address"])
 
     def add_worker(self) -> subprocess.Popen[bytes]:

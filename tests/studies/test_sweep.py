@@ -31,13 +31,10 @@ def test_over_the_gain_the_vibration_ends_where_theory_has_it() -> None:
 
 
 def test_what_is_no_sweep_is_refused() -> None:
-    minimum = Axis("plant.friction.minimum", 0.5, 0.6, 2)
     for axes, message in (
         ([], "^0 parameters: a sweep is over one or"),
         ([SPEED, DAMPING, STATIC], "^3 parameters: a sweep is over one or"),
-        ([SPEED, SPEED], "must be different parameters"),
         ([SPEED, GAIN], "without control there is no controller"),
-        ([minimum], r"friction\.minimum = 0\.5 must not exceed"),
     ):
         with pytest.raises(InvalidInputError, match=message):
             sweep_study(free(), axes)

@@ -30,12 +30,6 @@ from tests.studies.studies import CYCLE_LOST_SPEED, EXPONENTIAL, HOPF_SPEED
 FREE = "plant.expects_control=false"
 
 
-@pytest.fixture
-def small_maps(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Compute the transitions of a map at few places."""
-    monkeypatch.setattr("stickslip_ros.studies.transitions._MAP_POINTS", 5)
-
-
 def found(over: str, *overrides: str, continuous: bool = False) -> dict[str, list[float]]:
     axis = Axis.parse(over)
     scenario = load_scenario("paper", list(overrides))
@@ -138,7 +132,7 @@ def test_a_sign_change_at_a_value_itself_is_found_once() -> None:
     assert list(sign_changes(lambda x: x * x, [-1.0, 0.0, 1.0])) == []
 
 
-@pytest.mark.usefixtures("small_maps")
+@pytest.mark.usefixtures("coarse_maps")
 def test_a_map_has_the_sides_of_the_transitions() -> None:
     axes = Axis.parse("plant.belt_speed=0.1:0.6:2"), Axis.parse("plant.damping=0.01:0.4:2")
     study = Study(load_scenario("paper", [FREE]), Grid(axes))
@@ -153,7 +147,7 @@ def test_a_map_has_the_sides_of_the_transitions() -> None:
     assert np.array_equal(over.margins[STICKING_LIMIT] > 0.0, speed < onsets)
 
 
-@pytest.mark.usefixtures("small_maps")
+@pytest.mark.usefixtures("coarse_maps")
 def test_a_map_has_the_ends_of_every_range_that_sticks() -> None:
     axes = Axis.parse("plant.stiffness=800:1200:3"), Axis.parse("plant.belt_speed=0.02:0.6:2")
     over = transition_map(Study(load_scenario("paper", [FREE]), Grid(axes)), axes)
@@ -165,7 +159,7 @@ def test_a_map_has_the_ends_of_every_range_that_sticks() -> None:
         assert np.array_equal(over.margins[STICKING_LIMIT][row] > 0.0, sticks)
 
 
-@pytest.mark.usefixtures("small_maps")
+@pytest.mark.usefixtures("coarse_maps")
 def test_a_map_of_a_sampled_loop_with_a_long_delay_has_the_sides_of_its_limit() -> None:
     axes = (
         Axis.parse("plant.force_delay=0.3:0.6:2"),
