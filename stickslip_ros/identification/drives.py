@@ -258,20 +258,22 @@ class DriveTask:
         names = [name for name in names if name not in (*self.friction, *law.optional)]
         tried: list[Refinement] = []
         for values in starts:
+            if tried and self.limit.is_over:
+                break
             tried.append(refine(short, names, self._known(law, values), most=_FIRST_STEPS))
             if is_white(tried[-1]) or _loss(tried[-1]) > most:
                 return tried[-1:]
         settled: list[Refinement] = []
         for near in sorted(tried, key=_loss)[:_FINALISTS]:
             settled.append(self._settled(near.best))
-            if is_white(settled[-1]) or _is_rounding(settled[-1]):
+            if is_white(settled[-1]) or _is_rounding(settled[-1]) or self.limit.is_over:
                 break
         return settled
 
     def _settled(self, near: Errors) -> Refinement:
         """Return the best fit near other values: segments with wrong starts try others."""
         fit = refine(near.task, near.names, near.values, near.starts, most=_STEPS)
-        while fit.best.has_outliers:
+        while fit.best.has_outliers and not self.limit.is_over:
             starts = fit.best.restarted().starts
             other = refine(near.task, near.names, fit.best.values, starts, most=_STEPS)
             if _loss(other) > _RESTART_LOSS_RATIO * _loss(fit):

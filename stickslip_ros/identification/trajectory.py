@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
-from math import copysign, isfinite
+from math import copysign, expm1, isfinite
 from typing import Self
 
 import numpy as np
@@ -57,9 +57,16 @@ class Predictor:
         """Return the same with the force behind a lag of first order, s."""
         if self.record.force is None or not time_constant > 0.0:
             return self
-        other, fine = copy(self), self.record.period / _LAG_STEPS
-        force, disturbance = (np.repeat(each, _LAG_STEPS) for each in self.record.held_forces)
-        other._force = lagged(force, fine / time_constant).tolist()
+        other, periods = copy(self), self.record.period / _LAG_STEPS / time_constant
+        command, disturbance = (np.repeat(each, _LAG_STEPS) for each in self.record.held_forces)
+        force = lagged(command, periods)
+        # A mean force gives the right velocity at the end of a step, and not the right position.
+        missing = (force - command) * (-1.0 / expm1(-periods) - 1.0 / periods - 0.5)
+        force, missing = (each.reshape(-1, _LAG_STEPS) for each in (force, missing))
+        moved = missing.sum(axis=1) / (_LAG_STEPS - 1)
+        force[:, 0] += moved
+        force[:, -1] -= moved
+        other._force = force.ravel().tolist()
         other._disturbance, other._steps = disturbance.tolist(), _LAG_STEPS
         return other
 

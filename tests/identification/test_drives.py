@@ -25,6 +25,7 @@ from stickslip_ros.identification.refinement import repetition_of
 from stickslip_ros.identification.sentences import notes, unidentified
 from stickslip_ros.identification.time_limit import TimeLimit
 from stickslip_ros.identification.trajectory import Predictor, Segment
+from stickslip_ros.model.actuator import Actuator
 from stickslip_ros.model.drive import Drive
 from stickslip_ros.model.friction import Coulomb, Directional, FrictionLaw, Table
 from stickslip_ros.model.signals import table
@@ -112,6 +113,25 @@ def test_a_disturbance_is_not_late() -> None:
     )
     assert np.ptp(known) > 1e-5
     assert late == pytest.approx(known, abs=1e-12)
+
+
+@pytest.mark.parametrize("lag", [5e-4, 5e-3])
+def test_a_force_that_lags_moves_the_slide_as_that_of_its_actuator(lag: float) -> None:
+    """Positions of a slide that slips differ by less than a thousandth of an encoder's step."""
+    force = 100.0 * np.random.default_rng(0).choice([-1.0, 1.0], 300)
+    law = study.LAWS["coulomb"]
+    drive = Drive(study.MASS, 200.0, study.STIFFNESS, study.NORMAL_FORCE, 0.1, law)
+    motion = Motion(replace(drive, actuator=Actuator(time_constant=lag)), 0.0, 0.0)
+    position = np.empty(len(force))
+    for number, each in enumerate(force.tolist()):
+        position[number] = motion.position
+        motion.set_forces(each, 0.0)
+        motion.advance(study.PERIOD)
+    record = Record("late", study.PERIOD, position, np.full(len(force), 0.1), force)
+    whole = [Segment(0, 0, len(force))]
+    found = Predictor(record).lagging(lag).followed(drive, whole, np.zeros((1, 2)), 0.0)[0]
+    assert np.ptp(position) > 1e-4
+    assert found == pytest.approx(position, abs=1e-3 * study.RESOLUTION)
 
 
 def test_static_above_kinetic_friction_is_recovered() -> None:
