@@ -191,12 +191,15 @@ class CycleMeans:
         below three it is not known.
         """
         values = np.array([[*vars(cycle).values()] for cycle in cycles])
-        mean, errors = Cycle(*values.mean(axis=0).tolist()), None
-        if len(cycles) >= LEAST_CYCLES:
-            scatter = values.std(axis=0, ddof=1) / len(cycles) ** 0.5
+        count, mean, errors = len(cycles), values.sum(axis=0) / len(cycles), None
+        if count >= LEAST_CYCLES:  # as values.std(axis=0, ddof=1), in half of its time
+            squares = (values - mean) ** 2
+            scatter = np.sqrt(squares.sum(axis=0) / (count - 1)) / count**0.5
             errors = Cycle(*scatter.tolist())
-        sticks = sum(cycle.stick_fraction > 0.0 for cycle in cycles) > share * len(cycles)
-        return cls(mean, errors, sticks, np.array([cycle.amplitude for cycle in cycles]))
+        sticks = sum(cycle.stick_fraction > 0.0 for cycle in cycles) > share * count
+        return cls(
+            Cycle(*mean.tolist()), errors, sticks, np.array([cycle.amplitude for cycle in cycles])
+        )
 
     def measures(self, resting: bool, steady: bool | None, trend: Trend | None) -> Measures:
         """Return the measures of a motion with this mean; one that is `resting` has no period."""

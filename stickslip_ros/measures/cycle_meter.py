@@ -1,10 +1,11 @@
 """Cycles of a motion from its breakpoints, and their measures, in constant memory."""
 
+from bisect import bisect_left, bisect_right
 from collections import deque
 from collections.abc import Sequence
 from functools import reduce
 from itertools import pairwise
-from typing import NamedTuple, Self
+from typing import NamedTuple
 
 import numpy as np
 
@@ -49,24 +50,6 @@ class _Stretch(NamedTuple):
     fastest: float
     stick_time: float
 
-    @classmethod
-    def between(cls, breakpoints: Breakpoints, first: int, last: int) -> Self:
-        """Return the part from one breakpoint to another."""
-        # Stretches are short: lists take a fraction of the time of arrays.
-        time = breakpoints.time[first : last + 1]
-        position = breakpoints.position[first : last + 1].tolist()
-        velocity = breakpoints.velocity[first : last + 1].tolist()
-        stuck = breakpoints.sticking[first + 1 : last + 1]
-        return cls(
-            float(time[0]),
-            float(time[-1]),
-            min(position),
-            max(position),
-            min(velocity),
-            max(velocity),
-            float(np.diff(time)[stuck].sum()) if stuck.any() else 0.0,
-        )
-
     def followed_by(self, later: "_Stretch") -> "_Stretch":
         return _Stretch(
             self.start,
@@ -91,6 +74,30 @@ class _Stretch(NamedTuple):
             period=self.duration,
             frequency=1.0 / self.duration,
             stick_fraction=stick_fraction if stick_fraction > GRAZING_FRACTION else 0.0,
+        )
+
+
+class _Rows:
+    """Breakpoints as lists: stretches are short, and arrays take several times as long."""
+
+    def __init__(self, breakpoints: Breakpoints) -> None:
+        self.time, self._position, self._velocity, self._sticking = (
+            column.tolist() for column in vars(breakpoints).values()
+        )
+
+    def stretch(self, first: int, last: int) -> _Stretch:
+        """Return the part from one breakpoint to another."""
+        time, position, velocity = self.time, self._position, self._velocity
+        rows, stuck = slice(first, last + 1), self._sticking[first + 1 : last + 1]
+        sticks = [time[row] - time[row - 1] for row, each in enumerate(stuck, first + 1) if each]
+        return _Stretch(
+            time[first],
+            time[last],
+            min(position[rows]),
+            max(position[rows]),
+            min(velocity[rows]),
+            max(velocity[rows]),
+            float(np.sum(sticks)) if len(sticks) > 1 else sum(sticks, 0.0),
         )
 
 
@@ -171,23 +178,22 @@ class CycleMeter:
         self._belt_speed = belt_speed
         self._fastest_belt = abs(belt_speed) if fastest_belt is None else fastest_belt
         breakpoints, last = self._last.followed_by(breakpoints), 0
-        if self._open is None:
-            self._open = _Stretch.between(breakpoints, 0, 0)
+        rows, current = _Rows(breakpoints), self._open
         completed: list[Cycle] = []
         for edge in self._upward_crossings(breakpoints):
-            self._open = self._open.followed_by(_Stretch.between(breakpoints, last, edge))
-            if self._whole and self._open.duration > 0.0:
-                completed.append(self._open.as_cycle())
-                self.ends.append(self._open.end)
-            self._open = _Stretch.between(breakpoints, edge, edge)
-            self._whole = True
+            part = rows.stretch(last, edge)
+            current = part if current is None else current.followed_by(part)
+            if self._whole and current.duration > 0.0:
+                completed.append(current.as_cycle())
+                self.ends.append(current.end)
+            current, self._whole = None, True
             self._recent = []
             last = edge
         self._cycles.extend(completed)
         self._amplitudes.extend(cycle.amplitude for cycle in completed)
-        end = _Stretch.between(breakpoints, last, len(breakpoints) - 1)
-        self._open = self._open.followed_by(end)
-        self._follow_recent(breakpoints, last)
+        part = rows.stretch(last, len(breakpoints) - 1)
+        self._open = part if current is None else current.followed_by(part)
+        self._follow_recent(rows, last)
         self._follow_sticking(breakpoints)
         self._last = breakpoints[len(breakpoints) - 1 :]
         return completed
@@ -275,7 +281,7 @@ class CycleMeter:
         before = np.maximum(rising - 1, 0)
         return np.where(speed[before] <= speed[rising], before, rising).tolist()
 
-    def _follow_recent(self, breakpoints: Breakpoints, row: int) -> None:
+    def _follow_recent(self, rows: _Rows, row: int) -> None:
         """Keep the extremes of at least the last half of the stretch since the last crossing.
 
         Once the stretch is longer than the last cycle, everything before the last doubling is
@@ -283,18 +289,18 @@ class CycleMeter:
         """
         assert self._open is not None
         if not self._recent:
-            self._recent = [_Stretch.between(breakpoints, row, row)]
-        last = len(breakpoints) - 1
+            self._recent = [rows.stretch(row, row)]
+        last = len(rows.time) - 1
         earliest = self._open.start + (self._cycles[-1].period if self._cycles else 0.0)
         while row < last:
             current = self._recent[-1]
             due = max(2.0 * current.start - self._open.start, earliest)
-            side = "left" if due > current.start else "right"
-            doubled = row + 1 + int(np.searchsorted(breakpoints.time[row + 1 :], due, side))
-            part = _Stretch.between(breakpoints, row, min(doubled, last))
+            find = bisect_left if due > current.start else bisect_right
+            doubled = find(rows.time, due, row + 1)
+            part = rows.stretch(row, min(doubled, last))
             self._recent[-1] = current.followed_by(part)
             if doubled <= last:
-                self._recent = [self._recent[-1], _Stretch.between(breakpoints, doubled, doubled)]
+                self._recent = [self._recent[-1], rows.stretch(doubled, doubled)]
             row = doubled
 
     def _recent_motion(self) -> Cycle | None:

@@ -36,9 +36,10 @@ class TrendMeter:
 
     def feed(self, time: npt.ArrayLike, value: npt.ArrayLike) -> None:
         """Add the times, s, and values that follow, in blocks of any length."""
-        if np.size(time) > 0:
-            self._waiting.append(np.array([time, value]))
-            self._waiting_count += np.size(time)
+        new = np.array([time, value])
+        if new.size > 0:
+            self._waiting.append(new)
+            self._waiting_count += new.shape[1]
         if self._waiting_count >= _PARTS:
             self._add_waiting()
 

@@ -33,7 +33,7 @@ EXACT = SampleAssumptions()
 UNKNOWN = SampleAssumptions(0.0, None)
 """Assumptions for samples of which nothing is known."""
 
-_CHANGING_KINDS = ("ramp", "sine", "trapezoid", "table", "topic")
+CHANGING_KINDS = ("ramp", "sine", "trapezoid", "table", "topic")
 """Kinds of signals and references that keep changing."""
 
 
@@ -48,7 +48,7 @@ def reading_of(
     samples are read as exact ones.
     """
     noisy, within = _resolution(plant)
-    changing, unbounded_speed = varies(plant), _unbounded_speed(plant)
+    changing, unbounded_speed = _varies(plant), _unbounded_speed(plant)
     if given is not None:
         noisy = False
     elif not plant:
@@ -60,10 +60,18 @@ def reading_of(
     return SampleAssumptions(stick_speed, noisy, within, changing, unbounded_speed)
 
 
-def varies(parameters: Mapping[str, Any]) -> bool:
+def held_range(step: float, stiffness: float) -> float:
+    """Return the range, m, in which an actuator with this step (N) can hold the slide.
+
+    Without a spring, `stiffness` (N/m) of 0, it holds none.
+    """
+    return step / (stiffness or inf)
+
+
+def _varies(parameters: Mapping[str, Any]) -> bool:
     """Return whether a profile or a reference among the parameters of a node keeps changing."""
     return any(
-        name.endswith(".kind") and str(value) in _CHANGING_KINDS
+        name.endswith(".kind") and str(value) in CHANGING_KINDS
         for name, value in parameters.items()
     )
 
@@ -78,7 +86,8 @@ def _resolution(plant: Mapping[str, Any]) -> tuple[bool | None, float]:
     try:
         sensor = Sensor.from_values(values)
         lengths = sensor.position_resolution, sensor.position_noise, sensor.velocity_noise
-        within = float(plant.get("actuator.resolution", 0.0)) / float(plant.get("stiffness") or inf)
+        step = float(plant.get("actuator.resolution", 0.0))
+        within = held_range(step, float(plant.get("stiffness") or 0.0))
         known = all(0.0 <= float(value) < inf for value in (*lengths, within))
     except (ArithmeticError, TypeError, ValueError):
         return None, 0.0

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from copy import copy
 from enum import Flag, auto
 from functools import partial
+from math import e, inf
 from typing import Any
 
 import heyoka as hy
@@ -22,6 +23,9 @@ from stickslip_ros.model.hybrid import HybridSystem, Mode
 # heyoka warns on standard output, which is for results, where a marker's polynomial is only
 # rounding, as in equilibrium.
 hy.set_logger_level_error()
+
+_LARGEST_MAGNITUDE = 1e12
+"""Largest magnitude of states and margins, which are mostly of the order of one."""
 
 Marks = list[tuple[float, float, float]]
 """Time, and the first two states, at the zeros of a flow's marks."""
@@ -53,6 +57,7 @@ class CompiledFlow:
         "marks",
         "mode",
         "parameters",
+        "series",
         "state",
         "switches",
         "taylor",
@@ -66,6 +71,8 @@ class CompiledFlow:
         """States and derivatives."""
         self.variables: memoryview[float] = self.state[: len(system.states)].data
         self.parameters: memoryview[float] = taylor.pars.data
+        self.series: memoryview[float] = taylor.tc.data
+        """Taylor coefficients of the last step: a row for each variable, a column an order."""
         # heyoka copies its callbacks with the integrator.
         self.marks = [event.callback.found for event in taylor.nt_events]
         self.mode: Mode | None = None
@@ -85,6 +92,18 @@ class CompiledFlow:
         used = array("d", list(system.constants.values())[: len(self.parameters)])
         self.parameters[: len(used)] = used
         self.mode = None
+
+    def phase_bound(self) -> float:
+        """Return an end of the integration that would have shortened no step of the last one.
+
+        A guard has ended the last step within its length h, which is unknown. By the last of the
+        orders p of the series c, heyoka has h <= (s / max |c_p|)^(1/p) / e^2 with the largest s of
+        1 and the magnitudes of states and margins (Jorba and Zou, 2005).
+        """
+        order = self.taylor.order
+        last = max(abs(self.series[row, order]) for row in range(len(self.variables)))
+        step = (_LARGEST_MAGNITUDE / last) ** (1.0 / order) / e**2 if last else inf
+        return self.taylor.time - self.taylor.last_h + step
 
     def another(self, system: HybridSystem) -> "CompiledFlow":
         """Return an independent integrator of the same flow; it needs no compilation."""

@@ -25,6 +25,8 @@ _MOST_STEPS = 1e18
 """Largest number of steps that heyoka accepts."""
 _STEPS_OF_A_PHASE = 10
 """Number of steps that the work around the integration of one phase is worth."""
+_SHORTEST_REPEATED = 16.0
+"""Duration of an advance above which its phases may be known: others have two cycles or fewer."""
 
 _DIVERGENCE = -1
 """Stands for a guard where the rates exceed any bound."""
@@ -150,9 +152,10 @@ class HybridMotion:
         epoch, now, elapsed, self._begun = instant.time, 0.0, 0.0, 0.0
         limits_steps, clocked, has_parts = system.limits_steps, self._clocked, system.has_parts
         slaves = system.slaves
-        is_long = duration > LONGEST_STEP and not clocked
-        repeats = is_long and Detail.DERIVATIVES not in self._detail
-        recurrence, longest = Recurrence() if repeats else None, LONGEST_STEP if is_long else inf
+        longest = LONGEST_STEP if duration > LONGEST_STEP and not clocked else inf
+        repeats = duration > _SHORTEST_REPEATED and not clocked
+        repeats = repeats and Detail.DERIVATIVES not in self._detail
+        recurrence = Recurrence() if repeats else None
         while now < duration:
             end, corner = duration, self._switch_time - epoch
             if corner < end:
@@ -221,22 +224,19 @@ class HybridMotion:
                 self.unbounded, self._short_step = True, None
                 break
             mode = following
-            if recurrence is not None and recurrence.is_known(
-                mode, instant.state, elapsed, self._kept()
-            ):
-                now = self._repeat(recurrence, now, duration - LONGEST_STEP)
-                mode, recurrence = self._mode, None
-            else:
-                self._enter(mode)
+            if recurrence is not None:
+                bound = elapsed if flow is None else min(flow.phase_bound(), elapsed + longest)
+                if recurrence.is_known(mode, instant.state, elapsed, bound, self._kept()):
+                    now = self._repeat(recurrence, now, duration)
+                    mode, recurrence = self._mode, None
+                    continue
+            self._enter(mode)
 
     def _repeat(self, recurrence: Recurrence, now: float, latest: float) -> float:
-        """Continue with the known phases that end before `latest`; return the time then.
-
-        Later a step of the integration could be cut short by the end of the advance.
-        """
+        """Continue with the known phases that `latest` does not shorten; return the time then."""
         for phase in recurrence.phases():
             begun, after = now, now + phase.duration
-            if after >= latest:
+            if now + phase.bound >= latest:
                 self._instant.state[:] = memoryview(phase.state).cast("d")
                 self._enter(phase.mode)
                 return now

@@ -19,6 +19,8 @@ class Phase:
     state: bytes
     """State at its start, before the mode is entered."""
     duration: float = 0.0
+    bound: float = 0.0
+    """Time from its start to an end of the advance that would have shortened none of its steps."""
     kept: Any = None
     """What the motion has kept of it."""
 
@@ -30,14 +32,17 @@ class Recurrence:
         self._phases: list[Phase] = []
         self._numbers: dict[tuple[Mode, bytes], int] = {}
 
-    def is_known(self, mode: Mode, state: "memoryview[float]", duration: float, kept: Any) -> bool:
+    def is_known(
+        self, mode: Mode, state: "memoryview[float]", duration: float, bound: float, kept: Any
+    ) -> bool:
         """Note the end of a phase, and the mode and the state of the next; return if it is known.
 
-        `duration` and `kept` are those of the phase that ends.
+        `duration`, `bound` and `kept` are those of the phase that ends.
         """
         phases, values = self._phases, state.tobytes()
         if phases:
-            phases[-1].duration, phases[-1].kept = duration, kept
+            last = phases[-1]
+            last.duration, last.bound, last.kept = duration, bound, kept
         first = self._numbers.setdefault((mode, values), len(phases))
         if first < len(phases):
             self._phases = phases[first:]

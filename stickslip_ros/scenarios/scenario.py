@@ -8,7 +8,11 @@ from typing import Any, Self
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.measures.cycle_meter import CycleMeter
 from stickslip_ros.measures.noise import resolved
-from stickslip_ros.measures.sample_assumptions import SampleAssumptions, varies
+from stickslip_ros.measures.sample_assumptions import (
+    CHANGING_KINDS,
+    SampleAssumptions,
+    held_range,
+)
 from stickslip_ros.model.control import ControlLaw
 from stickslip_ros.scenarios.keywords import (
     described,
@@ -87,8 +91,16 @@ class Scenario:
         """How the samples of the plant are to be read."""
         plant = self.plant
         found = self.analyzer.reading_of(plant.flat(), plant.as_drive().fastest_belt)
-        follows = plant.expects_control and varies(self.controller.flat())
-        return found._replace(varies=found.varies or follows)
+        return found._replace(varies=self._varies)
+
+    @property
+    def _varies(self) -> bool:
+        """Whether belt, load, disturbance or the reference keep changing."""
+        plant, controller = self.plant, self.controller
+        signals: list[Any] = [plant.belt, plant.load, plant.disturbance]
+        if plant.expects_control and controller.control_law.follows_reference:
+            signals.append(controller.reference)
+        return any(each.kind in CHANGING_KINDS for each in signals)
 
     def cycle_meter(self, cycles: int) -> CycleMeter:
         """Return what measures the motion itself.
@@ -98,10 +110,10 @@ class Scenario:
         cycles : int
             Number of the last cycles.
         """
-        meter, reading = CycleMeter(cycles), self.reading
-        meter.drift.resolution = step = self.plant.sensor.position_resolution
-        meter.drift.judged = not reading.varies
-        meter.within = max(resolved(step), reading.within)
+        meter, plant = CycleMeter(cycles), self.plant
+        meter.drift.resolution = step = plant.sensor.position_resolution
+        meter.drift.judged = not self._varies
+        meter.within = max(resolved(step), held_range(plant.actuator.resolution, plant.stiffness))
         return meter
 
     @property

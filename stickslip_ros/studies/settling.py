@@ -223,7 +223,8 @@ def settle(case: ControlledDrive, start: MotionState, settling: SettlingOptions)
 
         def advance(duration: float, section: _Section) -> None:
             motion.advance(duration)
-            measure_block(motion, section.meter, section)
+            if motion.recording:
+                measure_block(motion, section.meter, section)
 
     def observe() -> _Section:
         motion.recording = False

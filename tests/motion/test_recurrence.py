@@ -29,7 +29,7 @@ def drive_of(law: str, seed: int) -> Drive:
 class Unknown(Recurrence):
     """Knows no phase: all are integrated."""
 
-    def is_known(self, mode: Any, state: Any, duration: Any, kept: Any) -> bool:
+    def is_known(self, mode: Any, state: Any, duration: Any, bound: Any, kept: Any) -> bool:
         return False
 
 
