@@ -1,6 +1,7 @@
 """The drive of most motions: a static law, constant belt speed and load, no actuator states."""
 
 from stickslip_ros.model.control import ContinuousControl
+from stickslip_ros.model.control.base import TwoBodyControl
 from stickslip_ros.model.creeping_drive import CreepingDrive
 from stickslip_ros.model.dimensionless_drive import POSITION, SPEED
 from stickslip_ros.model.drive import Drive, ScaledDrive
@@ -27,10 +28,20 @@ class PlainDriveSystem(DriveSystem):
         self._coefficient = self.drive.friction.coefficient
         # Whether the belt bends the spring; without one a held force never releases the slide.
         self._loads = self._speed != 0.0 and self.drive.has_spring
+        # A control that does not receive pairs: there is no motor.
+        control = None if isinstance(self.control, TwoBodyControl) else self.control
+        self._control_force = None if control is None else control.control_force
 
     def belt_speed(self, mode: Mode, time: float) -> float:
         """Return the speed of the belt."""
         return self._speed
+
+    def control_force(self, instant: Instant) -> float:
+        """Return the force on the slide: held, or continuous control."""
+        if self._control_force is None:
+            return super().control_force(instant)
+        state = instant.state
+        return self._control_force(state[POSITION], state[SPEED], state[self.control_states])
 
     def reaction(self, instant: Instant) -> float:
         """Return h = X + 2 beta X' - U - bias."""

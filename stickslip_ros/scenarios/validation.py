@@ -97,8 +97,7 @@ class ParameterGroup:
         """Return the pairs in the files that these parameters were made from, by path."""
         own: Any = self
         found = {own.file: own.points} if getattr(self, "points", ()) else {}
-        for each in fields(self):
-            group = getattr(self, each.name)
+        for group in vars(self).values():
             if isinstance(group, ParameterGroup):
                 found |= group.curves()
         return found

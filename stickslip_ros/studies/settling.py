@@ -246,8 +246,8 @@ def settle(case: ControlledDrive, start: MotionState, settling: SettlingOptions)
 
     section = observe()
     for _ in range(settling.patience - 1):
-        before, section = section.meter.measures(), observe()
-        measures = section.meter.measures()
+        before, section = section.measures, observe()
+        measures = section.measures
         if _is_settled(measures) and _alike(before, measures, section.meter.drift.resolution):
             break
     state = motion.control_state if control is not None else None
@@ -293,6 +293,7 @@ class _Section:
         self.meter = meter
         self._missing, self._once = max(cycles, LEAST_CYCLES), once
         self._sections = [np.empty(0)]
+        self._measures: Measures | None = None
 
     def take_motion(self, motion: MeasuredMotion) -> None:
         """Keep the turning points of the slide, as an observer."""
@@ -302,15 +303,23 @@ class _Section:
             turns = turns[np.diff(turns, prepend=np.nan) != 0.0]
         self._sections.append(turns)
         self._missing -= len(motion.cycles)
+        self._measures = None
+
+    @property
+    def measures(self) -> Measures:
+        """The measures so far."""
+        if self._measures is None or self.meter.unbounded:
+            self._measures = self.meter.measures()
+        return self._measures
 
     @property
     def done(self) -> bool:
         """Whether there are enough cycles, or no more will follow."""
-        return self._missing <= 0 or self.meter.measures().regime in RESTS
+        return self._missing <= 0 or self.measures.regime in RESTS
 
     def settled(self, end: MotionState) -> Settled:
         """Return the settled motion, which ended in the state `end`."""
-        measures = self.meter.measures()
+        measures = self.measures
         section = np.concatenate(self._sections)
         if measures.regime is Regime.UNBOUNDED:
             section = np.empty(0)

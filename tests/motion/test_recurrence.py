@@ -41,7 +41,7 @@ def integrating_all() -> Generator[None]:
 
 
 def motion_of(drive: Drive, control: Washout | None) -> RecordedMotion:
-    """Return the motion after long advances, of which two are recorded."""
+    """Return the motion after four advances, of which three are recorded."""
     motion = RecordedMotion(drive, 0.0, 0.0, control)
     motion.recording = False
     period = drive.natural_period
@@ -49,6 +49,7 @@ def motion_of(drive: Drive, control: Washout | None) -> RecordedMotion:
     motion.recording = True
     motion.advance(30.0 * period)
     motion.advance(13.37 * period)
+    motion.advance(6.0 * period)
     return motion
 
 
@@ -97,3 +98,13 @@ def test_a_settled_cycle_is_not_integrated_again() -> None:
     with integrating_all():
         motion.advance(1000.0)
     assert 10 * known < 2 * (len(entered) - known)
+
+
+def test_no_step_is_longer_than_the_bound_of_its_phase() -> None:
+    motion = RecordedMotion(PAPER, 0.0, 0.0)
+    flow = motion._flow
+    assert flow is not None
+    for _ in range(100):
+        flow.taylor.step()
+        length, bound = flow.taylor.last_h, flow.phase_bound() - flow.taylor.time
+        assert 0.0 <= bound < 10.0 * length
