@@ -38,7 +38,9 @@ def choose(candidates: Sequence[Fit]) -> tuple[Fit, Mapping[str, bool]]:
 
     A model is as good as the best one if the difference of their validation errors is within three
     standard errors, from its scatter over the parts, or if it is simpler and better than such a
-    one. A model with constants that the records do not tell is chosen only if all have some.
+    one: the rule of one standard error (L. Breiman et al., Classification and Regression Trees,
+    1984, section 3.4), with three. A model with constants that the records do not tell is chosen
+    only if all have some.
     """
     best = min(candidates, key=lambda each: each.error)
     near = [each for each in candidates if each is best or better_by(best, each) < _SIGNIFICANT]

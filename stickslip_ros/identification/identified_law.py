@@ -143,7 +143,8 @@ class IdentifiedLaw:
     def friction(self, values: Values, normal_force: float) -> FrictionLaw:
         """Return the law of coordinates."""
         kind: Any = LAWS[self.name]
-        own = {"static": self.static_force(values) / normal_force}
+        has_static = "static" in constants_of(kind)
+        own = {"static": self.static_force(values) / normal_force} if has_static else {}
         for name in self.coordinates:
             if name != "rise":
                 own[name] = values[name] / (1.0 if name in self.unscaled else normal_force)

@@ -323,15 +323,6 @@ class RateStateAdapter(IdentifiedLaw):
         ]
 
     @override
-    def friction(self, values: Values, normal_force: float) -> FrictionLaw:
-        return RateState(
-            **{
-                name: values[name] / (1.0 if name in self.unscaled else normal_force)
-                for name in self.coordinates
-            }
-        )
-
-    @override
     def bounds(self, name: str, values: Values, fastest: float) -> tuple[float, float]:
         if name == "slip_distance":
             amplitude = fastest * sqrt(values["mass"] / values["stiffness"])

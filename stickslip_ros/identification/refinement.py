@@ -60,7 +60,7 @@ class Refinement(Fit):
 
     @override
     def linearized(self) -> tuple[FloatArray, FloatArray, int]:
-        return self._derivatives, self.best.residual, self._lost
+        return self._derivatives, self.best.residual, 2 * len(self.best.starts)
 
     @override
     def values_at(self, point: FloatArray) -> Mapping[str, float]:
@@ -157,11 +157,6 @@ class Refinement(Fit):
         """Derivatives of the errors, at starts that follow them; shape (rows, numbers)."""
         return self.best.without_starts(self.best.by_names)
 
-    @property
-    def _lost(self) -> int:
-        """Number of values at the starts that were fitted besides."""
-        return 2 * len(self.best.starts)
-
     def gain(self, name: str) -> tuple[float, float]:
         """Return what fitting one more coordinate would bring, to first order.
 
@@ -178,7 +173,7 @@ class Refinement(Fit):
         if size <= (_OWN_SHARE * float(np.linalg.norm(column))) ** 2:
             return 0.0, 0.0
         rest = best.residual - basis @ (basis.T @ best.residual)
-        error = np.sqrt(block_covariance(alone[:, None], rest, self._lost)[0, 0])
+        error = np.sqrt(block_covariance(alone[:, None], rest, 2 * len(best.starts))[0, 0])
         along = float(alone @ rest)
         return -along / size / float(error), along * along / size / float(rest @ rest)
 
@@ -186,8 +181,10 @@ class Refinement(Fit):
 def repetition_of(errors: FloatArray) -> int | None:
     """Return the number of samples after which errors repeat; None if they do not.
 
-    Errors that are coloured only are alike over few samples, and less and less: their correlation
-    falls, and does not rise again.
+    It is the lag of the highest peak of their autocorrelation (G. E. P. Box, G. M. Jenkins, Time
+    Series Analysis, 1970) behind the first lag at which they are unlike. Errors
+    that are coloured only are alike over few samples, and less and less: their correlation falls,
+    and does not rise again.
     """
     from scipy.signal import correlate
 

@@ -300,8 +300,10 @@ def regress(
     """Fit the equation m a + c v + k x - bias + sgn(v_r) F(|v_r|) = u to rows.
 
     The curve F has forces of its own in each direction of the rows. `free` are the constants of
-    `LINEAR` that are fitted, `fixed` has the others. The shape of the curve, m/s, is fitted in each
-    direction unless it is given.
+    `LINEAR` that are fitted, `fixed` has the others. All are linear least squares (M. Gautier, W.
+    Khalil, Exciting trajectories for the identification of base inertial parameters of robots,
+    International Journal of Robotics Research 11(4), 1992); the shape of the curve, m/s, is fitted
+    in each direction around them (variable projection, see `refine`) unless it is given.
     """
     fit = Regression(rows, curve, free, fixed, np.empty(0), np.empty(0))
     directions = len(rows.directions)
@@ -327,7 +329,11 @@ def regress(
 
 
 def solve(design: FloatArray, wanted: FloatArray, least: FloatArray) -> FloatArray:
-    """Return the unknowns by least squares."""
+    """Return the unknowns by least squares, none below `least`.
+
+    Where the free solution goes below, it is that by bounded-variable least squares (P. B. Stark,
+    R. L. Parker, Computational Statistics 10, 1995).
+    """
     from scipy.optimize import lsq_linear
 
     scale = np.linalg.norm(design, axis=0)

@@ -22,6 +22,10 @@ _MEAN_SAMPLES, _MEAN_ERRORS = 5, 4.0
 def static_force(record: Record, held: FloatArray, sign: float) -> tuple[float, float]:
     """Return the largest friction that holds the slide, and the least at which it breaks loose, N.
 
+    It is a break-away test (B. Armstrong-Helouvry, P. Dupont, C. Canudas de Wit, Automatica 30(7),
+    1994): the largest mean force of a few samples while the position stays, and the largest force
+    until it is gone.
+
     `held` is the force that friction holds, N, shape (samples,), and `sign` the direction in which
     it pushes the slide over the belt. Static friction is between both; they are minus infinity and
     infinite where the slide never rests, and never starts. The instant of a break-away is known as

@@ -68,7 +68,9 @@ def servo_of(record: Record) -> Servo | None:
     """Return the controller whose forces a record has; None if it has no such controller.
 
     Gains are from linear least squares, for the difference that explains most, over the samples
-    with a finite reference.
+    with a finite reference. Samples far from the fit are left out and it is made again, up to ten
+    times: a least trimmed squares (P. J. Rousseeuw, Journal of the American Statistical
+    Association 79, 1984) whose share is not given but follows from the errors.
     """
     if record.reference is None or record.force is None or not record.force.any():
         return None

@@ -27,7 +27,12 @@ _UNBOUNDED_ERROR = 10.0
 
 @dataclass(frozen=True, eq=False)
 class Trajectories:
-    """A law with the segments of records that it is to predict."""
+    """A law with the segments of records that it is to predict.
+
+    Each has a state of its own at its start, as in multiple shooting (H. G. Bock, Numerical
+    treatment of inverse problems in chemical reaction kinetics, 1981), but need not join the next:
+    what a model lacks does not grow over a record.
+    """
 
     law: IdentifiedLaw
     directions: Sequence[float]

@@ -206,7 +206,9 @@ def free_run(record: Record, drive: Drive) -> tuple[float, FloatArray]:
     """Return the motion of a drive through a whole record, with its force and without feedback.
 
     It starts at the measured position with the velocity that fits best, m/s, which is returned
-    before the positions, m.
+    before the positions, m. The velocity is found by parabolas through three squared errors each
+    (successive parabolic interpolation, R. P. Brent, Algorithms for Minimization Without
+    Derivatives, 1973).
     """
     predictor = Predictor(record)
     first = record.position[:_FIRST]

@@ -84,7 +84,11 @@ def resolved(step: float, noise: float = 0.0) -> float:
 
 
 def medians(signal: FloatArray) -> FloatArray:
-    """Return the median of each value and those beside it; the first and the last as they are."""
+    """Return the median of each value and those beside it; the first and the last as they are.
+
+    Running medians of three take out single impulses and keep edges (J. W. Tukey, Exploratory Data
+    Analysis, 1977, chapter 7).
+    """
     middle = np.sort([signal[:-2], signal[1:-1], signal[2:]], axis=0)[1]
     return np.concatenate([signal[:1], middle, signal[1:][-1:]])
 
@@ -92,7 +96,8 @@ def medians(signal: FloatArray) -> FloatArray:
 def rises(signal: FloatArray, band: float) -> IntArray:
     """Return the rows at which a signal rises above a band about zero from below it.
 
-    Within the band, from minus to plus `band`, it may go to and fro: a Schmitt trigger.
+    Within the band, from minus to plus `band`, it may go to and fro: a Schmitt trigger (O. H.
+    Schmitt, A thermionic trigger, Journal of Scientific Instruments 15, 1938).
     """
     outside = np.flatnonzero(np.abs(signal) > band)
     return outside[1:][(signal[outside[1:]] > 0.0) & (signal[outside[:-1]] < 0.0)]
@@ -123,7 +128,10 @@ def impulses(signal: FloatArray, noise: float) -> BoolArray:
 def strongest_line(signal: FloatArray) -> float | None:
     """Return the cycles per sample of the motion that the spectrum of 32 samples or more shows.
 
-    None where no line has a fifth of the power and stands out from noise.
+    It is the mean frequency, weighted by power, of the largest line in the periodogram of the
+    signal without its trend, under the window sin^4 (F. J. Harris, On the use of windows for
+    harmonic analysis with the discrete Fourier transform, Proceedings of the IEEE 66(1), 1978).
+    None where no line has a fifth of the power and stands out from the median of the spectrum.
     """
     power = _spectrum(signal)
     at = int(np.argmax(power))

@@ -50,8 +50,11 @@ def ring_downs(
     """Yield the ring-downs of evenly spaced samples, in order of time.
 
     Taps and steps are found where the vibration changes by more than a decay does; their impulse
-    need not be known. Positions are in m, belt velocities in m/s, the sample period and the time
-    `after` which they start in s.
+    need not be known. Between them a sine whose amplitude decays by r' = -(s + q r^2) r (Nayfeh,
+    Mook, Nonlinear Oscillations, section 3.3) is fitted by Gauss-Newton least squares.
+
+    Positions are in m, belt velocities in m/s, the sample period and the time `after` which they
+    start in s.
     """
     step, noise, frequency = _signal(position, period)
     length, omega = round(1.0 / (frequency * period)), 2.0 * pi * frequency

@@ -67,7 +67,12 @@ def fit_reach(samples: NoisySamples, low: int, high: int, noise: float) -> int:
 
 
 def vertex(samples: NoisySamples, at: int, reach: int) -> Point:
-    """Return the highest or lowest point near a row, of the parabola through `reach` beside it."""
+    """Return the highest or lowest point near a row.
+
+    It is the vertex of the parabola that fits the samples up to `reach` rows beside it best, by
+    least squares: a local polynomial (Savitzky and Golay, Analytical Chemistry 36, 1964) at times
+    that need not be even. Where there are too few samples, or no bend, it is the sample.
+    """
     rows = slice(max(at - reach, 0), at + reach + 1)
     time, position = samples.time[rows], samples.position[rows]
     centre, scale = float(samples.time[at]), float(time[-1] - time[0])
