@@ -8,10 +8,14 @@
 The names below are loaded when they are first used: importing the package takes a few milliseconds.
 """
 
+import os
+
 from stickslip_ros.interrupts import NODE_SCRIPTS, end_quietly_if_interrupted, is_run
 
 if is_run(__name__, "stickslip", *NODE_SCRIPTS):
     end_quietly_if_interrupted()
+    # Small matrices gain nothing from more threads, whose waiting takes processors from the nodes.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from typing import TYPE_CHECKING, Any  # what takes time comes second
 

@@ -31,6 +31,9 @@ settings.load_profile("quick")
 # What a shell starts in the background ignores SIGINT, and what the tests start would, too.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
+# The workers fill the processors already: threads that wait in a loop would hold them up.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 STARTING_FIXTURES = {"cluster", "processes", "recorded", "start", "start_stickslip"}
 
 _STARTS = {"os.fork", "os.forkpty", "os.posix_spawn", "os.system", "subprocess.Popen"}

@@ -1,5 +1,6 @@
 """The noise of a signal: its deviation, the step of an encoder, impulses, and lines above it."""
 
+from importlib import import_module
 from math import comb, sqrt
 
 import numpy as np
@@ -60,6 +61,12 @@ def white_noise(signal: FloatArray) -> float:
 
 def _agree(lower: float, higher: float) -> bool:
     return lower / _LARGEST_RATIO < higher < _LARGEST_RATIO * lower
+
+
+def import_for_noise() -> None:
+    """Import the parts of SciPy that measures of samples with noise import when they need them."""
+    for name in ("scipy.ndimage", "scipy.optimize"):
+        import_module(name)
 
 
 def encoder_step(signal: FloatArray) -> float:
@@ -145,10 +152,11 @@ def strongest_line(signal: FloatArray) -> float | None:
 
 def _spectrum(signal: FloatArray) -> FloatArray:
     """Return the power of a signal without its trend, for frequencies from 0 to a half."""
-    from scipy.signal import detrend  # takes long to import
-
     count = len(signal)
     window = np.sin(np.pi * (np.arange(count) + 0.5) / count) ** 4
     scale = max(float(np.abs(signal).max()), 1e-300)
-    power: FloatArray = np.abs(np.fft.rfft(detrend(signal / scale) * window)) ** 2
+    row = np.arange(count) - (count - 1) / 2.0
+    level = signal / scale - float(np.mean(signal / scale))
+    rest = level - float(row @ level) / float(row @ row) * row
+    power: FloatArray = np.abs(np.fft.rfft(rest * window)) ** 2
     return power * scale**2 / float(window @ window)

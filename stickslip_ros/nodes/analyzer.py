@@ -14,6 +14,7 @@ from itertools import islice
 from math import inf
 from operator import attrgetter
 from pathlib import Path
+from threading import Thread
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -25,6 +26,7 @@ from std_msgs.msg import Float64
 from stickslip_ros.arrays import IntArray
 from stickslip_ros.errors import BagError, InvalidInputError, MessageError
 from stickslip_ros.measures.cycle_measures import trend_text
+from stickslip_ros.measures.noise import import_for_noise
 from stickslip_ros.measures.onset import OnsetWatch
 from stickslip_ros.measures.run_meter import RunMeter
 from stickslip_ros.measures.sample_assumptions import SampleAssumptions
@@ -325,7 +327,7 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
             JOINT_STATES, lambda messages, _: self._motion.read(messages), NO_SAMPLES, NO_FORCES
         )
         if self._motion.estimated and self._meter.motion.reading.noisy is None:
-            self._meter.motion.reading = SampleAssumptions(noisy=True)
+            self._assume(SampleAssumptions(noisy=True))
         windows = self._cycles // self.parameters.window
         for cycle in self._meter.motion.feed(states):
             values = (cycle.amplitude, cycle.stick_fraction, cycle.frequency)
@@ -447,7 +449,7 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         """Put the parameters of a node into the bag, and the curves in the files that they name."""
         self._keep(f"stickslip_ros/{node}", values)
         if node == "plant":
-            self._meter.motion.reading = self.parameters.reading_of(values)
+            self._assume(self.parameters.reading_of(values))
             with suppress(InvalidInputError, KeyError, TypeError):  # a plant of another version
                 period = Drive(mass=values["mass"], stiffness=values["stiffness"]).natural_period
                 self._watch.pause = max(1.0, period if period < inf else 0.0)
@@ -458,6 +460,11 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
                     curves[path] = read_pairs(path)
         if curves:
             self._keep(CURVES, curves)
+
+    def _assume(self, reading: SampleAssumptions) -> None:
+        self._meter.motion.reading = reading
+        if reading.noisy:  # imported when first used, it would hold up the recording for long
+            Thread(target=import_for_noise, name="imports").start()
 
     def _keep(self, name: str, values: Mapping[str, Any]) -> None:
         """Put a table of metadata into the bag: origin or results of the recording."""

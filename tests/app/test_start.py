@@ -118,3 +118,19 @@ def test_what_the_dashboard_needs_is_named(command: str) -> None:
     assert done.returncode == 1
     assert "pip install 'stickslip_ros[dashboard]'" in done.stderr
     assert "Traceback" not in done.stderr
+
+
+def test_a_run_of_exact_samples_needs_no_scipy() -> None:
+    run = """from stickslip_ros.testing import ClosedLoop
+    with ClosedLoop("paper") as loop:
+        assert loop.run(20.0).lost_samples == 0
+    """
+    assert "scipy" not in loaded(run)
+
+
+def test_commands_and_nodes_leave_the_other_processors_to_others(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
+    done = start("import os, stickslip_ros; print(os.environ['OPENBLAS_NUM_THREADS'])")
+    assert done.stdout == "1\n"

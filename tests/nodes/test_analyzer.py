@@ -431,3 +431,15 @@ def test_on_a_full_disk_it_says_so_and_goes_on_measuring(graph: Graph, tmp_path:
     report = report_of_recording(tmp_path / "bag_2")
     assert report["complete"]
     assert report["samples"] == 6001
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-6])
+def test_it_imports_what_only_noise_needs_as_soon_as_the_plant_has_some(
+    graph: Graph, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, noise: float
+) -> None:
+    imported: list[None] = []
+    monkeypatch.setattr(
+        "stickslip_ros.nodes.analyzer.import_for_noise", lambda: imported.append(None)
+    )
+    run_to_the_end(graph, tmp_path / "bag", duration=1.0, **{"sensor.position_noise": noise})
+    assert len(imported) == (noise > 0.0)
