@@ -12,8 +12,8 @@ TRUE = {
     "stiffness": study.STIFFNESS,
     "damping": 0.0,
     "bias_force": 0.0,
-    "static": study.NORMAL_FORCE * study.LAWS["coulomb"].static,
-    "viscous": study.NORMAL_FORCE * study.LAWS["coulomb"].viscous,
+    "static": study.NORMAL_FORCE * study.truth("coulomb", "taps")["friction.static"],
+    "viscous": study.NORMAL_FORCE * study.truth("coulomb", "taps")["friction.viscous"],
     DELAY: 0.0,
     LAG: 0.0,
 }
