@@ -387,11 +387,7 @@ def why_no_figure(scenario: Scenario) -> str | None:
     """
     plant, law = scenario.plant, scenario.control_law
     if law is None:
-        try:
-            BifurcationBranches.check(plant.as_drive())
-        except NotCoveredError as error:
-            return str(error)
-        return None
+        return _covered(lambda: BifurcationBranches.check(plant.as_drive()))[1]
     drive = plant.as_drive()
     no_loop = why_no_linear_loop(drive, plant.rate, plant.force_delay)
     _, no_map = _covered(lambda: require("the stability map", drive, ONE_MASS))

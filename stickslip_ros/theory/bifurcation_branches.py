@@ -1,6 +1,6 @@
 """Equilibria and limit cycles over the belt speed, stable and unstable, joined to branches.
 
-This is the bifurcation diagram of the theory. That of `studies/sweep.py` shows the motions
+This is the bifurcation diagram of the theory. That of `studies/study.py` shows the motions
 that a simulation settles on, which are stable.
 """
 
@@ -20,14 +20,7 @@ from stickslip_ros.model.drive import Drive
 from stickslip_ros.theory.hopf import HopfPoint, hopf_points
 from stickslip_ros.theory.limit_cycles import limit_cycles
 from stickslip_ros.theory.linear import hurwitz_determinants, jacobians
-from stickslip_ros.theory.requirements import (
-    AUTONOMOUS,
-    ONE_MASS,
-    SPRING,
-    STATIC,
-    SYMMETRIC,
-    require,
-)
+from stickslip_ros.theory.requirements import ONE_DEGREE, STATIC, SYMMETRIC, require
 from stickslip_ros.theory.shooting import LimitCycle
 from stickslip_ros.theory.sticking import StickingOnset, sticking_onset
 
@@ -115,7 +108,7 @@ class BifurcationBranches:
             If friction differs between the directions, belt or load follow a signal, or the drive
             has no spring.
         """
-        require("the bifurcation diagram", drive, ONE_MASS, SPRING, AUTONOMOUS, SYMMETRIC)
+        require("the bifurcation diagram", drive, *ONE_DEGREE, SYMMETRIC)
 
     @classmethod
     def over(cls, drive: Drive, belt_speeds: FloatArray) -> Self:
@@ -161,7 +154,13 @@ class BifurcationBranches:
         >>> cycle.stable, cycle.belt_speeds.round(4).tolist()
         (True, [0.3, 0.3388, 0.4, 0.4088, 0.4395, 0.4395, 0.4488, 0.4738, 0.4858, 0.4888])
         """
-        _check(drive, belt_speeds)
+        cls.check(drive)
+        ascending = len(belt_speeds) > 1 and np.all(np.diff(belt_speeds) > 0.0)
+        one_sign = ascending and belt_speeds[0] * belt_speeds[-1] > 0.0
+        if not (one_sign and np.all(np.isfinite(belt_speeds))):
+            raise InvalidInputError(
+                "the bifurcation diagram needs at least two belt speeds, ascending and of one sign"
+            )
         return cls._found(drive, belt_speeds, hopf_points(drive), _onset(drive))
 
     @classmethod
@@ -226,17 +225,6 @@ class BifurcationBranches:
             cycles=tuple(_joined(drive, rows, at_points)),
             hopf_points=tuple(points),
             sticking_onset=sticking if sticking is not None and low < sticking < high else None,
-        )
-
-
-def _check(drive: Drive, belt_speeds: FloatArray) -> None:
-    BifurcationBranches.check(drive)
-    ascending = len(belt_speeds) > 1 and np.all(np.diff(belt_speeds) > 0.0)
-    if not (
-        ascending and np.all(np.isfinite(belt_speeds)) and belt_speeds[0] * belt_speeds[-1] > 0
-    ):
-        raise InvalidInputError(
-            "the bifurcation diagram needs at least two belt speeds, ascending and of one sign"
         )
 
 

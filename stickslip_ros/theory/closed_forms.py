@@ -11,7 +11,7 @@ from typing import Self
 
 from stickslip_ros.model.drive import Drive
 from stickslip_ros.model.friction import Stribeck
-from stickslip_ros.theory.requirements import AUTONOMOUS, ONE_MASS, SPRING, require
+from stickslip_ros.theory.requirements import ONE_DEGREE, require
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ class CubicLoop:
         InvalidInputError
             If belt or load follow a signal, or the drive has no spring.
         """
-        require("the closed form", drive, ONE_MASS, SPRING, AUTONOMOUS)
+        require("the closed form", drive, *ONE_DEGREE)
         law = drive.dimensionless.friction
         if not isinstance(law, Stribeck) or drive.belt_speed == 0.0:
             return None

@@ -15,16 +15,8 @@ from stickslip_ros.theory.gain_intervals import (
     gains_of,
     nearest_to_zero,
 )
-from stickslip_ros.theory.hopf import ComplexPair, first_lyapunov_coefficient
 from stickslip_ros.theory.linear import expand
-from stickslip_ros.theory.requirements import (
-    AUTONOMOUS,
-    ONE_MASS,
-    SMOOTH,
-    SPRING,
-    STATIC,
-    require,
-)
+from stickslip_ros.theory.requirements import ONE_DEGREE, SMOOTH, STATIC, require
 from stickslip_ros.theory.shooting import LimitCycle, shoot
 
 _ROUNDING = 1e-9
@@ -81,7 +73,7 @@ def critical_gains(drive: Drive, gains: ContinuousControl) -> CriticalGains | No
     >>> round(critical.linear, 6), round(critical.cubic, 4)
     (-0.935296, 31.468)
     """
-    require("the critical gain", drive, ONE_MASS, SPRING, AUTONOMOUS)
+    require("the critical gain", drive, *ONE_DEGREE)
     own, unit = gains_of(gains), drive.normal_force / drive.speed_scale
     if own is None:
         return None
@@ -160,9 +152,8 @@ def _between(low: float, high: float) -> float:
 def _sigma(drive: Drive, gains: Washout) -> float:
     expansion = expand(drive, gains)
     assert expansion is not None
-    sigma = first_lyapunov_coefficient(expansion)
-    assert sigma is not None
-    return sigma
+    assert expansion.first_lyapunov_coefficient is not None
+    return expansion.first_lyapunov_coefficient
 
 
 def limit_cycle_from_hopf(drive: Drive, gains: ContinuousControl) -> LimitCycle | None:
@@ -233,7 +224,7 @@ def _by_normal_form(drive: Drive, gains: Washout, sigma: float) -> FloatArray | 
     That are displacement (m), filter state (m), period (s), and the memory of the law (SI).
     """
     expansion = expand(drive, gains)
-    pair = None if expansion is None else ComplexPair.from_expansion(expansion)
+    pair = None if expansion is None else expansion.pair
     if expansion is None or pair is None or isnan(sigma) or sigma * pair.growth >= 0.0:
         return None
     # Y = r cos(theta) is zero and rises at -pi/2.

@@ -5,10 +5,10 @@ the distance from the equilibrium, dimensionless, x'' + x = g(x') in the open lo
 g(y) = mu(y - v0) - mu(-v0) - 2 beta y, and the energy (x^2 + x'^2) / 2 changes by g dx.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from math import sqrt
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -20,14 +20,9 @@ from stickslip_ros.model.drive import UNBOUNDED_SPEED, Drive
 from stickslip_ros.model.equations import acceleration, guide_reaction, reaction
 from stickslip_ros.model.friction import SteadyPart
 from stickslip_ros.motion.motion import RecordedMotion
-from stickslip_ros.theory.requirements import (
-    AUTONOMOUS,
-    ONE_MASS,
-    SPRING,
-    STATIC,
-    SYMMETRIC,
-    require,
-)
+from stickslip_ros.theory.requirements import ONE_MASS, PLANAR, SPRING, require
+
+_Found = TypeVar("_Found")
 
 _PHASES = 2.0 * np.pi * np.arange(1024) / 1024
 
@@ -56,23 +51,15 @@ def longest_return(drive: Drive, control: ContinuousControl | None = None) -> fl
     It may stick, and creep at a similar speed, as far as static friction can bend the spring.
     Continuous control that pushes a slide at rest softens or stiffens the spring.
     """
-    if control is not None and drive.motor is not None:
-        # The control is a spring behind that of the transmission; both carry slide and motor.
+    if control is not None:
         own = control.scaled(drive)
-        behind = _static_force(own, 0.0) - _static_force(own, 1.0)
-        left = behind / (1.0 + behind) if behind > 0.0 else 1.0
-        mass = drive.mass + drive.motor.mass
-        drive = replace(drive, mass=mass, stiffness=drive.stiffness * left, motor=None)
-    elif control is not None:
-        drive = replace(drive, stiffness=drive.stiffness * _static_stiffness(drive, control))
+        spring, mass = _static_force(own, 0.0) - _static_force(own, 1.0), drive.mass
+        left = 1.0 + spring  # it is a spring beside that of the slide
+        if drive.motor is not None:  # behind that of the transmission; both carry slide and motor
+            left, mass = max(spring, 0.0) / (1.0 + max(spring, 0.0)), mass + drive.motor.mass
+        stiffness = drive.stiffness * left if left > 0.0 else drive.stiffness
+        drive = replace(drive, mass=mass, stiffness=stiffness, motor=None)
     return 4.0 * drive.natural_period + 2.0 * loading_time(drive)
-
-
-def _static_stiffness(drive: Drive, control: ContinuousControl) -> float:
-    """Return the share of the stiffness that is left under control at rest; 1 if it is none."""
-    own = control.scaled(drive)
-    left = 1.0 - (_static_force(own, 1.0) - _static_force(own, 0.0))
-    return left if left > 0.0 else 1.0
 
 
 def _static_force(control: ContinuousControl, position: float) -> float:
@@ -104,6 +91,14 @@ def follow(motion: RecordedMotion) -> Iterator[Breakpoints]:
         yield breakpoints
 
 
+def first_found(
+    motion: RecordedMotion, find: Callable[[Breakpoints], _Found | None]
+) -> _Found | None:
+    """Return what `find` first finds as the motion is followed; None if it finds nothing."""
+    found = map(find, follow(motion))
+    return next((each for each in found if each is not None), None)
+
+
 def least_cycle(drive: Drive, control: ContinuousControl | None = None) -> float | None:
     """Return the least speed, dimensionless, at which energy may be gained; the belt moves.
 
@@ -112,7 +107,7 @@ def least_cycle(drive: Drive, control: ContinuousControl | None = None) -> float
     gain balances the loss, so that there is no cycle up to `UNBOUNDED_SPEED`, unless energy is
     conserved. Raises InvalidInputError for a drive that it does not cover, see `requirements`.
     """
-    require("the energy of a cycle", drive, ONE_MASS, SPRING, AUTONOMOUS, STATIC, SYMMETRIC)
+    require("the energy of a cycle", drive, *PLANAR)
     speed, force = _net_force(drive)
     if control is not None:
         force = force + control.scaled(drive).bound(speed)
@@ -130,7 +125,7 @@ def largest_cycle(drive: Drive) -> float | None:
     where D = d - 2 n - max(l, p) is at least sqrt(2) v0. The energy then changes by less than
     2 (p + n) v0^2 / D - 2 (u - n) (D - v0^2 / D). None if there is no such u.
     """
-    require("the energy of a cycle", drive, ONE_MASS, SPRING, AUTONOMOUS, STATIC, SYMMETRIC)
+    require("the energy of a cycle", drive, *PLANAR)
     speed, force = _net_force(drive)
     belt_speed = abs(drive.belt_speed) / drive.speed_scale
     above, below = force[speed > belt_speed], force[speed <= 0.0]
@@ -182,7 +177,7 @@ def averaged_growth(drive: Drive, belt_speed: Any, amplitude: Any) -> FloatArray
     that has a memory or differs between the directions, for a belt or load with a signal, and
     without a spring.
     """
-    require("averaging", drive, ONE_MASS, SPRING, AUTONOMOUS, STATIC, SYMMETRIC)
+    require("averaging", drive, *PLANAR)
     law = drive.dimensionless.friction
     belt_speed, amplitude = np.asarray(belt_speed, float), np.asarray(amplitude, float)
     relative_speed = np.multiply.outer(amplitude, np.cos(_PHASES)) - belt_speed[..., np.newaxis]

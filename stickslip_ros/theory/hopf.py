@@ -2,25 +2,15 @@
 
 from dataclasses import dataclass, replace
 from math import nan
-from typing import Any, Self
 
 import numpy as np
-import numpy.typing as npt
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.model.control import ContinuousControl
-from stickslip_ros.model.dimensionless_drive import SPEED
 from stickslip_ros.model.drive import Drive
 from stickslip_ros.model.functions import zero_between
 from stickslip_ros.theory.linear import Expansion, expand, hurwitz_determinants, jacobians
-from stickslip_ros.theory.requirements import (
-    AUTONOMOUS,
-    SMOOTH,
-    SPRING,
-    SYMMETRIC,
-    require,
-    require_position_loop,
-)
+from stickslip_ros.theory.requirements import SMOOTH, SYMMETRIC, require_equilibrium
 
 _BELT_SPEEDS = np.geomspace(1e-6, 1e3, 4001)
 """Dimensionless belt speeds, half a percent apart, between which sign changes are searched for."""
@@ -44,7 +34,7 @@ class HopfPoint:
     crossing_speed: float
     """Rate of change of the pair's real part with the belt speed, 1/s per m/s; eq. 11 and 22."""
     first_lyapunov_coefficient: float
-    """sigma, dimensionless; see the function `first_lyapunov_coefficient`.
+    """sigma, dimensionless; see `Expansion.first_lyapunov_coefficient`.
 
     It is nan where friction has no second derivative, as that of the elasto-plastic law.
     """
@@ -53,32 +43,6 @@ class HopfPoint:
     def supercritical(self) -> bool:
         """Whether a stable vibration is known to start here with a small amplitude."""
         return self.first_lyapunov_coefficient < 0.0
-
-
-@dataclass(frozen=True)
-class ComplexPair:
-    """The complex pair of eigenvalues that decays slowest, or grows fastest."""
-
-    growth: float
-    """Real part."""
-    frequency: float
-    """Imaginary part, above zero."""
-    right: npt.NDArray[np.complex128]
-    """q with A q = (growth + i frequency) q."""
-    left: npt.NDArray[np.complex128]
-    """p with A^T p = (growth - i frequency) p, and p* q = 1."""
-
-    @classmethod
-    def from_expansion(cls, expansion: Expansion) -> Self | None:
-        """Return the pair of the Jacobian; None if its eigenvalues are real."""
-        decomposed: Any = np.linalg.eig(expansion.jacobian)
-        values, right = decomposed
-        upper = int(np.argmax(np.where(values.imag > 0.0, values.real, -np.inf)))
-        if values[upper].imag <= 0.0:
-            return None
-        left = np.linalg.inv(right)[upper].conj()
-        value = complex(values[upper])
-        return cls(value.real, value.imag, right[:, upper], left)
 
 
 def hopf_points(drive: Drive, control: ContinuousControl | None = None) -> list[HopfPoint]:
@@ -118,8 +82,7 @@ def hopf_points(drive: Drive, control: ContinuousControl | None = None) -> list[
     >>> round(point.belt_speed, 6), point.supercritical
     (0.488763, True)
     """
-    require("the search for Hopf points", drive, SPRING, AUTONOMOUS)
-    require_position_loop("the search for Hopf points", drive, control)
+    require_equilibrium("the search for Hopf points", drive, control)
     smooth = SMOOTH.lack(drive) is None
     mirrored = SYMMETRIC.lack(drive) is None
     belt_speeds = _BELT_SPEEDS if mirrored or drive.belt_speed >= 0.0 else -_BELT_SPEEDS
@@ -135,7 +98,7 @@ def hopf_points(drive: Drive, control: ContinuousControl | None = None) -> list[
         at_point = replace(drive, belt_speed=speed * drive.speed_scale)
         expansion = expand(at_point, control)
         assert expansion is not None
-        crossing, sigma = crossing_speed(expansion), first_lyapunov_coefficient(expansion)
+        crossing, sigma = expansion.crossing_speed, expansion.first_lyapunov_coefficient
         if crossing is None or sigma is None or not _crosses(expansion):
             continue
         points.append(
@@ -147,61 +110,6 @@ def hopf_points(drive: Drive, control: ContinuousControl | None = None) -> list[
             )
         )
     return points
-
-
-def first_lyapunov_coefficient(expansion: Expansion) -> float | None:
-    """Return sigma of r' = alpha r + sigma r^3, r the amplitude of the dimensionless speed.
-
-    By projection onto the critical eigenvectors, for any order n: Kuznetsov, Elements of Applied
-    Bifurcation Theory, section 5.4. His coefficient is that of the amplitude along the eigenvector
-    and is divided by the frequency.
-
-    Parameters
-    ----------
-    expansion : Expansion
-        Expansion at a Hopf point.
-
-    Returns
-    -------
-    float or None
-        sigma, dimensionless; below zero the Hopf point is supercritical. None if all eigenvalues
-        are real.
-    """
-    jacobian, quadratic, cubic = expansion.jacobian, expansion.quadratic, expansion.cubic
-    pair = ComplexPair.from_expansion(expansion)
-    if pair is None:
-        return None
-    frequency, q, p = pair.frequency, pair.right, pair.left
-    conjugate = q.conj()
-    mean = np.linalg.solve(jacobian, np.einsum("ijk,j,k", quadratic, q, conjugate))
-    double = np.linalg.solve(
-        2j * frequency * np.eye(len(jacobian)) - jacobian, np.einsum("ijk,j,k", quadratic, q, q)
-    )
-    projected = p.conj() @ (
-        np.einsum("ijkl,j,k,l", cubic, q, q, conjugate)
-        - 2.0 * np.einsum("ijk,j,k", quadratic, q, mean)
-        + np.einsum("ijk,j,k", quadratic, conjugate, double)
-    )
-    return float(projected.real / (8.0 * abs(q[SPEED]) ** 2))
-
-
-def crossing_speed(expansion: Expansion) -> float | None:
-    """Return d Re(l)/d v0 of the complex pair l, eq. 11 and 22.
-
-    Parameters
-    ----------
-    expansion : Expansion
-        Expansion at the belt speed v0.
-
-    Returns
-    -------
-    float or None
-        Slope, dimensionless; None if all eigenvalues are real.
-    """
-    pair = ComplexPair.from_expansion(expansion)
-    if pair is None:
-        return None
-    return float((pair.left.conj() @ expansion.jacobian_by_belt_speed @ pair.right).real)
 
 
 def _crosses(expansion: Expansion) -> bool:

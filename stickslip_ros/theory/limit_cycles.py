@@ -25,13 +25,11 @@ from stickslip_ros.theory.cycle_bounds import (
 )
 from stickslip_ros.theory.linear import expand
 from stickslip_ros.theory.requirements import (
-    AUTONOMOUS,
-    ONE_MASS,
-    SPRING,
+    ONE_DEGREE,
     STATIC,
     SYMMETRIC,
     require,
-    require_position_loop,
+    require_equilibrium,
 )
 from stickslip_ros.theory.shooting import AGREEMENT, LimitCycle, next_turn, solve
 
@@ -83,8 +81,7 @@ def limit_cycle_of_run(
         If friction differs between the directions, belt or load follow a signal, or the drive has
         no spring.
     """
-    require("the limit cycle of a run", drive, SPRING, AUTONOMOUS, SYMMETRIC)
-    require_position_loop("the limit cycle of a run", drive, control)
+    require_equilibrium("the limit cycle of a run", drive, control, SYMMETRIC)
     bounded = STATIC.lack(drive) is None and drive.motor is None
     if drive.belt_speed == 0.0 or (bounded and least_cycle(drive, control) is None):
         return None
@@ -138,7 +135,7 @@ def limit_cycles(drive: Drive) -> list[LimitCycle]:
     >>> round(cycle.measures.amplitude, 6), cycle.stable
     (0.434086, True)
     """
-    require("the search for limit cycles", drive, ONE_MASS, SPRING, AUTONOMOUS, SYMMETRIC)
+    require("the search for limit cycles", drive, *ONE_DEGREE, SYMMETRIC)
     static = STATIC.lack(drive) is None
     if drive.belt_speed == 0.0 or (static and least_cycle(drive) is None):
         return []

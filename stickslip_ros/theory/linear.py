@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import permutations
 from math import copysign
-from typing import Any
+from typing import Any, Self
 
 import heyoka as hy
 import numpy as np
@@ -25,12 +25,7 @@ from stickslip_ros.model.drive import Drive
 from stickslip_ros.model.drive_system import SLIP, DriveSystem
 from stickslip_ros.model.plain_drive import drive_system
 from stickslip_ros.motion.compiled_flow import evaluated, flow_rates
-from stickslip_ros.theory.requirements import (
-    AUTONOMOUS,
-    SPRING,
-    require,
-    require_position_loop,
-)
+from stickslip_ros.theory.requirements import require_equilibrium
 
 _ORDERS = (1, 2, 3)
 """Orders of the derivatives."""
@@ -38,6 +33,32 @@ _ORDERS = (1, 2, 3)
 _ITERATIONS = 50
 _CONVERGED_STEP = 1e-14
 """Step, relative to the state or to one, below which Newton's method has converged."""
+
+
+@dataclass(frozen=True)
+class ComplexPair:
+    """The complex pair of eigenvalues that decays slowest, or grows fastest."""
+
+    growth: float
+    """Real part."""
+    frequency: float
+    """Imaginary part, above zero."""
+    right: npt.NDArray[np.complex128]
+    """q with A q = (growth + i frequency) q."""
+    left: npt.NDArray[np.complex128]
+    """p with A^T p = (growth - i frequency) p, and p* q = 1."""
+
+    @classmethod
+    def of(cls, jacobian: FloatArray) -> Self | None:
+        """Return the pair of a matrix; None if its eigenvalues are real."""
+        decomposed: Any = np.linalg.eig(jacobian)
+        values, right = decomposed
+        upper = int(np.argmax(np.where(values.imag > 0.0, values.real, -np.inf)))
+        if values[upper].imag <= 0.0:
+            return None
+        left = np.linalg.inv(right)[upper].conj()
+        value = complex(values[upper])
+        return cls(value.real, value.imag, right[:, upper], left)
 
 
 @dataclass(frozen=True)
@@ -63,6 +84,44 @@ class Expansion:
         """Eigenvalues of A, sorted by decreasing real part, then imaginary part; shape (n,)."""
         found = np.linalg.eigvals(self.jacobian).astype(np.complex128)
         return np.array(sorted(found, key=lambda value: (-round(value.real, 14), -value.imag)))
+
+    @cached_property
+    def pair(self) -> ComplexPair | None:
+        """The complex pair of A that decays slowest; None if all eigenvalues are real."""
+        return ComplexPair.of(self.jacobian)
+
+    @property
+    def crossing_speed(self) -> float | None:
+        """Slope d Re(l)/d v0 of the pair l, eq. 11 and 22; None if all eigenvalues are real."""
+        if self.pair is None:
+            return None
+        left, right = self.pair.left.conj(), self.pair.right
+        return float((left @ self.jacobian_by_belt_speed @ right).real)
+
+    @property
+    def first_lyapunov_coefficient(self) -> float | None:
+        """Coefficient sigma of r' = alpha r + sigma r^3 at a Hopf point, r the speed amplitude.
+
+        Below zero the Hopf point is supercritical. None if all eigenvalues are real. By projection
+        onto the critical eigenvectors, for any order n: Kuznetsov, Elements of Applied Bifurcation
+        Theory, section 5.4. His coefficient is that of the amplitude along the eigenvector and is
+        divided by the frequency.
+        """
+        jacobian, quadratic, pair = self.jacobian, self.quadratic, self.pair
+        if pair is None:
+            return None
+        q, conjugate = pair.right, pair.right.conj()
+        mean = np.linalg.solve(jacobian, np.einsum("ijk,j,k", quadratic, q, conjugate))
+        double = np.linalg.solve(
+            2j * pair.frequency * np.eye(len(jacobian)) - jacobian,
+            np.einsum("ijk,j,k", quadratic, q, q),
+        )
+        projected = pair.left.conj() @ (
+            np.einsum("ijkl,j,k,l", self.cubic, q, q, conjugate)
+            - 2.0 * np.einsum("ijk,j,k", quadratic, q, mean)
+            + np.einsum("ijk,j,k", quadratic, conjugate, double)
+        )
+        return float(projected.real / (8.0 * abs(q[SPEED]) ** 2))
 
     @property
     def stable(self) -> bool | None:
@@ -116,8 +175,7 @@ def expand(drive: Drive, control: ContinuousControl | None = None) -> Expansion 
     >>> round(float(expansion.eigenvalues[0].real), 6)
     0.071
     """
-    require("the expansion at the equilibrium", drive, SPRING, AUTONOMOUS)
-    require_position_loop("the expansion at the equilibrium", drive, control)
+    require_equilibrium("the expansion at the equilibrium", drive, control)
     if drive.belt_speed == 0.0:
         return None
     states, (first, second, third) = _at_equilibrium(

@@ -33,11 +33,15 @@ def require(function: str, drive: Drive, *requirements: Requirement) -> None:
             raise NotCoveredError(f"{function} needs {requirement.need}: {lack}")
 
 
-def require_position_loop(function: str, drive: Drive, control: ContinuousControl | None) -> None:
-    """Raise NotCoveredError, which names the function, where nothing holds a motor at a position.
+def require_equilibrium(
+    function: str, drive: Drive, control: ContinuousControl | None, *requirements: Requirement
+) -> None:
+    """Raise NotCoveredError, which names the function, where a loop has no equilibrium.
 
-    A drive with an ideal motor needs no control.
+    It needs a spring, constant belt speed and load, and a control that holds a motor at a position;
+    a drive with an ideal motor needs no control. There may be further `requirements`.
     """
+    require(function, drive, SPRING, AUTONOMOUS, *requirements)
     if drive.motor is None or (control is not None and _holds_position(control.scaled(drive))):
         return
     raise NotCoveredError(no_position_loop(function, "the control" if control else "no control"))
@@ -115,3 +119,9 @@ SMOOTH = Requirement("friction that is smooth in steady slip", _no_second_deriva
 
 SYMMETRIC = Requirement("friction that is the same in both directions", _asymmetry)
 """The coefficient is an odd function of the relative speed."""
+
+ONE_DEGREE = (ONE_MASS, SPRING, AUTONOMOUS)
+"""Only the slide moves, about one equilibrium."""
+
+PLANAR = (*ONE_DEGREE, STATIC, SYMMETRIC)
+"""Displacement and velocity determine the motion, and either direction is as good."""

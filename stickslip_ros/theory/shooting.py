@@ -23,13 +23,8 @@ from stickslip_ros.model.drive import Drive
 from stickslip_ros.model.hybrid import Mode
 from stickslip_ros.motion.variational import ShootingMotion, TooStiffError
 from stickslip_ros.samples import RESTING_MOTOR, MotorSample
-from stickslip_ros.theory.cycle_bounds import follow, longest_return
-from stickslip_ros.theory.requirements import (
-    AUTONOMOUS,
-    SPRING,
-    require,
-    require_position_loop,
-)
+from stickslip_ros.theory.cycle_bounds import first_found, longest_return
+from stickslip_ros.theory.requirements import require_equilibrium
 
 AGREEMENT = 1e-6
 """Relative tolerance for a turn of a run, or a measured period, to agree with the previous one."""
@@ -121,8 +116,7 @@ def shoot(
     >>> round(shoot(drive, position=-0.1, period=6.4).period, 6)
     6.392424
     """
-    require("shooting", drive, SPRING, AUTONOMOUS)
-    require_position_loop("shooting", drive, control)
+    require_equilibrium("shooting", drive, control)
     if drive.belt_speed == 0.0:
         return None
     motion = ShootingMotion(drive, control)
@@ -136,8 +130,7 @@ def shoot(
 def next_turn(motion: ShootingMotion, state: FloatArray) -> tuple[FloatArray, float] | None:
     """Return state and time (s) of the next upward turn, or None; the motion is left there."""
     motion.start(state)
-    turns = (_first_turn(breakpoints) for breakpoints in follow(motion))
-    turn = next((turn for turn in turns if turn is not None), None)
+    turn = first_found(motion, _first_turn)
     if turn is None:
         return None
     motion.start(state)

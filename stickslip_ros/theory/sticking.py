@@ -1,6 +1,6 @@
 """The belt speeds at which the slide sticks once a cycle, and the highest of them, the onset."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import tanh
@@ -13,18 +13,11 @@ from stickslip_ros.model.functions import zero_between
 from stickslip_ros.motion import RecordedMotion
 from stickslip_ros.theory.cycle_bounds import (
     averaged_growth,
-    follow,
+    first_found,
     least_cycle,
     release_position,
 )
-from stickslip_ros.theory.requirements import (
-    AUTONOMOUS,
-    ONE_MASS,
-    SPRING,
-    STATIC,
-    SYMMETRIC,
-    require,
-)
+from stickslip_ros.theory.requirements import PLANAR, require
 
 _AVERAGED_SPEEDS = np.geomspace(1e-4, 1e4, 200)
 """Dimensionless belt speeds between which averaging searches for an onset."""
@@ -104,7 +97,7 @@ def sticking_onset(drive: Drive) -> StickingOnset:
     >>> round(onset.approximate, 6), round(onset.exact, 6)
     (0.437163, 0.439472)
     """
-    require("the stick-slip onset speed", drive, ONE_MASS, SPRING, AUTONOMOUS, STATIC, SYMMETRIC)
+    require("the stick-slip onset speed", drive, *PLANAR)
     approximate, no_approximate = _averaged(drive)
     reference = approximate or abs(drive.belt_speed) or drive.speed_scale
     speeds = (reference * _FOLLOWED_SPEEDS).tolist()
@@ -151,8 +144,7 @@ def _followed(drive: Drive, speeds: Sequence[float]) -> _Onset:
     """Return the exact onset, or the reason why there is none; the speeds to try descend."""
 
     def excess(speed: float) -> float:
-        at_speed = replace(drive, belt_speed=speed)
-        return -1.0 if least_cycle(at_speed) is None else release_excess(at_speed)
+        return _at_speed(drive, speed, release_excess)
 
     above = None
     for speed in speeds:
@@ -181,8 +173,7 @@ def _ranges(
     """Yield the ranges of belt speeds, ascending, at which a slide that stuck sticks again."""
 
     def margin(speed: float) -> float:
-        at_speed = replace(drive, belt_speed=speed)
-        return -1.0 if least_cycle(at_speed) is None else tanh(release_margin(at_speed))
+        return tanh(_at_speed(drive, speed, release_margin))
 
     tried = [(speed, margin(speed)) for speed in speeds if onset is None or speed < onset]
     if onset is not None:  # below it there is a range, however narrow
@@ -202,6 +193,12 @@ def _ranges(
         yield low, tried[-1][0] if onset is None else onset
 
 
+def _at_speed(drive: Drive, speed: float, margin: Callable[[Drive], float]) -> float:
+    """Return a margin at a belt speed, -1 if there is no cycle."""
+    at_speed = replace(drive, belt_speed=speed)
+    return -1.0 if least_cycle(at_speed) is None else margin(at_speed)
+
+
 def release_excess(drive: Drive) -> float:
     """Return the share of the belt speed by which the slide's next upward speed exceeds it.
 
@@ -212,8 +209,7 @@ def release_excess(drive: Drive) -> float:
     it per unit of time, as an orbit does that touches. Raises RunError for a motion too stiff
     to follow.
     """
-    peaks = (_highest(breakpoints, drive.belt_speed) for breakpoints in _follow_release(drive))
-    peak = next((peak for peak in peaks if peak is not None), None)
+    peak = first_found(_released(drive), lambda found: _highest(found, drive.belt_speed))
     if peak is None:
         return -1.0
     position, velocity = peak
@@ -236,17 +232,17 @@ def release_margin(drive: Drive) -> float:
     excess = release_excess(drive)
     if excess <= 0.0:
         return excess
-    entries = (_entry(breakpoints, drive.belt_speed) for breakpoints in _follow_release(drive))
-    position = next((entry for entry in entries if entry is not None), None)
+    position = first_found(_released(drive), lambda found: _entry(found, drive.belt_speed))
     if position is None:
         return -1.0
     return min(excess, (release_position(drive) - position) / drive.length_scale)
 
 
-def _follow_release(drive: Drive) -> Iterator[Breakpoints]:
+def _released(drive: Drive) -> RecordedMotion:
+    """Return the motion of a slide that the belt has just released."""
     motion = RecordedMotion(drive, release_position(drive), drive.belt_speed)
     motion.take_breakpoints()
-    return follow(motion)
+    return motion
 
 
 def _highest(breakpoints: Breakpoints, belt_speed: float) -> tuple[float, float] | None:

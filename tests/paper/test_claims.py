@@ -38,7 +38,6 @@ from stickslip_ros.paper.figures import (
     portrait_of,
     unit_drive,
 )
-from stickslip_ros.theory.hopf import first_lyapunov_coefficient
 
 HOLDS, CORRECTED, FAILS = Verdict.HOLDS, Verdict.CORRECTED, Verdict.FAILS
 
@@ -232,7 +231,7 @@ def test_the_nonlinearity_of_the_closed_loop(cubic: float) -> None:
     q = Nonlinearity.at(at_critical_gain)
     assert q.frequency == pytest.approx(np.sqrt(1.0 - p * d), rel=1e-9)
     assert sigma_of_coefficients(q) == pytest.approx(
-        first_lyapunov_coefficient(at_critical_gain), rel=1e-9
+        at_critical_gain.first_lyapunov_coefficient, rel=1e-9
     )
 
 

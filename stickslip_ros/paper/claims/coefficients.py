@@ -31,7 +31,6 @@ from stickslip_ros.paper.claims.paper_values import (
     number_for_both,
 )
 from stickslip_ros.paper.claims.verdict import Computations, Evidence, Formula, Number, Observation
-from stickslip_ros.theory.hopf import first_lyapunov_coefficient
 from stickslip_ros.theory.linear import Expansion
 
 computes = Computations()
@@ -119,9 +118,7 @@ class Nonlinearity:
         jacobian = np.diag([0.0, 0.0, self.third_eigenvalue])[:n, :n]
         jacobian[0, 1], jacobian[1, 0] = -w, w
         expansion = Expansion(np.zeros(n), jacobian, self.second, self.third, np.zeros((n, n)))
-        found = first_lyapunov_coefficient(expansion)
-        assert found is not None
-        return found
+        return known(expansion.first_lyapunov_coefficient)
 
     @property
     def _z(self) -> npt.NDArray[np.complex128]:
@@ -253,7 +250,7 @@ def _(_: Evidence) -> Formula:
 
 
 computes["eq-15-value"] = lambda _: Number(
-    known(first_lyapunov_coefficient(at(OPEN.hopf.belt_speed).expansion))
+    known(at(OPEN.hopf.belt_speed).expansion.first_lyapunov_coefficient)
 )
 computes["eq-15-imaginary"] = lambda _: number_for_both(
     lambda damping: ((q := _at_hopf_point(damping)).g20 * q.g11).real / 2.0

@@ -27,7 +27,6 @@ from stickslip_ros.paper.claims.paper_values import (
     printed_trace,
 )
 from stickslip_ros.paper.claims.verdict import Computations, Evidence, Formula, Number, Observation
-from stickslip_ros.theory.hopf import crossing_speed
 from stickslip_ros.theory.linear import hurwitz_determinants
 
 computes = Computations()
@@ -200,7 +199,7 @@ computes["eq-22-value"] = lambda _: number_for_both(_crossing)
 
 def _crossing(damping: float) -> float:
     gains = replace(FILTER, linear_gain=critical(STUDIED_SPEED, damping).linear)
-    return known(crossing_speed(at(STUDIED_SPEED, damping, gains).expansion))
+    return known(at(STUDIED_SPEED, damping, gains).expansion.crossing_speed)
 
 
 computes["eq-11-product"] = lambda _: Number(-3.6 * PRINTED_HOPF_SPEED)
