@@ -90,11 +90,7 @@ def slips_in(
     They are looked for from the `landing` on, the row at which a stick begins; without one, from
     the start on, and when the first stick began is not known.
     """
-    from scipy.ndimage import maximum_filter1d, median_filter  # takes long to import
-
-    # The last medians are not known yet.
-    smooth = median_filter(position, _MEDIAN, mode="nearest")[: -(_MEDIAN // 2)]
-    before = maximum_filter1d(smooth, span + 1, origin=span // 2, mode="nearest")
+    smooth, before = _smooth_and_highest(position, span)
     found: list[tuple[Slip, int]] = []
     while True:
         begin = landing or 0
@@ -120,6 +116,14 @@ def slips_in(
         top += int(np.argmax(smooth[top : start + 1]))
         found.append((_slip(time, smooth, top, bottom, landing), bottom))
         landing = bottom
+
+
+def _smooth_and_highest(position: FloatArray, span: int) -> tuple[FloatArray, FloatArray]:
+    """Return the medians but the last, not known yet, and the highest of each and `span` before."""
+    from scipy.ndimage import maximum_filter1d, median_filter  # takes long to import
+
+    smooth: FloatArray = median_filter(position, _MEDIAN, mode="nearest")[: -(_MEDIAN // 2)]
+    return smooth, maximum_filter1d(smooth, span + 1, origin=span // 2, mode="nearest")
 
 
 def _slip(time: FloatArray, smooth: FloatArray, top: int, bottom: int, landing: int | None) -> Slip:
@@ -159,7 +163,7 @@ class SlipMeter:
 
     def _begin(self) -> None:
         self._time, self._position = np.empty(0), np.empty(0)
-        self._span = 0
+        self._span = self._searched = 0
         self._landing: int | None = None
 
     def feed(self, time: FloatArray, position: FloatArray) -> list[Slip]:
@@ -182,8 +186,15 @@ class SlipMeter:
             step = float(time[_MEDIAN * 2] - time[0]) / (_MEDIAN * 2)
             span = min(self.threshold.within / step, _MOST_SAMPLES) if step > 0.0 else 1
             self._span = max(round(span), 1)
+        # What was searched is not searched again while nothing drops; the filters reach back.
+        recent = self._position[max(self._searched - self._span - 2 * _MEDIAN, 0) :]
+        smooth, highest = _smooth_and_highest(recent, self._span)
+        if not (smooth < highest - self.threshold.drop).any():
+            self._searched = len(time)
+            return []
         found = slips_in(time, self._position, self.threshold.drop, self._span, self._landing)
         if found:
+            self._searched = 0
             # What is found must not depend on the blocks: the filters reach back.
             kept = max(found[-1][1] - self._span - _MEDIAN, 0)
             self._time, self._position = time[kept:], self._position[kept:]

@@ -8,8 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.measures import Regime
+from stickslip_ros.measures import Regime, slips
 from stickslip_ros.measures.sample_assumptions import SampleAssumptions
 from stickslip_ros.measures.slips import SlipMeter, SlipThreshold, regime_by_slips
 from stickslip_ros.record.report import report_of_recording
@@ -45,12 +46,12 @@ def sawtooth(noise: float = 0.0, seed: int = 1) -> tuple[np.ndarray, np.ndarray,
 def test_the_slips_of_a_sawtooth_are_found(noise: float) -> None:
     time, position, drops = sawtooth(noise)
     meter = SlipMeter(SlipThreshold(1e-4))
-    slips = meter.feed(time, position)
-    assert [slip.drop for slip in slips] == pytest.approx(drops.tolist(), abs=5e-6 + 4.0 * noise)
+    found = meter.feed(time, position)
+    assert [slip.drop for slip in found] == pytest.approx(drops.tolist(), abs=5e-6 + 4.0 * noise)
     # From a tenth to nine tenths, a half cosine takes 0.59 of its time.
-    assert [slip.slip_time for slip in slips] == pytest.approx([0.59 * SLIP_TIME] * 30, abs=3e-3)
-    speeds = [slip.stick_velocity for slip in slips[1:]]
-    errors = [slip.stick_velocity_error for slip in slips[1:]]
+    assert [slip.slip_time for slip in found] == pytest.approx([0.59 * SLIP_TIME] * 30, abs=3e-3)
+    speeds = [slip.stick_velocity for slip in found[1:]]
+    errors = [slip.stick_velocity_error for slip in found[1:]]
     assert np.mean(speeds) == pytest.approx(BELT, rel=0.01)
     if noise:
         assert np.std(np.array(speeds) - BELT) == pytest.approx(np.mean(errors), rel=0.5)
@@ -77,6 +78,20 @@ def test_impulses_and_slow_drops_are_no_slips() -> None:
     position = -2e-4 * time
     position[500::1000] -= 1e-2
     assert SlipMeter(SlipThreshold(1e-4)).feed(time, position) == []
+
+
+def test_what_does_not_slip_is_searched_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    searched: list[int] = []
+    whole = slips._smooth_and_highest
+
+    def counted(position: FloatArray, span: int) -> tuple[FloatArray, FloatArray]:
+        searched.append(len(position))
+        return whole(position, span)
+
+    monkeypatch.setattr(slips, "_smooth_and_highest", counted)
+    time = np.arange(100_000) * 1e-3
+    SlipMeter(SlipThreshold(1e-4)).feed(time, BELT * time)
+    assert sum(searched) == pytest.approx(len(time), rel=0.05)
 
 
 def test_an_oscillation_is_no_stick_slip() -> None:
