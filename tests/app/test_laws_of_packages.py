@@ -104,7 +104,7 @@ def test_a_control_law_of_another_package_is_shown_and_in_the_schema(with_packag
 
 
 @pytest.mark.parametrize(
-    "how", [pytest.param(["--composed"], marks=pytest.mark.long), []], ids=["composed", "processes"]
+    "how", [["--composed"], pytest.param([], marks=pytest.mark.long)], ids=["composed", "processes"]
 )
 def test_a_control_law_of_another_package_runs_as_a_node(
     with_packages: Run, how: list[str]

@@ -27,9 +27,10 @@ def logged(folder: Path, feed: float) -> Path:
     return path
 
 
-@pytest.fixture
-def logs(tmp_path: Path) -> list[str]:
-    return [str(logged(tmp_path, feed)) for feed in (0.052, 0.054, 0.056)]
+@pytest.fixture(scope="module")
+def logs(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
+    folder = tmp_path_factory.mktemp("logs")
+    return [str(logged(folder, feed)) for feed in (0.052, 0.054, 0.056)]
 
 
 def test_safe_runs_tell_the_onset(logs: list[str], stickslip: Run, tmp_path: Path) -> None:

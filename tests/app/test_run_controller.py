@@ -15,86 +15,19 @@ from stickslip_ros.record.topics import DIAGNOSTICS
 from tests.app.conftest import Run, Start, ended
 from tests.app.test_run import children, command, is_complete, is_running, wait_for_samples
 from tests.nodes.graph import Graph, wait_for
+from tests.testing import controllers
 
 pytestmark = pytest.mark.process
 
 Install = Callable[..., str]
-DAMPER = """
-import signal
-import sys
-
-import rclpy
-from geometry_msgs.msg import WrenchStamped
-from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
-from rclpy.node import Node
-from sensor_msgs.msg import JointState
 
 
-class Answering:
-    def connect(self):
-        self.gain = self.declare_parameter("gain", 0.1).value
-        self.force = self.create_publisher(WrenchStamped, "control_force", 1000)
-        self.create_subscription(JointState, "joint_states", self.answer, 10)
-
-    def answer(self, state):
-        force = WrenchStamped(header=state.header)
-        force.wrench.force.x = -self.gain * state.velocity[0]
-        self.force.publish(force)
-
-
-class Damper(Answering, Node):
-    def __init__(self):
-        super().__init__("damper")
-        self.connect()
-
-
-class ManagedDamper(Answering, LifecycleNode):
-    def __init__(self):
-        super().__init__("damper")
-        self.active = False
-
-    def on_configure(self, state):
-        self.connect()
-        return TransitionCallbackReturn.SUCCESS
-
-    def on_activate(self, state):
-        self.active = True
-        return TransitionCallbackReturn.SUCCESS
-
-    def answer(self, state):
-        if self.active:
-            super().answer(state)
-
-
-class Mortal(Damper):
-    def answer(self, state):
-        if state.header.stamp.sec == 2:
-            sys.exit(3)
-        super().answer(state)
-
-
-class ForceOnly(Node):
-    def __init__(self):
-        super().__init__("damper")
-        self.force = self.create_publisher(WrenchStamped, "control_force", 1000)
-
-
-class DeafAndMute(Damper):
-    def __init__(self):
-        super().__init__()
-        signal.signal(signal.SIGTERM, signal.SIG_IGN)
-        signal.signal(signal.SIGINT, signal.SIG_IGN)
-
-    def answer(self, state):
-        pass
-
-
-def run(node):
-    rclpy.init()
-    try:
-        rclpy.spin(node())
-    except KeyboardInterrupt:
-        print("ended as it should")
+def damper(node: str) -> str:
+    """Return a script that runs one of the controllers that are written as by a user."""
+    return f"""
+import runpy, sys
+sys.argv.insert(1, {node!r})
+runpy.run_path({controllers.__file__!r}, run_name="__main__")
 """
 
 
@@ -118,10 +51,6 @@ def install(
         return f"my_controllers/{name}"
 
     return install
-
-
-def damper(node: str) -> str:
-    return f"{DAMPER}\n\nrun({node})\n"
 
 
 def read_until(process: subprocess.Popen[str], text: str) -> str:

@@ -1,5 +1,6 @@
 """Controllers as a user writes them: plain rclpy nodes that do not use this package."""
 
+import signal
 import sys
 import time
 from contextlib import suppress
@@ -19,15 +20,17 @@ GAIN = 0.7
 class VelocityFeedback(Node):
     """Answers every state with a force against the slide's velocity."""
 
-    def __init__(self, **options: Any) -> None:
-        super().__init__("velocity_feedback", **options)
+    gain: Any = GAIN
+
+    def __init__(self, name: str = "velocity_feedback", **options: Any) -> None:
+        super().__init__(name, **options)
         self.answered = 0
         self.force = self.create_publisher(WrenchStamped, "control_force", 1000)
         self.create_subscription(JointState, "joint_states", self.answer, 10)
 
     def answer(self, state: JointState) -> None:
         force = WrenchStamped(header=state.header)
-        force.wrench.force.x = -GAIN * state.velocity[state.name.index("slide")]
+        force.wrench.force.x = -self.gain * state.velocity[state.name.index("slide")]
         self.force.publish(force)
         self.answered += 1
 
@@ -72,11 +75,46 @@ class Silent(WithoutArguments):
         self.answered += 1
 
 
+class Damper(VelocityFeedback):
+    """Has its gain as a parameter."""
+
+    def __init__(self) -> None:
+        super().__init__("damper")
+        self.gain = self.declare_parameter("gain", 0.1).value
+
+
+class Mortal(Damper):
+    def answer(self, state: JointState) -> None:
+        if state.header.stamp.sec == 2:
+            sys.exit(3)
+        super().answer(state)
+
+
+class ForceOnly(Node):
+    """Does not read what it should answer."""
+
+    def __init__(self) -> None:
+        super().__init__("damper")
+        self.force = self.create_publisher(WrenchStamped, "control_force", 1000)
+
+
+class DeafAndMute(Damper):
+    def __init__(self) -> None:
+        super().__init__()
+        signal.signal(signal.SIGTERM, signal.SIG_IGN)
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+    def answer(self, state: JointState) -> None:
+        pass
+
+
 class Managed(LifecycleNode):
     """Has publisher and subscription from when it is configured on, and publishes when active."""
 
-    def __init__(self) -> None:
-        super().__init__("managed_feedback")
+    gain: Any = 0.0
+
+    def __init__(self, name: str = "managed_feedback") -> None:
+        super().__init__(name)
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         self.force = self.create_lifecycle_publisher(WrenchStamped, "control_force", 1000)
@@ -84,7 +122,18 @@ class Managed(LifecycleNode):
         return TransitionCallbackReturn.SUCCESS
 
     def answer(self, state: JointState) -> None:
-        self.force.publish(WrenchStamped(header=state.header))
+        force = WrenchStamped(header=state.header)
+        force.wrench.force.x = -self.gain * state.velocity[0]
+        self.force.publish(force)
+
+
+class ManagedDamper(Managed):
+    def __init__(self) -> None:
+        super().__init__("damper")
+
+    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
+        self.gain = self.declare_parameter("gain", 0.1).value
+        return super().on_configure(state)
 
 
 class Refusing(LifecycleNode):
@@ -123,8 +172,11 @@ class WithGain(VelocityFeedback):
 
 def main() -> None:
     rclpy.init()
-    with suppress(KeyboardInterrupt, ExternalShutdownException):
-        rclpy.spin(globals()[sys.argv[1]]())
+    with suppress(ExternalShutdownException):
+        try:
+            rclpy.spin(globals()[sys.argv[1]]())
+        except KeyboardInterrupt:
+            print("ended as it should")
 
 
 if __name__ == "__main__":
