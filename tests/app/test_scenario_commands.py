@@ -34,6 +34,7 @@ def test_show_tells_where_each_value_comes_from(stickslip: Run, tmp_path: Path) 
     (tmp_path / "mine.yaml").write_text(
         "/**/scenario: {ros__parameters: {base: feed_drive}}\n"
         "/**/plant: {ros__parameters: {mass: 80.0}}\n"
+        "/**/damper: {ros__parameters: {gain: 3.0}}\n"
     )
     arguments = ("show", "mine.yaml", "-p", "plant.belt_speed=0.02")
     shown = stickslip.json(*arguments)
@@ -50,21 +51,14 @@ def test_show_tells_where_each_value_comes_from(stickslip: Run, tmp_path: Path) 
     assert {node: set(rows) for node, rows in found.items()} == {
         node: set(values) for node, values in load_scenario("paper").as_dict().items()
     }
-    lines = [line.split() for line in stickslip(*arguments).stdout.splitlines()]
+    text = stickslip(*arguments).stdout
+    assert "section /**/damper is for another node" in text
+    lines = [line.split() for line in text.splitlines()]
     assert ["mass", "80.0", "kg", "file"] in lines
     assert ["belt_speed", "0.02", "m/s", "override"] in lines
-
-
-def test_a_dimensionless_scenario_is_shown_without_units(stickslip: Run) -> None:
-    lines = [line.split() for line in stickslip("show", "paper").stdout.splitlines()]
-    assert ["mass", "1.0", "file"] in lines
-    assert ["max_bag_size", "0", "bytes", "default"] in lines
-
-
-def test_show_tells_of_sections_for_other_nodes(stickslip: Run, tmp_path: Path) -> None:
-    (tmp_path / "mine.yaml").write_text("/**/damper: {ros__parameters: {gain: 3.0}}\n")
-    done = stickslip("show", "mine.yaml", "--base", "feed_drive")
-    assert "section /**/damper is for another node" in done.stdout
+    dimensionless = [line.split() for line in stickslip("show", "paper").stdout.splitlines()]
+    assert ["mass", "1.0", "file"] in dimensionless
+    assert ["max_bag_size", "0", "bytes", "default"] in dimensionless
 
 
 @pytest.mark.parametrize("source", ["feed_drive", "paper"])
@@ -126,7 +120,7 @@ def schema(stickslip: Run) -> Any:
     return jsonschema.Draft7Validator(found)
 
 
-def test_the_schema_accepts_what_ships_and_what_new_writes(
+def test_the_schema_accepts_what_ships_what_new_writes_and_other_ways_to_write_it(
     schema: Any, stickslip: Run, tmp_path: Path
 ) -> None:
     for name, shipped in shipped_scenarios().items():
@@ -134,9 +128,6 @@ def test_the_schema_accepts_what_ships_and_what_new_writes(
         stickslip("new", f"all_{name}.yaml", "--from", name, "--complete")
         for path in (shipped, tmp_path / f"{name}.yaml", tmp_path / f"all_{name}.yaml"):
             assert list(schema.iter_errors(yaml.safe_load(path.read_text()))) == [], path
-
-
-def test_the_schema_accepts_other_ways_to_write_it(schema: Any) -> None:
     for text in (
         "/**/plant: {ros__parameters: {friction.law: coulomb, friction: {static: 0.3}}}",
         "/feed_drive/plant: {ros__parameters: {mass: 2}}",

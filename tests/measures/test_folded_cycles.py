@@ -6,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from stickslip_ros.measures.folded_cycles import FoldedCycles
+from tests.examples import examples
 
 PERIOD, COUNT = 0.06247, 20
 
@@ -23,6 +24,7 @@ def folded(
     return FoldedCycles(time, position, COUNT, guess, 0.0)
 
 
+@examples(quick=5, thorough=25)
 @given(st.floats(-0.004, 0.004))
 def test_the_period_is_found_from_a_guess(wrong: float) -> None:
     fold = folded(guess=PERIOD * (1.0 + wrong))

@@ -116,15 +116,15 @@ def test_times_that_repeat_and_velocities_that_are_missing_are_noted(tmp_path: P
         assert note in recording.notes
 
 
-def test_only_tables_are_tables() -> None:
-    names = ("a/log.CSV", "log.mat", "log.txt", "bags/reference", "reference_0.mcap", "log")
-    assert [is_table(Path(name)) for name in names] == [True, True, True, False, False, False]
-
-
-def test_a_file_without_a_known_end_is_a_table_unless_it_is_a_bag(tmp_path: Path) -> None:
-    for name, content in (("log", b"t,x\n0,1\n"), ("bag", b"\x89MCAP0\r\n")):
+def test_only_tables_are_tables(tmp_path: Path) -> None:
+    """A file without a known end is one unless it is a bag."""
+    for name, content in (("table", b"t,x\n0,1\n"), ("bag", b"\x89MCAP0\r\n")):
         (tmp_path / name).write_bytes(content)
-    assert [is_table(tmp_path / name) for name in ("log", "bag")] == [True, False]
+    for names, expected in (
+        (("a/log.CSV", "log.mat", "log.txt", "table"), True),
+        (("bags/reference", "reference_0.mcap", "log", "bag"), False),
+    ):
+        assert {is_table(tmp_path / name) for name in names} == {expected}
 
 
 def test_columns_that_make_no_recording_are_refused(tmp_path: Path) -> None:

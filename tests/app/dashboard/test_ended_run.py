@@ -87,18 +87,15 @@ def test_a_bag_that_a_node_only_names_is_not_looked_at(bag: Path) -> None:
 
 
 @pytest.mark.parametrize("attack", ATTACKS)
-def test_a_file_put_in_place_of_the_bag_is_refused(bag: Path, attack: Attack) -> None:
-    attack(bag / FILE, bag.parent / "secret")
-    run = ended(bag, bag)
-    assert run.file is None
-    assert not run._report
-    assert str(bag) in run._problem
-    assert "secret" not in run._problem
-
-
-@pytest.mark.parametrize("attack", ATTACKS)
-def test_a_file_put_in_place_later_is_not_served(bag: Path, attack: Attack) -> None:
+def test_a_file_put_in_place_of_the_bag_is_neither_served_nor_read(
+    bag: Path, attack: Attack
+) -> None:
     recorded = (bag / FILE).read_bytes()
-    run = ended(bag, bag)
+    before = ended(bag, bag)
     attack(bag / FILE, bag.parent / "secret")
-    assert run.file.read_bytes() == recorded
+    assert before.file.read_bytes() == recorded
+    after = ended(bag, bag)
+    assert after.file is None
+    assert not after._report
+    assert str(bag) in after._problem
+    assert "secret" not in after._problem
