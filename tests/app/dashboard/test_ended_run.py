@@ -14,7 +14,6 @@ from stickslip_ros.app.dashboard.ended_run import EndedRun
 from stickslip_ros.app.dashboard.listener import Health
 from tests.record.runs import STAMPS, record
 
-SECRET = b"secret"
 FILE = "bag_0.mcap"
 
 
@@ -30,7 +29,10 @@ def ended(named: Path | str, *readable: Path) -> EndedRun:
 
 @pytest.fixture
 def bag(tmp_path: Path) -> Path:
-    (tmp_path / "secret").write_bytes(SECRET)
+    """A bag, and beside it a file that is one, too, and that nobody has given."""
+    record(tmp_path / "other", STAMPS[:70], STAMPS[:70])
+    (tmp_path / "other" / "other_0.mcap").rename(tmp_path / "secret")
+    shutil.rmtree(tmp_path / "other")
     record(tmp_path / "bag", STAMPS[:50], STAMPS[:50])
     return tmp_path / "bag"
 
@@ -46,6 +48,7 @@ def hard_linked(file: Path, secret: Path) -> None:
 
 
 def renamed(file: Path, secret: Path) -> None:
+    secret.write_bytes(b"secret")
     secret.rename(file)
 
 
