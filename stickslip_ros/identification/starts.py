@@ -21,6 +21,8 @@ _START_STEPS = 8
 _OUTLIER_LOSS_RATIO = 9.0
 """The start of a segment is doubted if its squared error is larger than that of the median one by
 this factor."""
+_OUTLIER_SHARE = 0.3
+"""Share of the squared error from which segments with such starts spoil the fit of the others."""
 _KICKS = (0.0, 0.5, -0.5, 2.0, -2.0)
 """Changes of the velocity at such a start, in errors of position per period."""
 
@@ -69,10 +71,10 @@ class Errors:
 
     @property
     def has_outliers(self) -> bool:
-        """Whether most of the error is that of a few segments: their starts may be wrong."""
+        """Whether much of the error is that of a few segments: their starts may be wrong."""
         losses = self.losses
         worse = losses > _OUTLIER_LOSS_RATIO * np.median(losses)
-        return float(losses[worse].sum()) > 0.5 * float(losses.sum())
+        return float(losses[worse].sum()) > _OUTLIER_SHARE * float(losses.sum())
 
     def without_starts(self, columns: FloatArray) -> FloatArray:
         """Return the part of columns, shape (rows, columns), that no change of starts explains."""
