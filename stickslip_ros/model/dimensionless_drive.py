@@ -236,6 +236,16 @@ class DimensionlessDrive(HybridSystem):
         own = () if control is None else control.rest(*seen)
         return [position, velocity, *map(float, memory), *own, *without, *motor]
 
+    def sliding_acceleration(self, position: Any, speed: Any, force: Any) -> Any:
+        """Return the acceleration in slip, in `symbols`: static law, steady belt, ideal motor."""
+        parts = self._expressions
+        drive, relative_speed = parts.drive, speed - parts.belt_speed
+        held = equations.reaction(drive, position, speed, force)
+        if self.has_guide_damping:
+            held += drive.guide_damping * relative_speed
+        friction = parts.normal * parts.law.coefficient(relative_speed, parts.sign)
+        return equations.acceleration(drive, friction, held)
+
     def belt_speed(self, mode: Mode, time: float) -> float:
         """Return the speed of the belt."""
         return float(equations.belt_speed(self.drive, time, mode.switches[self._parts.belt]))

@@ -1,6 +1,7 @@
 """Elementary functions of numbers, arrays and heyoka expressions alike, and zeros of functions."""
 
 from collections.abc import Callable
+from math import expm1 as float_expm1
 from math import sin as float_sin
 from typing import Any
 
@@ -40,6 +41,11 @@ def sqrt(x: Any) -> Any:
 def sin(x: Any) -> Any:
     """Return the sine of a float, an array or an expression."""
     return float_sin(x) if isinstance(x, float) else _function("sin", x)
+
+
+def expm1(x: Any) -> Any:
+    """Return exp(x) - 1 of a float, an array or an expression."""
+    return float_expm1(x) if isinstance(x, float) else _function("expm1", x)
 
 
 def power(base: Any, exponent: Any) -> Any:

@@ -121,6 +121,15 @@ class Controller:
             return force
         return _limited(law, since, force)
 
+    def continues(self, stamp: int, period: int) -> bool:
+        """Return whether a sample follows the last by a period (ns), and the force acts."""
+        since = (stamp - self._first_stamp) * 1e-9
+        return self._stamp == stamp - period and since >= self.law.start_after
+
+    def skip(self, stamp: int, state: tuple[float, ...]) -> None:
+        """Continue after samples that were answered elsewhere, up to a stamp, ns."""
+        self._stamp, self.state, self._older = stamp, state, None
+
     def _answer_older(self, sample: Sample, newest: int) -> float | None:
         """Answer a sample that is not later than the newest answered one."""
         stamp, first = sample.stamp, self._first_stamp

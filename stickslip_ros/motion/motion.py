@@ -1,5 +1,6 @@
 """The stick-slip motion of a drive under a held force or continuous control, recorded or not."""
 
+from array import array
 from collections.abc import Sequence
 from typing import ClassVar
 
@@ -13,7 +14,7 @@ from stickslip_ros.model.control import ContinuousControl
 from stickslip_ros.model.dimensionless_drive import MEMORY, POSITION, SPEED
 from stickslip_ros.model.drive import Drive
 from stickslip_ros.model.drive_system import STICK, TIME_ROUNDING, DriveSystem
-from stickslip_ros.model.hybrid import HybridSystem, Mode
+from stickslip_ros.model.hybrid import HybridSystem, Instant, Mode
 from stickslip_ros.model.plain_drive import drive_system
 from stickslip_ros.motion.compiled_flow import Detail
 from stickslip_ros.motion.hybrid_motion import (
@@ -21,6 +22,7 @@ from stickslip_ros.motion.hybrid_motion import (
     HybridMotion,
     TooManyStepsError,
 )
+from stickslip_ros.motion.short_step import STEPS_PER_ADVANCE
 from stickslip_ros.samples import MotorSample
 
 _LARGEST_FORCE = 1e100
@@ -333,6 +335,22 @@ class Motion(HybridMotion):
         else:
             self.set_forces(control, disturbance)
             self.advance(duration)
+
+    @property
+    def phase(self) -> tuple[DriveSystem, Mode, Instant]:
+        """Dimensionless system, its mode, and state and inputs."""
+        return self._system, self._mode, self._instant
+
+    def skip(self, state: Sequence[float], force: float, advances: int, duration: float) -> None:
+        """Continue after short advances (s) in this mode that were computed elsewhere.
+
+        `state` is that of `phase` after them, `force` that of the last one, N.
+        """
+        self._instant.state[:] = array("d", state)
+        self.force = force
+        self._steps_left += advances * STEPS_PER_ADVANCE
+        for _ in range(advances):  # with the rounding of single ones
+            self._pass_time(duration)
 
     def reading(self) -> tuple[float, float, float, float, MotorSample | None]:
         """Return position, velocity, friction force, belt speed (SI units) and motor at once."""

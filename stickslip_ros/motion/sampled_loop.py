@@ -188,6 +188,18 @@ class SampledLoop:
         return self._newest[0] == self.sample_number
 
     @property
+    def is_ideal(self) -> bool:
+        """Whether exact samples are answered at once, and only the answers act on the slide."""
+        return (
+            self._immediate
+            and self._samples == 1
+            and self._limiter is self._moving_belt is self._scenario_disturbance is None
+            and self.disturbance == self.asked_disturbance == 0.0
+            and not (self._measures or self._changes)
+            and self._advance == self._motion.advance_under
+        )
+
+    @property
     def unbounded(self) -> bool:
         """Whether the motion is unbounded."""
         return self._motion.unbounded
@@ -362,6 +374,16 @@ class SampledLoop:
         self.sample_number = present + 1
         self.sample = sample = self._take_sample(belt_position)
         return sample
+
+    def skip(self, samples: int, force: float) -> None:
+        """Continue after samples that were answered elsewhere, the last by `force` (N)."""
+        belt_position = self.sample.belt_position
+        for _ in range(samples):  # with the rounding of single ones
+            belt_position += self._travel
+        self.sample_number += samples
+        self._accept(self.sample_number - 1, force)
+        self._sent_number, self._acting = self.sample_number - 1, force
+        self.sample = self._take_sample(belt_position)
 
     def run(self, answer: Callable[[Sample], float | None]) -> Iterator[float]:
         """Answer each sample immediately and advance to the next one, without end.

@@ -13,6 +13,7 @@ from stickslip_ros.model.control import ControlLaw
 from stickslip_ros.motion import Motion, RecordedMotion
 from stickslip_ros.motion.controller import Controller, answer
 from stickslip_ros.motion.sampled_loop import SampledLoop
+from stickslip_ros.motion.tick_blocks import LEAST_TICKS, TickBlocks
 from stickslip_ros.motion.trajectory import SampleRecorder
 from stickslip_ros.progress import Progress
 from stickslip_ros.samples import Sample, SampleColumns
@@ -155,17 +156,25 @@ def simulate_sampled(
     samples, done = round(duration / loop.period), 0
     seen, present = [loop.sample], (loop.true_sample, loop.sample)
     answers = loop.run(_no_answer if controller is None else controller.answer)
+    blocks = None
+    if recorder is None and measured is None and samples >= LEAST_TICKS:
+        blocks = TickBlocks.of(loop, motion, controller)
     while done < samples and not motion.unbounded:
-        forces = list[float]()
-        for force in islice(answers, min(_BLOCK, samples - done)):
-            forces.append(force)
-            if recorder is not None:
-                recorder.take(present[0], force, present[1])
-                present = loop.true_sample, loop.sample
-            if measured is not None:
-                seen.append(loop.sample)
-            if motion.unbounded:
-                break
+        forces, count = list[float](), min(_BLOCK, samples - done)
+        while len(forces) < count and not motion.unbounded:
+            left = count - len(forces)
+            if blocks is not None:
+                forces += blocks.advance(left)
+                left = min(count - len(forces), blocks.left)
+            for force in islice(answers, left):
+                forces.append(force)
+                if recorder is not None:
+                    recorder.take(present[0], force, present[1])
+                    present = loop.true_sample, loop.sample
+                if measured is not None:
+                    seen.append(loop.sample)
+                if motion.unbounded:
+                    break
         measure_block(motion, meter, observer)
         times = loop.period * np.arange(done, done + len(forces))
         meter.drift.force.feed(times, forces)

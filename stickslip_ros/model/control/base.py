@@ -261,6 +261,11 @@ class ControlLaw(ABC):
     """
     state_units: ClassVar[Mapping[str, str | None]] = {}
     """Unit of each state, by name."""
+    accepts_expressions: ClassVar[bool] = False
+    """Whether `respond` of this very class accepts heyoka expressions, and decides nothing.
+
+    It is not inherited. Many samples are then answered in one compiled step.
+    """
     tuned: ClassVar[Sequence[str]] = ()
     """Gains that a design chooses, see `linear_part`; each has the sign of its default."""
 

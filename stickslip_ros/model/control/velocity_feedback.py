@@ -37,6 +37,7 @@ class VelocityFeedback(FeedbackLaw, ContinuousControl):
     """
 
     name: ClassVar[str] = "velocity_feedback"
+    accepts_expressions: ClassVar[bool] = True
     tuned: ClassVar[Sequence[str]] = ("velocity_gain",)
     states: ClassVar[Sequence[str]] = ()
 

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import expm1
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -17,6 +16,7 @@ from stickslip_ros.model.control.base import (
     State,
 )
 from stickslip_ros.model.drive import Drive
+from stickslip_ros.model.functions import expm1
 from stickslip_ros.samples import Reference, Sample
 
 
@@ -46,6 +46,7 @@ class Washout(FeedbackLaw, ContinuousControl):
     """
 
     name: ClassVar[str] = "washout"
+    accepts_expressions: ClassVar[bool] = True
     tuned: ClassVar[Sequence[str]] = ("corner_frequency", "linear_gain")
     states: ClassVar[Sequence[str]] = ("w",)
     state_units: ClassVar[Mapping[str, str | None]] = {"low_passed": "m/s", "velocity": "m/s"}
@@ -82,8 +83,7 @@ class Washout(FeedbackLaw, ContinuousControl):
     ) -> tuple[float, State]:
         low_passed, held = state
         velocity = (sample if self.feedback == TABLE else sample.of(self.feedback)).velocity
-        if elapsed > 0.0:
-            low_passed -= expm1(-self.corner_frequency * elapsed) * (held - low_passed)
+        low_passed -= expm1(-self.corner_frequency * elapsed) * (held - low_passed)
         return self.force(velocity - low_passed), (low_passed, velocity)
 
     def linear_feedback(self, period: float) -> LinearFeedback:
