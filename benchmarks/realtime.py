@@ -16,7 +16,7 @@ All run in turns, one slice at a time, while the others are idle. The values are
 import os
 import time
 from array import array
-from collections.abc import Generator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
@@ -80,8 +80,8 @@ class TimedPlant(ObservedPlant):
         self.ages[number] = number - 1 - self._answered
         super()._publish(sample)
 
-    def _on_force(self, message: bytes) -> None:
-        super()._on_force(message)
+    def _on_force(self, unpack: Callable[[bytes], tuple[int, float]], message: bytes) -> None:
+        super()._on_force(unpack, message)
         self._answered = max(self._answered, self._loop.number(unpack_header(message)))
 
 
