@@ -25,7 +25,7 @@ from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.refinement import Refinement
 from stickslip_ros.identification.regression import LINEAR, Regression, Rows, regress
 from stickslip_ros.identification.search import refine
-from stickslip_ros.identification.starts import Errors, best_starts
+from stickslip_ros.identification.segment_starts import Errors, best_starts
 from stickslip_ros.identification.time_limit import TimeLimit
 from stickslip_ros.identification.trajectories import Trajectories, segments_of
 from stickslip_ros.identification.trajectory import Predictor

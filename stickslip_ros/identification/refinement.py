@@ -13,7 +13,7 @@ from stickslip_ros.identification.filtered import filtered
 from stickslip_ros.identification.fit import CURVE_POINTS, Fit, ForceErrors, Residuals
 from stickslip_ros.identification.identified_law import DELAY, LAG, IdentifiedLaw
 from stickslip_ros.identification.record import Record
-from stickslip_ros.identification.starts import Errors, best_starts
+from stickslip_ros.identification.segment_starts import Errors, best_starts
 from stickslip_ros.identification.trajectories import Trajectories, segments_of
 from stickslip_ros.identification.trajectory import Predictor
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.identification.refinement import Refinement
-from stickslip_ros.identification.starts import ROUGH_TOLERANCE, Errors
+from stickslip_ros.identification.segment_starts import ROUGH_TOLERANCE, Errors
 from stickslip_ros.identification.time_limit import OutOfTimeError
 from stickslip_ros.identification.trajectories import Trajectories
 

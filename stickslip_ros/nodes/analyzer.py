@@ -38,6 +38,7 @@ from stickslip_ros.nodes.base.clients import (
     ServiceCall,
     parameters_call,
 )
+from stickslip_ros.nodes.base.endpoints import qos_profile, timed_messages
 from stickslip_ros.nodes.base.managed import (
     ERROR,
     FIRST_STAMP,
@@ -48,7 +49,6 @@ from stickslip_ros.nodes.base.managed import (
     diagnosis,
 )
 from stickslip_ros.nodes.base.process import run_node
-from stickslip_ros.nodes.base.ros_topics import qos_profile, timed_messages
 from stickslip_ros.record.cdr import Messages, Refused, joined
 from stickslip_ros.record.codec import (
     UNSTAMPED,

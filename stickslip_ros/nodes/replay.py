@@ -19,9 +19,9 @@ from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 
 from stickslip_ros.errors import RunError
+from stickslip_ros.nodes.base.endpoints import message_class
 from stickslip_ros.nodes.base.managed import ERROR, OK, WARN, Diagnosis, ManagedNode
 from stickslip_ros.nodes.base.process import ros_session, run_node, run_until_stopped
-from stickslip_ros.nodes.base.ros_topics import message_class
 from stickslip_ros.nodes.pacing import FlowWindow
 from stickslip_ros.nodes.replaying.player import Message, Player
 from stickslip_ros.nodes.replaying.selection import Selection

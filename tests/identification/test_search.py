@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from stickslip_ros.identification.search import refine
-from stickslip_ros.identification.starts import best_starts
+from stickslip_ros.identification.segment_starts import best_starts
 from tests.identification.segments import FREE, TRUE, segments
 
 

@@ -15,8 +15,8 @@ from rclpy.publisher import Publisher
 from rclpy.signals import SignalHandlerOptions
 from rclpy.subscription import Subscription
 
+from stickslip_ros.nodes.base.endpoints import message_class, qos_profile
 from stickslip_ros.nodes.base.managed import ManagedNode
-from stickslip_ros.nodes.base.ros_topics import message_class, qos_profile
 from stickslip_ros.nodes.base.spinner import Spinner
 from stickslip_ros.record.topics import DIAGNOSTICS
 

@@ -19,8 +19,8 @@ from std_msgs.msg import Float64, Float64MultiArray
 
 from stickslip_ros.api.recordings import recorded_drive
 from stickslip_ros.nodes.analyzer import AnalyzerNode
+from stickslip_ros.nodes.base.endpoints import qos_profile
 from stickslip_ros.nodes.base.managed import ERROR, WARN
-from stickslip_ros.nodes.base.ros_topics import qos_profile
 from stickslip_ros.nodes.plant import PlantNode
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
 from stickslip_ros.record.codec import joint_state_columns, pack_joint_state, pack_wrench

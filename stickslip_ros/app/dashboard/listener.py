@@ -33,8 +33,8 @@ from stickslip_ros.nodes.base.clients import (
     setting_call,
     transition_request,
 )
+from stickslip_ros.nodes.base.endpoints import PollingNode, qos_profile, waiting_messages
 from stickslip_ros.nodes.base.managed import FIRST_STAMP, STATE
-from stickslip_ros.nodes.base.ros_topics import PollingNode, qos_profile, waiting_messages
 from stickslip_ros.nodes.base.spinner import steady_clock
 from stickslip_ros.nodes.running.controller_search import DASHBOARD
 from stickslip_ros.record.codec import joint_state_columns, pack_wrench, wrench_columns

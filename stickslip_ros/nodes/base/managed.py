@@ -19,14 +19,14 @@ from rclpy.task import Future
 from rclpy.timer import Timer
 
 from stickslip_ros.errors import BagError, InvalidInputError, StickslipError
-from stickslip_ros.nodes.base.parameters import ParameterNode, ParametersT, first_line
-from stickslip_ros.nodes.base.ros_topics import (
+from stickslip_ros.nodes.base.endpoints import (
     PollingNode,
     matching_readers,
     matching_writers,
     message_class,
     qos_profile,
 )
+from stickslip_ros.nodes.base.parameters import ParameterNode, ParametersT, first_line
 from stickslip_ros.nodes.base.scheduling import schedule_process
 from stickslip_ros.nodes.base.spinner import steady_clock
 from stickslip_ros.record.topics import DIAGNOSTICS, RECORDED, Topic

@@ -20,7 +20,7 @@ from rclpy.qos import (
 from rclpy.validate_full_topic_name import validate_full_topic_name
 
 from stickslip_ros.errors import BagError, InvalidInputError
-from stickslip_ros.nodes.base.ros_topics import message_class
+from stickslip_ros.nodes.base.endpoints import message_class
 from stickslip_ros.nodes.replaying.player import JITTER, Message, Timeline
 from stickslip_ros.record.codec import pack_joint_state, pack_wrench
 from stickslip_ros.record.definitions import message_definition

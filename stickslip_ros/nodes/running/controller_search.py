@@ -7,7 +7,7 @@ from itertools import filterfalse
 from rclpy.node import Node, NodeNameNonExistentError
 from rclpy.topic_endpoint_info import TopicEndpointInfo, TopicEndpointTypeEnum
 
-from stickslip_ros.nodes.base.ros_topics import mismatch, qos_profile
+from stickslip_ros.nodes.base.endpoints import mismatch, qos_profile
 from stickslip_ros.record.topics import CONTROL_FORCE, JOINT_STATES
 from stickslip_ros.scenarios import full_name
 

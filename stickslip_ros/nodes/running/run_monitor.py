@@ -7,8 +7,8 @@ from rclpy.node import Node
 from std_msgs.msg import Header
 
 from stickslip_ros.nodes.base.clients import ACTIVE, NEXT_TRANSITION
+from stickslip_ros.nodes.base.endpoints import qos_profile
 from stickslip_ros.nodes.base.managed import FAILURE, FINISHED, NEWEST_STAMP, STATE
-from stickslip_ros.nodes.base.ros_topics import qos_profile
 from stickslip_ros.record.topics import DIAGNOSTICS, RECORDED
 from stickslip_ros.scenarios import full_name
 from stickslip_ros.stamps import NANOSECONDS

@@ -11,7 +11,7 @@ from playwright.sync_api import Page, expect
 from rcl_interfaces.msg import ParameterEvent
 from rclpy.parameter import Parameter
 
-from stickslip_ros.nodes.base.ros_topics import message_class, qos_profile
+from stickslip_ros.nodes.base.endpoints import message_class, qos_profile
 from stickslip_ros.record.codec import pack_joint_state
 from stickslip_ros.record.topics import DIAGNOSTICS, JOINT_STATES
 from tests.app.dashboard.test_page import Served, Start, browser  # noqa: F401 - a fixture used here

@@ -16,7 +16,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 
 from stickslip_ros.errors import BagError, InvalidInputError
-from stickslip_ros.nodes.base.ros_topics import qos_profile
+from stickslip_ros.nodes.base.endpoints import qos_profile
 from stickslip_ros.nodes.replaying.player import JITTER
 from stickslip_ros.nodes.replaying.selection import (
     Selection,

@@ -1,4 +1,4 @@
-"""Topics for rclpy: message class, quality of service, matching endpoints, messages that wait."""
+"""Endpoints of topics in rclpy: message class, quality of service, what matches, what waits."""
 
 from collections.abc import Iterator
 from functools import cache

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from stickslip_ros.identification.starts import Errors, best_starts
+from stickslip_ros.identification.segment_starts import Errors, best_starts
 from tests.identification.segments import FREE, TRUE, segments
 
 
