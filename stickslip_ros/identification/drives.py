@@ -63,8 +63,6 @@ _OPTIONAL_GAIN, _OPTIONAL_ERRORS = 0.05, 4.0
 _CLEAR_GAIN = 0.5
 """Share of the squared error for which it is searched in any case: where the error is that of what
 is missing, it makes the standard error large."""
-_LAG_GAIN = 0.05
-"""The same for a lag beside a delay, which stands for most of it."""
 _ZERO_ERRORS = 3.0
 """Standard errors by which such a constant must differ from zero."""
 _SEARCH_SAMPLES, _MOST_SAMPLES = 4_000, 15_000
@@ -291,12 +289,16 @@ class DriveTask:
             best = fit.best
             if name in self.fixed or name in self.friction or name in best.names:
                 continue
-            errors, share = fit.gain(name)
-            clear = _LAG_GAIN if name == LAG and DELAY in best.names else _CLEAR_GAIN
-            unclear = abs(errors) < _OPTIONAL_ERRORS and share < clear
-            if unclear or share < least_share:
-                continue
-            more = refine(task, [*best.names, name], best.values, best.starts, most=_STEPS)
+            values = best.values
+            if name == LAG and DELAY in best.names:
+                # A short lag is like a delay, which stands for most of it: gains do not tell.
+                values = {**values, **dict.fromkeys((DELAY, LAG), 0.5 * values[DELAY])}
+            else:
+                errors, share = fit.gain(name)
+                unclear = abs(errors) < _OPTIONAL_ERRORS and share < _CLEAR_GAIN
+                if unclear or share < least_share:
+                    continue
+            more = refine(task, [*best.names, name], values, best.starts, most=_STEPS)
             if _loss(more) >= _loss(fit):
                 continue
             if _errors_from_zero(more, name) > _ZERO_ERRORS:
