@@ -342,9 +342,18 @@ class Motion(HybridMotion):
         return self._system, self._mode, self._instant
 
     def skip(self, state: Sequence[float], force: float, advances: int, duration: float) -> None:
-        """Continue after short advances (s) in this mode that were computed elsewhere.
+        """Continue after short advances in this mode that were computed elsewhere.
 
-        `state` is that of `phase` after them, `force` that of the last one, N.
+        Parameters
+        ----------
+        state : sequence of float
+            State of `phase` after them.
+        force : float
+            Force during the last one, N.
+        advances : int
+            Their number.
+        duration : float
+            Duration of each, s.
         """
         self._instant.state[:] = array("d", state)
         self.force = force
