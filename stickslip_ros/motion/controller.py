@@ -122,12 +122,33 @@ class Controller:
         return _limited(law, since, force)
 
     def continues(self, stamp: int, period: int) -> bool:
-        """Return whether a sample follows the last by a period (ns), and the force acts."""
+        """Return whether a sample follows the last by a period, and the force acts.
+
+        Parameters
+        ----------
+        stamp : int
+            Stamp of the sample, ns.
+        period : int
+            Sample period, ns.
+
+        Returns
+        -------
+        bool
+            Whether both hold.
+        """
         since = (stamp - self._first_stamp) * 1e-9
         return self._stamp == stamp - period and since >= self.law.start_after
 
     def skip(self, stamp: int, state: tuple[float, ...]) -> None:
-        """Continue after samples that were answered elsewhere, up to a stamp, ns."""
+        """Continue after samples that were answered elsewhere.
+
+        Parameters
+        ----------
+        stamp : int
+            Stamp of the last of them, ns.
+        state : tuple[float, ...]
+            State of the law after it.
+        """
         self._stamp, self.state, self._older = stamp, state, None
 
     def _answer_older(self, sample: Sample, newest: int) -> float | None:

@@ -376,7 +376,15 @@ class SampledLoop:
         return sample
 
     def skip(self, samples: int, force: float) -> None:
-        """Continue after samples that were answered elsewhere, the last by `force` (N)."""
+        """Continue after samples that were answered elsewhere.
+
+        Parameters
+        ----------
+        samples : int
+            Their number.
+        force : float
+            Answer to the last one, N.
+        """
         belt_position = self.sample.belt_position
         for _ in range(samples):  # with the rounding of single ones
             belt_position += self._travel
