@@ -118,7 +118,7 @@ class ManagedNode(PollingNode, ParameterNode[ParametersT], ABC):
         self._last_refusal = ""
         self._waiting = False
         for service in self.services:  # those of rclpy
-            service.callback = partial(self._answer, service.callback)
+            service.callback = partial(_answered, self.get_logger(), service.callback)
         self._diagnostics = self.create_publisher(
             DiagnosticArray, DIAGNOSTICS.name, qos_profile(DIAGNOSTICS)
         )
@@ -293,17 +293,6 @@ class ManagedNode(PollingNode, ParameterNode[ParametersT], ABC):
         """Disconnect, to start again."""
         return self._transition(self._disconnect)
 
-    def _answer(self, callback: Callable[[Any, Any], Any], request: Any, response: Any) -> Any:
-        """Answer also a request that rclpy cannot serve, such as a transition from another state.
-
-        After an exception it would answer neither this request nor, until more come, later ones.
-        """
-        try:
-            return callback(request, response)
-        except Exception as error:
-            self.get_logger().error(f"a request is refused: {first_line(error)}")
-            return response
-
     def _stop_and_tell(self) -> None:
         try:
             self.stop()
@@ -385,3 +374,17 @@ class ManagedNode(PollingNode, ParameterNode[ParametersT], ABC):
                 return f"{end.topic_name} is not yet matched"
         absent = waiting_for - found
         return f"missing: {', '.join(sorted(absent))}" if absent else ""
+
+
+def _answered(
+    logger: RcutilsLogger, callback: Callable[[Any, Any], Any], request: Any, response: Any
+) -> Any:
+    """Answer also a request that rclpy cannot serve, such as a transition from another state.
+
+    After an exception it would answer neither this request nor, until more come, later ones.
+    """
+    try:
+        return callback(request, response)
+    except Exception as error:
+        logger.error(f"a request is refused: {first_line(error)}")
+        return response
