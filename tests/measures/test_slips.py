@@ -19,7 +19,7 @@ from tests.measures import records
 
 BELT, SLIP_TIME = 1e-3, 0.04
 DATA = Path(
-    os.environ.get("STICKSLIP_DATA", Path(__file__).parents[4] / "shared" / "data"),
+    os.environ.get("STICKSLIP_DATA", Path(__file__).parents[3] / "shared" / "data"),
     "paper_on_paper",
 )
 WEIGHT = 0.0307 * 9.81
