@@ -78,11 +78,11 @@ class _Stretch(NamedTuple):
 
 
 class _Rows:
-    """Breakpoints as lists: stretches are short, and arrays take several times as long."""
+    """Breakpoints as views: elements of arrays take several times as long, lists more memory."""
 
     def __init__(self, breakpoints: Breakpoints) -> None:
         self.time, self._position, self._velocity, self._sticking = (
-            column.tolist() for column in vars(breakpoints).values()
+            column.data for column in vars(breakpoints).values()
         )
 
     def stretch(self, first: int, last: int) -> _Stretch:
