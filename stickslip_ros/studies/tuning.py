@@ -121,7 +121,7 @@ class _Rule:
     def __init__(self, scenario: Scenario, law: ControlLaw, goal: Goal) -> None:
         self.goal, self.law = goal, law
         plant = scenario.plant
-        drive, sensor = plant.as_drive(), plant.sensor
+        drive, sensors = plant.as_drive(), (plant.sensor, plant.motor.sensor)
         require("the theory of the sampled loop", drive, AUTONOMOUS)
         delay = plant.force_delay + plant.force_jitter / 2.0
         self.plants: list[PlantResponse] = []
@@ -130,11 +130,12 @@ class _Rule:
             reason = why_no_linear_loop(at_feed, plant.rate, delay)
             if reason is not None:
                 raise InvalidInputError(f"gains of {law.name} by theory: {reason}")
-            loop = LinearSampledLoop(at_feed, plant.rate, delay, _jacobian(at_feed), sensor.spans)
+            spans = (each.spans for each in sensors[: 1 if drive.motor is None else 2])
+            loop = LinearSampledLoop(at_feed, plant.rate, delay, _jacobian(at_feed), *spans)
             self.plants.append(PlantResponse.of(loop))
         self.loops = Loops([each.loop for each in self.plants])
         self.deciding = [self.plants[place] for place in self.loops.ends]
-        self.noise = sqrt(sensor.position_resolution**2 / 12.0 + sensor.position_noise**2)
+        self.noises = [sqrt(s.position_resolution**2 / 12.0 + s.position_noise**2) for s in sensors]
         self.friction = max(drive.friction.limits) * drive.normal_force
         constants = constants_of(type(law))
         self.units = [1.0 / drive.scales.factor(constants[name].unit) for name in law.tuned]
@@ -153,7 +154,7 @@ class _Rule:
         feedback = linear_part(law, plants[0].loop)
         responses = tuple(LoopResponse(plant, feedback) for plant in plants)
         steps = [each.step_response() for each in responses]
-        noise = max(each.noise_force(self.noise) for each in responses)
+        noise = max(each.noise_force(*self.noises) for each in responses)
         peak = max(
             self.goal.disturbance * float(np.abs(step).max()) + self.friction * share
             for step, share in zip(steps, (self.carried(each) for each in responses), strict=True)

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import ceil, log2, pi
+from math import ceil, log2, pi, sqrt
 from typing import Self
 
 import numpy as np
@@ -37,7 +37,7 @@ class PlantResponse:
     @classmethod
     def of(cls, loop: LinearSampledLoop) -> Self:
         """Return the response of a loop."""
-        drive, spans = loop.drive, loop.difference_samples
+        drive = loop.drive
         whole, rest = loop.delay
         short = replace(loop, force_delay=rest / loop.rate)  # whole periods are a factor
         count = 1 << max(ceil(log2(_PERIODS * min(drive.natural_period, 0.2) * loop.rate)), 11)
@@ -55,14 +55,15 @@ class PlantResponse:
         forces = np.zeros((order, 2))
         forces[:, 0] = effect[:, seen] / drive.length_scale
         forces[: len(loop.disturbed), 1] = loop.disturbed / drive.normal_force
-        states = np.linalg.solve(z[:, None, None] * np.eye(order) - open_loop, forces)
-        rows = [states[:, POSITION] * drive.length_scale, states[:, SPEED] * drive.speed_scale]
-        if spans:
-            rows[1] = rows[0] * ((1.0 - z**-spans) * loop.rate / spans)[:, None]
-        if drive.motor is not None:
-            rows.append(states[:, seen] * drive.length_scale)
-            rows.append(states[:, seen + 1] * drive.speed_scale)
-        found: ComplexArray = np.stack(rows, axis=1).astype(np.complex128)
+        responses = np.linalg.solve(z[:, None, None] * np.eye(order) - open_loop, forces)
+        states: ComplexArray = responses.astype(np.complex128)
+        rows: list[ComplexArray] = []
+        places = [POSITION] if drive.motor is None else [POSITION, seen]
+        for place, spans in zip(places, _differences(loop), strict=False):
+            rows.append(states[:, place] * drive.length_scale)
+            speed = states[:, place + SPEED] * drive.speed_scale
+            rows.append(rows[-1] * _rate(spans, loop.rate, z)[:, None] if spans else speed)
+        found = np.stack(rows, axis=1)
         delayed = found[..., 0] * (z**-whole)[:, None]
         return cls(loop, 2.0 * pi * turns * loop.rate, delayed, found[..., 1])
 
@@ -149,15 +150,31 @@ class LoopResponse:
         found = np.fft.irfft(spectrum, 2 * count)[:count]
         return (found + found[-1]) / 2.0
 
-    def noise_force(self, noise: float) -> float:
-        """Return the rms force, N, by white noise of the measured position with this rms, m."""
-        spans, z = self.plant.loop.difference_samples, self.plant.frequency
-        by_noise = self.law[:, 0].copy()
-        if spans:
-            delay = np.exp(-1j * spans * z / self.plant.loop.rate)
-            by_noise += self.law[:, 1] * (1.0 - delay) * self.plant.loop.rate / spans
-        size = np.abs(by_noise * self.sensitivity)
-        return noise * float(np.sqrt(np.mean(size * size)))
+    def noise_force(self, *noises: float) -> float:
+        """Return the rms force, N, by white noise of these rms, m, of the measured positions.
+
+        The first is that of the slide, a second that of a motor.
+        """
+        loop = self.plant.loop
+        z, total = np.exp(1j * self.plant.frequency / loop.rate), 0.0
+        for body, (noise, spans) in enumerate(zip(noises, _differences(loop), strict=False)):
+            if 2 * body >= self.law.shape[1]:
+                break
+            by_noise = self.law[:, 2 * body].copy()
+            if spans:
+                by_noise += self.law[:, 2 * body + 1] * _rate(spans, loop.rate, z)
+            total += noise**2 * float(np.mean(np.abs(by_noise * self.sensitivity) ** 2))
+        return sqrt(total)
+
+
+def _differences(loop: LinearSampledLoop) -> tuple[int, int]:
+    """Return the samples that the velocities of slide and motor span."""
+    return loop.difference_samples, loop.motor_difference_samples
+
+
+def _rate(spans: int, rate: float, z: ComplexArray) -> ComplexArray:
+    """Return the response, 1/s, of a difference over samples."""
+    return (1.0 - z**-spans) * rate / spans
 
 
 def loop_response(loop: LinearSampledLoop, law: ControlLaw) -> LoopResponse | None:

@@ -41,8 +41,10 @@ LAWS = [
 laws = pytest.mark.parametrize("law", LAWS, ids=lambda law: law.name)
 
 
-def loop_of(sensor: Sensor = EXACT_SENSOR, drive: Drive = DRIVE) -> LinearSampledLoop:
-    loop = LinearSampledLoop.from_drive(drive, RATE, 1.3e-3, sensor)
+def loop_of(
+    sensor: Sensor = EXACT_SENSOR, drive: Drive = DRIVE, motor_sensor: Sensor = EXACT_SENSOR
+) -> LinearSampledLoop:
+    loop = LinearSampledLoop.from_drive(drive, RATE, 1.3e-3, sensor, motor_sensor)
     assert loop is not None
     return loop
 
@@ -61,8 +63,10 @@ def test_one_plus_the_loop_is_the_ratio_of_the_characteristic_polynomials(
 ) -> None:
     if motor is not None and not isinstance(law, Pid | Cascade | DisturbanceObserver):
         return  # it needs a position loop
+    if motor is not None and isinstance(law, Cascade):
+        law = replace(law, velocity_feedback="motor")
     drive = replace(DRIVE, motor=motor, actuator=Actuator(time_constant=1e-3))
-    loop = loop_of(sensor, drive)
+    loop = loop_of(sensor, drive, sensor)
     found = response_of(loop, law)
     form = law.linear_feedback(1.0 / RATE)
     assert form is not None
@@ -98,29 +102,47 @@ def test_margins_lead_to_the_limit_of_stability(law: ControlLaw) -> None:
     assert 0.0 < found.phase_margin < pi
 
 
+def running_forces(
+    drive: Drive,
+    law: ControlLaw,
+    count: int,
+    size: float = 0.0,
+    noises: tuple[float, float] = (0.0, 0.0),
+) -> FloatArray:
+    """The forces of a running loop with a step at 0.01 s, and noise of slide and motor."""
+    rest = drive.equilibrium_position
+    own, motor = (replace(DIFFERENCE, position_noise=noise) for noise in noises)
+    running = SampledLoop(
+        Motion(drive, rest, 0.0),
+        RATE,
+        10**9,
+        force_delay=1.3e-3,
+        sensor=own,
+        motor_sensor=motor,
+        disturbance=step(size, 0.01, 1e9),
+    )
+    controller = Controller(law, lambda time: Reference(rest, 0.0, 0.0))
+    result: list[float] = []
+    for _ in range(count):
+        result.append(answer(running, controller))
+        running.advance()
+    return np.array(result)
+
+
 @laws
 def test_the_force_after_a_step_and_by_noise_is_that_of_the_running_loop(law: ControlLaw) -> None:
-    found, rest = response_of(loop_of(DIFFERENCE), law), DRIVE.equilibrium_position
-
-    def forces(size: float, noise: float, count: int) -> FloatArray:
-        running = SampledLoop(
-            Motion(DRIVE, rest, 0.0),
-            RATE,
-            10**9,
-            force_delay=1.3e-3,
-            sensor=replace(DIFFERENCE, position_noise=noise),
-            disturbance=step(size, 0.01, 1e9),
-        )
-        controller = Controller(law, lambda time: Reference(rest, 0.0, 0.0))
-        result: list[float] = []
-        for _ in range(count):
-            result.append(answer(running, controller))
-            running.advance()
-        return np.array(result)
-
-    small = 1e-3
-    by_step = (forces(small, 0.0, 210) - forces(-small, 0.0, 210))[10:] / (2.0 * small)
+    found, small = response_of(loop_of(DIFFERENCE), law), 1e-3
+    later, before = (running_forces(DRIVE, law, 210, size) for size in (small, -small))
+    by_step = (later - before)[10:] / (2.0 * small)
     size = np.abs(by_step).max()
     np.testing.assert_allclose(found.step_response()[:200], by_step, rtol=0.0, atol=1e-3 * size)
-    by_noise = forces(0.0, 1e-9, 4000)[1000:].std()
+    by_noise = running_forces(DRIVE, law, 4000, noises=(1e-9, 0.0))[1000:].std()
     assert found.noise_force(1e-9) == pytest.approx(by_noise, rel=0.1)
+
+
+def test_the_noise_of_a_motor_enters_the_force() -> None:
+    drive = replace(DRIVE, motor=Motor(50.0, 10.0))
+    law = Cascade(position_gain=20.0, velocity_gain=4e3, velocity_feedback="motor")
+    found = response_of(loop_of(DIFFERENCE, drive, DIFFERENCE), law)
+    noisy, exact = (running_forces(drive, law, 4000, noises=(0.0, n)) for n in (1e-9, 0.0))
+    assert found.noise_force(0.0, 1e-9) == pytest.approx((noisy - exact)[1000:].std(), rel=0.1)
