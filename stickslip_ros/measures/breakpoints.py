@@ -4,7 +4,6 @@ The motion records them exactly; from samples they are interpolated. The cycle m
 compare and subtract.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Self
 
@@ -71,30 +70,30 @@ def breakpoints_from_samples(
     belt_velocity: FloatArray,
     *,
     stick_speed: float = 0.0,
-    exact_times: bool = True,
+    exact_times: BoolArray | bool = True,
 ) -> Breakpoints:
     """Return the samples of a motion with interpolated stick edges, turning points and peaks.
 
     A sample sticks when its relative speed is at most `stick_speed` (m/s). Between two samples the
     displacement is interpolated by the cubic that has both positions and both velocities. The
     arrays have equal length n and SI units; the result has the n samples and the inserted points.
-    Without `exact_times` no peaks are inserted: they follow from distance over time and could be
-    far too high.
+    No peaks are inserted in the n - 1 intervals whose time is not exact: they follow from distance
+    over time and could be far too high.
     """
     stuck = sticks(velocity, belt_velocity, stick_speed)
     breakpoints = Breakpoints(
         time, position, velocity, np.concatenate([[False], stuck[1:] & stuck[:-1]])
     )
-    breakpoints = _with_stick_edges(breakpoints, stuck, belt_velocity, stick_speed)
+    edges = np.flatnonzero(stuck[1:] != stuck[:-1])
+    exact = np.broadcast_to(exact_times, len(time[1:]))
+    if len(edges) > 0:
+        landing = stuck[edges + 1]
+        breakpoints = _with_stick_edges(breakpoints, edges, landing, belt_velocity, stick_speed)
+        exact = np.insert(exact, edges, exact[edges])
+    sticking = breakpoints.sticking[1:]
     # A slide that moves exactly with the belt turns with it; one that is only near the belt's
     # velocity may turn while it sticks.
-    sticking = breakpoints.sticking
-    straight = sticking if stick_speed == 0.0 else np.zeros_like(sticking)
-    breakpoints = _with_interior_points(breakpoints, _turning_points, straight, velocity=0.0)
-    if exact_times:
-        sticking = breakpoints.sticking
-        breakpoints = _with_interior_points(breakpoints, _velocity_peaks, sticking)
-    return breakpoints
+    return _with_interior_points(breakpoints, ~sticking | (stick_speed > 0.0), ~sticking & exact)
 
 
 def _insert(breakpoints: Breakpoints, at: npt.NDArray[np.intp], new: Breakpoints) -> Breakpoints:
@@ -103,9 +102,13 @@ def _insert(breakpoints: Breakpoints, at: npt.NDArray[np.intp], new: Breakpoints
 
 
 def _with_stick_edges(
-    breakpoints: Breakpoints, stuck: BoolArray, belt_velocity: FloatArray, stick_speed: float
+    breakpoints: Breakpoints,
+    edges: npt.NDArray[np.intp],
+    landing: BoolArray,
+    belt_velocity: FloatArray,
+    stick_speed: float,
 ) -> Breakpoints:
-    """Insert the instant at which the slide starts or stops to stick.
+    """Insert the instant at which the slide lands or leaves in the intervals that are `edges`.
 
     For a part s of the interval, next to its slipping end, the velocity differs from that of the
     sticking end; for the other part it equals it. The difference is r at the slipping end and has
@@ -115,10 +118,6 @@ def _with_stick_edges(
     it is the interval, and p follows from this displacement. The edge is where the relative speed
     is `stick_speed`: with 0 at the end of s, otherwise within s.
     """
-    edges = np.flatnonzero(stuck[1:] != stuck[:-1])
-    if len(edges) == 0:
-        return breakpoints
-    landing = stuck[edges + 1]
     at_stick, at_slip = np.where(landing, edges + 1, edges), np.where(landing, edges, edges + 1)
     riding, slipping = breakpoints.velocity[at_stick], breakpoints.velocity[at_slip]
     stick_excess, slip_excess = riding - belt_velocity[at_stick], slipping - belt_velocity[at_slip]
@@ -153,58 +152,35 @@ def _with_stick_edges(
     return _insert(breakpoints, edges + 1, edge_breakpoints)
 
 
-def _turning_points(
-    start: FloatArray, end: FloatArray, slope: FloatArray, curvature: FloatArray
-) -> FloatArray:
-    """Return where the velocity start + slope u + curvature u^2 is zero, NaN where it is not."""
-    with np.errstate(all="ignore"):
-        root = np.sqrt(slope * slope - 4.0 * curvature * start)
-        # The form of the root without cancellation.
-        u = -2.0 * start / (slope + np.copysign(root, end - start))
-        straight = start / (start - end)
-    u = np.where((u > 0.0) & (u < 1.0), u, straight)
-    return np.where(start * end < 0.0, u, np.nan)
-
-
-def _velocity_peaks(
-    _start: FloatArray, _end: FloatArray, slope: FloatArray, curvature: FloatArray
-) -> FloatArray:
-    """Return where the velocity start + slope u + curvature u^2 has an extreme, else NaN."""
-    with np.errstate(all="ignore"):
-        u = -slope / (2.0 * curvature)
-    return np.where((u > 0.0) & (u < 1.0), u, np.nan)
-
-
 def _with_interior_points(
-    breakpoints: Breakpoints,
-    find: Callable[[FloatArray, FloatArray, FloatArray, FloatArray], FloatArray],
-    straight: BoolArray,
-    velocity: float | None = None,
+    breakpoints: Breakpoints, may_turn: BoolArray, may_peak: BoolArray
 ) -> Breakpoints:
-    """Insert the points that `find` returns, with `velocity` where it is known.
+    """Insert turning points and peaks of the velocity in the intervals that may have them.
 
-    In each interval the velocity is start + slope u + curvature u^2, for u from 0 to 1. Before the
-    breakpoints that are `straight` there are no points.
+    In each interval the velocity is start + slope u + curvature u^2, for u from 0 to 1.
     """
-    step, start, end = (
-        np.diff(breakpoints.time),
-        breakpoints.velocity[:-1],
-        breakpoints.velocity[1:],
-    )
-    with np.errstate(divide="ignore", invalid="ignore"):
+    step, velocity = np.diff(breakpoints.time), breakpoints.velocity
+    start, end = velocity[:-1], velocity[1:]
+    with np.errstate(all="ignore"):
         mean = np.diff(breakpoints.position) / step
-    slope, curvature = 6.0 * mean - 4.0 * start - 2.0 * end, 3.0 * (start + end - 2.0 * mean)
-    u = np.where(straight[1:], np.nan, find(start, end, slope, curvature))
+        slope, curvature = 6.0 * mean - 4.0 * start - 2.0 * end, 3.0 * (start + end - 2.0 * mean)
+        peak = -slope / (2.0 * curvature)
+        # The form of the root without cancellation.
+        root = np.sqrt(slope * slope - 4.0 * curvature * start)
+        turn = -2.0 * start / (slope + np.copysign(root, end - start))
+        turn = np.where((turn > 0.0) & (turn < 1.0), turn, start / (start - end))
+        turns = may_turn & (start * end < 0.0)
+        peaks = may_peak & (peak > 0.0) & (peak < 1.0)
     # A jump onto the belt takes no time: there are no points within it.
-    at = np.flatnonzero(np.isfinite(u) & (step > 0.0))
-    if len(at) == 0:
-        return breakpoints
-    u, step, start, slope, curvature = (each[at] for each in (u, step, start, slope, curvature))
-    reached = start + u * (slope + u * curvature)
+    at, is_peak = np.nonzero(np.column_stack([turns, peaks]) & (step > 0.0)[:, None])
+    u = np.where(is_peak, peak[at], turn[at])
+    order = np.lexsort((u, at))
+    u, at, is_peak = u[order], at[order], is_peak[order]
+    step, start, slope, curvature = (each[at] for each in (step, start, slope, curvature))
     new = Breakpoints(
         breakpoints.time[at] + u * step,
         breakpoints.position[at] + step * u * (start + u * (slope / 2.0 + u * curvature / 3.0)),
-        reached if velocity is None else np.full(len(at), velocity),
+        np.where(is_peak, start + u * (slope + u * curvature), 0.0),
         breakpoints.sticking[at + 1],
     )
     return _insert(breakpoints, at + 1, new)

@@ -70,10 +70,10 @@ class MotionObserver(Protocol):
 class SampleMeter:
     """Measures a motion from its samples, fed in blocks of columns of any length.
 
-    A gap of a whole number of sample periods, up to ten million, is a loss. Any other gap, and a
-    stamp that goes back, starts a new segment and is not a loss. Stamps on no grid, for example
-    those read from a clock, are measured, too: then a gap of up to ten periods is a loss, and a
-    longer one starts a new segment.
+    A gap of up to ten sample periods is bridged, and what is missing in it is lost. A longer one is
+    a loss if it is a whole number of periods, up to ten million. Any other gap, and a stamp that
+    goes back, starts a new segment and is not a loss. Stamps on no grid, for example those read
+    from a clock, are measured, too.
     """
 
     def __init__(
@@ -131,9 +131,8 @@ class SampleMeter:
             return []
         self.steps_back += np.count_nonzero(samples.stamp[1:] <= samples.stamp[:-1])
         cycles: list[Cycle] = []
-        segments = self._grid.segments(samples.stamp)
-        ends = [*(segment.start for segment in segments[1:]), len(samples)]
-        for (start, jittered), end in zip(segments, ends, strict=True):
+        starts = [0, *self._grid.cuts(samples.stamp)]
+        for start, end in zip(starts, [*starts[1:], len(samples)], strict=True):
             segment = samples[start:end]
             self._look_for_unbounded(segment)
             if len(segment) == 1 and end < len(samples):
@@ -142,7 +141,7 @@ class SampleMeter:
                 self._meter.interrupt()
                 self._noisy_meter.interrupt()
                 self._last = None
-            cycles += self._feed_segment(segment, jittered)
+            cycles += self._feed_segment(segment)
         self._last = samples[-1:]
         return cycles
 
@@ -224,7 +223,7 @@ class SampleMeter:
                 )
         return notes if self.drift.judged else [*notes, NOT_JUDGED]
 
-    def _feed_segment(self, samples: SampleColumns, jittered: bool) -> list[Cycle]:
+    def _feed_segment(self, samples: SampleColumns) -> list[Cycle]:
         stamp = samples.stamp
         time = (stamp - stamp[0] + float(self._elapsed)) * 1e-9
         self._elapsed += int(stamp[-1] - stamp[0])
@@ -241,7 +240,7 @@ class SampleMeter:
                     samples.velocity,
                     belt,
                     stick_speed=self._stick_speed,
-                    exact_times=not jittered,
+                    exact_times=self._grid.on_grid(np.diff(stamp)),
                 )
             if self._last is not None:
                 breakpoints = breakpoints[1:]  # the first sample was fed with the previous block

@@ -1,8 +1,5 @@
 """The grid of sampling instants: its period, its gaps and its jitter, from stamps."""
 
-from statistics import median
-from typing import NamedTuple
-
 import numpy as np
 
 from stickslip_ros.arrays import BoolArray, IntArray
@@ -14,6 +11,9 @@ LONGEST_GAP = 10
 _FEW_STEPS = 10
 """Number of steps after which the period counts as known."""
 
+_LOOK_AHEAD = 4096
+"""Number of steps that are looked at once: from each cut to the end would take quadratic time."""
+
 _LONGEST_STEP = 86_400 * NANOSECONDS
 """A longer step is neither a period nor a loss: one of the two stamps is not from this run."""
 
@@ -21,159 +21,98 @@ _LONGEST_LOSS = 10**7
 """Longest gap on the grid, in periods, that may be a loss."""
 
 
-class Segment(NamedTuple):
-    """Part of a block without a cut: from row `start` to the start of the next segment."""
-
-    start: int
-    jittered: bool
-
-
-class _JitteredSteps:
-    """Steps that vary about a period, for example between readings of a clock."""
-
-    def __init__(self, period: float) -> None:
-        self._period = period
-        self._count = 0
-        self._missing = 0
-        self._single_count = 0
-        self._single_time = 0
-        self._next_estimate = _FEW_STEPS
-
-    @property
-    def lost(self) -> int:
-        """Number of missing samples; a late sample and the punctual one after it cancel out."""
-        return max(self._missing, 0)
-
-    def follow(self, steps: IntArray) -> int:
-        """Follow some of the steps (ns) up to the next gap; return how many, 0 at a gap."""
-        steps = steps[: self._next_estimate - self._count]
-        steps = steps[: _first((steps <= 0) | (steps > LONGEST_GAP * self._period))]
-        periods = np.rint(steps / self._period)
-        single = steps[periods == 1.0]
-        self._count += len(steps)
-        self._missing += int(periods.sum()) - len(steps)
-        self._single_count += len(single)
-        self._single_time += int(single.sum())
-        if self._count == self._next_estimate:
-            self._next_estimate *= 2
-            if self._single_count > 0:
-                self._period = self._single_time / self._single_count
-        return len(steps)
-
-
 class SamplingGrid:
     """Grid of sampling instants, found from the stamps, and the number of missing samples.
 
-    Stamps are rounded to the nanosecond. The more periods have been seen, the more exactly the
-    period is known, so that a long gap of a whole number of periods can be distinguished from one
-    between segments. Stamps that leave the grid soon and repeatedly are on no grid: their steps are
-    jittered.
+    Stamps are rounded to the nanosecond, or read from a clock: then the steps vary about a period,
+    and a late sample and the punctual one after it cancel out. The more periods have been seen, the
+    more exactly the period is known, so that a long gap of a whole number of periods can be
+    distinguished from one between segments.
     """
 
     def __init__(self) -> None:
         self._lost_before = 0
-        self._jittered: _JitteredSteps | None = None
-        self._off_grid: list[float] = []
         self._begin()
 
     def _begin(self) -> None:
-        self._step = 0
-        self._covered = 0
-        self._periods = 0
-        self._intervals = 0
-        self._since_gap = 0
+        self._first: list[int] = []
+        self._period = float(_LONGEST_STEP)
+        self._count, self._next_estimate = 0, 2 * _FEW_STEPS
+        self._covered = self._periods = self._missing = 0
 
     @property
     def lost(self) -> int:
         """Number of instants of the grid without a sample."""
-        lost = self._lost_before + self._periods - self._intervals
-        return lost if self._jittered is None else lost + self._jittered.lost
+        return self._lost_before + max(self._missing, 0)
 
-    def segments(self, stamp: IntArray) -> list[Segment]:
-        """Follow the stamps (ns), the first of which is known; return the segments of the motion.
+    def cuts(self, stamp: IntArray) -> list[int]:
+        """Follow the stamps (ns), the first of which is known; return the rows that start anew.
 
         The motion is cut where a new segment starts, which is no loss, and after a gap that is too
-        long for interpolation. The first segment continues the motion so far.
+        long for interpolation.
         """
-        steps = np.diff(stamp)
-        segments = [Segment(0, self._jittered is not None)]
-        done = 0
+        steps, rows, done = np.diff(stamp), list[int](), 0
         while done < len(steps):
-            followed = self._follow(steps[done:])
-            done += followed
-            if followed > 0 or self._reconsider(int(steps[done])):
-                continue
-            self._jump(int(steps[done]))
-            done += 1
-            segments.append(Segment(done, self._jittered is not None))
-        return segments
+            # Up to where the period is estimated again: what is found must not depend on blocks.
+            known = self._count >= _FEW_STEPS
+            most = min(self._next_estimate - self._count, _LOOK_AHEAD) if known else 1
+            ahead = steps[done : done + most]
+            longest = self._period * (LONGEST_GAP if self._count else 1)
+            cut = (ahead <= 0) | (ahead > longest)
+            count = int(np.argmax(cut)) if cut.any() else len(ahead)
+            done += count
+            if count > 0:
+                self._follow(ahead[:count])
+            else:
+                self._jump(int(ahead[0]))
+                done += 1
+                rows.append(done)
+        return rows
 
-    def _follow(self, steps: IntArray) -> int:
-        """Follow some of the steps up to the next irregular one; return how many."""
-        if self._jittered is not None:
-            return self._jittered.follow(steps)
-        if self._step == 0:
-            self._step = int(steps[0])
-        # A longer look ahead than the stretch since the last gap could take quadratic time.
-        steps = steps[: max(64, self._since_gap)]
-        steps = steps[: _first(self._odd(steps))]
-        if len(steps) > 0:
-            self._covered += int(steps.sum())
-            self._periods += int(np.rint(steps / self._step).sum())
-            self._intervals += len(steps)
-            self._since_gap += len(steps)
-        return len(steps)
+    def on_grid(self, steps: IntArray) -> BoolArray:
+        """Return which steps (ns) are a whole number of periods, within the rounding of stamps."""
+        return _whole(steps, self._period)
 
-    def _odd(self, steps: IntArray) -> BoolArray:
-        """Return which steps are not a few whole periods."""
-        if not 0 < self._step <= _LONGEST_STEP:
-            return np.ones(len(steps), dtype=bool)
-        periods = np.rint(steps / self._step)
-        off_grid = np.abs(steps - periods * self._step) > periods + 1.0
-        return off_grid | (periods < 1.0) | (periods > LONGEST_GAP)
-
-    def _reconsider(self, step: int) -> bool:
-        """Count the first few steps as several periods each if a shorter step divides them."""
-        times = round(self._step / step) if step > 0 else 0
-        fits = 1 < times <= _LONGEST_LOSS and abs(self._step - times * step) <= times + 1
-        if not fits or self._intervals > _FEW_STEPS:
-            return False
-        self._periods *= times
-        self._step = step
-        return True
+    def _follow(self, steps: IntArray) -> None:
+        """Count some of the steps up to the next gap."""
+        self._count += len(steps)
+        if self._count <= _FEW_STEPS:
+            self._first += steps.tolist()
+            steps, self._period = np.array(self._first), _period_of(np.array(self._first))
+            self._covered = self._periods = self._missing = 0
+        periods = np.rint(steps / self._period)
+        self._missing += int(periods.sum()) - len(steps)
+        # A gap off the grid tells nothing of the period, a late sample on no grid does.
+        used = self.on_grid(steps) | (periods == 1.0)
+        self._covered += int(steps[used].sum())
+        self._periods += int(periods[used].sum())
+        if self._count == self._next_estimate:
+            self._next_estimate *= 2
+            self._period = self._covered / self._periods
 
     def _jump(self, gap: int) -> None:
         """Count a long gap as a loss if it is on the grid, otherwise start a new grid."""
-        self._since_gap = 0
         if 0 < gap <= _LONGEST_STEP and self._periods > 0:
             period = self._covered / self._periods
             periods = round(gap / period)
             on_grid = abs(gap - periods * period) <= 1.0 + periods / self._periods
             if on_grid and periods <= _LONGEST_LOSS:
-                self._covered += gap
-                self._periods += periods
-                self._intervals += 1
+                self._period = period
+                self._follow(np.array([gap]))
                 return
         self._lost_before = self.lost
-        self._jittered = self._jitter(gap)
         self._begin()
 
-    def _jitter(self, gap: int) -> _JitteredSteps | None:
-        """Return jittered steps for a gap off the grid if the grid was left too often."""
-        if self._intervals > 1000:  # a steady grid: leaving it once is no sign of jitter
-            self._off_grid.clear()
-        period = self._covered / self._periods if self._periods > 0 else 0.0
-        if not 0.0 < period / 5 <= gap <= 5 * period:
-            self._off_grid.clear()
-            return None
-        self._off_grid += [period, gap]
-        if len(self._off_grid) < 6:  # two for each gap: one or two gaps are not enough
-            return None
-        steps = _JitteredSteps(median(self._off_grid))
-        self._off_grid.clear()
-        return steps
+
+def _period_of(steps: IntArray) -> float:
+    """Return the period of a few steps (ns): the shortest one if it divides all others."""
+    shortest = float(steps.min())
+    if steps.max() <= _LONGEST_LOSS * shortest and _whole(steps, shortest).all():
+        return float(steps.sum() / np.rint(steps / shortest).sum())
+    middle = np.sort(steps)[(len(steps) - 1) // 2]
+    return float(np.mean(steps[np.rint(steps / middle) == 1.0]))
 
 
-def _first(found: BoolArray) -> int:
-    """Return the index of the first row that is true, or the number of rows if there is none."""
-    return int(np.argmax(found)) if found.any() else len(found)
+def _whole(steps: IntArray, period: float) -> BoolArray:
+    periods = np.rint(steps / period)
+    return (periods >= 1.0) & (np.abs(steps - periods * period) <= periods + 1.0)

@@ -226,6 +226,18 @@ def test_states_that_were_really_taken_at_jittered_stamps_are_measured() -> None
     assert measures.period == pytest.approx(2.0 * np.pi, rel=1e-6)
 
 
+def test_a_short_gap_off_the_grid_is_bridged() -> None:
+    """Afterwards the samples are on a grid again, with the peaks of the velocity between them."""
+    samples = still(stamps(100, 7001))
+    samples.stamp[3000:] += 34_000_000
+    time = samples.stamp * 1e-9
+    meter = fed(replace(samples, position=np.sin(time), velocity=np.cos(time)))
+    measures = meter.measures()
+    assert meter.lost_samples == 3
+    assert measures.cycles == 10
+    assert measures.velocity_amplitude == pytest.approx(1.0, rel=1e-9)
+
+
 @given(st.sets(st.integers(50, 198)), st.integers(0, 100))
 def test_what_is_lost_of_jittered_samples_is_counted(lost: set[int], seed: int) -> None:
     lost = {number for number in lost if number % 10}  # never over the longest gap
