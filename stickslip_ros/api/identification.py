@@ -14,7 +14,8 @@ from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.identification import sentences
 from stickslip_ros.identification.findings import Findings
 from stickslip_ros.identification.fit import Estimate
-from stickslip_ros.identification.identify import AUTO, AUTO_TIME, identify_recordings
+from stickslip_ros.identification.identify import AUTO, AUTO_TIME, constants
+from stickslip_ros.identification.identify import identify as identify_records
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.recordings import read_all, read_records
 from stickslip_ros.identification.scenario import written_scenario
@@ -106,7 +107,7 @@ class Model(Result):
         form = {name: options.pop(name) for name in _FORM if name in options}
         layout = {name: options.pop(name) for name in _LAYOUT if name in options}
         options |= {"form": TableFormat(**form), "layout": BagLayout(**layout)}
-        records = read_records(Path(recording), columns, start=start, end=end, **options).records
+        records = read_records(Path(recording), columns, start=start, end=end, **options)
         if len(records) > 1:
             raise InvalidInputError(
                 f"{recording} has {len(records)} parts between long gaps: one must be chosen by "
@@ -295,11 +296,11 @@ def identify(
         form=TableFormat(decimal, skip, encoding),
         layout=BagLayout(joint, belt_joint, states_topic, force_topic, time, force),
     )
-    own = [read[path] for path in fitted]
-    found = identify_recordings(own, law, dict(fixed or {}), progress, time_limit)
+    own = [record for path in fitted for record in read[path]]
+    found = identify_records(own, law, constants(fixed or {}), progress, time_limit)
     predicted = {
-        str(path) if len(read[path].records) == 1 else f"{path}, part {number}": record
+        str(path) if len(read[path]) == 1 else f"{path}, part {number}": record
         for path in others
-        for number, record in enumerate(read[path].records, start=1)
+        for number, record in enumerate(read[path], start=1)
     }
     return Model(found, predicted, Units(rotary=rotary))

@@ -8,20 +8,11 @@ import numpy as np
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.identification.choice import AUTO
-from stickslip_ros.identification.filtered import filtered
+from stickslip_ros.identification.filtered import END, START, filtered, mean_forces
 from stickslip_ros.identification.identified_law import DELAY, IdentifiedLaw
-from stickslip_ros.identification.laws import (
-    BristledTableAdapter,
-    SaturatingAdapter,
-    TableAdapter,
-)
+from stickslip_ros.identification.laws import SaturatingAdapter, TableAdapter
 from stickslip_ros.identification.record import Record
-from stickslip_ros.identification.regression import (
-    LINEAR,
-    Regression,
-    Rows,
-    regress,
-)
+from stickslip_ros.identification.regression import LINEAR, Regression, Rows, regress
 from stickslip_ros.identification.time_limit import TimeLimit
 
 _RESOLVED_ERROR_RATIO = 0.9
@@ -105,7 +96,9 @@ class AxisTask:
         if self.delay is not None:
             return found
         if self.rows.resting:
-            found = min(fit, self._fitted(law, self._rows(None)).validated(), key=_error)
+            found = min(
+                fit, self._fitted(law, self._rows(None)).validated(), key=lambda each: each.error
+            )
         period, tried = self.records[0].period, _DELAYS
         for _ in range(2):
             design, wanted = fit.system
@@ -120,13 +113,16 @@ class AxisTask:
 
     def _with_memory(self, static: Regression, table: TableAdapter, *, asked: bool) -> Regression:
         """Return the fit whose friction follows the table of another over a path."""
-        if not table.shaped:
-            table = TableAdapter(self.rows.curve_speeds, table.speeds)
+        speeds = self.rows.curve_speeds
         span = max(float(np.ptp(record.position)) for record in self.records)
         tried: dict[float, Regression] = {}
 
         def error(deflection: float) -> float:
-            bristled = BristledTableAdapter(table, deflection)
+            bristled = (
+                SaturatingAdapter(speeds, deflection)
+                if table.shaped
+                else TableAdapter(speeds, table.speeds, deflection)
+            )
             tried[deflection] = replace(static, curve=bristled).refitted()
             return _loss(tried[deflection])
 
@@ -150,12 +146,10 @@ class AxisTask:
 
     def _forces(self, delay: float) -> FloatArray:
         pairs = zip(self.rows.parts, self.records, strict=True)
-        return np.concatenate([part.rows(part.delayed(record, delay)) for part, record in pairs])
+        return np.concatenate(
+            [part.rows(mean_forces(record, delay)[START:-END]) for part, record in pairs]
+        )
 
 
 def _loss(fit: Regression) -> float:
     return float(fit.residual @ fit.residual)
-
-
-def _error(fit: Regression) -> float:
-    return fit.error

@@ -5,7 +5,6 @@ from dataclasses import replace
 from functools import cached_property
 from itertools import chain
 from math import inf, pi, sqrt
-from typing import Any
 
 import numpy as np
 
@@ -13,7 +12,7 @@ from stickslip_ros.arrays import FloatArray, rms
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.identification.choice import AUTO
 from stickslip_ros.identification.filtered import filtered
-from stickslip_ros.identification.identified_law import DELAY, LAG, IdentifiedLaw
+from stickslip_ros.identification.identified_law import DELAY, LAG, IdentifiedLaw, label_of
 from stickslip_ros.identification.laws import (
     DAHL,
     EXPONENTIAL,
@@ -113,50 +112,40 @@ class DriveTask:
         much worse in the search is not fitted further.
         """
         found: list[Refinement] = []
-        near: list[Sequence[Refinement]] = []
 
-        def search(own: IdentifiedLaw, name: str, **options: Any) -> None:
-            if (found or near) and self.limit.is_over:
-                self.left.append(name)
-                return
-            progress(name)
-            near.append(self.searched(own, **options))
-
-        def extend() -> None:
-            least = min(map(_loss, chain(found, *near)))
+        def compete(own: Sequence[IdentifiedLaw], like: Refinement | None = None) -> None:
+            """Search laws one by one, then extend what was found of them."""
+            near: list[Sequence[Refinement]] = []
+            for each in own:
+                self.limit.begin_part(_LAW_TIME if len(own) > 1 else 1.0)
+                name = label_of(each)
+                if (found or near) and self.limit.is_over:
+                    self.left.append(name)
+                    continue
+                progress(name)
+                thorough = not any(map(is_white, chain(*near)))
+                near.append(self.searched(each, thorough=thorough, like=like))
+            self.limit.begin_part(1.0)
+            least = min(map(_loss, chain(found, *near)), default=inf)
             found.extend(self.extended(fits, least) for fits in near)
-            near.clear()
+
+        def explained() -> bool:
+            return any(map(is_white, found))
 
         self.limit.begin_stage(_SEARCH_TIME)
-        for each in laws:
-            if not each.memory:
-                self.limit.begin_part(_LAW_TIME)
-                search(each, each.name, thorough=not any(map(is_white, chain(*near))))
-        if law == self.table.name:
-            search(self.table, law)
-        self.limit.begin_part(1.0)
-        if near:
-            extend()
-        if len(self.rows.directions) > 1 and found and not any(map(is_white, found)):
-            best = min(found, key=_loss).law
-            search(DirectionalAdapter(best), f"{best.name} by direction")
-            extend()
+        tables = [self.table] if law == self.table.name else []
+        compete([*(each for each in laws if not each.memory), *tables])
+        if len(self.rows.directions) > 1 and found and not explained():
+            compete([DirectionalAdapter(min(found, key=_loss).law)])
         # A memory changes the motion near sticking: it does not explain an input that is missing.
-        explained = not found or (law == AUTO and min(map(_share, found)) < _MISSING_INPUT_ERROR)
-        if explained and not any(map(is_white, found)):
-            bristles: Refinement | None = None
-            for each in laws:
-                if not each.memory:
-                    continue
-                if each is not DAHL and any(map(is_white, found)):
-                    break
-                search(each, each.name, like=bristles)
-                extend()
-                if found[-1].law is LUGRE:
-                    bristles = found[-1]
-        if law == AUTO and not any(map(is_white, found)):
-            search(self.table, self.table.name)
-            extend()
+        complete = not found or (law == AUTO and min(map(_share, found)) < _MISSING_INPUT_ERROR)
+        bristles: Refinement | None = None
+        for each in laws if complete and not explained() else ():
+            if each.memory and (each is DAHL or not explained()):
+                compete([each], bristles)
+                bristles = found[-1] if found[-1].law is LUGRE else bristles
+        if law == AUTO and not explained():
+            compete([self.table])
         return self._finished(found)
 
     def _finished(self, found: Sequence[Refinement]) -> list[Refinement]:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from stickslip_ros.arrays import BoolArray, FloatArray
-from stickslip_ros.identification.record import Record
+from stickslip_ros.identification.record import Record, late
 from stickslip_ros.measures.noise import white_noise
 
 _CUTOFF = 100.0
@@ -94,10 +94,6 @@ class Filtered:
         found: FloatArray = np.asarray(sosfiltfilt(low_pass, values, axis=0))
         return found[:: self.decimation]
 
-    def delayed(self, record: Record, delay: float) -> FloatArray:
-        """Return the forces of the same record, decimated, with another delay, s."""
-        return _shifted(record, delay)[START:-END]
-
 
 @cache
 def _chebyshev(decimation: int) -> FloatArray:
@@ -135,7 +131,7 @@ def filtered(record: Record, *, decimated: bool, delay: float | None = None) -> 
         # The low-pass would carry the jump where the slide stops into the rows beside it; that of
         # the rows is enough for noise.
         acceleration[1:-1] = np.diff(record.position, 2) / record.period**2
-    force = record.held_force if delay is None else _shifted(record, delay)
+    force = record.held_force if delay is None else mean_forces(record, delay)
     if not decimated:
         force = smooth(force)  # all that enters the equation passes the same filter
     time: FloatArray = record.period * np.arange(len(position), dtype=float)
@@ -154,15 +150,10 @@ def filtered(record: Record, *, decimated: bool, delay: float | None = None) -> 
     )
 
 
-def _shifted(record: Record, delay: float) -> FloatArray:
-    """Return the known forces, of which one is late, as they are on average around each sample."""
-    found = np.zeros(len(record.position))
-    for held, late in zip(record.held_forces, (delay, 0.0), strict=True):
-        at = np.arange(len(held)) - late / record.period
-        edges = np.concatenate([[0.0], np.cumsum(held)])
-        places = np.arange(len(edges))
-        found += np.interp(at + 0.5, places, edges) - np.interp(at - 0.5, places, edges)
-    return found
+def mean_forces(record: Record, delay: float) -> FloatArray:
+    """Return the known forces, of which one is late, s, as they are on average around a sample."""
+    force, disturbance = record.held_forces
+    return late(force, 0.5 + delay / record.period) + late(disturbance, 0.5)
 
 
 def _slipping(relative: FloatArray, reach: float) -> BoolArray:

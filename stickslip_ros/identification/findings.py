@@ -1,21 +1,19 @@
 """The identified model: constants with intervals, the friction curve, and its predictions."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import cached_property
+from dataclasses import dataclass
+from functools import cache, cached_property
 from math import inf, isfinite
-from typing import Any, TypeVar
 
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray, rms
 from stickslip_ros.identification.choice import better_by
-from stickslip_ros.identification.filtered import START, Filtered, filtered
+from stickslip_ros.identification.filtered import START, filtered
 from stickslip_ros.identification.fit import Estimate, Fit, ForceErrors, Friction, Residuals
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.rest import static_force
 from stickslip_ros.identification.servo import Servo, closed_loop, servo_of
-from stickslip_ros.identification.trajectory import delayed
 from stickslip_ros.model.drive import Drive
 
 _STILL_SPEED = 0.02
@@ -32,8 +30,6 @@ CHECKED = (
     "closed_loop_force_error",
 )
 """Errors of the prediction of a recording."""
-
-_T = TypeVar("_T")
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,10 +48,6 @@ class Findings:
     """Constants that were given."""
     left: Sequence[str]
     """Laws that were not fitted to the end, because the time was over."""
-    _predicted: dict[tuple[Any, Record], Any] = field(
-        default_factory=dict[tuple[Any, Record], Any], init=False, repr=False
-    )
-    """Predictions so far, by method of the fit and record."""
 
     @property
     def normal_force(self) -> float:
@@ -103,14 +95,10 @@ class Findings:
         """Pairs of constants whose errors go together, with their correlation."""
         names, _, covariance = self._constants
         errors = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-        found: list[tuple[str, str, float]] = []
-        for first, one in enumerate(names):
-            for second in range(first):
-                product = errors[first] * errors[second]
-                share = covariance[first, second] / product if product > 0.0 else 0.0
-                if isfinite(share) and abs(share) > _NAMED_CORRELATION:
-                    found.append((names[second], one, float(share)))
-        return found
+        with np.errstate(invalid="ignore", divide="ignore"):
+            shares = covariance / np.outer(errors, errors)
+        near = np.tril(np.isfinite(shares) & (np.abs(shares) > _NAMED_CORRELATION), -1)
+        return [(names[j], names[i], float(shares[i, j])) for i, j in np.argwhere(near).tolist()]
 
     @cached_property
     def _constants(self) -> tuple[list[str], FloatArray, FloatArray]:
@@ -141,14 +129,10 @@ class Findings:
         return float(np.ptp(belts)) <= 1e-3 * float(np.abs(belts).max())
 
     @cached_property
-    def _filtered(self) -> Sequence[Filtered]:
-        """Filtered columns of each record, without a delay."""
-        return [filtered(each, decimated=False) for each in self.records]
-
-    @property
     def _speeds(self) -> Sequence[FloatArray]:
         """Sliding speeds of each record, m/s."""
-        return [np.abs(each.relative_speed) for each in self._filtered]
+        columns = (filtered(each, decimated=False) for each in self.records)
+        return [np.abs(each.relative_speed) for each in columns]
 
     @property
     def slowest(self) -> float:
@@ -178,7 +162,7 @@ class Findings:
         See `static_force`; `sign` is one of `directions`.
         """
         values = self.chosen.values_at(self.chosen.point)
-        records = [delayed(record, self.delay) for record in self.records]
+        records = [record.delayed(self.delay) for record in self.records]
         held = (
             record.held_force + values["bias_force"] - values["stiffness"] * record.position
             for record in records
@@ -215,27 +199,23 @@ class Findings:
         found = self.errors(record)
         return rms(found.error) / rms(found.force) if len(found.force) else None
 
-    def free_run(self, record: Record) -> FloatArray:
-        """Return the positions that the model runs through, with the recorded force, no feedback.
+    @cached_property
+    def free_run(self) -> Callable[[Record], FloatArray]:
+        """The positions that the model runs through, with the recorded force and no feedback.
 
         The velocity at the start is the one that fits best. A drive on a spring starts where the
         slide is fast relative to the belt, at the position that fits best, too; NaN before.
         """
-        return self._once(self.chosen.free_run, record)
+        return cache(self.chosen.free_run)
 
-    def residuals(self, record: Record | None = None) -> Residuals:
-        """Return what the model leaves of a record, or of the first one.
+    @cached_property
+    def residuals(self) -> Callable[[Record], Residuals]:
+        """What the model leaves of a record.
 
         Of a drive on a spring these are the position errors in segments like those of the fit, each
         from the state that fits best. The model of an axis is fitted to the forces.
         """
-        return self._once(self.chosen.residuals, self.records[0] if record is None else record)
-
-    def _once(self, predicted: Callable[[Record], _T], record: Record) -> _T:
-        key = predicted, record
-        if key not in self._predicted:
-            self._predicted[key] = predicted(record)
-        return self._predicted[key]
+        return cache(self.chosen.residuals)
 
     def check(self, record: Record) -> dict[str, float | None]:
         """Return what the model predicts of a record, as `CHECKED` names it.

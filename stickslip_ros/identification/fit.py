@@ -11,7 +11,7 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.identification.covariance import block_covariance, propagated
-from stickslip_ros.identification.identified_law import DELAY, IdentifiedLaw
+from stickslip_ros.identification.identified_law import DELAY, IdentifiedLaw, label_of
 from stickslip_ros.identification.record import Record
 from stickslip_ros.model.drive import Drive
 
@@ -145,9 +145,9 @@ class Fit(ABC):
     def errors(self, record: Record) -> ForceErrors:
         """Return measured and modelled forces on the filtered rows of a record where it slips."""
 
-    @abstractmethod
     def residuals(self, record: Record) -> Residuals:
         """Return what the fit leaves of a record; see `Findings.residuals`."""
+        return self.errors(record)
 
     @abstractmethod
     def free_run(self, record: Record) -> FloatArray:
@@ -166,7 +166,7 @@ class Fit(ABC):
     @property
     def label(self) -> str:
         """Name of the law, and whether it is by direction."""
-        return f"{self.law.name} by direction" if self.by_direction else self.law.name
+        return label_of(self.law) if self.has_spring else self.law.name
 
     @property
     def error(self) -> float:
@@ -221,14 +221,12 @@ class Fit(ABC):
         self, function: Callable[[FloatArray], FloatArray]
     ) -> tuple[FloatArray, FloatArray]:
         """Return the values of a function of the point, and their derivatives by it."""
+        from scipy.optimize import approx_fprime  # takes long to import
+
         point, base = self.point, function(self.point)
         errors = np.sqrt(np.diag(self.covariance))
         sizes = np.abs(point)
         # Of a number that is nearly zero its error is the size.
         sizes = np.where((sizes < _NEAR_ZERO * errors) & np.isfinite(errors), errors, sizes)
-        linear = np.zeros((len(base), len(point)))
-        for number, step in enumerate((_STEP * np.maximum(sizes, 1e-9)).tolist()):
-            moved = point.copy()
-            moved[number] += step
-            linear[:, number] = (function(moved) - base) / step
-        return base, linear
+        linear: Any = approx_fprime(point, function, _STEP * np.maximum(sizes, 1e-9))
+        return base, np.reshape(linear, (len(base), len(point)))

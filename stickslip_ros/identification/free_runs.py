@@ -8,7 +8,7 @@ import numpy as np
 from stickslip_ros.arrays import FloatArray, rms
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.regression import Regression, solve
-from stickslip_ros.identification.trajectory import Predictor, delayed, free_run
+from stickslip_ros.identification.trajectory import Predictor, free_run
 
 _UNBOUNDED_ERROR = 1e3
 """Error of a free run that is not bounded, in units of that of the regression."""
@@ -56,7 +56,7 @@ class _FreeRuns:
 
     def __init__(self, fit: Regression, records: Sequence[Record]) -> None:
         self._fit = fit
-        records = [delayed(record, fit.delay or 0.0) for record in records]
+        records = [record.delayed(fit.delay or 0.0) for record in records]
         self._predictors = [Predictor(record) for record in records]
         self._measured = np.concatenate([record.position for record in records])
         self._records = records

@@ -24,17 +24,23 @@ _LEAST_SHARE = 1e-9
 """Smallest constant that must be above zero, as a share of the friction or of other forces."""
 LEAST_RISE = 1e-3
 """Smallest force from which a search starts, as a share of the static friction."""
-_SEARCH_FACTOR = 30.0
-"""Factor by which the search may leave the mass and the stiffness that it starts from; viscous
-friction up to which it goes, in static friction at the fastest speed."""
-_LARGEST_STIFFNESS = 3000.0
-"""Largest stiffness of the bristles, in stiffnesses of the spring."""
-_SLOWEST_SHAPE, _FASTEST_SHAPE = 0.01, 10.0
-"""Shapes of a curve that records may tell, in fastest speeds."""
 DELAY = "force_delay"
 """Name of the constant that is not one of the drive: the time until a force acts, s."""
 LAG = "actuator.time_constant"
 """Name of the time constant of the lag of the force, s."""
+_SEARCHED = {
+    **dict.fromkeys(("mass", "stiffness"), (1.0 / 30.0, 30.0)),
+    DELAY: (-1.0, 1.0),
+    LAG: (0.0, 1.0),
+    "bias_force": (-inf, inf),
+    "viscous": (-30.0, 30.0),
+    "bristle_stiffness": (1.0, 3000.0),
+    "bristle_damping": (0.0, 3000.0),
+    **dict.fromkeys(("rise", "damping"), (0.0, inf)),
+}
+"""Smallest and largest value of a coordinate in a search, in sizes of where it begins."""
+_SPEEDS = 0.01, 10.0
+"""The same of speeds of a curve: what it does far below or above what was recorded is not told."""
 REVERSE = "reverse."
 """Start of the names of coordinates of backward slip where both directions have their own."""
 
@@ -150,6 +156,11 @@ class IdentifiedLaw:
                 own[name] = values[name] / (1.0 if name in self.unscaled else normal_force)
         return kind(**own)
 
+    def following(self, curve: FrictionLaw, values: Values, normal_force: float) -> FrictionLaw:
+        """Return the law whose memory follows a curve."""
+        kind: Any = LAWS[self.name]
+        return kind(curve, **{name: values[name] / normal_force for name in self.memory})
+
     def drive(self, values: Values, normal_force: float, belt_speed: float = 0.0) -> Drive:
         """Return the drive of coordinates."""
         return Drive(
@@ -184,37 +195,25 @@ class IdentifiedLaw:
     def bounds(self, name: str, values: Values, fastest: float) -> tuple[float, float]:
         """Return the smallest and the largest value of a coordinate in the search from `values` on.
 
-        The fastest speed is that relative to the belt in the records, m/s: what friction does at a
-        hundredth of it or far above it, they do not tell.
+        The fastest speed is that relative to the belt in the records, m/s.
         """
-        static = self.static_force(values)
-        if name in ("mass", "stiffness"):
-            return values[name] / _SEARCH_FACTOR, values[name] * _SEARCH_FACTOR
-        if name in (DELAY, LAG):
-            longest = sqrt(values["mass"] / values["stiffness"])
-            return -longest if name == DELAY else 0.0, longest
-        if name == "bias_force":
-            return -inf, inf
-        if name == "viscous":
-            return -_SEARCH_FACTOR * static / fastest, _SEARCH_FACTOR * static / fastest
-        if name == "bristle_stiffness":
-            return values["stiffness"], _LARGEST_STIFFNESS * values["stiffness"]
-        if name == "bristle_damping":
-            return 0.0, _LARGEST_STIFFNESS * static / fastest
-        if name.endswith("_speed"):
-            return _SLOWEST_SHAPE * fastest, _FASTEST_SHAPE * fastest
-        return 0.0 if name in ("rise", "damping") else _LEAST_SHARE * static, inf
+        other = _SPEEDS if name.endswith("_speed") else (_LEAST_SHARE, inf)
+        low, high = _SEARCHED.get(name, other)
+        size = self.size(name, values, fastest)
+        return low * size, high * size
 
     def size(self, name: str, values: Values, fastest: float) -> float:
-        """Return a typical size of a coordinate of the law, from which differences are made."""
-        static = self.static_force(values)
+        """Return a typical size of a coordinate, above 0, from which differences are made."""
         if name.endswith("_speed"):
             return fastest
-        if name in ("viscous", "bristle_damping"):
-            return static / fastest
-        if name in self.unscaled:
-            return abs(values[name])
-        return values["stiffness"] if name == "bristle_stiffness" else static
+        if name in (DELAY, LAG):
+            return sqrt(values["mass"] / values["stiffness"])
+        if name in ("mass", "stiffness", *self.unscaled):
+            return max(abs(values[name]), np.finfo(float).tiny)
+        if name == "bristle_stiffness":
+            return values["stiffness"]
+        static = self.static_force(values)
+        return static / fastest if name in ("viscous", "damping", "bristle_damping") else static
 
     def to_search(self, values: Values, fastest: float) -> dict[str, float]:
         """Return the coordinates with those in place that `straightened` names."""
@@ -223,6 +222,11 @@ class IdentifiedLaw:
     def from_search(self, found: Values, fastest: float) -> dict[str, float]:
         """Return the coordinates of `to_search`, which may be ones that the law refuses."""
         return dict(found)
+
+
+def label_of(law: IdentifiedLaw) -> str:
+    """Return the name of a law, and whether it is by direction."""
+    return law.name if law.one_way is law else f"{law.name} by direction"
 
 
 def by_group(law: FrictionLaw) -> Mapping[str, FrictionLaw]:

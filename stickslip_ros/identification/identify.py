@@ -13,7 +13,6 @@ from stickslip_ros.identification.free_runs import adjusted
 from stickslip_ros.identification.identified_law import DELAY, IdentifiedLaw
 from stickslip_ros.identification.laws import COMPETING, KNOWN_LAWS, TableAdapter
 from stickslip_ros.identification.record import Record
-from stickslip_ros.identification.recordings import ReadRecords
 from stickslip_ros.identification.regression import LINEAR, Regression
 from stickslip_ros.identification.time_limit import TimeLimit
 from stickslip_ros.model.constants import constants_of
@@ -41,27 +40,12 @@ _SAME_PERIOD = 0.01
 """Share by which sample periods of recordings that are fitted together may differ."""
 
 
-def identify_recordings(
-    read: Sequence[ReadRecords],
-    law: str,
-    fixed: Mapping[str, float | str],
-    progress: Callable[[str], None] = lambda _: None,
-    time_limit: float = AUTO_TIME,
-) -> Findings:
-    """Identify a drive from recordings of one machine, as `identify` does from their records.
+def constants(fixed: Mapping[str, float | str]) -> dict[str, float]:
+    """Return known constants by parameter of the plant, SI units, from those by NODE.PARAMETER.
 
-    `fixed` has the known constants by NODE.PARAMETER. Raises InvalidInputError if an argument is
-    not allowed, or no model is identifiable from the recordings.
+    Raises InvalidInputError for one that cannot be given, or has no such value.
     """
-    if not read:
-        raise InvalidInputError("no recording is given: must be at least one")
-    known: dict[str, float] = {}
-    for each in read:
-        known |= each.known
-    for target, value in fixed.items():
-        known[target.removeprefix("plant.")] = _constant(target, value)
-    records = [record for each in read for record in each.records]
-    return identify(records, law, known, progress, time_limit)
+    return {target.removeprefix("plant."): _constant(target, fixed[target]) for target in fixed}
 
 
 def fixed_of(texts: Sequence[str]) -> dict[str, float]:
@@ -102,11 +86,15 @@ def identify(
 
     A belt that is at rest in all records means an axis that no spring holds, unless a stiffness is
     given: then, and on a belt that moves, the slide is on a spring. `fixed` has the known
-    constants, of `FIXABLE`. `progress` receives the name of each law before it is fitted. `AUTO`
-    ends after `time_limit`, s, with the best law so far; a single law takes its time. Raises
-    InvalidInputError if a name or a value is not allowed, or no model is identifiable.
+    constants, of `FIXABLE`, beside the delay that a record may have. `progress` receives the name
+    of each law before it is fitted. `AUTO` ends after `time_limit`, s, with the best law so far; a
+    single law takes its time. Raises InvalidInputError if a name or a value is not allowed, or no
+    model is identifiable.
     """
-    fixed = {} if fixed is None else fixed
+    if not records:
+        raise InvalidInputError("no recording is given: must be at least one")
+    delays = [each.delay for each in records if each.delay is not None]
+    fixed = ({DELAY: delays[-1]} if delays else {}) | dict(fixed or {})
     laws = _laws(law)
     fixable = {*FIXABLE, *(f"friction.{name}" for own in laws for name in own.fixable)}
     for name, value in fixed.items():

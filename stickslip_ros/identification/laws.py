@@ -2,20 +2,13 @@
 
 from collections.abc import Mapping, Sequence
 from math import exp, inf, log, sqrt
-from typing import Any
 
 import numpy as np
 from typing_extensions import override
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.identification.identified_law import LEAST_RISE, REVERSE, IdentifiedLaw, Values
-from stickslip_ros.model.friction import (
-    LAWS,
-    Directional,
-    FrictionLaw,
-    RateState,
-    Table,
-)
+from stickslip_ros.model.friction import Directional, FrictionLaw, RateState, Table
 
 _LEAST_FRICTION = 0.01
 """Least friction of bristles at a speed, as a share of the largest."""
@@ -37,6 +30,7 @@ least one, as a share of the friction at the reference speed."""
 _SLIP_DISTANCES, _LEAST_SLIP_DISTANCE = (0.03, 0.1), 1e-3
 """Slip distances from which the search starts, and the least one, in amplitudes of the free
 vibration whose speed is the fastest one."""
+_BRISTLES = "bristle_stiffness", "bristle_damping"
 _REFERENCE_SPEED = float(RateState().reference_speed)
 
 
@@ -155,18 +149,29 @@ class ExponentialAdapter(IdentifiedLaw):
 
 
 class TableAdapter(IdentifiedLaw):
-    """Friction without a law, a sum of straight lines between knots: forces at given speeds."""
+    """Friction without a law, a sum of straight lines between knots: forces at given speeds.
+
+    With a deflection d friction follows the table over a path, as bristles do: F' = |v_r|
+    (F_table - F) / d. It is the LuGre law without damping of the bristles, of one deflection at all
+    speeds.
+    """
 
     name = "table"
     smallest = "force_0"
 
-    def __init__(self, speeds: FloatArray, knots: FloatArray | None = None) -> None:
+    def __init__(
+        self, speeds: FloatArray, knots: FloatArray | None = None, deflection: float = 0.0
+    ) -> None:
         """Take the speeds of the points and of the knots, m/s, from 0; by default the same."""
         self.speeds, self.knots = speeds, speeds if knots is None else knots
         self.least = (0.0, *[-np.inf] * (len(self.knots) - 1))
         self.coordinates = [f"force_{number}" for number in range(len(speeds))]
         # The polynomials of the pieces are made from them.
         self.by_differences = self.coordinates
+        self.deflection = deflection
+        if deflection > 0.0:
+            self.name, self.memory = "lugre", _BRISTLES
+            self.coordinates = [*self.coordinates, *self.memory]
 
     @override
     def curve_speeds(self, recorded: FloatArray) -> FloatArray:
@@ -181,7 +186,20 @@ class TableAdapter(IdentifiedLaw):
     @override
     def coordinates_of(self, forces: Sequence[float], shape: float) -> dict[str, float]:
         found = self.terms(self.speeds, shape) @ np.array(forces)
-        return dict(zip(self.coordinates, found.tolist(), strict=True))
+        return dict(zip(self.coordinates, found.tolist(), strict=False))
+
+    @override
+    def joined(self, directions: Sequence[Values]) -> dict[str, float]:
+        if self.deflection > 0.0:
+            # A law has one contact: the mean friction of both directions is that of its stiffness.
+            mean = float(np.mean([max(0.0, *each.values()) for each in directions]))
+            bristles = dict(zip(self.memory, (mean / self.deflection, 0.0), strict=True))
+            # Bristles need friction to deflect.
+            least = _LEAST_FRICTION * mean
+            directions = [
+                {name: max(each[name], least) for name in each} | bristles for each in directions
+            ]
+        return super().joined(directions)
 
     @override
     def start(self, values: Values, smallest: float) -> dict[str, float]:
@@ -190,8 +208,9 @@ class TableAdapter(IdentifiedLaw):
 
     @override
     def friction(self, values: Values, normal_force: float) -> FrictionLaw:
-        sizes = [max(values[name], 0.0) / normal_force for name in self.coordinates]
-        return Table(tuple(zip(self.speeds.tolist(), sizes, strict=True)))
+        forces = zip(self.speeds.tolist(), self.coordinates, strict=False)
+        curve = Table(tuple((w, max(values[name], 0.0) / normal_force) for w, name in forces))
+        return self.following(curve, values, normal_force) if self.memory else curve
 
 
 class SaturatingAdapter(TableAdapter):
@@ -200,60 +219,14 @@ class SaturatingAdapter(TableAdapter):
     shaped = True
     least_shape = 1.0  # a rise far below the slowest speed is one with the force at rest
 
-    def __init__(self, speeds: FloatArray) -> None:
-        """Take the speeds of the points of its table, m/s, from 0."""
-        super().__init__(speeds)
+    def __init__(self, speeds: FloatArray, deflection: float = 0.0) -> None:
+        """Take the speeds of the points of its table, m/s, from 0, and the deflection, m."""
+        super().__init__(speeds, deflection=deflection)
         self.least = 0.0, 0.0, 0.0
 
     @override
     def terms(self, speed: FloatArray, shape: float) -> FloatArray:
         return np.column_stack([np.ones_like(speed), 1.0 - np.exp(-speed / shape), speed])
-
-
-class _DerivedAdapter(IdentifiedLaw):
-    """A law that is made from another one, whose friction in steady slip it has."""
-
-    def __init__(self, own: IdentifiedLaw) -> None:
-        """Take the adapter of the other law."""
-        self.own, self.name, self.deflection = own, own.name, own.deflection
-        self.least, self.shaped, self.least_shape = own.least, own.shaped, own.least_shape
-
-    @override
-    def terms(self, speed: FloatArray, shape: float) -> FloatArray:
-        return self.own.terms(speed, shape)
-
-    @override
-    def coordinates_of(self, forces: Sequence[float], shape: float) -> dict[str, float]:
-        return self.own.coordinates_of(forces, shape)
-
-
-class BristledTableAdapter(_DerivedAdapter):
-    """A table that friction follows over a path, as bristles do: F' = |v_r| (F_table - F) / d.
-
-    It is the LuGre law without damping of the bristles, of one deflection d at all speeds.
-    """
-
-    def __init__(self, table: TableAdapter, deflection: float) -> None:
-        """Take the table in steady slip, and the deflection, m."""
-        super().__init__(table)
-        self.name, self.deflection, self.smallest = "lugre", deflection, table.smallest
-        self.memory = "bristle_stiffness", "bristle_damping"
-        self.coordinates = (*table.coordinates, *self.memory)
-
-    @override
-    def joined(self, directions: Sequence[Values]) -> dict[str, float]:
-        # A law has one contact: the mean friction of both directions is that of its stiffness.
-        mean = float(np.mean([max(0.0, *each.values()) for each in directions]))
-        own = {"bristle_stiffness": mean / self.deflection, "bristle_damping": 0.0}
-        # Bristles need friction to deflect.
-        least = _LEAST_FRICTION * mean
-        return super().joined(
-            [{name: max(each[name], least) for name in each} | own for each in directions]
-        )
-
-    @override
-    def friction(self, values: Values, normal_force: float) -> FrictionLaw:
-        return _bristled(self, self.own, values, normal_force)
 
 
 class BristleAdapter(ExponentialAdapter):
@@ -277,7 +250,7 @@ class BristleAdapter(ExponentialAdapter):
 
     @override
     def friction(self, values: Values, normal_force: float) -> FrictionLaw:
-        return _bristled(self, EXPONENTIAL, values, normal_force)
+        return self.following(EXPONENTIAL.friction(values, normal_force), values, normal_force)
 
 
 class RateStateAdapter(IdentifiedLaw):
@@ -347,12 +320,12 @@ class RateStateAdapter(IdentifiedLaw):
         return slope * log(fastest / _REFERENCE_SPEED)
 
 
-class DirectionalAdapter(_DerivedAdapter):
+class DirectionalAdapter(IdentifiedLaw):
     """A law that has constants of its own in each direction of slip."""
 
     def __init__(self, own: IdentifiedLaw) -> None:
         """Take the adapter of each direction."""
-        super().__init__(own)
+        self.own, self.name, self.deflection = own, own.name, own.deflection
         self.coordinates, self.optional, self.by_differences, self.unscaled = (
             [*names, *(REVERSE + name for name in names)]
             for names in (own.coordinates, own.optional, own.by_differences, own.unscaled)
@@ -383,14 +356,6 @@ class DirectionalAdapter(_DerivedAdapter):
         # Both directions are of a size.
         larger = max(_by_direction(values), key=self.own.static_force)
         return self.own.size(name.removeprefix(REVERSE), larger, fastest)
-
-
-def _bristled(
-    law: IdentifiedLaw, curve: IdentifiedLaw, values: Values, normal_force: float
-) -> FrictionLaw:
-    kind: Any = LAWS[law.name]
-    own = {name: values[name] / normal_force for name in law.memory}
-    return kind(curve.friction(values, normal_force), **own)
 
 
 def _bristle_starts(values: Values) -> Sequence[Values]:
@@ -431,13 +396,13 @@ STATIC_LAWS: Sequence[IdentifiedLaw] = (
     EXPONENTIAL,
 )
 """Laws without a memory that compete, the simpler ones first."""
-LUGRE = BristleAdapter("lugre", ("bristle_stiffness", "bristle_damping"))
+LUGRE = BristleAdapter("lugre", _BRISTLES)
 DAHL = DahlAdapter()
 MEMORY_LAWS: Sequence[IdentifiedLaw] = (
     LUGRE,
     DAHL,
     # Its elastic limit is made from the smallest friction.
-    BristleAdapter("elasto_plastic", LUGRE.memory, ("kinetic",)),
+    BristleAdapter("elasto_plastic", _BRISTLES, ("kinetic",)),
     BristleAdapter("maxwell_slip", ("bristle_stiffness",)),
 )
 """Laws with a memory that compete. Those after LuGre are searched from what LuGre gives."""

@@ -1,7 +1,7 @@
 """Recordings as identification uses them: evenly spaced samples of the motion and its inputs."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from math import exp, sqrt
 from typing import Self
@@ -77,6 +77,8 @@ class Record:
     """Share of the samples of the recording in parts that are too short for a record."""
     notes: tuple[str, ...] = ()
     """Sentences on how the recording was read."""
+    delay: float | None = None
+    """Time from a sample until its force acts, s, as far as the recording tells."""
 
     @property
     def duration(self) -> float:
@@ -86,11 +88,11 @@ class Record:
     @property
     def held_forces(self) -> tuple[FloatArray, FloatArray]:
         """The force, which may be late, and the disturbance, N; zero if none is recorded."""
-        none = np.zeros(len(self.position))
-        force, disturbance = (
-            none if each is None else each for each in (self.force, self.disturbance)
+        none = np.zeros_like(self.position)
+        return (
+            none if self.force is None else self.force,
+            none if self.disturbance is None else self.disturbance,
         )
-        return force, disturbance
 
     @property
     def held_force(self) -> FloatArray:
@@ -184,19 +186,19 @@ class Record:
             return self
         return replace(self, force=lagged(self.force, self.period / time_constant))
 
+    def delayed(self, delay: float) -> Self:
+        """Return the record with the mean of the force, which acts later, s, in each period.
+
+        Half as many steps then simulate a delay that is no whole number of periods, to a change of
+        the force within a period.
+        """
+        return replace(self, force=late(self.held_forces[0], delay / self.period))
+
     def part(self, start: int, end: int) -> Self:
         """Return the samples from `start` to before `end`."""
-        optional = {
-            name: None if column is None else column[start:end]
-            for name in ("force", "disturbance", "reference", "velocity", "missing")
-            for column in (getattr(self, name),)
-        }
-        return replace(
-            self,
-            position=self.position[start:end],
-            belt_velocity=self.belt_velocity[start:end],
-            **optional,
-        )
+        values = {each.name: getattr(self, each.name) for each in fields(self)}
+        columns = {name: own for name, own in values.items() if isinstance(own, np.ndarray)}
+        return replace(self, **{name: own[start:end] for name, own in columns.items()})
 
 
 def lagged(command: FloatArray, periods: float) -> FloatArray:
@@ -212,17 +214,34 @@ def lagged(command: FloatArray, periods: float) -> FloatArray:
     return command - (command - np.concatenate([[0.0], end[:-1]])) * (1.0 - kept) / periods
 
 
+def mean_held(time: FloatArray, held: FloatArray, edges: FloatArray) -> FloatArray:
+    """Return the means between edges of values that are held from their times on; 0 before."""
+    ends = np.append(time, max(time[-1], edges[-1]))
+    total = np.concatenate([[0.0], np.cumsum(held * np.diff(ends))])
+    return np.diff(np.interp(edges, ends, total)) / np.diff(edges)
+
+
+def late(held: FloatArray, periods: float) -> FloatArray:
+    """Return the mean from each sample to the next of what is held, some sample periods late."""
+    edges = np.arange(len(held) + 1.0)
+    return mean_held(edges[:-1], held, edges - periods)
+
+
 def evenly_spaced(
-    name: str, stamp: IntArray, columns: dict[str, FloatArray], notes: Sequence[str] = ()
+    name: str,
+    stamp: IntArray,
+    columns: dict[str, FloatArray],
+    notes: Sequence[str] = (),
+    delay: float | None = None,
 ) -> list[Record]:
     """Return records with even spacing from samples whose clock may jitter and have gaps.
 
-    Stamps are in ns, columns and notes are those of `Record`. Samples of which one is not finite
-    count as missing; only the reference may be. Velocities are left out if they are differences of
-    the positions, or if less than half of them are finite. Each part without a longer gap is a
-    record: positions between samples are interpolated, forces are held; where the clock does more
-    than jitter a force is the mean of what is held meanwhile. Raises InvalidInputError if no part
-    is long enough, or the clock is not even up to gaps and jitter.
+    Stamps are in ns; columns, notes and delay are those of `Record`. Samples of which one is not
+    finite count as missing; only the reference may be. Velocities are left out if they are
+    differences of the positions, or if less than half of them are finite. Each part without a
+    longer gap is a record: positions between samples are interpolated, forces are held; where the
+    clock does more than jitter a force is the mean of what is held meanwhile. Raises
+    InvalidInputError if no part is long enough, or the clock is not even up to gaps and jitter.
     """
     columns = dict(columns)
     velocity = columns.get("velocity")
@@ -259,8 +278,7 @@ def evenly_spaced(
             if as_measured:
                 found[each] = values[rows]
             elif each in ("force", "disturbance") and not jitters:
-                edges = np.append(even, even[-1] + period)
-                found[each] = np.diff(_integral(own, values[rows], edges)) / period
+                found[each] = mean_held(own, values[rows], np.append(even, even[-1] + period))
             elif each in ("force", "disturbance"):
                 last = np.searchsorted(own, even + _JITTER * period, "right") - 1
                 found[each] = values[rows][np.maximum(last, 0)]
@@ -271,20 +289,21 @@ def evenly_spaced(
         far = _distances(even, own) > _MISSING_DISTANCE * period
         missing = far if far.any() else None
         records.append(
-            Record(name, period, **found, missing=missing, left_out=left_out, notes=tuple(notes))
+            Record(
+                name,
+                period,
+                **found,
+                missing=missing,
+                left_out=left_out,
+                notes=tuple(notes),
+                delay=delay,
+            )
         )
     if not records:
         raise InvalidInputError(
             f"{name} has no {FEWEST} samples without a gap of more than {_LONGEST_GAP:g} periods"
         )
     return records
-
-
-def _integral(time: FloatArray, held: FloatArray, until: FloatArray) -> FloatArray:
-    """Return the integral of values that are held from their times on, from the first one."""
-    total = np.concatenate([[0.0], np.cumsum(held[:-1] * np.diff(time))])
-    last = np.clip(np.searchsorted(time, until, "right") - 1, 0, None)
-    return total[last] + held[last] * (until - time[last])
 
 
 def _check_clock(name: str, stamp: IntArray) -> None:

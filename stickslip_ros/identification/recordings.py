@@ -5,13 +5,12 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from math import inf, isfinite, nan
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray, IntArray
 from stickslip_ros.errors import BagError, InvalidInputError
-from stickslip_ros.identification.identified_law import DELAY
 from stickslip_ros.identification.record import FEWEST, Record, evenly_spaced, lagged
 from stickslip_ros.model.actuator import Actuator
 from stickslip_ros.record.motion_reader import ANY_LAYOUT, BagLayout
@@ -30,21 +29,13 @@ _MAY_LACK_VALUES = ("velocity", "reference")
 """Quantities without which samples are used."""
 
 
-class ReadRecords(NamedTuple):
-    """The records of one recording, and what it tells of the drive."""
-
-    records: list[Record]
-    known: Mapping[str, float]
-    """Constants by parameter of the plant."""
-
-
 def read_all(
     paths: Sequence[Path],
     columns: Mapping[str, str] | None = None,
     *,
     form: TableFormat = ANY_FORM,
     **options: Any,
-) -> dict[Path, ReadRecords]:
+) -> dict[Path, list[Record]]:
     """Return what several recordings of one machine have for identification, by path.
 
     What identification can do without, such as a disturbance, may be a column of some tables only:
@@ -60,7 +51,7 @@ def read_all(
         for path, table in tables.items()
     }
     nowhere = set[str].intersection(*lacking.values()) if lacking else set[str]()
-    found: dict[Path, ReadRecords] = {}
+    found: dict[Path, list[Record]] = {}
     for path in dict.fromkeys(paths):
         own = columns
         if columns is not None and path in tables:
@@ -81,7 +72,7 @@ def read_records(
     form: TableFormat = ANY_FORM,
     layout: BagLayout = ANY_LAYOUT,
     table: Table | None = None,
-) -> ReadRecords:
+) -> list[Record]:
     """Return what a bag, or a CSV or MAT file, has for identification.
 
     The part that is used is from `start` to `end`, s from the first sample. Each part without a
@@ -97,16 +88,16 @@ def read_records(
     notes: Sequence[str] = ()
     if table is not None:
         stamp, found, notes = _of_table(table, columns, belt_speed)
-        known: Mapping[str, float] = {}
+        delay = None
     else:
-        stamp, found, known, notes = _of_bag(path, namespace, belt_speed, layout)
+        stamp, found, delay, notes = _of_bag(path, namespace, belt_speed, layout)
     since = (stamp - stamp[0]) / NANOSECONDS
     part = (since >= start) & (since < end)
     if not part.any():
         part_of = f"from {start:g} s" + (f" to {end:g} s" if isfinite(end) else " on")
         raise InvalidInputError(f"{path} holds no samples {part_of}: it lasts {since.max():.4g} s")
     own = {name: values[part] for name, values in found.items()}
-    return ReadRecords(evenly_spaced(str(path), stamp[part], own, notes), known)
+    return evenly_spaced(str(path), stamp[part], own, notes, delay)
 
 
 def _of_table(
@@ -141,7 +132,7 @@ def _has_motor(path: Path) -> InvalidInputError:
 
 def _of_bag(
     path: Path, namespace: str | None, belt_speed: float | None, layout: BagLayout
-) -> tuple[IntArray, dict[str, FloatArray], dict[str, float], Sequence[str]]:
+) -> tuple[IntArray, dict[str, FloatArray], float | None, Sequence[str]]:
     with Recording(path, namespace, belt_speed=belt_speed, layout=layout) as recording:
         states = recording.joint_states
         states = states[states.is_valid]
@@ -167,8 +158,8 @@ def _of_bag(
     if len(references):
         found["reference"] = _since(stamp, references.stamp, references.position, before=nan)
     delay = plant.get("force_delay", 0.0)
-    known = {DELAY: float(delay)} if isinstance(delay, int | float) and delay > 0.0 else {}
-    return stamp, found, known, notes
+    late = isinstance(delay, int | float) and delay > 0.0
+    return stamp, found, float(delay) if late else None, notes
 
 
 def _held(forces: ForceColumns, stamp: IntArray, plant: Mapping[str, Any]) -> FloatArray:

@@ -79,16 +79,9 @@ class Refinement(Fit):
     def errors(self, record: Record) -> ForceErrors:
         record = record.lagging(self.best.values.get(LAG, 0.0))
         columns = filtered(record, decimated=False, delay=self.delay)
+        names = ("time", "position", "velocity", "acceleration", "relative_speed", "force")
         time, position, velocity, acceleration, speed, force = (
-            each[columns.settled]
-            for each in (
-                columns.time,
-                columns.position,
-                columns.velocity,
-                columns.acceleration,
-                columns.relative_speed,
-                columns.force,
-            )
+            getattr(columns, name)[columns.settled] for name in names
         )
         values = self.best.values
         law = self.law.friction(values, 1.0)
@@ -186,7 +179,7 @@ def repetition_of(errors: FloatArray) -> int | None:
     that are coloured only are alike over few samples, and less and less: their correlation falls,
     and does not rise again.
     """
-    from scipy.signal import correlate
+    from scipy.signal import correlate, find_peaks
 
     found = correlate(errors, errors, method="fft")[len(errors) - 1 :][: len(errors) // 4]
     if not len(found) or not found[0] > 0.0:
@@ -196,8 +189,5 @@ def repetition_of(errors: FloatArray) -> int | None:
     if not len(unlike):
         return None
     start = max(_SHORTEST_CYCLE, int(unlike[0]))
-    later = shares[start:]
-    peaks = np.flatnonzero((later[1:-1] >= later[:-2]) & (later[1:-1] >= later[2:])) + 1
-    if not len(peaks) or float(later[peaks].max()) < _REPEATED_CORRELATION:
-        return None
-    return int(peaks[np.argmax(later[peaks])]) + start
+    peaks = find_peaks(shares[start:], height=_REPEATED_CORRELATION)[0] + start
+    return int(peaks[np.argmax(shares[peaks])]) if len(peaks) else None

@@ -15,7 +15,7 @@ from stickslip_ros.identification.fit import CURVE_POINTS, Fit, ForceErrors
 from stickslip_ros.identification.identified_law import IdentifiedLaw
 from stickslip_ros.identification.laws import DirectionalAdapter
 from stickslip_ros.identification.record import Record
-from stickslip_ros.identification.trajectory import delayed, free_run
+from stickslip_ros.identification.trajectory import free_run
 
 _DIRECTION_SHARE = 0.05
 """Least share of the rows of a direction that has a curve of its own."""
@@ -212,12 +212,8 @@ class Regression(Fit):
         return ForceErrors(time, position, speed, error, error - friction, force)
 
     @override
-    def residuals(self, record: Record) -> ForceErrors:
-        return self.errors(record)
-
-    @override
     def free_run(self, record: Record) -> FloatArray:
-        return free_run(delayed(record, self.delay or 0.0), self.drive(1.0))[1]
+        return free_run(record.delayed(self.delay or 0.0), self.drive(1.0))[1]
 
     def _forces(self, number: int) -> FloatArray:
         """Return the forces of the curve in a direction of the rows, N."""

@@ -121,11 +121,12 @@ class _Search:
         """Return the derivatives of the coordinates by those of the search."""
         if not self._straight:
             return np.eye(len(point))
-        base, columns = self._coordinates(point), list[list[float]]()
-        for number in range(len(point)):
-            step = _STEP * max(abs(float(point[number])), 1e-12)
-            moved = point.copy()
-            moved[number] += step
-            other = self._coordinates(moved)
-            columns.append([(other[each] - base[each]) / step for each in self._free])
-        return np.transpose(columns)
+        from scipy.optimize import approx_fprime
+
+        def coordinates(point: FloatArray) -> FloatArray:
+            found = self._coordinates(point)
+            return np.array([found[name] for name in self._free])
+
+        steps = _STEP * np.maximum(np.abs(point), 1e-12)
+        found: Any = approx_fprime(point, coordinates, steps)
+        return found

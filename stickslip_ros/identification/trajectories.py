@@ -21,6 +21,8 @@ _STEP = 1e-4
 """Step, as a share of the value, of constants that are linear in the coordinates."""
 _MOTION_STEP = 1e-5
 """Step, as a share of the value, of what a motion has no derivatives by."""
+_LONG_DELAY = 100.0
+"""Size of a delay and of a lag from which steps are made, in sample periods."""
 _UNBOUNDED_ERROR = 10.0
 """Error of a motion that is not bounded, in spans of the record."""
 
@@ -120,63 +122,60 @@ class Trajectories:
         count = len(self.measured)
         outputs = np.full(count, np.nan)
         by_names, by_start = np.zeros((count, len(names))), np.zeros((count, 2))
-        typical = self.typical(values)
+        fastest, long = self.fastest, _LONG_DELAY * self.predictors[0].record.period
+
+        def step(name: str, share: float) -> float:
+            size = long if name in (DELAY, LAG) else self.law.size(name, values, fastest)
+            return share * max(abs(values[name]), size)
+
         others = [name for name in names if name in (DELAY, LAG, *self.law.by_differences)]
         own = [name for name in names if name not in others]
-        place = {name: number for number, name in enumerate(names)}
         try:
-            steps = {name: _STEP * max(abs(values[name]), typical.get(name, 0.0)) for name in own}
-            followed = self._followed(values, starts, steps)
-            for part, (found, *derivatives) in zip(self.parts, followed, strict=True):
+            drive = self._drive(values)
+            moved = [
+                (step(name, _STEP), self._drive({**values, name: values[name] + step(name, _STEP)}))
+                for name in own
+            ]
+
+            def by_coordinates(function: Callable[[Drive], FloatArray]) -> FloatArray:
+                base = function(drive)
+                columns = [(function(other) - base) / change for change, other in moved]
+                return np.column_stack(columns) if columns else np.empty((len(base), 0))
+
+            def of_system(other: Drive) -> FloatArray:
+                system = drive_system(in_units_of(drive, other))
+                return np.array([system.constants[name] for name in system.free_constants])
+
+            of_constants = by_coordinates(of_system)
+            units = 1.0 / drive.length_scale, 1.0 / drive.speed_scale
+            runs = (
+                run
+                for predictor, segments, begun in self._by_record(values, starts)
+                for run in predictor.sensitivities(drive, segments, begun, values.get(DELAY, 0.0))
+            )
+            each_segment = zip(self.parts, self.segments, starts.tolist(), runs, strict=True)
+            for part, segment, (_, velocity), (found, rows) in each_segment:
+                order = rows.shape[1] - len(of_constants)
+                derivatives = rows[:, order:] @ of_constants
+                if order > MEMORY:
+                    belt = self.predictors[segment.record].record.belt_velocity[segment.start]
+                    memory = by_coordinates(
+                        lambda other, speeds=(velocity, float(belt)): np.array(
+                            steady_memory(other, *speeds)
+                        )
+                    )
+                    derivatives += rows[:, MEMORY:order] @ memory / drive.length_scale
                 outputs[part] = found
-                by_names[part, [place[name] for name in own]], by_start[part] = derivatives
+                by_names[part, [names.index(name) for name in own]] = derivatives
+                by_start[part] = rows[:, :2] * units
         except (InvalidInputError, RunError):
             outputs[:] = np.nan
         outputs = self._bounded(outputs)
         for name in others:
-            step = _MOTION_STEP * max(abs(values[name]), typical.get(name, 0.0))
-            moved = self.predicted({**values, name: values[name] + step}, starts)
-            by_names[:, place[name]] = (moved - outputs) / step
+            change = step(name, _MOTION_STEP)
+            moved_outputs = self.predicted({**values, name: values[name] + change}, starts)
+            by_names[:, names.index(name)] = (moved_outputs - outputs) / change
         return outputs, by_names, by_start
-
-    def _followed(
-        self, values: Mapping[str, float], starts: FloatArray, steps: Mapping[str, float]
-    ) -> Iterator[tuple[FloatArray, FloatArray, FloatArray]]:
-        """Yield outputs, and derivatives by coordinates and by the start, of each segment.
-
-        `steps` are those of the coordinates in differences of the constants.
-        """
-        drive = self._drive(values)
-        moved = [
-            (step, self._drive({**values, name: values[name] + step}))
-            for name, step in steps.items()
-        ]
-
-        def by_coordinates(function: Callable[[Drive], FloatArray]) -> FloatArray:
-            base = function(drive)
-            columns = [(function(other) - base) / step for step, other in moved]
-            return np.column_stack(columns) if columns else np.empty((len(base), 0))
-
-        def of_system(other: Drive) -> FloatArray:
-            system = drive_system(in_units_of(drive, other))
-            return np.array([system.constants[name] for name in system.free_constants])
-
-        of_constants = by_coordinates(of_system)
-        for predictor, segments, own in self._by_record(values, starts):
-            delay, belt = values.get(DELAY, 0.0), predictor.record.belt_velocity
-            runs = predictor.sensitivities(drive, segments, own, delay)
-            units = 1.0 / drive.length_scale, 1.0 / drive.speed_scale
-            for segment, (_, velocity), (outputs, rows) in zip(segments, own, runs, strict=True):
-                order = rows.shape[1] - len(of_constants)
-                derivatives = rows[:, order:] @ of_constants
-                if order > MEMORY:
-                    speeds = float(velocity), float(belt[segment.start])
-                    derivatives += rows[:, MEMORY:order] @ by_coordinates(
-                        lambda other, speeds=speeds: (
-                            np.array(steady_memory(other, *speeds)) / drive.length_scale
-                        )
-                    )
-                yield outputs, derivatives, rows[:, :2] * units
 
     def _drive(self, values: Mapping[str, float]) -> Drive:
         """Return the drive of coordinates; raises InvalidInputError if there is none."""
@@ -210,14 +209,6 @@ class Trajectories:
             for segment in self.segments
         ]
         return max(float(np.abs(self.starts[:, 1] - belts).max()), 1e-12)
-
-    def typical(self, values: Mapping[str, float]) -> dict[str, float]:
-        """Return a size of each coordinate, SI units, from which steps of differences are made."""
-        force, fastest = self.law.static_force(values), self.fastest
-        found = {"bias_force": force, "damping": force / fastest}
-        found[DELAY] = found[LAG] = 100.0 * self.predictors[0].record.period
-        own = {name: self.law.size(name, values, fastest) for name in self.law.coordinates}
-        return found | own
 
     def chosen(self, which: BoolArray) -> "Trajectories":
         """Return the same with some of the segments."""

@@ -3,8 +3,8 @@
 from collections.abc import Iterator, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
-from math import copysign, expm1, isfinite
-from typing import Self
+from math import copysign, expm1
+from typing import Any, Self
 
 import numpy as np
 
@@ -20,9 +20,8 @@ _FIRST = 20
 """Samples from which the velocity at the start is found."""
 _UNBOUNDED_LOSS = 1e300
 """Squared error of a motion that is not bounded, m^2."""
-_REACHES, _REACH_RATIO, _END_TOLERANCE = 14, 0.25, 0.05
-"""Reaches within which the velocity at the start is sought, at most; ratio of one to the one
-before; share of the squared error by which both ends of the last one may be worse."""
+_SPEED_TOLERANCE = 1e-4
+"""Tolerance of the velocity at the start, as a share of the range in which it is sought."""
 _LAG_STEPS = 3
 """Steps of a sample in which a force that lags is held: one alone moves the slide otherwise."""
 _TOLERANCE = 1e-6
@@ -72,13 +71,9 @@ class Predictor:
 
     def positions(self, drive: Drive, velocity: float) -> FloatArray:
         """Return positions, m, from the measured one at a velocity, m/s; NaN once unbounded."""
-        count, start = len(self.record.position), float(self.record.position[0])
-        motion = Motion(self.with_belt(drive, 0, count), start, velocity)
-        found = np.full(count, np.nan)
-        found[0] = start
-        for number in self._samples(motion, 0, count, 0.0):
-            found[number] = motion.position
-        return found
+        count = len(self.record.position)
+        start = np.array([[self.record.position[0], velocity]])
+        return self.followed(drive, [Segment(0, 0, count)], start, 0.0)[0][:count]
 
     @property
     def outputs(self) -> int:
@@ -190,53 +185,28 @@ class Predictor:
         return replace(drive, belt_speed=0.0, belt=table(points))
 
 
-def delayed(record: Record, delay: float) -> Record:
-    """Return a record whose force from sample to sample is the mean of what acts meanwhile.
-
-    Half as many steps then simulate a delay that is no whole number of periods, to a change of the
-    force within a period.
-    """
-    held, periods = record.held_forces[0], delay / record.period
-    total = np.concatenate([[0.0], np.cumsum(held)])
-    edges = np.interp(np.arange(len(total)) - periods, np.arange(len(total)), total)
-    return replace(record, force=np.diff(edges))
-
-
 def free_run(record: Record, drive: Drive) -> tuple[float, FloatArray]:
     """Return the motion of a drive through a whole record, with its force and without feedback.
 
     It starts at the measured position with the velocity that fits best, m/s, which is returned
-    before the positions, m. The velocity is found by parabolas through three squared errors each
-    (successive parabolic interpolation, R. P. Brent, Algorithms for Minimization Without
-    Derivatives, 1973).
+    before the positions, m. The velocity is found by bounded minimization (R. P. Brent, Algorithms
+    for Minimization Without Derivatives, 1973) around that of the first samples.
     """
-    predictor = Predictor(record)
-    first = record.position[:_FIRST]
+    from scipy.optimize import minimize_scalar  # takes long to import
+
+    predictor, first = Predictor(record), record.position[:_FIRST]
     slope = float(np.polyfit(np.arange(len(first)) * record.period, first, 1)[0])
     # The range also makes up for the friction over the first stroke.
     spread = 3.0 * abs(slope) + float(np.std(np.diff(first))) / record.period
 
-    def run(velocity: float) -> tuple[float, FloatArray]:
-        found = predictor.positions(drive, velocity)
-        loss = float(np.mean((found - record.position) ** 2))
-        return loss if isfinite(loss) else _UNBOUNDED_LOSS, found
+    def loss(velocity: float) -> float:
+        found = predictor.positions(drive, float(velocity)) - record.position
+        return float(np.mean(found * found)) if np.isfinite(found).all() else _UNBOUNDED_LOSS
 
-    tried = {slope: run(slope)}
-    best, reach = slope, spread
-    for _ in range(_REACHES):
-        # The squared error is a parabola in the velocity at the start, if the reach is small.
-        for speed in (best - reach, best + reach):
-            tried[speed] = run(speed)
-        low, middle, high = (tried[best + sign * reach][0] for sign in (-1.0, 0.0, 1.0))
-        bend = low - 2.0 * middle + high
-        if reach > 0.0 and bend > 0.0 and max(low, high) < _UNBOUNDED_LOSS:
-            lowest = best + 0.5 * reach * (low - high) / bend
-            tried[lowest] = run(lowest)
-        best = min(tried, key=lambda speed: tried[speed][0])
-        if max(low, high) <= (1.0 + _END_TOLERANCE) * tried[best][0]:
-            break
-        reach *= _REACH_RATIO
-    return best, tried[best][1]
+    solve: Any = minimize_scalar  # its types know no bounds
+    bounds, options = (slope - spread, slope + spread), {"xatol": _SPEED_TOLERANCE * spread}
+    velocity = float(solve(loss, bounds=bounds, method="bounded", options=options).x)
+    return velocity, predictor.positions(drive, velocity)
 
 
 def _corners(values: FloatArray) -> FloatArray:

@@ -45,7 +45,7 @@ def identification_figure(
         grid = figure.add_gridspec(3, 2)
         first, *residuals, last = grid[0, :], grid[1, 0], grid[1, 1], grid[2, 0], grid[2, 1]
     _friction(figure.add_subplot(first), found, units)
-    left = found.residuals()
+    left = found.residuals(found.records[0])
     quantity, error_unit = ("position", "m") if found.has_spring else ("force", "N")
     what = "residual" if style.printed else "measured less fitted"
     errors = left.error, f"{quantity}, {what}", error_unit

@@ -29,7 +29,7 @@ def record() -> Record:
     """The record."""
     if not _FILE.exists():
         pytest.skip(f"the recorded data are not here: {_FILE}")
-    (found,) = read_records(_FILE, _COLUMNS).records
+    (found,) = read_records(_FILE, _COLUMNS)
     return found
 
 

@@ -195,16 +195,16 @@ def test_each_table_is_read_once(tables: list[Path], monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(module, "table_of", counted)
     found = read_all(tables, _NAMES)
     assert asked == tables
-    one, two = (found[path].records[0] for path in tables)
+    one, two = (found[path][0] for path in tables)
     assert one.disturbance is None
     assert two.disturbance is not None
 
 
 def test_the_belt_speed_of_a_table(tables: list[Path]) -> None:
     columns = {"time": "t", "position": "x"}
-    (plain,) = read_records(tables[0], columns).records
+    (plain,) = read_records(tables[0], columns)
     assert not plain.belt_velocity.any()
-    (moved,) = read_records(tables[0], columns, belt_speed=0.04).records
+    (moved,) = read_records(tables[0], columns, belt_speed=0.04)
     assert set(moved.belt_velocity) == {0.04}
 
 
@@ -221,7 +221,7 @@ def test_a_wild_cell_is_not_used(tables: list[Path], cell: str) -> None:
     rows = tables[1].read_text().splitlines()
     rows[300] = f"0.299,{cell},{cell},{cell}"
     tables[1].write_text("\n".join(rows))
-    (record,) = read_records(tables[1], _NAMES).records
+    (record,) = read_records(tables[1], _NAMES)
     assert len(record.position) == 700
     for values in (record.position, record.force, record.disturbance):
         assert values is not None
@@ -253,9 +253,8 @@ def test_forces_of_a_bag_are_those_that_the_actuator_applies(tmp_path: Path) -> 
         "force_delay": "0.002"
     }
     write_bag(tmp_path / "bag", messages, tables={"stickslip_ros/plant": plant})
-    found = read_records(tmp_path / "bag", {})
-    (record,) = found.records
-    assert found.known == {"force_delay": 0.002}
+    (record,) = read_records(tmp_path / "bag", {})
+    assert record.delay == 0.002
     held = np.where(np.arange(600) < 300, 1.0, 2.0)
     settled = np.abs(np.arange(600) % 300) > 40
     assert record.force[settled] == pytest.approx(held[settled], rel=1e-12)

@@ -50,7 +50,7 @@ def test_the_residuals_of_a_drive_on_a_spring_are_those_of_its_position() -> Non
     label = axes["residuals over time"].get_ylabel().replace("\n", " ")
     assert label == "position, measured less fitted (nm)"
     error = found.check(own)["segment_error"]
-    assert np.sqrt(np.mean(found.residuals().error ** 2)) == error
+    assert np.sqrt(np.mean(found.residuals(found.records[0]).error ** 2)) == error
     assert "difference" in axes
     motion = axes["in-sample: measured, and without feedback (dashed)"]
     assert motion.get_legend() is None
