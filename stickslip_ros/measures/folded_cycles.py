@@ -200,12 +200,14 @@ class FoldedCycles:
             float(np.sqrt(g @ covariance @ g))
             for g in (middle - length / 2.0, middle + length / 2.0, length, speed)
         )
-        if with_stick.stick_time < _UNTESTED_ERRORS * time_error:
+        hidden = with_stick.stick_time < self.period / len(self.time)  # no sample need be in it
+        if not hidden and with_stick.stick_time < _UNTESTED_ERRORS * time_error:
             without = fit_stick(time, position, with_stick.belt_speed, frequency, 0.0, sticks=False)
             variance = with_stick.squares / max(len(time) - with_stick.jacobian.shape[1], 1)
-            if without.squares - with_stick.squares <= STICK_LEVEL * variance:
-                self.hidden_stick = with_stick.stick_time
-                return None
+            hidden = without.squares - with_stick.squares <= STICK_LEVEL * variance
+        if hidden:
+            self.hidden_stick = with_stick.stick_time
+            return None
         moved = replace(
             with_stick,
             centre=with_stick.centre + centre,

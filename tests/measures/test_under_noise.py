@@ -75,6 +75,12 @@ def test_a_part_of_the_study_agrees_with_it(case: study.Case) -> None:
             assert row[name]["covered"] >= 0.6
 
 
+def test_a_slide_that_nearly_reaches_the_belt_speed_does_not_stick() -> None:
+    """Without noise, the error of the fit's form would tell a stick of a few microseconds."""
+    found = [measured(samples(0.044, count)) for count in (1500, 1700, 2000)]
+    assert [each.regime for each in found] == 3 * [Regime.PURE_SLIP]
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("told", [0.0, 0.03])
 def test_the_stick_of_a_steep_curve_is_within_its_error(told: float) -> None:
