@@ -1,12 +1,11 @@
 """Cycles and measures of positions with noise as they come, in bounded memory."""
 
-from collections import deque
 from math import inf
 
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.measures.cycle_measures import LEAST_CYCLES, Cycle
+from stickslip_ros.measures.cycle_measures import Cycle
 from stickslip_ros.measures.noise import (
     PRECISION,
     encoder_step,
@@ -14,7 +13,7 @@ from stickslip_ros.measures.noise import (
     medians,
     white_noise,
 )
-from stickslip_ros.measures.noisy_window import REVERSAL, LastCycles, NoisyWindow
+from stickslip_ros.measures.noisy_window import REVERSAL, NoisyWindow
 from stickslip_ros.measures.single_cycles import (
     NoisySamples,
     Point,
@@ -86,31 +85,21 @@ class NoisyCycleMeter:
     """
 
     def __init__(self, window: int) -> None:
-        self._most_cycles = window
-        self.noise = 0.0
-        """Standard deviation of the noise of the positions, m, as far as it is known."""
+        self.window = NoisyWindow(window)
         self.noisy = False
         """Whether positions or velocities have noise."""
-        self.step = 0.0
-        """Step of the positions, m, that they are multiples of; 0 as long as none is found."""
         self.ends: list[float] = []
         """Time, s, at which each cycle ended that `feed` returned last."""
-        self._count = 0
-        self._before: LastCycles | None = None
         self._begin()
 
     def _begin(self) -> None:
         self._columns = _Columns()
-        self._cycles: deque[Cycle] = deque(maxlen=self._most_cycles)
-        self._starts: deque[float] = deque(maxlen=self._most_cycles + 1)
         self._low: tuple[float, Point] | None = None
         """Time of the lowest sample at the end of the last cycle, and the vertex there."""
 
     def interrupt(self) -> None:
         """Drop the current cycle: the next sample does not continue the motion so far."""
-        if len(self._cycles) >= (1 if self._before is None else LEAST_CYCLES):
-            # The cycles so far are the window until there are enough others.
-            self._before = self._last
+        self.window.interrupt()
         self._begin()
 
     def feed(
@@ -119,63 +108,46 @@ class NoisyCycleMeter:
         """Add the samples that follow (s, m, m/s); return the cycles that they complete."""
         self.ends = []
         completed: list[Cycle] = []
-        new = NoisySamples(time, position, velocity, belt)
+        window, new = self.window, NoisySamples(time, position, velocity, belt)
         while len(new) > 0:
-            due = _BATCH - self._count % _BATCH
+            due = _BATCH - window.run % _BATCH
             part, new = new[:due], new[due:]
-            self._count += len(part)
+            window.run += len(part)
             self._take(part)
-            if self._count % _LOOK_INTERVAL == 0 or self._count == _FIRST_LOOK:
+            if window.run % _LOOK_INTERVAL == 0 or window.run == _FIRST_LOOK:
                 self._look()
             # Always at the same samples: what is found must not depend on the blocks.
-            if self._count % _BATCH == 0 and self._count >= _FIRST_LOOK:
+            if window.run % _BATCH == 0 and window.run >= _FIRST_LOOK:
                 completed += self._advance()
         return completed
-
-    def window(self, within: float, stick_speed: float, fastest_belt: float) -> NoisyWindow:
-        """Return the window of the last cycles, with these of its fields."""
-        return NoisyWindow(
-            self._last,
-            self._before,
-            most_cycles=self._most_cycles,
-            run=self._count,
-            noise=self.noise,
-            step=self.step,
-            within=within,
-            stick_speed=stick_speed,
-            fastest_belt=fastest_belt,
-        )
-
-    @property
-    def _last(self) -> LastCycles:
-        return LastCycles(self._columns.samples[:-_UNKNOWN], self._cycles, self._starts)
 
     def _take(self, part: NoisySamples) -> None:
         """Hold samples without impulses, which those beside them tell."""
         self._columns.replace_last(0, part)
-        if self.noise > 0.0:
+        if self.window.noise > 0.0:
             last = self._columns.samples[-len(part) - 2 * _UNKNOWN :]
-            found = impulses(last.position, self.noise)
+            found = impulses(last.position, self.window.noise)
             if found.any():
                 self._columns.replace_last(len(last), last[~found])
+        self.window.last.samples = self._columns.samples[:-_UNKNOWN]
 
     def _look(self) -> None:
         """Estimate the noise, and the step of an encoder, from the last samples."""
-        recent = self._columns.samples[:-_UNKNOWN][-_LOOK_LENGTH:]
+        window, recent = self.window, self.window.last.samples[-_LOOK_LENGTH:]
         position, belt, count = recent.position, recent.belt, len(recent)
         if count < 3:
             return
         noise, step = white_noise(position), encoder_step(position)
         moved = float(np.ptp(medians(position)))
         if noise > max(_ROUNDING_SHARE * moved, PRECISION * float(np.abs(position).max())):
-            self.noise, self.noisy = noise, True
+            window.noise, self.noisy = noise, True
         if step > 0.0:
-            self.step = min(self.step or inf, step)
+            window.step = min(window.step or inf, step)
             # Steps that divide the travel of a sample leave no noise where it is looked for. One
             # step from each sample to the next is a uniform motion, as of a slide that sticks.
             uniform = np.ptp(position) > (count - 1.5) * step
             uniform = uniform and float(np.abs(np.diff(position)).max()) < 1.5 * step
-            self.noisy |= self.step > _ROUNDING_SHARE * moved and not uniform
+            self.noisy |= window.step > _ROUNDING_SHARE * moved and not uniform
         fastest = float(np.abs(recent.velocity).max())
         of_velocity = white_noise(recent.velocity)
         if of_velocity > max(_ROUNDING_SHARE * fastest, PRECISION * float(np.abs(belt).max())):
@@ -183,44 +155,47 @@ class NoisyCycleMeter:
 
     def _advance(self) -> list[Cycle]:
         """Return the cycles that the samples since the last one complete."""
-        every, last = self._columns.samples.position, self._last
-        samples = last.samples
+        last, noise = self.window.last, self.window.noise
+        samples, cycles, starts = last.samples, last.cycles, last.starts
         first = 0 if self._low is None else samples.row(self._low[0])
-        if len(samples) - first > _WITHOUT_CYCLES and self._count % _LOOK_INTERVAL:
+        if len(samples) - first > _WITHOUT_CYCLES and self.window.run % _LOOK_INTERVAL:
             return []
-        size = 2.0 * self._cycles[-1].amplitude if self._cycles and not last.resting else 0.0
-        least = max(REVERSAL * self.noise, _REVERSAL_SHARE * size)
+        size = 2.0 * cycles[-1].amplitude if cycles and not last.resting else 0.0
+        least = max(REVERSAL * noise, _REVERSAL_SHARE * size)
         completed: list[Cycle] = []
         # The median of the last position takes one more.
-        for rows in reversals(every[first:-1], least):
+        for rows in reversals(self._columns.samples.position[first:-1], least):
             high, low = (first + row for row in rows)
-            reach = fit_reach(samples, low, high, self.noise)
+            reach = fit_reach(samples, low, high, noise)
             if low + reach >= len(samples):
                 break  # samples for the fit are missing
             start, end = self._low, vertex(samples, low, reach)
             self._low = float(samples.time[low]), end
-            cycle = start and cycle_between(samples, start[1], end, high, self.noise)
+            cycle = start and cycle_between(samples, start[1], end, high, noise)
             if start is None or cycle is None:
                 continue
-            if not self._cycles:
-                self._starts.append(start[1].time)
-            self._starts.append(end.time)
-            self._cycles.append(cycle)
+            if not cycles:
+                starts.append(start[1].time)
+            starts.append(end.time)
+            cycles.append(cycle)
             self.ends.append(end.time)
             completed.append(cycle)
-        self._trim(samples)
+        self._trim()
         return completed
 
-    def _trim(self, samples: NoisySamples) -> None:
+    def _trim(self) -> None:
         """Drop the samples before the window."""
+        last = self.window.last
+        samples, cycles, starts = last.samples, last.cycles, last.starts
         row = len(samples) - _WITHOUT_CYCLES
         if self._low is not None:
-            row = samples.row(self._starts[0] if self._starts else self._low[0])
+            row = samples.row(starts[0] if starts else self._low[0])
         row = min(max(row, len(samples) - _MOST_SAMPLES) - _MARGIN, len(samples) - _LOOK_LENGTH)
         if row <= 0:
             return
         self._columns.drop_first(row)
-        while self._starts and self._starts[0] < samples.time[row]:
-            self._starts.popleft()
-            if self._cycles:
-                self._cycles.popleft()
+        last.samples = samples[row:]
+        while starts and starts[0] < last.samples.time[0]:
+            starts.popleft()
+            if cycles:
+                cycles.popleft()

@@ -1,9 +1,9 @@
 """The measures of a window of samples with noise, as functions of it."""
 
+from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import sqrt
-from typing import NamedTuple
 
 import numpy as np
 
@@ -44,13 +44,14 @@ _SLIP_SHARE = 0.1
 """Share of the belt speed by which a slide at rest may seem to move."""
 
 
-class LastCycles(NamedTuple):
+class LastCycles:
     """The last cycles of a part of a run without a gap, with their samples; SI units."""
 
-    samples: NoisySamples
-    cycles: Sequence[Cycle]
-    starts: Sequence[float]
-    """Start of each cycle, and the end of the last, s."""
+    def __init__(self, most_cycles: int) -> None:
+        self.samples = NoisySamples(*np.empty((4, 0)))
+        self.cycles: deque[Cycle] = deque(maxlen=most_cycles)
+        self.starts: deque[float] = deque(maxlen=most_cycles + 1)
+        """Start of each cycle, and the end of the last, s."""
 
     @property
     def resting(self) -> bool:
@@ -61,32 +62,35 @@ class LastCycles(NamedTuple):
         return since > STALE_PERIODS * self.cycles[-1].period
 
 
-@dataclass(frozen=True)
 class NoisyWindow:
     """The last cycles of a run, and what is known of it and of its sensor; SI units."""
 
-    last: LastCycles
-    before: LastCycles | None
-    """Those before a gap, which count until there are enough others; None without."""
-    most_cycles: int
-    """Number of cycles that a window has if the run is long enough."""
-    run: int
-    """Number of samples of the run so far."""
-    noise: float
-    """Standard deviation of the noise of the positions, m."""
-    step: float
-    """Step of the positions, m; 0 without one."""
-    within: float
-    """Range in which a slide is held as far as its actuator can, m."""
-    stick_speed: float
-    """Relative speed up to which a slide sticks whose friction has a memory, m/s; else 0."""
-    fastest_belt: float
-    """Largest speed of the belt in the run, m/s."""
+    def __init__(self, most_cycles: int) -> None:
+        self.most_cycles = most_cycles
+        """Number of cycles that a window has if the run is long enough."""
+        self.last = LastCycles(most_cycles)
+        self.before: LastCycles | None = None
+        """Those before a gap, which count until there are enough others; None without."""
+        self.run = 0
+        """Number of samples of the run so far."""
+        self.noise = self.step = 0.0
+        """Standard deviation of the noise of the positions, m, and their step; 0 without one."""
+        self.within = 0.0
+        """Range in which a slide is held as far as its actuator can, m."""
+        self.stick_speed = self.fastest_belt = 0.0
+        """Relative speed up to which a slide sticks whose friction has a memory, m/s, else 0; and
+        largest speed of the belt in the run, m/s."""
+
+    def interrupt(self) -> None:
+        """Start a part of the run after a gap."""
+        if len(self.last.cycles) >= (1 if self.before is None else LEAST_CYCLES):
+            self.before = self.last
+        self.last = LastCycles(self.most_cycles)
 
     @property
     def _recent(self) -> NoisySamples:
         """Samples of the last part of the run, of several cycles if there are any."""
-        samples, cycles, _ = self.last
+        samples, cycles = self.last.samples, self.last.cycles
         row = len(samples) - min(max(self.run // 4, _SHORTEST), _LONGEST)
         if cycles and 2.0 * cycles[-1].amplitude > self._resolved:
             # What seems to be a last cycle may have ended by noise, long after.

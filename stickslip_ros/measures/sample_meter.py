@@ -164,7 +164,7 @@ class SampleMeter:
     @property
     def position_noise(self) -> float | None:
         """Standard deviation of the noise of the positions, m; None for exact samples."""
-        return self._noisy_meter.noise if self.noisy else None
+        return self._noisy_meter.window.noise if self.noisy else None
 
     def measures(self, *, quick: bool = False) -> Measures:
         """Return the means over the last whole cycles.
@@ -177,8 +177,9 @@ class SampleMeter:
         ended = self._fastest >= (1.0 - 1e-9) * self.reading.unbounded_speed
         unbounded = ended or self._unbounded_speed > limit
         self._meter.unbounded = unbounded
-        self._meter.within = within = self.reading.within
-        window = self._noisy_meter.window(within, self._stick_speed, self._fastest_belt)
+        window = self._noisy_meter.window
+        self._meter.within = window.within = self.reading.within
+        window.stick_speed, window.fastest_belt = self._stick_speed, self._fastest_belt
         few = not self.noisy and self._per_cycle < FEW_SAMPLES and window.line
         self.mean_cycle = None
         if unbounded or not (self.noisy or few):
@@ -187,7 +188,7 @@ class SampleMeter:
             found = without_cycles(None, Regime.UNDERSAMPLED)
         else:
             found, self.mean_cycle = window.measures(quick=quick)
-        self.drift.resolution = self._noisy_meter.step
+        self.drift.resolution = window.step
         self.drift.judged = not (self.reading.varies or self._belt_varies)
         return with_drift(found, self.drift)
 
