@@ -147,9 +147,9 @@ class CycleMeter:
         """Drop the current cycle: the next breakpoint does not continue the motion so far."""
         self._last = Breakpoints.empty()
         self._direction = 0.0
-        self._open: _Stretch | None = None
+        self._parts: list[_Stretch] = []
+        """Parts of the stretch since the last crossing."""
         self._whole = False
-        self._recent: list[_Stretch] = []
         self._sticking_since: float | None = None
 
     def feed(
@@ -178,22 +178,16 @@ class CycleMeter:
         self._belt_speed = belt_speed
         self._fastest_belt = abs(belt_speed) if fastest_belt is None else fastest_belt
         breakpoints, last = self._last.followed_by(breakpoints), 0
-        rows, current = _Rows(breakpoints), self._open
-        completed: list[Cycle] = []
+        rows, completed = _Rows(breakpoints), list[Cycle]()
         for edge in self._upward_crossings(breakpoints):
-            part = rows.stretch(last, edge)
-            current = part if current is None else current.followed_by(part)
-            if self._whole and current.duration > 0.0:
-                completed.append(current.as_cycle())
-                self.ends.append(current.end)
-            current, self._whole = None, True
-            self._recent = []
-            last = edge
-        self._cycles.extend(completed)
-        self._amplitudes.extend(cycle.amplitude for cycle in completed)
-        part = rows.stretch(last, len(breakpoints) - 1)
-        self._open = part if current is None else current.followed_by(part)
-        self._follow_recent(rows, last)
+            stretch = reduce(_Stretch.followed_by, [*self._parts, rows.stretch(last, edge)])
+            if self._whole and stretch.duration > 0.0:
+                completed.append(stretch.as_cycle())
+                self.ends.append(stretch.end)
+                self._cycles.append(completed[-1])
+                self._amplitudes.append(completed[-1].amplitude)
+            self._parts, self._whole, last = [], True, edge
+        self._follow(rows, last, len(breakpoints) - 1)
         self._follow_sticking(breakpoints)
         self._last = breakpoints[len(breakpoints) - 1 :]
         return completed
@@ -212,12 +206,12 @@ class CycleMeter:
 
     def _measures(self) -> Measures:
         period = self._cycles[-1].period if self._cycles else 0.0
-        now = self._open.end if self._open else 0.0
+        now = self._parts[-1].end if self._parts else 0.0
         since = self._sticking_since
         if self._belt_speed == 0.0 and since is not None and now - since >= period:
             steady = True if self._lasts(now - since) else None
             return without_cycles(self._recent_motion(), Regime.STUCK, steady=steady)
-        since_turn = self._open.duration if self._open else 0.0
+        since_turn = now - self._parts[0].start if self._parts else 0.0
         held = self._held(since_turn > STALE_PERIODS * period) if self.within else None
         if held is not None:
             # What rounding leaves of a motion may grow over a few cycles by chance.
@@ -281,33 +275,32 @@ class CycleMeter:
         before = np.maximum(rising - 1, 0)
         return np.where(speed[before] <= speed[rising], before, rising).tolist()
 
-    def _follow_recent(self, rows: _Rows, row: int) -> None:
-        """Keep the extremes of at least the last half of the stretch since the last crossing.
+    def _follow(self, rows: _Rows, row: int, last: int) -> None:
+        """Add the breakpoints from one to another to the stretch since the last crossing.
 
-        Once the stretch is longer than the last cycle, everything before the last doubling is
-        dropped whenever it doubles again.
+        Once it is longer than the last cycle, a part begins whenever it has doubled: its last two
+        parts are at least its last half.
         """
-        assert self._open is not None
-        if not self._recent:
-            self._recent = [rows.stretch(row, row)]
-        last = len(rows.time) - 1
-        earliest = self._open.start + (self._cycles[-1].period if self._cycles else 0.0)
+        if not self._parts:
+            self._parts = [rows.stretch(row, row)]
+        start = self._parts[0].start
+        earliest = start + (self._cycles[-1].period if self._cycles else 0.0)
         while row < last:
-            current = self._recent[-1]
-            due = max(2.0 * current.start - self._open.start, earliest)
+            current = self._parts[-1]
+            due = max(2.0 * current.start - start, earliest)
             find = bisect_left if due > current.start else bisect_right
-            doubled = find(rows.time, due, row + 1)
-            part = rows.stretch(row, min(doubled, last))
-            self._recent[-1] = current.followed_by(part)
+            doubled = find(rows.time, due, row + 1, last + 1)
+            self._parts[-1] = current.followed_by(rows.stretch(row, min(doubled, last)))
             if doubled <= last:
-                self._recent = [self._recent[-1], rows.stretch(doubled, doubled)]
+                self._parts.append(rows.stretch(doubled, doubled))
             row = doubled
 
     def _recent_motion(self) -> Cycle | None:
         """Return the latest part of a stretch without crossings, as if it were a cycle."""
-        if not self._recent or self._recent[0].duration <= 0.0:
+        recent = self._parts[-2:]
+        if not recent or recent[0].duration <= 0.0:
             return None
-        return reduce(_Stretch.followed_by, self._recent).as_cycle()
+        return reduce(_Stretch.followed_by, recent).as_cycle()
 
     def _follow_sticking(self, breakpoints: Breakpoints) -> None:
         slipping = np.flatnonzero(~breakpoints.sticking[1:])
