@@ -106,10 +106,10 @@ def _measures(
 ) -> tuple[Cycle, Cycle]:
     """Return the measures of a shape, and their standard errors."""
     grid, period = np.linspace(0.0, fold.period, GRID, endpoint=False), fold.period
-    courses = shape.value(grid), shape.value(grid, 1)
+    courses = shape.value(grid), shape.velocity(grid)
     at = np.array([_refined(grid, sign * course) for course in courses for sign in (1.0, -1.0)])
-    positions, velocities = shape.value(at), shape.value(at, 1)
-    rows, rates = shape.rows(at, 0), shape.rows(at, 1)
+    positions, velocities = shape.value(at), shape.velocity(at)
+    rows, rates = shape.rows(at), shape.rates(at)
     peak, peak_row, peak_error = velocities[2], rates[2], 0.0
     if stick is not None:
         peak, peak_row, peak_error = stick.fit.belt_speed, 0.0 * rates[2], stick.speed_error
@@ -148,8 +148,8 @@ def _slow_share(
     draws = random.multivariate_normal(
         0.0 * series.found, series.covariance, _DRAWS, check_valid="ignore", method="eigh"
     )
-    relative = series.value(grid, 1) - belt_speed
-    drawn = np.abs(relative + draws @ series.rows(grid, 1).T) <= stick_speed
+    relative = series.velocity(grid) - belt_speed
+    drawn = np.abs(relative + draws @ series.rates(grid).T) <= stick_speed
     share = float(np.mean(np.abs(relative) <= stick_speed))
     scatter = float(np.sqrt(np.mean((drawn.mean(axis=1) - share) ** 2)))
     return share, hypot(scatter, 1.0 / (len(series.found) - 1)) if share else scatter

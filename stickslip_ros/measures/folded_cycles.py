@@ -12,6 +12,8 @@ from stickslip_ros.arrays import FloatArray, IntArray
 from stickslip_ros.measures.drift import fit_line
 from stickslip_ros.measures.stick_fit import StickFit, fit_stick
 
+_DIFFERENCE = 1e-6
+"""Step of a difference over the phase, in periods."""
 GRID = 512
 """Points of a cycle at which its extremes are looked for."""
 STICK_LEVEL = 6.63
@@ -38,19 +40,26 @@ _OFFSETS = 16
 
 @dataclass(frozen=True)
 class Shape:
-    """A fitted cycle: its position, or the derivative by time, as functions of the phase (s).
+    """A fitted cycle: its position as a function of the phase (s), `rows` by what was `found`."""
 
-    It is what is `known` and the `rows` of the derivatives by the coefficients that were `found`.
-    """
-
-    known: Callable[[FloatArray, int], FloatArray]
-    rows: Callable[[FloatArray, int], FloatArray]
+    rows: Callable[[FloatArray], FloatArray]
+    """Derivatives of the position by the coefficients, in rows."""
     found: FloatArray
     covariance: FloatArray
+    period: float
 
-    def value(self, phase: FloatArray, derivative: int = 0) -> FloatArray:
-        """Return positions, m, or velocities, m/s, at phases, s."""
-        return self.known(phase, derivative) + self.rows(phase, derivative) @ self.found
+    def rates(self, phase: FloatArray) -> FloatArray:
+        """Return the derivatives of the rows by time, by a central difference."""
+        step = _DIFFERENCE * self.period
+        return (self.rows(phase + step) - self.rows(phase - step)) / (2.0 * step)
+
+    def value(self, phase: FloatArray) -> FloatArray:
+        """Return positions, m, at phases, s."""
+        return self.rows(phase) @ self.found
+
+    def velocity(self, phase: FloatArray) -> FloatArray:
+        """Return velocities, m/s, at phases, s."""
+        return self.rates(phase) @ self.found
 
 
 class Stick(NamedTuple):
@@ -97,22 +106,20 @@ class FoldedCycles:
     def smooth(self) -> Shape:
         """Return the cycle as a Fourier series, after fitting the period to it."""
 
-        def rows(phase: FloatArray, derivative: int, harmonics: int) -> FloatArray:
-            omega: FloatArray = (2.0 * pi / self.period) * np.arange(1.0, harmonics + 1.0)
-            angle, one = phase[:, None] * omega, np.ones((len(phase), 1))
-            if derivative == 0:
-                return np.hstack([one, np.cos(angle), np.sin(angle)])
-            return np.hstack([0.0 * one, -omega * np.sin(angle), omega * np.cos(angle)])
+        def rows(phase: FloatArray, harmonics: int) -> FloatArray:
+            angle = phase[:, None] * (2.0 * pi / self.period * np.arange(1.0, harmonics + 1.0))
+            return np.hstack([np.ones((len(phase), 1)), np.cos(angle), np.sin(angle)])
 
         most = max(len(self.time) // (3 * self.count), 1)
         if most < _HARMONICS[0]:  # the cycles have samples at different phases
             most = max(min(int(self.phases / 3.0), _HARMONICS[2]), 1)
+        few = min(_HARMONICS[0], most)
         for _ in range(4):
-            phase = self.phase
-            basis = rows(phase, 0, min(_HARMONICS[0], most))
-            found = np.linalg.lstsq(basis, self.position, rcond=None)[0]
-            delay = -(rows(phase, 1, min(_HARMONICS[0], most)) @ found) * self._turns
-            joint = np.linalg.lstsq(np.column_stack([basis, delay]), self.position, rcond=None)[0]
+            basis = rows(self.phase, few)
+            found = np.linalg.lstsq(basis, self.position, rcond=None)[0].astype(np.float64)
+            shape = Shape(lambda phase: rows(phase, few), found, np.empty(0), self.period)
+            basis = np.column_stack([basis, -shape.velocity(self.phase) * self._turns])
+            joint = np.linalg.lstsq(basis, self.position, rcond=None)[0]
             change = float(np.clip(joint[-1] / self.period, -0.02, 0.02))
             self.period *= 1.0 + change
             if abs(change) < 1e-9:
@@ -120,7 +127,7 @@ class FoldedCycles:
         if self._step:  # more harmonics would follow the stairs
             most = min(most, max(int(np.ptp(self.position) / self._step / 2.0), 2))
         choices = [each for each in _HARMONICS if each <= most] or [most]
-        return self._linear(rows, choices, lambda phase, derivative: np.zeros(len(phase)))
+        return self._linear(rows, choices)
 
     def remove_drift(self, shape: Shape) -> bool:
         """Return whether the positions drift, after the drift is taken out of them.
@@ -141,17 +148,20 @@ class FoldedCycles:
 
     def _linear(
         self,
-        rows: Callable[[FloatArray, int, int], FloatArray],
+        rows: Callable[[FloatArray, int], FloatArray],
         sizes: Sequence[int],
-        known: Callable[[FloatArray, int], FloatArray],
+        known: int = 0,
     ) -> Shape:
-        """Return a shape that is linear in coefficients, of the size that the data ask for."""
+        """Return a shape that is linear in coefficients, of the size that the data ask for.
+
+        The first ones are `known` to be 1.
+        """
         phase = self.phase
-        rest = self.position - known(phase, 0)
         squares, width = inf, 0
         found, covariance, size = np.empty(0), np.empty((0, 0)), sizes[0]
         for size in sizes:
-            basis = rows(phase, 0, size)
+            every = rows(phase, size)
+            basis, rest = every[:, known:], self.position - every[:, :known].sum(axis=1)
             found = np.linalg.lstsq(basis, rest, rcond=None)[0]
             residual = rest - basis @ found
             left, more = float(residual @ residual), basis.shape[1] - width
@@ -162,16 +172,16 @@ class FoldedCycles:
                 break
             squares, width = left, basis.shape[1]
         return Shape(
-            known,
-            lambda phase, derivative: rows(phase, derivative, size),
-            found.astype(np.float64),
-            covariance,
+            lambda phase: rows(phase, size),
+            np.append(np.ones(known), found),
+            np.pad(covariance, ((known, 0), (known, 0))),
+            self.period,
         )
 
     def stick(self, shape: Shape, belt_speed: float, noise: float) -> Stick | None:
         """Return the stick of the cycles; None without one."""
         grid = np.linspace(0.0, self.period, GRID, endpoint=False)
-        velocity = shape.value(grid, 1)
+        velocity = shape.velocity(grid)
         if not _STICKING_SHARE * belt_speed < velocity.max() < _PASSING_SHARE * belt_speed:
             return None
         near = velocity > np.minimum(0.93 * belt_speed, 0.98 * velocity.max())
@@ -218,37 +228,20 @@ class FoldedCycles:
     def slip(self, stick: StickFit) -> Shape:
         """Return the cycle as a stick and a slip that starts and ends at the speed of the belt."""
         length = self.period - stick.stick_time
-        belt_speed, drop = stick.belt_speed, stick.belt_speed * self.period
 
-        def since(phase: FloatArray) -> FloatArray:
-            return (phase - stick.departure) % self.period
-
-        def known(phase: FloatArray, derivative: int) -> FloatArray:
-            after = since(phase)
+        def rows(phase: FloatArray, degree: int) -> FloatArray:
+            after = (phase - stick.departure) % self.period
             u = np.clip(after / length, 0.0, 1.0)
-            if derivative == 0:
-                # After the landing the next stick has started: its line is lower by the drop.
-                return (
-                    stick.offset
-                    - drop * u * u * (3.0 - 2.0 * u)
-                    + belt_speed * (after + stick.departure)
-                )
-            return belt_speed - drop * 6.0 * u * (1.0 - u) / length
-
-        def rows(phase: FloatArray, derivative: int, degree: int) -> FloatArray:
-            u = np.clip(since(phase) / length, 0.0, 1.0)
-            shape, slope = (u * (1.0 - u)) ** 2, 2.0 * u * (1.0 - u) * (1.0 - 2.0 * u)
-            basis = chebyshev.chebvander(2.0 * u - 1.0, degree)
-            if derivative == 0:
-                return shape[:, None] * basis
-            every = map(chebyshev.chebder, np.eye(degree + 1))
-            derived = np.column_stack([chebyshev.chebval(2.0 * u - 1.0, row) for row in every])
-            return (slope[:, None] * basis + 2.0 * shape[:, None] * derived) / length
+            line = stick.offset + stick.belt_speed * (after + stick.departure)
+            # After the landing the next stick has started: its line is lower.
+            line -= stick.belt_speed * self.period * u * u * (3.0 - 2.0 * u)
+            slip = (u * (1.0 - u))[:, None] ** 2 * chebyshev.chebvander(2.0 * u - 1.0, degree)
+            return np.column_stack([line, slip])
 
         # With a whole number of samples per cycle the slip has few different ones.
         most = self.phases * length / self.period / 2.0
         degrees = [each for each in _DEGREES if each <= most] or _DEGREES[:1]
-        return self._linear(rows, degrees, known)
+        return self._linear(rows, degrees, known=1)
 
     def adjust(self, shape: Shape) -> None:
         """Fit the period to what a shape leaves."""
@@ -265,7 +258,7 @@ class FoldedCycles:
         """Return the amplitude of each cycle over that of the shape."""
         phase, number = self.phase, self.number
         values = shape.value(phase)
-        rate = shape.value(phase, 1)
+        rate = shape.velocity(phase)
         design = np.column_stack([values - values.mean(), np.ones(len(phase)), rate])
         relative = np.ones(self.count)
         for cycle in range(self.count):
@@ -277,7 +270,7 @@ class FoldedCycles:
 
     def _shifts(self, shape: Shape) -> FloatArray:
         """Return the derivatives of the positions by delay, period and offset."""
-        rate = -shape.value(self.phase, 1)
+        rate = -shape.velocity(self.phase)
         return np.column_stack([rate, rate * self._turns, np.ones(len(rate))])
 
     def _covariance(self, jacobian: FloatArray, residual: FloatArray) -> FloatArray:

@@ -41,7 +41,7 @@ def test_values_and_velocities_are_those_of_the_motion() -> None:
     assert shape.value(phase) == pytest.approx(
         1e-4 * (np.sin(turn) + 0.1 * np.cos(3.0 * turn)), abs=1e-8
     )
-    assert shape.value(phase, 1) == pytest.approx(
+    assert shape.velocity(phase) == pytest.approx(
         1e-4 * rate * (np.cos(turn) - 0.3 * np.sin(3.0 * turn)), abs=1e-5
     )
 
