@@ -197,9 +197,7 @@ class CycleMeans:
             scatter = np.sqrt(squares.sum(axis=0) / (count - 1)) / count**0.5
             errors = Cycle(*scatter.tolist())
         sticks = sum(cycle.stick_fraction > 0.0 for cycle in cycles) > share * count
-        return cls(
-            Cycle(*mean.tolist()), errors, sticks, np.array([cycle.amplitude for cycle in cycles])
-        )
+        return cls(Cycle(*mean.tolist()), errors, sticks, values[:, 0])
 
     def measures(self, resting: bool, steady: bool | None, trend: Trend | None) -> Measures:
         """Return the measures of a motion with this mean; one that is `resting` has no period."""

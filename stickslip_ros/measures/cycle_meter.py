@@ -177,8 +177,9 @@ class CycleMeter:
             return []
         self._belt_speed = belt_speed
         self._fastest_belt = abs(belt_speed) if fastest_belt is None else fastest_belt
-        breakpoints, last = self._last.followed_by(breakpoints), 0
-        rows, completed = _Rows(breakpoints), list[Cycle]()
+        if len(self._last):
+            breakpoints = self._last.followed_by(breakpoints)
+        rows, completed, last = _Rows(breakpoints), list[Cycle](), 0
         for edge in self._upward_crossings(breakpoints):
             stretch = reduce(_Stretch.followed_by, [*self._parts, rows.stretch(last, edge)])
             if self._whole and stretch.duration > 0.0:
@@ -265,15 +266,14 @@ class CycleMeter:
     def _upward_crossings(self, breakpoints: Breakpoints) -> list[int]:
         """Return the breakpoints at which the velocity changes from negative to positive."""
         speed = np.abs(breakpoints.velocity)
-        self._fastest = max(self._fastest, float(speed.max()))
-        moving = np.flatnonzero(speed > _NOISE * max(self._fastest, self._fastest_belt))
+        self._fastest = max(self._fastest, float(speed[speed.argmax()]))
+        (moving,) = (speed > _NOISE * max(self._fastest, self._fastest_belt)).nonzero()
         if len(moving) == 0:
             return []
         directions = np.concatenate([[self._direction], np.sign(breakpoints.velocity[moving])])
         self._direction = float(directions[-1])
-        rising = moving[(directions[:-1] < 0.0) & (directions[1:] > 0.0)]
-        before = np.maximum(rising - 1, 0)
-        return np.where(speed[before] <= speed[rising], before, rising).tolist()
+        rising = moving[(directions[:-1] < 0.0) & (directions[1:] > 0.0)].tolist()
+        return [row - (row > 0 and bool(speed[row - 1] <= speed[row])) for row in rising]
 
     def _follow(self, rows: _Rows, row: int, last: int) -> None:
         """Add the breakpoints from one to another to the stretch since the last crossing.
@@ -303,7 +303,7 @@ class CycleMeter:
         return reduce(_Stretch.followed_by, recent).as_cycle()
 
     def _follow_sticking(self, breakpoints: Breakpoints) -> None:
-        slipping = np.flatnonzero(~breakpoints.sticking[1:])
+        (slipping,) = (~breakpoints.sticking[1:]).nonzero()
         if len(breakpoints) > 1 and not breakpoints.sticking[-1]:
             self._sticking_since = None
         elif len(slipping) > 0 or self._sticking_since is None:

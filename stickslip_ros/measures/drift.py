@@ -19,6 +19,9 @@ _LEAST_CHANGE = 0.01
 """Change over one more run, as a share of the largest magnitude, above which it matters."""
 
 
+_Values = Sequence[float] | npt.NDArray[Any]
+
+
 class TrendMeter:
     """Means of a quantity over equal parts of a run, in constant memory.
 
@@ -30,24 +33,29 @@ class TrendMeter:
         self._sums = np.zeros((2 * _PARTS + 1, 3))
         """Weight, and weighted time and value, of each part."""
         self._count, self._each, self._largest = 0, 1, 0.0
-        self._waiting: list[FloatArray] = []
+        self._waiting: list[tuple[_Values, _Values]] = []
         """Times and values that are not yet in the sums: short runs have no trend."""
         self._waiting_count = 0
 
-    def feed(self, time: npt.ArrayLike, value: npt.ArrayLike) -> None:
-        """Add the times, s, and values that follow, in blocks of any length."""
-        new = np.array([time, value])
-        if new.size > 0:
-            self._waiting.append(new)
-            self._waiting_count += new.shape[1]
+    def feed(self, time: _Values, value: _Values) -> None:
+        """Add the times, s, and values that follow, in blocks of any length; they are kept."""
+        if len(time) > 0:
+            self._waiting.append((time, value))
+            self._waiting_count += len(time)
         if self._waiting_count >= _PARTS:
             self._add_waiting()
 
-    def _add_waiting(self) -> None:
-        time, value = np.concatenate([np.empty((2, 0)), *self._waiting], axis=1)
+    def _take_waiting(self) -> FloatArray:
+        """Return the times and the finite values that wait, shape (2, n)."""
+        new = np.concatenate([np.empty((2, 0)), *map(np.array, self._waiting)], axis=1)
+        new = new[:, np.isfinite(new[1])]
+        self._largest = max(self._largest, float(np.abs(new[1]).max(initial=0.0)))
         self._waiting, self._waiting_count = [], 0
-        new = np.array([np.ones(len(time)), time, value]).T[np.isfinite(value)]
-        self._largest = max(self._largest, float(np.abs(new[:, 2]).max(initial=0.0)))
+        return new
+
+    def _add_waiting(self) -> None:
+        time, value = self._take_waiting()
+        new = np.array([np.ones(len(time)), time, value]).T
         while len(new) > 0:
             fits = 2 * _PARTS * self._each - self._count
             part, new = new[:fits], new[fits:]
@@ -78,26 +86,32 @@ class TrendMeter:
         """
         if self._count + self._waiting_count < _LEAST_PARTS:
             return None
-        self._add_waiting()
-        weight, *sums = self._sums.T
-        with np.errstate(invalid="ignore"):
-            every, values = np.array(sums)[:, weight == self._each] / self._each
+        if self._count == 0:  # each value is a part
+            every, values = self._take_waiting()
+            self._waiting, self._waiting_count = [(every, values)], len(every)
+        else:
+            self._add_waiting()
+            weight, *sums = self._sums.T
+            with np.errstate(invalid="ignore"):
+                every, values = np.array(sums)[:, weight == self._each] / self._each
         run = float(every[-1] - every[0]) if len(every) else 0.0
-        last: tuple[float, float] | None = None
+        lines: list[tuple[FloatArray, FloatArray]] = []
         for length in (max(run / 4.0, span), run / 2.0):
             rows = every >= every[-1:] - length
-            if length > run or np.count_nonzero(rows) < _LEAST_PARTS:
-                continue
-            with np.errstate(over="ignore", invalid="ignore"):
-                slope, error = fit_line(
-                    every[rows] - every[rows].mean(), values[rows], least / sqrt(24.0)
-                )
-                matters = abs(slope) * run > max(_LEAST_CHANGE * self._largest, least)
-            if last is not None and abs(slope - last[0]) > 2.0 * last[1]:
-                break
-            if matters and abs(slope) > _LEAST_ERRORS * error:
-                return slope
-            last = slope, error
+            if length <= run and np.count_nonzero(rows) >= _LEAST_PARTS:
+                lines.append((every[rows] - every[rows].mean(), values[rows]))
+        matters = max(_LEAST_CHANGE * self._largest, least)
+        last: tuple[float, float] | None = None
+        with np.errstate(over="ignore", invalid="ignore"):
+            if all(abs(time @ value) * run <= matters * (time @ time) for time, value in lines):
+                return None
+            for time, value in lines:
+                slope, error = fit_line(time, value, least / sqrt(24.0))
+                if last is not None and abs(slope - last[0]) > 2.0 * last[1]:
+                    break
+                if abs(slope) * run > matters and abs(slope) > _LEAST_ERRORS * error:
+                    return slope
+                last = slope, error
         return None
 
 

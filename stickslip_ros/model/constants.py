@@ -4,7 +4,7 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from enum import StrEnum
-from functools import cache, partial
+from functools import cache, cached_property, partial
 from math import ceil, inf, isinf, isnan, nextafter
 from typing import Any, TypedDict, TypeVar, Unpack
 
@@ -82,19 +82,19 @@ class Parameter:
     file: bool = False
     """Whether it is the path of a file, or empty."""
 
-    @property
+    @cached_property
     def kind(self) -> type:
         """Type: bool, int, float, str or list (of str)."""
         if isinstance(self.default, bool | str | list):
             return type(self.default)
         return int if self.whole else float
 
-    @property
+    @cached_property
     def finite(self) -> bool:
         """Whether a number must be finite."""
         return self.kind is not float or not isinf(self.default)
 
-    @property
+    @cached_property
     def least(self) -> float | None:
         """Smallest value of a number, if it has one."""
         least = max(self.at_least, SMALLEST if self.positive else -inf)
@@ -102,7 +102,7 @@ class Parameter:
             return -LARGEST if self.kind is float and self.finite else None
         return ceil(least) if self.whole else least
 
-    @property
+    @cached_property
     def largest(self) -> float | None:
         """Largest value of a number, if it has one."""
         largest = min(self.at_most, nextafter(self.below, -inf) if self.below < inf else inf)
@@ -157,8 +157,9 @@ class Parameter:
         bool
             True for a whole number that makes or simplifies the equations.
         """
-        number = isinstance(value, int | float)
-        return self.whole or (self.simplifies and number and float(value).is_integer())
+        return self.whole or (
+            self.simplifies and isinstance(value, int | float) and float(value).is_integer()
+        )
 
     def text(self, value: Any) -> str:
         """Return a value for a reader: nan as its meaning.

@@ -270,12 +270,12 @@ class DimensionlessDrive(HybridSystem):
             return force if self.drive.motor is not None else force + inputs[1]
         return inputs[0]
 
-    def reaction(self, instant: Instant) -> float:
-        """Return h = X + 2 beta X' - U - bias, the reaction of the slide at the belt speed."""
+    def reaction(self, instant: Instant, force: float | None = None) -> float:
+        """Return h = X + 2 beta X' - U - bias of the slide at the belt speed; `force` is known."""
         state = instant.state
         x, y = state[POSITION], state[SPEED]
         if self.drive.motor is None:
-            return self._reaction(x, y, self.control_force(instant))
+            return self._reaction(x, y, self.control_force(instant) if force is None else force)
         stretch = stretched(x, y, state[self.motor_states])
         return self._reaction(*stretch, instant.inputs[1])
 

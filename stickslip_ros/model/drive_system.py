@@ -288,14 +288,15 @@ class DriveSystem(DimensionlessDrive):
             return
         if self.sticks:
             force = self.control_force(instant)
-            held = self.reaction(instant) if self._steady else self.held_force(mode, instant)
+            held = self.reaction(instant, force) if self._steady else self.held_force(mode, instant)
             backward = sign < 0.0 or (sign == 0.0 and held > 0.0)
             limit = self.backward_limit if backward else self.forward_limit
             if self._loaded:
                 limit *= self.normal_force(mode, instant.time)
             # Without a spring no displacement changes the reaction.
             size = abs(x) + abs(held) + abs(force) + limit
-            size += sum(map(abs, state[self.motor_states]))
+            if self.drive.motor is not None:
+                size += sum(map(abs, state[self.motor_states]))
             margin = self.drive.stiffness * 8.0 * ulp(size)
             if sign == 0.0:
                 if abs(held) > limit - margin:

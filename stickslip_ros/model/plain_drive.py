@@ -38,16 +38,12 @@ class PlainDriveSystem(DriveSystem):
 
     def control_force(self, instant: Instant) -> float:
         """Return the force on the slide: held, or continuous control."""
+        if self.control is None:
+            return instant.inputs[0]
         if self._control_force is None:
             return super().control_force(instant)
         state = instant.state
         return self._control_force(state[POSITION], state[SPEED], state[self.control_states])
-
-    def reaction(self, instant: Instant) -> float:
-        """Return h = X + 2 beta X' - U - bias."""
-        state = instant.state
-        force = instant.inputs[0] if self.control is None else self.control_force(instant)
-        return self._reaction(state[POSITION], state[SPEED], force)
 
     def friction_force(self, mode: Mode, instant: Instant) -> float:
         """Return the friction force on the slide."""

@@ -13,7 +13,9 @@ def numbers(part: Any, name: str) -> Iterator[tuple[str, float]]:
 
     A number is one constant.
     """
-    if is_dataclass(part):
+    if isinstance(part, float):  # first: most are
+        yield name, part
+    elif is_dataclass(part):
         for own, each in _values(part).items():
             yield from numbers(each, f"{name}.{own}")
     elif isinstance(part, tuple):
@@ -49,7 +51,7 @@ def structure(part: Any) -> Any:
             found.append(value if constant.stays(value) else None)
         elif isinstance(value, tuple):
             found.append(len(value) if constant is not None else None)
-        elif not isinstance(value, int | float):
+        elif not isinstance(value, (int, float)):
             found.append(structure(value))
     return tuple(found)
 
@@ -63,7 +65,7 @@ def _values(part: Any) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for name, constant in _fields(type(part)):
         value = getattr(part, name)
-        if isinstance(value, int | float):
+        if isinstance(value, (int, float)):
             varies = constant is None or not constant.stays(value)
         else:
             varies = is_dataclass(value) or (isinstance(value, tuple) and constant is not None)

@@ -60,6 +60,7 @@ class HybridMotion:
         """Whether the motion is unbounded; then it does not advance any further."""
         self._steps_left = _SPARE_STEPS
         self._detail, self._watched = detail, bool(detail)
+        self._derives = Detail.DERIVATIVES in detail
         self._integrators = IntegratorPool()
         self._flow: CompiledFlow | None = None
         self._short_step: ShortStep | None = None
@@ -89,6 +90,7 @@ class HybridMotion:
     def _set_detail(self, detail: Detail) -> None:
         """Continue with another detail."""
         self._detail, self._watched = detail, bool(detail)
+        self._derives = Detail.DERIVATIVES in detail
         self._prepared = self._prepared_by_detail.setdefault(detail, {})
         self._enter(self._mode)
 
@@ -124,7 +126,7 @@ class HybridMotion:
     def _prepare(self, mode: Mode) -> _Prepared:
         """Load the constants into the integrator of a mode's flow, unless it has a closed form."""
         name, system, flow = mode.flow, self._system, None
-        if Detail.DERIVATIVES in self._detail or not system.has_closed_form(mode):
+        if self._derives or not system.has_closed_form(mode):
             flow = self._integrators.flow(system, name, self._detail)
             flow.load(system)
         prepared = self._prepared[name] = flow, system.shared_flow(name).transitions
@@ -133,7 +135,7 @@ class HybridMotion:
     def _advance(self, duration: float) -> None:
         """Integrate over a duration; stop early if the motion becomes unbounded."""
         step = self._short_step
-        if step is None and Detail.DERIVATIVES not in self._detail:
+        if step is None and not self._derives:
             step = self._short_step = short_step(
                 self._system, self._mode, self._instant, self._flow, self._switch_time
             )
@@ -153,8 +155,7 @@ class HybridMotion:
         limits_steps, clocked, has_parts = system.limits_steps, self._clocked, system.has_parts
         slaves = system.slaves
         longest = LONGEST_STEP if duration > LONGEST_STEP and not clocked else inf
-        repeats = duration > _SHORTEST_REPEATED and not clocked
-        repeats = repeats and Detail.DERIVATIVES not in self._detail
+        repeats = duration > _SHORTEST_REPEATED and not (clocked or self._derives)
         recurrence = Recurrence() if repeats else None
         while now < duration:
             end, corner = duration, self._switch_time - epoch

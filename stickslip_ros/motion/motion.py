@@ -71,7 +71,7 @@ class Motion(HybridMotion):
     """
 
     _system: DriveSystem
-    _first_detail: ClassVar[Detail] = Detail.STATES
+    _first_detail = Detail.STATES
 
     def __init__(
         self,
@@ -466,6 +466,8 @@ class RecordedMotion(Motion):
         Relative speed, m/s, up to which the slide sticks, for friction with a memory, where it
         never has exactly the speed of the belt. By default it is a hundredth of the fastest belt
         speed, or, on a belt at rest, of the fastest relative speed so far.
+    recording : bool, optional
+        Whether breakpoints are recorded from the start; see the attribute.
 
     Examples
     --------
@@ -483,7 +485,7 @@ class RecordedMotion(Motion):
     [671, -71, 760]
     """
 
-    _first_detail = Detail.MARKS
+    _recorded_detail: ClassVar[Detail] = Detail.MARKS
 
     def __init__(
         self,
@@ -492,7 +494,10 @@ class RecordedMotion(Motion):
         velocity: float,
         control: ContinuousControl | None = None,
         stick_speed: float | None = None,
+        *,
+        recording: bool = True,
     ) -> None:
+        self._first_detail = self._recorded_detail if recording else Detail.STATES
         self._recording = Detail.MARKS in self._first_detail
         self._recorded: list[tuple[float, float, float, bool]] = []
         self._passed: list[_Point] = []
@@ -522,7 +527,7 @@ class RecordedMotion(Motion):
         if recording == self._recording:
             return
         self._recording = recording
-        self._set_detail(self._first_detail if recording else Detail.STATES)
+        self._set_detail(self._recorded_detail if recording else Detail.STATES)
         self._append_present()
 
     def take_breakpoints(self) -> Breakpoints:
@@ -573,7 +578,7 @@ class RecordedMotion(Motion):
             time = now if instant is None else begun + instant
             sticking = mode.flow == STICK if sticks else self._stays_slow(mode, time, y)
             self._passed.append((instant, x, y, sticking))
-            self._append(time, x, y, sticking=sticking)
+            self._append(time, x, y, sticking)
 
     @override
     def _kept(self) -> tuple[list[_Point], bool]:
@@ -583,7 +588,7 @@ class RecordedMotion(Motion):
     def _recall(self, kept: tuple[list[_Point], bool], begun: float, now: float) -> None:
         points, self._was_slow = kept
         for instant, x, y, sticking in points:
-            self._append(now if instant is None else begun + instant, x, y, sticking=sticking)
+            self._append(now if instant is None else begun + instant, x, y, sticking)
 
     def _stays_slow(self, mode: Mode, now: float, y: float) -> bool:
         """Return whether the slide has been slow since the last breakpoint.
@@ -599,10 +604,11 @@ class RecordedMotion(Motion):
     def _append_present(self) -> None:
         if self._recording:
             state = self._instant.state
-            self._append(0.0, state[POSITION], state[SPEED], sticking=False)
+            self._append(0.0, state[POSITION], state[SPEED], False)
 
-    def _append(self, now: float, x: float, y: float, *, sticking: bool) -> None:
-        time = self._time + now / self._drive.angular_frequency
-        # Rounding must not take the time back.
-        self._breakpoint_time = max(self._breakpoint_time, time)
-        self._recorded.append((self._breakpoint_time, x, y, sticking))
+    def _append(self, now: float, x: float, y: float, sticking: bool) -> None:
+        time = self._time + now / self._frequency
+        if time < self._breakpoint_time:  # rounding must not take the time back
+            time = self._breakpoint_time
+        self._breakpoint_time = time
+        self._recorded.append((time, x, y, sticking))

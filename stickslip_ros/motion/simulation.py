@@ -16,7 +16,7 @@ from stickslip_ros.motion.sampled_loop import SampledLoop
 from stickslip_ros.motion.tick_blocks import LEAST_TICKS, TickBlocks
 from stickslip_ros.motion.trajectory import SampleRecorder
 from stickslip_ros.progress import Progress
-from stickslip_ros.samples import Sample, SampleColumns
+from stickslip_ros.samples import SampleColumns
 
 _BLOCK = 1000
 """Number of samples after which meters and observers receive the motion."""
@@ -68,10 +68,6 @@ class MotionTracer:
             time, *states = np.array(self._motor).T
             self._observer.take_motor(time, np.array(states))
             self._motor.clear()
-
-
-def _no_answer(sample: Sample) -> None:
-    """Answer no sample."""
 
 
 def measure_block(
@@ -155,7 +151,7 @@ def simulate_sampled(
     """
     samples, done = round(duration / loop.period), 0
     seen, present = [loop.sample], (loop.true_sample, loop.sample)
-    answers = loop.run(_no_answer if controller is None else controller.answer)
+    answers = loop.run((lambda _: None) if controller is None else controller.answer)
     blocks = None
     if recorder is None and measured is None and samples >= LEAST_TICKS:
         blocks = TickBlocks.of(loop, motion, controller)

@@ -52,7 +52,7 @@ class VariationalMotion(RecordedMotion):
     limit of `ElastoPlastic`, is held. Breakpoints are not recorded.
     """
 
-    _first_detail = Detail.DERIVATIVES
+    _recorded_detail = Detail.DERIVATIVES
 
     def __init__(
         self,
@@ -171,7 +171,7 @@ class ShootingMotion(VariationalMotion):
     costly, summed over all starts.
     """
 
-    _first_detail = Detail.MARKS | Detail.DERIVATIVES
+    _recorded_detail = Detail.MARKS | Detail.DERIVATIVES
 
     def __init__(self, drive: Drive, control: ContinuousControl | None = None) -> None:
         """Start at rest at X = 0, with continuous control if `control` (SI) is given.

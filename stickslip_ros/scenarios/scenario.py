@@ -289,8 +289,7 @@ class Scenario:
         by_node: dict[str, dict[str, Any]] = {}
         for target, value in values.items():
             node, _, name = target.partition(".")
-            absolute = NODE_PARAMETERS[node].absolute(name, value, Path())
-            by_node.setdefault(node, {})[name] = absolute
+            by_node.setdefault(node, {})[name] = NODE_PARAMETERS[node].absolute(name, value)
         own = self.controller.node
         changes: dict[str, Any] = {}
         for node, new in by_node.items():

@@ -53,15 +53,15 @@ class ParameterGroup:
                 )
         complaints: list[str] = []
         taken: dict[str, Any] = {}
-        for name in (name for name in known if name in values):
+        for name in filter(values.__contains__, known):
             try:
                 taken[name] = checked(known[name], values[name])
             except InvalidInputError as error:
                 complaints.append(str(error))
         if not complaints:
-            kept = {
-                path: each for path, each in self.curves().items() if path not in taken.values()
-            }
+            reads = "file" in known or any("." in name for name in taken)
+            curves_now = self.curves() if reads else {}
+            kept = {path: each for path, each in curves_now.items() if path not in taken.values()}
             changed = _changed(self, taken, "", {**kept, **(curves or {})}, complaints)
             if not complaints:
                 return changed
@@ -76,14 +76,16 @@ class ParameterGroup:
             raise InvalidInputError(f"unknown parameter {name:.80}")
         checked(self.known[name], value)
 
-    def absolute(self, name: str, value: Any, folder: Path) -> Any:
+    def absolute(self, name: str, value: Any, folder: Path = Path()) -> Any:
         """Return a value; a path that is relative to a folder as an absolute one."""
         is_path = name in self.known and self.known[name].file and value and isinstance(value, str)
         return str((folder / value).absolute()) if is_path else value
 
     def replaced(self, values: Mapping[str, Any]) -> Self:
         """Return the group with other values of its own fields, by name."""
-        return replace(self, **values)
+        made, own = object.__new__(type(self)), vars(self)  # `replace` takes five times as long
+        vars(made).update({name: own[name] for name in self.__dataclass_fields__}, **values)
+        return made
 
     def completed(self, prefix: str, curves: dict[str, Pairs]) -> Self:
         """Return the group with what is in its files; those whose `curves` are known are not read.

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import product
 from math import isfinite, prod
 from typing import Any, ClassVar, Self
@@ -165,7 +166,7 @@ class Axis:
         """Unit of the parameter; empty for a pure number."""
         return self._parameter.unit or ""
 
-    @property
+    @cached_property
     def _parameter(self) -> Parameter:
         node, _, name = self.parameter.partition(".")
         if node not in _NODES:

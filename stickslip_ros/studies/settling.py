@@ -188,13 +188,11 @@ def settle(case: ControlledDrive, start: MotionState, settling: SettlingOptions)
     """
     drive, law, period = case.drive, case.law, case.period
     control = law.continuous if law is not None and case.sampled is None else None
-    motion = RecordedMotion(drive, start.position, start.velocity, control)
-    motion.recording = False
+    motion = RecordedMotion(drive, start.position, start.velocity, control, recording=False)
     kept = start.memory is not None and len(start.memory) == len(drive.friction.states)
     if kept or start.motor is not None:
         memory = start.memory if kept else None
         motion.restart(start.position, start.velocity, memory, start.motor)
-    motion.take_breakpoints()  # the start is not part of what is measured
     loads = drive.belt_speed != 0.0 and drive.has_spring
     loading = loading_time(drive) if loads else 0.0
     transient = settling.transient * period
@@ -272,9 +270,7 @@ def _start_control(
 
 def _is_settled(measures: Measures) -> bool:
     """Return whether a motion is steady; a motion at rest after its transient is."""
-    if measures.steady is None:
-        return measures.regime in RESTS
-    return measures.steady
+    return measures.regime in RESTS if measures.steady is None else measures.steady
 
 
 def _alike(before: Measures, after: Measures, resolution: float) -> bool:

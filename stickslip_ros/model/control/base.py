@@ -108,7 +108,7 @@ class ContinuousControl(Protocol):
         ContinuousControl
             The same control, dimensionless.
         """
-        return scaled(self, drive.scales)
+        return self if drive.is_dimensionless else scaled(self, drive.scales)
 
     def silenced(self) -> Self:
         """Return a control with the same states that gives no force."""
