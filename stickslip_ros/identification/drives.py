@@ -182,10 +182,11 @@ class DriveTask:
             values = {**like.best.values, "static": like.best.values["kinetic"]}
             return self._nearest(law, [values], _GIVEN_UP_LOSS_RATIO * _loss(like))
         fastest = float(self.rows.speeds[-1])
+        shapes = [share * fastest for share in _SHAPES] if law.one_way.shaped and thorough else []
         starts = [
             start
-            for each in self._regressions(law.one_way, thorough)
-            for start in law.starts(self._start(law, each), fastest)
+            for shape in (None, *shapes)
+            for start in law.starts(self._start(law, self._regression(law.one_way, shape)), fastest)
         ]
         return self._nearest(law, starts)
 
@@ -210,10 +211,7 @@ class DriveTask:
         constants, columns = fit.constants, fit.rows.columns
         others = sum(abs(value) * rms(columns[name]) for name, value in constants.items())
         smallest = _LEAST_SHARE * (others or 1.0)
-        own = [
-            fit.curve.start(fit.coordinates(number), smallest)
-            for number in range(len(fit.directions))
-        ]
+        own = [fit.curve.start(each, smallest) for each in fit.coordinates]
         # A curve that does not suit the friction may leave no mass or stiffness to them.
         unfit = [name for name in self.free if not constants[name] > 0.0]
         return {
@@ -228,13 +226,6 @@ class DriveTask:
         speeds = np.quantile(self.rows.speeds, np.linspace(0.0, 1.0, _POINTS))
         speeds[0] = 0.0
         return TableAdapter(speeds)
-
-    def _regressions(self, law: IdentifiedLaw, thorough: bool) -> list[Regression]:
-        fits = [self._regression(law)]
-        if law.shaped and thorough:
-            top = float(self.rows.speeds[-1])
-            fits += [self._regression(law, shape * top) for shape in _SHAPES]
-        return fits
 
     def _nearest(
         self, law: IdentifiedLaw, starts: Sequence[Mapping[str, float]], most: float = inf

@@ -137,9 +137,9 @@ class Fit(ABC):
     def force_at(self, point: FloatArray, sign: float, speed: FloatArray) -> FloatArray:
         """Return the size of steady friction at another point, N, at speeds |v_r|, m/s."""
 
-    @abstractmethod
     def curve_speeds(self, fastest: float) -> FloatArray:
         """Return the speeds of the points that stand for a curve, m/s."""
+        return np.linspace(0.0, fastest, CURVE_POINTS)
 
     @abstractmethod
     def errors(self, record: Record) -> ForceErrors:

@@ -62,6 +62,8 @@ class IdentifiedLaw:
     """Whether there is a shape."""
     least_shape: float = 0.25
     """Smallest shape that records tell, in their slowest speeds."""
+    speeds: FloatArray | None = None
+    """Speeds of the points that stand for a curve, m/s; None: those recorded."""
     deflection: float = 0.0
     """Path over which friction follows a change of direction or speed, m; 0: immediately."""
     coordinates: Sequence[str]
@@ -105,10 +107,6 @@ class IdentifiedLaw:
     def one_way(self) -> "IdentifiedLaw":
         """The law of each direction of slip."""
         return self
-
-    def curve_speeds(self, recorded: FloatArray) -> FloatArray:
-        """Return the speeds of the points that stand for a curve, m/s, by default the recorded."""
-        return recorded
 
     def joined(self, directions: Sequence[Values]) -> dict[str, float]:
         """Return the coordinates of one direction, or of forward and backward slip."""

@@ -163,7 +163,8 @@ class TableAdapter(IdentifiedLaw):
         self, speeds: FloatArray, knots: FloatArray | None = None, deflection: float = 0.0
     ) -> None:
         """Take the speeds of the points and of the knots, m/s, from 0; by default the same."""
-        self.speeds, self.knots = speeds, speeds if knots is None else knots
+        self.speeds = self._points = speeds
+        self.knots = speeds if knots is None else knots
         self.least = (0.0, *[-np.inf] * (len(self.knots) - 1))
         self.coordinates = [f"force_{number}" for number in range(len(speeds))]
         # The polynomials of the pieces are made from them.
@@ -174,10 +175,6 @@ class TableAdapter(IdentifiedLaw):
             self.coordinates = [*self.coordinates, *self.memory]
 
     @override
-    def curve_speeds(self, recorded: FloatArray) -> FloatArray:
-        return self.speeds
-
-    @override
     def terms(self, speed: FloatArray, shape: float) -> FloatArray:
         low, high = self.knots[:-1], self.knots[1:]
         shares = np.clip((speed[:, None] - low) / (high - low), 0.0, 1.0)
@@ -185,7 +182,7 @@ class TableAdapter(IdentifiedLaw):
 
     @override
     def coordinates_of(self, forces: Sequence[float], shape: float) -> dict[str, float]:
-        found = self.terms(self.speeds, shape) @ np.array(forces)
+        found = self.terms(self._points, shape) @ np.array(forces)
         return dict(zip(self.coordinates, found.tolist(), strict=False))
 
     @override
@@ -208,7 +205,7 @@ class TableAdapter(IdentifiedLaw):
 
     @override
     def friction(self, values: Values, normal_force: float) -> FrictionLaw:
-        forces = zip(self.speeds.tolist(), self.coordinates, strict=False)
+        forces = zip(self._points.tolist(), self.coordinates, strict=False)
         curve = Table(tuple((w, max(values[name], 0.0) / normal_force) for w, name in forces))
         return self.following(curve, values, normal_force) if self.memory else curve
 

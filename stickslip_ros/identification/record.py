@@ -26,7 +26,7 @@ _TURNING_SHARE = 0.2
 _LONGEST_DIFFERENCE, _DIFFERENCE_ERROR = 8, 1e-6
 """Samples over which a velocity may be a difference of positions; its error, in the largest one."""
 _SMOOTHED_SAMPLES = 11
-"""Samples over which a speed is found."""
+"""Samples over which positions are smoothed, and a speed is found."""
 _REST_SAMPLES = 20
 """Successive samples of the same position from which the slide is at rest."""
 _FEWEST_VALUES = 10
@@ -126,18 +126,11 @@ class Record:
         no weight, if other samples are enough. Of positions whose noise is larger than their steps
         all count alike.
         """
-        return np.where(self.lost, 0.0, self._weight_by_rounding)
-
-    @property
-    def _weight_by_rounding(self) -> FloatArray:
-        from scipy.signal import savgol_filter
-
         position, step = self.position, self.resolution
         if step == 0.0 or white_noise(position) > _DITHER_NOISE * step:
-            return np.ones(len(position))
+            return np.where(self.lost, 0.0, 1.0)
         speed, change = (
-            np.abs(np.asarray(savgol_filter(position, _SMOOTHED_SAMPLES, 3, deriv=order))) / step
-            for order in (1, 2)
+            np.abs(self.smoothed(order)) * self.period**order / step for order in (1, 2)
         )
         counts = 1.0 / np.clip(speed / _INDEPENDENT_SPEED, 1e-3, 1.0)
         changes = np.flatnonzero(np.diff(position)) + 1
@@ -149,7 +142,18 @@ class Record:
         turning = (speed < _INDEPENDENT_SPEED) & (change > _TURNING_CHANGE)
         if np.mean(turning) < _TURNING_SHARE:
             counts[turning] = np.inf
-        return 1.0 / np.sqrt(counts)
+        return np.where(self.lost, 0.0, 1.0 / np.sqrt(counts))
+
+    def smoothed(self, order: int) -> FloatArray:
+        """Return the smoothed position, m, or its first or second derivative by time.
+
+        It is that of a cubic through the samples around each (A. Savitzky, M. J. E. Golay,
+        Analytical Chemistry 36(8), 1964).
+        """
+        from scipy.signal import savgol_filter  # takes long to import
+
+        found = savgol_filter(self.position, _SMOOTHED_SAMPLES, 3, deriv=order, delta=self.period)
+        return np.asarray(found)
 
     @cached_property
     def velocity_weight(self) -> float:

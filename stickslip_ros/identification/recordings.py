@@ -42,22 +42,18 @@ def read_all(
     it is left out where a table lacks it. Options and errors are those of `read_records`.
     """
     tables = {path: table_of(path, form) for path in paths if is_table(path)}
-    lacking = {
-        path: {
-            quantity
-            for quantity, text in ({} if columns is None else columns).items()
-            if quantity in _OPTIONAL and not table.has(text)
-        }
-        for path, table in tables.items()
-    }
-    nowhere = set[str].intersection(*lacking.values()) if lacking else set[str]()
     found: dict[Path, list[Record]] = {}
     for path in dict.fromkeys(paths):
-        own = columns
-        if columns is not None and path in tables:
-            absent = lacking[path] - nowhere
-            own = {name: text for name, text in columns.items() if name not in absent}
-        found[path] = read_records(path, own, table=tables.get(path), **options)
+        own, table = columns, tables.get(path)
+        if columns is not None and table is not None:
+            own = {
+                quantity: text
+                for quantity, text in columns.items()
+                if table.has(text)
+                or quantity not in _OPTIONAL
+                or not any(other.has(text) for other in tables.values())
+            }
+        found[path] = read_records(path, own, table=table, **options)
     return found
 
 

@@ -10,7 +10,7 @@ from typing_extensions import override
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.identification.covariance import block_covariance
 from stickslip_ros.identification.filtered import filtered
-from stickslip_ros.identification.fit import CURVE_POINTS, Fit, ForceErrors, Residuals
+from stickslip_ros.identification.fit import Fit, ForceErrors, Residuals
 from stickslip_ros.identification.identified_law import DELAY, LAG, IdentifiedLaw
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.segment_starts import Errors, best_starts
@@ -72,10 +72,6 @@ class Refinement(Fit):
         return np.array([-sign * float(law.coefficient(sign * w, sign)) for w in speed.tolist()])
 
     @override
-    def curve_speeds(self, fastest: float) -> FloatArray:
-        return np.linspace(0.0, fastest, CURVE_POINTS)
-
-    @override
     def errors(self, record: Record) -> ForceErrors:
         record = record.lagging(self.best.values.get(LAG, 0.0))
         columns = filtered(record, decimated=False, delay=self.delay)
@@ -102,21 +98,16 @@ class Refinement(Fit):
 
     @override
     def residuals(self, record: Record) -> Residuals:
-        from scipy.signal import savgol_filter
-
         own, values = self.best.task, self.best.values
         length = float(np.median([segment.count for segment in own.segments]))
-        task = self._divided(record, length * own.predictors[0].record.period)
-        task = replace(task, predictors=[Predictor(replace(record, velocity=None))])
+        length *= own.predictors[0].record.period
+        task = self._divided(replace(record, velocity=None), length)
         starts = best_starts(task, values).restarted().starts
         away = task.positions - task.predicted(values, starts)
         rows = np.concatenate([np.arange(s.start, s.start + s.count) for s in task.segments])
         measured = ~record.lost[rows]
         away, rows = away[measured], rows[measured]
-        speed: FloatArray = np.asarray(
-            savgol_filter(record.position, 11, 3, deriv=1, delta=record.period)
-        )
-        relative = (speed - record.belt_velocity)[rows]
+        relative = (record.smoothed(1) - record.belt_velocity)[rows]
         time = record.period * rows.astype(float)
         return Residuals(time, record.position[rows], relative, away)
 

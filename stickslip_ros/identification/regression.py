@@ -180,24 +180,31 @@ class Regression(Fit):
         """Value of each of `LINEAR`."""
         return {**self.fixed, **dict(zip(self.free, self.unknowns.tolist(), strict=False))}
 
-    def coordinates(self, number: int) -> dict[str, float]:
-        """Return the coordinates of the curve in a direction of the rows."""
-        return self.curve.coordinates_of(self._forces(number).tolist(), self._shape(number))
+    @property
+    def curves(self) -> Sequence[tuple[FloatArray, float]]:
+        """Forces of the curve, N, and its shape, m/s, in each direction; 1 without a shape."""
+        forces = np.array_split(self.unknowns[len(self.free) :], len(self.directions))
+        return [*zip(forces, self.shapes.tolist() or [1.0] * len(forces), strict=True)]
+
+    @property
+    def coordinates(self) -> Sequence[dict[str, float]]:
+        """Coordinates of the curve in each direction of the rows."""
+        return [self.curve.coordinates_of(each.tolist(), shape) for each, shape in self.curves]
 
     @override
     def values_at(self, point: FloatArray) -> Mapping[str, float]:
         own = self.at(point)
-        numbers = range(len(self.directions))
-        return {**own.constants, **self.curve.joined([own.coordinates(each) for each in numbers])}
+        return {**own.constants, **self.curve.joined(own.coordinates)}
 
     @override
     def force_at(self, point: FloatArray, sign: float, speed: FloatArray) -> FloatArray:
-        own, number = self.at(point), [*self.directions].index(sign)
-        return self.curve.terms(speed, own._shape(number)) @ own._forces(number)
+        forces, shape = self.at(point).curves[[*self.directions].index(sign)]
+        return self.curve.terms(speed, shape) @ forces
 
     @override
     def curve_speeds(self, fastest: float) -> FloatArray:
-        return self.curve.curve_speeds(self.rows.curve_speeds)
+        own = self.curve.speeds
+        return self.rows.curve_speeds if own is None else own
 
     @override
     def errors(self, record: Record) -> ForceErrors:
@@ -214,15 +221,6 @@ class Regression(Fit):
     @override
     def free_run(self, record: Record) -> FloatArray:
         return free_run(record.delayed(self.delay or 0.0), self.drive(1.0))[1]
-
-    def _forces(self, number: int) -> FloatArray:
-        """Return the forces of the curve in a direction of the rows, N."""
-        own = np.array_split(self.unknowns[len(self.free) :], len(self.directions))
-        return own[number]
-
-    def _shape(self, number: int) -> float:
-        """Return the shape of the curve in a direction of the rows, m/s; 1 without one."""
-        return float(self.shapes[number]) if len(self.shapes) else 1.0
 
     def at(self, point: FloatArray) -> "Regression":
         """Return the same with the unknowns and then the shapes of a point."""

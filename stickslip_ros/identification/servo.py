@@ -45,13 +45,6 @@ class Servo:
     error: float = 0.0
     """Largest difference from the forces of its record, N, apart from forces added to them."""
 
-    def forces(self, record: Record) -> FloatArray:
-        """Return the forces by the measured positions, N, in which the record has a reference."""
-        assert record.reference is not None
-        speed = _differences(record, self.difference_samples)
-        wanted = self.position_gain * (record.reference - record.position)
-        return np.clip(wanted - self.velocity_gain * speed, -self.limit, self.limit)
-
     def added(self, record: Record) -> FloatArray:
         """Return what was added to the command of the controller, as taps are; N, zero elsewhere.
 
@@ -59,7 +52,11 @@ class Servo:
         the controller leaves unexplained. Another controller would leave such forces, too.
         """
         assert record.force is not None
-        rest = record.force - self.forces(record)
+        assert record.reference is not None
+        speed = _differences(record, self.difference_samples)
+        wanted = self.position_gain * (record.reference - record.position)
+        own = np.clip(wanted - self.velocity_gain * speed, -self.limit, self.limit)
+        rest = record.force - own
         rest[: self.difference_samples] = 0.0
         return np.where(np.abs(rest) > _ADDED_FORCE_RATIO * self.error, rest, 0.0)
 

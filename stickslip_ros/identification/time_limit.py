@@ -22,7 +22,6 @@ class TimeLimit:
 
     def __init__(self, seconds: float = inf) -> None:
         """Take the time, s; the first stage has all of it."""
-        self.seconds = seconds
         self._end = self._end_of_stage = self._end_of_part = time.thread_time() + seconds
 
     def begin_stage(self, share: float) -> None:

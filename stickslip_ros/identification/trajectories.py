@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -16,11 +17,14 @@ from stickslip_ros.identification.trajectory import Predictor, Segment, steady_m
 from stickslip_ros.model.dimensionless_drive import MEMORY
 from stickslip_ros.model.drive import Drive, in_units_of
 from stickslip_ros.model.plain_drive import drive_system
+from stickslip_ros.motion.variational import VariationalMotion
 
 _STEP = 1e-4
 """Step, as a share of the value, of constants that are linear in the coordinates."""
 _MOTION_STEP = 1e-5
 """Step, as a share of the value, of what a motion has no derivatives by."""
+_ROUGH_SAMPLES = 5
+"""Samples at the start of a record whose velocity is rough."""
 _LONG_DELAY = 100.0
 """Size of a delay and of a lag from which steps are made, in sample periods."""
 _UNBOUNDED_ERROR = 10.0
@@ -50,14 +54,12 @@ class Trajectories:
     @cached_property
     def measured(self) -> FloatArray:
         """Outputs of all segments: positions, m, and then velocities, m/s, of each."""
-        return self._joined(lambda record: (record.position, record.velocity))
+        return self._joined(lambda predictor: predictor.measured)
 
     @cached_property
     def weight(self) -> FloatArray:
         """Weight of the error of each output; that of velocities in s."""
-        return self._joined(
-            lambda record: (record.weight, np.where(record.lost, 0.0, record.velocity_weight))
-        )
+        return self._joined(lambda predictor: predictor.weight)
 
     @cached_property
     def positions(self) -> FloatArray:
@@ -78,23 +80,17 @@ class Trajectories:
     @cached_property
     def of_positions(self) -> BoolArray:
         """Which rows are those of positions."""
-        of_outputs = [np.arange(each.outputs) == 0 for each in self.predictors]
-        return np.concatenate([np.repeat(of_outputs[s.record], s.count) for s in self.segments])
+        return self._joined(lambda predictor: np.arange(len(predictor.measured))[:, None] == 0)
 
     @property
     def _counts(self) -> Sequence[int]:
-        outputs = [each.outputs for each in self.predictors]
-        return [each.count * outputs[each.record] for each in self.segments]
+        return [s.count * len(self.predictors[s.record].measured) for s in self.segments]
 
-    def _joined(self, values: Callable[[Record], tuple[FloatArray | None, ...]]) -> FloatArray:
-        columns = [values(each.record)[: each.outputs] for each in self.predictors]
+    def _joined(self, values: Callable[[Predictor], Any]) -> Any:
+        """Return rows of all segments from values of shape (outputs, samples) of each record."""
+        columns = [np.broadcast_to(values(each), each.measured.shape) for each in self.predictors]
         return np.concatenate(
-            [
-                column[own.start : own.start + own.count]
-                for own in self.segments
-                for column in columns[own.record]
-                if column is not None
-            ]
+            [columns[s.record][:, s.start : s.start + s.count].ravel() for s in self.segments]
         )
 
     def predicted(self, values: Mapping[str, float], starts: FloatArray) -> FloatArray:
@@ -105,7 +101,7 @@ class Trajectories:
             found = [
                 each
                 for predictor, segments, own in self._by_record(values, starts)
-                for each in predictor.followed(drive, segments, own, delay)
+                for each, _ in predictor.followed(drive, segments, own, delay)
             ]
         except (InvalidInputError, RunError):
             return self._bounded(np.full(len(self.measured), np.nan))
@@ -148,10 +144,11 @@ class Trajectories:
 
             of_constants = by_coordinates(of_system)
             units = 1.0 / drive.length_scale, 1.0 / drive.speed_scale
+            scaled, delay = in_units_of(drive, drive), values.get(DELAY, 0.0)
             runs = (
                 run
                 for predictor, segments, begun in self._by_record(values, starts)
-                for run in predictor.sensitivities(drive, segments, begun, values.get(DELAY, 0.0))
+                for run in predictor.followed(scaled, segments, begun, delay, VariationalMotion)
             )
             each_segment = zip(self.parts, self.segments, starts.tolist(), runs, strict=True)
             for part, segment, (_, velocity), (found, rows) in each_segment:
@@ -189,12 +186,10 @@ class Trajectories:
         self, values: Mapping[str, float], starts: FloatArray
     ) -> Iterator[tuple[Predictor, Sequence[Segment], FloatArray]]:
         """Yield each predictor with the segments of its record, which follow one another."""
-        numbers = np.array([segment.record for segment in self.segments])
         for number, predictor in enumerate(self.predictors):
-            own = numbers == number
-            if own.any():
-                segments = [each for each in self.segments if each.record == number]
-                yield predictor.lagging(values.get(LAG, 0.0)), segments, starts[own]
+            own = [n for n, segment in enumerate(self.segments) if segment.record == number]
+            segments = [self.segments[each] for each in own]
+            yield predictor.lagging(values.get(LAG, 0.0)), segments, starts[own]
 
     def _bounded(self, outputs: FloatArray) -> FloatArray:
         span = _UNBOUNDED_ERROR * float(np.ptp(self.measured))
@@ -223,30 +218,20 @@ def segments_of(records: Sequence[Record], length: float) -> tuple[list[Segment]
     relative to the belt: a slide that sticks has no velocity of its own, and friction with a memory
     is that of steady slip there. States have the shape (segments, 2).
     """
-    from scipy.signal import savgol_filter
-
     segments: list[Segment] = []
     starts: list[FloatArray] = []
     for number, record in enumerate(records):
         total = len(record.position)
-        window = 11
-        smooth: FloatArray = np.asarray(savgol_filter(record.position, window, 3))
-        speed: FloatArray = np.asarray(
-            savgol_filter(record.position, window, 3, deriv=1, delta=record.period)
-        )
+        smooth, speed = record.smoothed(0), record.smoothed(1)
         relative = np.abs(speed - record.belt_velocity)
-        relative[: window // 2] = -1.0  # its velocity is rough
+        relative[:_ROUGH_SAMPLES] = -1.0
         count = max(round(total * record.period / length), 1)
         edges = np.linspace(0, total, count + 1).astype(int)
         reach = max((edges[1] - edges[0]) // 5, 1)
-        places: list[int] = []
-        for edge in edges[:-1]:
-            around = np.arange(max(edge - reach, 0), min(edge + reach, total))
-            places.append(int(around[np.argmax(relative[around])]))
-        places.append(total)
+        near = [slice(max(edge - reach, 0), edge + reach) for edge in edges[:-1].tolist()]
+        places = [each.start + int(np.argmax(relative[each])) for each in near]
         if record.velocity_weight > 0.0 and record.velocity is not None:
             speed = record.velocity
-        for low, high in pairwise(places):
-            segments.append(Segment(number, low, high - low))
-            starts.append(np.array([smooth[low], speed[low]]))
-    return segments, np.array(starts)
+        segments += [Segment(number, low, high - low) for low, high in pairwise([*places, total])]
+        starts.append(np.column_stack([smooth, speed])[places])
+    return segments, np.concatenate(starts)

@@ -3,6 +3,8 @@
 from collections.abc import Iterator, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import chain
 from math import copysign, expm1
 from typing import Any, Self
 
@@ -10,8 +12,7 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.identification.record import Record, lagged
-from stickslip_ros.model.dimensionless_drive import POSITION, SPEED
-from stickslip_ros.model.drive import Drive, in_units_of
+from stickslip_ros.model.drive import Drive
 from stickslip_ros.model.signals import table
 from stickslip_ros.motion.motion import Motion
 from stickslip_ros.motion.variational import VariationalMotion
@@ -20,7 +21,7 @@ _FIRST = 20
 """Samples from which the velocity at the start is found."""
 _UNBOUNDED_LOSS = 1e300
 """Squared error of a motion that is not bounded, m^2."""
-_SPEED_TOLERANCE = 1e-4
+_SPEED_TOLERANCE = 1e-3
 """Tolerance of the velocity at the start, as a share of the range in which it is sought."""
 _LAG_STEPS = 3
 """Steps of a sample in which a force that lags is held: one alone moves the slide otherwise."""
@@ -52,6 +53,20 @@ class Predictor:
         self._steps = 1
         self._corners = _corners(record.belt_velocity)
 
+    @cached_property
+    def measured(self) -> FloatArray:
+        """Positions, m, and velocities, m/s, if they have a weight; shape (outputs, samples)."""
+        position, velocity = self.record.position, self.record.velocity
+        if velocity is None or self.record.velocity_weight == 0.0:
+            return position[np.newaxis]
+        return np.array([position, velocity])
+
+    @cached_property
+    def weight(self) -> FloatArray:
+        """Weight of the errors of `measured`; that of velocities in s."""
+        of_velocity = np.where(self.record.lost, 0.0, self.record.velocity_weight)
+        return np.array([self.record.weight, of_velocity])[: len(self.measured)]
+
     def lagging(self, time_constant: float) -> Self:
         """Return the same with the force behind a lag of first order, s."""
         if self.record.force is None or not time_constant > 0.0:
@@ -73,80 +88,50 @@ class Predictor:
         """Return positions, m, from the measured one at a velocity, m/s; NaN once unbounded."""
         count = len(self.record.position)
         start = np.array([[self.record.position[0], velocity]])
-        return self.followed(drive, [Segment(0, 0, count)], start, 0.0)[0][:count]
-
-    @property
-    def outputs(self) -> int:
-        """Number of outputs: positions, or positions and velocities."""
-        return 1 if self.record.velocity_weight == 0.0 else 2
+        ((found, _),) = self.followed(drive, [Segment(0, 0, count)], start, 0.0)
+        return found[:count]
 
     def followed(
-        self, drive: Drive, segments: Sequence[Segment], starts: FloatArray, delay: float
-    ) -> list[FloatArray]:
-        """Return the outputs of segments, each from a state (position, velocity) of its own.
-
-        Outputs are the positions, m, and then the velocities, m/s, if the record has some with a
-        weight. The memory of the friction law is that of steady slip at the start of a segment.
-        `delay` is the time from a sample until its force acts, s, from minus one to several
-        periods; a disturbance is never late. Outputs are NaN from where the motion is unbounded.
-        """
-        return [found for found, _ in self._followed(Motion, drive, segments, starts, delay)]
-
-    def sensitivities(
-        self, drive: Drive, segments: Sequence[Segment], starts: FloatArray, delay: float
-    ) -> Iterator[tuple[FloatArray, FloatArray]]:
-        """Yield the outputs of segments, as `followed`, and their derivatives.
-
-        The latter have shape (rows, arguments): the state at the start of the segment, then the
-        free constants of the drive, all dimensionless as in `VariationalMotion`; the outputs are in
-        SI units.
-        """
-        kind = VariationalMotion
-        return self._followed(kind, in_units_of(drive, drive), segments, starts, delay)
-
-    def _followed(
         self,
-        kind: type[Motion],
         drive: Drive,
         segments: Sequence[Segment],
         starts: FloatArray,
         delay: float,
+        kind: type[Motion] = Motion,
     ) -> Iterator[tuple[FloatArray, FloatArray]]:
-        units = np.array([drive.length_scale, drive.speed_scale])[: self.outputs]
-        for segment, motion in self._motions(kind, drive, segments, starts):
-            varied = motion if isinstance(motion, VariationalMotion) else None
-            own = np.full((self.outputs, segment.count), np.nan)
-            by = np.zeros((*own.shape, varied.derivatives.shape[1] if varied else 0))
-            own[:, 0] = (motion.position, motion.velocity)[: self.outputs]
-            if varied:
-                by[:, 0] = varied.derivatives[: self.outputs]
-            for number in self._samples(motion, segment.start, segment.count, delay):
-                own[0, number] = motion.position
-                if self.outputs > 1:
-                    own[1, number] = motion.velocity
-                if varied:
-                    by[0, number] = varied.derivatives[POSITION]
-                if varied and self.outputs > 1:
-                    by[1, number] = varied.derivatives[SPEED]
-            by *= units[:, np.newaxis, np.newaxis]
-            yield own.ravel(), by.reshape(own.size, -1)
+        """Yield the outputs of segments, each from a state (position, velocity), and derivatives.
 
-    def _motions(
-        self, kind: type[Motion], drive: Drive, segments: Sequence[Segment], starts: FloatArray
-    ) -> Iterator[tuple[Segment, Motion]]:
-        """Yield each segment with a motion at its start, which the caller advances to its end."""
+        Outputs are the positions, m, and then the velocities, m/s, if the record has some with a
+        weight; NaN from where the motion is unbounded. The memory of the friction law is that of
+        steady slip at the start of a segment. `delay` is the time from a sample until its force
+        acts, s, from minus one to several periods; a disturbance is never late.
+
+        A `VariationalMotion` of a `ScaledDrive` has derivatives of shape (rows, arguments): by the
+        state at the start of the segment, then by the free constants of the drive, all
+        dimensionless; another motion has none, shape (rows, 0).
+        """
         motion: Motion | None = None
-        end = -1
+        end, count = -1, len(self.measured)
+        units = np.array([drive.length_scale, drive.speed_scale])[:count, np.newaxis, np.newaxis]
         for segment, (position, velocity) in zip(segments, starts.tolist(), strict=True):
             if motion is None or motion.unbounded or segment.start != end:
-                left = len(self.record.position) - segment.start
+                left = self.measured.shape[1] - segment.start
                 motion = kind(self.with_belt(drive, segment.start, left), position, velocity)
             memory = None
             if drive.friction.states:
                 memory = steady_memory(drive, velocity, self.record.belt_velocity[segment.start])
             motion.restart(position, velocity, memory)
             end = segment.start + segment.count
-            yield segment, motion
+            varied = motion if isinstance(motion, VariationalMotion) else None
+            own = np.full((count, segment.count), np.nan)
+            by = np.zeros((*own.shape, varied.derivatives.shape[1] if varied else 0))
+            for number in chain((0,), self._samples(motion, segment.start, segment.count, delay)):
+                own[0, number] = motion.position
+                if count > 1:
+                    own[1, number] = motion.velocity
+                if varied:
+                    by[:, number] = varied.derivatives[:count]
+            yield own.ravel(), (by * units).reshape(own.size, -1)
             # The clock of the belt goes on to the start of the next segment.
             motion.advance(self.record.period)
 
