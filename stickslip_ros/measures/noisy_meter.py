@@ -51,9 +51,6 @@ class _Columns:
     def __init__(self) -> None:
         self._table, self._rows = np.empty((4, 0)), slice(0, 0)
 
-    def __len__(self) -> int:
-        return self._rows.stop - self._rows.start
-
     @property
     def samples(self) -> NoisySamples:
         return NoisySamples(*self._table[:, self._rows])

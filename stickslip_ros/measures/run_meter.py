@@ -1,9 +1,9 @@
 """The measures of a run: those of its samples, and those of its control forces and which acted."""
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import islice
-from math import isfinite
 from typing import Any, Protocol
 
 import numpy as np
@@ -13,7 +13,7 @@ from stickslip_ros.measures.cycle_fit import MeanCycle
 from stickslip_ros.measures.sample_assumptions import EXACT, SampleAssumptions
 from stickslip_ros.measures.sample_meter import MotionObserver, SampleMeter
 from stickslip_ros.measures.timing import Timing
-from stickslip_ros.samples import ForceColumns
+from stickslip_ros.samples import NO_FORCES, ForceColumns
 from stickslip_ros.stamps import NANOSECONDS
 
 HELD_FORCES = 20_000
@@ -30,8 +30,7 @@ class ForceMeter:
     def __init__(self) -> None:
         self._peak = 0.0
         self._first: int | None = None
-        self._stamp = np.empty(0, dtype=np.int64)
-        self._magnitude = np.empty(0)
+        self._kept = NO_FORCES
 
     def feed(self, forces: ForceColumns) -> None:
         """Add the forces that follow.
@@ -39,22 +38,19 @@ class ForceMeter:
         Forces that are not finite are skipped. Where time goes back, the last tenth is
         that of the time from there.
         """
-        finite = np.isfinite(forces.force)
-        stamp = np.concatenate([self._stamp, forces.stamp[finite]])
-        magnitude = np.concatenate([self._magnitude, np.abs(forces.force[finite])])
-        if len(stamp) == 0:
+        kept = self._kept.followed_by(forces[np.isfinite(forces.force)])
+        if len(kept) == 0:
             return
-        self._peak = max(self._peak, float(magnitude.max()))
-        restarts = np.flatnonzero(np.diff(stamp) < 0) + 1
+        self._peak = max(self._peak, float(np.abs(kept.force).max()))
+        restarts = np.flatnonzero(np.diff(kept.stamp) < 0) + 1
         if len(restarts) > 0:
-            stamp, magnitude = stamp[restarts[-1] :], magnitude[restarts[-1] :]
-        if self._first is None or len(restarts) > 0:
-            self._first = int(stamp[0])
+            kept, self._first = kept[restarts[-1] :], None
+        if self._first is None:
+            self._first = int(kept.stamp[0])
+        magnitude, last = np.abs(kept.force), int(kept.stamp[-1])
         largest_later = np.maximum.accumulate(magnitude[:0:-1])[::-1]
-        kept = np.append(magnitude[:-1] > largest_later, True)
-        last = int(stamp[-1])
-        kept &= stamp >= last - (last - self._first) // 10
-        self._stamp, self._magnitude = stamp[kept], magnitude[kept]
+        larger = np.append(magnitude[:-1] > largest_later, True)
+        self._kept = kept[larger & (kept.stamp >= last - (last - self._first) // 10)]
 
     @property
     def peak_force(self) -> float | None:
@@ -64,20 +60,19 @@ class ForceMeter:
     @property
     def resting_force(self) -> float | None:
         """Final force, the largest magnitude in the last tenth of the time, N, or None."""
-        return None if self._first is None else float(self._magnitude[0])
+        return None if self._first is None else float(np.abs(self._kept.force[0]))
 
 
 class DroppedForces:
     """Forces that are reported as dropped, each kept until it is found among the published ones."""
 
     def __init__(self) -> None:
-        self._number: dict[tuple[int, float], int] = {}
+        self._number = Counter[tuple[int, float]]()
 
     def add(self, forces: ForceColumns) -> None:
         """Add forces that were dropped; forces that are not finite never act anyway."""
-        for dropped in zip(forces.stamp.tolist(), forces.force.tolist(), strict=True):
-            if isfinite(dropped[1]):
-                self._number[dropped] = self._number.get(dropped, 0) + 1
+        forces = forces[np.isfinite(forces.force)]
+        self._number.update(zip(forces.stamp.tolist(), forces.force.tolist(), strict=True))
         for oldest in list(islice(self._number, max(0, len(self._number) - HELD_FORCES))):
             del self._number[oldest]
 
@@ -89,7 +84,7 @@ class DroppedForces:
         known = np.isin(sent.stamp, [stamp for stamp, _ in self._number])
         for row in np.flatnonzero(known).tolist():
             force = int(sent.stamp[row]), float(sent.force[row])
-            if force in self._number:
+            if self._number[force] > 0:
                 rows.append(row)
                 self._number[force] -= 1
                 if self._number[force] == 0:
@@ -104,7 +99,7 @@ class ForceSettler:
     """
 
     def __init__(self) -> None:
-        self._held = ForceColumns(np.empty(0, np.int64), np.empty(0))
+        self._held = NO_FORCES
         self._acted = np.empty(0, np.bool_)
         """Whether each held force acted, as far as it is known."""
         self._dropped = DroppedForces()
@@ -195,8 +190,7 @@ class RunMeter:
 
     def finish(self) -> None:
         """End the run: forces not reported as dropped have acted."""
-        none = ForceColumns(np.empty(0, np.int64), np.empty(0))
-        self._apply(*self._settler.feed(none, none, last=True))
+        self._apply(*self._settler.feed(NO_FORCES, NO_FORCES, last=True))
 
     def _apply(self, sent: ForceColumns, acted: BoolArray) -> None:
         self.applied.feed(ForceColumns(sent.stamp, np.where(acted, sent.force, 0.0)))

@@ -6,8 +6,9 @@ from math import inf
 from typing import Protocol
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
-from stickslip_ros.arrays import BoolArray, FloatArray
+from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.measures.breakpoints import (
     STICK_SHARE,
@@ -113,8 +114,7 @@ class SampleMeter:
         self._fastest_belt = self._fastest_slip = self._fastest = 0.0
         self._belt_varies = False
         self._per_cycle = inf  # samples of the last cycle of exact samples
-        # Highest speed above the limit at its sample: a belt that starts to move is slow at first.
-        self._unbounded_speed = 0.0
+        self._lasting_speed = 0.0  # since the belt moves: what it was before tells nothing
 
     def feed(self, samples: SampleColumns) -> list[Cycle]:
         """Add the samples that follow; return the cycles completed by them.
@@ -175,7 +175,7 @@ class SampleMeter:
         limit = UNBOUNDED_BELT_SPEEDS * self._fastest_belt
         # The last sample of a plant whose motion diverges has just that speed.
         ended = self._fastest >= (1.0 - 1e-9) * self.reading.unbounded_speed
-        unbounded = ended or self._unbounded_speed > limit
+        unbounded = ended or self._lasting_speed > limit > 0.0
         self._meter.unbounded = unbounded
         window = self._noisy_meter.window
         self._meter.within = window.within = self.reading.within
@@ -279,21 +279,11 @@ class SampleMeter:
     def _look_for_unbounded(self, samples: SampleColumns) -> None:
         belt_speed = np.abs(samples.belt_velocity)
         self._belt_varies |= bool(np.ptp(belt_speed) > 1e-6 * belt_speed[0])
-        np.maximum.accumulate(np.maximum(belt_speed, self._fastest_belt), out=belt_speed)
-        self._fastest_belt = float(belt_speed[-1])
-        speed = np.abs(samples.velocity)
-        self._fastest = max(self._fastest, float(speed.max()))
-        fast = (speed > UNBOUNDED_BELT_SPEEDS * belt_speed) & (belt_speed > 0.0)
-        if self.noisy:
-            fast &= _lasting(fast, np.sign(samples.velocity))
-        if fast.any():
-            self._unbounded_speed = max(self._unbounded_speed, float(speed[fast].max()))
-
-
-def _lasting(fast: BoolArray, direction: FloatArray) -> BoolArray:
-    """Return which fast samples end several fast ones in one direction: impulses go back."""
-    lasting = fast.copy()
-    for lag in range(1, _LASTING_SAMPLES):
-        lasting[lag:] &= fast[:-lag] & (direction[lag:] == direction[:-lag])
-        lasting[:lag] = False
-    return lasting
+        velocity = samples.velocity[np.logical_or.accumulate(belt_speed + self._fastest_belt > 0.0)]
+        self._fastest_belt = max(self._fastest_belt, float(belt_speed.max()))
+        self._fastest = max(self._fastest, float(np.abs(samples.velocity).max()))
+        count = _LASTING_SAMPLES if self.noisy else 1  # impulses go back
+        if len(velocity) >= count:
+            rows = sliding_window_view(velocity, count)
+            lasting = max(float(rows.min(axis=1).max()), -float(rows.max(axis=1).min()))
+            self._lasting_speed = max(self._lasting_speed, lasting)
