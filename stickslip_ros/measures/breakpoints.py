@@ -55,14 +55,6 @@ relative speed so far.
 """
 
 
-def sticks(velocity: FloatArray, belt_velocity: FloatArray, stick_speed: float = 0.0) -> BoolArray:
-    """Return which samples stick: those with a relative speed of at most `stick_speed` (m/s).
-
-    With 0 a sample sticks only at exactly the velocity of the belt.
-    """
-    return np.abs(velocity - belt_velocity) <= stick_speed
-
-
 def breakpoints_from_samples(
     time: FloatArray,
     position: FloatArray,
@@ -80,7 +72,7 @@ def breakpoints_from_samples(
     No peaks are inserted in the n - 1 intervals whose time is not exact: they follow from distance
     over time and could be far too high.
     """
-    stuck = sticks(velocity, belt_velocity, stick_speed)
+    stuck = np.abs(velocity - belt_velocity) <= stick_speed
     breakpoints = Breakpoints(
         time, position, velocity, np.concatenate([[False], stuck[1:] & stuck[:-1]])
     )

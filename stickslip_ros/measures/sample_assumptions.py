@@ -47,17 +47,16 @@ def reading_of(
     Parameters that no plant can have count as unknown. With a stick speed that is `given`, m/s, the
     samples are read as exact ones.
     """
-    noisy, within = _resolution(plant)
-    changing, unbounded_speed = _varies(plant), _unbounded_speed(plant)
-    if given is not None:
-        noisy = False
-    elif not plant:
+    if given is None and not plant:
         return UNKNOWN
     law = LAWS.get(str(plant.get("friction.law")))
-    stick_speed: float | None = 0.0 if given is None else given
-    if given is None and law is not None and law.states:
-        stick_speed = STICK_SHARE * fastest_belt if fastest_belt else None
-    return SampleAssumptions(stick_speed, noisy, within, changing, unbounded_speed)
+    known = SampleAssumptions(
+        (STICK_SHARE * fastest_belt or None) if law is not None and law.states else 0.0,
+        *_resolution(plant),
+        any(k.endswith(".kind") and str(kind) in CHANGING_KINDS for k, kind in plant.items()),
+        _unbounded_speed(plant),
+    )
+    return known if given is None else known._replace(stick_speed=given, noisy=False)
 
 
 def held_range(step: float, stiffness: float) -> float:
@@ -66,14 +65,6 @@ def held_range(step: float, stiffness: float) -> float:
     Without a spring, `stiffness` (N/m) of 0, it holds none.
     """
     return step / (stiffness or inf)
-
-
-def _varies(parameters: Mapping[str, Any]) -> bool:
-    """Return whether a profile or a reference among the parameters of a node keeps changing."""
-    return any(
-        name.endswith(".kind") and str(value) in CHANGING_KINDS
-        for name, value in parameters.items()
-    )
 
 
 def _resolution(plant: Mapping[str, Any]) -> tuple[bool | None, float]:

@@ -15,7 +15,6 @@ from stickslip_ros.measures.single_cycles import (
     NoisySamples,
     Point,
     cycle_between,
-    fit_reach,
     reversals,
     vertex,
 )
@@ -65,14 +64,6 @@ def test_the_vertex_of_a_parabola_is_found_between_its_samples(
     found = vertex(samples(0.5 + bend * time**2), 10, reach)
     assert found.time == pytest.approx(0.010 + share * 1e-3, abs=1e-9 if abs(bend) > 1e-3 else 1.0)
     assert found.position == pytest.approx(0.5, abs=1e-9)
-
-
-def test_a_fit_reaches_further_the_more_noise_there_is() -> None:
-    """A share of 1.2 (2 s/h)^(1/5) of the 50 samples from low to high over pi, 0.1 to 0.6."""
-    moving = samples(-np.cos(np.pi * np.arange(101) / 50.0))
-    reaches = [fit_reach(moving, 0, 50, noise) for noise in (0.0, 1e-3, 1.0)]
-    assert reaches == [2, int(1.2 * 1e-3**0.2 * 50.0 / np.pi), int(0.6 * 50.0 / np.pi)]
-    assert fit_reach(moving, 0, 0, 1.0) == 2
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
