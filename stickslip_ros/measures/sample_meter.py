@@ -22,11 +22,10 @@ from stickslip_ros.measures.cycle_measures import (
     Measures,
     Regime,
     with_drift,
-    without_cycles,
 )
 from stickslip_ros.measures.cycle_meter import CycleMeter
 from stickslip_ros.measures.drift import Drift
-from stickslip_ros.measures.noise import FEW_SAMPLES, LEAST_SAMPLES
+from stickslip_ros.measures.noise import FEW_SAMPLES
 from stickslip_ros.measures.noisy_meter import NoisyCycleMeter
 from stickslip_ros.measures.sample_assumptions import EXACT, SampleAssumptions
 from stickslip_ros.measures.sampling_grid import LONGEST_GAP, SamplingGrid
@@ -184,8 +183,6 @@ class SampleMeter:
         self.mean_cycle = None
         if unbounded or not (self.noisy or few):
             found = self._meter.measures()
-        elif few and self._per_cycle < LEAST_SAMPLES:
-            found = without_cycles(None, Regime.UNDERSAMPLED)
         else:
             found, self.mean_cycle = window.measures(quick=quick)
         self.drift.resolution = window.step

@@ -89,6 +89,8 @@ class SamplingGrid:
         if self._count == self._next_estimate:
             self._next_estimate *= 2
             self._period = self._covered / self._periods
+            if self._missing < -self._count / 2:  # the rate is a higher one by now
+                self._begin()
 
     def _jump(self, gap: int) -> None:
         """Count a long gap as a loss if it is on the grid, otherwise start a new grid."""

@@ -134,6 +134,14 @@ def test_a_new_segment_may_have_another_rate(rates: tuple[int, int], blocks: int
     assert meter.lost_samples == 0
 
 
+def test_a_rate_that_rises_without_a_gap_is_found() -> None:
+    slow = stamps(100, 100)
+    meter = fed(still(np.append(slow, stamps(1000, 1000, start=int(slow[-1]) + 1_000_000))))
+    assert meter.lost_samples == 0
+    meter.feed(still(stamps(1000, 100, start=int(slow[-1]) + 1_006_000_000)))
+    assert meter.lost_samples == 5
+
+
 @pytest.mark.parametrize("blocks", [1, 2])
 def test_stamps_that_go_back_start_a_new_segment(blocks: int) -> None:
     samples = limit_cycle()
