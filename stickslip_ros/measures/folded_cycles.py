@@ -114,15 +114,12 @@ class FoldedCycles:
         if most < _HARMONICS[0]:  # the cycles have samples at different phases
             most = max(min(int(self.phases / 3.0), _HARMONICS[2]), 1)
         few = min(_HARMONICS[0], most)
-        for _ in range(4):
-            basis = rows(self.phase, few)
-            found = np.linalg.lstsq(basis, self.position, rcond=None)[0].astype(np.float64)
-            shape = Shape(lambda phase: rows(phase, few), found, np.empty(0), self.period)
-            basis = np.column_stack([basis, -shape.velocity(self.phase) * self._turns])
-            joint = np.linalg.lstsq(basis, self.position, rcond=None)[0]
-            change = float(np.clip(joint[-1] / self.period, -0.02, 0.02))
-            self.period *= 1.0 + change
-            if abs(change) < 1e-9:
+        for _ in range(6):
+            found = np.linalg.lstsq(rows(self.phase, few), self.position, rcond=None)[0]
+            shape = Shape(
+                lambda phase: rows(phase, few), found.astype(np.float64), np.empty(0), self.period
+            )
+            if abs(self.adjust(shape)) < 1e-9:
                 break
         if self._step:  # more harmonics would follow the stairs
             most = min(most, max(int(np.ptp(self.position) / self._step / 2.0), 2))
@@ -243,11 +240,13 @@ class FoldedCycles:
         degrees = [each for each in _DEGREES if each <= most] or _DEGREES[:1]
         return self._linear(rows, degrees, known=1)
 
-    def adjust(self, shape: Shape) -> None:
-        """Fit the period to what a shape leaves."""
+    def adjust(self, shape: Shape) -> float:
+        """Fit the period to what a shape leaves; return its change, as a share."""
         jacobian, residual = self._shifts(shape), self.position - shape.value(self.phase)
         found = np.linalg.lstsq(jacobian, residual, rcond=None)[0]
-        self.period *= 1.0 + float(np.clip(found[1] / self.period, -1e-3, 1e-3))
+        change = float(np.clip(found[1] / self.period, -0.02, 0.02))
+        self.period *= 1.0 + change
+        return change
 
     def period_error(self, shape: Shape, residual: FloatArray) -> float:
         """Return the standard error of the period, s."""

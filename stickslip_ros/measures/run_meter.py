@@ -100,8 +100,8 @@ class ForceSettler:
 
     def __init__(self) -> None:
         self._held = NO_FORCES
-        self._acted = np.empty(0, np.bool_)
-        """Whether each held force acted, as far as it is known."""
+        self._acting = np.empty(0)
+        """The held forces, NaN where it is known that they did not act."""
         self._dropped = DroppedForces()
 
     def feed(
@@ -112,13 +112,13 @@ class ForceSettler:
         With these as the `last` ones, all are: no more reports follow.
         """
         self._held = self._held.followed_by(sent)
-        self._acted = np.concatenate([self._acted, np.isfinite(sent.force)])
+        self._acting = np.append(self._acting, sent.force)
         self._dropped.add(dropped)
-        undecided = ForceColumns(self._held.stamp, np.where(self._acted, self._held.force, np.nan))
-        self._acted[self._dropped.among(undecided)] = False
+        dropped_rows = self._dropped.among(ForceColumns(self._held.stamp, self._acting))
+        self._acting[dropped_rows] = np.nan
         number = len(self._held) - (0 if last else min(len(self._held), HELD_FORCES))
-        settled = self._held[:number], self._acted[:number]
-        self._held, self._acted = self._held[number:], self._acted[number:]
+        settled = self._held[:number], np.isfinite(self._acting[:number])
+        self._held, self._acting = self._held[number:], self._acting[number:]
         return settled
 
 

@@ -119,10 +119,7 @@ def cycle_between(
 def _velocities(samples: NoisySamples, reach: int, noise: float) -> tuple[float, float, float]:
     """Return lowest and highest velocity, m/s, of one cycle, and its stick time, s."""
     time, position = samples.time, samples.position
-    if len(time) < 2 * reach + 3:
-        if len(time) == 0:
-            return 0.0, 0.0, 0.0
-        return float(samples.velocity.min()), float(samples.velocity.max()), 0.0
+    reach = max(min(reach, (len(time) - 3) // 2), 1)
     # The slope of the parabola through the samples within reach.
     lags = np.arange(-reach, reach + 1)
     step = float(time[-1] - time[0]) / (len(time) - 1)
