@@ -248,10 +248,14 @@ class DimensionlessDrive(HybridSystem):
 
     def belt_speed(self, mode: Mode, time: float) -> float:
         """Return the speed of the belt."""
+        if self._steady:
+            return self.drive.belt_speed
         return float(equations.belt_speed(self.drive, time, mode.switches[self._parts.belt]))
 
     def normal_force(self, mode: Mode, time: float) -> float:
         """Return the normal force."""
+        if not self._loaded:
+            return self.drive.normal_force
         return float(equations.normal_force(self.drive, time, mode.switches[self._parts.load]))
 
     def control_force(self, instant: Instant) -> float:

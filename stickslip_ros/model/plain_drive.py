@@ -32,10 +32,6 @@ class PlainDriveSystem(DriveSystem):
         control = None if isinstance(self.control, TwoBodyControl) else self.control
         self._control_force = None if control is None else control.control_force
 
-    def belt_speed(self, mode: Mode, time: float) -> float:
-        """Return the speed of the belt."""
-        return self._speed
-
     def control_force(self, instant: Instant) -> float:
         """Return the force on the slide: held, or continuous control."""
         if self.control is None:

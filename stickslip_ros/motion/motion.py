@@ -126,8 +126,7 @@ class Motion(HybridMotion):
         # Those of the drive take longer to look up.
         self._frequency, self._length = drive.angular_frequency, drive.length_scale
         self._speed, self._weight = drive.speed_scale, drive.normal_force
-        # Whether a sum of forces acts, and an advance prepares nothing.
-        self._one_force = self._system.sticks and len(self._system.inputs) == 1
+        self._one_force = len(self._system.inputs) == 1
 
     @property
     def memory(self) -> tuple[float, ...]:
@@ -322,11 +321,12 @@ class Motion(HybridMotion):
         duration : float
             Time to advance by, s.
         """
-        step, force = self._short_step, (control + disturbance) / self._weight
-        scaled = duration * self._frequency
+        step, scaled = self._short_step, duration * self._frequency
+        force = (control + disturbance if self._one_force else control) / self._weight
         if (
             step is not None
-            and self._one_force
+            and self._system.sticks  # an advance prepares nothing else
+            and (self._one_force or disturbance == self._instant.inputs[1] * self._weight)
             and -_LARGEST_FORCE <= force <= _LARGEST_FORCE
             and step(scaled, force)
         ):
@@ -387,13 +387,12 @@ class Motion(HybridMotion):
         """
         if self.unbounded:
             return
-        frequency = self._drive.angular_frequency
         try:
-            self._advance(duration * frequency)
+            self._advance(duration * self._frequency)
         except TooManyStepsError:
             raise RunError(
                 "the motion is too stiff to be followed: it takes more than "
-                f"{STEPS_PER_UNIT} steps of integration for {1.0 / frequency:g} s"
+                f"{STEPS_PER_UNIT} steps of integration for {1.0 / self._frequency:g} s"
             ) from None
         self._pass_time(duration)
 
@@ -405,7 +404,7 @@ class Motion(HybridMotion):
         before, duration = self._time, duration - self._lost
         self._time = time = before + duration
         self._lost = (time - before) - duration
-        self._instant.time = time = (time - self._origin) * self._drive.angular_frequency
+        self._instant.time = time = (time - self._origin) * self._frequency
         if time + TIME_ROUNDING * time >= self._switch_time:
             self._enter(self._system.switch_inputs(self._mode, self._instant))
 
