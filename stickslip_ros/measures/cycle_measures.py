@@ -191,10 +191,10 @@ class CycleMeans:
         below three it is not known.
         """
         values = np.array([[*vars(cycle).values()] for cycle in cycles])
-        count, mean, errors = len(cycles), values.sum(axis=0) / len(cycles), None
+        count, mean, errors = len(cycles), np.add.reduce(values) / len(cycles), None
         if count >= LEAST_CYCLES:  # as values.std(axis=0, ddof=1), in half of its time
             squares = (values - mean) ** 2
-            scatter = np.sqrt(squares.sum(axis=0) / (count - 1)) / count**0.5
+            scatter = np.sqrt(np.add.reduce(squares) / (count - 1)) / count**0.5
             errors = Cycle(*scatter.tolist())
         sticks = sum(cycle.stick_fraction > 0.0 for cycle in cycles) > share * count
         return cls(Cycle(*mean.tolist()), errors, sticks, values[:, 0])

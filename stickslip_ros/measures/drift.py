@@ -30,8 +30,8 @@ class TrendMeter:
     """
 
     def __init__(self) -> None:
-        self._sums = np.zeros((2 * _PARTS + 1, 3))
-        """Weight, and weighted time and value, of each part."""
+        self._sums: FloatArray
+        """Weight, and weighted time and value, of each part; made with the first of them."""
         self._count, self._each, self._largest = 0, 1, 0.0
         self._waiting: list[tuple[_Values, _Values]] = []
         """Times and values that are not yet in the sums: short runs have no trend."""
@@ -56,6 +56,8 @@ class TrendMeter:
     def _add_waiting(self) -> None:
         time, value = self._take_waiting()
         new = np.array([np.ones(len(time)), time, value]).T
+        if self._count == 0:
+            self._sums = np.zeros((2 * _PARTS + 1, 3))
         while len(new) > 0:
             fits = 2 * _PARTS * self._each - self._count
             part, new = new[:fits], new[fits:]

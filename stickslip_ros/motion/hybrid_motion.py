@@ -135,7 +135,7 @@ class HybridMotion:
     def _advance(self, duration: float) -> None:
         """Integrate over a duration; stop early if the motion becomes unbounded."""
         step = self._short_step
-        if step is None and not self._derives:
+        if step is None and duration <= _SHORTEST_REPEATED and not self._derives:
             step = self._short_step = short_step(
                 self._system, self._mode, self._instant, self._flow, self._switch_time
             )
