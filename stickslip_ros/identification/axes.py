@@ -82,12 +82,11 @@ class AxisTask:
             knots = np.quantile(self.rows.speeds, np.linspace(0.0, 1.0, _KNOTS))
             knots[0] = 0.0
             tables = SaturatingAdapter(self.rows.curve_speeds), TableAdapter(knots)
-            fitted = ((self._with_delay(each), each) for each in tables)
-            best, table = min(fitted, key=lambda each: each[0].error)
+            best = min(map(self._with_delay, tables), key=lambda each: each.error)
             found += [best] if law != "lugre" else []
             if law != "table":
                 progress("lugre")
-                found.append(self._with_memory(best, table, asked=law == "lugre"))
+                found.append(self._with_memory(best, asked=law == "lugre"))
         return found
 
     def _with_delay(self, law: IdentifiedLaw) -> Regression:
@@ -96,9 +95,8 @@ class AxisTask:
         if self.delay is not None:
             return found
         if self.rows.resting:
-            found = min(
-                fit, self._fitted(law, self._rows(None)).validated(), key=lambda each: each.error
-            )
+            fits = fit, self._fitted(law, self._rows(None)).validated()
+            found = min(fits, key=lambda each: each.error)
         period, tried = self.records[0].period, _DELAYS
         for _ in range(2):
             design, wanted = fit.system
@@ -111,9 +109,9 @@ class AxisTask:
         fit = fit.validated()
         return fit if fit.error < _RESOLVED_ERROR_RATIO * found.error else found
 
-    def _with_memory(self, static: Regression, table: TableAdapter, *, asked: bool) -> Regression:
+    def _with_memory(self, static: Regression, *, asked: bool) -> Regression:
         """Return the fit whose friction follows the table of another over a path."""
-        speeds = self.rows.curve_speeds
+        speeds, table = self.rows.curve_speeds, static.curve
         span = max(float(np.ptp(record.position)) for record in self.records)
         tried: dict[float, Regression] = {}
 

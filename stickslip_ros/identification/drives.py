@@ -20,6 +20,7 @@ from stickslip_ros.identification.laws import (
     DirectionalAdapter,
     TableAdapter,
 )
+from stickslip_ros.identification.predictor import Predictor
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.refinement import Refinement
 from stickslip_ros.identification.regression import LINEAR, Regression, Rows, regress
@@ -27,7 +28,6 @@ from stickslip_ros.identification.search import refine
 from stickslip_ros.identification.segment_starts import Errors, best_starts
 from stickslip_ros.identification.time_limit import TimeLimit
 from stickslip_ros.identification.trajectories import Trajectories, segments_of
-from stickslip_ros.identification.trajectory import Predictor
 
 _SHORT_SEGMENT, _LONG_SEGMENT = 1.25, 5.0
 """Length of the segments in natural periods: of the search, and of the fit."""

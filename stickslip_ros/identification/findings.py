@@ -108,19 +108,17 @@ class Findings:
     @cached_property
     def rivals(self) -> Sequence[str]:
         """Laws that predict as well as the one that was chosen, and have another friction."""
-        found: list[str] = []
-        for each in self.candidates:
-            # The one that was chosen may have been fitted further since.
-            same = each.label == self.chosen.label
-            if same or not self.as_good.get(each.label) or each.remark:
-                continue
-            for number, sign in enumerate(self.directions):
-                own, other = self.friction(number), each.friction(sign, self.fastest)
-                away = np.abs(np.interp(own.speed, other.speed, other.force) - own.force)
-                if float(away.max()) > _FRICTION_DIFFERENCE * float(own.force.max()):
-                    found.append(each.label)
-                    break
-        return found
+
+        def differs(each: Fit, number: int) -> bool:
+            own, other = self.friction(number), each.friction(self.directions[number], self.fastest)
+            away = np.abs(np.interp(own.speed, other.speed, other.force) - own.force)
+            return float(away.max()) > _FRICTION_DIFFERENCE * float(own.force.max())
+
+        # The one that was chosen may have been fitted further since.
+        others = [each for each in self.candidates if each.label != self.chosen.label]
+        alike = [each for each in others if self.as_good.get(each.label) and not each.remark]
+        directions = range(len(self.directions))
+        return [each.label for each in alike if any(differs(each, n) for n in directions)]
 
     @property
     def one_belt_speed(self) -> bool:

@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray, rms
+from stickslip_ros.identification.predictor import Predictor, free_run
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.regression import Regression, solve
-from stickslip_ros.identification.trajectory import Predictor, free_run
 
 _UNBOUNDED_ERROR = 1e3
 """Error of a free run that is not bounded, in units of that of the regression."""
@@ -33,7 +33,7 @@ def adjusted(fit: Regression, records: Sequence[Record]) -> Regression:
     task = _FreeRuns(fit, records)
     if not task.bounded:
         return fit
-    start = task.begun() if fit.rows.resting else task.linear()
+    start = task.begun(fit if fit.rows.resting else task.linear())
     slowest = np.full(len(fit.shapes), fit.rows.least_shape(fit.curve))
     least = np.array([*task.least, *slowest, *[-np.inf] * len(records)])
     solved = least_squares(
@@ -92,12 +92,12 @@ class _FreeRuns:
         errors = np.nan_to_num(errors, nan=_UNBOUNDED_ERROR / self._weights[1])
         return np.concatenate([own.residual * self._weights[0], errors * self._weights[1]])
 
-    def begun(self) -> FloatArray:
-        """Return the point of the regression with the velocities of the best free runs."""
-        return np.concatenate([self._fit.point, [speed for speed, _ in self._runs(self._fit)]])
+    def begun(self, fit: Regression) -> FloatArray:
+        """Return the point of a regression with the velocities of its best free runs."""
+        return np.concatenate([fit.point, [speed for speed, _ in self._runs(fit)]])
 
-    def linear(self) -> FloatArray:
-        """Return the point at which the residual is least if errors of force move the mass alone.
+    def linear(self) -> Regression:
+        """Return the fit whose residual is least if errors of force move the mass alone.
 
         The position error of a free run is then the force error through mass and viscous friction,
         which is linear in the unknowns.
@@ -153,9 +153,7 @@ class _FreeRuns:
                 max_nfev=10,
             )
             shapes = np.exp(found.x)
-        values, _ = solved(shapes)
-        point = np.concatenate([values[: len(fit.unknowns)], shapes])
-        return np.concatenate([point, [speed for speed, _ in self._runs(self._fit.at(point))]])
+        return replace(fit, unknowns=solved(shapes)[0][: len(fit.unknowns)], shapes=shapes)
 
     def _runs(self, fit: Regression) -> list[tuple[float, FloatArray]]:
         drive = fit.drive(1.0)

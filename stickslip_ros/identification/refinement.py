@@ -12,10 +12,10 @@ from stickslip_ros.identification.covariance import block_covariance
 from stickslip_ros.identification.filtered import filtered
 from stickslip_ros.identification.fit import Fit, ForceErrors, Residuals
 from stickslip_ros.identification.identified_law import DELAY, LAG, IdentifiedLaw
+from stickslip_ros.identification.predictor import Predictor
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.segment_starts import Errors, best_starts
 from stickslip_ros.identification.trajectories import Trajectories, segments_of
-from stickslip_ros.identification.trajectory import Predictor
 
 _OWN_SHARE = 1e-5
 """Least share of a derivative beside the others, for a coordinate that is identifiable."""

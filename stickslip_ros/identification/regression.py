@@ -14,8 +14,8 @@ from stickslip_ros.identification.filtered import Filtered, filtered
 from stickslip_ros.identification.fit import CURVE_POINTS, Fit, ForceErrors
 from stickslip_ros.identification.identified_law import IdentifiedLaw
 from stickslip_ros.identification.laws import DirectionalAdapter
+from stickslip_ros.identification.predictor import free_run
 from stickslip_ros.identification.record import Record
-from stickslip_ros.identification.trajectory import free_run
 
 _DIRECTION_SHARE = 0.05
 """Least share of the rows of a direction that has a curve of its own."""

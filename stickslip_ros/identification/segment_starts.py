@@ -1,7 +1,7 @@
 """States at the starts of segments: those from which given constants fit best."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -130,14 +130,12 @@ class Errors:
         """Return the better one of two fits of each segment, and for which it is the other one."""
         better = self._sums(other.residual) < self._sums(self.residual)
         rows = better[self.task.block]
-        return Errors(
-            self.task,
-            self.names,
-            self.values,
-            np.where(better[:, None], other.starts, self.starts),
-            np.where(rows, other.residual, self.residual),
-            np.where(rows[:, None], other.by_names, self.by_names),
-            np.where(rows[:, None], other.by_start, self.by_start),
+        return replace(
+            self,
+            starts=np.where(better[:, None], other.starts, self.starts),
+            residual=np.where(rows, other.residual, self.residual),
+            by_names=np.where(rows[:, None], other.by_names, self.by_names),
+            by_start=np.where(rows[:, None], other.by_start, self.by_start),
         ), better
 
     def _sums(self, column: FloatArray) -> FloatArray:

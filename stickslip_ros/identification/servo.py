@@ -7,8 +7,8 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.identification.filtered import START
+from stickslip_ros.identification.predictor import Predictor
 from stickslip_ros.identification.record import FEWEST, Record
-from stickslip_ros.identification.trajectory import Predictor
 from stickslip_ros.model.drive import Drive
 from stickslip_ros.motion.motion import Motion
 from stickslip_ros.motion.sampled_loop import LOCKSTEP_START, SampledLoop

@@ -11,9 +11,9 @@ import numpy as np
 from stickslip_ros.arrays import BoolArray, FloatArray, IntArray
 from stickslip_ros.errors import InvalidInputError, RunError
 from stickslip_ros.identification.identified_law import DELAY, LAG, IdentifiedLaw
+from stickslip_ros.identification.predictor import Predictor, Segment, steady_memory
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.time_limit import TimeLimit
-from stickslip_ros.identification.trajectory import Predictor, Segment, steady_memory
 from stickslip_ros.model.dimensionless_drive import MEMORY
 from stickslip_ros.model.drive import Drive, in_units_of
 from stickslip_ros.model.plain_drive import drive_system

@@ -3,9 +3,9 @@
 from benchmarks import identification as study
 from stickslip_ros.identification.identified_law import DELAY, LAG
 from stickslip_ros.identification.laws import KNOWN_LAWS
+from stickslip_ros.identification.predictor import Predictor
 from stickslip_ros.identification.time_limit import TimeLimit
 from stickslip_ros.identification.trajectories import Trajectories, segments_of
-from stickslip_ros.identification.trajectory import Predictor
 
 TRUE = {
     "mass": study.MASS,

@@ -12,12 +12,12 @@ from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.identification.findings import Findings
 from stickslip_ros.identification.identify import identify
 from stickslip_ros.identification.laws import SaturatingAdapter
+from stickslip_ros.identification.predictor import Predictor, free_run
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.regression import regress
 from stickslip_ros.identification.rest import static_force
 from stickslip_ros.identification.sentences import notes, notes_on, unidentified
 from stickslip_ros.identification.servo import closed_loop, servo_of
-from stickslip_ros.identification.trajectory import Predictor, free_run
 from stickslip_ros.model.friction import Coulomb, Stiction
 from tests.identification.axis_record import COULOMB, SATURATING, SERVO, axis, record
 

@@ -20,11 +20,11 @@ from stickslip_ros.identification.findings import Findings
 from stickslip_ros.identification.identified_law import DELAY, LAG
 from stickslip_ros.identification.identify import identify
 from stickslip_ros.identification.laws import KNOWN_LAWS
+from stickslip_ros.identification.predictor import Predictor, Segment
 from stickslip_ros.identification.record import Record, evenly_spaced
 from stickslip_ros.identification.refinement import repetition_of
 from stickslip_ros.identification.sentences import notes, unidentified
 from stickslip_ros.identification.time_limit import TimeLimit
-from stickslip_ros.identification.trajectory import Predictor, Segment
 from stickslip_ros.model.actuator import Actuator
 from stickslip_ros.model.drive import Drive
 from stickslip_ros.model.friction import Coulomb, Directional, FrictionLaw, Table
