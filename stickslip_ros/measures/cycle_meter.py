@@ -5,6 +5,7 @@ from collections import deque
 from collections.abc import Sequence
 from functools import reduce
 from itertools import pairwise
+from math import inf
 from typing import NamedTuple
 
 import numpy as np
@@ -150,7 +151,8 @@ class CycleMeter:
         self._parts: list[_Stretch] = []
         """Parts of the stretch since the last crossing."""
         self._whole = False
-        self._sticking_since: float | None = None
+        self._slid = inf
+        """Time, s, until which it slid."""
 
     def feed(
         self, breakpoints: Breakpoints, belt_speed: float, fastest_belt: float | None = None
@@ -189,7 +191,9 @@ class CycleMeter:
                 self._amplitudes.append(completed[-1].amplitude)
             self._parts, self._whole, last = [], True, edge
         self._follow(rows, last, len(breakpoints) - 1)
-        self._follow_sticking(breakpoints)
+        row = int(np.flatnonzero(~breakpoints.sticking[1:]).max(initial=-1)) + 1
+        if row > 0 or self._slid == inf:
+            self._slid = rows.time[row]
         self._last = breakpoints[len(breakpoints) - 1 :]
         return completed
 
@@ -208,9 +212,8 @@ class CycleMeter:
     def _measures(self) -> Measures:
         period = self._cycles[-1].period if self._cycles else 0.0
         now = self._parts[-1].end if self._parts else 0.0
-        since = self._sticking_since
-        if self._belt_speed == 0.0 and since is not None and now - since >= period:
-            steady = True if self._lasts(now - since) else None
+        if self._belt_speed == 0.0 and now > self._slid and now - self._slid >= period:
+            steady = True if self._lasts(now - self._slid) else None
             return without_cycles(self._recent_motion(), Regime.STUCK, steady=steady)
         since_turn = now - self._parts[0].start if self._parts else 0.0
         held = self._held(since_turn > STALE_PERIODS * period) if self.within else None
@@ -301,14 +304,6 @@ class CycleMeter:
         if not recent or recent[0].duration <= 0.0:
             return None
         return reduce(_Stretch.followed_by, recent).as_cycle()
-
-    def _follow_sticking(self, breakpoints: Breakpoints) -> None:
-        (slipping,) = (~breakpoints.sticking[1:]).nonzero()
-        if len(breakpoints) > 1 and not breakpoints.sticking[-1]:
-            self._sticking_since = None
-        elif len(slipping) > 0 or self._sticking_since is None:
-            row = int(slipping[-1]) + 1 if len(slipping) > 0 else 0
-            self._sticking_since = float(breakpoints.time[row]) if len(breakpoints) > 1 else None
 
 
 def _trend(amplitudes: Sequence[float], resting: bool, share: float) -> Trend | None:
