@@ -572,22 +572,21 @@ class RecordedMotion(Motion):
             return
         state, sticks, begun = self._instant.state, self._system.sticks, self._begun
         marks = [] if self._flow is None else self._flow.take_marks()
-        self._passed.clear()
+        self._passed = passed = list[_Point]()
         for instant, x, y in (*marks, (None, state[POSITION], state[SPEED])):
             time = now if instant is None else begun + instant
             sticking = mode.flow == STICK if sticks else self._stays_slow(mode, time, y)
-            self._passed.append((instant, x, y, sticking))
-            self._append(time, x, y, sticking)
+            passed.append((instant, x, y, sticking))
+        self._record(passed, begun, now)
 
     @override
     def _kept(self) -> tuple[list[_Point], bool]:
-        return self._passed.copy(), self._was_slow
+        return self._passed, self._was_slow
 
     @override
     def _recall(self, kept: tuple[list[_Point], bool], begun: float, now: float) -> None:
         points, self._was_slow = kept
-        for instant, x, y, sticking in points:
-            self._append(now if instant is None else begun + instant, x, y, sticking)
+        self._record(points, begun, now)
 
     def _stays_slow(self, mode: Mode, now: float, y: float) -> bool:
         """Return whether the slide has been slow since the last breakpoint.
@@ -603,11 +602,13 @@ class RecordedMotion(Motion):
     def _append_present(self) -> None:
         if self._recording:
             state = self._instant.state
-            self._append(0.0, state[POSITION], state[SPEED], False)
+            self._record([(None, state[POSITION], state[SPEED], False)], 0.0, 0.0)
 
-    def _append(self, now: float, x: float, y: float, sticking: bool) -> None:
-        time = self._time + now / self._frequency
-        if time < self._breakpoint_time:  # rounding must not take the time back
-            time = self._breakpoint_time
-        self._breakpoint_time = time
-        self._recorded.append((time, x, y, sticking))
+    def _record(self, points: list[_Point], begun: float, now: float) -> None:
+        """Record the breakpoints of a phase, from `begun` to `now`."""
+        start, frequency, latest = self._time, self._frequency, self._breakpoint_time
+        for instant, x, y, sticking in points:
+            time = start + (now if instant is None else begun + instant) / frequency
+            latest = time if time > latest else latest  # rounding must not take the time back
+            self._recorded.append((latest, x, y, sticking))
+        self._breakpoint_time = latest
