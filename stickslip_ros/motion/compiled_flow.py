@@ -128,6 +128,7 @@ class IntegratorPool:
 
     def __del__(self) -> None:
         for flow, shelf in self._borrowed.values():
+            flow.take_marks()  # of a phase that an error has ended
             shelf.append(flow)
 
 

@@ -32,6 +32,17 @@ def test_turning_points_have_a_velocity_of_exactly_zero() -> None:
     assert len(motion.take_breakpoints()) == 0
 
 
+def test_a_motion_records_nothing_of_one_that_had_its_integrator_before() -> None:
+    motion = RecordedMotion(PAPER, 0.0, 0.0)
+    flow = motion._flow
+    assert flow is not None
+    flow.taylor.propagate_until(10.0)
+    assert any(flow.marks)
+    del motion
+    assert RecordedMotion(PAPER, 0.0, 0.0)._flow is flow
+    assert not any(flow.marks)
+
+
 def test_no_sampled_state_is_beyond_the_breakpoints() -> None:
     """Between neighbouring breakpoints displacement and speed have no extremes."""
     drive = replace(FEED_DRIVE, belt_speed=0.02)
