@@ -253,9 +253,7 @@ class BristleAdapter(ExponentialAdapter):
 class RateStateAdapter(IdentifiedLaw):
     """F = F_k + (A - B) ln(w/v_0) in steady slip, of which A is immediate.
 
-    The reference speed v_0 is that by default: another one only changes F_k. Far from v_0, F_k
-    hardly differs from the slope A - B: in the search `kinetic` is replaced by friction in steady
-    slip at the fastest speed.
+    The reference speed v_0 is that by default: another one only changes F_k.
     """
 
     name = "rate_state"
@@ -266,7 +264,6 @@ class RateStateAdapter(IdentifiedLaw):
     unscaled: Sequence[str] = ("slip_distance",)
     smallest = "kinetic"
     memory: Sequence[str] = coordinates[1:]
-    straightened: Mapping[str, tuple[float, float] | None] = {"kinetic": (0.0, inf)}
 
     @override
     def terms(self, speed: FloatArray, shape: float) -> FloatArray:
@@ -286,7 +283,8 @@ class RateStateAdapter(IdentifiedLaw):
     def starts(self, values: Values, fastest: float) -> Sequence[Values]:
         amplitude = fastest * sqrt(values["mass"] / values["stiffness"])
         slope = values["direct_effect"] - values["evolution_effect"]
-        direct = max(_DIRECT_EFFECT * self.to_search(values, fastest)["kinetic"], abs(slope))
+        steady = values["kinetic"] + slope * log(fastest / _REFERENCE_SPEED)
+        direct = max(_DIRECT_EFFECT * steady, abs(slope))
         effects = {"direct_effect": direct, "evolution_effect": direct - slope}
         return [
             {**values, **effects, "slip_distance": share * amplitude} for share in _SLIP_DISTANCES
@@ -302,19 +300,6 @@ class RateStateAdapter(IdentifiedLaw):
         if name == "evolution_effect":
             return 0.0, inf
         return super().bounds(name, values, fastest)
-
-    @override
-    def to_search(self, values: Values, fastest: float) -> dict[str, float]:
-        return {**values, "kinetic": values["kinetic"] + self._rise(values, fastest)}
-
-    @override
-    def from_search(self, found: Values, fastest: float) -> dict[str, float]:
-        return {**found, "kinetic": found["kinetic"] - self._rise(found, fastest)}
-
-    def _rise(self, values: Values, fastest: float) -> float:
-        """Return how far friction in steady slip rises to the fastest speed, N."""
-        slope = values["direct_effect"] - values["evolution_effect"]
-        return slope * log(fastest / _REFERENCE_SPEED)
 
 
 class DirectionalAdapter(IdentifiedLaw):
