@@ -7,7 +7,7 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.measures.cycle_measures import LEAST_CYCLES, Cycle, CycleMeans
-from stickslip_ros.measures.folded_cycles import GRID, FoldedCycles, Shape, Stick
+from stickslip_ros.measures.folded_cycles import GRID, STICKING_SHARE, FoldedCycles, Shape, Stick
 from stickslip_ros.measures.noise import FEW_SAMPLES, LEAST_SAMPLES
 
 _LEAST_PHASES = 12.0
@@ -142,7 +142,7 @@ def _slow_share(
     """Return the share of a cycle with at most this relative speed, m/s, and its standard error.
 
     The error is that of draws of the coefficients from their covariance, and the time that a
-    Fourier series resolves, half a period of its last term.
+    Fourier series resolves, half a period of its last term, where its speed comes near the belt's.
     """
     grid, random = np.linspace(0.0, period, 8 * GRID, endpoint=False), np.random.default_rng(0)
     draws = random.multivariate_normal(
@@ -152,7 +152,8 @@ def _slow_share(
     drawn = np.abs(relative + draws @ series.rates(grid).T) <= stick_speed
     share = float(np.mean(np.abs(relative) <= stick_speed))
     scatter = float(np.sqrt(np.mean((drawn.mean(axis=1) - share) ** 2)))
-    return share, hypot(scatter, 1.0 / (len(series.found) - 1)) if share else scatter
+    near = float(relative.max()) >= -max(stick_speed, (1.0 - STICKING_SHARE) * belt_speed)
+    return share, hypot(scatter, 1.0 / (len(series.found) - 1)) if near else scatter
 
 
 def _refined(grid: FloatArray, values: FloatArray) -> float:

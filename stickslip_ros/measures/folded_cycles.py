@@ -24,7 +24,7 @@ _DEGREES = (6, 9, 12, 16, 20, 26)
 """Degrees of the polynomial of a slip, beyond the conditions at its ends, likewise."""
 _UNTESTED_ERRORS = 10.0
 """Stick time, in standard errors, from which a stick needs no test."""
-_STICKING_SHARE = 0.85
+STICKING_SHARE = 0.85
 """Share of the belt speed that a motion reaches that may stick."""
 _PASSING_SHARE = 1.2
 """Share of the belt speed beyond which a motion has passed the belt instead of sticking."""
@@ -80,7 +80,7 @@ class FoldedCycles:
         self.time, self.position, self.count, self.period = time, position, count, period
         self._step = step
         self.hidden_stick = 0.0
-        """Stick time, s, that fits as well as none: the error of a stick that is not shown."""
+        """Stick time, s, that would not show: the error of a motion that shows none."""
 
     @property
     def _turns(self) -> FloatArray:
@@ -179,7 +179,7 @@ class FoldedCycles:
         """Return the stick of the cycles; None without one."""
         grid = np.linspace(0.0, self.period, GRID, endpoint=False)
         velocity = shape.velocity(grid)
-        if not _STICKING_SHARE * belt_speed < velocity.max() < _PASSING_SHARE * belt_speed:
+        if not STICKING_SHARE * belt_speed < velocity.max() < _PASSING_SHARE * belt_speed:
             return None
         near = velocity > np.minimum(0.93 * belt_speed, 0.98 * velocity.max())
         turn = 2j * pi / self.period
@@ -190,6 +190,8 @@ class FoldedCycles:
         around = self.phase - centre
         around -= np.rint(around / self.period) * self.period
         used = np.flatnonzero(np.abs(around) < min(reach, 0.49 * self.period))
+        gap = self.period / self.phases
+        self.hidden_stick = max(guess, gap)
         time, number = around[used], self.number[used]
         if len(used) < 12:
             return None
@@ -213,7 +215,9 @@ class FoldedCycles:
             variance = with_stick.squares / max(len(time) - with_stick.jacobian.shape[1], 1)
             hidden = without.squares - with_stick.squares <= STICK_LEVEL * variance
         if hidden:
-            self.hidden_stick = with_stick.stick_time
+            # A short stick changes the positions by its square, by s = 2 t dt with a time t.
+            unseen = (2.0 * with_stick.stick_time * time_error) ** 0.5
+            self.hidden_stick = max(with_stick.stick_time, unseen, gap)
             return None
         moved = replace(
             with_stick,

@@ -3,7 +3,7 @@
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import replace
-from math import sqrt
+from math import hypot, sqrt
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from stickslip_ros.measures.cycle_measures import (
     Trend,
     without_cycles,
 )
+from stickslip_ros.measures.folded_cycles import STICKING_SHARE
 from stickslip_ros.measures.noise import (
     FEW_SAMPLES,
     FEWEST_SAMPLES,
@@ -29,7 +30,7 @@ from stickslip_ros.measures.noise import (
     resolved,
     strongest_line,
 )
-from stickslip_ros.measures.single_cycles import NoisySamples
+from stickslip_ros.measures.single_cycles import LEAST_STICK, NoisySamples
 from stickslip_ros.measures.slips import regime_by_slips
 
 REVERSAL = 8.0
@@ -141,6 +142,10 @@ class NoisyWindow:
         # Half of the cycles: a single one may seem to stick for a moment.
         means = CycleMeans.over(part.cycles, 0.5)
         found = self._found(part.samples, means, self.noise)
+        fastest = max(cycle.velocity_amplitude for cycle in part.cycles)
+        if found.errors and fastest > STICKING_SHARE * self.fastest_belt:
+            error = hypot(found.errors["stick_fraction"], LEAST_STICK)
+            found = replace(found, errors={**found.errors, "stick_fraction": error})
         if not by_slips or found.regime not in (Regime.STICK_SLIP, Regime.PURE_SLIP):
             return found
         samples = part.samples[part.samples.row(part.starts[0]) :]

@@ -12,8 +12,8 @@ from stickslip_ros.measures.noise import medians
 
 _PASSING_SHARE = 1.15
 """Share of the belt speed beyond which a slide has passed the belt; calibrations err by less."""
-_LEAST_STICK = 0.03
-"""Stick fraction up to which a single cycle counts as one without a stick."""
+LEAST_STICK = 0.03
+"""Stick fraction up to which a single cycle counts as one without a stick: it errs by as much."""
 
 
 @dataclass
@@ -112,7 +112,7 @@ def cycle_between(
         midpoint=(highest + lowest) / 2.0,
         period=period,
         frequency=1.0 / period,
-        stick_fraction=stick_time / period if stick_time > _LEAST_STICK * period else 0.0,
+        stick_fraction=stick_time / period if stick_time > LEAST_STICK * period else 0.0,
     )
 
 

@@ -77,9 +77,9 @@ def fit_stick(
     """Fit the motion around a stick at time 0, and the belt speed, to positions, m, at times, s.
 
     Nonlinear least squares, with the motion integrated from its edges (single shooting). Where the
-    data do not tell one form of the friction from another, each has the weight of its information
-    criterion by Akaike (Burnham and Anderson, Model selection, 2002), and their `spread` is an
-    error.
+    data do not tell one form of the friction from another, the edges are means over the forms, with
+    the weights of their information criteria by Akaike (Burnham and Anderson, Model selection,
+    2002), and their `spread` is an error; residuals are those of the best form.
 
     The scale of the fit is the angular `frequency` of the cycle, rad/s; `belt_speed`, above 0 m/s,
     and `stick_time`, s, are the first guesses. Without `sticks` the belt has this speed, and the
@@ -105,18 +105,20 @@ def fit_stick(
     criterion = squares / max(squares.min(), 1e-300) * freedom
     criterion += [0.0, _JUMP_LEVEL, 0.0, 0.0][: len(fits)]
     weight = np.exp(0.5 * (criterion.min() - criterion))
-    best = fits[int(np.argmax(weight))]
-    apart = np.array([fit.values - best.values for fit in fits])[:, [_CENTRE, _SIZE, _BELT]]
-    spread = (apart.T * weight / weight.sum()) @ apart
+    best, weight = fits[int(np.argmax(weight))], weight / weight.sum()
+    found = np.array([fit.values for fit in fits])
+    mean = weight @ found
+    apart = (found - mean)[:, [_CENTRE, _SIZE, _BELT]]
+    spread = (apart.T * weight) @ apart
     units = np.array([1.0 / frequency, 1.0 / frequency, belt_speed])
     scale = np.append(units, np.ones(best.jacobian.shape[1] - 3))
     if not sticks:
         scale[2] = 1.0
     return StickFit(
-        centre=float(best.values[_CENTRE]) / frequency,
-        stick_time=float(best.values[_SIZE]) / frequency if sticks else 0.0,
-        belt_speed=belt_speed * (1.0 + float(best.values[_BELT])),
-        offset=float(best.values[_OFFSET]) * length,
+        centre=float(mean[_CENTRE]) / frequency,
+        stick_time=float(mean[_SIZE]) / frequency if sticks else 0.0,
+        belt_speed=belt_speed * (1.0 + float(mean[_BELT])),
+        offset=float(mean[_OFFSET]) * length,
         residual=-best.residual * length,
         jacobian=best.jacobian * length / scale,
         squares=best.squares * length**2,
@@ -148,7 +150,9 @@ _STRAIGHT = {_SLOPE: 0.0, _SECOND: 0.0, _THIRD: 0.0, _FALL: 0.5, _SCALE: 0.5}
 _FALLS = ((0, _JUMPING, {_FALL: 0.1}), (1, _STEEP, _STRAIGHT), (2, _STEEP, _STRAIGHT))
 """Exponent, free parameters and starts of each form of a fall of the friction; 0: it jumps."""
 _PRIOR = {_SECOND: _CURVATURE, _THIRD: _CURVATURE, _BELT: _CALIBRATION}
-_LOWER_BOUNDS = np.array([-np.inf, 0.0, -0.3, 0.0, -20.0, -20.0, -20.0, -np.inf, 0.0, 0.02])
+_LEAST_SIZE = 1e-4
+"""Least stick time of the fit: the derivative by it is proportional to it."""
+_LOWER_BOUNDS = np.array([-np.inf, _LEAST_SIZE, -0.3, 0.0, -20.0, -20.0, -20.0, -np.inf, 0.0, 0.02])
 _UPPER_BOUNDS = np.array([np.inf, np.inf, 0.3, 20.0, 20.0, 20.0, 20.0, np.inf, 20.0, 2.0])
 
 
@@ -174,9 +178,9 @@ class _Problem:
 
         values, prior = start.copy(), np.zeros((len(_PRIOR), len(start)))
         prior[range(len(_PRIOR)), list(_PRIOR)] = 1.0 / np.array([*_PRIOR.values()])
-        lowest = (
-            _LOWER_BOUNDS if self._sticks else np.where(_LOWER_BOUNDS == 0.0, -0.3, _LOWER_BOUNDS)
-        )
+        lowest = _LOWER_BOUNDS.copy()
+        if not self._sticks:
+            lowest[[_SIZE, _STIFFNESS]] = -0.3
         inside = np.clip(start, lowest + 1e-9, _UPPER_BOUNDS - 1e-9)[free]
         jacobian = np.empty(0)
 
@@ -199,7 +203,7 @@ class _Problem:
                 x_scale="jac",
                 ftol=1e-6,
                 xtol=1e-6,
-                max_nfev=30,
+                max_nfev=50,
             )
             inside = found.x
             # The prior is weighed by the noise that the fit leaves.

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
 
 from stickslip_ros.measures.stick_fit import fit_stick
 from tests.examples import examples
@@ -45,6 +46,29 @@ def test_edges_of_an_exact_motion_are_found(
     assert fit.departure == pytest.approx(shift + stick_time / 2.0, abs=5e-5)
     assert fit.belt_speed == pytest.approx(BELT, rel=1e-3)
     assert fit.offset == pytest.approx(-BELT * shift, abs=2e-7)
+
+
+@pytest.mark.parametrize("scale", [0.2, 0.3])
+def test_edges_on_a_steep_curve_are_found(scale: float) -> None:
+    """The friction falls by 0.375 (1 - e^-|r'/s|), in natural units: the form converges."""
+    stick_time, fall = 0.01, 0.375
+    time = np.arange(-0.5 * stick_time - 0.010, 0.5 * stick_time + 0.010, 1e-4)
+    position = BELT * time
+    for side, gap in ((-1.0, stick_time * FREQUENCY), (1.0, 0.0)):
+        since = (side * time - 0.5 * stick_time) * FREQUENCY
+
+        def rates(at: float, r: np.ndarray, side: float = side, gap: float = gap) -> list[float]:
+            drop = fall * np.expm1(-abs(r[1] / scale))
+            return [side * r[1], side * (drop - (r[0] + side * at - gap))]
+
+        span = float(since.max())
+        found = solve_ivp(
+            rates, (0.0, span), [0.0, 0.0], "DOP853", rtol=1e-11, atol=1e-13, dense_output=True
+        )
+        position += BELT / FREQUENCY * found.sol(np.maximum(since, 0.0))[0]
+    fit = fit_stick(time, position, BELT, FREQUENCY, stick_time + 0.001)
+    assert fit.landing == pytest.approx(-stick_time / 2.0, abs=1e-7)
+    assert fit.departure == pytest.approx(stick_time / 2.0, abs=1e-7)
 
 
 @pytest.mark.parametrize(

@@ -13,6 +13,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import stickslip_ros as ss
 from benchmarks import measures_under_noise as study
 from stickslip_ros.measures import Measures, Regime
 from stickslip_ros.measures.sample_assumptions import EXACT, UNKNOWN, SampleAssumptions
@@ -204,6 +205,39 @@ def test_friction_with_a_memory_sticks_below_the_stick_speed_under_noise_as_with
     assert true.stick_fraction == pytest.approx(share, rel=0.02)
     assert found.stick_fraction == pytest.approx(share, rel=0.05)
     assert found.regime is true.regime is Regime.STICK_SLIP
+
+
+@pytest.mark.parametrize("stick_speed", [0.0, 0.0004])
+@pytest.mark.parametrize("growth", [0.0, 0.4], ids=["alike", "growing"])
+@pytest.mark.parametrize("speed", [0.5, 0.97])
+def test_no_stick_is_certain_only_where_the_slide_stays_far_below_the_belt(
+    speed: float, growth: float, stick_speed: float
+) -> None:
+    """By its highest speed, in belt speeds; cycles that grow are measured one by one."""
+    time = np.arange(2000) * 1e-3
+    size = speed * 0.04 / 100.0 * (1.0 + growth * (time - 2.0))
+    noise = 1e-7 * np.random.default_rng(0).standard_normal(2000)
+    record = columns(milliseconds(2000), size * np.sin(100.0 * time) + noise)
+    found = measured(record, SampleAssumptions(stick_speed, noisy=True))
+    assert found.regime is Regime.PURE_SLIP
+    assert found.stick_fraction == 0.0
+    error = found.errors["stick_fraction"]
+    assert error == 0.0 if speed < 0.85 else 1e-3 < error < 0.1
+
+
+def test_a_stick_that_an_encoder_hides_is_within_the_error_of_none() -> None:
+    """It sticks in 3 % of the time, and the encoder has 80 or 160 steps from peak to peak."""
+    law = {"friction_law": "exponential", "friction_decay_speed": 0.5}
+    drive = ss.scenario("feed_drive", belt_speed=0.08, start_after=1e6, **law)
+    run = ss.simulate(drive, duration=10.0)
+    for seed, resolution in ((2, 1e-5), (2, 2e-5), (3, 2e-5)):
+        part = np.array(run.trajectory.position[7000 + 300 * seed :][:2000])
+        case = study.Case(0.08, resolution, 0.0)
+        found = study.measured(case, seed, part, np.zeros(len(part)))
+        assert found.stick_fraction == 0.0
+        error = found.errors["stick_fraction"]
+        assert error < 0.05
+        assert run.measures.stick_fraction < 1.96 * error
 
 
 def test_lost_samples_and_impulses_change_little() -> None:
