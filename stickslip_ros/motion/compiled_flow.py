@@ -168,10 +168,9 @@ class _Finder:
         self._zero_speed, self._keep = zero_speed, keep
 
     def __call__(self, integrator: Any, now: float, _: int) -> None:
-        if not self._keep:
-            return
-        x, y = integrator.update_d_output(now)[:2].tolist()
-        self.found.append((now, x, 0.0 if self._zero_speed else y))
+        if self._keep:
+            x, y, *_ = integrator.update_d_output(now).tolist()
+            self.found.append((now, x, 0.0 if self._zero_speed else y))
 
 
 class FlowRates:
