@@ -169,7 +169,7 @@ class _Finder:
 
     def __call__(self, integrator: Any, now: float, _: int) -> None:
         if self._keep:
-            x, y, *_ = integrator.update_d_output(now).tolist()
+            x, y = integrator.update_d_output(now).tolist()[:2]
             self.found.append((now, x, 0.0 if self._zero_speed else y))
 
 
