@@ -50,7 +50,7 @@ _HOPELESS_LOSS_RATIO = 4.0
 further."""
 _GIVEN_UP_LOSS_RATIO = 100.0
 """A law whose squared error is larger by this factor is given up: than LuGre's after the first
-steps, or than that of the best law before constants are added that the records ask for."""
+steps, or than that of the best law so far before constants are added that the records ask for."""
 _SEARCH_TIME = 0.7
 """Share of the time in which laws are searched; in the rest the best ones are fitted further."""
 _LAW_TIME = 0.25
@@ -126,8 +126,9 @@ class DriveTask:
                 thorough = not any(map(is_white, chain(*near)))
                 near.append(self.searched(each, thorough=thorough, like=like))
             self.limit.begin_part(1.0)
-            least = min(map(_loss, chain(found, *near)), default=inf)
-            found.extend(self.extended(fits, least) for fits in near)
+            for fits in sorted(near, key=lambda fits: min(map(_loss, fits))):
+                least = min(map(_loss, chain(found, *near)))
+                found.append(self.extended(fits, least))
 
         def explained() -> bool:
             return any(map(is_white, found))
@@ -194,7 +195,7 @@ class DriveTask:
         """Return the best fit of a law with the constants that the records ask for.
 
         `near` has its fits without them, in the order in which they are tried. Where the squared
-        error of the best law is much less, `least`, they are as they are.
+        error of the best law so far is much less, `least`, they are as they are.
         """
         if min(map(_loss, near)) > _GIVEN_UP_LOSS_RATIO * least:
             return min(near, key=_loss)
