@@ -90,12 +90,14 @@ def test_a_plant_that_is_deactivated_pauses_the_run(
     graph.wait_until(
         lambda: states_of_plant(health)[-1] == "active" or process.poll() is not None, "it goes on"
     )
+    was_told = states_of_plant(health)[-1] == "active"
     graph.close()
     if duration is None:
         process.send_signal(signal.SIGINT)
     output, errors = process.communicate(timeout=PATIENCE)
     assert process.returncode == (0 if duration else 130), errors
-    assert errors.count("the plant is paused") == errors.count("the plant continues") == 1
+    assert errors.count("the plant is paused") == 1
+    assert was_told <= errors.count("the plant continues") <= 1
     result = json.loads(output)
     assert result["report"]["complete"]
     assert result["lost_samples"] == 0 or pace == "realtime"

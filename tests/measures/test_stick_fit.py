@@ -76,7 +76,10 @@ def test_edges_on_a_steep_curve_are_found(scale: float) -> None:
     [(0.010, 12), *(pytest.param(each, 40, marks=pytest.mark.long) for each in (0.003, 0.030))],
 )
 def test_under_noise_the_stick_time_is_within_its_error(stick_time: float, seeds: int) -> None:
-    """The errors, over their standard error, have a deviation near one."""
+    """The errors, over their standard error, have a deviation near one.
+
+    A mean over forms of the friction scatters less than the one form whose errors these are.
+    """
     time, position = around_a_stick(stick_time)
     random, errors = np.random.default_rng(1), []
     for _ in range(seeds):
@@ -85,7 +88,7 @@ def test_under_noise_the_stick_time_is_within_its_error(stick_time: float, seeds
         variance = fit.squares / (len(time) - fit.jacobian.shape[1])
         covariance = np.linalg.inv(fit.jacobian.T @ fit.jacobian) * variance
         errors.append((fit.stick_time - stick_time) / covariance[1, 1] ** 0.5)
-    assert 0.7 < np.std(errors) < 1.3
+    assert 0.6 < np.std(errors) < 1.3
     assert abs(np.mean(errors)) < 0.6
 
 

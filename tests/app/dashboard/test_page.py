@@ -289,8 +289,15 @@ def test_what_an_engineer_does(start_stickslip: Start, page: Page, tmp_path: Pat
     wait_for(lambda: swing(page) > 500.0, "before and after are drawn")
     page.get_by_role("button", name="Pause view").click()
     time_plots = page.locator(".chart.tall")
-    time_plots.hover()
-    expect(time_plots).to_have_text(re.compile(r"^\S+ s\D.* µm\D.* mm/s\D.* N$"))
+
+    def told() -> str:
+        """Values at the pointer; a chart that is drawn meanwhile tells none until it moves."""
+        for x in (300, 301):
+            time_plots.hover(position={"x": x, "y": 100})
+        return time_plots.text_content() or ""
+
+    values = re.compile(r"\S+ s\D.* µm\D.* mm/s\D.* N")
+    wait_for(lambda: values.fullmatch(told()) is not None, "values at the pointer are told")
     with page.expect_download() as download:
         page.get_by_role("button", name="CSV").click()
     rows = np.genfromtxt(download.value.path(), delimiter=",", names=True)
