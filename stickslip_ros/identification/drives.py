@@ -139,9 +139,9 @@ class DriveTask:
         if len(self.rows.directions) > 1 and found and not explained():
             compete([DirectionalAdapter(min(found, key=_loss).law)])
         # A memory changes the motion near sticking: it does not explain an input that is missing.
-        complete = not found or (law == AUTO and min(map(_share, found)) < _MISSING_INPUT_ERROR)
+        described = not found or (law == AUTO and min(map(_share, found)) < _MISSING_INPUT_ERROR)
         bristles: Refinement | None = None
-        for each in laws if complete and not explained() else ():
+        for each in laws if described and not explained() else ():
             if each.memory and (each is DAHL or not explained()):
                 compete([each], bristles)
                 bristles = found[-1] if found[-1].law is LUGRE else bristles
