@@ -34,12 +34,9 @@ def test_figures_from_samples_are_those_of_the_limit_cycle(stickslip: Run) -> No
 @pytest.mark.long
 def test_samples_that_the_analyzer_has_not_taken_in_at_the_end_are_waited_for(
     start_stickslip: Start,
-    domain: int,
+    graph: Graph,
     tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-    graph = Graph(domain)
     health = graph.listen(DIAGNOSTICS)
     in_real_time = ("--pace", "realtime", "--duration", "10")
     process = start_stickslip("run", "paper", *in_real_time, "--bag", "bag", "--json")
@@ -48,7 +45,6 @@ def test_samples_that_the_analyzer_has_not_taken_in_at_the_end_are_waited_for(
     os.kill(analyzer, signal.SIGSTOP)
     graph.wait_until(lambda: states_of_plant(health)[-3:] == 3 * ["inactive"], "the plant pauses")
     os.kill(analyzer, signal.SIGCONT)
-    graph.close()
     output, _ = ended(process, 0)
     result = json.loads(output)
     assert (result["samples"], result["report"]["complete"]) == (1001, True)
@@ -57,20 +53,17 @@ def test_samples_that_the_analyzer_has_not_taken_in_at_the_end_are_waited_for(
 @pytest.mark.parametrize(
     ("pace", "duration", "flags"),
     [
-        pytest.param("realtime", 10, (), marks=pytest.mark.long),
+        pytest.param("realtime", 20, (), marks=pytest.mark.long),
         ("lockstep", None, ("--composed",)),
     ],
 )
 def test_a_plant_that_is_deactivated_pauses_the_run(
     start_stickslip: Start,
-    domain: int,
-    monkeypatch: pytest.MonkeyPatch,
+    graph: Graph,
     pace: str,
     duration: int | None,
     flags: tuple[str, ...],
 ) -> None:
-    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-    graph = Graph(domain)
     health = graph.listen(DIAGNOSTICS)
 
     def ask_for(transition: int) -> None:
@@ -91,7 +84,6 @@ def test_a_plant_that_is_deactivated_pauses_the_run(
         lambda: states_of_plant(health)[-1] == "active" or process.poll() is not None, "it goes on"
     )
     was_told = states_of_plant(health)[-1] == "active"
-    graph.close()
     if duration is None:
         process.send_signal(signal.SIGINT)
     output, errors = process.communicate(timeout=PATIENCE)

@@ -237,12 +237,9 @@ def test_an_external_controller_is_waited_for(
 def test_an_external_controller_may_die_and_return(
     start_stickslip: Start,
     start_damper: Callable[..., subprocess.Popen[bytes]],
-    domain: int,
-    monkeypatch: pytest.MonkeyPatch,
+    graph: Graph,
     tmp_path: Path,
 ) -> None:
-    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-    graph = Graph(domain)
     health = graph.listen(DIAGNOSTICS)
     impatient = ("-p", "plant.reply_timeout=3.0", "-p", "analyzer.flush_period=0.2")
     first = start_damper()
@@ -253,7 +250,6 @@ def test_an_external_controller_may_die_and_return(
     graph.wait_until(lambda: "no control" in words_of_plant(health), "it is diagnosed")
     start_damper()
     graph.wait_until(lambda: "no control" not in words_of_plant(health), "it is taken back")
-    graph.close()
     _, errors = ended(process, 130, signal.SIGINT)
     assert "no control force arrives" not in errors
 

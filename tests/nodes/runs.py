@@ -1,5 +1,6 @@
 """Recorded runs for tests that need one."""
 
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -48,10 +49,8 @@ def close_the_loop(graph: Graph, bag: Path, **plant_parameters: object) -> None:
 
 def record_run(bag: Path, **plant_parameters: object) -> None:
     """Record the closed loop in a graph of its own."""
-    with own_domain() as domain:
-        graph = Graph(domain)
+    with own_domain() as domain, closing(Graph(domain)) as graph:
         close_the_loop(graph, bag, **plant_parameters)
-        graph.close()
 
 
 def messages_of(bag: Path) -> dict[str, list[tuple[int, bytes]]]:
