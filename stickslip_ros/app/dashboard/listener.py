@@ -251,17 +251,20 @@ class ListenerNode(PollingNode):
 
     def set_active(self, node: str, active: bool) -> Answer:
         """Activate or deactivate a managed (lifecycle) node."""
-        done = "activated" if active else "deactivated"
+        state = "active" if active else "inactive"
         transition = Transition.TRANSITION_ACTIVATE if active else Transition.TRANSITION_DEACTIVATE
+
+        def outcome(response: Any) -> str:
+            # A node refuses the repeated request if it has obeyed the first, whose answer was lost.
+            made = response.success or self.health.get(node, Health()).state == state
+            return "" if made else f"{node} could not become {state}"
 
         def call(on_answer: OnAnswer) -> ServiceCall:
             longest = 8.0  # s, of a transition
             call = ServiceCall(self, ChangeState, f"{node}/change_state", answer_time=longest)
             return call.start(transition_request(transition), on_answer)
 
-        return self._request(
-            node, call, lambda response: "" if response.success else f"{node} could not be {done}"
-        )
+        return self._request(node, call, outcome)
 
     def reset(self) -> Answer:
         """Reset the motion to its initial state."""

@@ -119,6 +119,8 @@ def test_a_value_is_taken_or_refused_with_the_reason_of_the_node(
         graph.wait_until(
             lambda s=state: observer.health["washout_controller"].state == s, f"it is {state}"
         )
+        # A request that is repeated, since its answer was lost, has been obeyed.
+        assert not outcome(graph, observer.set_active("washout_controller", active))
     assert [each.text for each in observer.events if "inactive" in each.text] == [
         "washout_controller inactive"
     ]
