@@ -38,7 +38,9 @@ _LASTING_SAMPLES = 4
 _LEAST_ERRORS, _LEAST_SHARE = 4.0, 1e-3
 """Difference between the velocities of stick and belt, in standard errors and in belt speeds, above
 which they disagree."""
-
+_EDGE_ERROR = 0.03
+"""Standard error of the stick of a cycle of exact samples, in sample periods: its edges are
+interpolated, and the rounding is alike in all cycles."""
 
 NOT_JUDGED = "belt, load, disturbance or reference vary: a drift is not judged"
 """Note on measures that do not say whether they drift."""
@@ -183,6 +185,9 @@ class SampleMeter:
         self.mean_cycle = None
         if unbounded or not (self.noisy or few):
             found = self._meter.measures()
+            if found.errors is not None and found.stick_fraction:
+                error = max(found.errors["stick_fraction"], _EDGE_ERROR / self._per_cycle)
+                found = replace(found, errors={**found.errors, "stick_fraction": error})
         else:
             found, self.mean_cycle = window.measures(quick=quick)
         self.drift.resolution = window.step

@@ -66,6 +66,21 @@ def test_measures_of_a_limit_cycle() -> None:
     assert meter.duration == pytest.approx(70.0, rel=1e-15)
 
 
+@pytest.mark.parametrize("apart", [5, 10, 20])
+@pytest.mark.parametrize("belt_speed", [0.2, 0.3, 0.4])
+def test_the_error_of_a_stick_is_more_than_its_scatter_from_cycle_to_cycle(
+    belt_speed: float, apart: int
+) -> None:
+    meter = SampleMeter(window=20)
+    meter.feed(limit_cycle(belt_speed)[::apart])
+    measures = meter.measures()
+    (expected,) = (cycle for cycle in LIMIT_CYCLES if cycle.belt_speed == belt_speed)
+    assert measures.stick_fraction is not None
+    assert measures.errors is not None
+    error = abs(measures.stick_fraction - expected.stick_fraction)
+    assert error < 1.96 * measures.errors["stick_fraction"] < 0.06 * apart * 0.01 / expected.period
+
+
 # 3, 7 and 30 Hz have periods that are no whole number of nanoseconds.
 rates = st.sampled_from([3, 7, 30, 100, 1000, 100_000])
 
