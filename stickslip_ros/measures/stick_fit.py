@@ -1,11 +1,12 @@
 """Stick edges from positions with noise: the motion near the speed of the belt, fitted."""
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Self
+from math import inf
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from stickslip_ros.arrays import FloatArray
+from stickslip_ros.arrays import FloatArray, rms
 
 _STEPS = 24
 """Steps of the integration on each side of the stick."""
@@ -13,6 +14,8 @@ _MARGIN = 0.5
 """Part of the reach of the data by which the integration reaches further: edges move."""
 _LARGEST_SPEED = 10.0
 """Largest velocity of the fit, in belt speeds."""
+_STEP = 1e-6
+"""Step of the differences by the parameters."""
 _CURVATURE, _CALIBRATION = 1.0, 0.05
 """Prior standard deviations of the friction's second and third power, in natural units, and of the
 belt speed, as a share of it."""
@@ -88,18 +91,16 @@ def fit_stick(
     reach = (float(np.abs(time).max()) - stick_time / 2.0) * frequency
     length = belt_speed / frequency
     times, relative = time * frequency, (position - belt_speed * time) / length
+    motion = _Motion(times, relative, (1.0 + _MARGIN) * reach, sticks)
     start = np.zeros(len(_LOWER_BOUNDS))
     start[_SIZE] = max(stick_time * frequency, 0.05) if sticks else 0.02
     start[_STIFFNESS], start[_OFFSET] = 1.2, float(np.median(relative))
-    free = _SMOOTH if sticks else _NO_STICK
-    fits = [_Fit.of(_Problem(times, relative, reach, sticks=sticks), start, free)]
-    if sticks:
-        start = fits[0].values.copy()
-        noise = (fits[0].squares / len(time)) ** 0.5
-        for exponent, free, values in _FALLS if may_fall else ():
+    fits = [motion.fit(start, _SMOOTH if sticks else _NO_STICK)]
+    if sticks and may_fall:
+        start, noise = fits[0].values.copy(), (fits[0].squares / len(time)) ** 0.5
+        for free, values in _FALLS:
             start[[*values]] = [*values.values()]
-            problem = _Problem(times, relative, reach, exponent=exponent, noise=noise)
-            fits.append(_Fit.of(problem, start, free))
+            fits.append(motion.fit(start, free, noise))
     squares = np.array([fit.squares for fit in fits])
     freedom = max(len(time) - len(_STEEP), 1)
     criterion = squares / max(squares.min(), 1e-300) * freedom
@@ -131,65 +132,60 @@ class _Fit(NamedTuple):
     residual: FloatArray
     jacobian: FloatArray
 
-    @classmethod
-    def of(cls, problem: "_Problem", start: FloatArray, free: list[int]) -> Self:
-        values = problem.solve(start, free)
-        return cls(values, *problem.linearized(values, free))
-
     @property
     def squares(self) -> float:
         return float(self.residual @ self.residual)
 
 
 _CENTRE, _SIZE, _BELT, _STIFFNESS, _SLOPE, _SECOND, _THIRD, _OFFSET, _FALL, _SCALE = range(10)
+_EXPONENT = 10
 _SMOOTH = [_CENTRE, _SIZE, _BELT, _STIFFNESS, _SLOPE, _SECOND, _THIRD, _OFFSET]
-_JUMPING = [*_SMOOTH, _FALL]
 _STEEP = [_CENTRE, _SIZE, _BELT, _STIFFNESS, _SLOPE, _OFFSET, _FALL, _SCALE]
 _NO_STICK = [each for each in _SMOOTH if each != _BELT]
 _STRAIGHT = {_SLOPE: 0.0, _SECOND: 0.0, _THIRD: 0.0, _FALL: 0.5, _SCALE: 0.5}
-_FALLS = ((0, _JUMPING, {_FALL: 0.1}), (1, _STEEP, _STRAIGHT), (2, _STEEP, _STRAIGHT))
-"""Exponent, free parameters and starts of each form of a fall of the friction; 0: it jumps."""
-_PRIOR = {_SECOND: _CURVATURE, _THIRD: _CURVATURE, _BELT: _CALIBRATION}
+_FALLS = (
+    ([*_SMOOTH, _FALL], {_FALL: 0.1}),
+    (_STEEP, {**_STRAIGHT, _EXPONENT: 1.0}),
+    (_STEEP, {**_STRAIGHT, _EXPONENT: 2.0}),
+)
+"""Free parameters and starts of each form of a fall of the friction; with exponent 0 it jumps."""
 _LEAST_SIZE = 1e-4
 """Least stick time of the fit: the derivative by it is proportional to it."""
-_LOWER_BOUNDS = np.array([-np.inf, _LEAST_SIZE, -0.3, 0.0, -20.0, -20.0, -20.0, -np.inf, 0.0, 0.02])
-_UPPER_BOUNDS = np.array([np.inf, np.inf, 0.3, 20.0, 20.0, 20.0, 20.0, np.inf, 20.0, 2.0])
+_LOWER_BOUNDS = np.array([-inf, _LEAST_SIZE, -0.3, 0.0, -20.0, -20.0, -20.0, -inf, 0.0, 0.02, 0.0])
+_UPPER_BOUNDS = np.array([inf, inf, 0.3, 20.0, 20.0, 20.0, 20.0, inf, 20.0, 2.0, 2.0])
+_PRIOR = np.zeros((3, len(_LOWER_BOUNDS)))
+_PRIOR[range(3), [_SECOND, _THIRD, _BELT]] = 1.0 / np.array([_CURVATURE, _CURVATURE, _CALIBRATION])
+"""Parameters in their prior standard deviations, by the parameters."""
 
 
-class _Problem:
-    """Least squares in natural units: time 1 / frequency, length belt speed / frequency."""
+class _Motion:
+    """Positions near a stick, in units of 1 / frequency and of belt speed / frequency."""
 
-    def __init__(
-        self,
-        time: FloatArray,
-        relative: FloatArray,
-        reach: float,
-        *,
-        sticks: bool = True,
-        exponent: int = 0,
-        noise: float = 0.0,
-    ) -> None:
-        self.time, self.relative, self._sticks = time, relative, sticks
-        self._reach, self._exponent, self._noise = (1.0 + _MARGIN) * reach, exponent, noise
+    def __init__(self, time: FloatArray, relative: FloatArray, reach: float, sticks: bool) -> None:
+        self._time, self._relative, self._reach, self._sticks = time, relative, reach, sticks
 
-    def solve(self, start: FloatArray, free: list[int]) -> FloatArray:
-        """Return the parameters with the least squares of those that are free."""
+    def fit(self, start: FloatArray, free: list[int], noise: float = 0.0) -> _Fit:
+        """Return the fit with the least squares by the parameters that are free.
+
+        The prior is weighed by the noise; where it is not known, by what a fit without it leaves.
+        """
         from scipy.optimize import least_squares  # takes long to import
 
-        values, prior = start.copy(), np.zeros((len(_PRIOR), len(start)))
-        prior[range(len(_PRIOR)), list(_PRIOR)] = 1.0 / np.array([*_PRIOR.values()])
+        values, jacobian = start.copy(), np.empty(0)
         lowest = _LOWER_BOUNDS.copy()
         if not self._sticks:
             lowest[[_SIZE, _STIFFNESS]] = -0.3
         inside = np.clip(start, lowest + 1e-9, _UPPER_BOUNDS - 1e-9)[free]
-        jacobian = np.empty(0)
 
         def residual(part: FloatArray) -> FloatArray:
             nonlocal jacobian
             values[free] = part
-            rest, slopes = self.linearized(values, free)
-            jacobian = np.concatenate([slopes, self._noise * prior[:, free]])
-            return np.append(rest, self._noise * (prior @ values))
+            trials = np.tile(values, (len(free) + 1, 1))
+            trials[np.arange(len(free)), free] += _STEP
+            fitted = self._fitted(trials)
+            slopes = (fitted[:-1] - fitted[-1]).T / _STEP
+            jacobian = np.concatenate([slopes, noise * _PRIOR[:, free]])
+            return np.append(fitted[-1] - self._relative, noise * (_PRIOR @ values))
 
         def rates(_: FloatArray) -> FloatArray:
             return jacobian
@@ -205,46 +201,33 @@ class _Problem:
                 xtol=1e-6,
                 max_nfev=50,
             )
-            inside = found.x
-            # The prior is weighed by the noise that the fit leaves.
-            known, self._noise = self._noise, float(np.sqrt(np.mean(np.square(found.fun))))
-            if known > 0.0:
-                values[free] = inside
-                return values
-
-    def linearized(self, values: FloatArray, free: list[int]) -> tuple[FloatArray, FloatArray]:
-        """Return fit less data, and the derivatives of the fit by the free parameters."""
-        step = 1e-6
-        trials = np.tile(values, (len(free) + 1, 1))
-        trials[np.arange(len(free)), free] += step
-        fitted = self._fitted(trials)
-        return fitted[-1] - self.relative, (fitted[:-1] - fitted[-1]).T / step
+            values[free] = inside = found.x
+            if noise > 0.0:
+                return _Fit(values, found.fun[: -len(_PRIOR)], found.jac[: -len(_PRIOR)])
+            noise = max(rms(found.fun), 1e-300)
 
     def _fitted(self, trials: FloatArray) -> FloatArray:
         """Return the fit for k sets of parameters, shape (k, n)."""
-        half = trials[:, _SIZE] / 2.0 if self._sticks else np.zeros(len(trials))
-        positions, velocities = self._integrate(trials)
-        step, since_centre = self._reach / _STEPS, self.time - trials[:, _CENTRE, None]
-        fitted, speed = (
-            trials[:, _OFFSET, None] + trials[:, _BELT, None] * self.time,
-            1.0 + trials[:, _BELT, None],
-        )
-        for side, columns in ((-1.0, slice(None, len(trials))), (1.0, slice(len(trials), None))):
+        count, belt = len(trials), trials[:, _BELT, None]
+        half = trials[:, _SIZE] / 2.0 if self._sticks else np.zeros(count)
+        motion = self._integrate(trials)
+        since_centre = self._time - trials[:, _CENTRE, None]
+        fitted = trials[:, _OFFSET, None] + belt * self._time
+        for side, own in ((-1.0, motion[..., :count]), (1.0, motion[..., count:])):
             since = np.clip(side * since_centre - half[:, None], 0.0, self._reach)
-            fitted += speed * _interpolate(
-                positions[:, columns], side * velocities[:, columns], step, since
-            )
+            step = self._reach / _STEPS
+            fitted += (1.0 + belt) * _interpolate(own[:, 0], side * own[:, 1], step, since)
         return fitted
 
-    def _integrate(self, trials: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _integrate(self, trials: FloatArray) -> FloatArray:
         """Return displacement and derivative before the landing and after the departure.
 
-        Shape (steps + 1, 2 k), from the edges outwards.
+        Shape (steps + 1, 2, 2 k), from the edges outwards, by the classical Runge-Kutta method.
         """
         size, stiffness, slope, second, third, fall, scale = np.tile(
             trials[:, [_SIZE, _STIFFNESS, _SLOPE, _SECOND, _THIRD, _FALL, _SCALE]].T, 2
         )
-        exponent = self._exponent
+        exponent = float(trials[0, _EXPONENT])
         side = np.repeat([-1.0, 1.0], len(trials))
         if self._sticks:
             # At the landing the spring is short of the limit by the time of the stick.
@@ -252,33 +235,25 @@ class _Problem:
         else:
             early, gap = np.zeros_like(size), size
             limit = gap * (slope + gap * (-second + gap * third))
-        step = side * (self._reach / _STEPS)
-        position, velocity = np.zeros_like(size), -gap
 
-        def rate(position: FloatArray, velocity: FloatArray, time: FloatArray) -> FloatArray:
+        def rate(state: FloatArray, time: FloatArray) -> FloatArray:
             # Far from the solution the motion diverges within reach.
-            velocity = np.maximum(np.minimum(velocity, _LARGEST_SPEED), -_LARGEST_SPEED)
+            velocity = np.maximum(np.minimum(state[1], _LARGEST_SPEED), -_LARGEST_SPEED)
             friction = velocity * (slope + velocity * (second + velocity * third))
-            if exponent:
-                share = np.abs(velocity / scale)
-                friction += fall * np.exp(-(share if exponent == 1 else share * share))
-            return friction + limit - stiffness * (position + time - early)
+            if exponent > 0.0:
+                friction += fall * np.exp(-(np.abs(velocity / scale) ** exponent))
+            return np.array([state[1], friction + limit - stiffness * (state[0] + time - early)])
 
-        positions, velocities = [position], [velocity]
+        step = side * (self._reach / _STEPS)
+        states = [np.array([np.zeros_like(gap), -gap])]
         for row in range(_STEPS):
-            time, middle = row * step, (row + 0.5) * step
-            a1 = rate(position, velocity, time)
-            v2 = velocity + step / 2.0 * a1
-            a2 = rate(position + step / 2.0 * velocity, v2, middle)
-            v3 = velocity + step / 2.0 * a2
-            a3 = rate(position + step / 2.0 * v2, v3, middle)
-            v4 = velocity + step * a3
-            a4 = rate(position + step * v3, v4, time + step)
-            position = position + step / 6.0 * (velocity + 2.0 * v2 + 2.0 * v3 + v4)
-            velocity = velocity + step / 6.0 * (a1 + 2.0 * a2 + 2.0 * a3 + a4)
-            positions.append(position)
-            velocities.append(velocity)
-        return np.array(positions), np.array(velocities)
+            state, middle = states[-1], (row + 0.5) * step
+            k1 = rate(state, row * step)
+            k2 = rate(state + step / 2.0 * k1, middle)
+            k3 = rate(state + step / 2.0 * k2, middle)
+            k4 = rate(state + step * k3, (row + 1.0) * step)
+            states.append(state + step / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4))
+        return np.array(states)
 
 
 def _interpolate(
