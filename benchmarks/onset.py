@@ -23,7 +23,8 @@ import numpy as np
 
 import stickslip_ros as ss
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.measures.onset import OnsetWatch, onset_of
+from stickslip_ros.measures.onset import onset_of
+from stickslip_ros.measures.onset_watch import OnsetWatch
 from stickslip_ros.measures.ring_down import ring_downs
 from stickslip_ros.model.drive import Drive
 from stickslip_ros.model.friction import Exponential, FrictionLaw, LuGre, Stribeck

@@ -30,12 +30,8 @@ class MeanCycle(CycleMeans):
     """Positions, m; shape (n,)."""
     fitted: FloatArray
     """The fit at each sample, m; shape (n,)."""
-    edges: tuple[float, float] | None
-    """Landing and departure within the cycle, s, or None without a stick."""
-    edge_errors: tuple[float, float] | None
-    """Their standard errors, s."""
-    stick_velocity: tuple[float, float] | None
-    """Velocity while sticking, m/s, and its standard error; None without a stick."""
+    stick: Stick | None
+    """The stick within the cycle, on a belt that moves forward; None without one."""
 
 
 def fit_mean_cycle(
@@ -44,8 +40,8 @@ def fit_mean_cycle(
     belt_velocity: float,
     starts: FloatArray,
     noise: float,
-    step: float = 0.0,
-    stick_speed: float = 0.0,
+    step: float,
+    stick_speed: float,
 ) -> MeanCycle | None:
     """Fit the mean of cycles of equal period to samples, s and m, on a belt with a velocity, m/s.
 
@@ -95,9 +91,7 @@ def fit_mean_cycle(
         phase=fold.phase,
         position=sign * fold.position,
         fitted=sign * fitted,
-        edges=None if stick is None else (stick.fit.landing, stick.fit.departure),
-        edge_errors=None if stick is None else stick.edge_errors,
-        stick_velocity=None if stick is None else (sign * stick.fit.belt_speed, stick.speed_error),
+        stick=stick,
     )
 
 

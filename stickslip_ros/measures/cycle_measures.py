@@ -19,7 +19,8 @@ UNBOUNDED_BELT_SPEEDS = 1e3
 """Speed of the slide, in belt speeds, above which a sampled motion counts as unbounded."""
 
 STEADY_CHANGE_UNDER_NOISE = 0.01
-"""The same under noise."""
+"""Largest change of the amplitude over the measured cycles of a steady motion under noise, as a
+share of it."""
 
 LEAST_CYCLES = 3
 """Number of cycles needed to decide whether a motion is steady."""

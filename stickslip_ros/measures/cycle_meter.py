@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from functools import reduce
 from itertools import pairwise
 from math import inf
-from typing import NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -40,6 +40,10 @@ _NOISE = 1e-9
 """Speeds below this share of the belt speed, or of the highest speed so far, are rounding."""
 
 
+_Columns = Sequence["memoryview[Any]"]
+"""Breakpoints as views: elements of arrays take several times as long, lists more memory."""
+
+
 class _Stretch(NamedTuple):
     """Ends, extremes and stick time of a part of a motion."""
 
@@ -50,6 +54,22 @@ class _Stretch(NamedTuple):
     slowest: float
     fastest: float
     stick_time: float
+
+    @classmethod
+    def of(cls, columns: _Columns, first: int, last: int) -> Self:
+        """Return the part from one breakpoint to another."""
+        time, position, velocity, sticking = columns
+        rows, stuck = slice(first, last + 1), sticking[first + 1 : last + 1]
+        sticks = [time[row] - time[row - 1] for row, each in enumerate(stuck, first + 1) if each]
+        return cls(
+            time[first],
+            time[last],
+            min(position[rows]),
+            max(position[rows]),
+            min(velocity[rows]),
+            max(velocity[rows]),
+            float(np.sum(sticks)) if len(sticks) > 1 else sum(sticks, 0.0),
+        )
 
     def followed_by(self, later: "_Stretch") -> "_Stretch":
         return _Stretch(
@@ -75,30 +95,6 @@ class _Stretch(NamedTuple):
             period=self.duration,
             frequency=1.0 / self.duration,
             stick_fraction=stick_fraction if stick_fraction > GRAZING_FRACTION else 0.0,
-        )
-
-
-class _Rows:
-    """Breakpoints as views: elements of arrays take several times as long, lists more memory."""
-
-    def __init__(self, breakpoints: Breakpoints) -> None:
-        self.time, self._position, self._velocity, self._sticking = (
-            column.data for column in vars(breakpoints).values()
-        )
-
-    def stretch(self, first: int, last: int) -> _Stretch:
-        """Return the part from one breakpoint to another."""
-        time, position, velocity = self.time, self._position, self._velocity
-        rows, stuck = slice(first, last + 1), self._sticking[first + 1 : last + 1]
-        sticks = [time[row] - time[row - 1] for row, each in enumerate(stuck, first + 1) if each]
-        return _Stretch(
-            time[first],
-            time[last],
-            min(position[rows]),
-            max(position[rows]),
-            min(velocity[rows]),
-            max(velocity[rows]),
-            float(np.sum(sticks)) if len(sticks) > 1 else sum(sticks, 0.0),
         )
 
 
@@ -181,19 +177,20 @@ class CycleMeter:
         self._fastest_belt = abs(belt_speed) if fastest_belt is None else fastest_belt
         if len(self._last):
             breakpoints = self._last.followed_by(breakpoints)
-        rows, completed, last = _Rows(breakpoints), list[Cycle](), 0
+        columns = [column.data for column in vars(breakpoints).values()]
+        completed, last = list[Cycle](), 0
         for edge in self._upward_crossings(breakpoints):
-            stretch = reduce(_Stretch.followed_by, [*self._parts, rows.stretch(last, edge)])
+            stretch = reduce(_Stretch.followed_by, [*self._parts, _Stretch.of(columns, last, edge)])
             if self._whole and stretch.duration > 0.0:
                 completed.append(stretch.as_cycle())
                 self.ends.append(stretch.end)
                 self._cycles.append(completed[-1])
                 self._amplitudes.append(completed[-1].amplitude)
             self._parts, self._whole, last = [], True, edge
-        self._follow(rows, last, len(breakpoints) - 1)
+        self._follow(columns, last, len(breakpoints) - 1)
         row = int(np.flatnonzero(~breakpoints.sticking[1:]).max(initial=-1)) + 1
         if row > 0 or self._slid == inf:
-            self._slid = rows.time[row]
+            self._slid = columns[0][row]
         self._last = breakpoints[len(breakpoints) - 1 :]
         return completed
 
@@ -278,24 +275,24 @@ class CycleMeter:
         rising = moving[(directions[:-1] < 0.0) & (directions[1:] > 0.0)].tolist()
         return [row - (row > 0 and bool(speed[row - 1] <= speed[row])) for row in rising]
 
-    def _follow(self, rows: _Rows, row: int, last: int) -> None:
+    def _follow(self, columns: _Columns, row: int, last: int) -> None:
         """Add the breakpoints from one to another to the stretch since the last crossing.
 
         Once it is longer than the last cycle, a part begins whenever it has doubled: its last two
         parts are at least its last half.
         """
         if not self._parts:
-            self._parts = [rows.stretch(row, row)]
+            self._parts = [_Stretch.of(columns, row, row)]
         start = self._parts[0].start
         earliest = start + (self._cycles[-1].period if self._cycles else 0.0)
         while row < last:
             current = self._parts[-1]
             due = max(2.0 * current.start - start, earliest)
             find = bisect_left if due > current.start else bisect_right
-            doubled = find(rows.time, due, row + 1, last + 1)
-            self._parts[-1] = current.followed_by(rows.stretch(row, min(doubled, last)))
+            doubled = find(columns[0], due, row + 1, last + 1)
+            self._parts[-1] = current.followed_by(_Stretch.of(columns, row, min(doubled, last)))
             if doubled <= last:
-                self._parts.append(rows.stretch(doubled, doubled))
+                self._parts.append(_Stretch.of(columns, doubled, doubled))
             row = doubled
 
     def _recent_motion(self) -> Cycle | None:

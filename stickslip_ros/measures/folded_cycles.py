@@ -162,7 +162,7 @@ class FoldedCycles:
             found = np.linalg.lstsq(basis, rest, rcond=None)[0]
             residual = rest - basis @ found
             left, more = float(residual @ residual), basis.shape[1] - width
-            covariance = self._covariance(basis, residual)
+            covariance = self._covariance(basis, residual, slice(None))
             # A coefficient takes one variance of noise. The size that adds no more than noise is
             # used, not the one before it: then the bias is small against the standard error.
             if squares - left <= 3.0 * more * left / max(len(phase) - basis.shape[1], 1):
@@ -192,17 +192,15 @@ class FoldedCycles:
         used = np.flatnonzero(np.abs(around) < min(reach, 0.49 * self.period))
         gap = self.period / self.phases
         self.hidden_stick = max(guess, gap)
-        time, number = around[used], self.number[used]
         if len(used) < 12:
             return None
-        position = self.position[used]
+        time, position = around[used], self.position[used]
         # The stairs of a few steps look like falls of the friction.
         may_fall = (
             noise >= self._step / 2.0 or float(np.ptp(self.position)) > _FEW_STEPS * self._step
         )
         with_stick = fit_stick(time, position, belt_speed, frequency, guess, may_fall=may_fall)
-        covariance = _clustered(with_stick.jacobian, with_stick.residual, number)
-        covariance += self._rounding(with_stick.jacobian, with_stick.residual, self.position[used])
+        covariance = self._covariance(with_stick.jacobian, with_stick.residual, used)
         covariance[:3, :3] += with_stick.spread
         middle, length, speed = np.eye(3, len(covariance))
         landing, departure, time_error, speed_error = (
@@ -254,7 +252,7 @@ class FoldedCycles:
 
     def period_error(self, shape: Shape, residual: FloatArray) -> float:
         """Return the standard error of the period, s."""
-        covariance = self._covariance(self._shifts(shape), residual)
+        covariance = self._covariance(self._shifts(shape), residual, slice(None))
         return float(np.sqrt(covariance[1, 1]))
 
     def relative_amplitudes(self, shape: Shape, residual: FloatArray) -> FloatArray:
@@ -276,22 +274,21 @@ class FoldedCycles:
         rate = -shape.velocity(self.phase)
         return np.column_stack([rate, rate * self._turns, np.ones(len(rate))])
 
-    def _covariance(self, jacobian: FloatArray, residual: FloatArray) -> FloatArray:
-        covariance = _clustered(jacobian, residual, self.number)
-        return covariance + self._rounding(jacobian, residual, self.position)
-
-    def _rounding(
-        self, jacobian: FloatArray, residual: FloatArray, position: FloatArray
+    def _covariance(
+        self, jacobian: FloatArray, residual: FloatArray, rows: IntArray | slice
     ) -> FloatArray:
-        """Return the covariance by rounding to steps, which in each cycle follows the motion alike.
+        """Return the covariance of a fit to these rows, see `_clustered`, and that by rounding.
 
-        The mean over the offsets that the fit may have from the grid of the steps.
+        Rounding to steps follows the motion alike in each cycle: it is the mean over the offsets
+        that the fit may have from the grid of the steps.
         """
-        if float(np.std(residual)) >= _WHITENING_RESIDUAL * self._step:
-            return np.zeros((jacobian.shape[1],) * 2)
-        steps = (position - residual)[:, None] / self._step + np.arange(_OFFSETS) / _OFFSETS
-        errors = np.linalg.pinv(jacobian) @ ((np.rint(steps) - steps) * self._step)
-        return errors @ errors.T / _OFFSETS
+        covariance = _clustered(jacobian, residual, self.number[rows])
+        if float(np.std(residual)) < _WHITENING_RESIDUAL * self._step:
+            fitted = self.position[rows] - residual
+            steps = fitted[:, None] / self._step + np.arange(_OFFSETS) / _OFFSETS
+            errors = np.linalg.pinv(jacobian) @ ((np.rint(steps) - steps) * self._step)
+            covariance += errors @ errors.T / _OFFSETS
+        return covariance
 
 
 def _clustered(jacobian: FloatArray, residual: FloatArray, number: IntArray) -> FloatArray:

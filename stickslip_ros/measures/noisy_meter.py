@@ -9,14 +9,12 @@ from stickslip_ros.measures.cycle_measures import Cycle
 from stickslip_ros.measures.noise import (
     PRECISION,
     encoder_step,
-    impulses,
     medians,
     white_noise,
 )
 from stickslip_ros.measures.noisy_window import REVERSAL, NoisyWindow
 from stickslip_ros.measures.single_cycles import (
     NoisySamples,
-    Point,
     cycle_between,
     fit_reach,
     reversals,
@@ -41,33 +39,6 @@ _MARGIN = 64
 """Number of samples that are kept before the window, for the fits at its start."""
 _ROUNDING_SHARE = 1e-7
 """Noise below this share of the motion is rounding, or an imperfection of the estimate."""
-_UNKNOWN = 2
-"""Number of the last samples that may still be impulses."""
-
-
-class _Columns:
-    """Samples as columns that grow at the end and are cut at both ends."""
-
-    def __init__(self) -> None:
-        self._table, self._rows = np.empty((4, 0)), slice(0, 0)
-
-    @property
-    def samples(self) -> NoisySamples:
-        return NoisySamples(*self._table[:, self._rows])
-
-    def replace_last(self, rows: int, samples: NoisySamples) -> None:
-        """Put samples in place of the last rows."""
-        start, stop = self._rows.start, max(self._rows.stop - rows, self._rows.start)
-        end = stop + len(samples)
-        if end > self._table.shape[1]:
-            table = np.empty((4, 2 * (end - start) + 1024))
-            table[:, : stop - start] = self._table[:, start:stop]
-            self._table, start, stop, end = table, 0, stop - start, end - start
-        self._table[:, stop:end] = list(vars(samples).values())
-        self._rows = slice(start, end)
-
-    def drop_first(self, rows: int) -> None:
-        self._rows = slice(self._rows.start + rows, self._rows.stop)
 
 
 class NoisyCycleMeter:
@@ -87,17 +58,6 @@ class NoisyCycleMeter:
         """Whether positions or velocities have noise."""
         self.ends: list[float] = []
         """Time, s, at which each cycle ended that `feed` returned last."""
-        self._begin()
-
-    def _begin(self) -> None:
-        self._columns = _Columns()
-        self._low: tuple[float, Point] | None = None
-        """Time of the lowest sample at the end of the last cycle, and the vertex there."""
-
-    def interrupt(self) -> None:
-        """Drop the current cycle: the next sample does not continue the motion so far."""
-        self.window.interrupt()
-        self._begin()
 
     def feed(
         self, time: FloatArray, position: FloatArray, velocity: FloatArray, belt: FloatArray
@@ -110,23 +70,13 @@ class NoisyCycleMeter:
             due = _BATCH - window.run % _BATCH
             part, new = new[:due], new[due:]
             window.run += len(part)
-            self._take(part)
+            window.last.add(part, window.noise)
             if window.run % _LOOK_INTERVAL == 0 or window.run == _FIRST_LOOK:
                 self._look()
             # Always at the same samples: what is found must not depend on the blocks.
             if window.run % _BATCH == 0 and window.run >= _FIRST_LOOK:
                 completed += self._advance()
         return completed
-
-    def _take(self, part: NoisySamples) -> None:
-        """Hold samples without impulses, which those beside them tell."""
-        self._columns.replace_last(0, part)
-        if self.window.noise > 0.0:
-            last = self._columns.samples[-len(part) - 2 * _UNKNOWN :]
-            found = impulses(last.position, self.window.noise)
-            if found.any():
-                self._columns.replace_last(len(last), last[~found])
-        self.window.last.samples = self._columns.samples[:-_UNKNOWN]
 
     def _look(self) -> None:
         """Estimate the noise, and the step of an encoder, from the last samples."""
@@ -153,46 +103,31 @@ class NoisyCycleMeter:
     def _advance(self) -> list[Cycle]:
         """Return the cycles that the samples since the last one complete."""
         last, noise = self.window.last, self.window.noise
-        samples, cycles, starts = last.samples, last.cycles, last.starts
-        first = 0 if self._low is None else samples.row(self._low[0])
+        samples, cycles, lows = last.samples, last.cycles, last.lows
+        first = samples.row(lows[-1].time) if lows else 0
         if len(samples) - first > _WITHOUT_CYCLES and self.window.run % _LOOK_INTERVAL:
             return []
         size = 2.0 * cycles[-1].amplitude if cycles and not last.resting else 0.0
         least = max(REVERSAL * noise, _REVERSAL_SHARE * size)
         completed: list[Cycle] = []
         # The median of the last position takes one more.
-        for rows in reversals(self._columns.samples.position[first:-1], least):
+        for rows in reversals(last.held.position[first:-1], least):
             high, low = (first + row for row in rows)
             reach = fit_reach(samples, low, high, noise)
             if low + reach >= len(samples):
                 break  # samples for the fit are missing
-            start, end = self._low, vertex(samples, low, reach)
-            self._low = float(samples.time[low]), end
-            cycle = start and cycle_between(samples, start[1], end, high, noise)
-            if start is None or cycle is None:
-                continue
-            if not cycles:
-                starts.append(start[1].time)
-            starts.append(end.time)
-            cycles.append(cycle)
-            self.ends.append(end.time)
-            completed.append(cycle)
-        self._trim()
-        return completed
-
-    def _trim(self) -> None:
-        """Drop the samples before the window."""
-        last = self.window.last
-        samples, cycles, starts = last.samples, last.cycles, last.starts
-        row = len(samples) - _WITHOUT_CYCLES
-        if self._low is not None:
-            row = samples.row(starts[0] if starts else self._low[0])
+            end = vertex(samples, low, reach)
+            cycle = cycle_between(samples, lows[-1], end, high, noise) if lows else None
+            if cycle is not None:
+                cycles.append(cycle)
+                self.ends.append(end.time)
+                completed.append(cycle)
+            elif lows:
+                lows.pop()
+            lows.append(end)
+        # Drop the samples before the window.
+        row = samples.row(lows[0].time) if lows else len(samples) - _WITHOUT_CYCLES
         row = min(max(row, len(samples) - _MOST_SAMPLES) - _MARGIN, len(samples) - _LOOK_LENGTH)
-        if row <= 0:
-            return
-        self._columns.drop_first(row)
-        last.samples = samples[row:]
-        while starts and starts[0] < last.samples.time[0]:
-            starts.popleft()
-            if cycles:
-                cycles.popleft()
+        if row > 0:
+            last.drop_first(row)
+        return completed

@@ -27,10 +27,11 @@ from stickslip_ros.measures.noise import (
     FEWEST_SAMPLES,
     LEAST_SAMPLES,
     PRECISION,
+    impulses,
     resolved,
     strongest_line,
 )
-from stickslip_ros.measures.single_cycles import LEAST_STICK, NoisySamples
+from stickslip_ros.measures.single_cycles import LEAST_STICK, NoisySamples, Point
 from stickslip_ros.measures.slips import regime_by_slips
 
 REVERSAL = 8.0
@@ -43,23 +44,62 @@ _QUANTUM = 1.73
 """Resolution of an encoder with a noise of half of it, in standard deviations of the two."""
 _SLIP_SHARE = 0.1
 """Share of the belt speed by which a slide at rest may seem to move."""
+_UNKNOWN = 2
+"""Number of the last samples that may still be impulses."""
 
 
 class LastCycles:
     """The last cycles of a part of a run without a gap, with their samples; SI units."""
 
     def __init__(self, most_cycles: int) -> None:
-        self.samples = NoisySamples(*np.empty((4, 0)))
         self.cycles: deque[Cycle] = deque(maxlen=most_cycles)
-        self.starts: deque[float] = deque(maxlen=most_cycles + 1)
-        """Start of each cycle, and the end of the last, s."""
+        self.lows: deque[Point] = deque(maxlen=most_cycles + 1)
+        """Lowest points: the start of each cycle, and the end of the last."""
+        self._table, self._rows = np.empty((4, 0)), slice(0, 0)
+        """Columns with room to grow, and the rows of them that are held."""
+
+    @property
+    def held(self) -> NoisySamples:
+        """Samples so far; the last two may still be impulses."""
+        return NoisySamples(*self._table[:, self._rows])
+
+    @property
+    def samples(self) -> NoisySamples:
+        """Samples that are no impulses."""
+        return self.held[:-_UNKNOWN]
+
+    def add(self, part: NoisySamples, noise: float) -> None:
+        """Add samples, and drop impulses beyond this noise, which the samples beside them tell."""
+        self._replace_last(0, part)
+        if noise > 0.0:
+            last = self.held[-len(part) - 2 * _UNKNOWN :]
+            found = impulses(last.position, noise)
+            if found.any():
+                self._replace_last(len(last), last[~found])
+
+    def _replace_last(self, rows: int, samples: NoisySamples) -> None:
+        start, stop = self._rows.start, max(self._rows.stop - rows, self._rows.start)
+        end = stop + len(samples)
+        if end > self._table.shape[1]:
+            table = np.empty((4, 2 * (end - start) + 1024))
+            table[:, : stop - start] = self._table[:, start:stop]
+            self._table, start, stop, end = table, 0, stop - start, end - start
+        self._table[:, stop:end] = list(vars(samples).values())
+        self._rows = slice(start, end)
+
+    def drop_first(self, rows: int) -> None:
+        """Drop samples, and the cycles that began with them."""
+        self._rows = slice(self._rows.start + rows, self._rows.stop)
+        while len(self.lows) > 1 and self.lows[0].time < self._table[0, self._rows.start]:
+            self.lows.popleft()
+            self.cycles.popleft()
 
     @property
     def resting(self) -> bool:
         """Whether no reversal has come for several periods."""
         if not self.cycles or len(self.samples) == 0:
             return False
-        since = float(self.samples.time[-1]) - self.starts[-1]
+        since = float(self.samples.time[-1]) - self.lows[-1].time
         return since > STALE_PERIODS * self.cycles[-1].period
 
 
@@ -130,9 +170,9 @@ class NoisyWindow:
         if resting:
             # The second half of what has come since the last cycle.
             samples = part.samples
-            first = samples.row(part.starts[-1]) if part.cycles else 0
+            first = samples.row(part.lows[-1].time) if part.cycles else 0
             return self._rest(samples[(first + len(samples)) // 2 :]), None
-        fit = None if quick else self._fit(part.samples, part.starts)
+        fit = None if quick else self._fit(part.samples, [low.time for low in part.lows])
         if fit is not None:
             return self._found(part.samples, fit, fit.noise), fit
         return self._unlike(part, by_slips=not quick), None
@@ -148,7 +188,7 @@ class NoisyWindow:
             found = replace(found, errors={**found.errors, "stick_fraction": error})
         if not by_slips or found.regime not in (Regime.STICK_SLIP, Regime.PURE_SLIP):
             return found
-        samples = part.samples[part.samples.row(part.starts[0]) :]
+        samples = part.samples[part.samples.row(part.lows[0].time) :]
         sign = -1.0 if float(samples.belt[-1]) < 0.0 else 1.0
         size = max(means.cycle.amplitude / 2.0, REVERSAL * max(self.noise, self.step))
         regime = regime_by_slips(samples.time, sign * samples.position, size, means.cycle.period)

@@ -8,11 +8,9 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.measures.ring_down import RingDown, ring_downs
+from stickslip_ros.measures.ring_down import RingDown
 from stickslip_ros.model.friction import Exponential, FrictionLaw, RateState, Stribeck
 from stickslip_ros.quantities import Quantity
-from stickslip_ros.samples import NO_SAMPLES, SampleColumns
-from stickslip_ros.stamps import NANOSECONDS
 from stickslip_ros.text import quantity
 
 _SAME_SPEED, _LEAST_RANGE = 1.005, 1.03
@@ -37,10 +35,6 @@ _FAMILIES: Mapping[str, tuple[FrictionLaw, str, int]] = {
 }
 """Families of friction laws: a law, any multiple of which is in it; the constant that may have any
 value; number of constants of the decay rate, of which viscous damping is one."""
-_WINDOW, _LONG = 8, 4
-"""Time that a watch keeps, and length of a ring-down that need not have ended, in its pauses."""
-_MOST_KEPT, _MOST_SAMPLES = 300, 100_000
-"""Number of ring-downs and of samples that it keeps at most."""
 
 
 @dataclass(frozen=True)
@@ -224,68 +218,3 @@ def _slope(law: FrictionLaw, speed: FloatArray) -> FloatArray:
     step = 1e-4 * speed
     found: FloatArray = (law.at_rest(speed + step) - law.at_rest(speed - step)) / (2.0 * step)
     return found
-
-
-class OnsetWatch:
-    """Follows the onset of a running machine by the ring-downs in its last seconds.
-
-    The pause between its looks, 1 s, must not be shorter than the period of the vibration.
-    """
-
-    def __init__(self) -> None:
-        self.ring_downs: list[RingDown] = []
-        self.onset = Onset([], {})
-        self.pause = 1.0
-        """Time between two looks, s."""
-        self._kept, self._looks, self._after = NO_SAMPLES, 0, -inf
-
-    def feed(self, samples: SampleColumns) -> list[RingDown]:
-        """Add samples, in blocks of any length; return the ring-downs that have ended with them."""
-        samples = samples[samples.is_valid]
-        looks = np.append(self._looks, samples.stamp // round(self.pause * NANOSECONDS))
-        found: list[RingDown] = []
-        first, self._looks = 0, int(looks[-1])
-        for edge in np.flatnonzero(np.diff(looks)).tolist():
-            self._kept = self._kept.followed_by(samples[first:edge])
-            found, first = [*found, *self._look()], edge
-        self._kept = self._kept.followed_by(samples[first:])[-_MOST_SAMPLES:]
-        if found:
-            self.ring_downs = [*self.ring_downs, *found][-_MOST_KEPT:]
-            self.onset = onset_of(self.ring_downs)
-        return found
-
-    def _look(self) -> list[RingDown]:
-        kept = self._kept
-        steps = np.diff(kept.stamp)
-        usual = float(np.median(steps)) if len(steps) else 0.0
-        gaps = np.flatnonzero((steps <= 0) | (steps > 1.5 * usual))
-        kept = kept[int(gaps[-1]) + 1 :] if len(gaps) else kept
-        if usual <= 0.0:
-            return []
-        first = kept.stamp[-1] - round(_WINDOW * self.pause * NANOSECONDS)
-        self._kept = kept = kept[kept.stamp > first]
-        origin, now = kept.stamp[[0, -1]] / NANOSECONDS
-        period = usual / NANOSECONDS
-        after = self._after - origin if self._after < now else -inf  # a clock may be set back
-        seen = ring_downs(kept.position, kept.belt_velocity, period, after)
-        ended = now - origin - 2.0 * period
-        long = _LONG * self.pause
-        found = [each for each in seen if each.end < ended or each.end - each.start > long]
-        self._after = origin + found[-1].end if found else self._after
-        return found
-
-    def status(self, margin: float) -> tuple[str, bool]:
-        """Return decay, onset and feed as text, and whether the feed is too near the onset.
-
-        It is unless a share `margin` of the feed is above the upper limit of the onset.
-        """
-        if not self.ring_downs:
-            return "", False
-        own, feed = self.onset, float(abs(self._kept.belt_velocity[-1]))
-        text = f"decay {self.ring_downs[-1].decay_rate:.2g} 1/s, "
-        if own.speed and own.lower and own.upper:
-            half = 500.0 * (own.upper - own.lower)
-            text += f"onset {1e3 * own.speed:.3g} +- {half:.2g} mm/s, "
-        elif own.upper:
-            text += f"onset below {1e3 * own.upper:.3g} mm/s, "
-        return f"{text}feed {1e3 * feed:.3g} mm/s", (own.upper or 0.0) > (1.0 - margin) * feed

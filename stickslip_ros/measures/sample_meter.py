@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import inf
+from math import copysign, inf
 from typing import Protocol
 
 import numpy as np
@@ -140,7 +140,7 @@ class SampleMeter:
                 continue  # a single sample is no motion, and there may be very many of them
             if start > 0:
                 self._meter.interrupt()
-                self._noisy_meter.interrupt()
+                self._noisy_meter.window.interrupt()
                 self._last = None
             cycles += self._feed_segment(segment)
         self._last = samples[-1:]
@@ -215,8 +215,8 @@ class SampleMeter:
                 "known from single cycles (see --slips)"
             )
         mean, belt = self.mean_cycle, self._last.belt_velocity[-1] if self._last else 0.0
-        if mean is not None and mean.stick_velocity is not None and not self._stick_speed:
-            velocity, error = mean.stick_velocity
+        if mean is not None and mean.stick is not None and not self._stick_speed:
+            velocity, error = copysign(mean.stick.fit.belt_speed, belt), mean.stick.speed_error
             if abs(velocity - belt) > _LEAST_ERRORS * error + _LEAST_SHARE * abs(belt):
                 notes.append(
                     f"the slide sticks at {quantity(velocity, 'm/s')} (standard error "

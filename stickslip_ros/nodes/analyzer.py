@@ -27,7 +27,7 @@ from stickslip_ros.arrays import IntArray
 from stickslip_ros.errors import BagError, InvalidInputError, MessageError
 from stickslip_ros.measures.cycle_measures import trend_text
 from stickslip_ros.measures.noise import import_for_noise
-from stickslip_ros.measures.onset import OnsetWatch
+from stickslip_ros.measures.onset_watch import OnsetWatch
 from stickslip_ros.measures.run_meter import RunMeter
 from stickslip_ros.measures.sample_assumptions import SampleAssumptions
 from stickslip_ros.measures.timing import Timing

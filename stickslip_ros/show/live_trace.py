@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip_ros.arrays import FloatArray, IntArray
-from stickslip_ros.measures.run_meter import HELD_FORCES, DroppedForces
+from stickslip_ros.measures.control_forces import HELD_FORCES, DroppedForces
 from stickslip_ros.measures.sampling_grid import LONGEST_GAP
 from stickslip_ros.samples import ForceColumns, SampleColumns
 from stickslip_ros.show.run_history import Trace, peaks

@@ -265,9 +265,10 @@ def _cycle(axes: Axes, mean: MeanCycle, units: Units, *, short: bool) -> None:
     raw: Any = _RAW | {"ms": 6.0}  # wider than the line
     axes.plot(mean.phase / second, mean.position / scale, **raw, label="measured, all cycles")
     axes.plot(mean.phase[order] / second, mean.fitted[order] / scale, **_FITTED, label="fitted")
-    if mean.edges is not None and mean.edge_errors is not None:
-        period = mean.cycle.period
-        named = zip(("landing", "departure"), mean.edges, mean.edge_errors, strict=True)
+    if mean.stick is not None:
+        period, fit = mean.cycle.period, mean.stick.fit
+        edges = (fit.landing, fit.departure), mean.stick.edge_errors
+        named = zip(("landing", "departure"), *edges, strict=True)
         for line, (name, edge, error) in enumerate(named):
             at, half = edge % period / second, _CONFIDENCE * error / second
             axes.axvspan(at - half, at + half, color=GREY, alpha=0.6, lw=0.0)

@@ -8,7 +8,8 @@ import pytest
 
 import stickslip_ros as ss
 from benchmarks.onset import summary, tapped, tried
-from stickslip_ros.measures.onset import OnsetWatch, mean_decays, onset_of
+from stickslip_ros.measures.onset import mean_decays, onset_of
+from stickslip_ros.measures.onset_watch import OnsetWatch
 from stickslip_ros.measures.ring_down import RingDown
 from stickslip_ros.model.drive import Drive
 from stickslip_ros.model.friction import Exponential, FrictionLaw, LuGre, Stribeck

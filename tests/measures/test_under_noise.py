@@ -186,8 +186,8 @@ def test_a_belt_speed_that_is_told_wrong_and_a_drift_leave_the_stick(
     )
     assert found.errors["stick_fraction"] < 0.005
     assert found.amplitude == pytest.approx(434.09e-6, rel=1e-3)
-    velocity, error = meter.mean_cycle.stick_velocity
-    assert velocity == pytest.approx(0.04, abs=4.0 * error)
+    stick = meter.mean_cycle.stick
+    assert stick.fit.belt_speed == pytest.approx(0.04, abs=4.0 * stick.speed_error)
     assert any("the slide sticks at" in note for note in meter.notes(found)) == (told != 0.0)
     assert (found.drift is not None) == (drift != 0.0)
 
