@@ -188,9 +188,9 @@ class CycleMeter:
                 self._amplitudes.append(completed[-1].amplitude)
             self._parts, self._whole, last = [], True, edge
         self._follow(columns, last, len(breakpoints) - 1)
-        row = int(np.flatnonzero(~breakpoints.sticking[1:]).max(initial=-1)) + 1
-        if row > 0 or self._slid == inf:
-            self._slid = columns[0][row]
+        (slides,) = (~breakpoints.sticking[1:]).nonzero()
+        if len(slides) > 0 or self._slid == inf:
+            self._slid = columns[0][slides[-1] + 1 if len(slides) > 0 else 0]
         self._last = breakpoints[len(breakpoints) - 1 :]
         return completed
 

@@ -192,7 +192,9 @@ class DimensionlessDrive(HybridSystem):
             )
         )
         self.constants = dict(self._named_constants())
-        self._reaction, self._friction = partial(equations.reaction, self.drive), law.friction
+        # Whether friction follows from the speed alone.
+        self._is_static = self.autonomous and not law.states and not law.switches
+        self._reaction, self._coefficient = partial(equations.reaction, self.drive), law.coefficient
 
     def _named_constants(self) -> Iterator[tuple[str, float]]:
         drive, law = self.drive, self.drive.friction
@@ -269,8 +271,7 @@ class DimensionlessDrive(HybridSystem):
             seen = seen_by(self.control, state[POSITION], state[SPEED], motor)
             return self.control.control_force(*seen, own)
         if self.has_actuator:
-            lagging = state[self.actuator_states].tolist()
-            force = float(self.drive.actuator.force(inputs[0], lagging))
+            force = self.drive.actuator.force(inputs[0], state[self.actuator_states])
             return force if self.drive.motor is not None else force + inputs[1]
         return inputs[0]
 
@@ -317,9 +318,13 @@ class DimensionlessDrive(HybridSystem):
         sign = mode.switches[0]
         if sign == 0.0:
             return self.held_force(mode, instant)
+        drive = self.drive
+        if self._is_static:
+            relative_speed = instant.state[SPEED] - drive.belt_speed
+            return drive.normal_force * float(self._coefficient(relative_speed, sign))
         relative_speed = instant.state[SPEED] - self.belt_speed(mode, instant.time)
         memory, own = self._memory(instant), mode.switches[self._parts.law]
-        coefficient = self._friction(relative_speed, sign, memory, own)
+        coefficient = drive.friction.friction(relative_speed, sign, memory, own)
         return self.normal_force(mode, instant.time) * float(coefficient)
 
     @cached_property

@@ -25,7 +25,6 @@ class PlainDriveSystem(DriveSystem):
     def __init__(self, drive: Drive, control: ContinuousControl | None = None) -> None:
         super().__init__(drive, control)
         self._speed = self.drive.belt_speed
-        self._coefficient = self.drive.friction.coefficient
         # Whether the belt bends the spring; without one a held force never releases the slide.
         self._loads = self._speed != 0.0 and self.drive.has_spring
         # A control that does not receive pairs: there is no motor.
