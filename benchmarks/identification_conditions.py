@@ -19,9 +19,10 @@ from typing import Any
 import numpy as np
 
 from benchmarks import identification as study
+from stickslip_ros.identification.even_clock import evenly_spaced
 from stickslip_ros.identification.identified_law import DELAY, LAG
 from stickslip_ros.identification.identify import identify
-from stickslip_ros.identification.record import Record, evenly_spaced
+from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.servo import Servo, closed_loop
 from stickslip_ros.model.drive import Drive
 from stickslip_ros.model.friction import Coulomb, Directional
@@ -105,7 +106,7 @@ def tried(case: str, seed: int) -> tuple[dict[str, list[float]], float]:
         name: [each.value - true.get(name, 0.0), each.standard_error]
         for name, each in found.fitted.items()
     }
-    return errors, found.delay
+    return errors, found.chosen.delay
 
 
 def summary(case: str, seeds: int, choices: int = 0) -> dict[str, Any]:

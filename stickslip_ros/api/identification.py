@@ -155,17 +155,6 @@ class Model(Result):
     @override
     def _entries(self) -> dict[str, Any]:
         found = self.findings
-        curves: list[dict[str, Any]] = []
-        for number, direction in enumerate(found.directions):
-            curve = found.friction(number)
-            curves.append(
-                {
-                    "direction": direction,
-                    "speed": curve.speed.tolist(),
-                    "force": curve.force.tolist(),
-                    "standard_error": curve.standard_error.tolist(),
-                }
-            )
         return {
             "law": found.law,
             "parameters": {name: each.as_dict() for name, each in self.parameters.items()},
@@ -186,10 +175,18 @@ class Model(Result):
                 }
                 for each in found.candidates
             ],
-            "curves": curves,
+            "curves": [
+                {
+                    "direction": each.direction,
+                    "speed": each.speed.tolist(),
+                    "force": each.force.tolist(),
+                    "standard_error": each.standard_error.tolist(),
+                }
+                for each in found.curves
+            ],
             "notes": self._notes,
             "servo": None if found.servo is None else vars(found.servo),
-            "force_delay": found.delay,
+            "force_delay": found.chosen.delay,
             "checks": self._checks,
         }
 

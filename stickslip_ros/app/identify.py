@@ -132,7 +132,6 @@ def _write(path: Path, found: "Findings") -> None:
         files = written_scenario(found, path)
     names = ", ".join(map(str, files))
     command = shlex.join(["stickslip", "simulate", str(path)])
-    moves = (
-        "" if found.has_spring else ", which stays at rest until a force or a reference moves it"
-    )
+    still = ", which stays at rest until a force or a reference moves it"
+    moves = "" if found.chosen.has_spring else still
     tell(f"{names}: written; `{command}` simulates the drive{moves}")

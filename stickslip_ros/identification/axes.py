@@ -57,7 +57,7 @@ class AxisTask:
         self.delay: float | None = fixed.get(DELAY)
         # Where the slide never rests it is as in the published method: the force is that at the
         # instant of a sample. Otherwise it is held until the next one.
-        self.rows = Rows.of([filtered(each, decimated=True) for each in records], None)
+        self.rows = Rows.of([filtered(each, decimated=True) for each in records])
         if self.delay is not None or self.rows.resting:
             self.rows = self._rows(self.delay or 0.0)
 
@@ -91,11 +91,11 @@ class AxisTask:
 
     def _with_delay(self, law: IdentifiedLaw) -> Regression:
         """Return a fit with a delay if the records ask for one."""
-        fit = found = self._fitted(law, self.rows).validated()
+        fit = found = self._fitted(law, self.rows)
         if self.delay is not None:
             return found
         if self.rows.resting:
-            fits = fit, self._fitted(law, self._rows(None)).validated()
+            fits = fit, self._fitted(law, self._rows(None))
             found = min(fits, key=lambda each: each.error)
         period, tried = self.records[0].period, _DELAYS
         for _ in range(2):
@@ -106,28 +106,24 @@ class AxisTask:
             best = float(tried[np.argmin(np.sum(left * left, axis=0))])
             fit = self._fitted(law, self._rows(best * period))
             tried = best + _DELAY_STEPS
-        fit = fit.validated()
         return fit if fit.error < _RESOLVED_ERROR_RATIO * found.error else found
 
     def _with_memory(self, static: Regression, *, asked: bool) -> Regression:
         """Return the fit whose friction follows the table of another over a path."""
         speeds, table = self.rows.curve_speeds, static.curve
         span = max(float(np.ptp(record.position)) for record in self.records)
-        tried: dict[float, Regression] = {}
 
-        def error(deflection: float) -> float:
+        def fitted(deflection: float) -> Regression:
             bristled = (
                 SaturatingAdapter(speeds, deflection)
                 if table.shaped
                 else TableAdapter(speeds, table.speeds, deflection)
             )
-            tried[deflection] = replace(static, curve=bristled).refitted()
-            return _loss(tried[deflection])
+            return replace(static, curve=bristled).refitted()
 
-        best = min((share * span for share in _DEFLECTIONS), key=error)
-        for factor in (0.2, 0.4, 2.0, 4.0):
-            error(factor * best)
-        found = min(tried.values(), key=_loss).validated()
+        best = min((fitted(share * span) for share in _DEFLECTIONS), key=_loss)
+        others = [fitted(factor * best.curve.deflection) for factor in (0.2, 0.4, 2.0, 4.0)]
+        found = min([best, *others], key=_loss).validated()
         if asked or found.error < _RESOLVED_ERROR_RATIO * static.error:
             return found
         share = f"{1.0 - _RESOLVED_ERROR_RATIO:.0%}"
@@ -135,7 +131,7 @@ class AxisTask:
         return replace(found, remark=remark)
 
     def _fitted(self, law: IdentifiedLaw, rows: Rows) -> Regression:
-        return regress(rows, law, self.free, self.fixed)
+        return regress(rows, law, self.free, self.fixed).validated()
 
     def _rows(self, delay: float | None) -> Rows:
         """Return the rows with another delay of the force, s; None: read when the position is."""

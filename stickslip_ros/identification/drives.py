@@ -96,10 +96,8 @@ class DriveTask:
                 "no force acts in the recordings: only ratios of mass, stiffness and friction are "
                 "identifiable; fix one, as in --fix plant.mass=100"
             )
-        parts = [
-            filtered(each, decimated=False, delay=self.fixed.get(DELAY, 0.0)) for each in records
-        ]
-        self.rows = Rows.of(parts, None)
+        delay = self.fixed.get(DELAY, 0.0)
+        self.rows = Rows.of([filtered(each, decimated=False, delay=delay) for each in records])
         self.predictors = [Predictor(record) for record in records]
 
     def candidates(
@@ -152,7 +150,7 @@ class DriveTask:
     def _finished(self, found: Sequence[Refinement]) -> list[Refinement]:
         """Return searched models fitted further, the better ones first, as far as time allows."""
         least = min(map(_loss, found))
-        near = [each for each in found if _loss(each) <= _HOPELESS_LOSS_RATIO * least]
+        near = [each for each in found if each.loss <= _HOPELESS_LOSS_RATIO * least]
         finished = {each: _remarked(each, _HOPELESS) for each in found}
         for number, each in enumerate(sorted(near, key=_loss)):
             self.limit.begin_stage(1.0 / (len(near) - number))
@@ -180,8 +178,8 @@ class DriveTask:
         """Return the best fits to short segments, from several starts, or from a LuGre model."""
         if like is not None:
             # The static friction of Dahl's law is the kinetic one.
-            values = {**like.best.values, "static": like.best.values["kinetic"]}
-            return self._nearest(law, [values], _GIVEN_UP_LOSS_RATIO * _loss(like))
+            values = {**like.values, "static": like.values["kinetic"]}
+            return self._nearest(law, [values], _GIVEN_UP_LOSS_RATIO * like.loss)
         fastest = float(self.rows.speeds[-1])
         shapes = [share * fastest for share in _SHAPES] if law.one_way.shaped and thorough else []
         starts = [
@@ -240,11 +238,11 @@ class DriveTask:
             if tried and self.limit.is_over:
                 break
             tried.append(refine(short, names, self._known(law, values), most=_FIRST_STEPS))
-            if is_white(tried[-1]) or _loss(tried[-1]) > most:
+            if is_white(tried[-1]) or tried[-1].loss > most:
                 return tried[-1:]
         settled: list[Refinement] = []
         for near in sorted(tried, key=_loss)[:_FINALISTS]:
-            settled.append(self._settled(near.best))
+            settled.append(self._settled(near))
             if is_white(settled[-1]) or _is_rounding(settled[-1]) or self.limit.is_over:
                 break
         return settled
@@ -252,10 +250,10 @@ class DriveTask:
     def _settled(self, near: Errors) -> Refinement:
         """Return the best fit near other values: segments with wrong starts try others."""
         fit = refine(near.task, near.names, near.values, near.starts, most=_STEPS)
-        while fit.best.has_outliers and not self.limit.is_over:
-            starts = fit.best.restarted().starts
-            other = refine(near.task, near.names, fit.best.values, starts, most=_STEPS)
-            if _loss(other) > _RESTART_LOSS_RATIO * _loss(fit):
+        while fit.has_outliers and not self.limit.is_over:
+            starts = fit.restarted().starts
+            other = refine(near.task, near.names, fit.values, starts, most=_STEPS)
+            if other.loss > _RESTART_LOSS_RATIO * fit.loss:
                 break
             fit = other
         return fit
@@ -265,13 +263,12 @@ class DriveTask:
 
         They must take away a share of the squared error, and differ clearly from zero.
         """
-        task = fit.best.task
+        task = fit.task
         for name in (*OPTIONAL, *fit.law.optional):
-            best = fit.best
-            if name in self.fixed or name in self.friction or name in best.names:
+            values = fit.values
+            if name in self.fixed or name in self.friction or name in fit.names:
                 continue
-            values = best.values
-            if name == LAG and DELAY in best.names:
+            if name == LAG and DELAY in fit.names:
                 # A short lag is like a delay, which stands for most of it: gains do not tell.
                 values = {**values, **dict.fromkeys((DELAY, LAG), 0.5 * values[DELAY])}
             else:
@@ -279,29 +276,28 @@ class DriveTask:
                 unclear = abs(errors) < _OPTIONAL_ERRORS and share < _CLEAR_GAIN
                 if unclear or share < least_share:
                     continue
-            more = refine(task, [*best.names, name], values, best.starts, most=_STEPS)
-            if _loss(more) >= _loss(fit):
+            more = refine(task, [*fit.names, name], values, fit.starts, most=_STEPS)
+            if more.loss >= fit.loss:
                 continue
             if _errors_from_zero(more, name) > _ZERO_ERRORS:
                 fit = more
                 continue
             # It was not needed, but may have led the others out of a local minimum.
-            without = {**more.best.values, name: best.values[name]}
-            other = refine(task, best.names, without, more.best.starts, most=_STEPS)
+            without = {**more.values, name: fit.values[name]}
+            other = refine(task, fit.names, without, more.starts, most=_STEPS)
             fit = min(fit, other, key=_loss)
-        best = fit.best
-        if {DELAY, LAG} <= {*best.names} and _errors_from_zero(fit, DELAY) < _ZERO_ERRORS:
+        if {DELAY, LAG} <= {*fit.names} and _errors_from_zero(fit, DELAY) < _ZERO_ERRORS:
             # It stood for the lag.
-            free = [name for name in best.names if name != DELAY]
-            fit = refine(task, free, {**best.values, DELAY: 0.0}, best.starts, most=_STEPS)
+            free = [name for name in fit.names if name != DELAY]
+            fit = refine(task, free, {**fit.values, DELAY: 0.0}, fit.starts, most=_STEPS)
         return fit
 
     def finished(self, near: Refinement) -> Refinement:
         """Return a fit to long segments, with the constants that the records ask for."""
         task = self._trajectories(near.law, _LONG_SEGMENT * self.period, _MOST_SAMPLES)
         # Measured starts are too rough for motions that grow over a segment.
-        begun = best_starts(task, near.best.values)
-        fit = self._settled(replace(begun, names=near.best.names))
+        begun = best_starts(task, near.values)
+        fit = self._settled(replace(begun, names=near.names))
         fit = self._with_optional(fit, least_share=0.0)
         validated = replace(fit, held_out=_held_out(fit))
         if not self.limit.is_over:
@@ -310,20 +306,14 @@ class DriveTask:
         return _remarked(fit, OUT_OF_TIME)
 
     def _regression(self, law: IdentifiedLaw, shape: float | None = None) -> Regression:
-        fixed = {name: 0.0 for name in LINEAR if name not in self.free} | {
-            name: value for name, value in self.fixed.items() if name != DELAY
-        }
+        fixed = {name: self.fixed.get(name, 0.0) for name in LINEAR if name not in self.free}
         return regress(self.rows, law, self.free, fixed, shape)
 
     def _trajectories(self, law: IdentifiedLaw, length: float, most: int) -> Trajectories:
-        segments, starts = segments_of(self.records, length)
-        directions = self.rows.directions
-        task = Trajectories(
-            law, directions, self.predictors, segments, starts, self.normal_force, self.limit
-        )
         # Of the segments of long records one of so many is used.
         stride = -(-sum(len(each.position) for each in self.records) // most)
-        return task.chosen(np.arange(len(segments)) % stride == 0)
+        segments = segments_of(self.predictors, length)[::stride]
+        return Trajectories(law, self.rows.directions, segments, self.limit)
 
     def _known(self, law: IdentifiedLaw, values: Mapping[str, float]) -> dict[str, float]:
         own = {
@@ -343,44 +333,41 @@ def _is_rounding(fit: Refinement) -> bool:
 
     They repeat where a slide sticks and the belt moves by whole steps of it between samples.
     """
-    task = fit.best.task
-    step = min(each.record.resolution for each in task.predictors)
+    task = fit.task
+    step = min(each.resolution for each in task.records)
     own = task.of_positions
-    return rms(fit.best.residual[own]) < _ROUNDING * step / sqrt(12.0) * rms(task.weight[own])
+    return rms(fit.residual[own]) < _ROUNDING * step / sqrt(12.0) * rms(task.weight[own])
 
 
 def _errors_from_zero(fit: Refinement, name: str) -> float:
     """Return by how many standard errors a fitted coordinate differs from zero."""
-    place = [*fit.best.names].index(name)
+    place = [*fit.names].index(name)
     error = sqrt(max(fit.covariance[place, place], 0.0))
-    return abs(fit.best.values[name]) / error if error > 0.0 else inf
+    return abs(fit.values[name]) / error if error > 0.0 else inf
 
 
 def _share(fit: Refinement) -> float:
     """Return the rms error as a share of the rms motion."""
-    return sqrt(_loss(fit) / len(fit.best.residual)) / fit.scale
+    return sqrt(fit.loss / len(fit.residual)) / fit.scale
 
 
 def _loss(fit: Refinement) -> float:
-    return fit.best.loss
+    return fit.loss
 
 
 def _remarked(fit: Refinement, remark: str) -> Refinement:
     """Return a fit that is out of the choice, with its errors in the segments that it is for."""
-    return replace(fit, held_out=fit.best.losses, remark=remark)
+    return replace(fit, held_out=fit.losses, remark=remark)
 
 
 def _held_out(fit: Refinement) -> FloatArray:
     """Return the mean square error in each segment, fitted to the other half of the segments."""
-    best = fit.best
-    count = len(best.starts)
-    losses = np.empty(count)
-    if count < 4:
-        return best.losses
-    for half in (0, 1):
-        trained = np.arange(count) % 2 == half
-        task, starts = best.task.chosen(trained), best.starts[trained]
-        others = refine(task, best.names, best.values, starts, most=6)
-        rest = best.task.chosen(~trained)
-        losses[~trained] = best_starts(rest, others.best.values, best.starts[~trained]).losses
+    losses, segments = fit.losses, fit.task.segments
+    if len(segments) < 4:
+        return losses
+    even, odd = slice(0, None, 2), slice(1, None, 2)
+    for own, other in ((even, odd), (odd, even)):
+        task, rest = (replace(fit.task, segments=segments[half]) for half in (own, other))
+        trained = refine(task, fit.names, fit.values, fit.starts[own], most=6)
+        losses[other] = best_starts(rest, trained.values, fit.starts[other]).losses
     return losses

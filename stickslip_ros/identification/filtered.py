@@ -2,14 +2,13 @@
 
 from dataclasses import dataclass
 from functools import cache, cached_property
-from math import sqrt
 from typing import Any
 
 import numpy as np
 
 from stickslip_ros.arrays import BoolArray, FloatArray
 from stickslip_ros.identification.record import Record, late
-from stickslip_ros.measures.noise import white_noise
+from stickslip_ros.identification.rests import rests
 
 _CUTOFF = 100.0
 """Cutoff frequency of the low-pass, Hz; at most a tenth of the sample rate."""
@@ -18,14 +17,6 @@ _DECIMATION, _ROW_RATE = 10, 100.0
 """Of a record that is decimated one of at least so many rows is kept; rows per second at most."""
 START, END = 49, 50
 """Samples at both ends that the filter spoils."""
-_LEAST_REST = 5
-"""Samples from which the slide rests; without sticking it passes zero speed faster."""
-_REST_NOISE, _REST_SHARE = 0.8, 1e-3
-"""Speed below which the slide may rest: in errors of position per period, and as a share of the
-fastest one."""
-_REST_ERRORS, _REST_DRIFT = 12.0, 10.0
-"""Range of positions of a slide that rests: in errors of position, and in periods at that speed, as
-the filter blurs both ends."""
 _REVERSAL_SAMPLES = 3
 """Samples on both sides of a reversal within which a slide that rests may stick unseen."""
 _REACH, _TAPER = 0.5, 1.0
@@ -190,21 +181,3 @@ def _moving_weight(
     away = 1.0 - maximum_filter1d(left_out.astype(float), 2 * reach + 1)
     weight: FloatArray = np.convolve(away, taper / np.sum(taper), "same")
     return weight[START:-END]
-
-
-def rests(record: Record, relative: FloatArray) -> list[tuple[int, int]]:
-    """Return first sample and end of each rest of the slide on the belt.
-
-    `relative` is the filtered speed, m/s. It rests where it is slower than the encoder tells, and
-    has not drifted when it goes on: slow slip does.
-    """
-    noise = max(white_noise(record.position), record.resolution / sqrt(12.0))
-    slow = max(_REST_NOISE * noise / record.period, _REST_SHARE * float(np.abs(relative).max()))
-    drift = _REST_ERRORS * noise + _REST_DRIFT * slow * record.period
-    place = record.position - record.period * np.cumsum(record.belt_velocity)
-    edges = np.flatnonzero(np.diff(np.abs(relative) < slow, prepend=False, append=False))
-    return [
-        (low, high)
-        for low, high in edges.reshape(-1, 2).tolist()
-        if high - low >= _LEAST_REST and float(np.ptp(place[low:high])) <= drift
-    ]

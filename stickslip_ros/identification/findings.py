@@ -10,9 +10,9 @@ import numpy as np
 from stickslip_ros.arrays import FloatArray, rms
 from stickslip_ros.identification.choice import better_by
 from stickslip_ros.identification.filtered import START, filtered
-from stickslip_ros.identification.fit import Estimate, Fit, ForceErrors, Friction, Residuals
+from stickslip_ros.identification.fit import Estimate, Fit, Friction, Residuals
 from stickslip_ros.identification.record import Record
-from stickslip_ros.identification.rest import static_force
+from stickslip_ros.identification.rests import static_force
 from stickslip_ros.identification.servo import Servo, closed_loop, servo_of
 from stickslip_ros.model.drive import Drive
 
@@ -22,14 +22,6 @@ _FRICTION_DIFFERENCE = 0.05
 """Difference of friction at any speed, as a share of the largest, by which two laws differ."""
 _NAMED_CORRELATION = 0.95
 """Correlation from which two constants are named together."""
-CHECKED = (
-    "force_error",
-    "free_run_error",
-    "segment_error",
-    "position_error",
-    "closed_loop_force_error",
-)
-"""Errors of the prediction of a recording."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,16 +62,6 @@ class Findings:
         """Friction law."""
         return self.chosen.law.name
 
-    @property
-    def delay(self) -> float:
-        """Time from a sample until its force acts, s."""
-        return self.chosen.delay or 0.0
-
-    @property
-    def has_spring(self) -> bool:
-        """Whether the model has a spring."""
-        return self.chosen.has_spring
-
     @cached_property
     def fitted(self) -> Mapping[str, Estimate]:
         """Constants by parameter of the plant, such as `friction.static`; SI units."""
@@ -109,16 +91,15 @@ class Findings:
     def rivals(self) -> Sequence[str]:
         """Laws that predict as well as the one that was chosen, and have another friction."""
 
-        def differs(each: Fit, number: int) -> bool:
-            own, other = self.friction(number), each.friction(self.directions[number], self.fastest)
+        def differs(each: Fit, own: Friction) -> bool:
+            other = each.friction(own.direction, self.fastest)
             away = np.abs(np.interp(own.speed, other.speed, other.force) - own.force)
             return float(away.max()) > _FRICTION_DIFFERENCE * float(own.force.max())
 
         # The one that was chosen may have been fitted further since.
         others = [each for each in self.candidates if each.label != self.chosen.label]
         alike = [each for each in others if self.as_good.get(each.label) and not each.remark]
-        directions = range(len(self.directions))
-        return [each.label for each in alike if any(differs(each, n) for n in directions)]
+        return [each.label for each in alike if any(differs(each, own) for own in self.curves)]
 
     @property
     def one_belt_speed(self) -> bool:
@@ -149,29 +130,25 @@ class Findings:
             np.mean(each > _STILL_SPEED * each.max()) < 0.98 for each in (*self._speeds, *raw)
         )
 
-    @property
-    def directions(self) -> Sequence[float]:
-        """Signs of the relative speed that were recorded: 1, -1 or both."""
-        return self.chosen.directions
-
     def static_forces(self, sign: float) -> tuple[float, float, float]:
         """Return the static friction of the law in a direction, and its bounds by rests, N.
 
-        See `static_force`; `sign` is one of `directions`.
+        See `static_force`; `sign` is one of `Fit.directions`.
         """
-        values = self.chosen.values_at(self.chosen.point)
-        records = [record.delayed(self.delay) for record in self.records]
-        held = (
-            record.held_force + values["bias_force"] - values["stiffness"] * record.position
-            for record in records
-        )
-        bounds = [static_force(*each, sign) for each in zip(records, held, strict=True)]
-        own = float(self.chosen.force_at(self.chosen.point, sign, np.zeros(1))[0])
+        chosen, bounds = self.chosen, list[tuple[float, float]]()
+        values = chosen.values_at(chosen.point)
+        for record in self.records:
+            late = record.delayed(chosen.delay)
+            held = late.held_force + values["bias_force"] - values["stiffness"] * late.position
+            bounds.append(static_force(late, held, sign))
+        own = float(chosen.force_at(chosen.point, sign, np.zeros(1))[0])
         return own, max(low for low, _ in bounds), min(high for _, high in bounds)
 
-    def friction(self, direction: int = 0) -> Friction:
-        """Return the friction curve over the recorded speeds, in one of `directions`."""
-        return self.chosen.friction(self.directions[direction], self.fastest)
+    @cached_property
+    def curves(self) -> Sequence[Friction]:
+        """The friction curve over the recorded speeds, in each direction that was recorded."""
+        chosen = self.chosen
+        return [chosen.friction(sign, self.fastest) for sign in chosen.directions]
 
     @property
     def fastest(self) -> float:
@@ -183,18 +160,11 @@ class Findings:
         """The drive, with the usual belt speed of the first record: the median where it moves."""
         return self.chosen.drive(self.normal_force, _usual(self.records[0].belt_velocity))
 
-    def errors(self, record: Record | None = None) -> ForceErrors:
-        """Return measured and modelled forces on the filtered rows of a record, or of the first.
-
-        Of a drive on a spring these are the rows where it slips.
-        """
-        return self.chosen.errors(self.records[0] if record is None else record)
-
     def force_error(self, record: Record) -> float | None:
         """Return the rms of F - F_model over that of F, on filtered rows; None without a force."""
         if not record.held_force.any():
             return None
-        found = self.errors(record)
+        found = self.chosen.errors(record)
         return rms(found.error) / rms(found.force) if len(found.force) else None
 
     @cached_property
@@ -216,23 +186,24 @@ class Findings:
         return cache(self.chosen.residuals)
 
     def check(self, record: Record) -> dict[str, float | None]:
-        """Return what the model predicts of a record, as `CHECKED` names it.
+        """Return what the model predicts of a record; None for what it cannot.
 
         `free_run_error` and `segment_error` are in m, the others are shares of the rms of what was
         recorded. What is unbounded is infinite.
         """
         record.require_motion()
-        away = (self.free_run(record) - record.position)[~record.lost]
-        error = rms(away[~np.isnan(away)]) if self.has_spring else rms(away)
-        found: dict[str, float | None] = dict.fromkeys(CHECKED)
-        found |= {
+        away, has_spring = self.free_run(record) - record.position, self.chosen.has_spring
+        error = rms(away[~(record.lost | (has_spring & np.isnan(away)))])
+        found = {
             "force_error": self.force_error(record),
             "free_run_error": error if isfinite(error) else inf,
-            "segment_error": rms(self.residuals(record).error) if self.has_spring else None,
+            "segment_error": rms(self.residuals(record).error) if has_spring else None,
+            "position_error": None,
+            "closed_loop_force_error": None,
         }
         led = record.led
         if self.servo is not None and led is not None and led.force is not None:
-            position, force = closed_loop(led, self.drive, self.servo, self.delay)
+            position, force = closed_loop(led, self.drive, self.servo, self.chosen.delay)
             found["position_error"] = _relative(position[START:], led.position[START:])
             found["closed_loop_force_error"] = _relative(force[START:], led.force[START:])
         return found

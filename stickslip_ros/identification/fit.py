@@ -51,6 +51,8 @@ class Estimate:
 class Friction:
     """A friction curve with its band, in one direction; arrays of shape (points,)."""
 
+    direction: float
+    """Sign of the relative speed."""
     speed: FloatArray
     """Speed |v_r|, m/s, within what was recorded."""
     force: FloatArray
@@ -109,11 +111,6 @@ class Fit(ABC):
 
     @property
     @abstractmethod
-    def delay(self) -> float | None:
-        """Time from a sample until its force acts, s; None if nothing asks for one."""
-
-    @property
-    @abstractmethod
     def scale(self) -> float:
         """Root mean square of what is predicted, N or m."""
 
@@ -133,10 +130,6 @@ class Fit(ABC):
     def values_at(self, point: FloatArray) -> Mapping[str, float]:
         """Return the coordinates of the drive at another point, SI units."""
 
-    @abstractmethod
-    def force_at(self, point: FloatArray, sign: float, speed: FloatArray) -> FloatArray:
-        """Return the size of steady friction at another point, N, at speeds |v_r|, m/s."""
-
     def curve_speeds(self, fastest: float) -> FloatArray:
         """Return the speeds of the points that stand for a curve, m/s."""
         return np.linspace(0.0, fastest, CURVE_POINTS)
@@ -152,6 +145,11 @@ class Fit(ABC):
     @abstractmethod
     def free_run(self, record: Record) -> FloatArray:
         """Return the positions in a run through a whole record, m; see `Findings.free_run`."""
+
+    @property
+    def delay(self) -> float:
+        """Time from a sample until its force acts, s."""
+        return self.values_at(self.point)[DELAY]
 
     @property
     def size(self) -> int:
@@ -174,9 +172,8 @@ class Fit(ABC):
         known = len(self.held_out) and self.scale > 0.0
         return sqrt(float(np.mean(self.held_out))) / self.scale if known else inf
 
-    @property
-    def used(self) -> float:
-        """Share of the samples of the records that were used."""
+    def used(self, records: Sequence[Record]) -> float:
+        """Return the share of the samples that were used of the records it was fitted to."""
         return 1.0
 
     @property
@@ -198,9 +195,7 @@ class Fit(ABC):
 
         def found(point: FloatArray) -> dict[str, float]:
             values = self.values_at(point)
-            own = self.law.constants(values, normal_force)
-            own[DELAY] = values.get(DELAY, 0.0)
-            return own
+            return self.law.constants(values, normal_force) | {DELAY: values[DELAY]}
 
         values, linear = self._linear(lambda point: np.array([*found(point).values()]))
         fitted = np.abs(linear).sum(axis=1) > 0.0
@@ -215,7 +210,12 @@ class Fit(ABC):
         speed = self.curve_speeds(fastest)
         force, linear = self._linear(lambda point: self.force_at(point, sign, speed))
         variance = np.diag(propagated(linear, self.covariance))
-        return Friction(speed, force, np.sqrt(np.maximum(variance, 0.0)))
+        return Friction(sign, speed, force, np.sqrt(np.maximum(variance, 0.0)))
+
+    def force_at(self, point: FloatArray, sign: float, speed: FloatArray) -> FloatArray:
+        """Return the size of steady friction at another point, N, at speeds |v_r|, m/s."""
+        law = self.law.friction(self.values_at(point), 1.0)
+        return np.array([-sign * float(law.coefficient(sign * w, sign)) for w in speed.tolist()])
 
     def _linear(
         self, function: Callable[[FloatArray], FloatArray]

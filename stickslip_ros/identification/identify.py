@@ -9,11 +9,11 @@ from stickslip_ros.identification.choice import AUTO, choose
 from stickslip_ros.identification.drives import DriveTask
 from stickslip_ros.identification.findings import Findings
 from stickslip_ros.identification.foreign_laws import foreign_adapter, foreign_names
-from stickslip_ros.identification.free_runs import adjusted
 from stickslip_ros.identification.identified_law import DELAY, IdentifiedLaw
 from stickslip_ros.identification.laws import COMPETING, KNOWN_LAWS, TableAdapter
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.regression import LINEAR, Regression
+from stickslip_ros.identification.table_adjustment import adjusted
 from stickslip_ros.identification.time_limit import TimeLimit
 from stickslip_ros.model.constants import constants_of
 from stickslip_ros.model.friction import LAWS

@@ -371,24 +371,20 @@ def _sag(values: Values, fastest: float) -> float:
 
 
 EXPONENTIAL = ExponentialAdapter()
-STATIC_LAWS: Sequence[IdentifiedLaw] = (
+LUGRE = BristleAdapter("lugre", _BRISTLES)
+DAHL = DahlAdapter()
+COMPETING: Sequence[IdentifiedLaw] = (
     CoulombAdapter(),
     StictionAdapter(),
     StribeckAdapter(),
     EXPONENTIAL,
-)
-"""Laws without a memory that compete, the simpler ones first."""
-LUGRE = BristleAdapter("lugre", _BRISTLES)
-DAHL = DahlAdapter()
-MEMORY_LAWS: Sequence[IdentifiedLaw] = (
     LUGRE,
     DAHL,
     # Its elastic limit is made from the smallest friction.
     BristleAdapter("elasto_plastic", _BRISTLES, ("kinetic",)),
     BristleAdapter("maxwell_slip", ("bristle_stiffness",)),
 )
-"""Laws with a memory that compete. Those after LuGre are searched from what LuGre gives."""
-COMPETING = (*STATIC_LAWS, *MEMORY_LAWS)
+"""Laws that compete, the simpler ones first. Those after LuGre are searched from what it gives."""
 KNOWN_LAWS: Mapping[str, IdentifiedLaw] = {
     each.name: each for each in (*COMPETING, RateStateAdapter())
 }

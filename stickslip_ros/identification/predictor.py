@@ -2,11 +2,11 @@
 
 from collections.abc import Iterator, Sequence
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from itertools import chain
 from math import copysign, expm1
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 
@@ -17,25 +17,10 @@ from stickslip_ros.model.signals import table
 from stickslip_ros.motion.motion import Motion
 from stickslip_ros.motion.variational import VariationalMotion
 
-_FIRST = 20
-"""Samples from which the velocity at the start is found."""
-_UNBOUNDED_LOSS = 1e300
-"""Squared error of a motion that is not bounded, m^2."""
-_SPEED_TOLERANCE = 1e-3
-"""Tolerance of the velocity at the start, as a share of the range in which it is sought."""
 _LAG_STEPS = 3
 """Steps of a sample in which a force that lags is held: one alone moves the slide otherwise."""
 _TOLERANCE = 1e-6
 """Largest error of the belt velocity between corners, as a share of its largest value."""
-
-
-@dataclass(frozen=True)
-class Segment:
-    """Consecutive samples of a record that are predicted from a state of their own."""
-
-    record: int
-    start: int
-    count: int
 
 
 def steady_memory(drive: Drive, velocity: float, belt_speed: float) -> Sequence[float]:
@@ -88,51 +73,52 @@ class Predictor:
         """Return positions, m, from the measured one at a velocity, m/s; NaN once unbounded."""
         count = len(self.record.position)
         start = np.array([[self.record.position[0], velocity]])
-        ((found, _),) = self.followed(drive, [Segment(0, 0, count)], start, 0.0)
+        ((found, _),) = self.followed(drive, [slice(0, count)], start, 0.0)
         return found[:count]
 
     def followed(
         self,
         drive: Drive,
-        segments: Sequence[Segment],
+        parts: Sequence[slice],
         starts: FloatArray,
         delay: float,
         kind: type[Motion] = Motion,
     ) -> Iterator[tuple[FloatArray, FloatArray]]:
-        """Yield the outputs of segments, each from a state (position, velocity), and derivatives.
+        """Yield the outputs of parts, each from a state (position, velocity), and derivatives.
 
         Outputs are the positions, m, and then the velocities, m/s, if the record has some with a
         weight; NaN from where the motion is unbounded. The memory of the friction law is that of
-        steady slip at the start of a segment. `delay` is the time from a sample until its force
+        steady slip at the start of a part. `delay` is the time from a sample until its force
         acts, s, from minus one to several periods; a disturbance is never late.
 
         A `VariationalMotion` of a `ScaledDrive` has derivatives of shape (rows, arguments): by the
-        state at the start of the segment, then by the free constants of the drive, all
+        state at the start of the part, then by the free constants of the drive, all
         dimensionless; another motion has none, shape (rows, 0).
         """
         motion: Motion | None = None
         end, count = -1, len(self.measured)
         units = np.array([drive.length_scale, drive.speed_scale])[:count, np.newaxis, np.newaxis]
-        for segment, (position, velocity) in zip(segments, starts.tolist(), strict=True):
-            if motion is None or motion.unbounded or segment.start != end:
-                left = self.measured.shape[1] - segment.start
-                motion = kind(self.with_belt(drive, segment.start, left), position, velocity)
+        for part, (position, velocity) in zip(parts, starts.tolist(), strict=True):
+            if motion is None or motion.unbounded or part.start != end:
+                left = self.measured.shape[1] - part.start
+                motion = kind(self.with_belt(drive, part.start, left), position, velocity)
             memory = None
             if drive.friction.states:
-                memory = steady_memory(drive, velocity, self.record.belt_velocity[segment.start])
+                belt_speed = float(self.record.belt_velocity[part.start])
+                memory = steady_memory(drive, velocity, belt_speed)
             motion.restart(position, velocity, memory)
-            end = segment.start + segment.count
+            end, length = part.stop, part.stop - part.start
             varied = motion if isinstance(motion, VariationalMotion) else None
-            own = np.full((count, segment.count), np.nan)
+            own = np.full((count, length), np.nan)
             by = np.zeros((*own.shape, varied.derivatives.shape[1] if varied else 0))
-            for number in chain((0,), self._samples(motion, segment.start, segment.count, delay)):
+            for number in chain((0,), self._samples(motion, part.start, length, delay)):
                 own[0, number] = motion.position
                 if count > 1:
                     own[1, number] = motion.velocity
                 if varied:
                     by[:, number] = varied.derivatives[:count]
             yield own.ravel(), (by * units).reshape(own.size, -1)
-            # The clock of the belt goes on to the start of the next segment.
+            # The clock of the belt goes on to the start of the next part.
             motion.advance(self.record.period)
 
     def _samples(self, motion: Motion, start: int, count: int, delay: float) -> Iterator[int]:
@@ -168,30 +154,6 @@ class Predictor:
         times = ((places - start) * period).tolist()
         points = list(zip(times, belt[places].tolist(), strict=True))
         return replace(drive, belt_speed=0.0, belt=table(points))
-
-
-def free_run(record: Record, drive: Drive) -> tuple[float, FloatArray]:
-    """Return the motion of a drive through a whole record, with its force and without feedback.
-
-    It starts at the measured position with the velocity that fits best, m/s, which is returned
-    before the positions, m. The velocity is found by bounded minimization (R. P. Brent, Algorithms
-    for Minimization Without Derivatives, 1973) around that of the first samples.
-    """
-    from scipy.optimize import minimize_scalar  # takes long to import
-
-    predictor, first = Predictor(record), record.position[:_FIRST]
-    slope = float(np.polyfit(np.arange(len(first)) * record.period, first, 1)[0])
-    # The range also makes up for the friction over the first stroke.
-    spread = 3.0 * abs(slope) + float(np.std(np.diff(first))) / record.period
-
-    def loss(velocity: float) -> float:
-        found = predictor.positions(drive, float(velocity)) - record.position
-        return float(np.mean(found * found)) if np.isfinite(found).all() else _UNBOUNDED_LOSS
-
-    solve: Any = minimize_scalar  # its types know no bounds
-    bounds, options = (slope - spread, slope + spread), {"xatol": _SPEED_TOLERANCE * spread}
-    velocity = float(solve(loss, bounds=bounds, method="bounded", options=options).x)
-    return velocity, predictor.positions(drive, velocity)
 
 
 def _corners(values: FloatArray) -> FloatArray:

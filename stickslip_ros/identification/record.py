@@ -1,6 +1,5 @@
 """Recordings as identification uses them: evenly spaced samples of the motion and its inputs."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from math import exp, sqrt
@@ -8,36 +7,24 @@ from typing import Self
 
 import numpy as np
 
-from stickslip_ros.arrays import BoolArray, FloatArray, IntArray
+from stickslip_ros.arrays import BoolArray, FloatArray
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.measures.noise import white_noise
-from stickslip_ros.stamps import NANOSECONDS
 
 FEWEST = 500
 """Fewest samples of a record."""
-_LONGEST_GAP = 3.5
-"""Longest distance of samples, in periods, that is bridged."""
 _INDEPENDENT_SPEED = 1.5
 """Steps of the encoder between samples from which rounding errors are independent."""
 _TURNING_CHANGE = 0.1
 """Change of the speed in a sample, steps of the encoder per sample, at a turning point."""
 _TURNING_SHARE = 0.2
 """Share of samples up to which turning points are left out."""
-_LONGEST_DIFFERENCE, _DIFFERENCE_ERROR = 8, 1e-6
-"""Samples over which a velocity may be a difference of positions; its error, in the largest one."""
 _SMOOTHED_SAMPLES = 11
 """Samples over which positions are smoothed, and a speed is found."""
 _REST_SAMPLES = 20
 """Successive samples of the same position from which the slide is at rest."""
 _FEWEST_VALUES = 10
 """Fewest different positions of a slide that moves."""
-_MISSING_DISTANCE = 0.75
-"""Distance of a sample, in periods, from which it counts as missing."""
-_STEP_TOLERANCE, _EVEN_SHARE = 0.25, 0.6
-"""Largest difference of a time step from the period, as a share of it; share of the steps, at
-least, that are so near."""
-_JITTER = 0.25
-"""Distance of samples from an even clock, in periods, up to which it jitters."""
 _DITHER_NOISE = 0.5
 """Noise, in steps of the encoder, from which rounding errors are independent; rounding has 0.29."""
 
@@ -104,6 +91,16 @@ class Record:
         """Where no sample is near."""
         return np.zeros(len(self.position), bool) if self.missing is None else self.missing
 
+    @cached_property
+    def noise(self) -> float:
+        """Standard deviation of the error of a position, m: its noise, or rounding."""
+        return max(white_noise(self.position), self.resolution / sqrt(12.0))
+
+    @property
+    def position_on_belt(self) -> FloatArray:
+        """Displacement of the slide over the belt, m, from some place on."""
+        return self.position - self.period * np.cumsum(self.belt_velocity)
+
     def require_motion(self) -> None:
         """Raise InvalidInputError if the position hardly ever changes."""
         count = len(np.unique(self.position))
@@ -163,9 +160,8 @@ class Record:
         """
         if self.velocity is None:
             return 0.0
-        noise = max(white_noise(self.position), self.resolution / sqrt(12.0))
         of_velocity = white_noise(self.velocity)
-        return noise / of_velocity if of_velocity > 0.0 else 0.0
+        return self.noise / of_velocity if of_velocity > 0.0 else 0.0
 
     @property
     def resolution(self) -> float:
@@ -229,115 +225,3 @@ def late(held: FloatArray, periods: float) -> FloatArray:
     """Return the mean from each sample to the next of what is held, some sample periods late."""
     edges = np.arange(len(held) + 1.0)
     return mean_held(edges[:-1], held, edges - periods)
-
-
-def evenly_spaced(
-    name: str,
-    stamp: IntArray,
-    columns: dict[str, FloatArray],
-    notes: Sequence[str] = (),
-    delay: float | None = None,
-) -> list[Record]:
-    """Return records with even spacing from samples whose clock may jitter and have gaps.
-
-    Stamps are in ns; columns, notes and delay are those of `Record`. Samples of which one is not
-    finite count as missing; only the reference may be. Velocities are left out if they are
-    differences of the positions, or if less than half of them are finite. Each part without a
-    longer gap is a record: positions between samples are interpolated, forces are held; where the
-    clock does more than jitter a force is the mean of what is held meanwhile. Raises
-    InvalidInputError if no part is long enough, or the clock is not even up to gaps and jitter.
-    """
-    columns = dict(columns)
-    velocity = columns.get("velocity")
-    if velocity is not None and np.mean(np.isfinite(velocity)) < 0.5:
-        del columns["velocity"]
-    _check_clock(name, stamp)
-    known = np.ones(len(stamp), bool)
-    for each in columns.keys() - {"reference"}:
-        known &= np.isfinite(columns[each])
-    known &= np.diff(stamp, prepend=np.iinfo(np.int64).min // 2) > 0
-    time = (stamp[known] - stamp[0]) / NANOSECONDS
-    columns = {each: values[known] for each, values in columns.items()}
-    if len(time) < FEWEST:
-        raise InvalidInputError(
-            f"{name} has {len(time)} samples: identification needs at least {FEWEST}"
-        )
-    steps = np.diff(time)
-    # Where every other sample is missing, half of the steps are double.
-    usual = float(np.quantile(steps, 0.5, method="lower"))
-    # Stamps are whole nanoseconds; the mean of the usual steps is the period.
-    period = float(np.mean(steps[np.abs(steps - usual) <= _STEP_TOLERANCE * usual]))
-    breaks = np.flatnonzero(steps > _LONGEST_GAP * period) + 1
-    records: list[Record] = []
-    parts = np.split(np.arange(len(time)), breaks)
-    long_enough = [rows for rows in parts if len(rows) >= FEWEST]
-    left_out = 1.0 - sum(map(len, long_enough)) / len(time)
-    for rows in long_enough:
-        own = time[rows]
-        even = own[0] + period * np.arange(round((own[-1] - own[0]) / period) + 1)
-        found: dict[str, FloatArray] = {}
-        jitters = float(_distances(own, even).max()) <= _JITTER * period
-        as_measured = len(own) == len(even) and np.abs(own - even).max() < 1e-3 * period
-        for each, values in columns.items():
-            if as_measured:
-                found[each] = values[rows]
-            elif each in ("force", "disturbance") and not jitters:
-                found[each] = mean_held(own, values[rows], np.append(even, even[-1] + period))
-            elif each in ("force", "disturbance"):
-                last = np.searchsorted(own, even + _JITTER * period, "right") - 1
-                found[each] = values[rows][np.maximum(last, 0)]
-            else:
-                found[each] = np.interp(even, own, values[rows])
-        if "velocity" in found and _is_difference(found["velocity"], found["position"], period):
-            del found["velocity"]
-        far = _distances(even, own) > _MISSING_DISTANCE * period
-        missing = far if far.any() else None
-        records.append(
-            Record(
-                name,
-                period,
-                **found,
-                missing=missing,
-                left_out=left_out,
-                notes=tuple(notes),
-                delay=delay,
-            )
-        )
-    if not records:
-        raise InvalidInputError(
-            f"{name} has no {FEWEST} samples without a gap of more than {_LONGEST_GAP:g} periods"
-        )
-    return records
-
-
-def _check_clock(name: str, stamp: IntArray) -> None:
-    """Refuse times that jump back, or whose steps are of no usual size."""
-    steps = np.diff(stamp) / NANOSECONDS
-    if not len(steps):
-        return
-    forward = steps[steps > 0.0]
-    usual = float(np.median(forward)) if len(forward) else 0.0
-    near = np.abs(forward - usual) <= _STEP_TOLERANCE * usual
-    if float(steps.min()) < 0.0 or not len(forward) or float(np.mean(near)) < _EVEN_SHARE:
-        raise InvalidInputError(
-            f"{name}: the time steps are from {steps.min():.4g} s to {steps.max():.4g} s: they "
-            "must be even up to gaps"
-        )
-
-
-def _distances(times: FloatArray, samples: FloatArray) -> FloatArray:
-    """Return the distance of each time from the nearest sample; both increase."""
-    after = np.clip(np.searchsorted(samples, times), 1, len(samples) - 1)
-    return np.minimum(np.abs(samples[after] - times), np.abs(times - samples[after - 1]))
-
-
-def _is_difference(velocity: FloatArray, position: FloatArray, period: float) -> bool:
-    """Return whether velocities are made from the positions, over some samples or centrally."""
-    allowed = _DIFFERENCE_ERROR * float(np.abs(velocity).max())
-    for span in range(1, _LONGEST_DIFFERENCE + 1):
-        differences = (position[span:] - position[:-span]) / (span * period)
-        for late in {span, span // 2}:
-            own = velocity[late : late + len(differences)]
-            if float(np.median(np.abs(own - differences))) <= allowed:
-                return True
-    return False

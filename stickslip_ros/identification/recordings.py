@@ -3,6 +3,7 @@
 import json
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from math import inf, isfinite, nan
 from pathlib import Path
 from typing import Any
@@ -11,7 +12,8 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray, IntArray
 from stickslip_ros.errors import BagError, InvalidInputError
-from stickslip_ros.identification.record import FEWEST, Record, evenly_spaced, lagged
+from stickslip_ros.identification.even_clock import evenly_spaced
+from stickslip_ros.identification.record import FEWEST, Record, lagged
 from stickslip_ros.model.actuator import Actuator
 from stickslip_ros.record.motion_reader import ANY_LAYOUT, BagLayout
 from stickslip_ros.record.reader import Recording
@@ -93,7 +95,8 @@ def read_records(
         part_of = f"from {start:g} s" + (f" to {end:g} s" if isfinite(end) else " on")
         raise InvalidInputError(f"{path} holds no samples {part_of}: it lasts {since.max():.4g} s")
     own = {name: values[part] for name, values in found.items()}
-    return evenly_spaced(str(path), stamp[part], own, notes, delay)
+    records = evenly_spaced(str(path), stamp[part], own)
+    return [replace(each, notes=tuple(notes), delay=delay) for each in records]
 
 
 def _of_table(

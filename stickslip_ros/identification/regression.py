@@ -7,14 +7,14 @@ from functools import cached_property
 import numpy as np
 from typing_extensions import override
 
-from stickslip_ros.arrays import FloatArray, IntArray, rms
+from stickslip_ros.arrays import FloatArray, rms
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.identification.covariance import BLOCKS
 from stickslip_ros.identification.filtered import Filtered, filtered
 from stickslip_ros.identification.fit import CURVE_POINTS, Fit, ForceErrors
-from stickslip_ros.identification.identified_law import IdentifiedLaw
+from stickslip_ros.identification.free_run import free_run
+from stickslip_ros.identification.identified_law import DELAY, IdentifiedLaw
 from stickslip_ros.identification.laws import DirectionalAdapter
-from stickslip_ros.identification.predictor import free_run
 from stickslip_ros.identification.record import Record
 
 _DIRECTION_SHARE = 0.05
@@ -37,15 +37,13 @@ class Rows:
     """Factor of each of `LINEAR`."""
     force: FloatArray
     """Known forces, N."""
-    block: IntArray
-    """Number of the block of time."""
     directions: Sequence[float]
     """Signs of the relative speed that occur: 1, -1 or both."""
-    delay: float | None
+    delay: float | None = None
     """Time from a sample until its force acts, s; None if nothing is known of one."""
 
     @classmethod
-    def of(cls, parts: Sequence[Filtered], delay: float | None) -> "Rows":
+    def of(cls, parts: Sequence[Filtered]) -> "Rows":
         """Return the rows of filtered records."""
 
         def joined(values: Callable[[Filtered], FloatArray]) -> FloatArray:
@@ -74,9 +72,7 @@ class Rows:
                 "bias_force": -np.ones(len(force)),
             },
             force,
-            np.arange(len(force)) * BLOCKS // len(force),
             directions,
-            delay,
         )
 
     @property
@@ -162,11 +158,6 @@ class Regression(Fit):
 
     @property
     @override
-    def delay(self) -> float | None:
-        return self.rows.delay
-
-    @property
-    @override
     def scale(self) -> float:
         return rms(self.rows.force)
 
@@ -194,12 +185,8 @@ class Regression(Fit):
     @override
     def values_at(self, point: FloatArray) -> Mapping[str, float]:
         own = self.at(point)
-        return {**own.constants, **self.curve.joined(own.coordinates)}
-
-    @override
-    def force_at(self, point: FloatArray, sign: float, speed: FloatArray) -> FloatArray:
-        forces, shape = self.at(point).curves[[*self.directions].index(sign)]
-        return self.curve.terms(speed, shape) @ forces
+        delay = {DELAY: self.rows.delay or 0.0}
+        return {**own.constants, **self.curve.joined(own.coordinates), **delay}
 
     @override
     def curve_speeds(self, fastest: float) -> FloatArray:
@@ -208,8 +195,8 @@ class Regression(Fit):
 
     @override
     def errors(self, record: Record) -> ForceErrors:
-        columns = filtered(record, decimated=True, delay=self.delay)
-        rows = replace(Rows.of([columns], self.delay), directions=self.directions)
+        columns = filtered(record, decimated=True, delay=self.rows.delay)
+        rows = replace(Rows.of([columns]), directions=self.directions)
         error = replace(self, rows=rows).residual
         friction = -rows.friction_terms(self.curve, self.shapes) @ self.unknowns[len(self.free) :]
         time, position, speed, force = (
@@ -220,7 +207,7 @@ class Regression(Fit):
 
     @override
     def free_run(self, record: Record) -> FloatArray:
-        return free_run(record.delayed(self.delay or 0.0), self.drive(1.0))[1]
+        return free_run(record.delayed(self.delay), self.drive(1.0))[1]
 
     def at(self, point: FloatArray) -> "Regression":
         """Return the same with the unknowns and then the shapes of a point."""
@@ -269,9 +256,9 @@ class Regression(Fit):
     def validated(self) -> "Regression":
         """Return the same with its errors in blocks of time that are held out one by one."""
         design, wanted = self.system
-        losses = np.empty(BLOCKS)
+        losses, blocks = np.empty(BLOCKS), np.arange(len(wanted)) * BLOCKS // len(wanted)
         for block in range(BLOCKS):
-            held = self.rows.block == block
+            held = blocks == block
             values = solve(design[~held], wanted[~held], self.least)
             own = wanted[held] - design[held] @ values
             losses[block] = np.mean(own * own)

@@ -68,9 +68,9 @@ def _scenario(found: Findings, laws: Mapping[str, FrictionLaw], files: dict[str,
             values["plant.friction.curve"] = law.curve.name
     values |= files
     values["plant.rate"] = float(f"{1.0 / record.period:.9g}")
-    values["plant.force_delay"] = max(found.delay, 0.0)
+    values["plant.force_delay"] = max(found.chosen.delay, 0.0)
     values["plant.initial.position"] = float(record.position[0])
-    if found.has_spring:
+    if found.chosen.has_spring:
         if LAG in found.fitted:
             values[f"plant.{LAG}"] = found.fitted[LAG].value
         values |= {"washout_controller.linear_gain": 0.0, "washout_controller.start_after": 0.0}

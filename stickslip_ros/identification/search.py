@@ -7,7 +7,7 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.identification.refinement import Refinement
-from stickslip_ros.identification.segment_starts import ROUGH_TOLERANCE, Errors
+from stickslip_ros.identification.segment_starts import ROUGH_TOLERANCE
 from stickslip_ros.identification.time_limit import OutOfTimeError
 from stickslip_ros.identification.trajectories import Trajectories
 
@@ -56,7 +56,7 @@ def refine(
             ).x
         except OutOfTimeError:
             point = search.best[0]
-    return Refinement(search.at(point).settled())
+    return search.at(point).settled()
 
 
 class _Search:
@@ -81,7 +81,7 @@ class _Search:
         # No more than a part of narrow bounds that the start is far away from.
         least = np.minimum(_BOUND_DISTANCE * np.abs(first), 0.25 * np.ptp(self.bounds, axis=0))
         first = np.clip(first, self.bounds[0] + least, self.bounds[1] - least)
-        begun = Errors.at(task, free, self._coordinates(first), starts)
+        begun = Refinement.at(task, free, self._coordinates(first), starts)
         self.best = self._last = first, begun.settled(ROUGH_TOLERANCE)
         """The best point so far, with its errors."""
 
@@ -97,7 +97,7 @@ class _Search:
         found = self.at(point)
         return found.without_starts(found.by_names) @ self._by_point(point) * self._scale
 
-    def at(self, point: FloatArray) -> Errors:
+    def at(self, point: FloatArray) -> Refinement:
         """Return the errors at a point, at starts that are nearly the best ones."""
         for known, found in (self._last, self.best):
             if np.array_equal(known, point):
@@ -105,7 +105,7 @@ class _Search:
         before, best = self.best
         change = best.by_names @ self._by_point(before) @ (point - before)
         values = self._coordinates(point)
-        found = Errors.at(self._task, self._free, values, best.starts - best.steps(change))
+        found = Refinement.at(self._task, self._free, values, best.starts - best.steps(change))
         if found.loss > _WORSE_LOSS_RATIO * best.loss:
             found = min(found, found.moved(best.starts), key=lambda each: each.loss)
         self._last = point.copy(), found.settled(ROUGH_TOLERANCE)

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 
@@ -38,8 +39,8 @@ class Errors:
     """All coordinates."""
     starts: FloatArray
     """State at the start of each segment, m and m/s; shape (segments, 2)."""
-    residual: FloatArray
-    """Predicted less measured outputs, weighted, m."""
+    outputs: FloatArray
+    """Predicted outputs; see `Trajectories.measured`."""
     by_names: FloatArray
     """Derivatives of the residual by `names`; shape (rows, names)."""
     by_start: FloatArray
@@ -52,12 +53,16 @@ class Errors:
         names: Sequence[str],
         values: Mapping[str, float],
         starts: FloatArray,
-    ) -> "Errors":
+    ) -> Self:
         """Return the errors of coordinates from states of shape (segments, 2)."""
         outputs, by_names, by_start = task.sensitivities(values, starts, names)
         weight = task.weight[:, None]
-        residual = task.weight * (outputs - task.measured)
-        return cls(task, names, values, starts, residual, weight * by_names, weight * by_start)
+        return cls(task, names, values, starts, outputs, weight * by_names, weight * by_start)
+
+    @cached_property
+    def residual(self) -> FloatArray:
+        """Predicted less measured outputs, weighted, m."""
+        return self.task.weight * (self.outputs - self.task.measured)
 
     @property
     def loss(self) -> float:
@@ -92,7 +97,7 @@ class Errors:
             ]
         )
 
-    def settled(self, tolerance: float = _FINAL_TOLERANCE) -> "Errors":
+    def settled(self, tolerance: float = _FINAL_TOLERANCE) -> Self:
         """Return the errors from starts that are best up to a share of the squared error.
 
         The start of a segment has no part in the others: each takes steps of its own length.
@@ -108,11 +113,11 @@ class Errors:
             share = np.where(better, np.minimum(2.0 * share, 1.0), 0.25 * share)
         return found
 
-    def moved(self, starts: FloatArray) -> "Errors":
+    def moved(self, starts: FloatArray) -> Self:
         """Return the errors of the same coordinates from other states."""
-        return Errors.at(self.task, self.names, self.values, starts)
+        return self.at(self.task, self.names, self.values, starts)
 
-    def restarted(self) -> "Errors":
+    def restarted(self) -> Self:
         """Return the errors from what kicks of the measured starts lead to, where that is better.
 
         They are the same if no segment fits much worse than the others.
@@ -120,20 +125,20 @@ class Errors:
         if not self.has_outliers:
             return self
         found = self
-        rough = np.sqrt(np.median(found.losses)) / self.task.predictors[0].record.period
+        rough = np.sqrt(np.median(found.losses)) / self.task.records[0].period
         for kick in _KICKS:
             other = self.moved(self.task.starts + np.array([0.0, kick * rough])).settled()
             found, _ = found._better(other)
         return found
 
-    def _better(self, other: "Errors") -> tuple["Errors", BoolArray]:
+    def _better(self, other: Self) -> tuple[Self, BoolArray]:
         """Return the better one of two fits of each segment, and for which it is the other one."""
         better = self._sums(other.residual) < self._sums(self.residual)
         rows = better[self.task.block]
         return replace(
             self,
             starts=np.where(better[:, None], other.starts, self.starts),
-            residual=np.where(rows, other.residual, self.residual),
+            outputs=np.where(rows, other.outputs, self.outputs),
             by_names=np.where(rows[:, None], other.by_names, self.by_names),
             by_start=np.where(rows[:, None], other.by_start, self.by_start),
         ), better

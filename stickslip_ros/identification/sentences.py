@@ -39,10 +39,10 @@ def notes(found: Findings) -> Sequence[str]:
         texts += [f"{name}: {note}" for note in own[0].notes]
         missing = float(np.mean(np.concatenate([record.lost for record in own])))
         if missing > _MISSING_SHARE:
-            used = ", and not fitted" if found.has_spring else ""
+            fitted = ", and not fitted" if found.chosen.has_spring else ""
             texts.append(
                 f"{100.0 * missing:.2g} % of the samples of {name} are missing: they are "
-                f"interpolated{used}"
+                f"interpolated{fitted}"
             )
         if own[0].left_out > 0.0:
             texts.append(
@@ -59,9 +59,10 @@ def notes(found: Findings) -> Sequence[str]:
             f"the slide is as fast as {found.fastest:.3g} m/s: check the units of time, position "
             "and belt velocity"
         )
-    if found.chosen.used < _USED_SHARE:
+    used = found.chosen.used(found.records)
+    if used < _USED_SHARE:
         texts.append(
-            f"{found.chosen.used:.0%} of the samples were used, in parts over the whole length: "
+            f"{used:.0%} of the samples were used, in parts over the whole length: "
             "the recordings are long; choose a part by --from and --to"
         )
     if found.chosen.repetition is not None:
@@ -96,7 +97,7 @@ def _static_friction(found: Findings) -> str:
     """Return what rests tell of the static friction, where it may be another one than the law's."""
     texts: list[str] = []
     for sign, way in zip((1.0, -1.0), ("forward", "backward"), strict=True):
-        if sign not in found.directions:
+        if sign not in found.chosen.directions:
             continue
         own, low, high = found.static_forces(sign)
         if isfinite(low) and isfinite(high) and not low <= own <= high <= _STATIC_SHARE * own:
@@ -117,8 +118,8 @@ def unidentified(found: Findings) -> Mapping[str, str]:
         "coefficients are in N and viscous ones in N s/m; give it by --fix plant.normal_force=..."
     }
     slower = f"run below {1e3 * found.slowest:.3g} mm/s"
-    one_direction = len(found.directions) == 1
-    if not found.has_spring:
+    one_direction = len(found.chosen.directions) == 1
+    if not found.chosen.has_spring:
         why["damping"] = (
             "viscous damping and the viscous part of friction are one where the belt is at rest: "
             "it is in the friction, and taken as 0"

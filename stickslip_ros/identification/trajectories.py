@@ -1,9 +1,9 @@
 """Segments of records, the positions that a model predicts for them, and their derivatives."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
+from itertools import groupby, pairwise
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,7 @@ import numpy as np
 from stickslip_ros.arrays import BoolArray, FloatArray, IntArray
 from stickslip_ros.errors import InvalidInputError, RunError
 from stickslip_ros.identification.identified_law import DELAY, LAG, IdentifiedLaw
-from stickslip_ros.identification.predictor import Predictor, Segment, steady_memory
+from stickslip_ros.identification.predictor import Predictor, steady_memory
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.time_limit import TimeLimit
 from stickslip_ros.model.dimensionless_drive import MEMORY
@@ -32,6 +32,21 @@ _UNBOUNDED_ERROR = 10.0
 
 
 @dataclass(frozen=True, eq=False)
+class Segment:
+    """Consecutive samples of a record that are predicted from a state of their own."""
+
+    predictor: Predictor
+    samples: slice
+    state: FloatArray
+    """Measured position and velocity at the start, m and m/s."""
+
+    @property
+    def belt_speed(self) -> float:
+        """Belt speed at the start, m/s."""
+        return float(self.predictor.record.belt_velocity[self.samples.start])
+
+
+@dataclass(frozen=True, eq=False)
 class Trajectories:
     """A law with the segments of records that it is to predict.
 
@@ -43,13 +58,25 @@ class Trajectories:
     law: IdentifiedLaw
     directions: Sequence[float]
     """Signs of the relative speed in the records: 1, -1 or both."""
-    predictors: Sequence[Predictor]
     segments: Sequence[Segment]
-    starts: FloatArray
-    """Measured state at the start of each segment, m and m/s; shape (segments, 2)."""
-    normal_force: float
+    """Segments, those of a record after one another."""
     limit: TimeLimit
     """Time after which a search ends."""
+
+    @property
+    def records(self) -> Sequence[Record]:
+        """Records of the segments."""
+        return [*dict.fromkeys(each.predictor.record for each in self.segments)]
+
+    @property
+    def lengths(self) -> Sequence[int]:
+        """Number of samples of each segment."""
+        return [each.samples.stop - each.samples.start for each in self.segments]
+
+    @cached_property
+    def starts(self) -> FloatArray:
+        """Measured state at the start of each segment, m and m/s; shape (segments, 2)."""
+        return np.array([each.state for each in self.segments])
 
     @cached_property
     def measured(self) -> FloatArray:
@@ -84,28 +111,15 @@ class Trajectories:
 
     @property
     def _counts(self) -> Sequence[int]:
-        return [s.count * len(self.predictors[s.record].measured) for s in self.segments]
+        return [each.predictor.measured[:, each.samples].size for each in self.segments]
 
     def _joined(self, values: Callable[[Predictor], Any]) -> Any:
         """Return rows of all segments from values of shape (outputs, samples) of each record."""
-        columns = [np.broadcast_to(values(each), each.measured.shape) for each in self.predictors]
-        return np.concatenate(
-            [columns[s.record][:, s.start : s.start + s.count].ravel() for s in self.segments]
-        )
 
-    def predicted(self, values: Mapping[str, float], starts: FloatArray) -> FloatArray:
-        """Return the outputs of all segments; far away where there is no motion."""
-        delay = values.get(DELAY, 0.0)
-        try:
-            drive = self._drive(values)
-            found = [
-                each
-                for predictor, segments, own in self._by_record(values, starts)
-                for each, _ in predictor.followed(drive, segments, own, delay)
-            ]
-        except (InvalidInputError, RunError):
-            return self._bounded(np.full(len(self.measured), np.nan))
-        return self._bounded(np.concatenate(found))
+        def own(predictor: Predictor, samples: slice) -> Any:
+            return np.broadcast_to(values(predictor), predictor.measured.shape)[:, samples]
+
+        return np.concatenate([own(s.predictor, s.samples).ravel() for s in self.segments])
 
     def sensitivities(
         self, values: Mapping[str, float], starts: FloatArray, names: Sequence[str]
@@ -118,7 +132,7 @@ class Trajectories:
         count = len(self.measured)
         outputs = np.full(count, np.nan)
         by_names, by_start = np.zeros((count, len(names))), np.zeros((count, 2))
-        fastest, long = self.fastest, _LONG_DELAY * self.predictors[0].record.period
+        fastest, long = self.fastest, _LONG_DELAY * self.records[0].period
 
         def step(name: str, share: float) -> float:
             size = long if name in (DELAY, LAG) else self.law.size(name, values, fastest)
@@ -144,20 +158,19 @@ class Trajectories:
 
             of_constants = by_coordinates(of_system)
             units = 1.0 / drive.length_scale, 1.0 / drive.speed_scale
-            scaled, delay = in_units_of(drive, drive), values.get(DELAY, 0.0)
+            scaled, delay = in_units_of(drive, drive), values[DELAY]
             runs = (
                 run
-                for predictor, segments, begun in self._by_record(values, starts)
-                for run in predictor.followed(scaled, segments, begun, delay, VariationalMotion)
+                for predictor, parts, begun in self._by_record(values, starts)
+                for run in predictor.followed(scaled, parts, begun, delay, VariationalMotion)
             )
             each_segment = zip(self.parts, self.segments, starts.tolist(), runs, strict=True)
             for part, segment, (_, velocity), (found, rows) in each_segment:
                 order = rows.shape[1] - len(of_constants)
                 derivatives = rows[:, order:] @ of_constants
                 if order > MEMORY:
-                    belt = self.predictors[segment.record].record.belt_velocity[segment.start]
                     memory = by_coordinates(
-                        lambda other, speeds=(velocity, float(belt)): np.array(
+                        lambda other, speeds=(velocity, segment.belt_speed): np.array(
                             steady_memory(other, *speeds)
                         )
                     )
@@ -170,13 +183,27 @@ class Trajectories:
         outputs = self._bounded(outputs)
         for name in others:
             change = step(name, _MOTION_STEP)
-            moved_outputs = self.predicted({**values, name: values[name] + change}, starts)
+            moved_outputs = self._predicted({**values, name: values[name] + change}, starts)
             by_names[:, names.index(name)] = (moved_outputs - outputs) / change
         return outputs, by_names, by_start
 
+    def _predicted(self, values: Mapping[str, float], starts: FloatArray) -> FloatArray:
+        """Return the outputs of all segments; far away where there is no motion."""
+        delay = values[DELAY]
+        try:
+            drive = self._drive(values)
+            found = [
+                each
+                for predictor, parts, own in self._by_record(values, starts)
+                for each, _ in predictor.followed(drive, parts, own, delay)
+            ]
+        except (InvalidInputError, RunError):
+            return self._bounded(np.full(len(self.measured), np.nan))
+        return self._bounded(np.concatenate(found))
+
     def _drive(self, values: Mapping[str, float]) -> Drive:
         """Return the drive of coordinates; raises InvalidInputError if there is none."""
-        drive = self.law.drive(values, self.normal_force)
+        drive = self.law.drive(values, 1.0)
         refusal = drive.friction.refusal()
         if refusal is not None:
             raise InvalidInputError(refusal)
@@ -184,12 +211,13 @@ class Trajectories:
 
     def _by_record(
         self, values: Mapping[str, float], starts: FloatArray
-    ) -> Iterator[tuple[Predictor, Sequence[Segment], FloatArray]]:
-        """Yield each predictor with the segments of its record, which follow one another."""
-        for number, predictor in enumerate(self.predictors):
-            own = [n for n, segment in enumerate(self.segments) if segment.record == number]
-            segments = [self.segments[each] for each in own]
-            yield predictor.lagging(values.get(LAG, 0.0)), segments, starts[own]
+    ) -> Iterator[tuple[Predictor, Sequence[slice], FloatArray]]:
+        """Yield each predictor with its segments and their starts, which follow one another."""
+        pairs = zip(self.segments, starts, strict=True)
+        for predictor, own in groupby(pairs, key=lambda each: each[0].predictor):
+            segments, begun = zip(*own, strict=True)
+            parts = [each.samples for each in segments]
+            yield predictor.lagging(values[LAG]), parts, np.array(begun)
 
     def _bounded(self, outputs: FloatArray) -> FloatArray:
         span = _UNBOUNDED_ERROR * float(np.ptp(self.measured))
@@ -199,28 +227,20 @@ class Trajectories:
     @property
     def fastest(self) -> float:
         """Fastest speed relative to the belt, m/s, by the starts of the segments."""
-        belts = [
-            self.predictors[segment.record].record.belt_velocity[segment.start]
-            for segment in self.segments
-        ]
+        belts = [each.belt_speed for each in self.segments]
         return max(float(np.abs(self.starts[:, 1] - belts).max()), 1e-12)
 
-    def chosen(self, which: BoolArray) -> "Trajectories":
-        """Return the same with some of the segments."""
-        segments = [each for each, used in zip(self.segments, which, strict=True) if used]
-        return replace(self, segments=segments, starts=self.starts[which])
 
-
-def segments_of(records: Sequence[Record], length: float) -> tuple[list[Segment], FloatArray]:
-    """Return segments of about a length, s, and the measured states at their starts, m and m/s.
+def segments_of(predictors: Sequence[Predictor], length: float) -> Sequence[Segment]:
+    """Return segments of about a length, s.
 
     They follow each other up to the end of each record, and start where the slide is fastest
     relative to the belt: a slide that sticks has no velocity of its own, and friction with a memory
-    is that of steady slip there. States have the shape (segments, 2).
+    is that of steady slip there.
     """
     segments: list[Segment] = []
-    starts: list[FloatArray] = []
-    for number, record in enumerate(records):
+    for predictor in predictors:
+        record = predictor.record
         total = len(record.position)
         smooth, speed = record.smoothed(0), record.smoothed(1)
         relative = np.abs(speed - record.belt_velocity)
@@ -232,6 +252,9 @@ def segments_of(records: Sequence[Record], length: float) -> tuple[list[Segment]
         places = [each.start + int(np.argmax(relative[each])) for each in near]
         if record.velocity_weight > 0.0 and record.velocity is not None:
             speed = record.velocity
-        segments += [Segment(number, low, high - low) for low, high in pairwise([*places, total])]
-        starts.append(np.column_stack([smooth, speed])[places])
-    return segments, np.concatenate(starts)
+        states = np.column_stack([smooth, speed])
+        segments += [
+            Segment(predictor, slice(low, high), states[low])
+            for low, high in pairwise([*places, total])
+        ]
+    return segments

@@ -46,7 +46,7 @@ def identification_figure(
         first, *residuals, last = grid[0, :], grid[1, 0], grid[1, 1], grid[2, 0], grid[2, 1]
     _friction(figure.add_subplot(first), found, units)
     left = found.residuals(found.records[0])
-    quantity, error_unit = ("position", "m") if found.has_spring else ("force", "N")
+    quantity, error_unit = ("position", "m") if found.chosen.has_spring else ("force", "N")
     what = "residual" if style.printed else "measured less fitted"
     errors = left.error, f"{quantity}, {what}", error_unit
     for place, values, name, unit in zip(
@@ -97,14 +97,14 @@ def map_figure(
 
 
 def _friction(axes: Axes, found: Findings, units: Units) -> None:
-    errors = found.errors()
-    curves = [found.friction(number) for number in range(len(found.directions))]
+    errors, curves = found.chosen.errors(found.records[0]), found.curves
     sizes = [np.abs(errors.friction), *(curve.force for curve in curves)]
     top = max(float(np.quantile(each, _SHOWN_SHARE)) for each in sizes if len(each))
     scale, label = units.axis("friction force", "N", np.array([top]))
     fastest = max(float(curve.speed[-1]) for curve in curves)
     speed_scale, speed_label = units.axis("sliding speed $|v_r|$", "m/s", np.array([fastest]))
-    for curve, direction, colour in zip(curves, found.directions, (BLUE, ORANGE), strict=False):
+    for curve, colour in zip(curves, (BLUE, ORANGE), strict=False):
+        direction = curve.direction
         own, name = errors.relative_speed * direction > 0.0, _NAMES[direction]
         axes.plot(
             np.abs(errors.relative_speed[own]) / speed_scale,

@@ -32,7 +32,7 @@ def identification_tables(
     names = ", ".join(dict.fromkeys(record.name for record in found.records))
     constants = {f"plant.{name}": each for name, each in found.fitted.items()}
     yield constants_table(f"{names}: law {found.law}", constants, units)
-    if found.law == "table" or (found.law == "lugre" and not found.has_spring):
+    if found.law == "table" or (found.law == "lugre" and not found.chosen.has_spring):
         yield _curve(found, units)
     yield TextTable(
         "laws",
@@ -86,12 +86,11 @@ def _interval(estimate: Estimate, unit: str, units: Units) -> str:
 
 def _curve(found: Findings, units: Units) -> TextTable:
     rows: list[list[str]] = []
-    for number, direction in enumerate(found.directions):
-        curve = found.friction(number)
+    for curve in found.curves:
         places = range(0, len(curve.speed), max(len(curve.speed) // 6, 1))
         rows += [
             [
-                "forward" if direction > 0.0 else "backward",
+                "forward" if curve.direction > 0.0 else "backward",
                 units.text(float(curve.speed[place]), "m/s"),
                 units.text(float(curve.force[place]), "N"),
                 units.text(QUANTILE * float(curve.standard_error[place]), "N"),

@@ -10,12 +10,13 @@ import pytest
 from benchmarks import identification_conditions as conditions
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.identification.findings import Findings
+from stickslip_ros.identification.free_run import free_run
 from stickslip_ros.identification.identify import identify
 from stickslip_ros.identification.laws import SaturatingAdapter
-from stickslip_ros.identification.predictor import Predictor, free_run
+from stickslip_ros.identification.predictor import Predictor
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.regression import regress
-from stickslip_ros.identification.rest import static_force
+from stickslip_ros.identification.rests import static_force
 from stickslip_ros.identification.sentences import notes, notes_on, unidentified
 from stickslip_ros.identification.servo import closed_loop, servo_of
 from stickslip_ros.model.friction import Coulomb, Stiction
@@ -124,7 +125,7 @@ def test_the_law_is_chosen_by_held_out_parts() -> None:
     assert found.law == "table"
     errors = {each.law.name: each.error for each in found.candidates}
     assert errors["table"] < 0.7 * errors["coulomb"]
-    curve = found.friction(0)
+    curve = found.curves[0]
     true = -np.array([float(SATURATING.coefficient(w, 1.0)) for w in curve.speed.tolist()])
     fast = curve.speed > 0.02
     assert curve.force[fast] == pytest.approx(true[fast], rel=0.03)
@@ -212,7 +213,7 @@ def test_friction_that_follows_the_curve_over_a_path_is_fitted() -> None:
     assert found.fitted["mass"].value == pytest.approx(95.0, rel=0.03)
     for direction in (found.drive.friction.forward, found.drive.friction.reverse):
         assert direction.bristle_stiffness > 1e4
-    curve = found.friction(0)
+    curve = found.curves[0]
     true = -np.array([float(SATURATING.coefficient(w, 1.0)) for w in curve.speed.tolist()])
     assert curve.force[1:] == pytest.approx(true[1:], rel=0.03)
 
@@ -260,7 +261,7 @@ def test_a_curve_does_not_rise_far_below_the_slowest_speed() -> None:
     saturating = regress(fit.rows, curve, fit.free, fit.fixed)
     assert (saturating.shapes >= 0.999 * np.quantile(fit.rows.speeds, 0.02)).all()
     for number, law in enumerate((COULOMB.forward, COULOMB.reverse)):
-        force = found.friction(number)
+        force = found.curves[number]
         assert force.force[1] == pytest.approx(law.static, rel=0.3)
 
 

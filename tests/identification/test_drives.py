@@ -15,13 +15,14 @@ import stickslip_ros as ss
 from benchmarks import identification as study
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.identification.drives import OUT_OF_TIME, DriveTask
+from stickslip_ros.identification.even_clock import evenly_spaced
 from stickslip_ros.identification.filtered import filtered
 from stickslip_ros.identification.findings import Findings
 from stickslip_ros.identification.identified_law import DELAY, LAG
 from stickslip_ros.identification.identify import identify
 from stickslip_ros.identification.laws import KNOWN_LAWS
-from stickslip_ros.identification.predictor import Predictor, Segment
-from stickslip_ros.identification.record import Record, evenly_spaced
+from stickslip_ros.identification.predictor import Predictor
+from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.refinement import repetition_of
 from stickslip_ros.identification.sentences import notes, unidentified
 from stickslip_ros.identification.time_limit import TimeLimit
@@ -73,8 +74,8 @@ def test_a_law_that_another_excels_gets_no_further_constants() -> None:
     own = study.record("coulomb", "ramp", seed=7, duration=1.5, delay=2e-3)
     task = DriveTask([own], {"normal_force": study.NORMAL_FORCE}, TimeLimit())
     near = task.searched(KNOWN_LAWS["coulomb"])
-    least = near[0].best.loss
-    assert DELAY in task.extended(near, least).best.names
+    least = near[0].loss
+    assert DELAY in task.extended(near, least).names
     assert task.extended(near, 1e-3 * least) is near[0]
 
 
@@ -99,7 +100,7 @@ def test_a_force_that_is_late(delay: float, lag: float) -> None:
     for name, each in found.fitted.items():
         assert abs(each.value - true[name]) < _FAR * each.standard_error, name
     assert found.fitted["mass"].standard_error < 0.002 * study.MASS
-    assert (found.delay > 0.0) == (delay > 0.0)
+    assert (found.chosen.delay > 0.0) == (delay > 0.0)
     assert (LAG in found.fitted) == (lag > 0.0)
 
 
@@ -108,7 +109,7 @@ def test_a_disturbance_is_not_late() -> None:
     drive = Drive(study.MASS, 0.0, study.STIFFNESS, 1000.0, 0.0, study.LAWS["coulomb"])
     shifted = replace(own, force=np.concatenate([np.zeros(2), own.force[:-2]]))
     late, known = (
-        next(Predictor(each).followed(drive, [Segment(0, 0, 500)], np.zeros((1, 2)), delay))[0]
+        next(Predictor(each).followed(drive, [slice(0, 500)], np.zeros((1, 2)), delay))[0]
         for each, delay in ((own, 2.0 * study.PERIOD), (shifted, 0.0))
     )
     assert np.ptp(known) > 1e-5
@@ -128,7 +129,7 @@ def test_a_force_that_lags_moves_the_slide_as_that_of_its_actuator(lag: float) -
         motion.set_forces(each, 0.0)
         motion.advance(study.PERIOD)
     record = Record("late", study.PERIOD, position, np.full(len(force), 0.1), force)
-    whole = [Segment(0, 0, len(force))]
+    whole = [slice(0, len(force))]
     found, _ = next(Predictor(record).lagging(lag).followed(drive, whole, np.zeros((1, 2)), 0.0))
     assert np.ptp(position) > 1e-4
     assert found == pytest.approx(position, abs=1e-3 * study.RESOLUTION)
@@ -181,13 +182,13 @@ def test_what_stick_slip_at_one_belt_speed_tells(stick: Findings) -> None:
     check_constants(stick, study.truth("stribeck", "stick"))
     assert "several belt speeds" in unidentified(stick)["damping"]
     assert "both directions" in unidentified(stick)["bias_force"]
-    assert stick.directions == [-1.0]
+    assert stick.chosen.directions == [-1.0]
 
 
 def test_rows_near_sticking_are_not_those_of_measured_friction(stick: Findings) -> None:
     columns = filtered(stick.records[0], decimated=False)
     assert 50 < np.count_nonzero(columns.settled) < np.count_nonzero(columns.slipping)
-    errors = stick.errors()
+    errors = stick.chosen.errors(stick.records[0])
     law = study.LAWS["stribeck"]
     true = study.NORMAL_FORCE * np.array(
         [float(law.coefficient(each, np.sign(each))) for each in errors.relative_speed.tolist()]
@@ -200,7 +201,7 @@ def test_on_a_belt_that_moves_backward_the_slide_slips_forward() -> None:
     back = replace(own, position=-own.position, belt_velocity=-own.belt_velocity)
     late = replace(back, belt_velocity=np.where(np.arange(2500) < 5, 0.0, back.belt_velocity))
     found = identify([late], "stribeck", {"mass": 100.0})
-    assert found.directions == [1.0]
+    assert found.chosen.directions == [1.0]
     assert found.drive.belt_speed == float(back.belt_velocity[-1])
 
 
@@ -269,7 +270,7 @@ def test_friction_without_a_law() -> None:
     own = study.record("stribeck", "ramp", 3, 1.5)
     found = identify([own], "table", {"normal_force": study.NORMAL_FORCE})
     assert {"mass", "stiffness"} <= found.fitted.keys()
-    curve = found.friction()
+    curve = found.curves[0]
     law = study.LAWS["stribeck"]
     true = [-study.NORMAL_FORCE * float(law.coefficient(w, 1.0)) for w in curve.speed.tolist()]
     recorded = curve.speed < 0.8 * curve.speed.max()
@@ -283,7 +284,7 @@ def test_friction_by_direction() -> None:
     found = identify([reversing(law)], "coulomb", {"normal_force": 1000.0, "damping": 0.0})
     assert [each.label for each in found.candidates] == ["coulomb", "coulomb by direction"]
     assert found.chosen.by_direction
-    assert found.directions == [1.0, -1.0]
+    assert found.chosen.directions == [1.0, -1.0]
     assert "by direction" in unidentified(found)["bias_force"]
     for number, (group, each) in enumerate(
         (("friction.", law.forward), ("friction.reverse.", law.reverse))
@@ -292,7 +293,7 @@ def test_friction_by_direction() -> None:
             estimate = found.fitted[group + name]
             away = abs(estimate.value - getattr(each, name))
             assert away < _FAR * estimate.standard_error, group + name
-        curve = found.friction(number)
+        curve = found.curves[number]
         true = 1000.0 * (each.static + each.viscous * curve.speed)
         assert curve.force == pytest.approx(true, rel=0.01)
         assert (curve.standard_error > 0.0).all()
@@ -374,11 +375,10 @@ def test_only_errors_of_positions_are_compared() -> None:
     own = study.record("coulomb", "ramp", 1, 2.0)
     velocity = np.gradient(own.position, own.period)
     velocity += 1e-3 * np.random.default_rng(0).normal(size=len(velocity))
-    best = identify([replace(own, velocity=velocity)], "coulomb").chosen.best
+    best = identify([replace(own, velocity=velocity)], "coulomb").chosen
     assert 2 * np.count_nonzero(best.task.of_positions) == len(best.residual)
-    first = best.task.segments[0]
-    positions = own.position[first.start : first.start + first.count]
-    assert (best.task.positions[: first.count] == positions).all()
+    positions = own.position[best.task.segments[0].samples]
+    assert (best.task.positions[: len(positions)] == positions).all()
 
 
 def test_missing_samples_are_not_measured() -> None:

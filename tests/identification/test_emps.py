@@ -63,7 +63,7 @@ def test_a_curve_is_chosen_that_predicts_better(record: Record, table: Findings)
     assert check["closed_loop_force_error"] < 0.03
     assert check["free_run_error"] < 2.0e-3
     for number in range(2):
-        force = table.friction(number).force
+        force = table.curves[number].force
         assert (force[1:] >= force[:-1]).all()
     documented = json.loads(_STUDY.read_text(encoding="utf-8"))["chosen"]
     assert table.fitted["mass"].value == pytest.approx(

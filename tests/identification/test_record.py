@@ -7,7 +7,8 @@ import pytest
 
 from stickslip_ros.errors import BagError, InvalidInputError
 from stickslip_ros.identification import recordings as module
-from stickslip_ros.identification.record import Record, evenly_spaced
+from stickslip_ros.identification.even_clock import evenly_spaced
+from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.recordings import read_all, read_records
 from stickslip_ros.record.codec import pack_joint_state, pack_reference, pack_wrench
 from stickslip_ros.record.table_columns import Table

@@ -14,8 +14,8 @@ def test_a_search_from_constants_nearby_finds_the_true_ones(seed: int) -> None:
     task, factors = segments(), np.random.default_rng(seed).uniform(0.9, 1.1, len(FREE))
     begun = TRUE | {name: f * TRUE[name] for name, f in zip(FREE, factors.tolist(), strict=True)}
     found = refine(task, FREE, begun)
-    assert found.best.loss <= min(best_starts(task, each).loss for each in (begun, TRUE))
-    for name, value in found.best.values.items():
+    assert found.loss <= min(best_starts(task, each).loss for each in (begun, TRUE))
+    for name, value in found.values.items():
         if name not in FREE:
             assert value == TRUE[name], name
             continue
@@ -30,7 +30,7 @@ def test_a_search_from_outside_of_the_bounds_stays_inside() -> None:
     task, begun = segments(), TRUE | {"viscous": 1e6}
     low, high = task.law.bounds("viscous", begun, task.fastest)
     assert high < 1e6
-    found = refine(task, ["viscous"], begun, most=3).best
+    found = refine(task, ["viscous"], begun, most=3)
     assert low <= found.values["viscous"] <= high
     assert found.loss <= best_starts(task, TRUE | {"viscous": high}).loss
 
@@ -38,11 +38,11 @@ def test_a_search_from_outside_of_the_bounds_stays_inside() -> None:
 def test_a_search_without_free_constants_is_one_of_the_starts() -> None:
     task = segments()
     found = refine(task, [], TRUE)
-    assert found.best.values == TRUE
-    assert found.best.loss == pytest.approx(best_starts(task, TRUE).loss, rel=1e-3)
+    assert found.values == TRUE
+    assert found.loss == pytest.approx(best_starts(task, TRUE).loss, rel=1e-3)
 
 
 def test_a_search_whose_time_is_over_is_not_worse_than_its_start() -> None:
     task, begun = segments(0.0), TRUE | {"mass": 1.05 * TRUE["mass"]}
     found = refine(task, FREE, begun)
-    assert found.best.loss <= 1.001 * best_starts(task, begun).loss
+    assert found.loss <= 1.001 * best_starts(task, begun).loss

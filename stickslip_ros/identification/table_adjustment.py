@@ -6,7 +6,8 @@ from dataclasses import replace
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray, rms
-from stickslip_ros.identification.predictor import Predictor, free_run
+from stickslip_ros.identification.free_run import free_run
+from stickslip_ros.identification.predictor import Predictor
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.regression import Regression, solve
 
@@ -56,7 +57,7 @@ class _FreeRuns:
 
     def __init__(self, fit: Regression, records: Sequence[Record]) -> None:
         self._fit = fit
-        records = [record.delayed(fit.delay or 0.0) for record in records]
+        records = [record.delayed(fit.delay) for record in records]
         self._predictors = [Predictor(record) for record in records]
         self._measured = np.concatenate([record.position for record in records])
         self._records = records
@@ -162,8 +163,8 @@ class _FreeRuns:
 
 def _slope(fit: Regression, low: float, high: float) -> float:
     """Return the mean slope of the friction curves between two speeds, N s/m."""
-    slopes: list[float] = []
-    for sign in fit.directions:
-        low_force, high_force = fit.force_at(fit.point, sign, np.array([low, high]))
-        slopes.append(float(high_force - low_force) / (high - low))
-    return float(np.mean(slopes))
+    rises = [
+        np.diff(fit.curve.terms(np.array([low, high]), shape) @ forces)
+        for forces, shape in fit.curves
+    ]
+    return float(np.mean(rises)) / (high - low)
