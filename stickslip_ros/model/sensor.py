@@ -131,7 +131,7 @@ class Sensor:
         resolution = self.position_resolution
         of_position = _Noise(self.position_noise, self.seed, 0) if self.position_noise else None
         of_velocity = _Noise(self.velocity_noise, self.seed, 1) if self.velocity_noise else None
-        positions = deque[float](maxlen=self.spans + 1) if self.spans else None
+        earlier = deque[float](maxlen=self.spans) if self.spans else None
 
         # Without calls or objects that could be avoided: it is a part of each sample.
         def measure(number: int, position: float, velocity: float) -> tuple[float, float]:
@@ -141,10 +141,9 @@ class Sensor:
                 steps = position / resolution
                 if -_MOST_STEPS < steps < _MOST_STEPS:
                     position = round(steps) * resolution
-            if positions is not None:
-                positions.append(position)
-                spanned = len(positions) - 1
-                velocity = (position - positions[0]) / (spanned * period) if spanned else 0.0
+            if earlier is not None:
+                velocity = (position - earlier[0]) / (len(earlier) * period) if earlier else 0.0
+                earlier.append(position)
             elif of_velocity is not None:
                 velocity += next(of_velocity.upcoming or of_velocity.start(number))
             return position, velocity
