@@ -20,7 +20,8 @@ class ForceMeter:
     """
 
     def __init__(self) -> None:
-        self._peak = 0.0
+        self.peak_force: float | None = None
+        """Largest magnitude of the force, N; None without forces."""
         self._first: int | None = None
         self._kept = NO_FORCES
 
@@ -33,7 +34,7 @@ class ForceMeter:
         kept = self._kept.followed_by(forces[np.isfinite(forces.force)])
         if len(kept) == 0:
             return
-        self._peak = max(self._peak, float(np.abs(kept.force).max()))
+        self.peak_force = max(self.peak_force or 0.0, float(np.abs(kept.force).max()))
         restarts = np.flatnonzero(np.diff(kept.stamp) < 0) + 1
         if len(restarts) > 0:
             kept, self._first = kept[restarts[-1] :], None
@@ -43,11 +44,6 @@ class ForceMeter:
         largest_later = np.maximum.accumulate(magnitude[:0:-1])[::-1]
         larger = np.append(magnitude[:-1] > largest_later, True)
         self._kept = kept[larger & (kept.stamp >= last - (last - self._first) // 10)]
-
-    @property
-    def peak_force(self) -> float | None:
-        """Largest magnitude of the force, N; None without forces."""
-        return None if self._first is None else self._peak
 
     @property
     def resting_force(self) -> float | None:

@@ -115,11 +115,7 @@ class FoldedCycles:
             most = max(min(int(self.phases / 3.0), _HARMONICS[2]), 1)
         few = min(_HARMONICS[0], most)
         for _ in range(6):
-            found = np.linalg.lstsq(rows(self.phase, few), self.position, rcond=None)[0]
-            shape = Shape(
-                lambda phase: rows(phase, few), found.astype(np.float64), np.empty(0), self.period
-            )
-            if abs(self.adjust(shape)) < 1e-9:
+            if abs(self.adjust(self._linear(rows, [few]))) < 1e-9:
                 break
         if self._step:  # more harmonics would follow the stairs
             most = min(most, max(int(np.ptp(self.position) / self._step / 2.0), 2))
@@ -154,15 +150,14 @@ class FoldedCycles:
         The first ones are `known` to be 1.
         """
         phase = self.phase
-        squares, width = inf, 0
-        found, covariance, size = np.empty(0), np.empty((0, 0)), sizes[0]
+        squares, width, size = inf, 0, sizes[0]
+        basis = residual = found = np.empty((0, 0))
         for size in sizes:
             every = rows(phase, size)
             basis, rest = every[:, known:], self.position - every[:, :known].sum(axis=1)
             found = np.linalg.lstsq(basis, rest, rcond=None)[0]
             residual = rest - basis @ found
             left, more = float(residual @ residual), basis.shape[1] - width
-            covariance = self._covariance(basis, residual, slice(None))
             # A coefficient takes one variance of noise. The size that adds no more than noise is
             # used, not the one before it: then the bias is small against the standard error.
             if squares - left <= 3.0 * more * left / max(len(phase) - basis.shape[1], 1):
@@ -171,7 +166,7 @@ class FoldedCycles:
         return Shape(
             lambda phase: rows(phase, size),
             np.append(np.ones(known), found),
-            np.pad(covariance, ((known, 0), (known, 0))),
+            np.pad(self._covariance(basis, residual, slice(None)), ((known, 0), (known, 0))),
             self.period,
         )
 

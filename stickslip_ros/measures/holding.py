@@ -1,27 +1,9 @@
-"""How well a controller holds: columns of a trial, settling, hunting."""
-
-from dataclasses import dataclass
+"""How well a controller holds: settling and hunting."""
 
 import numpy as np
 
-from stickslip_ros.arrays import BoolArray, FloatArray, Table
+from stickslip_ros.arrays import FloatArray
 from stickslip_ros.measures.noise import rises
-
-
-@dataclass(frozen=True, eq=False)
-class Trial(Table):
-    """Samples of a controlled motion, true values; arrays of shape (samples,)."""
-
-    position: FloatArray
-    """Displacement, m."""
-    velocity: FloatArray
-    """Velocity, m/s."""
-    force: FloatArray
-    """Control force that answers the sample, N."""
-    target: FloatArray
-    """Reference of the displacement, m."""
-    sticks: BoolArray
-    """Whether the slide sticks."""
 
 
 def settling_time(distance: FloatArray, allowed: float, start: float, rate: float) -> float | None:

@@ -12,9 +12,9 @@ from stickslip_ros.measures.noise import (
     medians,
     white_noise,
 )
+from stickslip_ros.measures.noisy_samples import NoisySamples
 from stickslip_ros.measures.noisy_window import REVERSAL, NoisyWindow
 from stickslip_ros.measures.single_cycles import (
-    NoisySamples,
     cycle_between,
     fit_reach,
     reversals,

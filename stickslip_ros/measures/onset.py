@@ -27,14 +27,14 @@ the lowest onset has no lower limit."""
 _WIDE, _AWAY = 0.1, 1.05
 """Length of an interval, in onsets, from which another run is advised; its feed, in upper limits,
 at least."""
-_FAMILIES: Mapping[str, tuple[FrictionLaw, str, int]] = {
-    "stribeck": (Stribeck(1.0, 0.0, 1.0), "", 2),
-    "exponential, exponent 1": (Exponential(1.0, 0.0), "decay_speed", 3),
-    "exponential, exponent 2": (Exponential(1.0, 0.0, exponent=2.0), "decay_speed", 3),
-    "rate_state": (RateState(1.0, 1.0, 2.0), "", 2),
+_FAMILIES: Mapping[str, tuple[Callable[[FloatArray], FrictionLaw], int]] = {
+    "stribeck": (lambda _: Stribeck(1.0, 0.0, 1.0), 2),
+    "exponential, exponent 1": (lambda speed: Exponential(1.0, 0.0, speed), 3),
+    "exponential, exponent 2": (lambda speed: Exponential(1.0, 0.0, speed, exponent=2.0), 3),
+    "rate_state": (lambda _: RateState(1.0, 1.0, 2.0), 2),
 }
-"""Families of friction laws: a law, any multiple of which is in it; the constant that may have any
-value; number of constants of the decay rate, of which viscous damping is one."""
+"""Families of friction laws: the law for speeds, m/s, any multiple of which is in it; number of
+constants of the decay rate, of which viscous damping is one."""
 
 
 @dataclass(frozen=True)
@@ -165,7 +165,7 @@ def onset_of(ring_downs: Sequence[RingDown], length: str = "m") -> Onset:
     if rows[0] == 0:
         advice = f"only an upper limit of the onset is known: {run} the onset"
         return Onset(feeds, families, upper=upper, advice=advice)
-    likely = [exp((least - families[n].chi_square) / 2.0 - _FAMILIES[n][2]) for n in kept]
+    likely = [exp((least - families[n].chi_square) / 2.0 - _FAMILIES[n][1]) for n in kept]
     weights = np.array(likely)
     found = float(weights @ [families[name].onset_speed for name in kept] / weights.sum())
     advice = f"{run} it more exactly" if upper - lower > _WIDE * found else ""
@@ -176,8 +176,7 @@ def _fit(
     speed: FloatArray,
     rate: FloatArray,
     weight: FloatArray,
-    law: FrictionLaw,
-    shape: str,
+    family: Callable[[FloatArray], FrictionLaw],
     count: int,
 ) -> tuple[FamilyOnset, FloatArray]:
     """Return the best fit of a family, and the least chi^2 for each onset.
@@ -188,8 +187,7 @@ def _fit(
     from scipy.special import gammaincc  # takes long to import
 
     onsets, shapes = _ONSETS * speed[0], _SHAPES[:, np.newaxis] * speed[0]
-    laws = replace(law, **{shape: shapes}) if shape else law
-    at_speed, at_onset = (np.atleast_2d(_slope(laws, each)) for each in (speed, onsets))
+    at_speed, at_onset = (np.atleast_2d(_slope(family(shapes), each)) for each in (speed, onsets))
     later = np.minimum.accumulate(at_onset[:, ::-1], axis=1)[:, ::-1]
     allowed = (at_onset <= later) & (at_onset < at_speed.min(axis=1, keepdims=True))
     own, onset = at_speed - at_speed[:, :1], at_onset - at_speed[:, :1]
@@ -202,7 +200,7 @@ def _fit(
     chi_square = np.where(usable, left, inf)
     row, column = np.unravel_index(int(np.argmin(chi_square)), chi_square.shape)
     least, size = float(chi_square[row, column]), float(factor[row, column])
-    best, zero = replace(law, **{shape: shapes[row]}) if shape else law, onsets[column : column + 1]
+    best, zero = family(shapes[row]), onsets[column : column + 1]
     degrees, known = len(rate) - count, least < inf
     chance = float(gammaincc(degrees / 2.0, least / 2.0)) if degrees > 0 else float(known)
 

@@ -1,40 +1,18 @@
 """Single cycles of positions with noise: reversals, and what is measured between them."""
 
-from dataclasses import dataclass
 from math import isfinite, nan, pi, sqrt
-from typing import NamedTuple
 
 import numpy as np
 
-from stickslip_ros.arrays import FloatArray, Table
+from stickslip_ros.arrays import FloatArray
 from stickslip_ros.measures.cycle_measures import Cycle
 from stickslip_ros.measures.noise import medians
+from stickslip_ros.measures.noisy_samples import NoisySamples, Point
 
 _PASSING_SHARE = 1.15
 """Share of the belt speed beyond which a slide has passed the belt; calibrations err by less."""
 LEAST_STICK = 0.03
 """Stick fraction up to which a single cycle counts as one without a stick: it errs by as much."""
-
-
-@dataclass
-class NoisySamples(Table):
-    """Columns of samples without impulses; SI units."""
-
-    time: FloatArray
-    position: FloatArray
-    velocity: FloatArray
-    belt: FloatArray
-
-    def row(self, time: float) -> int:
-        """Return the first row that is not earlier than a time, s."""
-        return int(np.searchsorted(self.time, time))
-
-
-class Point(NamedTuple):
-    """A position at an instant."""
-
-    time: float
-    position: float
 
 
 def reversals(position: FloatArray, least: float) -> list[tuple[int, int]]:

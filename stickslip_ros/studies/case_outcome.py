@@ -6,9 +6,9 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from stickslip_ros.arrays import rms
+from stickslip_ros.arrays import FloatArray, rms
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.measures.holding import Trial, hunting, settling_time
+from stickslip_ros.measures.holding import hunting, settling_time
 from stickslip_ros.motion import Motion
 from stickslip_ros.motion.controller import answer
 from stickslip_ros.quantities import Quantity, number_of, quantities_of
@@ -165,28 +165,27 @@ def simulate_case(
         if loop.unbounded:
             return Outcome(0, held=False, reason="the motion diverges")
     position, velocity, force, target, sticks = np.array(rows).T.copy()
-    trial = Trial(position, velocity, force, target, sticks != 0.0)
-    late = trial[round(_JUDGED * len(trial)) :]
+    late = slice(round(_JUDGED * len(rows)), None)
     limit = min(limit, drive.actuator.limit)
-    middle, swing = float(late.position.mean()), rms(late.velocity)
+    middle, swing = float(position[late].mean()), rms(velocity[late])
     found = Outcome(
         0,
-        sticking=float(late.sticks.mean()),
+        sticking=float(sticks[late].mean()),
         rms_velocity=swing,
         set_point=middle,
-        mean_force=float(late.force.mean()),
-        rms_force=float(late.force.std()),
-        peak_force=float(np.abs(trial.force).max()),
-        at_limit=float((np.abs(trial.force) >= limit).mean()),
+        mean_force=float(force[late].mean()),
+        rms_force=float(force[late].std()),
+        peak_force=float(np.abs(force).max()),
+        at_limit=float((np.abs(force) >= limit).mean()),
     )
     if is_positioning(scenario):
-        return _positioned(found, trial, late, tolerance, plant.rate)
+        return _positioned(found, position - target, target, late, tolerance, plant.rate)
     allowed = tolerance * abs(drive.belt_speed)
     if disturbance.kind == "sine":
         return found._replace(held=found.sticking == 0.0)
     ends = {"step": _END, "none": 0.0}.get(disturbance.kind, _START) * duration
     omega = drive.angular_frequency if drive.has_spring else 0.0
-    distance = np.hypot(omega * (trial.position - middle), trial.velocity)
+    distance = np.hypot(omega * (position - middle), velocity)
     return found._replace(
         held=found.sticking == 0.0 and swing <= allowed,
         settling_time=settling_time(distance, 2.0 * allowed, ends, plant.rate),
@@ -194,18 +193,22 @@ def simulate_case(
 
 
 def _positioned(
-    found: Outcome, trial: Trial, late: Trial, tolerance: float, rate: float
+    found: Outcome,
+    error: FloatArray,
+    target: FloatArray,
+    late: slice,
+    tolerance: float,
+    rate: float,
 ) -> Outcome:
     """Return an outcome with what positioning on a guide at rest has."""
-    target, error = trial.target, np.abs(trial.position - trial.target)
     allowed = tolerance * (float(np.ptp(target)) or float(np.abs(target).max()) or 1.0)
     moving = np.flatnonzero(np.diff(target))
     ends = (int(moving[-1]) + 1) / rate if len(moving) else 0.0
-    amplitude, period = hunting(late.position - late.target, allowed, rate)
-    final = float(error[-len(late) :].max())
+    amplitude, period = hunting(error[late], allowed, rate)
+    final = float(np.abs(error[late]).max())
     return found._replace(
         held=final <= allowed,
-        settling_time=settling_time(error, allowed, ends, rate),
+        settling_time=settling_time(np.abs(error), allowed, ends, rate),
         final_error=final,
         hunting_amplitude=amplitude,
         hunting_period=period,

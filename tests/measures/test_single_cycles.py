@@ -10,10 +10,9 @@ from scipy.signal import find_peaks
 
 from stickslip_ros.measures import Regime
 from stickslip_ros.measures.noise import medians
+from stickslip_ros.measures.noisy_samples import NoisySamples, Point
 from stickslip_ros.measures.noisy_window import rest
 from stickslip_ros.measures.single_cycles import (
-    NoisySamples,
-    Point,
     cycle_between,
     reversals,
     vertex,
