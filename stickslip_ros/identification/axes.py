@@ -12,7 +12,8 @@ from stickslip_ros.identification.filtered import END, START, filtered, mean_for
 from stickslip_ros.identification.identified_law import DELAY, IdentifiedLaw
 from stickslip_ros.identification.laws import SaturatingAdapter, TableAdapter
 from stickslip_ros.identification.record import Record
-from stickslip_ros.identification.regression import LINEAR, Regression, Rows, regress
+from stickslip_ros.identification.regression import Regression, regress
+from stickslip_ros.identification.rows import LINEAR, Rows
 from stickslip_ros.identification.time_limit import TimeLimit
 
 _RESOLVED_ERROR_RATIO = 0.9
@@ -91,11 +92,11 @@ class AxisTask:
 
     def _with_delay(self, law: IdentifiedLaw) -> Regression:
         """Return a fit with a delay if the records ask for one."""
-        fit = found = self._fitted(law, self.rows)
+        fit = found = self._fitted(law, self.rows).validated()
         if self.delay is not None:
             return found
         if self.rows.resting:
-            fits = fit, self._fitted(law, self._rows(None))
+            fits = fit, self._fitted(law, self._rows(None)).validated()
             found = min(fits, key=lambda each: each.error)
         period, tried = self.records[0].period, _DELAYS
         for _ in range(2):
@@ -106,6 +107,7 @@ class AxisTask:
             best = float(tried[np.argmin(np.sum(left * left, axis=0))])
             fit = self._fitted(law, self._rows(best * period))
             tried = best + _DELAY_STEPS
+        fit = fit.validated()
         return fit if fit.error < _RESOLVED_ERROR_RATIO * found.error else found
 
     def _with_memory(self, static: Regression, *, asked: bool) -> Regression:
@@ -131,7 +133,7 @@ class AxisTask:
         return replace(found, remark=remark)
 
     def _fitted(self, law: IdentifiedLaw, rows: Rows) -> Regression:
-        return regress(rows, law, self.free, self.fixed).validated()
+        return regress(rows, law, self.free, self.fixed)
 
     def _rows(self, delay: float | None) -> Rows:
         """Return the rows with another delay of the force, s; None: read when the position is."""

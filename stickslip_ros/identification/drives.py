@@ -23,7 +23,8 @@ from stickslip_ros.identification.laws import (
 from stickslip_ros.identification.predictor import Predictor
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.refinement import Refinement
-from stickslip_ros.identification.regression import LINEAR, Regression, Rows, regress
+from stickslip_ros.identification.regression import Regression, regress
+from stickslip_ros.identification.rows import LINEAR, Rows
 from stickslip_ros.identification.search import refine
 from stickslip_ros.identification.segment_starts import Errors, best_starts
 from stickslip_ros.identification.time_limit import TimeLimit

@@ -6,7 +6,6 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.identification.predictor import Predictor
-from stickslip_ros.identification.record import Record
 from stickslip_ros.model.drive import Drive
 
 _FIRST = 20
@@ -17,7 +16,7 @@ _SPEED_TOLERANCE = 1e-3
 """Tolerance of the velocity at the start, as a share of the range in which it is sought."""
 
 
-def free_run(record: Record, drive: Drive) -> tuple[float, FloatArray]:
+def free_run(predictor: Predictor, drive: Drive) -> tuple[float, FloatArray]:
     """Return the motion of a drive through a whole record, with its force and without feedback.
 
     It starts at the measured position with the velocity that fits best, m/s, which is returned
@@ -26,7 +25,7 @@ def free_run(record: Record, drive: Drive) -> tuple[float, FloatArray]:
     """
     from scipy.optimize import minimize_scalar  # takes long to import
 
-    predictor, first = Predictor(record), record.position[:_FIRST]
+    record, first = predictor.record, predictor.record.position[:_FIRST]
     slope = float(np.polyfit(np.arange(len(first)) * record.period, first, 1)[0])
     # The range also makes up for the friction over the first stroke.
     spread = 3.0 * abs(slope) + float(np.std(np.diff(first))) / record.period

@@ -57,10 +57,8 @@ class _FreeRuns:
 
     def __init__(self, fit: Regression, records: Sequence[Record]) -> None:
         self._fit = fit
-        records = [record.delayed(fit.delay) for record in records]
-        self._predictors = [Predictor(record) for record in records]
+        self._predictors = [Predictor(record.delayed(fit.delay)) for record in records]
         self._measured = np.concatenate([record.position for record in records])
-        self._records = records
         left = np.concatenate([run for _, run in self._runs(fit)]) - self._measured
         self.bounded = bool(np.isfinite(left).all())
         count = len(fit.residual)
@@ -83,13 +81,10 @@ class _FreeRuns:
     def residual(self, point: FloatArray) -> FloatArray:
         """Return the errors of the forces and of the simulated free runs, weighted."""
         own = self._fit.at(point)
-        drive = own.drive(1.0)
-        positions: list[FloatArray] = []
-        for each, speed in zip(
-            self._predictors, point[-len(self._predictors) :].tolist(), strict=True
-        ):
-            positions.append(each.positions(drive, speed))
-        errors = np.concatenate(positions) - self._measured
+        drive, speeds = own.drive(1.0), point[len(own.point) :].tolist()
+        pairs = zip(self._predictors, speeds, strict=True)
+        runs = [predictor.positions(drive, speed) for predictor, speed in pairs]
+        errors = np.concatenate(runs) - self._measured
         errors = np.nan_to_num(errors, nan=_UNBOUNDED_ERROR / self._weights[1])
         return np.concatenate([own.residual * self._weights[0], errors * self._weights[1]])
 
@@ -158,7 +153,7 @@ class _FreeRuns:
 
     def _runs(self, fit: Regression) -> list[tuple[float, FloatArray]]:
         drive = fit.drive(1.0)
-        return [free_run(record, drive) for record in self._records]
+        return [free_run(each, drive) for each in self._predictors]
 
 
 def _slope(fit: Regression, low: float, high: float) -> float:

@@ -294,7 +294,7 @@ def test_no_velocity_at_the_start_near_the_found_one_is_better() -> None:
     start = Record("axis", 1e-3, still, still, force=force)
     position = np.rint(Predictor(start).positions(drive, velocity) / 1e-6) * 1e-6
     moved = replace(start, position=position)
-    found, positions = free_run(moved, drive)
+    found, positions = free_run(Predictor(moved), drive)
     assert found == pytest.approx(velocity, rel=0.05)
     error = np.std(positions - position)
     for share in (-0.05, -0.01, 0.01, 0.05):
