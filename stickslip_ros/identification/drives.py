@@ -314,7 +314,8 @@ class DriveTask:
         # Of the segments of long records one of so many is used.
         stride = -(-sum(len(each.position) for each in self.records) // most)
         segments = segments_of(self.predictors, length)[::stride]
-        return Trajectories(law, self.rows.directions, segments, self.limit)
+        directions = self.rows.directions
+        return Trajectories(law, directions, segments, self.normal_force, self.limit)
 
     def _known(self, law: IdentifiedLaw, values: Mapping[str, float]) -> dict[str, float]:
         own = {

@@ -60,6 +60,8 @@ class Trajectories:
     """Signs of the relative speed in the records: 1, -1 or both."""
     segments: Sequence[Segment]
     """Segments, those of a record after one another."""
+    normal_force: float
+    """Normal force, N: in its units the simulated motion is of the order of 1."""
     limit: TimeLimit
     """Time after which a search ends."""
 
@@ -203,7 +205,7 @@ class Trajectories:
 
     def _drive(self, values: Mapping[str, float]) -> Drive:
         """Return the drive of coordinates; raises InvalidInputError if there is none."""
-        drive = self.law.drive(values, 1.0)
+        drive = self.law.drive(values, self.normal_force)
         refusal = drive.friction.refusal()
         if refusal is not None:
             raise InvalidInputError(refusal)

@@ -25,4 +25,5 @@ def segments(seconds: float = float("inf")) -> Trajectories:
     """Return ten segments of a run with Coulomb friction, and the time that a search may take."""
     own = study.record("coulomb", "taps", seed=1, duration=0.8)
     parts = segments_of([Predictor(own)], 0.08)
-    return Trajectories(KNOWN_LAWS["coulomb"], [-1.0], parts, TimeLimit(seconds))
+    law, limit = KNOWN_LAWS["coulomb"], TimeLimit(seconds)
+    return Trajectories(law, [-1.0], parts, study.NORMAL_FORCE, limit)
