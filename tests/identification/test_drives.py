@@ -267,8 +267,7 @@ def test_what_is_refused() -> None:
 
 @pytest.mark.long
 def test_friction_without_a_law() -> None:
-    own = study.record("stribeck", "ramp", 3, 1.5)
-    found = identify([own], "table", {"normal_force": study.NORMAL_FORCE})
+    found = identify([study.record("stribeck", "ramp", 3, 1.5)], "table")  # nor a normal force
     assert {"mass", "stiffness"} <= found.fitted.keys()
     curve = found.curves[0]
     law = study.LAWS["stribeck"]

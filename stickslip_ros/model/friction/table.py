@@ -59,12 +59,15 @@ class Table(FrictionLaw):
         return -sign * (c0 + speed * (c1 + speed * (c2 + speed * c3)))
 
     def margins(self, relative_speed: Any, sign: Any, memory: Values, switches: Values) -> Values:
-        """Return the distances to the ends, 1 for no end; see `FrictionMemory.margins`."""
+        """Return the distances to the ends, in units of the upper one; 1 for no end.
+
+        So rounding is small beside them at any speed. See `FrictionMemory.margins`.
+        """
         lower, upper, first, last, *_ = switches
         speed = relative_speed * sign
         return (
-            first + (1.0 - first) * (speed - lower),
-            last + (1.0 - last) * (upper - speed),
+            first + (1.0 - first) * (speed - lower) / upper,
+            last + (1.0 - last) * (upper - speed) / upper,
         )
 
     def switches_at(self, relative_speed: float, sign: float, memory: Numbers) -> Numbers:
@@ -114,11 +117,11 @@ class Table(FrictionLaw):
         speeds, values = np.array(self.points, dtype=float).T
         pieces = np.zeros((len(speeds), len(self.switches)))
         pieces[:, 0] = speeds
-        pieces[:, 1] = [*speeds[1:], speeds[-1]]
-        pieces[0, 2] = pieces[-1, 3] = 1.0
-        pieces[-1, 4] = values[-1]
         # One more point, so that the slope is 0 where the constant begins.
         beyond = 2.0 * speeds[-1] or 1.0
+        pieces[:, 1] = [*speeds[1:], beyond]
+        pieces[0, 2] = pieces[-1, 3] = 1.0
+        pieces[-1, 4] = values[-1]
         cubics = PchipInterpolator([*speeds, beyond], [*values, values[-1]]).c
         pieces[:-1, 4:] = cubics[::-1, :-1].T
         return pieces
