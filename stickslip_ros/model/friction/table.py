@@ -59,15 +59,15 @@ class Table(FrictionLaw):
         return -sign * (c0 + speed * (c1 + speed * (c2 + speed * c3)))
 
     def margins(self, relative_speed: Any, sign: Any, memory: Values, switches: Values) -> Values:
-        """Return the distances to the ends, in units of the upper one; 1 for no end.
+        """Return the distances to the ends, 1 for no end; see `FrictionMemory.margins`.
 
-        So rounding is small beside them at any speed. See `FrictionMemory.margins`.
+        At high speeds they are relative to the upper one: rounding stays small beside them.
         """
         lower, upper, first, last, *_ = switches
-        speed = relative_speed * sign
+        speed, scale = relative_speed * sign, 1.0 + upper
         return (
-            first + (1.0 - first) * (speed - lower) / upper,
-            last + (1.0 - last) * (upper - speed) / upper,
+            first + (1.0 - first) * (speed - lower) / scale,
+            last + (1.0 - last) * (upper - speed) / scale,
         )
 
     def switches_at(self, relative_speed: float, sign: float, memory: Numbers) -> Numbers:
