@@ -91,23 +91,21 @@ def test_stick_slip_with_stiction_in_closed_form() -> None:
     assert np.ptp(positions) == pytest.approx(2.0 * amplitude, rel=1e-11)
 
 
-@pytest.mark.parametrize("normal_force", [1000.0, 1.0])
 @pytest.mark.parametrize("width", [1e-3, 1e-5, 1e-9])
-def test_pieces_of_a_table_may_be_narrow_or_far_from_the_scale_of_the_drive(
-    width: float, normal_force: float
-) -> None:
+def test_pieces_of_a_table_may_be_narrow_or_far_from_the_scale_of_the_drive(width: float) -> None:
     """Rounding must not lead back and forth between two pieces."""
     forces = ((0.0, 400.0), (width, 399.0), (2.0 * width, 398.0), (0.05, 250.0), (0.08, 270.0))
-    friction = Table(tuple((speed, force / normal_force) for speed, force in forces))
-    drive = Drive(
-        mass=100.0,
-        damping=200.0,
-        stiffness=1e6,
-        normal_force=normal_force,
-        belt_speed=0.03,
-        friction=friction,
-    )
-    motion = Motion(drive, 0.0, 0.0)
-    motion.advance(0.4)
-    assert abs(motion.position) < 1e-3
-    assert abs(motion.velocity) < 0.1
+    ends: list[tuple[float, float]] = []
+    for normal_force in (1000.0, 1.0):
+        drive = Drive(
+            mass=100.0,
+            damping=200.0,
+            stiffness=1e6,
+            normal_force=normal_force,
+            belt_speed=0.03,
+            friction=Table(tuple((speed, force / normal_force) for speed, force in forces)),
+        )
+        motion = Motion(drive, 0.0, 0.0)
+        motion.advance(0.4)
+        ends.append((motion.position, motion.velocity))
+    assert ends[0] == pytest.approx(ends[1], rel=1e-9)
