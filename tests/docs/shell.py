@@ -108,6 +108,7 @@ class Shell:
             "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
             "ROS_LOG_DIR": str(scratch / "log"),
             "PIP_COMPILE": "0",
+            "PYTHONFAULTHANDLER": "1",
             "PORT": str(free_port()),
             "ROS_SETUP": str(scratch / "setup.bash"),
         }
@@ -186,7 +187,12 @@ class Shell:
             yield
             assert process.poll() is None, f"has ended: {said()}"
             os.killpg(process.pid, signal.SIGINT)
-            status = process.wait(PATIENCE)
+            try:
+                status = process.wait(PATIENCE)
+            except subprocess.TimeoutExpired:
+                os.killpg(process.pid, signal.SIGABRT)  # lets Python print where it is
+                process.wait(PATIENCE)
+                raise AssertionError(f"does not end by Ctrl-C: {said()}") from None
         finally:
             _end(process)
         assert status in _of(command, _INTERRUPTED, _OTHERS_INTERRUPTED), (

@@ -95,16 +95,18 @@ def destroy(node: Node) -> None:
 
 
 def stop_on_signals(executor: Executor, *stopped: Future) -> None:
-    """Let each SIGINT, SIGTERM or SIGHUP complete the next of `stopped` with None.
+    """Let each SIGINT, SIGTERM or SIGHUP complete the next of `stopped` with None, from `executor`.
 
     SIGHUP stays ignored if it is, as under nohup.
     """
 
-    def stop(*_: object) -> None:
+    def complete() -> None:
         due = next((future for future in stopped if not future.done()), None)
         if due is not None:
             due.set_result(None)
-            executor.wake()
+
+    def stop(*_: object) -> None:
+        executor.create_task(complete)  # the code that the signal interrupts may hold their locks
 
     numbers = [signal.SIGINT, signal.SIGTERM]
     if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:

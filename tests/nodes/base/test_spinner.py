@@ -13,9 +13,16 @@ from pathlib import Path
 import pytest
 from rclpy.exceptions import InvalidHandle
 from rclpy.node import Node
+from rclpy.task import Future
+from typing_extensions import override
 
 from stickslip_ros.nodes.base.process import loopback_session
-from stickslip_ros.nodes.base.spinner import Spinner, signal_handlers_kept
+from stickslip_ros.nodes.base.spinner import (
+    Spinner,
+    signal_handlers_kept,
+    spin,
+    stop_on_signals,
+)
 from tests.nodes.graph import PATIENCE
 
 # What the library waits for by the system's clock takes as much longer as that is set back.
@@ -125,6 +132,40 @@ def test_a_session_destroys_its_nodes_however_it_ends(domain: int) -> None:
         raise ZeroDivisionError
     with pytest.raises(InvalidHandle):
         made[0].get_name()
+
+
+class InterruptedFuture(Future):
+    """Is interrupted, once, when a callback is added to it, while it holds its lock."""
+
+    interrupts = 0
+
+    @override
+    def _pending(self) -> bool:
+        if not self.interrupts:
+            self.interrupts += 1
+            signal.raise_signal(signal.SIGINT)
+        return super()._pending()
+
+
+@pytest.mark.timeout(PATIENCE)
+def test_a_signal_stops_even_what_adds_callbacks_to_the_future(spinner: Spinner) -> None:
+    stopped = InterruptedFuture()
+    with signal_handlers_kept():
+        stop_on_signals(spinner.executor, stopped)
+        spin(spinner.executor, stopped)
+    assert stopped.interrupts == 1
+
+
+def test_each_signal_completes_the_next_future(spinner: Spinner) -> None:
+    stop, hurry = Future(), Future()
+    with signal_handlers_kept():
+        stop_on_signals(spinner.executor, stop, hurry)
+        signal.raise_signal(signal.SIGTERM)
+        spin(spinner.executor, stop)
+        assert not hurry.done()
+        for _ in range(2):
+            signal.raise_signal(signal.SIGINT)
+        spin(spinner.executor, hurry)
 
 
 def test_signals_have_their_handlers_again_after_a_run() -> None:
