@@ -1,47 +1,17 @@
-"""Identification of drives on a spring: the simulated trajectory is fitted."""
+"""Identification of drives on a spring: friction laws compete for the records."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
-from functools import cached_property
 from itertools import chain
-from math import inf, pi, sqrt
+from math import sqrt
 
-import numpy as np
-
-from stickslip_ros.arrays import FloatArray, rms
-from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.identification.choice import AUTO
-from stickslip_ros.identification.filtered import filtered
-from stickslip_ros.identification.identified_law import DELAY, LAG, IdentifiedLaw, label_of
-from stickslip_ros.identification.laws import (
-    DAHL,
-    EXPONENTIAL,
-    LUGRE,
-    DirectionalAdapter,
-    TableAdapter,
-)
-from stickslip_ros.identification.predictor import Predictor
+from stickslip_ros.identification.identified_law import IdentifiedLaw, label_of
+from stickslip_ros.identification.law_search import LawSearch, is_white, loss_of, remarked
+from stickslip_ros.identification.laws import DAHL, LUGRE, DirectionalAdapter
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.refinement import Refinement
-from stickslip_ros.identification.regression import Regression, regress
-from stickslip_ros.identification.rows import LINEAR, Rows
-from stickslip_ros.identification.search import refine
-from stickslip_ros.identification.segment_starts import Errors, best_starts
 from stickslip_ros.identification.time_limit import TimeLimit
-from stickslip_ros.identification.trajectories import Trajectories, segments_of
 
-_SHORT_SEGMENT, _LONG_SEGMENT = 1.25, 5.0
-"""Length of the segments in natural periods: of the search, and of the fit."""
-_FIRST_STEPS, _STEPS, _FINALISTS = 5, 100, 2
-"""Steps of the search from each start, steps from the best ones, and their number."""
-_RESTART_LOSS_RATIO = 0.8
-"""Other starts of segments must lower the squared error to this share, or the search ends."""
-_ROUNDING = 1.4
-"""Errors, in rounding errors of the encoder, up to which no other start is tried."""
-_WHITE_CORRELATION = 0.3
-"""Correlation of successive errors up to which they are noise: rounding leaves some."""
-_SHAPES = (0.1, 0.3, 0.8)
-"""Shapes from which the search starts, besides that of the regression: shares of the speeds."""
 POOR_ERROR = 0.1
 """Error, as a share of the motion, from which a model does not describe it."""
 _MISSING_INPUT_ERROR = 0.5
@@ -49,57 +19,21 @@ _MISSING_INPUT_ERROR = 0.5
 _HOPELESS_LOSS_RATIO = 4.0
 """A model whose squared error is larger than that of the best one by this factor is not fitted
 further."""
-_GIVEN_UP_LOSS_RATIO = 100.0
-"""A law whose squared error is larger by this factor is given up: than LuGre's after the first
-steps, or than that of the best law so far before constants are added that the records ask for."""
 _SEARCH_TIME = 0.7
 """Share of the time in which laws are searched; in the rest the best ones are fitted further."""
 _LAW_TIME = 0.25
 """Share of what is left of it that the search of a law without a memory may take: others follow."""
-OUT_OF_TIME = "the time was over before it was fitted to the end"
 _HOPELESS = "much worse in the search: not fitted further"
-_OPTIONAL_GAIN, _OPTIONAL_ERRORS = 0.05, 4.0
-"""Share of the squared error, and standard errors, for which one more constant is searched."""
-_CLEAR_GAIN = 0.5
-"""Share of the squared error for which it is searched in any case: where the error is that of what
-is missing, it makes the standard error large."""
-_ZERO_ERRORS = 3.0
-"""Standard errors by which such a constant must differ from zero."""
-_SEARCH_SAMPLES, _MOST_SAMPLES = 4_000, 15_000
-"""Samples of a drive in which a law is searched, and that are fitted: minutes of work."""
-_POINTS = 8
-"""Number of points of friction without a law."""
-_LEAST_SHARE = 1e-9
-"""Smallest friction from which a search starts, as a share of the other forces."""
-OPTIONAL = ("damping", "bias_force", DELAY, LAG)
-"""Constants that are fitted only if the record asks for them."""
 
 
 class DriveTask:
-    """Records of a drive on a spring, with what is known of it."""
+    """Records of a drive on a spring, for which laws compete."""
 
     def __init__(
         self, records: Sequence[Record], fixed: Mapping[str, float], limit: TimeLimit
     ) -> None:
-        self.records, self.limit = records, limit
-        self.left: list[str] = []
-        """Laws that were not fitted to the end, because the time was over."""
-        self.normal_force = fixed.get("normal_force", 1.0)
-        self.fixed = {name: fixed[name] for name in (*LINEAR, DELAY) if name in fixed}
-        self.friction = {
-            name.removeprefix("friction."): value
-            for name, value in fixed.items()
-            if name.startswith("friction.")
-        }
-        self.free = [name for name in ("mass", "stiffness") if name not in self.fixed]
-        if all(not record.held_force.any() for record in records) and len(self.free) == 2:
-            raise InvalidInputError(
-                "no force acts in the recordings: only ratios of mass, stiffness and friction are "
-                "identifiable; fix one, as in --fix plant.mass=100"
-            )
-        delay = self.fixed.get(DELAY, 0.0)
-        self.rows = Rows.of([filtered(each, decimated=False, delay=delay) for each in records])
-        self.predictors = [Predictor(record) for record in records]
+        self._search, self._limit = LawSearch(records, fixed, limit), limit
+        self.left = self._search.left
 
     def candidates(
         self, law: str, laws: Sequence[IdentifiedLaw], progress: Callable[[str], None]
@@ -110,33 +44,34 @@ class DriveTask:
         best one are more than noise, and friction without a law if theirs are, too. What predicts
         much worse in the search is not fitted further.
         """
+        search = self._search
         found: list[Refinement] = []
 
         def compete(own: Sequence[IdentifiedLaw], like: Refinement | None = None) -> None:
             """Search laws one by one, then extend what was found of them."""
             near: list[Sequence[Refinement]] = []
             for each in own:
-                self.limit.begin_part(_LAW_TIME if len(own) > 1 else 1.0)
+                self._limit.begin_part(_LAW_TIME if len(own) > 1 else 1.0)
                 name = label_of(each)
-                if (found or near) and self.limit.is_over:
+                if (found or near) and self._limit.is_over:
                     self.left.append(name)
                     continue
                 progress(name)
                 thorough = not any(map(is_white, chain(*near)))
-                near.append(self.searched(each, thorough=thorough, like=like))
-            self.limit.begin_part(1.0)
-            for fits in sorted(near, key=lambda fits: min(map(_loss, fits))):
-                least = min(map(_loss, chain(found, *near)))
-                found.append(self.extended(fits, least))
+                near.append(search.searched(each, thorough=thorough, like=like))
+            self._limit.begin_part(1.0)
+            for fits in sorted(near, key=lambda fits: min(map(loss_of, fits))):
+                least = min(map(loss_of, chain(found, *near)))
+                found.append(search.extended(fits, least))
 
         def explained() -> bool:
             return any(map(is_white, found))
 
-        self.limit.begin_stage(_SEARCH_TIME)
-        tables = [self.table] if law == self.table.name else []
+        self._limit.begin_stage(_SEARCH_TIME)
+        tables = [search.table] if law == search.table.name else []
         compete([*(each for each in laws if not each.memory), *tables])
-        if len(self.rows.directions) > 1 and found and not explained():
-            compete([DirectionalAdapter(min(found, key=_loss).law)])
+        if len(search.rows.directions) > 1 and found and not explained():
+            compete([DirectionalAdapter(min(found, key=loss_of).law)])
         # A memory changes the motion near sticking: it does not explain an input that is missing.
         described = not found or (law == AUTO and min(map(_share, found)) < _MISSING_INPUT_ERROR)
         bristles: Refinement | None = None
@@ -145,231 +80,20 @@ class DriveTask:
                 compete([each], bristles)
                 bristles = found[-1] if found[-1].law is LUGRE else bristles
         if law == AUTO and not explained():
-            compete([self.table])
+            compete([search.table])
         return self._finished(found)
 
     def _finished(self, found: Sequence[Refinement]) -> list[Refinement]:
         """Return searched models fitted further, the better ones first, as far as time allows."""
-        least = min(map(_loss, found))
+        least = min(map(loss_of, found))
         near = [each for each in found if each.loss <= _HOPELESS_LOSS_RATIO * least]
-        finished = {each: _remarked(each, _HOPELESS) for each in found}
-        for number, each in enumerate(sorted(near, key=_loss)):
-            self.limit.begin_stage(1.0 / (len(near) - number))
-            finished[each] = self.finished(each)
+        finished = {each: remarked(each, _HOPELESS) for each in found}
+        for number, each in enumerate(sorted(near, key=loss_of)):
+            self._limit.begin_stage(1.0 / (len(near) - number))
+            finished[each] = self._search.finished(each)
         return [*finished.values()]
-
-    @cached_property
-    def constants(self) -> Mapping[str, float]:
-        """Mass and stiffness by the regression; InvalidInputError where one is not above zero."""
-        fit = self._regression(EXPONENTIAL)
-        fit.require("mass", "stiffness")
-        return fit.constants
-
-    @cached_property
-    def period(self) -> float:
-        """Natural period by the regression, s, within what the records can have."""
-        natural = 2.0 * pi * sqrt(self.constants["mass"] / self.constants["stiffness"])
-        shortest = 20.0 * self.records[0].period
-        longest = max(record.duration for record in self.records) / _LONG_SEGMENT
-        return max(min(natural, longest), shortest)
-
-    def searched(
-        self, law: IdentifiedLaw, *, thorough: bool = True, like: Refinement | None = None
-    ) -> Sequence[Refinement]:
-        """Return the best fits to short segments, from several starts, or from a LuGre model."""
-        if like is not None:
-            # The static friction of Dahl's law is the kinetic one.
-            values = {**like.values, "static": like.values["kinetic"]}
-            return self._nearest(law, [values], _GIVEN_UP_LOSS_RATIO * like.loss)
-        fastest = float(self.rows.speeds[-1])
-        shapes = [share * fastest for share in _SHAPES] if law.one_way.shaped and thorough else []
-        starts = [
-            start
-            for shape in (None, *shapes)
-            for start in law.starts(self._start(law, self._regression(law.one_way, shape)), fastest)
-        ]
-        return self._nearest(law, starts)
-
-    def extended(self, near: Sequence[Refinement], least: float) -> Refinement:
-        """Return the best fit of a law with the constants that the records ask for.
-
-        `near` has its fits without them, in the order in which they are tried. Where the squared
-        error of the best law so far is much less, `least`, they are as they are.
-        """
-        if min(map(_loss, near)) > _GIVEN_UP_LOSS_RATIO * least:
-            return min(near, key=_loss)
-        extended: list[Refinement] = []
-        for each in near:
-            fit = each if is_white(each) else self._with_optional(each, least_share=_OPTIONAL_GAIN)
-            extended.append(fit)
-            if is_white(fit) or _is_rounding(fit):
-                break
-        return min(extended, key=_loss)
-
-    def _start(self, law: IdentifiedLaw, fit: Regression) -> dict[str, float]:
-        """Return the coordinates that a regression gives, within their bounds."""
-        constants, columns = fit.constants, fit.rows.columns
-        others = sum(abs(value) * rms(columns[name]) for name, value in constants.items())
-        smallest = _LEAST_SHARE * (others or 1.0)
-        own = [fit.curve.start(each, smallest) for each in fit.coordinates]
-        # A curve that does not suit the friction may leave no mass or stiffness to them.
-        unfit = [name for name in self.free if not constants[name] > 0.0]
-        return {
-            **constants,
-            **law.joined(own if law.one_way is not law else own[-1:]),
-            **{name: self.constants[name] for name in unfit},
-        }
-
-    @cached_property
-    def table(self) -> TableAdapter:
-        """Friction without a law, at the speeds that were recorded."""
-        speeds = np.quantile(self.rows.speeds, np.linspace(0.0, 1.0, _POINTS))
-        speeds[0] = 0.0
-        return TableAdapter(speeds)
-
-    def _nearest(
-        self, law: IdentifiedLaw, starts: Sequence[Mapping[str, float]], most: float = inf
-    ) -> Sequence[Refinement]:
-        """Return the best searches; errors that are noise, or a larger loss than `most`, end it."""
-        short = self._trajectories(law, _SHORT_SEGMENT * self.period, _SEARCH_SAMPLES)
-        names = [*self.free, *law.coordinates]
-        names = [name for name in names if name not in (*self.friction, *law.optional)]
-        tried: list[Refinement] = []
-        for values in starts:
-            if tried and self.limit.is_over:
-                break
-            tried.append(refine(short, names, self._known(law, values), most=_FIRST_STEPS))
-            if is_white(tried[-1]) or tried[-1].loss > most:
-                return tried[-1:]
-        settled: list[Refinement] = []
-        for near in sorted(tried, key=_loss)[:_FINALISTS]:
-            settled.append(self._settled(near))
-            if is_white(settled[-1]) or _is_rounding(settled[-1]) or self.limit.is_over:
-                break
-        return settled
-
-    def _settled(self, near: Errors) -> Refinement:
-        """Return the best fit near other values: segments with wrong starts try others."""
-        fit = refine(near.task, near.names, near.values, near.starts, most=_STEPS)
-        while fit.has_outliers and not self.limit.is_over:
-            starts = fit.restarted().starts
-            other = refine(near.task, near.names, fit.values, starts, most=_STEPS)
-            if other.loss > _RESTART_LOSS_RATIO * fit.loss:
-                break
-            fit = other
-        return fit
-
-    def _with_optional(self, fit: Refinement, *, least_share: float) -> Refinement:
-        """Return the fit with the constants that the records ask for.
-
-        They must take away a share of the squared error, and differ clearly from zero.
-        """
-        task = fit.task
-        for name in (*OPTIONAL, *fit.law.optional):
-            values = fit.values
-            if name in self.fixed or name in self.friction or name in fit.names:
-                continue
-            if name == LAG and DELAY in fit.names:
-                # A short lag is like a delay, which stands for most of it: gains do not tell.
-                values = {**values, **dict.fromkeys((DELAY, LAG), 0.5 * values[DELAY])}
-            else:
-                errors, share = fit.gain(name)
-                unclear = abs(errors) < _OPTIONAL_ERRORS and share < _CLEAR_GAIN
-                if unclear or share < least_share:
-                    continue
-            more = refine(task, [*fit.names, name], values, fit.starts, most=_STEPS)
-            if more.loss >= fit.loss:
-                continue
-            if _errors_from_zero(more, name) > _ZERO_ERRORS:
-                fit = more
-                continue
-            # It was not needed, but may have led the others out of a local minimum.
-            without = {**more.values, name: fit.values[name]}
-            other = refine(task, fit.names, without, more.starts, most=_STEPS)
-            fit = min(fit, other, key=_loss)
-        if {DELAY, LAG} <= {*fit.names} and _errors_from_zero(fit, DELAY) < _ZERO_ERRORS:
-            # It stood for the lag.
-            free = [name for name in fit.names if name != DELAY]
-            fit = refine(task, free, {**fit.values, DELAY: 0.0}, fit.starts, most=_STEPS)
-        return fit
-
-    def finished(self, near: Refinement) -> Refinement:
-        """Return a fit to long segments, with the constants that the records ask for."""
-        task = self._trajectories(near.law, _LONG_SEGMENT * self.period, _MOST_SAMPLES)
-        # Measured starts are too rough for motions that grow over a segment.
-        begun = best_starts(task, near.values)
-        fit = self._settled(replace(begun, names=near.names))
-        fit = self._with_optional(fit, least_share=0.0)
-        validated = replace(fit, held_out=_held_out(fit))
-        if not self.limit.is_over:
-            return validated
-        self.left.append(fit.law.name)
-        return _remarked(fit, OUT_OF_TIME)
-
-    def _regression(self, law: IdentifiedLaw, shape: float | None = None) -> Regression:
-        fixed = {name: self.fixed.get(name, 0.0) for name in LINEAR if name not in self.free}
-        return regress(self.rows, law, self.free, fixed, shape)
-
-    def _trajectories(self, law: IdentifiedLaw, length: float, most: int) -> Trajectories:
-        # Of the segments of long records one of so many is used.
-        stride = -(-sum(len(each.position) for each in self.records) // most)
-        segments = segments_of(self.predictors, length)[::stride]
-        directions = self.rows.directions
-        return Trajectories(law, directions, segments, self.normal_force, self.limit)
-
-    def _known(self, law: IdentifiedLaw, values: Mapping[str, float]) -> dict[str, float]:
-        own = {
-            name: value * (1.0 if name in law.unscaled else self.normal_force)
-            for name, value in self.friction.items()
-        }
-        return {DELAY: 0.0, LAG: 0.0, **values, **own, **self.fixed}
-
-
-def is_white(fit: Refinement) -> bool:
-    """Return whether the errors of a fit are noise, as far as their successive ones tell."""
-    return abs(fit.correlation) < _WHITE_CORRELATION
-
-
-def _is_rounding(fit: Refinement) -> bool:
-    """Return whether the errors of positions are as small as those of the encoder.
-
-    They repeat where a slide sticks and the belt moves by whole steps of it between samples.
-    """
-    task = fit.task
-    step = min(each.resolution for each in task.records)
-    own = task.of_positions
-    return rms(fit.residual[own]) < _ROUNDING * step / sqrt(12.0) * rms(task.weight[own])
-
-
-def _errors_from_zero(fit: Refinement, name: str) -> float:
-    """Return by how many standard errors a fitted coordinate differs from zero."""
-    place = [*fit.names].index(name)
-    error = sqrt(max(fit.covariance[place, place], 0.0))
-    return abs(fit.values[name]) / error if error > 0.0 else inf
 
 
 def _share(fit: Refinement) -> float:
     """Return the rms error as a share of the rms motion."""
     return sqrt(fit.loss / len(fit.residual)) / fit.scale
-
-
-def _loss(fit: Refinement) -> float:
-    return fit.loss
-
-
-def _remarked(fit: Refinement, remark: str) -> Refinement:
-    """Return a fit that is out of the choice, with its errors in the segments that it is for."""
-    return replace(fit, held_out=fit.losses, remark=remark)
-
-
-def _held_out(fit: Refinement) -> FloatArray:
-    """Return the mean square error in each segment, fitted to the other half of the segments."""
-    losses, segments = fit.losses, fit.task.segments
-    if len(segments) < 4:
-        return losses
-    even, odd = slice(0, None, 2), slice(1, None, 2)
-    for own, other in ((even, odd), (odd, even)):
-        task, rest = (replace(fit.task, segments=segments[half]) for half in (own, other))
-        trained = refine(task, fit.names, fit.values, fit.starts[own], most=6)
-        losses[other] = best_starts(rest, trained.values, fit.starts[other]).losses
-    return losses

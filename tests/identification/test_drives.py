@@ -14,12 +14,12 @@ import pytest
 import stickslip_ros as ss
 from benchmarks import identification as study
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.identification.drives import OUT_OF_TIME, DriveTask
 from stickslip_ros.identification.even_clock import evenly_spaced
 from stickslip_ros.identification.filtered import filtered
 from stickslip_ros.identification.findings import Findings
 from stickslip_ros.identification.identified_law import DELAY, LAG
 from stickslip_ros.identification.identify import identify
+from stickslip_ros.identification.law_search import OUT_OF_TIME, LawSearch
 from stickslip_ros.identification.laws import KNOWN_LAWS
 from stickslip_ros.identification.predictor import Predictor
 from stickslip_ros.identification.record import Record
@@ -72,7 +72,7 @@ def test_a_search_ends_with_the_best_so_far() -> None:
 
 def test_a_law_that_another_excels_gets_no_further_constants() -> None:
     own = study.record("coulomb", "ramp", seed=7, duration=1.5, delay=2e-3)
-    task = DriveTask([own], {"normal_force": study.NORMAL_FORCE}, TimeLimit())
+    task = LawSearch([own], {"normal_force": study.NORMAL_FORCE}, TimeLimit())
     near = task.searched(KNOWN_LAWS["coulomb"])
     least = near[0].loss
     assert DELAY in task.extended(near, least).names
@@ -82,7 +82,7 @@ def test_a_law_that_another_excels_gets_no_further_constants() -> None:
 def test_the_search_of_a_law_leaves_time_for_others() -> None:
     own = study.record("stribeck", "taps", seed=1, duration=1.5)
     limit = TimeLimit(600.0)
-    task = DriveTask([own], {"normal_force": study.NORMAL_FORCE}, limit)
+    task = LawSearch([own], {"normal_force": study.NORMAL_FORCE}, limit)
     limit.begin_stage(0.5)
     limit.begin_part(1e-9)
     task.searched(KNOWN_LAWS["coulomb"])

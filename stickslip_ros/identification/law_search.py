@@ -1,0 +1,294 @@
+"""The search of one friction law: the motion of a drive on a spring is simulated and fitted."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import cached_property
+from math import inf, pi, sqrt
+
+import numpy as np
+
+from stickslip_ros.arrays import FloatArray, rms
+from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.identification.filtered import filtered
+from stickslip_ros.identification.identified_law import DELAY, LAG, IdentifiedLaw
+from stickslip_ros.identification.laws import EXPONENTIAL, TableAdapter
+from stickslip_ros.identification.predictor import Predictor
+from stickslip_ros.identification.record import Record
+from stickslip_ros.identification.refinement import Refinement
+from stickslip_ros.identification.regression import Regression, regress
+from stickslip_ros.identification.rows import LINEAR, Rows
+from stickslip_ros.identification.search import refine
+from stickslip_ros.identification.segment_starts import Errors, best_starts
+from stickslip_ros.identification.time_limit import TimeLimit
+from stickslip_ros.identification.trajectories import Trajectories, segments_of
+
+_SHORT_SEGMENT, _LONG_SEGMENT = 1.25, 5.0
+"""Length of the segments in natural periods: of the search, and of the fit."""
+_FIRST_STEPS, _STEPS, _FINALISTS = 5, 100, 2
+"""Steps of the search from each start, steps from the best ones, and their number."""
+_RESTART_LOSS_RATIO = 0.8
+"""Other starts of segments must lower the squared error to this share, or the search ends."""
+_ROUNDING = 1.4
+"""Errors, in rounding errors of the encoder, up to which no other start is tried."""
+_WHITE_CORRELATION = 0.3
+"""Correlation of successive errors up to which they are noise: rounding leaves some."""
+_SHAPES = (0.1, 0.3, 0.8)
+"""Shapes from which the search starts, besides that of the regression: shares of the speeds."""
+_GIVEN_UP_LOSS_RATIO = 100.0
+"""A law whose squared error is larger by this factor is given up: than LuGre's after the first
+steps, or than that of the best law so far before constants are added that the records ask for."""
+OUT_OF_TIME = "the time was over before it was fitted to the end"
+_OPTIONAL_GAIN, _OPTIONAL_ERRORS = 0.05, 4.0
+"""Share of the squared error, and standard errors, for which one more constant is searched."""
+_CLEAR_GAIN = 0.5
+"""Share of the squared error for which it is searched in any case: where the error is that of what
+is missing, it makes the standard error large."""
+_ZERO_ERRORS = 3.0
+"""Standard errors by which such a constant must differ from zero."""
+_SEARCH_SAMPLES, _MOST_SAMPLES = 4_000, 15_000
+"""Samples of a drive in which a law is searched, and that are fitted: minutes of work."""
+_POINTS = 8
+"""Number of points of friction without a law."""
+_LEAST_SHARE = 1e-9
+"""Smallest friction from which a search starts, as a share of the other forces."""
+OPTIONAL = ("damping", "bias_force", DELAY, LAG)
+"""Constants that are fitted only if the record asks for them."""
+
+
+class LawSearch:
+    """Records of a drive on a spring, with what is known of it, and the fits of laws to them."""
+
+    def __init__(
+        self, records: Sequence[Record], fixed: Mapping[str, float], limit: TimeLimit
+    ) -> None:
+        self.records, self.limit = records, limit
+        self.left: list[str] = []
+        """Laws that were not fitted to the end, because the time was over."""
+        self.normal_force = fixed.get("normal_force", 1.0)
+        self.fixed = {name: fixed[name] for name in (*LINEAR, DELAY) if name in fixed}
+        self.friction = {
+            name.removeprefix("friction."): value
+            for name, value in fixed.items()
+            if name.startswith("friction.")
+        }
+        self.free = [name for name in ("mass", "stiffness") if name not in self.fixed]
+        if all(not record.held_force.any() for record in records) and len(self.free) == 2:
+            raise InvalidInputError(
+                "no force acts in the recordings: only ratios of mass, stiffness and friction are "
+                "identifiable; fix one, as in --fix plant.mass=100"
+            )
+        delay = self.fixed.get(DELAY, 0.0)
+        self.rows = Rows.of([filtered(each, decimated=False, delay=delay) for each in records])
+        self.predictors = [Predictor(record) for record in records]
+
+    @cached_property
+    def constants(self) -> Mapping[str, float]:
+        """Mass and stiffness by the regression; InvalidInputError where one is not above zero."""
+        fit = self._regression(EXPONENTIAL)
+        fit.require("mass", "stiffness")
+        return fit.constants
+
+    @cached_property
+    def period(self) -> float:
+        """Natural period by the regression, s, within what the records can have."""
+        natural = 2.0 * pi * sqrt(self.constants["mass"] / self.constants["stiffness"])
+        shortest = 20.0 * self.records[0].period
+        longest = max(record.duration for record in self.records) / _LONG_SEGMENT
+        return max(min(natural, longest), shortest)
+
+    def searched(
+        self, law: IdentifiedLaw, *, thorough: bool = True, like: Refinement | None = None
+    ) -> Sequence[Refinement]:
+        """Return the best fits to short segments, from several starts, or from a LuGre model."""
+        if like is not None:
+            # The static friction of Dahl's law is the kinetic one.
+            values = {**like.values, "static": like.values["kinetic"]}
+            return self._nearest(law, [values], _GIVEN_UP_LOSS_RATIO * like.loss)
+        fastest = float(self.rows.speeds[-1])
+        shapes = [share * fastest for share in _SHAPES] if law.one_way.shaped and thorough else []
+        starts = [
+            start
+            for shape in (None, *shapes)
+            for start in law.starts(self._start(law, self._regression(law.one_way, shape)), fastest)
+        ]
+        return self._nearest(law, starts)
+
+    def extended(self, near: Sequence[Refinement], least: float) -> Refinement:
+        """Return the best fit of a law with the constants that the records ask for.
+
+        `near` has its fits without them, in the order in which they are tried. Where the squared
+        error of the best law so far is much less, `least`, they are as they are.
+        """
+        if min(map(loss_of, near)) > _GIVEN_UP_LOSS_RATIO * least:
+            return min(near, key=loss_of)
+        extended: list[Refinement] = []
+        for each in near:
+            fit = each if is_white(each) else self._with_optional(each, least_share=_OPTIONAL_GAIN)
+            extended.append(fit)
+            if is_white(fit) or _is_rounding(fit):
+                break
+        return min(extended, key=loss_of)
+
+    def _start(self, law: IdentifiedLaw, fit: Regression) -> dict[str, float]:
+        """Return the coordinates that a regression gives, within their bounds."""
+        constants, columns = fit.constants, fit.rows.columns
+        others = sum(abs(value) * rms(columns[name]) for name, value in constants.items())
+        smallest = _LEAST_SHARE * (others or 1.0)
+        own = [fit.curve.start(each, smallest) for each in fit.coordinates]
+        # A curve that does not suit the friction may leave no mass or stiffness to them.
+        unfit = [name for name in self.free if not constants[name] > 0.0]
+        return {
+            **constants,
+            **law.joined(own if law.one_way is not law else own[-1:]),
+            **{name: self.constants[name] for name in unfit},
+        }
+
+    @cached_property
+    def table(self) -> TableAdapter:
+        """Friction without a law, at the speeds that were recorded."""
+        speeds = np.quantile(self.rows.speeds, np.linspace(0.0, 1.0, _POINTS))
+        speeds[0] = 0.0
+        return TableAdapter(speeds)
+
+    def _nearest(
+        self, law: IdentifiedLaw, starts: Sequence[Mapping[str, float]], most: float = inf
+    ) -> Sequence[Refinement]:
+        """Return the best searches; errors that are noise, or a larger loss than `most`, end it."""
+        short = self._trajectories(law, _SHORT_SEGMENT * self.period, _SEARCH_SAMPLES)
+        names = [*self.free, *law.coordinates]
+        names = [name for name in names if name not in (*self.friction, *law.optional)]
+        tried: list[Refinement] = []
+        for values in starts:
+            if tried and self.limit.is_over:
+                break
+            tried.append(refine(short, names, self._known(law, values), most=_FIRST_STEPS))
+            if is_white(tried[-1]) or tried[-1].loss > most:
+                return tried[-1:]
+        settled: list[Refinement] = []
+        for near in sorted(tried, key=loss_of)[:_FINALISTS]:
+            settled.append(self._settled(near))
+            if is_white(settled[-1]) or _is_rounding(settled[-1]) or self.limit.is_over:
+                break
+        return settled
+
+    def _settled(self, near: Errors) -> Refinement:
+        """Return the best fit near other values: segments with wrong starts try others."""
+        fit = refine(near.task, near.names, near.values, near.starts, most=_STEPS)
+        while fit.has_outliers and not self.limit.is_over:
+            starts = fit.restarted().starts
+            other = refine(near.task, near.names, fit.values, starts, most=_STEPS)
+            if other.loss > _RESTART_LOSS_RATIO * fit.loss:
+                break
+            fit = other
+        return fit
+
+    def _with_optional(self, fit: Refinement, *, least_share: float) -> Refinement:
+        """Return the fit with the constants that the records ask for.
+
+        They must take away a share of the squared error, and differ clearly from zero.
+        """
+        task = fit.task
+        for name in (*OPTIONAL, *fit.law.optional):
+            values = fit.values
+            if name in self.fixed or name in self.friction or name in fit.names:
+                continue
+            if name == LAG and DELAY in fit.names:
+                # A short lag is like a delay, which stands for most of it: gains do not tell.
+                values = {**values, **dict.fromkeys((DELAY, LAG), 0.5 * values[DELAY])}
+            else:
+                errors, share = fit.gain(name)
+                unclear = abs(errors) < _OPTIONAL_ERRORS and share < _CLEAR_GAIN
+                if unclear or share < least_share:
+                    continue
+            more = refine(task, [*fit.names, name], values, fit.starts, most=_STEPS)
+            if more.loss >= fit.loss:
+                continue
+            if _errors_from_zero(more, name) > _ZERO_ERRORS:
+                fit = more
+                continue
+            # It was not needed, but may have led the others out of a local minimum.
+            without = {**more.values, name: fit.values[name]}
+            other = refine(task, fit.names, without, more.starts, most=_STEPS)
+            fit = min(fit, other, key=loss_of)
+        if {DELAY, LAG} <= {*fit.names} and _errors_from_zero(fit, DELAY) < _ZERO_ERRORS:
+            # It stood for the lag.
+            free = [name for name in fit.names if name != DELAY]
+            fit = refine(task, free, {**fit.values, DELAY: 0.0}, fit.starts, most=_STEPS)
+        return fit
+
+    def finished(self, near: Refinement) -> Refinement:
+        """Return a fit to long segments, with the constants that the records ask for."""
+        task = self._trajectories(near.law, _LONG_SEGMENT * self.period, _MOST_SAMPLES)
+        # Measured starts are too rough for motions that grow over a segment.
+        begun = best_starts(task, near.values)
+        fit = self._settled(replace(begun, names=near.names))
+        fit = self._with_optional(fit, least_share=0.0)
+        validated = replace(fit, held_out=_held_out(fit))
+        if not self.limit.is_over:
+            return validated
+        self.left.append(fit.law.name)
+        return remarked(fit, OUT_OF_TIME)
+
+    def _regression(self, law: IdentifiedLaw, shape: float | None = None) -> Regression:
+        fixed = {name: self.fixed.get(name, 0.0) for name in LINEAR if name not in self.free}
+        return regress(self.rows, law, self.free, fixed, shape)
+
+    def _trajectories(self, law: IdentifiedLaw, length: float, most: int) -> Trajectories:
+        # Of the segments of long records one of so many is used.
+        stride = -(-sum(len(each.position) for each in self.records) // most)
+        segments = segments_of(self.predictors, length)[::stride]
+        directions = self.rows.directions
+        return Trajectories(law, directions, segments, self.normal_force, self.limit)
+
+    def _known(self, law: IdentifiedLaw, values: Mapping[str, float]) -> dict[str, float]:
+        own = {
+            name: value * (1.0 if name in law.unscaled else self.normal_force)
+            for name, value in self.friction.items()
+        }
+        return {DELAY: 0.0, LAG: 0.0, **values, **own, **self.fixed}
+
+
+def is_white(fit: Refinement) -> bool:
+    """Return whether the errors of a fit are noise, as far as their successive ones tell."""
+    return abs(fit.correlation) < _WHITE_CORRELATION
+
+
+def _is_rounding(fit: Refinement) -> bool:
+    """Return whether the errors of positions are as small as those of the encoder.
+
+    They repeat where a slide sticks and the belt moves by whole steps of it between samples.
+    """
+    task = fit.task
+    step = min(each.resolution for each in task.records)
+    own = task.of_positions
+    return rms(fit.residual[own]) < _ROUNDING * step / sqrt(12.0) * rms(task.weight[own])
+
+
+def _errors_from_zero(fit: Refinement, name: str) -> float:
+    """Return by how many standard errors a fitted coordinate differs from zero."""
+    place = [*fit.names].index(name)
+    error = sqrt(max(fit.covariance[place, place], 0.0))
+    return abs(fit.values[name]) / error if error > 0.0 else inf
+
+
+def loss_of(fit: Refinement) -> float:
+    """Return the squared error of a fit."""
+    return fit.loss
+
+
+def remarked(fit: Refinement, remark: str) -> Refinement:
+    """Return a fit that is out of the choice, with its errors in the segments that it is for."""
+    return replace(fit, held_out=fit.losses, remark=remark)
+
+
+def _held_out(fit: Refinement) -> FloatArray:
+    """Return the mean square error in each segment, fitted to the other half of the segments."""
+    losses, segments = fit.losses, fit.task.segments
+    if len(segments) < 4:
+        return losses
+    even, odd = slice(0, None, 2), slice(1, None, 2)
+    for own, other in ((even, odd), (odd, even)):
+        task, rest = (replace(fit.task, segments=segments[half]) for half in (own, other))
+        trained = refine(task, fit.names, fit.values, fit.starts[own], most=6)
+        losses[other] = best_starts(rest, trained.values, fit.starts[other]).losses
+    return losses
