@@ -1,6 +1,6 @@
 """How much longer than bare heyoka does a bifurcation diagram of 1,000 points take?
 
-Ours: `BifurcationFigure.settled` of the paper's figures 2 and 3, including compilation,
+Ours: `BifurcationFigure.columns` of the paper's figures 2 and 3, including compilation,
 transients, turning points and measures. Peer: heyoka's integrators of slip and stick with their
 terminal events, compiled beforehand, and the loop over these phases, for the same motions from
 rest over the same number of periods.
@@ -23,8 +23,8 @@ def row(number: int) -> Row:
 
     def ours() -> float:
         start = time.perf_counter()
-        settled = BifurcationFigure(number, figure.values).settled
-        assert len(settled) == POINTS
+        columns = BifurcationFigure(number, figure.values).columns
+        assert len(columns.regime) == POINTS
         return time.perf_counter() - start
 
     def peer() -> float:
