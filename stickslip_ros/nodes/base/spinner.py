@@ -106,7 +106,8 @@ def stop_on_signals(executor: Executor, *stopped: Future) -> None:
             due.set_result(None)
 
     def stop(*_: object) -> None:
-        executor.create_task(complete)  # the code that the signal interrupts may hold their locks
+        # The interrupted code may hold the lock of a future: completing it here would never end.
+        executor.create_task(complete)
 
     numbers = [signal.SIGINT, signal.SIGTERM]
     if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:

@@ -148,7 +148,7 @@ class InterruptedFuture(Future):
 
 
 @pytest.mark.timeout(PATIENCE)
-def test_a_signal_stops_even_what_adds_callbacks_to_the_future(spinner: Spinner) -> None:
+def test_a_signal_completes_a_future_whose_lock_is_held(spinner: Spinner) -> None:
     stopped = InterruptedFuture()
     with signal_handlers_kept():
         stop_on_signals(spinner.executor, stopped)
