@@ -13,13 +13,13 @@ PIP := $(BIN)/python -m pip install -qq --disable-pip-version-check
 
 # A test that hangs fails by itself, with its name. What was skipped is listed at the end, and why.
 # Three at a time on two cores: some of it is waiting. Of what takes long, more is.
-TESTS ?= tests
 PYTEST := $(BIN)/python -m pytest $(TESTS) --timeout=600 --numprocesses=3 --dist=worksteal -rs
 
 # What Python compiles is kept, even if the environment says not to: the tests start hundreds.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: setup demo check test-quick slow test test-all lint site gallery bench screenshot clean
+.PHONY: setup demo check test-quick slow test test-all lint site gallery reproduction bench \
+	screenshot clean
 
 setup: $(READY)
 
@@ -88,6 +88,10 @@ site: setup
 # The figures of docs/gallery.md, drawn again by the scripts and notebooks.
 gallery: setup
 	$(BIN)/python docs/gallery.py
+
+# The paper's figures drawn and its claims judged again: docs/reproduction.md.
+reproduction: setup
+	$(BIN)/python -m reproduction
 
 # The picture of the dashboard in README.md; needs a browser, and a machine that has time for it.
 screenshot: setup

@@ -59,7 +59,6 @@ setup(
             "app/*.sh",
             "app/dashboard/*.css",
             "app/dashboard/*.js",
-            "paper/claims/*.toml",
             "nodes/base/*.xml",
         ]
     },

@@ -10,7 +10,7 @@ import time
 
 from benchmarks.bare import BareMotion
 from benchmarks.slices import Row, by_turns, compare_times, show
-from stickslip_ros.paper.figures import SETTLING, BifurcationFigure, compute_figure
+from reproduction.figures import SETTLING, BifurcationFigure, compute_figure
 
 POINTS, ROUNDS = 1000, 3
 PERIODS = SETTLING.transient + SETTLING.cycles + 2

@@ -29,7 +29,7 @@ ROOMS = ("model", "motion", "measures", "theory")
 FILE = Path(__file__).with_suffix(".json")
 TIERS = (
     tuple(f"tests/{room}" for room in ROOMS),
-    ("tests/studies", "tests/paper", "tests/show", "tests/scenarios", "tests/record", "tests/app"),
+    ("tests/studies", "reproduction", "tests/show", "tests/scenarios", "tests/record", "tests/app"),
 )
 TIMEOUT = 600.0
 

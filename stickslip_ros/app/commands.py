@@ -26,7 +26,6 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "show": ("Scenarios", "show every parameter of a scenario and where its value comes from"),
     "new": ("Scenarios", "write a commented scenario file to edit"),
     "schema": ("Scenarios", "print the JSON schema of scenario files, for editors"),
-    "paper": ("Paper", "reproduce the figures and the claims of the paper"),
     "completion": ("Shell", "print the completion script for bash or zsh"),
 }
 """Group in the overview, and what a command does, by name; each has a module of its name."""
@@ -53,7 +52,6 @@ EXAMPLES: dict[str, str] = {
     "show": "stickslip show feed_drive",
     "new": "stickslip new my_drive.yaml --from feed_drive",
     "schema": "stickslip schema > scenario.schema.json",
-    "paper": "stickslip paper --out reproduction",
     "completion": 'eval "$(stickslip completion bash)"',
 }
 """An example of each command, at the end of its help."""

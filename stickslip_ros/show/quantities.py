@@ -135,10 +135,8 @@ _SYMBOLS = {
 }
 """Symbols of docs/theory.md, in SI units and without units."""
 
-_GREEK = {"μ": r"\mu", "β": r"\beta", "γ": r"\gamma", "τ": r"\tau"}
-
-_SYMBOL = re.compile(r"(?<![A-Za-z])(?:([vkμ])([0-9sm])|([dβγτ]|X'))(?![A-Za-z])")
-"""A symbol in plain text: with an index, or without."""
+GREEK = {"μ": r"\mu", "β": r"\beta", "γ": r"\gamma", "τ": r"\tau"}
+"""Letters of symbols, and what they are in formulas."""
 
 _PARAMETERS = {
     "plant.mass": "mass",
@@ -218,7 +216,7 @@ class Units:
         """Return the same for text without formulas, such as "linear gain k1"."""
         quantity = plain_name(quantity)
         symbol = _SYMBOLS.get(quantity, ("", ""))[self.dimensionless]
-        for letter, formula in _GREEK.items():
+        for letter, formula in GREEK.items():
             symbol = symbol.replace(formula, letter)
         return f"{quantity} {symbol.replace('_', '')}".rstrip()
 
@@ -280,17 +278,6 @@ def check_colour(colour: str, parameters: int) -> None:
 def plain_name(quantity: str) -> str:
     """Return what figures call a parameter, NODE.PARAMETER; any other quantity as it is."""
     return _PARAMETERS.get(quantity, quantity)
-
-
-def typeset(text: str) -> str:
-    """Return a plain text, such as "belt speed v0", with its symbols as formulas."""
-
-    def formula(found: re.Match[str]) -> str:
-        letter, index, alone = found.groups()
-        symbol = f"{_GREEK.get(letter, letter)}_{index}" if index else _GREEK.get(alone, alone)
-        return f"${symbol}$"
-
-    return _SYMBOL.sub(formula, text)
 
 
 def _prefix_of(unit: str, largest: float) -> tuple[float, str]:

@@ -183,10 +183,6 @@ REFUSED: Mapping[str, Mapping[str, str]] = {
         f"{LOG} --out a.txt": "must end in .yaml",
         f"{LOG} --out kept.yaml": PLACE,
     },
-    "paper": {
-        "": "the following arguments are required: --out",
-        "--out /proc/none/out": "/proc/none/out",
-    },
     "show": {
         "papr": "did you mean paper?",
         "two.yaml": TWO,

@@ -170,11 +170,6 @@ def test_the_page_has_what_a_run_prints(
     assert list(differences("run", json.loads(done.stdout))) == []
 
 
-def test_the_page_has_what_is_kept_of_the_paper() -> None:
-    kept = json.loads((ROOT / "docs" / "reproduction.json").read_text(encoding="utf-8"))
-    assert list(differences("paper", {**kept, "versions": {"python": "3.12"}})) == []
-
-
 def test_every_command_with_json_is_on_the_page() -> None:
     options = {name: command_parser(name)._option_string_actions for name in COMMANDS}
     assert {name for name in COMMANDS if "--json" in options[name]} <= sections().keys()

@@ -114,7 +114,7 @@ def test_every_guarantee_names_a_test_that_exists() -> None:
     for row in rows:
         guarantee, test = (cell.strip() for cell in re.split(r"(?<!\\)\|", row)[1:-1])
         assert guarantee
-        assert re.fullmatch(r"`tests/[\w/]+\.py::test_\w+`", test), test
+        assert re.fullmatch(r"`(reproduction/)?tests/[\w/]+\.py::test_\w+`", test), test
         assert exists(test.strip("`")), test
 
 

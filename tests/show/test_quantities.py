@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from stickslip_ros.show.quantities import Units, typeset
+from stickslip_ros.show.quantities import Units
 from tests.drives import FEED_DRIVE, PAPER
 
 SI = Units.for_drive(FEED_DRIVE)
@@ -65,13 +65,6 @@ def test_names_in_text_have_their_symbols_and_no_formula() -> None:
     assert Units(dimensionless=True).plain("plant.belt_speed") == "belt speed v0"
     assert Units(dimensionless=True).plain("plant.damping") == "damping 2β"
     assert SI.plain("stick fraction") == "stick fraction"
-
-
-def test_symbols_in_plain_text_become_formulas() -> None:
-    assert typeset("belt speed v0") == "belt speed $v_0$"
-    assert typeset("k1 = -1, d = 2, μs / μm") == r"$k_1$ = -1, $d$ = 2, $\mu_s$ / $\mu_m$"
-    assert typeset("X' has 2β, up to τ = 300") == r"$X'$ has 2$\beta$, up to $\tau$ = 300"
-    assert typeset("drive and slide") == "drive and slide"
 
 
 def test_a_rotary_axis_has_angles_and_torques() -> None:

@@ -5,9 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from stickslip_ros.arrays import FloatArray
-from stickslip_ros.model.functions import zero_between
-from stickslip_ros.paper.claims.paper_values import (
+from reproduction.claims.paper_values import (
     BELT_SPEEDS,
     DAMPING,
     FILTER,
@@ -26,7 +24,9 @@ from stickslip_ros.paper.claims.paper_values import (
     number_for_both,
     printed_trace,
 )
-from stickslip_ros.paper.claims.verdict import Computations, Evidence, Formula, Number, Observation
+from reproduction.claims.verdict import Computations, Evidence, Formula, Number, Observation
+from stickslip_ros.arrays import FloatArray
+from stickslip_ros.model.functions import zero_between
 from stickslip_ros.theory.linear import hurwitz_determinants
 
 computes = Computations()

@@ -12,6 +12,8 @@ from typing import Any, TypeVar
 import numpy as np
 import numpy.typing as npt
 
+from reproduction.claims.verdict import Formula, Number
+from reproduction.figures import STRIBECK, unit_drive
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.model.control import Washout
 from stickslip_ros.model.drive import Drive
@@ -22,8 +24,6 @@ from stickslip_ros.model.hybrid import Mode
 from stickslip_ros.model.plain_drive import drive_system
 from stickslip_ros.motion import Motion, RecordedMotion
 from stickslip_ros.motion.compiled_flow import flow_rates, parameter_values
-from stickslip_ros.paper.claims.verdict import Formula, Number
-from stickslip_ros.paper.figures import STRIBECK, unit_drive
 from stickslip_ros.theory.critical_gains import CriticalGains, critical_gains
 from stickslip_ros.theory.cycle_bounds import follow, release_position
 from stickslip_ros.theory.hopf import HopfPoint, hopf_points

@@ -11,9 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from stickslip_ros.measures.cycle_measures import Regime
-from stickslip_ros.model.friction import Linear
-from stickslip_ros.paper.claims import (
+from reproduction.claims import (
     CHAPTERS,
     CLAIMS,
     COMPUTATIONS,
@@ -22,10 +20,10 @@ from stickslip_ros.paper.claims import (
     Finding,
     Verdict,
 )
-from stickslip_ros.paper.claims.coefficients import Nonlinearity, samples
-from stickslip_ros.paper.claims.paper_values import FILTER, OPEN, Loop, at
-from stickslip_ros.paper.claims.verdict import Formula, Number, Observation, Result, agrees
-from stickslip_ros.paper.figures import (
+from reproduction.claims.coefficients import Nonlinearity, samples
+from reproduction.claims.paper_values import FILTER, OPEN, Loop, at
+from reproduction.claims.verdict import Formula, Number, Observation, Result, agrees
+from reproduction.figures import (
     NUMBERS,
     PRINTED_SLOPE,
     STRIBECK,
@@ -38,6 +36,8 @@ from stickslip_ros.paper.figures import (
     portrait_of,
     unit_drive,
 )
+from stickslip_ros.measures.cycle_measures import Regime
+from stickslip_ros.model.friction import Linear
 
 HOLDS, CORRECTED, FAILS = Verdict.HOLDS, Verdict.CORRECTED, Verdict.FAILS
 

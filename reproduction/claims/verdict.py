@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from stickslip_ros.paper.figures import BifurcationFigure, PaperFigure, PortraitFigure
+from reproduction.figures import BifurcationFigure, PaperFigure, PortraitFigure
 
 _ROUNDING = 1e-9
 """Share of the largest value, or of one, below which a difference is rounding only."""

@@ -5,10 +5,7 @@ from math import log
 
 import numpy as np
 
-from stickslip_ros.measures.cycle_measures import Regime
-from stickslip_ros.model.control import Washout
-from stickslip_ros.motion import Motion
-from stickslip_ros.paper.claims.paper_values import (
+from reproduction.claims.paper_values import (
     DAMPING,
     FASTER,
     FILTER,
@@ -28,8 +25,11 @@ from stickslip_ros.paper.claims.paper_values import (
     known,
     listed,
 )
-from stickslip_ros.paper.claims.verdict import Computations, Evidence, Number, Observation
-from stickslip_ros.paper.figures import STRIBECK, Portraits, unit_drive
+from reproduction.claims.verdict import Computations, Evidence, Number, Observation
+from reproduction.figures import STRIBECK, Portraits, unit_drive
+from stickslip_ros.measures.cycle_measures import Regime
+from stickslip_ros.model.control import Washout
+from stickslip_ros.motion import Motion
 from stickslip_ros.studies.settling import CYCLES
 
 computes = Computations()

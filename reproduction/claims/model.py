@@ -4,12 +4,7 @@ from math import isclose, sqrt
 
 import numpy as np
 
-from stickslip_ros.arrays import FloatArray
-from stickslip_ros.measures.cycle_measures import Regime
-from stickslip_ros.model.drive import Drive
-from stickslip_ros.model.friction import Stribeck
-from stickslip_ros.model.functions import zero_between
-from stickslip_ros.paper.claims.paper_values import (
+from reproduction.claims.paper_values import (
     DAMPING,
     FASTER,
     OPEN,
@@ -19,8 +14,13 @@ from stickslip_ros.paper.claims.paper_values import (
     slip_friction,
     time_dependent,
 )
-from stickslip_ros.paper.claims.verdict import Computations, Evidence, Formula, Number, Observation
-from stickslip_ros.paper.figures import STRIBECK
+from reproduction.claims.verdict import Computations, Evidence, Formula, Number, Observation
+from reproduction.figures import STRIBECK
+from stickslip_ros.arrays import FloatArray
+from stickslip_ros.measures.cycle_measures import Regime
+from stickslip_ros.model.drive import Drive
+from stickslip_ros.model.friction import Stribeck
+from stickslip_ros.model.functions import zero_between
 
 computes = Computations()
 
@@ -178,8 +178,8 @@ def _(evidence: Evidence) -> Observation:
     figure = evidence.bifurcation(2)
     fast = figure.values > 1.05 * OPEN.hopf.belt_speed
     resting = figure.columns.regime[fast] == Regime.EQUILIBRIUM
-    rest = [drive.equilibrium_position for drive in figure.drives]
-    off = np.abs(figure.columns.midpoint / rest - 1.0)[fast].max()
+    rest = np.array([drive.equilibrium_position for drive in figure.drives])[fast]
+    off = np.abs(figure.columns.midpoint[fast] / rest - 1.0).max()
     return Observation(
         all(resting) and off < 1e-4 and all(at(speed).only_rests for speed in FASTER),
         resting=sum(resting),

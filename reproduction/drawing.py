@@ -12,8 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.lines import Line2D
 
-from stickslip_ros.measures.breakpoints import Breakpoints
-from stickslip_ros.paper.figures import (
+from reproduction.figures import (
     LAST_CYCLES,
     BifurcationFigure,
     Panel,
@@ -21,7 +20,8 @@ from stickslip_ros.paper.figures import (
     Portrait,
     PortraitFigure,
 )
-from stickslip_ros.show.quantities import Units, typeset
+from stickslip_ros.measures.breakpoints import Breakpoints
+from stickslip_ros.show.quantities import GREEK, Units
 from stickslip_ros.show.study_figure import draw_section, draw_transitions, regime_handles
 from stickslip_ros.show.style import (
     BLUE,
@@ -55,6 +55,9 @@ _LINE_LENGTH = 44
 
 _UNITS = Units(dimensionless=True, terse=True)
 
+_SYMBOL = re.compile(r"(?<![A-Za-z])(?:([vkμ])([0-9sm])|([dβγτ]|X'))(?![A-Za-z])")
+"""A symbol in plain text: with an index, or without."""
+
 
 def paper_figure(figure: PaperFigure, *, style: FigureStyle = SCREEN) -> Figure:
     """Return the drawing of a figure; a bifurcation diagram has what theory tells, too."""
@@ -69,6 +72,17 @@ def save_paper_figure(drawn: Figure, path: Path, style: FigureStyle = SCREEN) ->
         save(drawn, path, dots_per_inch=style.dots_per_inch)
     else:
         save(drawn, path, colours=_KEPT_COLOURS, dots_per_inch=_KEPT_DOTS)
+
+
+def typeset(text: str) -> str:
+    """Return a plain text, such as "belt speed v0", with its symbols as formulas."""
+
+    def formula(found: re.Match[str]) -> str:
+        letter, index, alone = found.groups()
+        symbol = f"{GREEK.get(letter, letter)}_{index}" if index else GREEK.get(alone, alone)
+        return f"${symbol}$"
+
+    return _SYMBOL.sub(formula, text)
 
 
 @styled

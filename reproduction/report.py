@@ -7,8 +7,8 @@ from dataclasses import asdict
 from itertools import groupby
 from typing import Any
 
-from stickslip_ros.paper.claims import CHAPTERS, Finding, Verdict
-from stickslip_ros.paper.figures import SETTLING, BifurcationFigure, PaperFigure
+from reproduction.claims import CHAPTERS, Finding, Verdict
+from reproduction.figures import SETTLING, BifurcationFigure, PaperFigure
 
 Report = Mapping[str, Any]
 """The report as in JSON: `claims` and `figures`, each a list of objects."""
@@ -19,7 +19,7 @@ _HEAD = """\
 "Dynamics of mass-spring-belt friction self-excited vibration system" models a mass on a moving belt
 with Stribeck friction, finds the feed speed below which self-excited vibration occurs, and
 suppresses the vibration with a washout filter. This page compares every number, formula and
-statement of that paper with the results of its own equations. `stickslip paper --out docs`
+statement of that paper with the results of its own equations. In a checkout, `make reproduction`
 computes and writes this page, the figures, and `reproduction.json`, which has the findings in full
 precision, the differences, and all of the evidence.
 

@@ -5,10 +5,7 @@ from math import sqrt
 
 import numpy as np
 
-from stickslip_ros.arrays import BoolArray
-from stickslip_ros.measures.cycle_measures import Regime
-from stickslip_ros.model.functions import zero_between
-from stickslip_ros.paper.claims.paper_values import (
+from reproduction.claims.paper_values import (
     DAMPING,
     OPEN,
     PRINTED_HOPF_SPEED,
@@ -20,8 +17,11 @@ from stickslip_ros.paper.claims.paper_values import (
     critical_beta,
     slip_friction,
 )
-from stickslip_ros.paper.claims.verdict import Computations, Evidence, Formula, Number, Observation
-from stickslip_ros.paper.figures import STRIBECK, BifurcationFigure
+from reproduction.claims.verdict import Computations, Evidence, Formula, Number, Observation
+from reproduction.figures import STRIBECK, BifurcationFigure
+from stickslip_ros.arrays import BoolArray
+from stickslip_ros.measures.cycle_measures import Regime
+from stickslip_ros.model.functions import zero_between
 
 computes = Computations()
 

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from stickslip_ros.paper.claims import (
+from reproduction.claims import (
     bifurcation_diagrams,
     coefficients,
     control_effect,
@@ -22,7 +22,7 @@ from stickslip_ros.paper.claims import (
     stability,
     washout,
 )
-from stickslip_ros.paper.claims.verdict import Evidence, Finding, Verdict
+from reproduction.claims.verdict import Evidence, Finding, Verdict
 
 _PARTS = (
     model,

@@ -7,10 +7,7 @@ from math import sqrt
 
 import numpy as np
 
-from stickslip_ros.measures.cycle_measures import Regime
-from stickslip_ros.model.friction import Coulomb, Linear, Stribeck
-from stickslip_ros.model.functions import zero_between
-from stickslip_ros.paper.claims.paper_values import (
+from reproduction.claims.paper_values import (
     FASTER,
     OPEN,
     PRINTED_HOPF_SPEED,
@@ -23,8 +20,11 @@ from stickslip_ros.paper.claims.paper_values import (
     falling,
     overdamped_from,
 )
-from stickslip_ros.paper.claims.verdict import Computations, Evidence, Number, Observation
-from stickslip_ros.paper.figures import PRINTED_SLOPE, STRIBECK, TANGENT_SLOPE, Portraits
+from reproduction.claims.verdict import Computations, Evidence, Number, Observation
+from reproduction.figures import PRINTED_SLOPE, STRIBECK, TANGENT_SLOPE, Portraits
+from stickslip_ros.measures.cycle_measures import Regime
+from stickslip_ros.model.friction import Coulomb, Linear, Stribeck
+from stickslip_ros.model.functions import zero_between
 
 computes = Computations()
 

@@ -8,9 +8,8 @@ import numpy.typing as npt
 import pytest
 from PIL import Image
 
-from stickslip_ros.model.friction import Linear
-from stickslip_ros.paper.drawing import paper_figure, save_paper_figure
-from stickslip_ros.paper.figures import (
+from reproduction.drawing import paper_figure, save_paper_figure, typeset
+from reproduction.figures import (
     Panel,
     PortraitCase,
     PortraitFigure,
@@ -18,9 +17,10 @@ from stickslip_ros.paper.figures import (
     compute_figure,
     portrait_of,
 )
+from reproduction.tests.test_figures import over_belt_speed
+from stickslip_ros.model.friction import Linear
 from stickslip_ros.show.style import BLUE, GREEN, ORANGE, STYLES
 from tests.drives import PAPER
-from tests.paper.test_figures import over_belt_speed
 from tests.show.texts import faults, in_styles, legend_texts
 
 STICKS = PortraitCase("it sticks", replace(PAPER, belt_speed=0.2), duration=100.0)
@@ -94,3 +94,10 @@ def test_a_bifurcation_diagram_names_regimes_and_marks(style: str) -> None:
 @pytest.mark.parametrize("number", [3, 4, 5])
 def test_the_title_of_every_diagram_fits(number: int) -> None:
     assert faults(paper_figure(compute_figure(number, points=3))) == []
+
+
+def test_symbols_in_plain_text_become_formulas() -> None:
+    assert typeset("belt speed v0") == "belt speed $v_0$"
+    assert typeset("k1 = -1, d = 2, μs / μm") == r"$k_1$ = -1, $d$ = 2, $\mu_s$ / $\mu_m$"
+    assert typeset("X' has 2β, up to τ = 300") == r"$X'$ has 2$\beta$, up to $\tau$ = 300"
+    assert typeset("drive and slide") == "drive and slide"

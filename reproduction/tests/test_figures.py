@@ -10,10 +10,7 @@ from math import log, sqrt
 import numpy as np
 import pytest
 
-from stickslip_ros.measures.cycle_measures import Regime
-from stickslip_ros.model.friction import Coulomb, Linear
-from stickslip_ros.motion.motion import Motion
-from stickslip_ros.paper.figures import (
+from reproduction.figures import (
     SETTLED,
     BifurcationFigure,
     Portrait,
@@ -21,6 +18,9 @@ from stickslip_ros.paper.figures import (
     compute_figure,
     portrait_of,
 )
+from stickslip_ros.measures.cycle_measures import Regime
+from stickslip_ros.model.friction import Coulomb, Linear
+from stickslip_ros.motion.motion import Motion
 from tests.drives import LIMIT_CYCLES, PAPER, LimitCycle
 
 DECAY = 0.05

@@ -4,10 +4,7 @@ from math import log
 
 import numpy as np
 
-from stickslip_ros.arrays import FloatArray
-from stickslip_ros.measures.cycle_measures import Regime
-from stickslip_ros.motion import RecordedMotion
-from stickslip_ros.paper.claims.paper_values import (
+from reproduction.claims.paper_values import (
     BELT_SPEEDS,
     DAMPING,
     FASTER,
@@ -25,8 +22,11 @@ from stickslip_ros.paper.claims.paper_values import (
     overdamped_from,
     printed_trace,
 )
-from stickslip_ros.paper.claims.verdict import Computations, Evidence, Formula, Number, Observation
-from stickslip_ros.paper.figures import STRIBECK
+from reproduction.claims.verdict import Computations, Evidence, Formula, Number, Observation
+from reproduction.figures import STRIBECK
+from stickslip_ros.arrays import FloatArray
+from stickslip_ros.measures.cycle_measures import Regime
+from stickslip_ros.motion import RecordedMotion
 
 computes = Computations()
 

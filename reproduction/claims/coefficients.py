@@ -15,9 +15,7 @@ from typing import Any, Self
 import numpy as np
 import numpy.typing as npt
 
-from stickslip_ros.arrays import FloatArray
-from stickslip_ros.model.dimensionless_drive import SPEED
-from stickslip_ros.paper.claims.paper_values import (
+from reproduction.claims.paper_values import (
     DAMPING,
     FILTER,
     OPEN,
@@ -30,7 +28,9 @@ from stickslip_ros.paper.claims.paper_values import (
     known,
     number_for_both,
 )
-from stickslip_ros.paper.claims.verdict import Computations, Evidence, Formula, Number, Observation
+from reproduction.claims.verdict import Computations, Evidence, Formula, Number, Observation
+from stickslip_ros.arrays import FloatArray
+from stickslip_ros.model.dimensionless_drive import SPEED
 from stickslip_ros.theory.linear import Expansion
 
 computes = Computations()
