@@ -20,27 +20,13 @@ def windows(rows: int, overlap: int = 0) -> Iterator[slice]:
 
     Work on a long array in such windows needs no memory for intermediate results, which takes more
     time than the work.
-
-    Examples
-    --------
-    >>> from stickslip_ros.arrays import windows
-    >>> [*windows(100_000, overlap=1)]
-    [slice(0, 65536, None), slice(65535, 100000, None)]
     """
     for begin in range(0, max(rows - overlap, 0), _WINDOW - overlap):
         yield slice(begin, min(begin + _WINDOW, rows))
 
 
 def rms(values: FloatArray) -> float:
-    """Return the root mean square.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from stickslip_ros.arrays import rms
-    >>> rms(np.array([3.0, -3.0]))
-    3.0
-    """
+    """Return the root mean square."""
     return float(np.sqrt(np.mean(values * values)))
 
 

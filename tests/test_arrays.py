@@ -1,5 +1,9 @@
-import numpy as np
+from itertools import pairwise
 
+import numpy as np
+import pytest
+
+from stickslip_ros.arrays import rms, windows
 from stickslip_ros.samples import ForceColumns
 
 
@@ -23,3 +27,18 @@ def test_a_table_has_rows() -> None:
 def test_tables_follow_each_other() -> None:
     assert told(forces(1).followed_by(forces(), forces(2, 3))) == told(forces(1, 2, 3))
     assert told(forces(1).followed_by()) == [(1, 0.5)]
+
+
+@pytest.mark.parametrize("rows", [0, 2, 3, 1000, 200_000])
+@pytest.mark.parametrize("overlap", [0, 1, 2])
+def test_windows_have_every_row_and_share_the_overlap(rows: int, overlap: int) -> None:
+    found = [np.arange(rows)[part] for part in windows(rows, overlap)]
+    own = [*found[:1], *(part[overlap:] for part in found[1:])]
+    assert np.concatenate([[], *own]).tolist() == list(range(rows if rows > overlap else 0))
+    assert (len(found) > 1) == (rows > 100_000)
+    for before, part in pairwise(found):
+        assert before[len(before) - overlap :].tolist() == part[:overlap].tolist()
+
+
+def test_the_root_mean_square() -> None:
+    assert rms(np.array([1.0, -7.0])) == 5.0

@@ -31,16 +31,7 @@ _DITHER_NOISE = 0.5
 
 @dataclass(frozen=True, eq=False)
 class Record:
-    """Evenly spaced samples of a slide and of what acts on it, arrays of shape (samples,).
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from stickslip_ros.identification.record import Record
-    >>> still = Record("log.csv", 1e-3, np.zeros(1000), np.full(1000, 0.04))
-    >>> still.duration, still.part(0, 500).duration
-    (1.0, 0.5)
-    """
+    """Evenly spaced samples of a slide and of what acts on it, arrays of shape (samples,)."""
 
     name: str
     """Name of the recording."""

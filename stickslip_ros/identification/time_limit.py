@@ -12,12 +12,6 @@ class TimeLimit:
     """Processor time from now on, of this thread, divided into stages.
 
     Results do not depend on what else the machine does.
-
-    Examples
-    --------
-    >>> from stickslip_ros.identification.time_limit import TimeLimit
-    >>> TimeLimit(60.0).is_over, TimeLimit(0.0).is_over
-    (False, True)
     """
 
     def __init__(self, seconds: float = inf) -> None:

@@ -59,12 +59,6 @@ class Regime(StrEnum):
         -------
         str
             Text such as "stick-slip"; "no whole cycle" for None.
-
-        Examples
-        --------
-        >>> from stickslip_ros.measures import Regime
-        >>> Regime.label("pure_slip")
-        'pure slip'
         """
         return "no whole cycle" if regime is None else _LABELS[cls(regime)]
 

@@ -23,14 +23,6 @@ def mean_feed(time: FloatArray, position: FloatArray) -> float | None:
     It is that over whole cycles: the position less the feed has the same extremes in each of them.
     A cycle ends where this position falls below its mean by half its standard deviation after it
     was as far above it. There must be three or more, and they must not go back.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from stickslip_ros.measures.feed import mean_feed
-    >>> time = np.arange(0.0, 5.3, 0.001)
-    >>> round(mean_feed(time, np.floor(time) + np.minimum(5.0 * (time % 1.0), 1.0)), 6)
-    1.0
     """
     if len(time) < 2 or not time[-1] > time[0]:
         return None

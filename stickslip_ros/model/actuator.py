@@ -21,13 +21,6 @@ class Actuator:
 
     The lag is a part of the drive: its equations accept floats and heyoka expressions, in the
     scales of the drive.
-
-    Examples
-    --------
-    >>> from stickslip_ros.model.actuator import Actuator
-    >>> actuator = Actuator(limit=100.0, resolution=30.0)
-    >>> [actuator.limiter(force) for force in (44.0, 46.0, 500.0)]
-    [30.0, 60.0, 90.0]
     """
 
     limit: float = constant(inf, "Largest force of the actuator.", "N", positive=True)

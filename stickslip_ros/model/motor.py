@@ -15,12 +15,6 @@ class Motor:
     The control force u acts on it: M X'' = k (x - X) + c (x' - X') + G - c_m (X' - v_belt) + u,
     with the dry friction |G| <= F_m of its bearings and the nut, which may hold it at the guide as
     that of the slide does. A drive without one has an ideal motor: X = 0, and u acts on the slide.
-
-    Examples
-    --------
-    >>> from stickslip_ros.model.motor import Motor
-    >>> Motor(mass=250.0, friction=50.0).mass
-    250.0
     """
 
     mass: Any = constant(1.0, "Mass of the motor, reflected to the slide.", "kg", positive=True)

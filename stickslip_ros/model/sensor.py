@@ -41,16 +41,6 @@ class Sensor:
     (p_k - p_(k-n)) / (n T); over fewer at the start and after a reset, and 0 at the first sample.
     Noise is normally distributed and independent from sample to sample; that of sample n depends on
     seed and n only. The state of the belt is known.
-
-    Examples
-    --------
-    An encoder of 1 um:
-
-    >>> from stickslip_ros.model.sensor import MeasuredVelocity, Sensor
-    >>> sensor = Sensor(position_resolution=1e-6, velocity=MeasuredVelocity.DIFFERENCE)
-    >>> measure = sensor.start(period=1e-3)
-    >>> [round(measure(n, 0.02 * n * 1e-3 + 3e-7, 0.02)[1], 6) for n in range(3)]
-    [0.0, 0.02, 0.02]
     """
 
     position_resolution: float = at_rest(

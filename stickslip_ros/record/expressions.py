@@ -32,14 +32,7 @@ _ALLOWED = (
 
 
 def parts_of(text: str) -> list[str]:
-    """Split a list at its commas, but not at those in brackets and quotes.
-
-    Examples
-    --------
-    >>> from stickslip_ros.record.expressions import parts_of
-    >>> parts_of("time=t,position=unwrap(n, 256),force='F, N'")
-    ['time=t', 'position=unwrap(n, 256)', "force='F, N'"]
-    """
+    """Split a list at its commas, but not at those in brackets and quotes."""
     parts, depth, quote = [""], 0, ""
     for character in text:
         if quote or character in "'\"":
@@ -55,16 +48,7 @@ def parts_of(text: str) -> list[str]:
 
 @dataclass(frozen=True)
 class Expression:
-    """An expression of columns of a table.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from stickslip_ros.record.expressions import Expression
-    >>> difference = Expression.read("log.csv", "cmd - 'x, mm'*1e-3", {"cmd": 0, "x, mm": 1})
-    >>> difference.places, difference.value([np.array([1.0, 2.0]), np.array([0.0, 500.0])]).tolist()
-    ((0, 1), [1.0, 1.5])
-    """
+    """An expression of columns of a table."""
 
     text: str
     bare: bool

@@ -42,17 +42,7 @@ class Wrap:
 
 
 class Jumps:
-    """Steps of a signal that are ten times as large as most of those before, or after.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from stickslip_ros.record.faults import Jumps
-    >>> signal = np.sin(0.01 * np.arange(1000.0))
-    >>> signal[200:203] = -5.0
-    >>> Jumps(signal).dropouts().tolist()
-    [200, 201, 202]
-    """
+    """Steps of a signal that are ten times as large as most of those before, or after."""
 
     def __init__(self, signal: FloatArray) -> None:
         """Find the jumps of a signal; they are also larger than steps of an encoder."""

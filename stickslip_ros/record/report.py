@@ -107,14 +107,6 @@ def report_of_recording(
         If `path` is not a bag or table, or holds neither joint states nor control forces.
     InvalidInputError
         If the part is empty, or a table does not have a column.
-
-    Examples
-    --------
-    >>> from pathlib import Path
-    >>> from stickslip_ros.record.report import report_of_recording
-    >>> report = report_of_recording(Path("bags/reference"), start=1.0)
-    >>> report["complete"], report["samples"]
-    (True, 2001)
     """
     if not start < end:
         raise InvalidInputError(f"the part from {start} s to {end} s is empty")

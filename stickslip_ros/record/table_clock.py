@@ -22,14 +22,6 @@ def even_times(time: FloatArray) -> tuple[FloatArray, list[str]]:
     """Return even times, s, for times that are even up to a rounding, and sentences on them.
 
     Between gaps of more than two steps of the rounding, they must be on a line to within a step.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from stickslip_ros.record.table_clock import even_times
-    >>> time, notes = even_times(np.round(np.arange(100) * 4e-4, 3))
-    >>> round(float(time[1]), 9), notes[0][:33]
-    (0.0004, 'the times are rounded to 1 ms: th')
     """
     if len(time) < _FEWEST or time[-1] > LONGEST:
         return time, []

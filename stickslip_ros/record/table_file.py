@@ -117,18 +117,6 @@ def read_table(
     `stickslip simulate --out`. A `belt_speed` is in place of a column. A velocity that is not given
     is the difference of the positions beside each sample. A belt whose velocity is not given is at
     rest. `form` is what is known of the form of a text.
-
-    Examples
-    --------
-    >>> from pathlib import Path
-    >>> from tempfile import TemporaryDirectory
-    >>> from stickslip_ros.record.table_file import read_table
-    >>> with TemporaryDirectory() as folder:
-    ...     path = Path(folder, "log.csv")
-    ...     _ = path.write_text("t;x [mm]\n0;1\n0,001;3\n")
-    ...     recording = read_table(path, {"time": "t", "position": "x"})
-    >>> recording.samples.stamp.tolist(), recording.samples.position.tolist()
-    ([0, 1000000], [0.001, 0.003])
     """
     return _recording(path, quantities_of(table_of(path, form), columns, belt_speed))
 

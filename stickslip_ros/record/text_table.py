@@ -43,14 +43,7 @@ _COMMENT = re.compile(r"^\s*(?:#|%|//)\s*")
 
 @dataclass(frozen=True)
 class TableFormat:
-    """What is known of the form of a text table; what is None is found from the table.
-
-    Examples
-    --------
-    >>> from stickslip_ros.record.text_table import TableFormat
-    >>> TableFormat(decimal=",", skip=3).encoding is None
-    True
-    """
+    """What is known of the form of a text table; what is None is found from the table."""
 
     decimal: str | None = None
     """Decimal mark, a point or a comma."""

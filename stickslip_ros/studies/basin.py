@@ -130,17 +130,6 @@ def basin_study(
     ------
     InvalidInputError
         If the plan is over other parameters or has a continuation, or no start is valid.
-
-    Examples
-    --------
-    >>> from stickslip_ros.scenarios.files import load_scenario
-    >>> from stickslip_ros.studies.plan import Grid
-    >>> from stickslip_ros.studies.runner import compute_columns
-    >>> scenario = load_scenario("paper", ["plant.expects_control=false"])
-    >>> study = basin_study(scenario, Grid(default_axes(scenario, 2)))
-    >>> basins = Basins.from_columns(compute_columns(study))
-    >>> [(str(each.regime), each.share) for each in basins.attractors]
-    [('stick_slip', 1.0)]
     """
     if set(plan.parameters) != {POSITION, VELOCITY} or plan.continuation:
         raise InvalidInputError(
@@ -174,12 +163,6 @@ def default_axes(scenario: Scenario, count: int) -> tuple[Axis, Axis]:
     ------
     InvalidInputError
         If the drive has no spring.
-
-    Examples
-    --------
-    >>> from stickslip_ros.scenarios.files import load_scenario
-    >>> [axis.count for axis in default_axes(load_scenario("paper"), 5)]
-    [5, 5]
     """
     drive = scenario.plant.as_drive()
     if not drive.has_spring:

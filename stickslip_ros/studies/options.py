@@ -20,11 +20,6 @@ class SettlingOptions:
     ------
     InvalidInputError
         If a value is out of range.
-
-    Examples
-    --------
-    >>> SettlingOptions(transient=50.0, patience=80)
-    SettlingOptions(transient=50.0, cycles=4, patience=80)
     """
 
     transient: float = 200.0

@@ -31,14 +31,6 @@ class Axis:
     ------
     InvalidInputError
         If the parameter is unknown or not a number, or a value is out of bounds.
-
-    Examples
-    --------
-    >>> axis = Axis("plant.belt_speed", 0.1, 0.5, 5)
-    >>> print(axis)
-    plant.belt_speed=0.1:0.5:5
-    >>> [round(value, 3) for value in axis.values().tolist()]
-    [0.1, 0.2, 0.3, 0.4, 0.5]
     """
 
     parameter: str
@@ -98,11 +90,6 @@ class Axis:
         ------
         InvalidInputError
             If the text has another form, or a value is not allowed.
-
-        Examples
-        --------
-        >>> Axis.parse("plant.damping=0.01:1:3:log").count
-        3
         """
         parameter, _, values = text.partition("=")
         parts: list[Any] = [*values.split(":"), "", ""]
@@ -222,14 +209,6 @@ class Grid:
 
     With a `continuation`, points follow each other along the last axis, and the grid has all points
     of one direction, then all points of the other.
-
-    Examples
-    --------
-    >>> grid = Grid((Axis("plant.belt_speed", 0.1, 0.3, 3), Axis("plant.damping", 0.0, 0.2, 2)))
-    >>> grid.shape, grid.size
-    ((3, 2), 6)
-    >>> grid.values(1)
-    (0.1, 0.2)
     """
 
     kind: ClassVar[str] = "grid"
@@ -323,12 +302,6 @@ class RandomSample:
 
     For a logarithmic axis the logarithms are uniformly distributed. A point depends on the seed
     and its index only, so a larger sample starts with the points of a smaller one.
-
-    Examples
-    --------
-    >>> sample = RandomSample((Axis("plant.belt_speed", 0.1, 0.5, 2),), size=3, seed=1)
-    >>> 0.1 <= sample.values(0)[0] <= 0.5
-    True
     """
 
     kind: ClassVar[str] = "sample"

@@ -178,19 +178,6 @@ def compute_columns(
         If `path` is not a journal of this study, or cannot be written.
     RunError
         If the worker processes keep dying, or the executor gives up.
-
-    Examples
-    --------
-    >>> from stickslip_ros.measures.cycle_measures import Regime
-    >>> from stickslip_ros.scenarios.files import load_scenario
-    >>> from stickslip_ros.studies.plan import Axis
-    >>> from stickslip_ros.studies.study import sweep_study
-    >>> scenario = load_scenario("paper", ["plant.expects_control=false"])
-    >>> study = sweep_study(scenario, [Axis("plant.belt_speed", 0.1, 0.6, 6)])
-    >>> found = compute_columns(study)
-    >>> sticks = found.regime == Regime.STICK_SLIP
-    >>> print(f"{found.values['plant.belt_speed'][sticks].max():.1f}")
-    0.4
     """
     with Journal(study, path, columns) as journal:
         if executor is not None:

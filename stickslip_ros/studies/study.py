@@ -251,13 +251,6 @@ def sweep_study(
     InvalidInputError
         If there are not one or two axes, an axis is of a controller that the scenario does not
         have, or no point is valid.
-
-    Examples
-    --------
-    >>> from stickslip_ros.scenarios.files import load_scenario
-    >>> study = sweep_study(load_scenario("paper"), [Axis("plant.belt_speed", 0.1, 0.5, 5)])
-    >>> study.plan.size
-    5
     """
     if not 1 <= len(axes) <= 2:
         raise InvalidInputError(f"{len(axes)} parameters: a sweep is over one or two")

@@ -129,17 +129,6 @@ def design_washout(task: Task, progress: Progress = lambda _: None) -> WashoutDe
     -------
     WashoutDesign
         The proposal with its margins and checks, or the reason why there is none.
-
-    Examples
-    --------
-    >>> from stickslip_ros.scenarios.files import load_scenario
-    >>> from stickslip_ros.studies.design import Task
-    >>> from stickslip_ros.studies.washout_design import design_washout
-    >>> overrides = ["washout_controller.force_limit=200"]
-    >>> task = Task.from_scenario(load_scenario("feed_drive", overrides), (0.03, 0.05))
-    >>> found = design_washout(task)
-    >>> max(check.peak_force or 0.0 for check in found.checks) < 200.0
-    True
     """
     found = _design(task, progress)
     if task.scenario.plant.force_jitter == 0.0:

@@ -136,23 +136,6 @@ class BifurcationBranches:
             no spring, or the belt speeds are not as described.
         RunError
             If the motion is too stiff to follow.
-
-        Examples
-        --------
-        The system of the paper: below the Hopf point rest is unstable, and there is one cycle.
-
-        >>> import numpy as np
-        >>> from stickslip_ros.model.drive import Drive
-        >>> from stickslip_ros.model.friction import Stribeck
-        >>> from stickslip_ros.theory.bifurcation_branches import BifurcationBranches
-        >>> drive = Drive(mass=1.0, damping=0.02, stiffness=1.0, normal_force=1.0,
-        ...               belt_speed=0.4, friction=Stribeck(0.4, 0.25, 0.5))
-        >>> found = BifurcationBranches.over(drive, np.linspace(0.3, 0.6, 4))
-        >>> [branch.stable for branch in found.equilibria]
-        [False, True]
-        >>> (cycle,) = found.cycles
-        >>> cycle.stable, cycle.belt_speeds.round(4).tolist()
-        (True, [0.3, 0.3388, 0.4, 0.4088, 0.4395, 0.4395, 0.4488, 0.4738, 0.4858, 0.4888])
         """
         cls.check(drive)
         ascending = len(belt_speeds) > 1 and np.all(np.diff(belt_speeds) > 0.0)

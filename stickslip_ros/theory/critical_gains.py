@@ -58,20 +58,6 @@ def critical_gains(drive: Drive, gains: ContinuousControl) -> CriticalGains | No
     ------
     InvalidInputError
         If belt or load follow a signal, or the drive has no spring.
-
-    Examples
-    --------
-    The system of the paper:
-
-    >>> from stickslip_ros.model.drive import Drive
-    >>> from stickslip_ros.model.control import Washout
-    >>> from stickslip_ros.model.friction import Stribeck
-    >>> from stickslip_ros.theory.critical_gains import critical_gains
-    >>> drive = Drive(mass=1.0, damping=0.02, stiffness=1.0, normal_force=1.0,
-    ...               belt_speed=0.4, friction=Stribeck(0.4, 0.25, 0.5))
-    >>> critical = critical_gains(drive, Washout(2.0, linear_gain=0.0, cubic_gain=-1.0))
-    >>> round(critical.linear, 6), round(critical.cubic, 4)
-    (-0.935296, 31.468)
     """
     require("the critical gain", drive, *ONE_DEGREE)
     own, unit = gains_of(gains), drive.normal_force / drive.speed_scale
@@ -177,20 +163,6 @@ def limit_cycle_from_hopf(drive: Drive, gains: ContinuousControl) -> LimitCycle 
         Limit cycle in SI units. None if there is no critical gain (see `critical_gains`), if the
         gain is on the other side of it, and where the cycle is lost on the way: where it ends or
         folds back.
-
-    Examples
-    --------
-    The system of the paper, at a linear gain just above the critical one of -0.9353:
-
-    >>> from stickslip_ros.model.drive import Drive
-    >>> from stickslip_ros.model.control import Washout
-    >>> from stickslip_ros.model.friction import Stribeck
-    >>> from stickslip_ros.theory.critical_gains import limit_cycle_from_hopf
-    >>> drive = Drive(mass=1.0, damping=0.02, stiffness=1.0, normal_force=1.0,
-    ...               belt_speed=0.4, friction=Stribeck(0.4, 0.25, 0.5))
-    >>> cycle = limit_cycle_from_hopf(drive, Washout(2.0, linear_gain=-0.9, cubic_gain=-1.0))
-    >>> round(cycle.measures.amplitude, 4), cycle.stable
-    (0.1154, True)
     """
     own, critical = gains_of(gains), critical_gains(drive, gains)
     if own is None or critical is None:

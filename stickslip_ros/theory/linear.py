@@ -159,21 +159,6 @@ def expand(drive: Drive, control: ContinuousControl | None = None) -> Expansion 
         If belt or load follow a signal, or the drive has no spring.
     RunError
         If the equilibrium of a law with a memory is not found.
-
-    Examples
-    --------
-    The system of the paper is unstable without control:
-
-    >>> from stickslip_ros.model.drive import Drive
-    >>> from stickslip_ros.model.friction import Stribeck
-    >>> from stickslip_ros.theory.linear import expand
-    >>> drive = Drive(mass=1.0, damping=0.02, stiffness=1.0, normal_force=1.0,
-    ...               belt_speed=0.4, friction=Stribeck(0.4, 0.25, 0.5))
-    >>> expansion = expand(drive)
-    >>> expansion.stable
-    False
-    >>> round(float(expansion.eigenvalues[0].real), 6)
-    0.071
     """
     require_equilibrium("the expansion at the equilibrium", drive, control)
     if drive.belt_speed == 0.0:

@@ -66,22 +66,6 @@ class LinearSampledLoop:
     velocity of a motor of finite mass, on which the force then acts, the states of the
     actuator, the states z of the control law, the forces under way, the newest first, and the
     earlier positions that a difference needs, the newest first.
-
-    Examples
-    --------
-    The slide of a machine tool, sampled at 1 kHz without delay:
-
-    >>> from stickslip_ros.model.drive import Drive
-    >>> from stickslip_ros.model.control import Washout
-    >>> from stickslip_ros.model.friction import Stribeck
-    >>> from stickslip_ros.theory.linear_sampled_loop import LinearSampledLoop
-    >>> drive = Drive(mass=100.0, damping=200.0, stiffness=1e6, normal_force=1000.0,
-    ...               belt_speed=0.04, friction=Stribeck(0.4, 0.25, 0.05))
-    >>> loop = LinearSampledLoop.from_drive(drive, rate=1000.0)
-    >>> round(loop.critical_linear_gain(corner_frequency=20.0), 1)
-    -1451.2
-    >>> round(loop.settling_time(Washout(20.0, linear_gain=-3000.0, cubic_gain=0.0)), 3)
-    0.601
     """
 
     drive: Drive

@@ -103,18 +103,6 @@ def shoot(
     ------
     InvalidInputError
         If belt or load follow a signal, or the drive has no spring.
-
-    Examples
-    --------
-    The system of the paper:
-
-    >>> from stickslip_ros.model.drive import Drive
-    >>> from stickslip_ros.model.friction import Stribeck
-    >>> from stickslip_ros.theory.shooting import shoot
-    >>> drive = Drive(mass=1.0, damping=0.02, stiffness=1.0, normal_force=1.0,
-    ...               belt_speed=0.4, friction=Stribeck(0.4, 0.25, 0.5))
-    >>> round(shoot(drive, position=-0.1, period=6.4).period, 6)
-    6.392424
     """
     require_equilibrium("shooting", drive, control)
     if drive.belt_speed == 0.0:

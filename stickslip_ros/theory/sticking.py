@@ -83,19 +83,6 @@ def sticking_onset(drive: Drive) -> StickingOnset:
         signal, or the drive has no spring.
     RunError
         If the motion is too stiff to follow.
-
-    Examples
-    --------
-    The system of the paper:
-
-    >>> from stickslip_ros.model.drive import Drive
-    >>> from stickslip_ros.model.friction import Stribeck
-    >>> from stickslip_ros.theory.sticking import sticking_onset
-    >>> drive = Drive(mass=1.0, damping=0.02, stiffness=1.0, normal_force=1.0,
-    ...               belt_speed=0.4, friction=Stribeck(0.4, 0.25, 0.5))
-    >>> onset = sticking_onset(drive)
-    >>> round(onset.approximate, 6), round(onset.exact, 6)
-    (0.437163, 0.439472)
     """
     require("the stick-slip onset speed", drive, *PLANAR)
     approximate, no_approximate = _averaged(drive)
