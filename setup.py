@@ -56,7 +56,6 @@ setup(
         NAME: [
             "py.typed",
             "api/*.html",
-            "app/*.sh",
             "app/dashboard/*.css",
             "app/dashboard/*.js",
             "nodes/base/*.xml",
@@ -89,6 +88,7 @@ setup(
         "pyyaml>=6.0.1",  # the first that builds with the Cython of today
         "rich>=13",
         "scipy>=1.13",  # the first built for numpy 2
+        "shtab>=1.11",  # the first that completes directories
         "typing_extensions>=4.10",  # the oldest that starlette takes; 3.11 has no `override`
         "zstandard>=0.22",  # the oldest wheels for 3.12
     ],

@@ -1,19 +1,59 @@
 """`stickslip completion`: the completion script of a shell."""
 
 import argparse
-from collections.abc import Iterable
-from pathlib import Path
+import re
 
 from stickslip_ros.app.commands import COMMANDS, command_parser
 
-_FILES = ("BAG", "DIR", "FILE", "OUT", "RECORDING")
+_FILES = ("BAG", "DIR", "FILE", "FILE.csv", "OUT", "PATH", "RECORDING")
 """Metavars of files and directories."""
 
-_PARAMETERS = ("NODE.PARAMETER=VALUE", "NODE.PARAMETER=A:B:COUNT")
+_FUNCTIONS = {
+    "NODE.PARAMETER=VALUE": "_stickslip_parameters",
+    "NODE.PARAMETER=A:B:COUNT": "_stickslip_parameters",
+    "SCENARIO": "_stickslip_scenario_files",  # from "_file" shtab knows that these can be files
+    "CONTROLLER": "_stickslip_controller_files",
+}
+"""What completes an argument in the shell, by its metavar."""
 
-_SPACE_OF_ZSH = """\
-    # zsh has no compopt: the space after a word is part of it.
-    [[ -z $kind || $kind == options ]] && COMPREPLY=("${COMPREPLY[@]/%/ }")
+_BASH = """
+_stickslip_parameters() { compgen -W '@PARAMETERS@' -- "$1"; }
+_stickslip_words_or_files() {
+    compgen -W "$2" -- "$1"
+    compgen -f -X "!$3" -- "$1"
+    compgen -d -- "$1"
+}
+_stickslip_scenario_files() { _stickslip_words_or_files "$1" '@SCENARIOS@' '*.y*ml'; }
+_stickslip_controller_files() { _stickslip_words_or_files "$1" '@LAWS@' '*.py'; }
+# bash splits words at "=": NAME=VALUE is completed as one word, --OPTION=VALUE as two.
+_stickslip() {
+    local words=("") word
+    for word in "${COMP_WORDS[@]:0:COMP_CWORD+1}"; do
+        case ${words[-1]},$word in
+            --*,=) words+=("") ;;
+            *,= | *=,* | ,*) words[-1]+=$word ;;
+            *) words+=("$word") ;;
+        esac
+    done
+    local COMP_WORDS=("${words[@]}") COMP_CWORD=$((${#words[@]} - 1))
+    _shtab_stickslip
+    [[ ${COMPREPLY[0]-} == *= ]] && compopt -o nospace
+    [[ ${words[-1]} == *=* ]] && COMPREPLY=("${COMPREPLY[@]#*=}")
+    return 0
+}
+"""
+_ZSH = """
+_stickslip_parameters() {
+    local words=(@PARAMETERS@)
+    compadd "$@" -S '' -- ${(M)words:#*=}
+    compadd "$@" -- ${words:#*=}
+}
+_stickslip_words_or_files() {
+    _alternative "words::($1)" "files::_path_files -g '$2'" 'folders::_path_files -/'
+}
+_stickslip_scenario_files() { _stickslip_words_or_files '@SCENARIOS@' '*.y*ml' }
+_stickslip_controller_files() { _stickslip_words_or_files '@LAWS@' '*.py' }
+(( $+functions[compdef] )) || { autoload -Uz compinit && compinit }
 """
 
 
@@ -29,83 +69,45 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> None:
     """Run the command."""
-    if arguments.shell == "zsh":
-        print("autoload -U +X compinit && compinit\nautoload -U +X bashcompinit && bashcompinit")
-    print(_script(arguments.shell), end="")
+    import shtab
 
-
-def _script(shell: str) -> str:
     from stickslip_ros.scenarios.files import shipped_scenarios
     from stickslip_ros.scenarios.parameters import CONTROLLER_PARAMETERS, NODE_PARAMETERS
-    from stickslip_ros.scenarios.template import own_first
+    from stickslip_ros.show.quantities import COLOURS
 
-    parameters = {
-        f"{node}.{parameter.name}": parameter
+    parser = argparse.ArgumentParser("stickslip")
+    commands = parser.add_subparsers()
+    for name, (_, meaning) in COMMANDS.items():
+        command = command_parser(name)
+        for action in command._actions:  # pyright: ignore[reportPrivateUsage]
+            metavar = str(action.metavar)
+            if metavar in _FILES:
+                vars(action)["complete"] = shtab.FILE
+            elif metavar in _FUNCTIONS:
+                vars(action)["complete"] = dict.fromkeys(("bash", "zsh"), _FUNCTIONS[metavar])
+            elif action.dest == "controller":
+                action.choices = list(CONTROLLER_PARAMETERS)
+            elif metavar == "MEASURE":
+                action.choices = list(COLOURS)
+            action.metavar = None  # which zsh would parse
+        commands.add_parser(name, help=meaning, add_help=False, parents=[command])
+    parameters = [
+        f"{node}.{parameter.name}={value}"
         for node, model in NODE_PARAMETERS.items()
-        for parameter in own_first(model)
-    }
-    values = {
-        name: ("true", "false") if parameter.kind is bool else parameter.choices
-        for name, parameter in parameters.items()
-    }
-    of_commands, of_options = _cases()
-    parts = {
-        "@SHELL@": shell,
-        "@SPACE@": _SPACE_OF_ZSH if shell == "zsh" else "",
-        "@NOSPACE@": " -o nospace" if shell == "zsh" else "",
-        "@COMMANDS@": _words(COMMANDS),
-        "@COMMAND_CASES@": "\n".join(of_commands),
-        "@OPTION_CASES@": "\n".join(of_options),
-        "@VALUE_CASES@": "\n".join(
-            f"            {name}) words={_words(choices)} ;;"
-            for name, choices in values.items()
-            if choices
-        ),
-        "@LAWS@": _words(CONTROLLER_PARAMETERS),
-        "@SCENARIOS@": _words(shipped_scenarios()),
-        "@PARAMETERS@": _words(f"{name}=" for name in parameters),
-    }
-    script = Path(__file__).with_suffix(".sh").read_text(encoding="utf-8")
-    for place, text in parts.items():
-        script = script.replace(place, text)
-    return script
-
-
-def _cases() -> tuple[list[str], list[str]]:
-    """Return the branches of the script for the commands, and for their options with a value."""
-    of_commands: list[str] = []
-    of_options: list[str] = []
-    for name in COMMANDS:
-        options: list[str] = []
-        positional = ""
-        for action in command_parser(name)._actions:  # pyright: ignore[reportPrivateUsage]
-            completed = _completed(action)
-            options += action.option_strings
-            if action.option_strings and action.nargs != 0:
-                pattern = " | ".join(f'"{name} {option}"' for option in action.option_strings)
-                of_options.append(f"            {pattern}) {completed} ;;")
-            elif not action.option_strings and not positional:
-                positional = completed.replace("kind=", "positional=")
-        of_commands.append(f"        {name}) options={_words(options)} {positional} ;;")
-    return of_commands, of_options
-
-
-def _completed(action: argparse.Action) -> str:
-    """Return how the script completes the value of an option or an argument."""
-    if action.choices is not None:
-        return f"words={_words(action.choices)}"
-    if action.metavar in _PARAMETERS:
-        return "kind=parameters"
-    if action.metavar in ("CONTROLLER", "NAME"):
-        return "words=@LAWS@" + (" kind=files" if action.metavar == "CONTROLLER" else "")
-    if action.metavar == "MEASURE":
-        from stickslip_ros.show.quantities import COLOURS
-
-        return f"words={_words(COLOURS)}"
-    if action.metavar == "SCENARIO":
-        return "kind=scenarios"
-    return "kind=files" if action.metavar in _FILES else "kind="
-
-
-def _words(words: Iterable[str]) -> str:
-    return f"'{' '.join(words)}'"
+        for parameter in model.known.values()
+        for value in (("true", "false") if parameter.kind is bool else parameter.choices or ("",))
+    ]
+    own = {"bash": _BASH, "zsh": _ZSH}[arguments.shell]
+    for place, words in (
+        ("@PARAMETERS@", parameters),
+        ("@SCENARIOS@", shipped_scenarios()),
+        ("@LAWS@", CONTROLLER_PARAMETERS),
+    ):
+        own = own.replace(place, " ".join(words))
+    script = shtab.complete(parser, arguments.shell, preamble=own)
+    if arguments.shell == "bash":
+        script += "\ncomplete -F _stickslip stickslip"
+    else:  # an argument that can be repeated, and --OPTION=VALUE
+        script = script.replace('"(*):', '"*:')
+        script = re.sub(r"(--[\w-]+)(?=\[.*[^\\]\]:)", r"\1=", script)
+    print(script)

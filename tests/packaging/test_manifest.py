@@ -55,6 +55,7 @@ KEYS = {
     "rosbags": {"python3-rosbags-pip"},
     "scipy": {"python3-scipy"},
     "setuptools": {"python3-setuptools"},
+    "shtab": set(),
     "typing_extensions": {"python3-typing-extensions"},
     "uvicorn": {"python3-uvicorn"},
     "xarray": set(),
