@@ -13,10 +13,7 @@ from stickslip_ros.errors import RunError
 @contextmanager
 def loading_ros() -> Generator[None]:
     """Wrap the imports that need ROS; raises RunError if ROS cannot be loaded."""
-    from stickslip_ros.nodes.base.machine import check_shared_memory
-
     try:
-        check_shared_memory()
         yield
     except ModuleNotFoundError as error:
         raise RunError(

@@ -2,17 +2,14 @@
 
 import os
 import shlex
-import socket
 from collections.abc import Mapping
-from contextlib import ExitStack, chdir
-from datetime import UTC, datetime
+from contextlib import chdir
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from stickslip_ros.app.main import main
-from stickslip_ros.nodes.base.machine import port
 from tests.app.conftest import Run
 from tests.record.runs import STAMPS, record
 
@@ -264,47 +261,6 @@ def test_an_impossible_domain_is_refused(
         refusal = f"ROS_DOMAIN_ID = {shown} is invalid: must be an integer from 0 to 232"
         assert refusal in done.stderr.splitlines()[-1]
         assert "Traceback" not in done.stderr
-
-
-@pytest.mark.parametrize(
-    ("numbers", "named"),
-    [
-        (range(1), "UDP port {0}, by which the nodes of ROS_DOMAIN_ID = {domain} find each other"),
-        (range(10, 210), "of its UDP ports, {0} to {1}, a node needs two that are free"),
-    ],
-)
-def test_a_domain_whose_ports_are_taken_is_refused(
-    stickslip: Run, process_environment: dict[str, str], numbers: range, named: str
-) -> None:
-    domain = int(process_environment["ROS_DOMAIN_ID"])
-    ports = [port(domain, number) for number in numbers]
-    with ExitStack() as held:
-        for taken in ports:
-            held.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)).bind(("", taken))
-        done = stickslip("run", "paper", "--duration", "1")
-    assert done.returncode == 2
-    assert named.format(ports[0], ports[-1], domain=domain) in done.stderr.splitlines()[-1]
-
-
-def test_full_shared_memory_is_reported(
-    stickslip: Run, process_environment: dict[str, str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("stickslip_ros.nodes.base.machine._free_shared_memory", lambda: 4096)
-    process_environment["FASTDDS_BUILTIN_TRANSPORTS"] = "DEFAULT"
-    done = stickslip("run", "paper", "--duration", "1")
-    assert done.returncode == 2
-    assert "/dev/shm has 4096 bytes free, less than 1048576" in done.stderr.splitlines()[-1]
-
-
-@pytest.mark.parametrize("year", [1969, 2039])
-def test_a_clock_that_no_stamp_can_hold_is_refused(
-    stickslip: Run, monkeypatch: pytest.MonkeyPatch, year: int
-) -> None:
-    now = int(datetime(year, 7, 1, tzinfo=UTC).timestamp()) * 1_000_000_000
-    monkeypatch.setattr("time.time_ns", lambda: now)
-    done = stickslip("run", "paper", "--duration", "1")
-    assert done.returncode == 2
-    assert f"the clock of this machine shows the year {year}: " in done.stderr.splitlines()[-1]
 
 
 @pytest.mark.parametrize(

@@ -125,9 +125,6 @@ class Namespaces:
             for link in ("lo", "cable"):
                 self._ip("-n", name, "link", "set", link, "up")
 
-    def set_loopback(self, state: str) -> None:
-        self._ip("-n", self.host, "link", "set", "lo", state)
-
     def remove(self) -> None:
         for name in (self.host, self.elsewhere):
             subprocess.run(["ip", "netns", "del", name], capture_output=True)
@@ -303,29 +300,6 @@ def test_a_run_that_is_open_to_the_network_is_seen_by_strangers(
         assert set(seen) >= OURS
         assert states
         assert readers > 0
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(
-    ("arguments", "environment"),
-    [
-        (RUN, {}),
-        (["-m", "stickslip_ros.nodes.plant"], {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}),
-        (["-c", LOOP], {}),
-    ],
-)
-def test_a_loopback_interface_that_is_down_is_reported(
-    start: Start, namespaces: Namespaces, arguments: list[str], environment: dict[str, str]
-) -> None:
-    namespaces.set_loopback("down")
-    try:
-        process = start(namespaces.host, *arguments, stderr=subprocess.PIPE, **environment)
-        _, errors = process.communicate(timeout=PATIENCE)
-    finally:
-        namespaces.set_loopback("up")
-    assert process.returncode != 0
-    assert "the loopback interface of this machine is down" in errors.splitlines()[-1]
-    assert "Error]" not in errors
 
 
 @pytest.mark.process

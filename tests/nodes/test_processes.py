@@ -133,28 +133,3 @@ def test_help_names_every_parameter(
         assert "--ros-args" in shown
         if node == name:
             assert all(f"  {parameter}  (" in shown for parameter in model.known)
-
-
-FULL = """
-mount -t tmpfs -o size=64k tmpfs /dev/shm && dd if=/dev/zero of=/dev/shm/full 2>/dev/null
-exec "$@"
-"""
-
-
-@pytest.mark.process
-@pytest.mark.parametrize("code", ["stickslip_ros.nodes.plant", "stickslip_ros.app.main"])
-def test_full_shared_memory_is_a_sentence(
-    process_environment: dict[str, str], tmp_path: Path, code: str
-) -> None:
-    """Loading ROS into a process writes a little of it, and SIGBUS ends the process."""
-    command = [sys.executable, "-m", code, *(["dashboard"] if "app" in code else [])]
-    isolated = ["unshare", "--user", "--map-root-user", "--mount", "sh", "-c"]
-    if subprocess.run([*isolated, "mount -t tmpfs tmpfs /dev/shm"], check=False).returncode != 0:
-        pytest.skip("no namespaces here")
-    done = subprocess.run(
-        [*isolated, FULL, "sh", *command],
-        env=process_environment, cwd=tmp_path, capture_output=True, text=True, check=False,
-    )  # fmt: skip
-    assert done.returncode == 1
-    (line,) = done.stderr.splitlines()
-    assert "shared memory is full: /dev/shm has 0 bytes free, and ROS needs" in line

@@ -1,4 +1,4 @@
-"""Conditions of ROS on this machine: memory, the clock, ports, a domain, a namespace of its own.
+"""Domains and namespaces of ROS on this machine, and the ports of a domain.
 
 Importing this module does not load ROS.
 """
@@ -12,13 +12,9 @@ import sys
 import time
 from collections.abc import Generator
 from contextlib import contextmanager, suppress
-from datetime import UTC, datetime
 from hashlib import sha256
-from pathlib import Path
 
 from stickslip_ros.errors import InvalidInputError, RunError
-from stickslip_ros.nodes.base.network import TRANSPORTS, is_fast_dds, is_kept_on_loopback
-from stickslip_ros.stamps import END_OF_TIME, NANOSECONDS
 
 DOMAINS = range(1, 102)
 """Domains whose ports are all below the ephemeral ports of the system."""
@@ -28,52 +24,10 @@ FIRST_PROCESS = 10
 _DOMAIN = "ROS_DOMAIN_ID"
 _LARGEST_DOMAIN = 232
 _DECIMAL = re.compile(r"0|[1-9][0-9]{0,20}")
-_SHARED_MEMORY = Path("/dev/shm")
-_LEAST_SHARED_MEMORY = 1 << 20
-"""Bytes that a process of Fast DDS uses at most, rounded up."""
-_TRACING_FILES = 2
-"""Files of one page each that the tracing library of ROS writes when it is loaded."""
 
 
 class NamespaceInUseError(InvalidInputError):
     """Another run is in the namespace."""
-
-
-def check_shared_memory() -> None:
-    """Raise RunError if loading ROS would end this process by SIGBUS."""
-    least = _TRACING_FILES * os.sysconf("SC_PAGESIZE")
-    if not _SHARED_MEMORY.is_dir() or _free_shared_memory() >= least:
-        return
-    written = [
-        file for file in _SHARED_MEMORY.glob("lttng-ust-wait-*") if file.stat().st_blocks > 0
-    ]
-    if len(written) < _TRACING_FILES:
-        raise RunError(
-            f"shared memory is full: {_SHARED_MEMORY} has {_free_shared_memory()} bytes free, and "
-            f"ROS needs {least} to load; remove unused files there"
-        )
-
-
-def check_machine(domain: int) -> None:
-    """Raise InvalidInputError if nodes cannot run because of the clock, the network or the domain.
-
-    The middleware reports these problems unclearly or not at all.
-    """
-    now = time.time_ns()
-    if not 0 < now < END_OF_TIME:
-        year = datetime.fromtimestamp(now / NANOSECONDS, UTC).year
-        raise InvalidInputError(
-            f"the clock of this machine shows the year {year}: the stamps of ROS messages "
-            "range from 1970 to January 2038"
-        )
-    if is_kept_on_loopback() and not _reaches_itself():
-        raise InvalidInputError(
-            "the loopback interface of this machine is down, and the nodes need it: "
-            "ip link set lo up"
-        )
-    if is_fast_dds():
-        _check_ports(domain)
-        _check_shared_memory()
 
 
 def domain_of_environment() -> int:
@@ -161,63 +115,13 @@ def port(domain: int, number: int) -> int:
     return 7400 + 250 * domain + number
 
 
-def is_free(taken: int, address: str = "", *, shared: bool = False) -> bool:
-    """Return whether a UDP port is free, or can be `shared` with the processes that share it."""
+def is_free(taken: int, address: str = "") -> bool:
+    """Return whether a UDP port of an address is free."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, shared)
         try:
             probe.bind((address, taken))
         except OSError as error:
             return error.errno != errno.EADDRINUSE
-    return True
-
-
-def _check_ports(domain: int) -> None:
-    shared = port(domain, 0)
-    # Fast DDS listens on these two addresses if it uses the loopback only.
-    for address in ("127.0.0.1", "239.255.0.1") if is_kept_on_loopback() else ("",):
-        if not is_free(shared, address, shared=True):
-            raise InvalidInputError(
-                f"UDP port {shared}, by which the nodes of {_DOMAIN} = {domain} find each other, "
-                "is in use by another program: end that program, or choose another domain"
-            )
-    # Fast DDS tries the ports of 100 processes at most.
-    own = range(port(domain, FIRST_PROCESS), 65_535, 2)[:100]
-    if not any(is_free(first) and is_free(first + 1) for first in own):
-        raise InvalidInputError(
-            f"{_DOMAIN} = {domain} is refused: of its UDP ports, {own[0]} to {own[-1] + 1}, a node "
-            "needs two that are free, and there are none: choose another domain"
-        )
-
-
-def _check_shared_memory() -> None:
-    transports = os.environ.get(TRANSPORTS, "")
-    if transports in ("", "NONE", "UDPv4", "UDPv6") or not _SHARED_MEMORY.is_dir():
-        return
-    free = _free_shared_memory()
-    if free < _LEAST_SHARED_MEMORY:
-        raise InvalidInputError(
-            f"{TRANSPORTS} = {transports} lets Fast DDS use shared memory, and {_SHARED_MEMORY} "
-            f"has {free} bytes free, less than {_LEAST_SHARED_MEMORY}: unset it, or remove unused "
-            "files there"
-        )
-
-
-def _free_shared_memory() -> int:
-    found = os.statvfs(_SHARED_MEMORY)
-    return found.f_bavail * found.f_frsize
-
-
-def _reaches_itself() -> bool:
-    kind = socket.AF_INET, socket.SOCK_DGRAM
-    with socket.socket(*kind) as reader, socket.socket(*kind) as writer:
-        reader.bind(("127.0.0.1", 0))
-        reader.settimeout(1.0)
-        try:
-            writer.sendto(b"", reader.getsockname())
-            reader.recv(1)
-        except OSError:
-            return False
     return True
 
 

@@ -5,9 +5,6 @@ from collections.abc import Generator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
-TRANSPORTS = "FASTDDS_BUILTIN_TRANSPORTS"
-"""Variable that names the transports of Fast DDS."""
-
 DISCOVERY_RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
 NO_PEERS = {"ROS_STATIC_PEERS": ""}
 
@@ -63,17 +60,12 @@ def prefer_prompt_middleware() -> None:
     millisecond each time and sometimes by seconds.
     """
     _translate_predecessor()
-    if any(os.environ.get(name) for name in (_PROFILES, TRANSPORTS)):
+    if any(os.environ.get(name) for name in (_PROFILES, "FASTDDS_BUILTIN_TRANSPORTS")):
         return
     if os.environ.get(DISCOVERY_RANGE) == "LOCALHOST":
         os.environ.update(this_machine_only())
     else:
         os.environ[_PROFILES] = _profile("network")
-
-
-def is_kept_on_loopback() -> bool:
-    """Return whether the environment has the settings of `this_machine_only` for Fast DDS."""
-    return os.environ.get(_PROFILES) == _profile("loopback")
 
 
 def is_fast_dds() -> bool:

@@ -21,7 +21,6 @@ from stickslip_ros.model.constants import Changes
 from stickslip_ros.nodes.base.child_process import die_with_parent
 from stickslip_ros.nodes.base.machine import (
     FIRST_PROCESS,
-    check_machine,
     domain_of_environment,
     is_free,
     own_domain,
@@ -61,9 +60,10 @@ def ros_session(
 
     This uses the default context and the domain of the environment, unless others are given. The
     nodes that are added to the spinner are destroyed at the end.
-    Raises InvalidInputError if nodes cannot run here, or ROS refuses the arguments.
+    Raises InvalidInputError if the environment names no domain, or ROS refuses the arguments.
     """
-    check_machine(domain_of_environment() if domain is None else domain)
+    if domain is None:
+        domain = domain_of_environment()
     try:
         rclpy.init(
             args=list(arguments),
