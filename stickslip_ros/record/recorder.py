@@ -28,6 +28,7 @@ from stickslip_ros.record.bag_files import BagFiles
 from stickslip_ros.record.definitions import message_definition, type_hash
 from stickslip_ros.record.mcap_file import McapFile
 from stickslip_ros.record.metadata import BagDescription, opening_information
+from stickslip_ros.record.topics import DURABILITY, HISTORY, RELIABILITY
 from stickslip_ros.stamps import NANOSECONDS
 
 Compression = Literal["lz4", "zstd", "none"]
@@ -42,10 +43,10 @@ def offered_qos(depth: int) -> str:
     """
     unlimited = {"sec": 9223372036, "nsec": 854775807}
     profile = {
-        "history": "keep_last",
+        "history": HISTORY,
         "depth": depth,
-        "reliability": "reliable",
-        "durability": "volatile",
+        "reliability": RELIABILITY,
+        "durability": DURABILITY,
         "deadline": dict(unlimited),
         "lifespan": dict(unlimited),
         "liveliness": "automatic",

@@ -19,13 +19,16 @@ MessageT = TypeVar("MessageT")
 DEEP = 4_900
 """Messages queued for a reader that falls behind; above 5,000, Fast DDS delays the writer."""
 
+HISTORY, RELIABILITY, DURABILITY = "keep_last", "reliable", "volatile"
+"""Quality of service of all topics, besides the depth of the history; rosbag2's names."""
+
 _WRENCH = "geometry_msgs/msg/WrenchStamped"
 _NUMBER = "std_msgs/msg/Float64"
 
 
 @dataclass(frozen=True)
 class Topic(Generic[MessageT]):
-    """A topic that the nodes of this package publish or subscribe; reliable, bounded history."""
+    """A topic that the nodes of this package publish or subscribe."""
 
     name: str
     type_name: str

@@ -9,6 +9,7 @@ from rclpy.duration import Duration, Infinite
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import (
+    DurabilityPolicy,
     HistoryPolicy,
     QoSCompatibility,
     QoSProfile,
@@ -18,19 +19,20 @@ from rclpy.qos import (
 from rclpy.subscription import Subscription
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
-from stickslip_ros.record.topics import Topic
+from stickslip_ros.record.topics import DURABILITY, HISTORY, RELIABILITY, Topic
 
 
 def qos_profile(
     topic: Topic[Any],
     depth: int | None = None,
-    reliability: ReliabilityPolicy = ReliabilityPolicy.RELIABLE,
+    reliability: ReliabilityPolicy | None = None,
 ) -> QoSProfile:
     """Return the quality of service of a topic, with a history of `depth` messages."""
     return QoSProfile(
-        reliability=reliability,
-        history=HistoryPolicy.KEEP_LAST,
+        history=HistoryPolicy.get_from_short_key(HISTORY),
         depth=topic.depth if depth is None else depth,
+        reliability=reliability or ReliabilityPolicy.get_from_short_key(RELIABILITY),
+        durability=DurabilityPolicy.get_from_short_key(DURABILITY),
     )
 
 
