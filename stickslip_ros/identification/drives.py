@@ -6,7 +6,13 @@ from math import sqrt
 
 from stickslip_ros.identification.choice import AUTO
 from stickslip_ros.identification.identified_law import IdentifiedLaw, label_of
-from stickslip_ros.identification.law_search import LawSearch, is_white, loss_of, remarked
+from stickslip_ros.identification.law_search import (
+    OUT_OF_TIME,
+    LawSearch,
+    is_white,
+    loss_of,
+    remarked,
+)
 from stickslip_ros.identification.laws import DAHL, LUGRE, DirectionalAdapter
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.refinement import Refinement
@@ -33,7 +39,8 @@ class DriveTask:
         self, records: Sequence[Record], fixed: Mapping[str, float], limit: TimeLimit
     ) -> None:
         self._search, self._limit = LawSearch(records, fixed, limit), limit
-        self.left = self._search.left
+        self.left: list[str] = []
+        """Laws that were not fitted to the end, because the time was over."""
 
     def candidates(
         self, law: str, laws: Sequence[IdentifiedLaw], progress: Callable[[str], None]
@@ -91,6 +98,8 @@ class DriveTask:
         for number, each in enumerate(sorted(near, key=loss_of)):
             self._limit.begin_stage(1.0 / (len(near) - number))
             finished[each] = self._search.finished(each)
+            if finished[each].remark == OUT_OF_TIME:
+                self.left.append(label_of(each.law))
         return [*finished.values()]
 
 

@@ -62,8 +62,6 @@ class LawSearch:
         self, records: Sequence[Record], fixed: Mapping[str, float], limit: TimeLimit
     ) -> None:
         self.records, self.limit = records, limit
-        self.left: list[str] = []
-        """Laws that were not fitted to the end, because the time was over."""
         self.normal_force = fixed.get("normal_force", 1.0)
         self.fixed = {name: fixed[name] for name in (*LINEAR, DELAY) if name in fixed}
         self.friction = {
@@ -224,10 +222,7 @@ class LawSearch:
         fit = self._settled(replace(begun, names=near.names))
         fit = self._with_optional(fit, least_share=0.0)
         validated = replace(fit, held_out=_held_out(fit))
-        if not self.limit.is_over:
-            return validated
-        self.left.append(fit.law.name)
-        return remarked(fit, OUT_OF_TIME)
+        return remarked(fit, OUT_OF_TIME) if self.limit.is_over else validated
 
     def _regression(self, law: IdentifiedLaw, shape: float | None = None) -> Regression:
         fixed = {name: self.fixed.get(name, 0.0) for name in LINEAR if name not in self.free}
