@@ -1,15 +1,32 @@
 # Everything runs in a private environment: PyPI wheels, ROS 2 Jazzy among them, and this checkout.
+# Ready, it has what the demo and the dashboard need; complete, also what tests and documentation do.
 VENV ?= .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
+COMPLETE := $(VENV)/.complete
 
 # The first that runs (a pyenv shim may not) and that the ROS wheels are made for.
 SUITS := -c 'import sys; sys.exit(not (3, 11) <= sys.version_info < (3, 14))'
 PYTHON ?= $(shell for python in python3.12 python3.13 python3.11 python3; do \
 	$$python $(SUITS) 2>/dev/null && echo $$python && break; done)
 
-# Python 3.11 comes with a pip that takes twice as long: it is replaced first.
-PIP := $(BIN)/python -m pip install -qq --disable-pip-version-check
+# uv takes a tenth of the time of pip: the one on PATH, or one that pip puts into the environment.
+# It is told which packages pip is told to take, and from where. Where it fails, or UV is empty, pip
+# installs. Python 3.11 comes with a pip that takes twice as long: it is replaced first.
+UV ?= $(shell command -v uv || echo $(BIN)/uv)
+PIP := $(BIN)/python -m ensurepip --default-pip >/dev/null && \
+	$(BIN)/python -m pip install -qq --disable-pip-version-check
+PIP_FILES := /etc/xdg/pip/pip.conf /etc/pip.conf ~/.pip/pip.conf \
+	$${XDG_CONFIG_HOME:-~/.config}/pip/pip.conf $$PIP_CONFIG_FILE
+configured = $$(sed -n 's/^$(1) *= *//p' $(PIP_FILES) 2>/dev/null | tail -n 1)
+define install
+@test -z '$(UV)' || test -x '$(UV)' || { $(PIP) uv; }; \
+UV_CONSTRAINT=$${UV_CONSTRAINT:-$${PIP_CONSTRAINT:-$(call configured,constraint)}} \
+UV_DEFAULT_INDEX=$${UV_DEFAULT_INDEX:-$${PIP_INDEX_URL:-$(call configured,index-url)}} \
+$(or $(UV),false) pip install --quiet --python $(BIN)/python \
+	--reinstall-package stickslip_ros pip --editable '.[$(EXTRAS)]' || \
+{ $(PIP) --upgrade pip && $(PIP) --editable '.[$(EXTRAS)]'; }
+endef
 
 # A test that hangs fails by itself, with its name. What was skipped is listed at the end, and why.
 # Three at a time on two cores: some of it is waiting. Of what takes long, more is.
@@ -21,10 +38,13 @@ export PYTHONDONTWRITEBYTECODE :=
 .PHONY: setup demo check test-quick slow test test-all lint site gallery reproduction bench \
 	screenshot clean
 
-setup: $(READY)
+setup: $(COMPLETE)
+
+$(READY): EXTRAS := ros,dashboard
+$(COMPLETE): EXTRAS := ros,dashboard,test,dev,docs
 
 # The stamp is set last. Without it the environment was interrupted, and pip cannot tell half
-# installed packages from whole ones: it is cleared and filled again, mostly from pip's cache.
+# installed packages from whole ones: it is cleared and filled again, mostly from a cache.
 # An editable install leaves data files out: what ament and `ros2 run` look for is linked.
 $(READY): setup.py setup.cfg pyproject.toml package.xml Makefile
 	@python='$(PYTHON)'; \
@@ -34,11 +54,10 @@ $(READY): setup.py setup.cfg pyproject.toml package.xml Makefile
 	$$python -c 'import ensurepip, venv' 2>/dev/null || { \
 		$$python -c 'import sys; print("This needs venv: sudo apt-get install" \
 			" python%d.%d-venv" % sys.version_info[:2])' >&2; exit 1; }; \
-	echo "setting up $(VENV) with $$($$python --version) (a minute or two, once)"; \
-	test -e $@ || $$python -m venv --clear $(VENV)
+	echo "setting up $(VENV) with $$($$python --version) (half a minute, once)"; \
+	test -e $@ || $$python -m venv --clear --without-pip $(VENV)
 	@rm -f $@
-	@$(PIP) --upgrade pip
-	@$(PIP) --editable '.[ros,test,dev,docs]'
+	$(install)
 	@rm -rf $(VENV)/lib/stickslip_ros $(VENV)/share/stickslip_ros
 	@mkdir $(VENV)/lib/stickslip_ros $(VENV)/share/stickslip_ros
 	@ln -s '$(CURDIR)/config' '$(CURDIR)/package.xml' $(VENV)/share/stickslip_ros
@@ -49,7 +68,13 @@ $(READY): setup.py setup.cfg pyproject.toml package.xml Makefile
 		xargs -I{} ln -s ../../bin/{} {}
 	@touch $@
 
-demo: setup
+$(COMPLETE): $(READY)
+	@echo 'adding what the tests and the documentation need'
+	@rm -f $(READY)
+	$(install)
+	@touch $(READY) $@
+
+demo: $(READY)
 	$(BIN)/python -m stickslip_ros.app.demo
 
 # The loop for those who change something: linters, types, and the tests that start no process.
