@@ -9,6 +9,7 @@ import time
 from pathlib import Path
 from typing import Any
 
+from benchmarks import dashboard
 from benchmarks.slices import LACKING, Row, table
 from stickslip_ros.versions import versions
 
@@ -57,7 +58,12 @@ def main() -> int:
         "load_average": os.getloadavg()[0],
         "versions": versions(),
     }
-    for name in dict.fromkeys(arguments.names or NAMES):
+    names = list(dict.fromkeys(arguments.names or NAMES))
+    if "dashboard" in names and (needed := dashboard.lacking()):
+        print(f"dashboard is skipped: this needs {needed}", file=sys.stderr)
+        names.remove("dashboard")
+        report["skipped"].append("dashboard")
+    for name in names:
         run(name, report)
     text = json.dumps(report, indent=2)
     if arguments.json:
@@ -80,26 +86,24 @@ def main() -> int:
 
 
 def run(name: str, report: dict[str, Any]) -> None:
-    """Run one benchmark and add its rows, its failure or that it was skipped to the report."""
+    """Run one benchmark and add its rows, or its failure, or both, to the report."""
     print(f"{name} ...", end=" ", flush=True, file=sys.stderr)
     started = time.monotonic()
     command = [sys.executable, "-m", f"benchmarks.{name}", "--json"]
     try:
-        done = subprocess.run(command, stdout=subprocess.PIPE, timeout=TIMEOUT, check=True)
-    except subprocess.CalledProcessError as error:
-        if error.returncode == LACKING:
-            report["skipped"].append(name)
-            return
-        report["failed"][name] = f"exit status {error.returncode}"
+        done = subprocess.run(command, stdout=subprocess.PIPE, timeout=TIMEOUT)
     except subprocess.TimeoutExpired:
         report["failed"][name] = f"not finished within {TIMEOUT:g} s"
-    else:
-        seconds = round(time.monotonic() - started, 1)
-        rows = json.loads(done.stdout)["rows"]
-        report["benchmarks"][name] = {"seconds": seconds, "rows": rows}
-        print(f"{seconds:.0f} s", file=sys.stderr)
+        print("failed", file=sys.stderr)
         return
-    print("failed", file=sys.stderr)
+    seconds = round(time.monotonic() - started, 1)
+    rows = json.loads(done.stdout)["rows"] if done.stdout else []
+    if rows:
+        report["benchmarks"][name] = {"seconds": seconds, "rows": rows}
+    if done.returncode:
+        failures = [f"{row['what']}: {row['failure']}" for row in rows if row["failure"]]
+        report["failed"][name] = "; ".join(failures) or f"exit status {done.returncode}"
+    print(f"{seconds:.0f} s{', failed' if done.returncode else ''}", file=sys.stderr)
 
 
 if __name__ == "__main__":

@@ -26,8 +26,15 @@ from statistics import median
 from typing import TYPE_CHECKING
 from urllib.error import URLError
 
-from benchmarks.parties import READY_TIMEOUT, ObservedPlant, Slice, closed_loop, party
-from benchmarks.slices import Row, by_turns, compare_rates, lacks, show
+from benchmarks.parties import (
+    READY_TIMEOUT,
+    ObservedPlant,
+    Slice,
+    closed_loop,
+    party,
+    results_by_turns,
+)
+from benchmarks.slices import Row, compare_rates, lacks, show
 from stickslip_ros.nodes.base.child_process import start_child
 
 if TYPE_CHECKING:
@@ -163,40 +170,60 @@ def wait_for_page(url: str) -> None:
             time.sleep(0.1)
 
 
-def measure() -> list[Row]:
+def lacking() -> str | None:
+    """Return what this needs, and how to install it, if something is not installed."""
     if shutil.which("chromium") is None:
-        lacks("chromium: sudo apt-get install chromium")
+        return "chromium: sudo apt-get install chromium"
     for module in ("playwright", "psutil"):
         if find_spec(module) is None:
-            lacks(f"{module}: pip install {module}")
-    kinds = (SEEN, UNSEEN, NOBODY)
+            return f"{module}: pip install {module}"
+    return None
+
+
+def measure() -> list[Row]:
+    if needed := lacking():
+        lacks(needed)
+    return [*lockstep_rows(), *realtime_rows()]
+
+
+def lockstep_rows() -> list[Row]:
+    figures, failures = results_by_turns(
+        LOCKSTEP_ROUNDS,
+        {by: party(watched, "paper", by) for by in (SEEN, UNSEEN, NOBODY)},
+        lambda run: round(LOCKSTEP_TIME * run(FIRST_SAMPLES).steps_per_second),
+    )
+    rates = {by: [each.steps_per_second for each in slices] for by, slices in figures.items()}
+    seen = rates.pop(SEEN, None)
+    if seen is None:
+        return failures
+    rows = [compare_rates("steps in lockstep, page open", seen, by, rates[by]) for by in rates]
+    return rows + failures
+
+
+def realtime_rows() -> list[Row]:
+    def count(run: Slice[Figures]) -> int:
+        run(FIRST_SAMPLES)
+        return REALTIME_SAMPLES
+
+    figures, failures = results_by_turns(
+        REALTIME_ROUNDS,
+        {by: party(watched, "feed_drive", by) for by in (SEEN, UNSEEN, NOBODY)},
+        count,
+    )
+    seen = figures.pop(SEEN, None)
+    if seen is None:
+        return failures
     rows: list[Row] = []
-    with ExitStack() as resources:
-        runs = [resources.enter_context(party(watched, "paper", by)) for by in kinds]
-        slices = [
-            partial(run, round(LOCKSTEP_TIME * run(FIRST_SAMPLES).steps_per_second)) for run in runs
-        ]
-        seen, *others = by_turns(LOCKSTEP_ROUNDS, *slices)
-        for by, figures in zip(kinds[1:], others, strict=True):
-            rates = [[each.steps_per_second for each in slices] for slices in (seen, figures)]
-            rows.append(compare_rates("steps in lockstep, page open", rates[0], by, rates[1]))
-    with ExitStack() as resources:
-        runs = [resources.enter_context(party(watched, "feed_drive", by)) for by in kinds]
-        for run in runs:
-            run(FIRST_SAMPLES)
-        seen, *others = by_turns(REALTIME_ROUNDS, *(partial(run, REALTIME_SAMPLES) for run in runs))
-        count = REALTIME_ROUNDS * REALTIME_SAMPLES
-        for by, figures in zip(kinds[1:], others, strict=True):
-            for what in ("missed_deadlines", "late_forces"):
-                ours, peer = (
-                    float(sum(getattr(each, what) for each in slices)) for slices in (seen, figures)
-                )
-                name = f"{what.replace('_', ' ')} of {count} at 1 kHz, page open"
-                rows.append(Row(name, "", ours, by, peer, peer / max(ours, 1.0)))
+    samples = REALTIME_ROUNDS * REALTIME_SAMPLES
+    for by, slices in figures.items():
+        for what in ("missed_deadlines", "late_forces"):
+            ours, peer = (float(sum(getattr(e, what) for e in each)) for each in (seen, slices))
+            name = f"{what.replace('_', ' ')} of {samples} at 1 kHz, page open"
+            rows.append(Row(name, "", ours, by, peer, peer / max(ours, 1.0)))
     for what, unit in (("frames_per_second", "1/s"), ("server", "cores"), ("browser", "cores")):
         name = f"{what.replace('_', ' ')} at 1 kHz, page open"
         rows.append(Row(name, unit, median(getattr(each, what) for each in seen)))
-    return rows
+    return rows + failures
 
 
 if __name__ == "__main__":

@@ -33,11 +33,12 @@ from benchmarks.parties import (
     Slice,
     closed_loop,
     party,
+    results_by_turns,
     ros,
     spin_for,
     wait_until_connected,
 )
-from benchmarks.slices import Row, by_turns, compare_rates, show
+from benchmarks.slices import Row, compare_rates, show
 from stickslip_ros.nodes.base.spinner import spin
 
 ROUNDS = 11
@@ -45,6 +46,7 @@ SLICE_TIME = 0.7
 """Approximate duration of a slice, s."""
 FIRST_SLICE = 2000
 
+TYPED, SERIALIZED = "typed ping-pong", "serialized ping-pong"
 STATE, FORCE = "state", "force"
 SERIALIZED_AIM = 0.3
 
@@ -157,27 +159,24 @@ def pong(serialized: bool) -> None:
 def measure() -> list[Row]:
     rows: list[Row] = []
     for name, composed, typed_required in (("composed", True, 1.0), ("processes", False, 0.7)):
-        with (
-            party(ours, composed) as loop,
-            party(ping_pong, False, composed) as typed,
-            party(ping_pong, True, composed) as serialized,
-        ):
-            slices = [
-                partial(run, round(SLICE_TIME * run(FIRST_SLICE)))
-                for run in (loop, typed, serialized)
-            ]
-            our_rates, typed_rates, serialized_rates = by_turns(ROUNDS, *slices)
-        what = f"steps, {name}"
-        rows += [
-            compare_rates(what, our_rates, "typed ping-pong", typed_rates, required=typed_required),
-            compare_rates(
-                what,
-                our_rates,
-                "serialized ping-pong",
-                serialized_rates,
-                aim=SERIALIZED_AIM if composed else None,
-            ),
-        ]
+        loop = f"steps, {name}"
+        parties = {
+            loop: party(ours, composed),
+            TYPED: party(ping_pong, False, composed),
+            SERIALIZED: party(ping_pong, True, composed),
+        }
+        rates, failures = results_by_turns(
+            ROUNDS, parties, lambda run: round(SLICE_TIME * run(FIRST_SLICE))
+        )
+        aim = SERIALIZED_AIM if composed else None
+        for peer, required, aimed in ((TYPED, typed_required, None), (SERIALIZED, None, aim)):
+            if loop in rates and peer in rates:
+                rows.append(
+                    compare_rates(
+                        loop, rates[loop], peer, rates[peer], required=required, aim=aimed
+                    )
+                )
+        rows += failures
     return rows
 
 

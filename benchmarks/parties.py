@@ -12,8 +12,8 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Generator
-from contextlib import AbstractContextManager, contextmanager, suppress
+from collections.abc import Callable, Generator, Mapping
+from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any, Generic, TypeVar
@@ -25,6 +25,7 @@ from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 
+from benchmarks.slices import Row, by_turns
 from stickslip_ros.nodes.analyzer import AnalyzerNode
 from stickslip_ros.nodes.base.child_process import start_child
 from stickslip_ros.nodes.base.machine import own_domain
@@ -46,11 +47,61 @@ Slice = Callable[[int], T]
 """Runs a number of samples or round trips and returns the measurement."""
 
 
+class PartyError(Exception):
+    """A party failed; the text says why."""
+
+
+def results_by_turns(
+    rounds: int,
+    parties: Mapping[str, AbstractContextManager[Slice[T]]],
+    count: Callable[[Slice[T]], int],
+) -> tuple[dict[str, list[T]], list[Row]]:
+    """Run slices of all parties in turns; return their results, and a row for each that failed.
+
+    `count` runs a first slice of a party and returns the length of the others. A party that fails
+    ends, without a result unless it has run all of its slices; the others go on.
+    """
+    failures: dict[str, str] = {}
+    results: dict[str, list[T]] = {}
+
+    @contextmanager
+    def noted(name: str) -> Generator[None]:
+        try:
+            yield
+        except PartyError as error:
+            failures.setdefault(name, str(error))
+
+    def begin(name: str) -> Callable[[], None]:
+        run = resources.enter_context(parties[name])
+        length = count(run)
+        results[name] = []
+
+        def turn() -> None:
+            if name not in failures:
+                with noted(name):
+                    results[name].append(run(length))
+
+        return turn
+
+    with ExitStack() as resources:
+        turns: list[Callable[[], None]] = []
+        for name in parties:
+            resources.enter_context(noted(name))
+            with noted(name):
+                turns.append(begin(name))
+        by_turns(rounds, *turns)
+    whole = {name: values for name, values in results.items() if len(values) == rounds}
+    return whole, [Row(name, failure=why) for name, why in failures.items()]
+
+
 @contextmanager
 def party(
     make: Callable[..., AbstractContextManager[Slice[T]]], *arguments: Any
 ) -> Generator[Slice[T]]:
-    """Yield a function that runs slices of `make(*arguments)` in a process with its own domain."""
+    """Yield a function that runs slices of `make(*arguments)` in a process with its own domain.
+
+    Raises PartyError if the process fails, also when it ends.
+    """
     context = multiprocessing.get_context("spawn")
     with own_domain() as domain:
         connection, theirs = context.Pipe()
@@ -60,24 +111,34 @@ def party(
 
         def receive() -> Any:
             try:
-                return connection.recv()
+                why, result = connection.recv()
             except EOFError:
-                raise SystemExit("a party ended early, see above") from None
+                process.join(EXIT_TIMEOUT)
+                raise PartyError(f"it ended early, with status {process.exitcode}") from None
+            if why:
+                raise PartyError(why)
+            return result
+
+        def ask(count: int | None) -> None:
+            with suppress(BrokenPipeError, ConnectionResetError):  # `receive` says that it ended
+                connection.send(count)
 
         def run(count: int) -> T:
-            connection.send(count)
+            ask(count)
             return receive()
 
         try:
             receive()
             yield run
+            ask(None)
+            if not connection.poll(EXIT_TIMEOUT):
+                raise PartyError(f"it did not end within {EXIT_TIMEOUT:g} s")
+            receive()
         finally:
             connection.close()
             process.join(EXIT_TIMEOUT)
             process.kill()
             process.join()
-        if process.exitcode:
-            raise SystemExit("a party failed, see above")
 
 
 def _serve(
@@ -88,11 +149,18 @@ def _serve(
 ) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent process ends it
     os.environ.update(domain_variables(domain))
-    with make(*arguments) as run:
-        connection.send(None)
-        with suppress(EOFError, BrokenPipeError):  # the parent process has no more requests
-            while True:
-                connection.send(run(connection.recv()))
+    try:
+        with make(*arguments) as run:
+            connection.send(("", None))
+            while (count := connection.recv()) is not None:
+                connection.send(("", run(count)))
+        connection.send(("", None))
+    except (EOFError, BrokenPipeError):  # the parent process has no more requests
+        return
+    except (Exception, SystemExit) as error:
+        with suppress(BrokenPipeError):
+            connection.send((str(error) or type(error).__name__, None))
+        raise
 
 
 @contextmanager
@@ -182,7 +250,10 @@ class OurLoop(Generic[PlantT]):
             process.wait()
         report = report_of_recording(self._bag)
         if report["samples"] != self._samples or not report["complete"]:
-            raise SystemExit(f"the bag does not hold {self._samples} samples: {report}")
+            whole = "whole" if report["complete"] else "cut off"
+            raise SystemExit(
+                f"its bag, {whole}, holds {report['samples']} of {self._samples} samples"
+            )
 
 
 @contextmanager

@@ -19,7 +19,6 @@ from array import array
 from collections.abc import Callable, Generator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -30,8 +29,8 @@ from rclpy.task import Future
 from sensor_msgs.msg import JointState
 
 from benchmarks.lateness import SLEEP_LOOP, lateness, lateness_rows, sleep_loop, times_of
-from benchmarks.parties import ObservedPlant, Slice, closed_loop, party, ros
-from benchmarks.slices import Row, by_turns, compare_times, show
+from benchmarks.parties import ObservedPlant, Slice, closed_loop, party, results_by_turns, ros
+from benchmarks.slices import Row, compare_times, show
 from stickslip_ros.record.codec import unpack_header
 from stickslip_ros.samples import Sample
 
@@ -199,26 +198,31 @@ def load_rows(name: str, ours: Sequence[Timings], peer: Sequence[Timings]) -> li
 
 
 def measure() -> list[Row]:
-    with (
-        party(ours, True) as composed,
-        party(ours, False) as processes,
-        party(bare_loop) as bare,
-        party(timer_node) as timer,
-    ):
-        parties = (composed, processes, bare, timer)
-        for run in parties:
-            run(FIRST_SAMPLES)
-        slices = [partial(run, SAMPLES) for run in parties]
-        composed_timings, processes_timings, bare_timings, timer_timings = by_turns(ROUNDS, *slices)
+    parties = {
+        "composed": party(ours, True),
+        "processes": party(ours, False),
+        SLEEP_LOOP: party(bare_loop),
+        TIMER: party(timer_node),
+    }
+    timings, failures = results_by_turns(ROUNDS, parties, samples_after_the_first)
     rows: list[Row] = []
-    for name, timings in (("composed", composed_timings), ("processes", processes_timings)):
-        rows += [
-            *deadline_rows(name, timings, SLEEP_LOOP, bare_timings, goals=True),
-            *deadline_rows(name, timings, TIMER, timer_timings, goals=False),
-            *force_rows(name, timings),
-            *load_rows(name, timings, timer_timings),
-        ]
-    return rows
+    for name in ("composed", "processes"):
+        if name not in timings:
+            continue
+        for peer in (SLEEP_LOOP, TIMER):
+            if peer in timings:
+                goals = peer == SLEEP_LOOP
+                rows += deadline_rows(name, timings[name], peer, timings[peer], goals=goals)
+        rows += force_rows(name, timings[name])
+        if TIMER in timings:
+            rows += load_rows(name, timings[name], timings[TIMER])
+    return rows + failures
+
+
+def samples_after_the_first(run: Slice[Timings]) -> int:
+    """Run a first slice; return the samples of each of the others."""
+    run(FIRST_SAMPLES)
+    return SAMPLES
 
 
 if __name__ == "__main__":

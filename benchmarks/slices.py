@@ -21,8 +21,8 @@ class Row:
     """One line of the table: our value, and the value of a peer."""
 
     what: str
-    unit: str
-    ours: float
+    unit: str = ""
+    ours: float | None = None
     against: str = ""
     """Name of the peer; empty if there is none."""
     peer: float | None = None
@@ -32,6 +32,8 @@ class Row:
     """Lower limit of the ratio that must be met."""
     aim: float | None = None
     """Lower limit of the ratio that should be met."""
+    failure: str = ""
+    """Why what this row is about failed; it has no values then."""
 
 
 def by_turns(rounds: int, *slices: Callable[[], T]) -> list[list[T]]:
@@ -95,20 +97,25 @@ def show(question: str | None, make_rows: Callable[[], list[Row]]) -> None:
         print(json.dumps({"rows": [asdict(row) for row in rows], "versions": versions()}, indent=2))
     else:
         print(table({"": rows}))
+    if any(row.failure for row in rows):
+        sys.exit(1)
 
 
 def table(sections: dict[str, list[Row]]) -> str:
     """Return rows as text, each section below its title; ratios below their limit are marked."""
-    lines = [("", "ours", "peer", "", "ratio", "at least")]
+    lines: list[tuple[str, ...]] = [("", "ours", "peer", "", "ratio", "at least")]
     for title, rows in sections.items():
         if title:
             lines += [("", "", "", "", "", ""), (title.upper(), "", "", "", "", "")]
         lines += [_cells(row) for row in rows]
-    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
+    full = [cells for cells in lines if len(cells) > 1]
+    widths = [max(map(len, column)) for column in zip(*full, strict=True)]
     return "\n".join(_line(cells, widths) for cells in lines)
 
 
 def _cells(row: Row) -> tuple[str, ...]:
+    if row.failure:
+        return (f"{row.what} failed: {row.failure}",)
     goal = row.aim if row.required is None else row.required
     at_least = ""
     if row.ratio is not None and goal is not None:
@@ -131,5 +138,5 @@ def _number(value: float | None, digits: int = 4) -> str:
 
 
 def _line(cells: Iterable[str], widths: Iterable[int]) -> str:
-    columns = zip(cells, "<>><><", widths, strict=True)
+    columns = zip(cells, "<>><><", widths, strict=False)
     return "  ".join(f"{text:{align}{width}}" for text, align, width in columns).rstrip()

@@ -1,17 +1,67 @@
-"""Benchmarks with a missing requirement."""
+"""Benchmarks with a missing requirement, or a party that fails."""
 
 import json
 import os
 import subprocess
 import sys
+from collections.abc import Generator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 
+from benchmarks.parties import Slice, party, results_by_turns
+from benchmarks.slices import Row, table
 from tests.nodes.graph import PATIENCE
 
+pytestmark = pytest.mark.process
 
-@pytest.mark.process
+ROUNDS = 3
+
+
+@contextmanager
+def counting(fails: str) -> Generator[Slice[int]]:
+    """Return the length of each slice, until it fails."""
+    slices = 0
+
+    def run(length: int) -> int:
+        nonlocal slices
+        slices += 1
+        if slices == 3 and fails == "is killed":
+            os.abort()
+        if slices == 3 and fails == "in a slice":
+            raise ValueError("three are too many")
+        return length
+
+    if fails == "at the start":
+        raise SystemExit("no message came")
+    yield run
+    if fails == "at the end":
+        raise SystemExit("samples are missing")
+
+
+def first_slice(run: Slice[int]) -> int:
+    return run(7)
+
+
+def test_a_party_that_fails_is_named_with_the_reason_and_the_others_have_results() -> None:
+    kinds = ("never", "at the start", "in a slice", "is killed", "at the end")
+    parties = {kind: party(counting, kind) for kind in kinds}
+    results, failures = results_by_turns(ROUNDS, parties, first_slice)
+    assert results == {kind: [7] * ROUNDS for kind in ("never", "at the end")}
+    assert {row.what: row.failure for row in failures} == {
+        "at the start": "no message came",
+        "in a slice": "three are too many",
+        "is killed": "it ended early, with status -6",
+        "at the end": "samples are missing",
+    }
+
+
+def test_a_failure_is_a_line_of_the_table() -> None:
+    rows = [Row("steps", "1/s", 3.0, "peer", 2.0, 1.5), Row("twin", failure="no message came")]
+    assert "twin failed: no message came" in table({"": rows}).splitlines()
+
+
 def test_a_benchmark_that_needs_a_browser_is_skipped_without_one(tmp_path: Path) -> None:
     done = subprocess.run(
         [sys.executable, "-m", "benchmarks", "dashboard", "--json"],
