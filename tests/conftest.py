@@ -34,7 +34,14 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 # The workers fill the processors already: threads that wait in a loop would hold them up.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-STARTING_FIXTURES = {"cluster", "processes", "recorded", "start", "start_stickslip"}
+STARTING_FIXTURES = {
+    "cluster",
+    "processes",
+    "recorded",
+    "start",
+    "start_stickslip",
+    "with_packages",
+}
 
 _STARTS = {"os.fork", "os.forkpty", "os.posix_spawn", "os.system", "subprocess.Popen"}
 _FOUND_BY_LIBRARIES = {"fc-list", "ldconfig", "/sbin/ldconfig"}

@@ -58,6 +58,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
         sys.stdout = nowhere()
         print(f"stickslip {command}: {_reason(error)}", file=sys.stderr)
         status = 1
+    except Exception as error:
+        from stickslip_ros.scenarios.foreign_laws import failure_in_words  # --help needs none
+
+        failure = failure_in_words(error)
+        if failure is None:
+            raise
+        print(f"stickslip {command}: {failure}", file=sys.stderr)
+        status = 1
     sys.exit(status)
 
 

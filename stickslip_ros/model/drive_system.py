@@ -2,10 +2,11 @@
 
 from collections.abc import Sequence
 from functools import partial
-from math import copysign, inf, ulp
+from math import copysign, inf, isfinite, ulp
 from typing import Any
 
 import heyoka as hy
+import numpy as np
 
 from stickslip_ros.errors import RunError
 from stickslip_ros.model import equations
@@ -322,7 +323,20 @@ class DriveSystem(DimensionlessDrive):
         return self._characteristic_speed / acceleration if acceleration > 0.0 else inf
 
     def overflow(self, mode: Mode, instant: Instant) -> Mode:
-        """Set the speed at which a motion counts as unbounded: what overflows exceeds any speed."""
+        """Set the speed at which a motion counts as unbounded: what overflows exceeds any speed.
+
+        Raises RunError where it is the friction of another package's law that is not finite.
+        """
+        law = self.drive.friction
+        if law.package and mode.flow == SLIP:
+            speed, own = self._relative_speed(mode, instant), mode.switches[self._parts.law]
+            with np.errstate(all="ignore"):
+                friction = float(law.friction(speed, mode.switches[0], self._memory(instant), own))
+            if not isfinite(friction):
+                raise RunError(
+                    f"the friction law {law.name} of package {law.package} fails: its coefficient "
+                    f"is {friction}, which must be a finite number"
+                )
         sign = copysign(1.0, -self.reaction(instant))
         instant.state[SPEED] = sign * UNBOUNDED_SPEED
         return self._slip(mode, sign, instant)

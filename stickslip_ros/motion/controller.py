@@ -204,4 +204,5 @@ def _limited(law: ControlLaw, since: float, force: Any) -> float:
 
 
 def _failure(law: ControlLaw, since: float, reason: str) -> RunError:
-    return RunError(f"the control law {law.name} fails at {since:.6g} s: {reason}")
+    package = f" of package {law.package}" if law.package else ""
+    return RunError(f"the control law {law.name}{package} fails at {since:.6g} s: {reason}")

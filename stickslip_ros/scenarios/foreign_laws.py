@@ -1,47 +1,31 @@
-"""The laws of other installed packages, found by their entry points and tried.
+"""The laws of other installed packages, found by their entry points and checked when they are used.
 
-A trial asks a law what motion and theory ask of it, at a few states. It raises InvalidInputError
-for what does not fit, and whatever the law raises.
+Their classes are imported to describe their constants, which are parameters. One that cannot be
+imported, or would be in the way of other laws, is refused where it is named.
 """
 
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, fields, is_dataclass
+from collections.abc import Callable, Collection, Iterable
+from dataclasses import dataclass, field
 from importlib.metadata import Distribution, EntryPoint, distributions
-from inspect import isabstract
-from itertools import product
-from math import inf, isfinite, isinf
-from typing import Any, Generic, TypeVar, cast
+from math import isfinite, isinf
+from operator import attrgetter
+from traceback import walk_tb
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 
 from stickslip_ros.errors import InvalidInputError, in_words
-from stickslip_ros.model.constants import (
-    LARGEST,
-    SMALLEST,
-    Parameter,
-    constants_of,
-)
+from stickslip_ros.model.constants import Parameter, constants_of
 from stickslip_ros.model.control import CONTROL_LAWS, ControlLaw
 from stickslip_ros.model.control.base import seen_by
-from stickslip_ros.model.drive import Drive
-from stickslip_ros.model.friction import (
-    LAWS,
-    Coulomb,
-    CurveFollower,
-    Directional,
-    FrictionLaw,
-)
-from stickslip_ros.model.symbols import numbers, with_symbols
-from stickslip_ros.scenarios.validation import ParameterGroup
+from stickslip_ros.model.friction import LAWS, Directional, FrictionLaw
+from stickslip_ros.scenarios.validation import ParameterGroup, checked
 
 _Law = TypeVar("_Law", bound=FrictionLaw | ControlLaw)
 _Base = TypeVar("_Base")
-_Equations = Callable[[Any, Sequence[Any]], Iterable[Any]]
-"""Equations of a part with the values of its variables, both as numbers or as expressions."""
 
-_TOLERANCE = 1e-9
-_DRIVE = Drive(2.0, 0.1, 3.0, 5.0, 0.4, Coulomb())
-"""Drive in whose units a control is tried."""
+_fixed = attrgetter("unit", "default", "at_least", "at_most", "below", "positive")
+"""Returns what must be the same for all constants of one name."""
 
 
 @dataclass
@@ -58,8 +42,8 @@ class LawFamily(Generic[_Law]):
     """Names that no constant can have."""
     one_namespace: bool
     """Whether all laws have their constants in one group of parameters."""
-    trial: Callable[..., None]
-    """Tries a law, on request also with symbols for its constants; raises anything."""
+    check: Callable[[Any], None]
+    """Asks a law once what motion and theory will ask of it; raises anything."""
     refused: dict[str, str] = field(default_factory=dict[str, str])
     """Reason of the refusal of each law of another package that is refused, by name."""
 
@@ -68,216 +52,111 @@ class LawFamily(Generic[_Law]):
         try:
             law = loaded(entry, self.base)
             if self.laws.get(entry.name) is not law:  # the package can be on the path twice
-                self._check(entry.name, law)
+                self._accept(entry.name, law)
+                law.package = package.name
                 self.laws[entry.name] = law
         except InvalidInputError as error:
             reason = f"{entry.value} of package {package.name} {error}"
             known = self.refused.get(entry.name)
             self.refused[entry.name] = f"{known}; {reason}" if known and known != reason else reason
 
-    def _check(self, name: str, law: type[_Law]) -> None:
-        """Refuse a law that cannot be one of `laws`."""
+    def _accept(self, name: str, law: type[_Law]) -> None:
+        """Refuse a law that would be in the way of others by its name or its constants."""
         if not (name.isascii() and name.isidentifier()):
             raise InvalidInputError(f"has the name {name!r}: must be of letters, digits and _")
         if name in self.laws:
-            raise InvalidInputError(f"has the name of another law, {_place(self.laws[name])}")
-        check_class(name, law)
-        if not is_dataclass(law) or "__dataclass_fields__" not in vars(law):
-            raise InvalidInputError("is no dataclass: must have @dataclass(frozen=True)")
-        constants = constants_of(law)
-        described = {*constants, "curve"} if issubclass(law, CurveFollower) else constants
-        for each in law.constants():
-            if each not in described:
-                raise InvalidInputError(f"does not describe its constant {each} by `constant`")
-        for constant in constants.values():
-            self._check_constant(constant)
+            raise InvalidInputError(
+                f"has the name of another law, {self.laws[name].__module__}."
+                f"{self.laws[name].__qualname__}"
+            )
+        check_name(name, law)
+        for constant in constants_of(law).values():
+            self._accept_constant(constant)
+        made(law)
+
+    def _accept_constant(self, constant: Parameter) -> None:
+        name, is_tuple = constant.name, isinstance(constant.default, tuple)
+        if name in self.reserved:
+            raise InvalidInputError(
+                f"has a constant {name}: the name cannot be that of a parameter"
+            )
+        for law in self.laws.values() if self.one_namespace else ():
+            known = constants_of(law).get(name)
+            both_tuples = is_tuple and known is not None and isinstance(known.default, tuple)
+            if known is not None and not both_tuples and _fixed(known) != _fixed(constant):
+                raise InvalidInputError(
+                    f"has a constant {name} unlike that of law {law.name}: must have its unit "
+                    f"({known.unit or 'none'}), default ({known.default}) and bounds, or another "
+                    "name"
+                )
         try:
-            made = law()
-            if made.refusal() is None:
-                self.trial(made, symbols=True)
-        except (Exception, SystemExit) as error:
-            raise InvalidInputError(f"fails with its defaults: {in_words(error)}") from None
+            if not is_tuple:
+                checked(constant, constant.default)
+        except InvalidInputError as error:
+            raise InvalidInputError(f"has a wrong default: {error}") from None
 
     def made(self, make: Callable[[], _Law], *kinds: type[_Law]) -> _Law:
-        """Return a law of these classes with its constants; those of other packages are tried.
+        """Return a law of these classes with its constants; those of other packages are checked.
 
-        Raises ValueError with the reason if the constants do not fit together.
+        Raises ValueError with the reason if the constants do not fit together, or the law fails.
         """
-        given = ""
+        foreign = next((kind for kind in kinds if kind.package), None)
         try:
             law = make()
-            foreign = not all(kind.__module__.startswith("stickslip_ros.") for kind in kinds)
-            if foreign:
-                values = (f"{each.name} = {getattr(law, each.name)}" for each in fields(law))
-                given = f" with {', '.join(values)}"
             refusal = law.refusal()
             if foreign and refusal is None:
-                self.trial(law)
+                self.check(law)
         except (Exception, SystemExit) as error:
-            raise ValueError(f"law {kinds[0].name}{given} fails: {in_words(error)}") from None
+            if foreign is None:
+                raise
+            raise ValueError(
+                f"law {foreign.name} of package {foreign.package} fails: {in_words(error)}"
+            ) from None
         if refusal is not None:
             raise ValueError(refusal)
         return law
 
-    def _check_constant(self, constant: Parameter) -> None:
-        name, default = constant.name, constant.default
-        if name in self.reserved or name.startswith("_") or not name.isascii():
-            raise InvalidInputError(
-                f"has a constant {name}: the name cannot be that of a parameter"
-            )
-        is_tuple = isinstance(default, tuple)
-        if not is_tuple:
-            self._check_default(constant, default)
-        for law in self.laws.values() if self.one_namespace else ():
-            known = constants_of(law).get(name)
-            if known is not None and not (is_tuple and isinstance(known.default, tuple)):
-                own, other = _one_for_all(constant), _one_for_all(known)
-                different = [what for what in own if own[what] != other[what]]
-                if different:
-                    raise InvalidInputError(
-                        f"has a constant {name} with "
-                        + " and ".join(f"{what} {own[what]}" for what in different)
-                        + f": must be {', '.join(other[what] for what in different)} "
-                        f"as in law {law.name}, or have another name"
-                    )
 
-    def _check_default(self, constant: Parameter, default: Any) -> None:
-        least = max(constant.at_least, SMALLEST if constant.positive else -LARGEST)
-        number = isinstance(default, int if constant.whole else int | float)
-        if not number or not (least <= default <= LARGEST or (isinf(default) and default > 0.0)):
-            raise InvalidInputError(
-                f"has the default {default!r} for its constant {constant.name}: must be a "
-                f"{'whole ' if constant.whole else ''}number within its bounds"
-            )
-
-
-def try_friction_law(law: FrictionLaw, *, symbols: bool = False) -> None:
-    """Try a friction law with its constants as numbers, and on request also as symbols."""
-    if isinstance(law, Directional):
-        try_friction_law(law.forward)
-        try_friction_law(law.reverse)
-        return
-    speed = law.characteristic_speed
-    _must(speed > 0.0, f"its characteristic_speed is {speed} m/s, which must be above 0")
-    unit, count = 1.0 if isinf(speed) else float(speed), len(law.states)
-    law.warning()
-    limits, in_other_units = (
-        _finite("limits", law.limits, ("forward", "backward")),
-        law.scaled(2.0, 3.0),
-    )
-    continuous = type(law).limits is FrictionLaw.limits
-
-    def equations(part: Any, values: Sequence[Any]) -> Iterable[Any]:
-        speed, sign, *rest = values
-        given = speed, sign, rest[:count], rest[count:]
-        own = part.friction(*given), *part.memory_rates(*given), *part.margins(*given)
-        return (*own, part.creep_limit(*given[:3])) if law.rate_sensitivity else own
-
-    points: list[Sequence[float]] = []
-    for share, sign in product((0.1, 1.0, 10.0, 0.0)[: 3 if count else 4], (1.0, -1.0)):
-        speed = sign * share * unit
-        memory = _finite("memory_at", law.memory_at(speed, sign), law.states)
-        switches = _finite("switches_at", law.switches_at(speed, sign, memory), law.switches)
-        _finite("initial_memory", law.initial_memory(speed), law.states)
-        _finite("memory_rates", law.memory_rates(speed, sign, memory, switches), law.states)
-        points.append((speed, sign, *memory, *switches))
-        _finite("equations", equations(law, points[-1]))
-        forms = [
-            law.coefficient(speed, sign),
-            *law.coefficient(np.full(2, speed), np.full(2, sign)),
-            in_other_units.coefficient(speed / 2.0, sign),
-            *([] if count else [law.friction(speed, sign, memory, switches)]),
-        ]
-        found = _finite("coefficient", forms)
-        _must(
-            bool(np.ptp(found) <= _TOLERANCE * np.abs(found).max()),
-            f"its coefficient at {speed:g} m/s is {found} for a number, for an array (2), in other "
-            "units and as friction, which must be the same",
-        )
-        if share == 0.0:  # where slip starts
-            size, limit = -sign * found[0], limits[sign < 0.0]
-            least = limit if continuous else 0.0
-            _must(
-                least - _TOLERANCE <= size <= limit + _TOLERANCE,
-                f"its coefficient(0, {sign:g}) is {found[0]}, which must be {-sign * limit}, "
-                "as static or limits say",
-            )
-    if symbols:
-        _try_symbols(law, equations, points[:6])
-
-
-def try_control_law(law: ControlLaw, *, symbols: bool = False) -> None:
-    """Try the equations of a control law, if any; its answers are checked at each sample."""
-    linear = law.linear_feedback(1e-3)
-    if linear is not None:
-        n, shapes = len(linear.state), [np.shape(each) for each in linear]
-        _must(
-            shapes in ([(n, n), (n, m), (n,), (m,)] for m in (2, 4))
-            and all(np.isfinite(x).all() for x in linear),
-            f"its linear_feedback has the shapes {shapes}, which must be (n, n), (n, 2), (n,) and "
-            "(2,), of finite numbers",
-        )
-    control = law.continuous
-    if control is None:
-        return
-
-    def equations(part: Any, values: Sequence[Any]) -> Iterable[Any]:
-        x, y, *own = values
-        seen = seen_by(part, x, y, ())
-        return *part.state_rates(*seen, own), part.control_force(*seen, own)
-
-    points: list[Sequence[float]] = []
-    for x, y in ((0.1, 0.2), (-0.3, 0.4)):
-        states = _finite("rest", control.rest(*seen_by(control, x, y, ())), control.states)
-        points.append((x, y, *(0.05 + state for state in states)))
-    for part in (control, control.silenced(), control.scaled(_DRIVE)):
-        _finite("continuous form", equations(part, points[0]), (*control.states, "force"))
-    _finite("state_scales", control.state_scales(_DRIVE), control.states)
-    np.broadcast_to(control.bound(np.ones(3)), 3)
-    if symbols:
-        _try_symbols(control, equations, points)
-
-
-def _must(fits: bool, reason: str) -> None:
-    if not fits:
-        raise InvalidInputError(reason)
-
-
-def _finite(
-    name: str, values: Iterable[Any], each_of: Collection[str] | None = None
-) -> list[float]:
-    """Return values as floats, where given one for each of some names."""
-    found = [float(each) for each in values]
-    _must(all(map(isfinite, found)), f"its {name}: {found}, which must be finite numbers")
-    if each_of is not None:
-        known = tuple(each_of)
-        _must(
-            len(found) == len(known), f"its {name}: {found}, which must be one for each of {known}"
-        )
-    return found
-
-
-def _try_symbols(part: Any, equations: _Equations, points: Sequence[Sequence[float]]) -> None:
-    """Compare the equations of a part with those that heyoka compiles for the integrator."""
+def check_friction_law(law: FrictionLaw) -> None:
+    """Ask a friction law for its equations, as numbers at one speed and as symbols."""
     import heyoka as hy  # only where a package has a law
 
-    constants = dict(numbers(part, "constant"))
-    symbols = {name: hy.expression(name) for name in constants}
-    variables = [hy.expression(f"variable[{number}]") for number in range(len(points[0]))]
-    try:
-        found = equations(with_symbols(part, "constant", symbols), variables)
-        given = [hy.expression(0.0) + each for each in found]
-        compiled = hy.cfunc(given, [*symbols.values(), *variables])
-    except Exception as error:
-        raise InvalidInputError(f"cannot be an expression of heyoka: {in_words(error)}") from None
-    for values in points:
-        expected = _finite("equations", equations(part, values))
-        got = compiled([*constants.values(), *values]).tolist()
-        _must(
-            np.allclose(got, expected, _TOLERANCE, _TOLERANCE),
-            f"its equations give {got} as an expression of heyoka and {expected} with numbers, "
-            "which must be the same",
-        )
+    for each in (law.forward, law.reverse) if isinstance(law, Directional) else (law,):
+
+        def equations(*given: Any, law: FrictionLaw = each) -> list[Any]:
+            rates = law.memory_rates(*given)
+            return [law.friction(*given), *rates, *law.margins(*given)]
+
+        speed = each.characteristic_speed
+        unit = 1.0 if isinf(speed) else float(speed)
+        for sign in (1.0, -1.0):
+            memory = each.memory_at(sign * unit, sign)
+            switches = each.switches_at(sign * unit, sign, memory)
+            _check_finite("friction", equations(sign * unit, sign, memory, switches))
+        symbols = [hy.expression(name) for name in ("speed", "sign", *each.states, *each.switches)]
+        count = 2 + len(each.states)
+        found = equations(*symbols[:2], symbols[2:count], symbols[count:])
+        hy.cfunc([hy.expression(0.0) + equation for equation in found], symbols)
+        _check_finite("limits", each.limits)
+
+
+def check_control_law(law: ControlLaw) -> None:
+    """Ask a control law for its equations, if it has some; its answers are checked as they come."""
+    linear = law.linear_feedback(1e-3)
+    if linear is not None:
+        _check_finite("linear_feedback", np.concatenate([np.ravel(each) for each in linear]))
+    control = law.continuous
+    if control is not None:
+        seen = seen_by(control, 0.1, 0.2, ())
+        states = control.rest(*seen)
+        rates = control.state_rates(*seen, states)
+        _check_finite("continuous form", [*rates, control.control_force(*seen, states)])
+
+
+def _check_finite(name: str, values: Iterable[Any]) -> None:
+    found = [float(each) for each in values]
+    if not all(map(isfinite, found)):
+        raise InvalidInputError(f"its {name} is {found}, which must be finite numbers")
 
 
 FRICTION_LAWS = LawFamily(
@@ -296,7 +175,7 @@ FRICTION_LAWS = LawFamily(
         *dir(ParameterGroup),
     },
     one_namespace=True,
-    trial=try_friction_law,
+    check=check_friction_law,
 )
 CONTROLLERS = LawFamily(
     "stickslip_ros.control_laws",
@@ -308,8 +187,13 @@ CONTROLLERS = LawFamily(
         *dir(ParameterGroup),
     },
     one_namespace=False,
-    trial=try_control_law,
+    check=check_control_law,
 )  # fmt: skip
+
+
+ADAPTERS = "stickslip_ros.identified_laws"
+"""Entry point group in which other packages name the adapters of identification of their laws."""
+GROUPS = FRICTION_LAWS.group, CONTROLLERS.group, ADAPTERS
 
 
 def add_laws_of_other_packages() -> None:
@@ -333,6 +217,15 @@ def entries_of_other_packages(*groups: str) -> list[tuple[EntryPoint, Distributi
     return sorted(found, key=lambda each: (each[0].name, each[0].value))
 
 
+def failure_in_words(error: BaseException) -> str | None:
+    """Return an error that the code of another package's law has raised; None for any other."""
+    modules = {frame.f_globals.get("__name__") for frame, _ in walk_tb(error.__traceback__)}
+    for entry, package in entries_of_other_packages(*GROUPS):
+        if entry.module in modules:
+            return f"law {entry.name} of package {package.name} fails: {in_words(error)}"
+    return None
+
+
 def loaded(entry: EntryPoint, base: type[_Base]) -> type[_Base]:
     """Return the class of an entry point; InvalidInputError if none derives from `base`."""
     try:
@@ -344,32 +237,18 @@ def loaded(entry: EntryPoint, base: type[_Base]) -> type[_Base]:
     return found
 
 
-def check_class(name: str, kind: type) -> None:
-    """Refuse a class that has another name than its entry point, or is abstract."""
+def made(kind: type[_Base]) -> _Base:
+    """Return an object of a class of another package, by default values."""
+    try:
+        return kind()
+    except (Exception, SystemExit) as error:
+        raise InvalidInputError(f"fails with its defaults: {in_words(error)}") from None
+
+
+def check_name(name: str, kind: type) -> None:
+    """Refuse a class that has another name than its entry point."""
     own = getattr(kind, "name", None)
     if own != name:
         raise InvalidInputError(
             f"has the name {own!r} in its class and {name!r} in its entry point: must be the same"
         )
-    if isabstract(kind):
-        missing = ", ".join(sorted(cast(Any, kind).__abstractmethods__))
-        raise InvalidInputError(f"does not define {missing}")
-
-
-def _one_for_all(constant: Parameter) -> Mapping[str, str]:
-    """Return what must be the same for all constants of one name, in words."""
-    bounds = [f"at least {constant.at_least:g}"] if constant.at_least > -inf else []
-    bounds += ["above 0"] if constant.positive else []
-    return {
-        "unit": constant.unit or "none",
-        "bounds": " and ".join(bounds) or "none",
-        "default": repr(
-            constant.default
-            if constant.whole or isinstance(constant.default, tuple)
-            else float(constant.default)
-        ),
-    }
-
-
-def _place(law: type) -> str:
-    return f"{law.__module__}.{law.__qualname__}"

@@ -254,6 +254,8 @@ class ControlLaw(ABC):
 
     name: ClassVar[str]
     """Name in parameters, options and names of nodes."""
+    package: ClassVar[str] = ""
+    """Installed package whose entry point names the law; empty for a law of this package."""
     follows_reference: ClassVar[bool] = False
     """Whether the law uses a reference: its controller has the parameters `reference.*`.
 

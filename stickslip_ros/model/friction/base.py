@@ -29,6 +29,8 @@ class SteadyFriction(ABC):
 
     name: ClassVar[str]
     """Name of the law in the parameters."""
+    package: ClassVar[str] = ""
+    """Installed package whose entry point names the law; empty for a law of this package."""
     nonsmooth: ClassVar[bool] = False
     """Whether friction has no second derivative in steady slip: no Lyapunov coefficient exists."""
     direction_independent: ClassVar[Sequence[str]] = ()

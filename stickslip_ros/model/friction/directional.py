@@ -79,7 +79,7 @@ class Directional(FrictionLaw):
     def __post_init__(self) -> None:
         if type(self.forward) is not type(self.reverse):
             raise TypeError("a directional law needs two laws of one class")
-        for shared in ("name", "states", "switches", "nonsmooth"):
+        for shared in ("name", "package", "states", "switches", "nonsmooth"):
             object.__setattr__(self, shared, getattr(self.forward, shared))
 
     @property
