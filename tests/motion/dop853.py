@@ -57,20 +57,34 @@ def exponential(
     return size
 
 
-def tabulated(speeds: Sequence[float], coefficients: Sequence[float]) -> Curve:
+@dataclass(frozen=True)
+class Piecewise:
+    """A curve in smooth pieces, each from its start up to the next one.
+
+    An integrator of high order is not accurate to its tolerance in a step that leads from piece to
+    piece: each is a phase of its own, in which its function continues beyond its ends.
+    """
+
+    starts: Sequence[float]
+    pieces: Sequence[Curve]
+
+    def __call__(self, w: float) -> float:
+        return self.pieces[self.number(w)](w)
+
+    def number(self, w: float) -> int:
+        return max(bisect_right(self.starts, w) - 1, 0)
+
+
+def tabulated(speeds: Sequence[float], coefficients: Sequence[float]) -> Piecewise:
     """Piecewise cubic Hermite interpolation (PCHIP); constant beyond the last speed."""
     beyond = [*speeds, 3.0 * speeds[-1]]  # so that the slope is zero at the last speed
     cubics = PchipInterpolator(beyond, [*coefficients, coefficients[-1]]).c.T.tolist()
 
-    def size(w: float) -> float:
-        if w >= speeds[-1]:
-            return coefficients[-1]
-        piece = max(bisect_right(speeds, w) - 1, 0)
-        a, b, c, d = cubics[piece]
-        q = w - speeds[piece]
-        return ((a * q + b) * q + c) * q + d
+    def piece(start: float, cubic: Sequence[float]) -> Curve:
+        a, b, c, d = cubic
+        return lambda w: (((a * (w - start) + b) * (w - start) + c) * (w - start)) + d
 
-    return size
+    return Piecewise(speeds, [piece(*each) for each in zip(speeds, cubics, strict=True)])
 
 
 # Courses
@@ -217,28 +231,27 @@ class Dop853Drive:
         ends = [*sorted({each for each in starts if 0.0 < each < last}), last]
         now, state = 0.0, (position, velocity)
         self._enter_pieces(now)
-        sign = self._direction(now, state)
+        mode = self._mode(now, state)
         for end in ends:
             while now < end:
-                phase, before, start = sign, state, now
-                now, state, guard = self._phase(sign, now, end, state)
+                phase, before, start = mode, state, now
+                now, state, following = self._phase(mode, now, end, state)
                 if phase == 0:
                     self._note_stick(start, now)
-                if guard is None:
+                if following is None:
                     continue
-                if phase == 0:
-                    sign = guard
-                else:  # at the speed of the belt
+                mode = following
+                if mode == 0:  # at the speed of the belt
                     state = state[0], self._belt(now)
-                    sign = self._direction(now, state)
+                    mode = self._mode(now, state)
                 if now == start and state == before:
                     raise LostError(f"no end of events at {now}")
             speed = self._belt(now)
             self._enter_pieces(now)
-            if sign == 0:
+            if mode == 0:
                 steps = abs(self._belt(now) - speed) > 1e-13 * self._speed
                 state = state[0], speed if steps else self._belt(now)
-            sign = self._direction(now, state)
+            mode = self._mode(now, state)
         return Solution(self._found[:, 0], self._found[:, 1], self._sticks)
 
     def _enter_pieces(self, time: float) -> None:
@@ -251,26 +264,27 @@ class Dop853Drive:
         inertia = self.mass * self._belt_rate(time) + self.damping * self._belt(time)
         return inertia + self.stiffness * x - self._force(time)
 
-    def _direction(self, time: float, state: tuple[float, float]) -> int:
-        """Return sgn v, and 0 for stick."""
+    def _mode(self, time: float, state: tuple[float, float]) -> int:
+        """Return 0 for stick, else sgn v times the number, from 1, of the piece of the law."""
         relative_speed = state[1] - self._belt(time)
         if relative_speed != 0.0:
-            return 1 if relative_speed > 0.0 else -1
+            sign = 1 if relative_speed > 0.0 else -1
+            return sign * (1 + self._law(sign).number(abs(relative_speed)))
         held, normal = self.held(time, state[0]), self._normal(time)
         if held > normal * self.backward(0.0):
             return -1
         return 1 if held < -normal * self.forward(0.0) else 0
 
     def _phase(
-        self, sign: int, now: float, end: float, state: tuple[float, float]
+        self, mode: int, now: float, end: float, state: tuple[float, float]
     ) -> tuple[float, tuple[float, float], int | None]:
-        """Follow one phase; return its end, the state there, and what the slide does there.
+        """Follow one phase; return its end, the state there, and the mode that follows.
 
-        That is the direction in which a sticking slide breaks loose, 0 if a slipping one has
-        reached the speed of the belt, and None if nothing has happened.
+        That is 0 if a slipping slide has reached the speed of the belt, where it need not stick,
+        and None if nothing has happened.
         """
         solver = DOP853(
-            self._rates(sign),
+            self._rates(mode),
             now,
             state,
             end,
@@ -278,7 +292,7 @@ class Dop853Drive:
             atol=1e-2 * self.rtol * np.array([self._length, self._speed]),
             max_step=self.longest_step * self._time,
         )
-        guards = self._guards(sign)
+        guards = self._guards(mode)
         watches = [_Watch(guard, now, state) for _, guard in guards]
         before = None
         while solver.status == "running":
@@ -299,10 +313,14 @@ class Dop853Drive:
         x, y = solver.y.tolist()
         return end, (x, y), None
 
-    def _rates(self, sign: int) -> Callable[[float, Array], tuple[float, float]]:
+    def _law(self, mode: int) -> Piecewise:
+        curve = self.forward if mode > 0 else self.backward
+        return curve if isinstance(curve, Piecewise) else Piecewise([0.0], [curve])
+
+    def _rates(self, mode: int) -> Callable[[float, Array], tuple[float, float]]:
         belt, belt_rate, normal, force = self._belt, self._belt_rate, self._normal, self._force
         mass, damping, stiffness = self.mass, self.damping, self.stiffness
-        curve = self.forward if sign > 0 else self.backward
+        curve, sign = self._law(mode).pieces[abs(mode) - 1], 1 if mode > 0 else -1
 
         def slip(time: float, state: Array) -> tuple[float, float]:
             x, y = state.tolist()
@@ -312,13 +330,18 @@ class Dop853Drive:
         def stick(time: float, _: Array) -> tuple[float, float]:
             return belt(time), belt_rate(time)
 
-        return slip if sign else stick
+        return slip if mode else stick
 
-    def _guards(self, sign: int) -> list[tuple[int, Callable[[float, float, float], float]]]:
-        """Return what is above zero during a phase, in units of one."""
+    def _guards(self, mode: int) -> list[tuple[int, Callable[[float, float, float], float]]]:
+        """Return what is above zero during a phase, in units of one, and the mode beyond that."""
         belt, normal = self._belt, self._normal
-        if sign:
-            return [(0, lambda t, x, y: sign * (y - belt(t)) / self._speed)]
+        if mode:
+            least, most = [*self._law(mode).starts, inf][abs(mode) - 1 :][:2]
+            sign = 1 if mode > 0 else -1
+            return [
+                (mode - sign, lambda t, x, y: (sign * (y - belt(t)) - least) / self._speed),
+                (mode + sign, lambda t, x, y: (most - sign * (y - belt(t))) / self._speed),
+            ]
         ahead, back = self.forward(0.0), self.backward(0.0)
         return [
             (-1, lambda t, x, y: (normal(t) * back - self.held(t, x)) / self._newton),
