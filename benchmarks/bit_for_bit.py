@@ -3,7 +3,8 @@
 `python -m benchmarks.bit_for_bit` runs 26 loops in lockstep and 16 commands with `--json`, hashes
 what they recorded and printed, and names each hash that differs from `bit_for_bit.json`. `--write`
 replaces that file: run it before a change that should move no bit, and without it afterwards. The
-hashes hold for one processor and one set of versions, which the file names.
+hashes hold for one instruction set and one set of versions, which the file names; with others
+nothing is compared (exit status 77).
 """
 
 import argparse
@@ -18,6 +19,9 @@ from collections.abc import Callable, Generator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from benchmarks.slices import LACKING
 from stickslip_ros.record.reader import Recording
 from stickslip_ros.testing import ClosedLoop, own_domain
 from stickslip_ros.versions import versions
@@ -94,11 +98,16 @@ COMMANDS = {
 
 
 def main() -> int:
-    """Compare the hashes, or write them; return 1 if one differs."""
+    """Compare the hashes, or write them; return 1 if one differs, 77 if none can be compared."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.bit_for_bit", description=__doc__)
     parser.add_argument("--write", action="store_true", help=f"write {FILE.name}")
     arguments = parser.parse_args()
-    known = json.loads(FILE.read_text(encoding="utf-8")) if FILE.exists() else {"hashes": {}}
+    known = json.loads(FILE.read_text(encoding="utf-8"))
+    others = known["made_with"].items() ^ made_with().items()
+    if others and not arguments.write:
+        names = ", ".join(sorted({name for name, _ in others}))
+        print(f"{FILE.name} holds for another {names}: --write replaces its hashes by your own")
+        return LACKING
     hashes: dict[str, str] = {}
     reference = Path(__file__).parents[1] / "bags" / "reference"
     with tempfile.TemporaryDirectory() as folder, own_domain() as domain:
@@ -109,11 +118,19 @@ def main() -> int:
             verdict = "new" if before is None else "same" if before == hashes[name] else "DIFFERS"
             print(f"{verdict:8} {hashes[name]}  {name}", flush=True)
     if arguments.write:
-        made_with = {"processor": platform.processor() or platform.machine(), **versions()}
-        found = {"made_with": made_with, "hashes": known["hashes"] | hashes}
+        found = {"made_with": made_with(), "hashes": hashes}
         FILE.write_text(json.dumps(found, indent=2) + "\n", encoding="utf-8")
         return 0
     return int(any(known["hashes"].get(name) != found for name, found in hashes.items()))
+
+
+def made_with() -> dict[str, str]:
+    """Return what the last bits depend on: numpy and OpenBLAS choose by the instruction sets."""
+    extensions = np.show_config(mode="dicts")["SIMD Extensions"]["found"]
+    processor = " ".join([platform.machine(), *extensions])
+    found = {"processor": processor, "libm": " ".join(platform.libc_ver()), **versions()}
+    del found["stickslip_ros"]  # what is compared
+    return found
 
 
 def cases(folder: Path, reference: Path) -> Generator[tuple[str, Callable[[], str]]]:

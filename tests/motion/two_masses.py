@@ -43,17 +43,21 @@ class Curve:
 
 @dataclass(frozen=True)
 class Bristles:
-    """LuGre's memory on a curve; with no damping and no fall it is Dahl's."""
+    """LuGre's memory on a curve; with no damping and no fall it is Dahl's.
+
+    `sign` is that of v; a phase keeps it beyond its end, since DOP853 is not accurate to its
+    tolerance in a step in which abs(v) turns.
+    """
 
     curve: Curve
     stiffness: float
     damping: float
 
-    def rate(self, v: float, z: float) -> float:
-        return v - self.stiffness * abs(v) * z / self.curve(abs(v))
+    def rate(self, v: float, z: float, sign: int) -> float:
+        return v - self.stiffness * sign * v * z / self.curve(sign * v)
 
-    def coefficient(self, v: float, z: float) -> float:
-        return self.stiffness * z + self.damping * self.rate(v, z)
+    def coefficient(self, v: float, z: float, sign: int) -> float:
+        return self.stiffness * z + self.damping * self.rate(v, z, sign)
 
 
 @dataclass
@@ -159,8 +163,8 @@ class TwoMasses:
             dz, accelerations = 0.0, [0.0, 0.0]
             if mode[0]:
                 if isinstance(self.law, Bristles):
-                    dz = self.law.rate(v, z)
-                    friction = -self.law.coefficient(v, z)
+                    dz = self.law.rate(v, z, mode[0])
+                    friction = -self.law.coefficient(v, z, mode[0])
                 else:
                     friction = -mode[0] * self.law(mode[0] * v)
                 force = self.normal_force * friction - self.guide_damping * v
