@@ -78,11 +78,12 @@ demo: $(READY)
 	$(BIN)/python -m stickslip_ros.app.demo
 
 # The loop for those who change something: linters, types, and the tests that start no process.
+# One process for types, one for tests: each further one would import everything again.
 check: setup
 	@$(MAKE) --no-print-directory --jobs=2 --output-sync=target lint test-quick
 
 test-quick: setup
-	$(PYTEST) --numprocesses=2 -m 'not process and not long and not slow' $(PYTEST_OPTIONS)
+	$(PYTEST) --numprocesses=0 -m 'not process and not long and not slow' $(PYTEST_OPTIONS)
 
 # Which tests are slow, by the processor time that they take: tests/slow.txt.
 slow: setup
@@ -92,9 +93,11 @@ slow: setup
 test: setup
 	$(PYTEST) -m 'not long' $(PYTEST_OPTIONS)
 
-# Besides, what takes long, and what needs a browser, a network of its own or new environments.
+# Besides, what takes long, and what needs a browser, a network of its own or new environments. A
+# test that is far too slow for `make check` and not listed fails.
 test-all: setup
-	$(PYTEST) --numprocesses=4 --hypothesis-profile=thorough $(PYTEST_OPTIONS)
+	$(PYTEST) --numprocesses=4 --hypothesis-profile=thorough -p tests.slow --slow-tests=known \
+		$(PYTEST_OPTIONS)
 
 lint: setup
 	$(BIN)/ruff check

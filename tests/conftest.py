@@ -13,7 +13,7 @@ from multiprocessing.process import BaseProcess
 import pytest
 from hypothesis import settings
 
-from tests.slow import LIST, function_of
+from tests.slow import EXAMPLES, function_of, listed
 
 # How long an example takes says more of the machine than of the code. Where nobody looks on,
 # the examples are the same every time, so that what fails is the change at hand.
@@ -22,7 +22,7 @@ settings.register_profile(
     "quick",
     deadline=None,
     derandomize=bool(os.environ.get("CI")),
-    max_examples=20,
+    max_examples=EXAMPLES,
     print_blob=True,
 )
 settings.register_profile(THOROUGH, settings.get_profile("quick"), max_examples=100)
@@ -61,11 +61,10 @@ sys.addaudithook(_note_start)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Mark the tests whose fixtures start processes and the slow ones; deal them to the workers."""
     items[:] = dealt(items, int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1")))
-    slow = set(LIST.read_text(encoding="utf-8").splitlines())
     for item in items:
         if STARTING_FIXTURES.intersection(getattr(item, "fixturenames", ())):
             item.add_marker("process")
-        if function_of(item.nodeid) in slow:
+        if function_of(item.nodeid) in listed():
             item.add_marker("slow")
 
 
