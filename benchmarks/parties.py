@@ -159,7 +159,8 @@ def _serve(
         return
     except (Exception, SystemExit) as error:
         with suppress(BrokenPipeError):
-            connection.send((str(error) or type(error).__name__, None))
+            why = str(error).partition("\n")[0] or type(error).__name__
+            connection.send((why, None))
         raise
 
 

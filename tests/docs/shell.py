@@ -33,6 +33,9 @@ _CALLERS = (
     "VIRTUAL_ENV",
 )
 
+_STAMPS = (".ready", ".complete")
+"""Files by which `make` knows what an environment has, the oldest first."""
+
 _INTERRUPTED = {"stickslip": {INTERRUPTED}, "ros2 topic": {signal.SIGINT}}
 _OTHERS_INTERRUPTED = {0, -signal.SIGINT}
 """The status with which a program ends by Ctrl-C."""
@@ -132,9 +135,10 @@ class Shell:
         environment = self.checkout / ".venv"
         environment.mkdir()
         for entry in Path(sys.prefix).iterdir():
-            if entry.name != ".ready":
+            if entry.name not in _STAMPS:
                 (environment / entry.name).symlink_to(entry)
-        (environment / ".ready").touch()
+        for stamp in _STAMPS:
+            (environment / stamp).touch()
 
     def renew(self) -> None:
         """Reset the environment to that of a new shell."""
