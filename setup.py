@@ -132,6 +132,7 @@ setup(
         ],
         "dev": [
             "colcon-common-extensions",
+            "colcon-core>=0.20",  # the first that says which setuptools it works with
             "colcon-ros",
             "psutil",  # processor time of a dashboard and its browser (make bench)
             "pyright",
