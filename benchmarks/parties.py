@@ -112,7 +112,7 @@ def party(
         def receive() -> Any:
             try:
                 why, result = connection.recv()
-            except EOFError:
+            except (EOFError, ConnectionResetError):
                 process.join(EXIT_TIMEOUT)
                 raise PartyError(f"it ended early, with status {process.exitcode}") from None
             if why:
@@ -139,6 +139,8 @@ def party(
             process.join(EXIT_TIMEOUT)
             process.kill()
             process.join()
+        if process.exitcode:
+            raise PartyError(f"it ended with status {process.exitcode}")
 
 
 def _serve(
