@@ -4,22 +4,18 @@ Fills in what stands between `<!-- generated: NAME -->` and `<!-- end: NAME -->`
 this file.
 """
 
-import ast
-import inspect
 import json
 import re
 from argparse import Action
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from itertools import pairwise
 from math import isinf
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-from stickslip_ros.measures.cycle_measures import CycleMeasures, Regime
+from stickslip_ros.measures.cycle_measures import Regime
 from stickslip_ros.model.constants import Parameter
-from stickslip_ros.quantities import quantities_of
 from stickslip_ros.record.topics import TOPICS
 from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, NodeParameters, ReplayParameters
@@ -34,7 +30,6 @@ PAGES = (
     "controllers.md",
     "command-line.md",
     "identification.md",
-    "json.md",
 )
 
 
@@ -422,36 +417,6 @@ def paper_on_paper() -> Iterator[str]:
     yield table(["record", "", "measured", *(f"`{name}`" for name in laws)], rows)
 
 
-JSON = ["key", "type", "unit", "null", "stable", "meaning"]
-
-
-def cycle() -> Iterator[str]:
-    """Yield the keys of the measures of a cycle."""
-    (described,) = ast.parse(inspect.getsource(CycleMeasures)).body
-    assert isinstance(described, ast.ClassDef)
-    meanings = {
-        ast.unparse(field.target): ast.literal_eval(text.value)
-        for field, text in pairwise(described.body)
-        if isinstance(field, ast.AnnAssign) and isinstance(text, ast.Expr)
-    }
-    rows: list[list[str]] = []
-    for name, (_, unit, missing) in quantities_of(CycleMeasures).items():
-        meaning = meanings[name].removesuffix(".").removesuffix(f", {unit}")
-        meaning = meaning[0].lower() + meaning[1:]
-        rows.append([f"`{name}`", "number", unit, missing, "yes", meaning])
-    yield table(JSON, rows)
-
-
-def columns() -> Iterator[str]:
-    """Yield the keys of the same measures as columns of a study."""
-    missing = "as in [cycle](#cycle), and where a point failed"
-    rows: list[list[str]] = []
-    for name, (_, unit, _) in quantities_of(CycleMeasures).items():
-        rows.append([f"`{name}`", "list", "", "no", "yes", "column"])
-        rows.append([f"`{name}[]`", "number", unit, missing, "yes", "see there"])
-    yield table(JSON, rows)
-
-
 BLOCKS: dict[str, Callable[[], Iterator[str]]] = {
     "parameters": parameters,
     "commands": commands,
@@ -461,8 +426,6 @@ BLOCKS: dict[str, Callable[[], Iterator[str]]] = {
     "axis": axis,
     "coverage": coverage,
     "paper_on_paper": paper_on_paper,
-    "cycle": cycle,
-    "columns": columns,
 }
 
 

@@ -20,6 +20,7 @@ PUBLISHED = (
     "docs/**/*.md",
     "docs/**/*.png",
     "docs/**/*.svg",
+    "docs/json.schema.json",
     "docs/site.css",
     "examples/**/*.py",
     "examples/**/*.ipynb",
