@@ -7,8 +7,8 @@ this file.
 import json
 import re
 from argparse import Action
-from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from itertools import groupby
 from math import isinf
 from pathlib import Path
 from typing import Any
@@ -40,128 +40,81 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 
 def parameters() -> Iterator[str]:
-    """Yield a table for what every node has, what controllers share, and what each node has."""
+    """Yield what every node has, what controllers share, and what each node has, with defaults."""
     common = NodeParameters()
     models = {**NODE_PARAMETERS, "replay": ReplayParameters()}
-    rows = {
-        node: [_parameter_row(p) for p in _listed(model) if p.name not in common.known]
+    texts = {
+        node: [_with_default(p) for p in _listed(model) if p.name not in common.known]
         for node, model in models.items()
     }
-    laws = [own for node, own in rows.items() if node.endswith("_controller")]
-    every = [row for row in laws[0] if all(row in own for own in laws)]
-    tracked = {row[0]: row for own in laws for row in own if row[0].startswith("`reference.")}
-    shared = [*every, *tracked.values()]
-    tables = {
-        "every node": [_parameter_row(p) for p in _listed(common)],
+    laws = [own for node, own in texts.items() if node.endswith("_controller")]
+    every = [text for text in laws[0] if all(text in own for own in laws)]
+    tracked = dict.fromkeys(text for own in laws for text in own if "`reference." in text)
+    lists = {
+        "every node": [_with_default(p) for p in _listed(common)],
         "every controller": every,
-        "every controller that tracks a reference": [*tracked.values()],
-        **{node: [row for row in own if row not in shared] for node, own in rows.items()},
+        "every controller that tracks a reference": [*tracked],
+        **{
+            node: [text for text in own if text not in {*every, *tracked}]
+            for node, own in texts.items()
+        },
     }
-    for title, own in tables.items():
+    for title, own in lists.items():
         yield f"## {title}\n"
-        yield table(["parameter", "unit", "default", "allowed", "can be changed", "meaning"], own)
+        for _, group in groupby(own, key=_prefix):
+            yield f"- {', '.join(group)}"
+        yield ""
         if title == "plant":
             names = ", ".join(f"`{name}`" for name in models[title].known if ".reverse." in name)
             yield f"Of the other direction, by default as forward: {names}.\n"
 
 
 def _listed(model: NodeParameters) -> Iterator[Parameter]:
-    """Yield the parameters with a row of their own: neither those as forward nor the law."""
+    """Yield the parameters with a default of their own: neither those as forward nor the law."""
     for parameter in model.known.values():
         if ".reverse." not in parameter.name and parameter.name != "law":
             yield parameter
 
 
-def _parameter_row(parameter: Parameter) -> list[str]:
+def _prefix(text: str) -> str:
+    """Return the first part of a parameter's name; empty if it has one part only."""
+    return text.split("`")[1].rpartition(".")[0].partition(".")[0]
+
+
+def _with_default(parameter: Parameter) -> str:
     default = parameter.default
     if parameter.kind is bool:
         default = str(default).lower()
     elif parameter.kind is float:
         default = "inf" if isinf(default) else parameter.text(default)
-    allowed = parameter.bounds
-    if not parameter.finite:
-        allowed += ", or inf" if allowed else "inf"
-    return [
-        f"`{parameter.name}`",
-        parameter.unit or "",
-        f"`{default}`" if default not in ("", [], parameter.unset) else default or "empty",
-        allowed,
-        parameter.changes,
-        parameter.meaning.removesuffix("."),
-    ]
+    known = default if default not in ("", [], parameter.unset) else default or "empty"
+    return " ".join(filter(None, [f"`{parameter.name}`", str(known), parameter.unit]))
 
 
 def commands() -> Iterator[str]:
-    """Yield what several commands share, and every command by group."""
-    from stickslip_ros.app.commands import COMMANDS, EXAMPLES
+    """Yield every command by group: its arguments, and what it does."""
+    from stickslip_ros.app.commands import COMMANDS
 
-    rows = {name: _arguments(name) for name in COMMANDS}
-    count = Counter(tuple(row) for own in rows.values() for row in own)
-    # Of an option with several meanings, the most frequent one is shared.
-    often = {_first(row): [*row] for row, uses in reversed(count.most_common()) if uses >= SHARED}
-    shared = sorted(often.values())
-    yield "## Arguments of several commands\n"
-    yield table(["argument", "meaning"], shared)
-    groups = dict.fromkeys(group for group, _ in COMMANDS.values())
-    for group in groups:
+    for group in dict.fromkeys(group for group, _ in COMMANDS.values()):
         yield f"## {group}\n"
-        for name, (own_group, line) in COMMANDS.items():
-            if own_group == group:
-                yield from _command(name, line, rows[name], shared)
-                yield f"Example: `{EXAMPLES.get(name, f'stickslip {name}')}`\n"
+        rows = [
+            [f"`{name}`", line, _arguments(name)]
+            for name, (own, line) in COMMANDS.items()
+            if own == group
+        ]
+        yield table(["command", "task", "arguments"], rows)
 
 
-SHARED = 3
-"""Number of commands from which on an argument is described once for all of them."""
-
-
-def _arguments(command: str) -> list[list[str]]:
-    """Return a row for each argument and option of a command."""
+def _arguments(command: str) -> str:
+    """Return the names of the arguments and options of a command."""
     from stickslip_ros.app.commands import command_parser
 
-    parser = command_parser(command)
-    formatter = parser._get_formatter()
-    rows: list[list[str]] = []
-    for action in parser._actions:
-        if action.dest not in ("help", "quiet"):
-            values = f" {_value(action)}" if action.nargs != 0 else ""
-            names = [f"`{option}{values}`" for option in action.option_strings]
-            meaning = formatter._expand_help(action).replace("|", "\\|")
-            rows.append([", ".join(names or [f"`{_value(action)}`"]), meaning])
-    return rows
-
-
-def _first(row: Sequence[str]) -> str:
-    """Return the name of an argument, without its value."""
-    return row[0].strip("`").split()[0].strip("`,")
+    actions = [a for a in command_parser(command)._actions if a.dest not in ("help", "quiet")]
+    return ", ".join(f"`{(a.option_strings or [_value(a)])[0]}`" for a in actions)
 
 
 def _value(action: Action) -> str:
     return str(action.metavar or f"{{{','.join(action.choices or ())}}}")
-
-
-def _command(name: str, line: str, rows: list[list[str]], shared: list[list[str]]) -> Iterator[str]:
-    from stickslip_ros.app.commands import command_parser
-
-    parser = command_parser(name)
-    positional: list[str] = []
-    for action in parser._actions:
-        value = _value(action)
-        if not action.option_strings:
-            positional.append(f"{value} [{value} ...]" if action.nargs == "+" else value)
-        elif action.required:
-            positional.append(f"{action.option_strings[0]} {value}")
-    yield f"### {name}\n"
-    usage = ["stickslip", name, *positional, *(["[OPTION ...]"] if rows else [])]
-    yield f"`{' '.join(usage)}`\n"
-    description = " ".join((parser.description or line).split())
-    yield f"{description[0].upper()}{description[1:].rstrip('.')}.\n"
-    own = [row for row in rows if row not in shared]
-    if own:
-        yield table(["argument", "meaning"], own)
-    names = [f"`{_first(row)}`" for row in rows if row in shared]
-    if names:
-        yield f"Also: {', '.join(names)}.\n"
 
 
 def topics() -> Iterator[str]:

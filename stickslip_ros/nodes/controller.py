@@ -1,7 +1,8 @@
 """Controller node: answers every joint state with the force of a control law.
 
 The parameter `law` chooses the law, and with it the name of the node, LAW_controller, and its
-parameters; `stickslip list` prints the laws and `docs/parameters.md` their parameters.
+parameters. `stickslip list` prints the laws, and `stickslip new FILE --complete --controller LAW`
+writes a file with the parameters of one, their meaning, unit and bounds.
 """
 
 import sys
