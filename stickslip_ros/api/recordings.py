@@ -16,7 +16,7 @@ from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.measures.cycle_measures import Measures, measures_of
 from stickslip_ros.measures.slips import SlipThreshold
 from stickslip_ros.model.drive import Drive
-from stickslip_ros.motion.trajectory import Trajectory
+from stickslip_ros.motion.trajectory import MotorTrajectory
 from stickslip_ros.quantities import Quantity, quantities_of
 from stickslip_ros.record.motion_reader import BagLayout
 from stickslip_ros.record.reader import Recording
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from stickslip_ros.show.run_figure import DrawnRun
     from stickslip_ros.show.style import FigureStyle
 
-_COLUMNS = quantities_of(Trajectory) | {"stamp": Quantity("stamp", "ns")}
+_COLUMNS = quantities_of(MotorTrajectory) | {"stamp": Quantity("stamp", "ns")}
 
 Part = SampleColumns | ForceColumns
 """Consecutive joint states or control forces."""
@@ -123,6 +123,8 @@ class RecordedRun(TabularResult):
             "time": time,
             "control_force": _answers(samples, self.forces),
         }
+        if not samples.has_motor:
+            columns = {name: each for name, each in columns.items() if "motor" not in name}
         units, source = self.units, {"bag": str(self.path)}
         return Table(columns, _COLUMNS, units, {"time": time}, source, "time")
 

@@ -1,5 +1,6 @@
 """Recorded runs as objects."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -47,6 +48,14 @@ def test_its_table_has_the_columns_of_a_simulated_run(found: ss.RecordedRun) -> 
     data = found.to_xarray()
     assert np.array_equal(data["velocity"], found.samples.velocity)
     assert data["stamp"].attrs["units"] == "ns"
+
+
+def test_the_motion_of_a_motor_is_in_its_table(found: ss.RecordedRun) -> None:
+    own = found.samples
+    behind = replace(own, motor_position=2.0 * own.position, motor_velocity=2.0 * own.velocity)
+    data = replace(found, samples=behind).to_xarray()
+    assert np.array_equal(data["motor_velocity"], 2.0 * own.velocity)
+    assert data["motor_position"].attrs["units"] == "m"
 
 
 def test_a_part_is_that_of_the_report() -> None:
