@@ -21,6 +21,19 @@ QUANTITY = re.compile(
 """A number and its unit."""
 
 
+ROTARY = {
+    "m": "rad",
+    "m/s": "rad/s",
+    "N": "N m",
+    "N/s": "N m/s",
+    "kg": "kg m^2",
+    "N/m": "N m/rad",
+    "N s/m": "N m s/rad",
+    "s/m": "s/rad",
+}
+"""Units of a rotary axis by those of a linear one."""
+
+
 class Quantity(NamedTuple):
     """What a value is, in tables, figures and on pages."""
 

@@ -4,7 +4,7 @@ from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import isfinite, nan
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.measures.cycle_measures import Regime
 from stickslip_ros.measures.drift import fit_line
+from stickslip_ros.quantities import Quantity
 
 _MEDIAN = 5
 """Number of samples of the median that suppresses impulses."""
@@ -31,13 +32,13 @@ class Slip(NamedTuple):
 
     time: float
     """Start of the slip, a tenth of the drop, s."""
-    stick_time: float
+    stick_time: Annotated[float, Quantity("time of sticking", "s")]
     """Duration of the stick before, s; NaN where it is not recorded as a whole."""
-    drop: float
+    drop: Annotated[float, Quantity("drop", "m")]
     """Displacement by which the slide goes back, m."""
-    slip_time: float
+    slip_time: Annotated[float, Quantity("time of slipping", "s")]
     """Duration of the slip, s."""
-    stick_velocity: float
+    stick_velocity: Annotated[float, Quantity("velocity while sticking", "m/s")]
     """Velocity during the first half of the stick, m/s, by a straight line."""
     stick_velocity_error: float
     """Its standard error, m/s."""

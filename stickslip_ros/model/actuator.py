@@ -5,10 +5,7 @@ from dataclasses import dataclass
 from math import copysign, inf
 from typing import Any
 
-from stickslip_ros.model.constants import constant
-
-_MOST_STEPS = 2.0**53
-"""Number of steps from which on floats are coarser than the steps."""
+from stickslip_ros.model.constants import MOST_STEPS, constant
 
 
 @dataclass(frozen=True)
@@ -52,7 +49,7 @@ class Actuator:
                 force = copysign(limit, force)
             if resolution:
                 steps = force / resolution
-                if -_MOST_STEPS < steps < _MOST_STEPS:
+                if -MOST_STEPS < steps < MOST_STEPS:
                     force = round(steps) * resolution
                     if not -limit < force < limit:
                         force = copysign(limit, force)

@@ -13,6 +13,9 @@ _Part = TypeVar("_Part")
 SMALLEST, LARGEST = 1e-30, 1e30
 """Magnitudes, in SI units, between which no product or power in the physics overflows."""
 
+MOST_STEPS = 2.0**53
+"""Number of steps of a resolution from which on floats are coarser than the steps."""
+
 _KEY = "constant"
 _OMITTED_LIMITS = (LARGEST, 2**62)
 """Limits that only a mistake exceeds: tables and messages omit them."""

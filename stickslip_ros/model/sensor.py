@@ -9,7 +9,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from stickslip_ros.model.constants import at_rest, constants_of
+from stickslip_ros.model.constants import MOST_STEPS, at_rest, constants_of
 
 Measure = Callable[[int, float, float], tuple[float, float]]
 """Returns the measured position (m) and velocity (m/s) for the number of a sample, and its true
@@ -21,8 +21,6 @@ LONGEST_DIFFERENCE = 300
 _BLOCK = 1024
 """Number of deviates that are made at once."""
 _WORD = 2**32
-_MOST_STEPS = 2.0**53
-"""Number of steps from which on floats are coarser than the steps."""
 
 
 class MeasuredVelocity(StrEnum):
@@ -129,7 +127,7 @@ class Sensor:
                 position += next(of_position.upcoming or of_position.start(number))
             if resolution:
                 steps = position / resolution
-                if -_MOST_STEPS < steps < _MOST_STEPS:
+                if -MOST_STEPS < steps < MOST_STEPS:
                     position = round(steps) * resolution
             if earlier is not None:
                 velocity = (position - earlier[0]) / (len(earlier) * period) if earlier else 0.0

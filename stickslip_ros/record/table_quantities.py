@@ -10,6 +10,7 @@ import numpy as np
 
 from stickslip_ros.arrays import BoolArray, FloatArray, IntArray, windows
 from stickslip_ros.errors import BagError, InvalidInputError
+from stickslip_ros.quantities import ROTARY
 from stickslip_ros.record.expressions import Expression
 from stickslip_ros.record.faults import Jumps, shift_note, velocity_fault
 from stickslip_ros.record.table_clock import even_times
@@ -32,7 +33,6 @@ QUANTITIES = (
 
 _UNITS = {"time": "s", "position": "m", "reference": "m", "velocity": "m/s", "belt_velocity": "m/s"}
 """Units of quantities; the others are forces."""
-_ROTARY = {"m": "rad", "m/s": "rad/s", "N": "N m"}
 _FORCES = ("force", "disturbance", "friction_force")
 """Quantities that hold until the next value."""
 _MERGED_SHARE, _BETWEEN_SHARE = 0.3, 0.05
@@ -277,7 +277,7 @@ def _factor(table: Table, kind: str, asked: Expression) -> tuple[float, list[str
     factor = unit_factor(given, unit)
     if factor is not None:
         return factor, [] if factor == 1.0 else [f"{name} is in {given}, and converted to {unit}"]
-    rotary = _ROTARY.get(unit, unit)
+    rotary = ROTARY.get(unit, unit)
     factor = unit_factor(given, rotary)
     if factor is not None:
         return factor, [

@@ -5,9 +5,11 @@ from math import inf
 from typing import Any
 
 from stickslip_ros.measures.cycle_measures import Measures, Regime, trend_text
+from stickslip_ros.measures.slips import Slip
 from stickslip_ros.model.drive import Drive
+from stickslip_ros.quantities import quantities_of
 from stickslip_ros.scenarios.files import Scenario
-from stickslip_ros.show.quantities import MEASURES, NOISE, SI, SLIPS, Units
+from stickslip_ros.show.quantities import MEASURES, NOISE, SI, Units
 from stickslip_ros.tables import TextTable
 
 _SENT = {
@@ -160,7 +162,7 @@ def slip_table(slips: Mapping[str, Any], units: Units) -> TextTable:
     title = f"{slips['count']} slips of more than {units.text(slips['least_drop'], 'm')}: {regime}"
     rows = [
         [label, *(units.text(slips[name][column], unit) for column in _DISTRIBUTION)]
-        for name, (label, unit, _) in SLIPS.items()
+        for name, (label, unit, _) in quantities_of(Slip).items()
         if slips[name] is not None
     ]
     if slips["belt_speed"]:

@@ -17,9 +17,10 @@ from stickslip_ros.arrays import FloatArray, IntArray
 from stickslip_ros.measures.cycle_fit import MeanCycle
 from stickslip_ros.measures.cycle_measures import Measures, trend_text
 from stickslip_ros.measures.run_meter import RunAnalysis
+from stickslip_ros.measures.slips import Slip
 from stickslip_ros.model.drive import Drive
-from stickslip_ros.quantities import Quantity
-from stickslip_ros.show.quantities import MEASURES, SLIPS, Units
+from stickslip_ros.quantities import Quantity, quantities_of
+from stickslip_ros.show.quantities import MEASURES, Units
 from stickslip_ros.show.run_history import DrawnMotion, RunHistory, intervals, peaks
 from stickslip_ros.show.style import BLUE, GREEN, GREY, LIGHT_GREY, ORANGE, REGIMES
 
@@ -249,10 +250,10 @@ def draw_analysis(
     `part` has three cells, beside each other or one above another. Labels may have to be `short`.
     """
     if found.slips is not None:  # they were asked for
-        each = found.slips["each"]
+        each, shown = found.slips["each"], quantities_of(Slip)
         for column, name in enumerate(("stick_time", "drop", "slip_time")):
             values = np.array([value for value in each[name] if value is not None])
-            _distribution(figure.add_subplot(part[column]), values, SLIPS[name], units)
+            _distribution(figure.add_subplot(part[column]), values, shown[name], units)
     elif found.mean_cycle is not None:
         _cycle(figure.add_subplot(part[0:2]), found.mean_cycle, units, short=short)
         _residual(figure.add_subplot(part[2]), found.mean_cycle, units, short=short)

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.measures.cycle_measures import CycleMeasures, Measures
 from stickslip_ros.model.drive import Drive
-from stickslip_ros.quantities import Quantity, quantities_of
+from stickslip_ros.quantities import ROTARY, Quantity, quantities_of
 from stickslip_ros.text import must_be_one_of, prefix_for, shown
 
 _OF_CYCLES = quantities_of(Measures)
@@ -36,13 +36,6 @@ MEASURES = {
     "bag": Quantity("bag"),
 }
 """Measures and counts of a run, in the order of its table."""
-
-SLIPS = {
-    "stick_time": Quantity("time of sticking", "s"),
-    "drop": Quantity("drop", "m"),
-    "slip_time": Quantity("time of slipping", "s"),
-    "stick_velocity": Quantity("velocity while sticking", "m/s"),
-}
 
 STUDY = _OF_CYCLES | {
     "steady": Quantity("whether the motion has settled"),
@@ -160,19 +153,6 @@ _PARAMETERS = {
 _SCALES = {"plant.mass", "plant.stiffness", "plant.normal_force"}
 
 
-_ROTARY = {
-    "m": "rad",
-    "m/s": "rad/s",
-    "N": "N m",
-    "N/s": "N m/s",
-    "kg": "kg m^2",
-    "N/m": "N m/rad",
-    "N s/m": "N m s/rad",
-    "s/m": "s/rad",
-}
-"""Units of a rotary axis by those of a linear one."""
-
-
 @dataclass(frozen=True)
 class Units:
     """Units of quantities, SI or none, and their labels."""
@@ -242,7 +222,7 @@ class Units:
         """Return the unit to show; empty if all is dimensionless."""
         if self.dimensionless:
             return ""
-        return _ROTARY.get(unit, unit) if self.rotary else unit
+        return ROTARY.get(unit, unit) if self.rotary else unit
 
     def text(self, value: float | None, unit: str, *, largest: float = 0.0) -> str:
         """Return a value (SI) as text with its unit."""

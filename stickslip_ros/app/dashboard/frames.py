@@ -11,6 +11,8 @@ import orjson
 from stickslip_ros.app.dashboard.listener import ListenerNode
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.model.drive import Drive
+from stickslip_ros.motion.trajectory import Trajectory
+from stickslip_ros.quantities import quantities_of
 from stickslip_ros.record.topics import AMPLITUDE, FREQUENCY, STICK_FRACTION
 from stickslip_ros.samples import ForceColumns, SampleColumns
 from stickslip_ros.show.live_trace import Line, LiveTrace
@@ -20,7 +22,7 @@ from stickslip_ros.stamps import NANOSECONDS
 PERIODS = (10, 50, 200)
 """Selectable lengths of the traces, in natural periods."""
 
-_QUANTITIES = (("displacement", "m"), ("velocity", "m/s"), ("control force", "N"))
+_QUANTITIES = [quantities_of(Trajectory)[n] for n in ("position", "velocity", "control_force")]
 _UNKNOWN_PERIOD = 1.0
 _LEAST_SPAN = 1e-3
 """Least length of an axis, relative to the largest value that the drive lets expect."""
@@ -145,7 +147,7 @@ def _axes(drive: Drive | None) -> list[_Axis]:
     units = Units.for_drive(drive)
     axes: list[_Axis] = []
     for quantity, magnitude in zip(_QUANTITIES, largest, strict=True):
-        scale, label = units.axis(*quantity, magnitude)
+        scale, label = units.axis(quantity.label, quantity.unit, magnitude)
         axes.append(_Axis(scale, label, _LEAST_SPAN * magnitude / scale))
     return axes
 
