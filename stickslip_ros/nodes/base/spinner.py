@@ -2,7 +2,7 @@
 
 Timers of the nodes are on monotonic clocks, to ring in time also if the system's clock is set back.
 A library that was built for old systems, as rclpy's on PyPI, waits by the system's clock instead.
-Such a wait takes longer by what the clock is set back, unless something else wakes the executor.
+Such a wait takes longer by what the clock is set back, unless something wakes the executor then.
 """
 
 import signal
@@ -24,6 +24,9 @@ from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.task import Future
 from rclpy.timer import Timer
+
+_CLOCK_SET = 0.01
+"""Change of the system's clock, s, after which what waits by it is woken."""
 
 
 class Spinner:
@@ -138,7 +141,7 @@ def spin(executor: Executor, until: Future) -> None:
 
 
 def steady_clock(node: Node) -> Clock:
-    """Return a monotonic clock for timers of the node; its executor is woken ten times a second."""
+    """Return a monotonic clock for timers of the node; its executor is woken when time is set."""
     clock = Clock(clock_type=ClockType.STEADY_TIME)
     waker = _Waker(node.create_timer(1e6, lambda: None, clock=clock))
     waker.start()
@@ -148,7 +151,11 @@ def steady_clock(node: Node) -> Clock:
 
 
 class _Waker(Thread):
-    """Wakes the executor of a node until the node is destroyed or its context is shut down."""
+    """Wakes the executor of a node when the system's clock is set, while the node exists.
+
+    Only then: each reset that waits for a busy executor makes it call the timers that are due once
+    more, and each call puts a timer off by its period.
+    """
 
     def __init__(self, timer: Timer) -> None:
         super().__init__(daemon=True)
@@ -156,11 +163,20 @@ class _Waker(Thread):
         self._ended = Event()
 
     def run(self) -> None:
+        known = _clock_difference()
         with suppress(InvalidHandle):  # the node is destroyed
             while not self._ended.wait(0.1):
-                self._timer.reset()
+                self._timer.is_canceled()
+                if abs(_clock_difference() - known) > _CLOCK_SET:
+                    known = _clock_difference()
+                    self._timer.reset()
 
     def end(self) -> None:
         """End the thread."""
         self._ended.set()
         self.join()
+
+
+def _clock_difference() -> float:
+    """Return the system's clock minus the monotonic one, s."""
+    return time.time() - time.monotonic()

@@ -21,9 +21,10 @@ from stickslip_ros.nodes.base.spinner import (
     Spinner,
     signal_handlers_kept,
     spin,
+    steady_clock,
     stop_on_signals,
 )
-from tests.nodes.graph import PATIENCE
+from tests.nodes.graph import PATIENCE, wait_for
 
 # What the library waits for by the system's clock takes as much longer as that is set back.
 _CLOCK = r"""
@@ -104,6 +105,20 @@ def test_waiting_is_cut_short(spinner: Spinner) -> None:
     spinner.is_cut_short = lambda: bool(rung)
     assert not spinner.spin_until(lambda: False)
     assert not spinner.spin_until(lambda: True)
+
+
+def test_timers_ring_at_their_period_after_an_executor_that_did_not_run(spinner: Spinner) -> None:
+    """Else a node that waited would do everything many times, and then nothing for long."""
+    node = Node("ringing", context=spinner.executor.context)
+    spinner.add(node)
+    rung: list[float] = []
+    period = 0.5
+    node.create_timer(period, lambda: rung.append(time.monotonic()), clock=steady_clock(node))
+    spinner.spin_until(lambda: bool(rung), PATIENCE)
+    until = time.monotonic() + 4.0 * period
+    wait_for(lambda: time.monotonic() > until, "time passes and nothing runs")
+    assert spinner.spin_until(lambda: len(rung) > 3, PATIENCE)
+    assert rung[3] - rung[1] > 0.99 * period  # the first one is late by an unknown part of it
 
 
 @pytest.mark.process
