@@ -111,11 +111,11 @@ class Pacer:
         self._loop = loop
         self._publish = publish
         self._end = end
-        self._last = 0
+        self._last: float = 0
         self._running = False
         self._started = self._stopped = time.monotonic()
 
-    def start(self, last: int) -> None:
+    def start(self, last: float) -> None:
         """Publish sample 0 and continue up to sample `last`."""
         self._last = last
         self._running = True
@@ -182,7 +182,7 @@ class LockstepPacer(Pacer):
         self._look_period = min(0.1, min(self._silence, self._reply_timeout) / 10.0)
         self._watchdog = node.every(self._look_period, self._watch)
 
-    def start(self, last: int) -> None:
+    def start(self, last: float) -> None:
         """Publish sample 0 and, once the node is active, continue when it is answered."""
         super().start(last)
         self._flow.sent(self._loop.sample.stamp)
@@ -303,7 +303,7 @@ class RealtimePacer(Pacer):
         self._sleeper = Sleeper()
         self._thread = Thread(target=self._run, name="pacer", daemon=True)
 
-    def start(self, last: int) -> None:
+    def start(self, last: float) -> None:
         """Publish sample 0 now; each following sample is due one interval later."""
         super().start(last)
         self._thread.start()
