@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.model.control import ControlLaw, LinearFeedback, VelocityFeedback
+from stickslip_ros.model.control import LinearFeedback, VelocityFeedback
 from stickslip_ros.model.control.base import MOTOR, TABLE
 from stickslip_ros.model.dimensionless_drive import POSITION, SPEED
 from stickslip_ros.theory.linear_sampled_loop import LinearSampledLoop
@@ -175,9 +175,3 @@ def _differences(loop: LinearSampledLoop) -> tuple[int, int]:
 def _rate(spans: int, rate: float, z: ComplexArray) -> ComplexArray:
     """Return the response, 1/s, of a difference over samples."""
     return (1.0 - z**-spans) * rate / spans
-
-
-def loop_response(loop: LinearSampledLoop, law: ControlLaw) -> LoopResponse | None:
-    """Return the response of a loop with a law; None if the law has no linear part."""
-    feedback = law.linear_part(1.0 / loop.rate)
-    return None if feedback is None else LoopResponse(PlantResponse.of(loop), feedback)

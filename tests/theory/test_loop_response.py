@@ -26,7 +26,7 @@ from stickslip_ros.motion import Motion
 from stickslip_ros.motion.controller import Controller, answer
 from stickslip_ros.motion.sampled_loop import SampledLoop
 from stickslip_ros.theory.linear_sampled_loop import LinearSampledLoop
-from stickslip_ros.theory.loop_response import LoopResponse, loop_response
+from stickslip_ros.theory.loop_response import LoopResponse, PlantResponse
 
 DRIVE = Drive(100.0, 200.0, 1e6, 1000.0, 0.03, Stribeck(0.4, 0.25, 0.05))
 RATE = 1000.0
@@ -50,9 +50,9 @@ def loop_of(
 
 
 def response_of(loop: LinearSampledLoop, law: ControlLaw) -> LoopResponse:
-    found = loop_response(loop, law)
-    assert found is not None
-    return found
+    feedback = law.linear_part(1.0 / loop.rate)
+    assert feedback is not None
+    return LoopResponse(PlantResponse.of(loop), feedback)
 
 
 @laws
