@@ -1,20 +1,24 @@
 """Read one MCAP file, also one that is incomplete (recorder killed) or damaged.
 
 The mcap library parses the records. This module steps from record to record, because the library
-fails on a truncated or damaged file and parses messages one by one. A record is sound if its
-fields fill it exactly; a chunk must also have the right checksum. After any damage, reading
-continues at the next sound chunk.
+fails on a truncated or damaged file, reads what a damaged length says into memory, and parses
+messages and their indexes one by one. A chunk is sound if its checksum and its records are; after
+any damage, reading continues at the next sound chunk.
 """
 
 import re
+import struct
 import zlib
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator
+from io import BytesIO
+from itertools import groupby, takewhile
 from pathlib import Path
 from typing import NamedTuple, TypeVar
 
 import numpy as np
 from mcap.data_stream import ReadDataStream
+from mcap.exceptions import EndOfFile
 from mcap.opcode import Opcode
 from mcap.records import (
     Attachment,
@@ -34,7 +38,6 @@ from stickslip_ros.errors import BagError
 from stickslip_ros.files import open_regular
 from stickslip_ros.record.chunk import (
     DEFINITIONS,
-    FIELDS,
     HEAD,
     LARGEST_TABLE,
     MESSAGE_LENGTH,
@@ -43,49 +46,45 @@ from stickslip_ros.record.chunk import (
     DamageError,
     MessageBlock,
     OpenChunk,
-    ParsedT,
-    as_block,
+    as_blocks,
     open_chunk,
-    parse,
     records_in,
 )
 from stickslip_ros.record.compression import LARGEST, unpack
 
+ParsedT = TypeVar("ParsedT")
 DefinitionT = TypeVar("DefinitionT", Schema, Channel)
 
 _INDEX_ENTRY = 16
 """Bytes of a log time and an offset in a message index."""
 _DATA_END = HEAD.pack(Opcode.DATA_END, 4)
-_OPCODES = frozenset((*FIELDS, Opcode.MESSAGE))
-_PRIVATE_FROM = 0x80
-"""Opcodes from this one on are private to an application."""
-_INVENTORY = frozenset((*DEFINITIONS, Opcode.METADATA, Opcode.ATTACHMENT))
+_FOOTER = HEAD.pack(Opcode.FOOTER, 20)
+_TAIL_SIZE = len(_FOOTER) + 20 + len(MCAP0_MAGIC)
+"""Bytes of the footer and of what ends a file."""
+_OPCODES = frozenset((*Opcode, *range(0x80, 0x100)))
+"""From 0x80 on they are private to an application."""
+_INVENTORY = (*DEFINITIONS, Opcode.METADATA, Opcode.ATTACHMENT)
 """Records between the messages that define or describe them."""
 _LARGEST_DEFINITIONS = 32 << 20
 """Bytes of all definitions that are kept."""
 _MOST_GAPS_LISTED = 20
 
-_CHUNK_HEAD = re.compile(
-    rb"\x06.{5}\0\0\0.{28}(?:\0\0\0\0|\x03\0\0\0lz4|\x04\0\0\0zstd)", re.DOTALL
+_CHUNK = re.compile(
+    rb"\x06(?=(.{5})\0\0\0.{28}(\0{4}|\x03\0{3}lz4|\x04\0{3}zstd)(.{5})\0\0\0)", re.DOTALL
 )
-_CHUNK_HEAD_SIZE = 9 + 28 + 8
+"""The start of a chunk, its length, compression, and size of the data."""
+_CHUNK_LENGTH = 28 + 4 + 8
+"""Bytes of the content of a chunk, without the name of the compression and the data."""
+_CHUNK_HEAD_SIZE = HEAD.size + _CHUNK_LENGTH + 4
 
 
 class _Record(NamedTuple):
-    """A sound record of a file."""
+    """A record of a file, and the content if it is a chunk."""
 
-    start: int
     opcode: int
-    length: int
-    """Bytes of the content."""
-
-    @property
-    def content(self) -> int:
-        return self.start + HEAD.size
-
-    @property
-    def end(self) -> int:
-        return self.content + self.length
+    start: int
+    end: int
+    chunk: OpenChunk | None = None
 
 
 class McapFile:
@@ -100,8 +99,8 @@ class McapFile:
         """By id."""
         self.statistics: Statistics | None = None
         """The statistics record of the file, if it has one."""
-        self._tables: dict[int, str] = {}
-        self._attachments: dict[int, str] = {}
+        self._tables: set[int] = set()
+        self._attachments: set[int] = set()
         self._definitions_size = 0
         self._chunked = False
         self._gaps: dict[int, int] = {}
@@ -151,11 +150,15 @@ class McapFile:
 
     def tables(self, name: str | None = None) -> Iterator[Metadata]:
         """Yield the readable metadata records, of this name or all, in file order."""
-        return self._named(self._tables, name, Opcode.METADATA, Metadata.read)
+        for found in self._parsed(self._tables, Opcode.METADATA, Metadata.read, LARGEST_TABLE):
+            if name in (None, found.name):
+                yield found
 
     def attachments(self, name: str | None = None) -> Iterator[Attachment]:
         """Yield the readable attachments, of this name or all, in file order."""
-        return self._named(self._attachments, name, Opcode.ATTACHMENT, Attachment.read)
+        for found in self._parsed(self._attachments, Opcode.ATTACHMENT, Attachment.read, LARGEST):
+            if name in (None, found.name):
+                yield found
 
     def blocks(self, channels: Collection[int]) -> Iterator[MessageBlock]:
         """Yield the messages on these channels in file order, one chunk at a time.
@@ -178,39 +181,30 @@ class McapFile:
 
     def _blocks(self) -> Iterator[MessageBlock]:
         """Yield the messages of each chunk, and each sequence of messages outside chunks."""
-        loose: list[bytes] = []
-        size = 0
-        for record, chunk in self._records(len(MCAP0_MAGIC)):
-            if record.opcode == Opcode.MESSAGE:
-                loose.append(self._read(record.start, record.end - record.start))
-                size += len(loose[-1])
-            if loose and (record.opcode != Opcode.MESSAGE or size > WINDOW):
-                yield as_block(loose)
-                loose, size = [], 0
-            if chunk is not None:
-                yield chunk.messages
-            elif record.opcode == Opcode.DATA_END:
-                return
-        if loose:
-            yield as_block(loose)
+        data = takewhile(lambda record: record.opcode != Opcode.DATA_END, self._records())
+        for opcode, records in groupby(data, lambda record: record.opcode):
+            if opcode == Opcode.MESSAGE:
+                yield from as_blocks(self._read(each.start, each.end) for each in records)
+            else:
+                yield from (each.chunk.messages for each in records if each.chunk is not None)
 
     def _read_inventory(self) -> bool:
         """Find the content of the file; return whether its beginning and end are sound."""
-        data_start = len(MCAP0_MAGIC)
-        begins_well = self._read(0, data_start) == MCAP0_MAGIC
+        begins_well = self._read(0, len(MCAP0_MAGIC)) == MCAP0_MAGIC
         if not begins_well and self._next_chunk(0) == self._size:
             raise BagError(f"the file {self.path} is not an MCAP file: it does not start like one")
         ends_well = self._read_summary()
         # A summary need not repeat the definitions.
         if not (ends_well and self.channels and not self._undefined):
-            for record, chunk in self._records(data_start):
+            for opcode, start, end, chunk in self._records():
                 if chunk is not None:
                     self._chunked = True
-                    for opcode, content in chunk.definitions:
-                        self._note(opcode, record.start, content, checked=True)
-                elif record.opcode in _INVENTORY:
-                    content = self._read(record.content, min(record.length, LARGEST_TABLE))
-                    self._note(record.opcode, record.start, content, checked=False)
+                    for kind, content in chunk.definitions:
+                        self._note(kind, start, content, checked=True)
+                elif opcode in _INVENTORY:
+                    begin = start + HEAD.size
+                    content = self._read(begin, min(end, begin + LARGEST_TABLE))
+                    self._note(opcode, start, content, checked=False)
         return begins_well and ends_well
 
     @property
@@ -221,66 +215,56 @@ class McapFile:
 
     def _read_summary(self) -> bool:
         """Read the summary; return whether the end of the file is sound."""
-        end = self._size - len(MCAP0_MAGIC) - FIELDS[Opcode.FOOTER][0] - HEAD.size
-        if end < 0 or self._read(self._size - len(MCAP0_MAGIC), 8) != MCAP0_MAGIC:
+        end = self._size - _TAIL_SIZE
+        tail = self._read(max(0, end), self._size)
+        if not (tail.startswith(_FOOTER) and tail.endswith(MCAP0_MAGIC)):
             return False
-        footer = self._parsed(end, Opcode.FOOTER, Footer.read)
-        if footer is None:
-            return False
+        footer = _parse(Footer.read, tail[HEAD.size : -len(MCAP0_MAGIC)])
         start = footer.summary_start
         if start == 0:
             return True
         # Checked first: with a wrong position the summary might be the whole file.
         before = max(0, start - len(_DATA_END) - 4)
-        moved = not 0 <= end - start <= LARGEST or self._read(before, len(_DATA_END)) != _DATA_END
+        moved = not 0 <= end - start <= LARGEST or self._read(before, start - 4) != _DATA_END
         if moved:
-            start = self._start_of_summary(end)
-            if start is None or footer.summary_crc == 0:
+            earliest = max(0, end - LARGEST_TABLE)
+            place = self._read(earliest, end).rfind(_DATA_END)
+            if place < 0 or footer.summary_crc == 0:
                 return False
-        summary = self._read(start, end - start)
-        checked = self._read(end, HEAD.size + 16)  # without the checksum itself
+            start = earliest + place + len(_DATA_END) + 4
+        summary = self._read(start, end)
+        checked = tail[: HEAD.size + 16]  # without the checksum itself
         if footer.summary_crc not in (0, zlib.crc32(checked, zlib.crc32(summary))):
             return False
         try:
             for opcode, begin, stop in records_in(summary):
                 content = summary[begin : min(stop, begin + LARGEST_TABLE)]
                 # Where bytes before it are lost, its definitions still hold, but no position.
-                if not moved or opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
+                if not moved or opcode in DEFINITIONS:
                     self._note(opcode, start, content, checked=True)
         except DamageError:
             return False
         return not moved
 
-    def _start_of_summary(self, end: int) -> int | None:
-        """Return where a summary that ends there starts; None if it is not found."""
-        earliest = max(0, end - LARGEST_TABLE)
-        place = self._read(earliest, end - earliest).rfind(_DATA_END)
-        return None if place < 0 else earliest + place + len(_DATA_END) + 4
-
     def _note(self, opcode: int, start: int, content: bytes, *, checked: bool) -> None:
-        """Keep what a record describes; `start` is its place, or that of the chunk around it.
-
-        The content of a record that is too large is cut off; the name of an attachment remains.
-        """
+        """Keep what a record describes; `start` is its place, or that of the chunk around it."""
         try:
             match opcode:
                 case Opcode.SCHEMA:
-                    self._define(self.schemas, parse(Schema.read, content), len(content), checked)
+                    self._define(self.schemas, _parse(Schema.read, content), content, checked)
                 case Opcode.CHANNEL:
-                    self._define(self.channels, parse(Channel.read, content), len(content), checked)
+                    self._define(self.channels, _parse(Channel.read, content), content, checked)
                 case Opcode.STATISTICS:
-                    self.statistics = parse(Statistics.read, content)
+                    self.statistics = _parse(Statistics.read, content)
                     self._chunked = self.statistics.chunk_count > 0
                 case Opcode.METADATA:
-                    self._tables[start] = _text_at(0, content)
+                    self._tables.add(start)
                 case Opcode.METADATA_INDEX:
-                    index = parse(MetadataIndex.read, content)
-                    self._tables[index.offset] = index.name
+                    self._tables.add(_parse(MetadataIndex.read, content).offset)
                 case Opcode.ATTACHMENT:
-                    self._attachments[start] = _text_at(16, content)  # behind its times
+                    self._attachments.add(start)
                 case Opcode.ATTACHMENT_INDEX:
-                    index = parse(AttachmentIndex.read, content)
-                    self._attachments[index.offset] = index.name
+                    self._attachments.add(_parse(AttachmentIndex.read, content).offset)
                 case _:
                     pass
         except DamageError:
@@ -291,87 +275,77 @@ class McapFile:
         self._gaps[start] = max(end, self._gaps.get(start, end))
 
     def _define(
-        self, known: dict[int, DefinitionT], found: DefinitionT, size: int, checked: bool
+        self, known: dict[int, DefinitionT], found: DefinitionT, content: bytes, checked: bool
     ) -> None:
         """Keep a definition; for each id the one with a checksum, or else the first."""
         if found.id not in known or (checked and known[found.id] != found):
-            self._definitions_size += size
+            self._definitions_size += len(content)
             if self._definitions_size > _LARGEST_DEFINITIONS:
                 raise DamageError
             known[found.id] = found
 
-    def _records(self, position: int) -> Iterator[tuple[_Record, OpenChunk | None]]:
-        """Yield the sound records from a position on; after damage continue at the next chunk."""
-        before = checked = position
+    def _records(self) -> Iterator[_Record]:
+        """Yield the records up to the footer; after damage continue at the next chunk."""
+        position = before = searched = len(MCAP0_MAGIC)
         while position < self._size:
-            record, chunk = self._record(position), None
-            if record is not None and record.opcode == Opcode.CHUNK:
-                chunk = self._opened(record)
-                checked = position + 1 if chunk is None else record.end
-            if record is None or (record.opcode == Opcode.CHUNK and chunk is None):
+            record = self._record(position)
+            try:
+                if record.opcode == Opcode.CHUNK:
+                    searched = position + 1
+                    record = record._replace(chunk=self._opened(record))
+                    searched = record.end
+                elif record.opcode == Opcode.MESSAGE:
+                    self._check_loose(record)
+                elif record.opcode not in _OPCODES:
+                    raise DamageError
+            except DamageError:
                 # A record without a checksum may have covered the beginning of a chunk.
-                following = self._next_chunk(checked)
+                following = self._next_chunk(searched)
                 self._add_gap(min(position, max(before, following - 1)), following)
                 position = following
                 continue
-            yield record, chunk
+            yield record
             if record.opcode == Opcode.FOOTER:
                 return
             before, position = position, record.end
 
-    def _record(self, position: int) -> _Record | None:
-        """Return the record at a position if its fields fill it and it lies within the file."""
-        head = self._read(position, HEAD.size)
-        if len(head) < HEAD.size:
-            return None
-        record = _Record(position, *HEAD.unpack(head))
-        if record.end > self._size:
-            return None
-        if record.opcode == Opcode.MESSAGE:
-            channel = int.from_bytes(self._read(record.content, 2), "little")
-            # If a file has chunks, all messages are in them; this is damaged data.
-            sound = channel in self.channels and MESSAGE_LENGTH <= record.length <= LARGEST
-            return record if sound and not self._chunked else None
-        if record.opcode not in FIELDS:
-            # A private record of an application, if another record follows.
-            following = self._read(record.end, 1)
-            followed = bool(following) and (
-                following[0] in _OPCODES or following[0] >= _PRIVATE_FROM
-            )
-            return record if record.opcode >= _PRIVATE_FROM and followed else None
-        place = record.content
-        for field in FIELDS[record.opcode]:
-            if field < 0:
-                place += int.from_bytes(self._read(place, -field), "little") - field
-            else:
-                place += field
-            if place > record.end:
-                return None
-        return record if place == record.end else None
+    def _record(self, start: int) -> _Record:
+        """Return the record at a place, one of opcode 0 if there is none within the file."""
+        begin = start + HEAD.size
+        head = self._read(start, begin) if begin <= self._size else b""
+        opcode, length = HEAD.unpack(head) if len(head) == HEAD.size else (0, 0)
+        return _Record(opcode if begin + length <= self._size else 0, start, begin + length)
 
-    def _opened(self, record: _Record) -> OpenChunk | None:
-        """Return the content of a chunk, None if it is damaged."""
-        if record.length > LARGEST + _CHUNK_HEAD_SIZE:
-            return None
-        try:
-            chunk = parse(Chunk.read, self._read(record.content, record.length))
-            data = unpack(chunk.compression, chunk.data, chunk.uncompressed_size)
-            if data is None or chunk.uncompressed_crc not in (0, zlib.crc32(data)):
-                return None
-            return open_chunk(data, self._indexed_starts(data, record.end))
-        except DamageError:
-            return None
+    def _check_loose(self, record: _Record) -> None:
+        """Raise DamageError for a message that is none."""
+        begin = record.start + HEAD.size
+        channel = int.from_bytes(self._read(begin, begin + 2), "little")
+        sound = channel in self.channels and MESSAGE_LENGTH <= record.end - begin <= LARGEST
+        # If a file has chunks, all messages are in them; this is damaged data.
+        if self._chunked or not sound:
+            raise DamageError
+
+    def _opened(self, record: _Record) -> OpenChunk:
+        """Return the content of a chunk; raise DamageError if it is damaged."""
+        begin = record.start + HEAD.size
+        if record.end - begin > LARGEST + _CHUNK_HEAD_SIZE:
+            raise DamageError
+        chunk = _parse(Chunk.read, self._read(begin, record.end))
+        data = unpack(chunk.compression, chunk.data, chunk.uncompressed_size)
+        if data is None or chunk.uncompressed_crc not in (0, zlib.crc32(data)):
+            raise DamageError
+        return open_chunk(data, self._indexed_starts(data, record.end))
 
     def _indexed_starts(self, data: bytes, position: int) -> IntArray:
         """Return where the messages of a chunk start, by its indexes; none if these are damaged."""
         offsets = [np.empty(0, np.int64)]
         room = len(data) // MESSAGE_SIZE * _INDEX_ENTRY
-        while (record := self._record(position)) and record.opcode == Opcode.MESSAGE_INDEX:
-            size = record.length - 6  # without channel and size of the entries
-            room -= size
-            if size % _INDEX_ENTRY or room < 0:
+        while (record := self._record(position)).opcode == Opcode.MESSAGE_INDEX:
+            begin = position + HEAD.size + 6  # behind channel and size of the entries
+            room -= record.end - begin
+            if (record.end - begin) % _INDEX_ENTRY or room < 0:
                 return np.empty(0, np.int64)
-            entries = self._read(record.end - size, size)
+            entries = self._read(begin, record.end)
             offsets.append(np.frombuffer(entries, "<i8").reshape(-1, 2)[:, 1])
             position = record.end
         return np.sort(np.concatenate(offsets), kind="stable")
@@ -379,49 +353,47 @@ class McapFile:
     def _next_chunk(self, position: int) -> int:
         """Return where the next chunk from a position on probably starts, or the file's size."""
         while position < self._size:
-            window = self._read(position, WINDOW + _CHUNK_HEAD_SIZE)
-            match = _CHUNK_HEAD.search(window)
-            while match and match.start() < WINDOW:
+            window = self._read(position, position + WINDOW + _CHUNK_HEAD_SIZE)
+            for match in _CHUNK.finditer(window):
+                length, size = (int.from_bytes(match[number], "little") for number in (1, 3))
                 start = position + match.start()
-                if self._record(start) is not None:
+                fills = length == _CHUNK_LENGTH - 4 + len(match[2]) + size
+                if fills and start + HEAD.size + length <= self._size:
                     return start
-                match = _CHUNK_HEAD.search(window, match.start() + 1)
             position += WINDOW
         return self._size
 
-    def _named(
-        self,
-        places: dict[int, str],
-        name: str | None,
-        opcode: Opcode,
-        read: Callable[[ReadDataStream], ParsedT],
-    ) -> Iterator[ParsedT]:
-        for start, found in sorted(places.items()):
-            if name in (None, found) and (parsed := self._parsed(start, opcode, read)) is not None:
-                yield parsed
-
     def _parsed(
-        self, start: int, opcode: Opcode, read: Callable[[ReadDataStream], ParsedT]
-    ) -> ParsedT | None:
-        record = self._record(start)
-        if record is None or record.opcode != opcode:
-            return None
-        try:
-            if record.length > (LARGEST if opcode == Opcode.ATTACHMENT else LARGEST_TABLE):
-                raise DamageError
-            return parse(read, self._read(record.content, record.length))
-        except DamageError:
-            self._add_gap(record.start, record.end)
-            return None
+        self, places: set[int], opcode: int, read: Callable[[ReadDataStream], ParsedT], largest: int
+    ) -> Iterator[ParsedT]:
+        """Yield what the records of an opcode at these places hold, in file order."""
+        for start in sorted(places):
+            record = self._record(start)
+            if record.opcode != opcode:
+                continue
+            try:
+                begin = start + HEAD.size
+                if record.end - begin > largest:
+                    raise DamageError
+                yield _parse(read, self._read(begin, record.end))
+            except DamageError:
+                self._add_gap(start, record.end)
 
-    def _read(self, start: int, size: int) -> bytes:
+    def _read(self, start: int, end: int) -> bytes:
         try:
             self._stream.seek(start)
-            return self._stream.read(size)
+            return self._stream.read(max(0, end - start))
         except OSError as error:
             raise BagError(f"the file {self.path} cannot be read: {error.strerror}") from error
 
 
-def _text_at(place: int, content: bytes) -> str:
-    """Return the text at a place of a record; raise DamageError if there is none."""
-    return parse(lambda stream: stream.read_prefixed_string(), content[place:])
+def _parse(read: Callable[[ReadDataStream], ParsedT], content: bytes) -> ParsedT:
+    """Parse a content with the mcap library; raise DamageError if it fails or leaves a rest."""
+    stream = ReadDataStream(BytesIO(content))
+    try:
+        found = read(stream)
+    except (EndOfFile, struct.error, OverflowError, ValueError) as error:
+        raise DamageError from error
+    if stream.count < len(content):
+        raise DamageError
+    return found

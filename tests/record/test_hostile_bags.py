@@ -17,7 +17,12 @@ from mcap.opcode import Opcode
 from zstandard import ZstdCompressor
 
 from stickslip_ros.errors import BagError
-from stickslip_ros.record.chunk import DamageError, MessageBlock, records_in
+from stickslip_ros.record.chunk import (
+    MESSAGE_SIZE,
+    DamageError,
+    MessageBlock,
+    records_in,
+)
 from stickslip_ros.record.codec import pack_joint_state
 from stickslip_ros.record.compression import (
     LARGEST,
@@ -252,6 +257,56 @@ def test_memory_is_bounded(tmp_path: Path, make: Callable[[Path], Path]) -> None
         assert not said.startswith("CRASH")
         assert "\n" not in said
         assert used < MUCH_MEMORY
+
+
+FIRST, SIZE = len(schema() + channel()), len(message(state(1)))
+STARTS = [FIRST + SIZE * number for number in range(499)]
+"""Where the messages of the sound chunk start."""
+
+
+@pytest.mark.parametrize(
+    "starts",
+    [
+        STARTS[1:],
+        STARTS[:-1],
+        STARTS[::2],
+        [*STARTS, STARTS[0]],
+        [*STARTS, 2**40],
+        [*STARTS, 2**63],
+        [0, *STARTS],
+        [start + 1 for start in STARTS],
+        [],
+    ],
+)
+def test_a_false_index_hides_nothing(tmp_path: Path, starts: list[int]) -> None:
+    entries = b"".join(struct.pack("<QQ", 1, start) for start in starts)
+    index = record(Opcode.MESSAGE_INDEX, struct.pack("<H", 1) + text(entries))
+    with Recording(bag_of(tmp_path / "bag", SOUND, index)) as recording:
+        assert recording.joint_states.stamp.tolist() == list(range(1, 500))
+        assert recording.complete
+
+
+def test_an_index_into_a_message_is_not_followed(tmp_path: Path) -> None:
+    starts = (FIRST, FIRST + MESSAGE_SIZE + SIZE)  # of a message, and of one within the next
+    content = message(state(1)) + message(message(state(2)))
+    index = b"".join(struct.pack("<QQ", 1, start) for start in starts)
+    indexed = record(Opcode.MESSAGE_INDEX, struct.pack("<H", 1) + text(index))
+    with Recording(
+        bag_of(tmp_path / "bag", chunk(schema() + channel() + content), indexed)
+    ) as recording:
+        assert recording.joint_states.stamp.tolist() == [1]
+        assert not recording.complete
+
+
+@pytest.mark.parametrize("place", [0, 2**62, 2**63, 2**64 - 1])
+def test_an_index_of_tables_that_points_nowhere_is_no_fault(tmp_path: Path, place: int) -> None:
+    table = struct.pack("<QQ", place, 10) + text("stickslip_ros/analyzer")
+    attached = struct.pack("<QQQQQ", place, 10, 0, 0, 0) + text("a") + text("b")
+    summary = record(Opcode.METADATA_INDEX, table) + record(Opcode.ATTACHMENT_INDEX, attached)
+    end = DATA_END + summary + footer(len(HEADER + SOUND + DATA_END))
+    bag = bag_of(tmp_path / "bag", SOUND, end=end)
+    assert report_of_recording(bag)["samples"] == 499
+    assert repair(bag, tmp_path / "out").messages == {STATES: 499}
 
 
 def test_a_packed_file_does_not_fill_the_disk(
