@@ -38,7 +38,6 @@ from stickslip_ros.model.friction import (
     Exponential,
     FrictionLaw,
     LuGre,
-    RateState,
     Stiction,
     Stribeck,
 )
@@ -54,12 +53,7 @@ LAWS: dict[str, FrictionLaw] = {
     "coulomb": Coulomb(static=0.3029, viscous=0.807),
     "stiction": Stiction(static=0.4037, kinetic=0.2519, viscous=0.507),
     "lugre": LuGre(_CURVE, bristle_stiffness=2e4, bristle_damping=1.0),
-    "rate_state": RateState(
-        kinetic=0.3037, direct_effect=0.0103, evolution_effect=0.0211, slip_distance=2e-5
-    ),
 }
-ASKED = ("rate_state",)
-"""Laws that do not compete; in no case, but --cases takes them."""
 CASES = (
     *product(("stribeck", "exponential", "coulomb", "lugre"), ("ramp", "taps")),
     ("stribeck", "stick"),
@@ -161,8 +155,7 @@ def tried(law: str, kind: str, seed: int) -> dict[str, Any]:
     if kind == "stick":
         known["mass"] = MASS
     begun = time.process_time()
-    name = law if law in ASKED else AUTO
-    found: Findings = identify([record(law, kind, seed)], name, known, time_limit=inf)
+    found: Findings = identify([record(law, kind, seed)], AUTO, known, time_limit=inf)
     untold = unidentified(found)
     result: dict[str, Any] = {
         "law": found.law,

@@ -4,7 +4,7 @@ J. Colas et al., Physical Review E, 2019: a slider of 30.7 g on paper, pulled by
 stiffnesses at three speeds (`STICKSLIP_DATA`, or ../shared/data, has the records). Their cycles are
 not alike, so that no trajectory can be fitted. Each law is fitted to the median period and drop of
 two records, slip by slip, and then simulated for the others. Laws without a memory: stribeck,
-exponential; with one: lugre, rate_state. The smallest kinetic coefficient is the median of the
+exponential; with one: lugre. The smallest kinetic coefficient is the median of the
 measured ones: a drop says nothing of it.
 """
 
@@ -28,7 +28,6 @@ from stickslip_ros.model.friction import (
     Exponential,
     FrictionLaw,
     LuGre,
-    RateState,
     Stribeck,
 )
 from stickslip_ros.motion import Motion
@@ -91,10 +90,6 @@ LAWS: dict[str, Law] = {
             "stiffness": (3e3, 1e5),
             "damping": (0.1, 100.0),
         },
-    ),
-    "rate_state": Law(
-        lambda direct, evolution, distance: RateState(KINETIC, direct, evolution, distance),
-        {"direct": (3e-4, 0.03), "evolution": (3e-3, 0.06), "distance": (3e-7, 1e-4)},
     ),
 }
 """Laws with the constants that are searched, dimensionless and in m/s, s/m, 1/m and m."""

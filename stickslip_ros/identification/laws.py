@@ -1,14 +1,14 @@
 """Friction laws as they are identified: one adapter for each law."""
 
 from collections.abc import Mapping, Sequence
-from math import exp, inf, log, sqrt
+from math import exp, inf, sqrt
 
 import numpy as np
 from typing_extensions import override
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.identification.identified_law import LEAST_RISE, REVERSE, IdentifiedLaw, Values
-from stickslip_ros.model.friction import Directional, FrictionLaw, RateState, Table
+from stickslip_ros.model.friction import Directional, FrictionLaw, Table
 
 _LEAST_FRICTION = 0.01
 """Least friction of bristles at a speed, as a share of the largest."""
@@ -24,14 +24,7 @@ _STIFFNESS_RATIOS = (10.0, 100.0)
 """Stiffnesses of bristles from which the search starts, in stiffnesses of the spring."""
 _DAMPING_RATIO = 0.03
 """Damping of the bristles from which the search starts, as a share of the critical one."""
-_DIRECT_EFFECT, _LEAST_DIRECT_EFFECT = 0.03, 0.01
-"""Direct effect from which the search starts, as a share of the friction at the fastest speed; the
-least one, as a share of the friction at the reference speed."""
-_SLIP_DISTANCES, _LEAST_SLIP_DISTANCE = (0.03, 0.1), 1e-3
-"""Slip distances from which the search starts, and the least one, in amplitudes of the free
-vibration whose speed is the fastest one."""
 _BRISTLES = "bristle_stiffness", "bristle_damping"
-_REFERENCE_SPEED = float(RateState().reference_speed)
 
 
 class CoulombAdapter(IdentifiedLaw):
@@ -250,58 +243,6 @@ class BristleAdapter(ExponentialAdapter):
         return self.following(EXPONENTIAL.friction(values, normal_force), values, normal_force)
 
 
-class RateStateAdapter(IdentifiedLaw):
-    """F = F_k + (A - B) ln(w/v_0) in steady slip, of which A is immediate.
-
-    The reference speed v_0 is that by default: another one only changes F_k.
-    """
-
-    name = "rate_state"
-    least = 0.0, -inf
-    coordinates: Sequence[str] = (
-        "kinetic", "direct_effect", "evolution_effect", "slip_distance",
-    )  # fmt: skip
-    unscaled: Sequence[str] = ("slip_distance",)
-    smallest = "kinetic"
-    memory: Sequence[str] = coordinates[1:]
-
-    @override
-    def terms(self, speed: FloatArray, shape: float) -> FloatArray:
-        decades = np.log(np.maximum(speed / _REFERENCE_SPEED, 1.0))
-        return np.column_stack([np.ones_like(speed), decades])
-
-    @override
-    def coordinates_of(self, forces: Sequence[float], shape: float) -> dict[str, float]:
-        kinetic, slope = forces
-        return {
-            "kinetic": kinetic,
-            "direct_effect": max(slope, 0.0),
-            "evolution_effect": max(-slope, 0.0),
-        }
-
-    @override
-    def starts(self, values: Values, fastest: float) -> Sequence[Values]:
-        amplitude = fastest * sqrt(values["mass"] / values["stiffness"])
-        slope = values["direct_effect"] - values["evolution_effect"]
-        steady = values["kinetic"] + slope * log(fastest / _REFERENCE_SPEED)
-        direct = max(_DIRECT_EFFECT * steady, abs(slope))
-        effects = {"direct_effect": direct, "evolution_effect": direct - slope}
-        return [
-            {**values, **effects, "slip_distance": share * amplitude} for share in _SLIP_DISTANCES
-        ]
-
-    @override
-    def bounds(self, name: str, values: Values, fastest: float) -> tuple[float, float]:
-        if name == "slip_distance":
-            amplitude = fastest * sqrt(values["mass"] / values["stiffness"])
-            return _LEAST_SLIP_DISTANCE * amplitude, amplitude
-        if name == "direct_effect":
-            return _LEAST_DIRECT_EFFECT * values["kinetic"], inf
-        if name == "evolution_effect":
-            return 0.0, inf
-        return super().bounds(name, values, fastest)
-
-
 class DirectionalAdapter(IdentifiedLaw):
     """A law that has constants of its own in each direction of slip."""
 
@@ -385,7 +326,5 @@ COMPETING: Sequence[IdentifiedLaw] = (
     BristleAdapter("maxwell_slip", ("bristle_stiffness",)),
 )
 """Laws that compete, the simpler ones first. Those after LuGre are searched from what it gives."""
-KNOWN_LAWS: Mapping[str, IdentifiedLaw] = {
-    each.name: each for each in (*COMPETING, RateStateAdapter())
-}
+KNOWN_LAWS: Mapping[str, IdentifiedLaw] = {each.name: each for each in COMPETING}
 """All laws with constants by their name."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.measures.ring_down import RingDown
-from stickslip_ros.model.friction import Exponential, FrictionLaw, RateState, Stribeck
+from stickslip_ros.model.friction import Exponential, FrictionLaw, Stribeck
 from stickslip_ros.quantities import Quantity
 from stickslip_ros.text import quantity
 
@@ -31,7 +31,6 @@ _FAMILIES: Mapping[str, tuple[Callable[[FloatArray], FrictionLaw], int]] = {
     "stribeck": (lambda _: Stribeck(1.0, 0.0, 1.0), 2),
     "exponential, exponent 1": (lambda speed: Exponential(1.0, 0.0, speed), 3),
     "exponential, exponent 2": (lambda speed: Exponential(1.0, 0.0, speed, exponent=2.0), 3),
-    "rate_state": (lambda _: RateState(1.0, 1.0, 2.0), 2),
 }
 """Families of friction laws: the law for speeds, m/s, any multiple of which is in it; number of
 constants of the decay rate, of which viscous damping is one."""

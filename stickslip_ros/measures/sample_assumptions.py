@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.measures.breakpoints import STICK_SHARE
 from stickslip_ros.model.drive import UNBOUNDED_SPEED, Drive
-from stickslip_ros.model.friction import LAWS
+from stickslip_ros.model.friction import LAWS, WITHDRAWN
 from stickslip_ros.model.sensor import Sensor
 
 
@@ -49,9 +49,10 @@ def reading_of(
     """
     if given is None and not plant:
         return UNKNOWN
-    law = LAWS.get(str(plant.get("friction.law")))
+    name = str(plant.get("friction.law"))
+    has_memory = name in WITHDRAWN or (name in LAWS and bool(LAWS[name].states))
     known = SampleAssumptions(
-        (STICK_SHARE * fastest_belt or None) if law is not None and law.states else 0.0,
+        (STICK_SHARE * fastest_belt or None) if has_memory else 0.0,
         *_resolution(plant),
         any(k.endswith(".kind") and str(kind) in CHANGING_KINDS for k, kind in plant.items()),
         _unbounded_speed(plant),

@@ -28,16 +28,6 @@ def exp(x: Any) -> Any:
     return _function("exp", x)
 
 
-def log(x: Any) -> Any:
-    """Return the natural logarithm of a float, an array or an expression."""
-    return _function("log", x)
-
-
-def sqrt(x: Any) -> Any:
-    """Return the square root of a float, an array or an expression."""
-    return _function("sqrt", x)
-
-
 def sin(x: Any) -> Any:
     """Return the sine of a float, an array or an expression."""
     return float_sin(x) if isinstance(x, float) else _function("sin", x)

@@ -6,7 +6,7 @@ variational equations and the jumps of the derivatives at a guard.
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Hashable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from math import inf
 from typing import Any, NamedTuple, TypeVar
@@ -69,11 +69,6 @@ class Flow:
     """Expressions at whose zeros a recorded motion has breakpoints."""
     step_limiters: tuple[Any, ...] = ()
     """Expressions above zero whose series the steps of the integration resolve, too."""
-    slaved: Mapping[int, Any] = field(default_factory=dict[int, Any])
-    """Expressions of states, by index, that follow from the others; `HybridSystem.slave` sets them.
-
-    Their rates are zero, and nothing of the flow depends on them.
-    """
 
     @cached_property
     def transitions(self) -> tuple[Transition, ...]:
@@ -172,12 +167,6 @@ class HybridSystem(ABC):
 
     many_steps = False
     """Whether an integration takes many steps, which must not depend on what is recorded."""
-
-    slaves = False
-    """Whether a flow has slaved states, see `Flow`."""
-
-    def slave(self, mode: Mode, instant: Instant) -> None:  # noqa: B027 - none by default
-        """Set the slaved states of a mode, if it has any."""
 
     limits_steps = False
     """Whether `longest_step` limits the steps of the integration."""

@@ -9,7 +9,6 @@ from functools import partial
 from math import copysign, ulp
 
 from stickslip_ros.model.control import ContinuousControl
-from stickslip_ros.model.creeping_drive import CreepingDrive
 from stickslip_ros.model.dimensionless_drive import POSITION, SPEED
 from stickslip_ros.model.drive import Drive
 from stickslip_ros.model.drive_system import SLIP, SMALLEST_STEP, STICK, DriveSystem
@@ -35,8 +34,10 @@ class MotorFrictionSystem(DriveSystem):
         assert parts.drive.motor is not None
         (sign,) = parts.switches.motor
         slips, friction = sign * sign, parts.drive.motor.friction
-        speed = flow.slaved.get(SPEED, parts.speed)
-        held, (_, motor_speed) = parts.motor_held(speed), self.symbols.state[self.motor_states]
+        held, (_, motor_speed) = (
+            parts.motor_held(parts.speed),
+            self.symbols.state[self.motor_states],
+        )
         sticks = 1.0 - slips
         guards = (
             Guard(sticks + sign * (motor_speed - parts.belt_speed), kind.motor_reaches_guide),
@@ -123,7 +124,3 @@ class MotorFrictionSystem(DriveSystem):
 
     def _with_motor(self, mode: Mode, sign: float) -> Mode:
         return with_switches(mode, self._parts.motor.start, (sign,))
-
-
-class CreepingMotorFrictionSystem(MotorFrictionSystem, CreepingDrive):
-    """The same with a slide that creeps."""

@@ -2,15 +2,11 @@
 
 from stickslip_ros.model.control import ContinuousControl
 from stickslip_ros.model.control.base import TwoBodyControl
-from stickslip_ros.model.creeping_drive import CreepingDrive
 from stickslip_ros.model.dimensionless_drive import POSITION, SPEED
 from stickslip_ros.model.drive import Drive, ScaledDrive
 from stickslip_ros.model.drive_system import SLIP, STICK, DriveSystem
 from stickslip_ros.model.hybrid import Instant, Mode
-from stickslip_ros.model.motor_friction import (
-    CreepingMotorFrictionSystem,
-    MotorFrictionSystem,
-)
+from stickslip_ros.model.motor_friction import MotorFrictionSystem
 
 _STUCK, _FORWARD, _BACKWARD = Mode(STICK, (0.0,)), Mode(SLIP, (1.0,)), Mode(SLIP, (-1.0,))
 """All modes of such a drive."""
@@ -100,10 +96,9 @@ def drive_system(drive: Drive, control: ContinuousControl | None = None) -> Driv
     if isinstance(drive, ScaledDrive):
         return DriveSystem(drive, control)
     law, moves, motor = drive.friction, drive.belt.pieces or drive.load.pieces, drive.motor
-    creeps = bool(law.rate_sensitivity)
     if motor is not None and motor.sticks:
-        return (CreepingMotorFrictionSystem if creeps else MotorFrictionSystem)(drive, control)
+        return MotorFrictionSystem(drive, control)
     plain = not moves and not law.states and not law.switches and not drive.actuator.states
     if plain and motor is None:
         return PlainDriveSystem(drive, control)
-    return (CreepingDrive if creeps else DriveSystem)(drive, control)
+    return DriveSystem(drive, control)

@@ -174,15 +174,13 @@ class _Finder:
 
 
 class FlowRates:
-    """Rates of a flow, and the gradients of them, of its margins and of its slaved states."""
+    """Rates of a flow, and the gradients of them and of its margins."""
 
     def __init__(self, system: HybridSystem, name: str) -> None:
         """Compile them for an instant at which an integration starts."""
         flow, still = system.shared_flow(name), {hy.time: hy.expression(0.0)}
-        self.slaved = tuple(flow.slaved)
-        """Indices of the slaved states; their gradients come after those of the margins."""
         by = [*_variations(system), hy.par[system.index["epoch"]]]  # added to the time everywhere
-        rows = [*flow.rates, *(guard.margin for guard in flow.guards), *flow.slaved.values()]
+        rows = [*flow.rates, *(guard.margin for guard in flow.guards)]
         found = [*flow.rates, *(hy.diff(row, each) for row in rows for each in by)]
         self._order, self._count = len(system.states), len(by)
         self._compiled = hy.cfunc([hy.subs(each, still) for each in found], list(system.variables))
@@ -191,7 +189,7 @@ class FlowRates:
         """Return the rates, as the state (n, ...), and the gradients.
 
         A row of the gradients has the derivatives by the states, the free constants and the time;
-        the shape is (rates, margins and slaved states; derivatives; ...).
+        the shape is (rates and margins; derivatives; ...).
         """
         found = evaluated(self._compiled, state, parameters)
         order = self._order

@@ -153,7 +153,6 @@ class HybridMotion:
             self._enter(mode)
         epoch, now, elapsed, self._begun = instant.time, 0.0, 0.0, 0.0
         limits_steps, clocked, has_parts = system.limits_steps, self._clocked, system.has_parts
-        slaves = system.slaves
         longest = LONGEST_STEP if duration > LONGEST_STEP and not clocked else inf
         repeats = duration > _SHORTEST_REPEATED and not (clocked or self._derives)
         recurrence = Recurrence() if repeats else None
@@ -196,9 +195,6 @@ class HybridMotion:
                         guard, now = _DIVERGENCE, self._begun + elapsed
                     else:
                         guard, now = -outcome - 1, self._begun + elapsed
-            if slaves:
-                instant.time = epoch + now
-                system.slave(mode, instant)
             if guard is None:
                 following = mode
                 if now >= corner:

@@ -52,8 +52,6 @@ def short_step(
             return False
 
         return move
-    if system.slaves:
-        return lambda duration, force: False
     taylor, step, propagate = flow.taylor, flow.taylor.step, flow.taylor.propagate_until
     parameters, epoch = flow.parameters, flow.epoch
     limits_steps, longest_step = system.limits_steps, system.longest_step

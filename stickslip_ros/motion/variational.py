@@ -135,11 +135,9 @@ class VariationalMotion(RecordedMotion):
         normal = own[:order] @ found
         normal[order:] += own[order:-1]
         rate = float(own[:order] @ before + own[-1])
-        reset = self._enslaving(following)
-        found = reset @ found
         if abs(rate) > _GRAZING_RATE:
             after, _ = self._rates(following)
-            change: Any = np.outer((after - reset @ before) / rate, normal)
+            change: Any = np.outer((after - before) / rate, normal)
             found += change
         self._found, self._holder = found, None
 
@@ -150,18 +148,7 @@ class VariationalMotion(RecordedMotion):
         """
         state, instant = self.state if state is None else state, self._instant
         parameters = parameter_values(self._system, mode, instant.inputs, instant.time)
-        rates, gradients = flow_rates(self._system, mode.flow).at(state, parameters)
-        return self._enslaving(mode, gradients) @ rates, gradients
-
-    def _enslaving(self, mode: Mode, gradients: FloatArray | None = None) -> FloatArray:
-        """Return the derivatives of the state by itself where a mode sets its slaved states."""
-        found = np.eye(self.order)
-        flow = flow_rates(self._system, mode.flow)
-        if flow.slaved:
-            if gradients is None:
-                _, gradients = self._rates(mode)
-            found[list(flow.slaved)] = gradients[-len(flow.slaved) :, : self.order]
-        return found
+        return flow_rates(self._system, mode.flow).at(state, parameters)
 
 
 class ShootingMotion(VariationalMotion):
@@ -258,12 +245,12 @@ class ShootingMotion(VariationalMotion):
         return min(end, now + _LONGEST_SLIP) if self._mode.flow == SLIP else end
 
     def _pass(self, mode: Mode, guard: int | None, following: Mode | None, now: float) -> None:
-        self._found = self._enslaving(mode) @ self._integrated(self._flow) @ self._found
+        self._found = self._integrated(self._flow) @ self._found
         super()._pass(mode, guard, following, now)
         if not self._system.sticks:
             self._effort += _EFFORT_OF_A_STEP * (self._steps_before - self._steps_left)
         elif mode.flow == SLIP:
-            # A slide that begins to creep is put at the speed of creep, maybe beyond the belt's.
+            # What follows may have set the speed, beyond that of the belt.
             state = self.state if guard is None else self._at_guard
             _, gradients = self._rates(mode, state)
             self._effort += (now - self._begun) * (1.0 + abs(float(gradients[SPEED, SPEED])))

@@ -18,6 +18,7 @@ from stickslip_ros.model.constants import (
 )
 from stickslip_ros.model.friction import (
     LAWS,
+    WITHDRAWN,
     CurveFollower,
     Directional,
     FrictionLaw,
@@ -93,7 +94,9 @@ class ReverseFriction(_constants_of_laws(reverse=True)):
 
 @dataclass(frozen=True)
 class _ChosenLaw(ParameterGroup):
-    law: str = constant("stribeck", "Friction law.", choices=LAWS, refused=FRICTION_LAWS.refused)
+    law: str = constant(
+        "stribeck", "Friction law.", choices=LAWS, refused=WITHDRAWN | FRICTION_LAWS.refused
+    )
     curve: str = constant(
         "exponential",
         f"Static law that a law with a memory has in steady slip ({', '.join(_FOLLOWERS)}).",

@@ -45,12 +45,6 @@ class ParameterGroup:
         path. Raises InvalidInputError that names `source`, parameter, value and what is allowed.
         """
         known = self.known
-        for name, value in values.items():
-            if name not in known:
-                raise InvalidInputError(
-                    f"{source}: unknown parameter {name:.80} = {shown(value)}; "
-                    f"{did_you_mean(name, known, f'known are {by_group(known)}')}"
-                )
         complaints: list[str] = []
         taken: dict[str, Any] = {}
         for name in filter(values.__contains__, known):
@@ -58,6 +52,12 @@ class ParameterGroup:
                 taken[name] = checked(known[name], values[name])
             except InvalidInputError as error:
                 complaints.append(str(error))
+        for name, value in values.items():
+            if name not in known and not complaints:  # it may be of a choice that is refused
+                raise InvalidInputError(
+                    f"{source}: unknown parameter {name:.80} = {shown(value)}; "
+                    f"{did_you_mean(name, known, f'known are {by_group(known)}')}"
+                )
         if not complaints:
             reads = "file" in known or any("." in name for name in taken)
             curves_now = self.curves() if reads else {}

@@ -13,14 +13,13 @@ LAWS: Mapping[str, Mapping[str, float]] = {
     "lugre": {"bristle_stiffness": 1e5, "bristle_damping": 100.0},
     "elasto_plastic": {"bristle_stiffness": 1e5, "bristle_damping": 100.0},
     "maxwell_slip": {"bristle_stiffness": 1e5, "attraction": 1000.0, "elements": 2},
-    "rate_state": {"slip_distance": 1e-5, "evolution_effect": 0.03},
 }
 CURVE: Mapping[str, Any] = {"curve": "exponential", "decay_speed": 0.02, "kinetic": 0.25}
 
 
 def options(law: str, **others: float) -> list[str]:
     """Overrides of feed_drive that give it a law."""
-    values = {**LAWS[law], **({} if law in ("dahl", "rate_state") else CURVE), **others}
+    values = {**LAWS[law], **({} if law == "dahl" else CURVE), **others}
     pairs = {"law": law, **values}
     return [f"-p=plant.friction.{name}={value}" for name, value in pairs.items()]
 

@@ -9,7 +9,6 @@ import pytest
 from stickslip_ros.record.reader import Recording
 from tests.app.conftest import Run
 
-SLIPS = "-p plant.friction.slip_distance=1e-5 -p plant.friction.evolution_effect=0.03"
 LATE = "-p washout_controller.start_after=1.0 --duration 1.5"
 ENCODER = (
     "-p plant.sensor.position_resolution=1e-6 -p plant.sensor.position_noise=1e-7 "
@@ -25,7 +24,7 @@ RUNS: Mapping[str, tuple[str, str]] = {
     "load": ("vibrating_load --duration 1.8", ""),
     "no spring": ("axis -p plant.initial.position=1e-3 --duration 1.5", "--composed"),
     "motor": ("feed_drive_motor -p plant.motor.sensor.position_resolution=1e-6 --duration 1.5", ""),
-    "rate and state": (f"feed_drive -p plant.friction.law=rate_state {SLIPS} {LATE}", ""),
+    "bristles": (f"feed_drive -p plant.friction.law=lugre {LATE}", ""),
     "sensor and actuator": (f"feed_drive {ENCODER} {DRIVE} {LATE}", ""),
     "sensor and actuator, composed": (f"feed_drive {ENCODER} {DRIVE} {LATE}", "--composed"),
 }
@@ -61,7 +60,7 @@ def test_nodes_in_lockstep_give_what_simulate_does(
     if measured:
         assert simulated["truth"]["regime"] == "stick_slip"
         assert 50.0 < np.abs(applied.force).max() <= 100.0 < np.abs(commands.force).max()
-    assert (stick_speed == "0.0004") == (name == "rate and state")
+    assert (stick_speed == "0.0004") == (name == "bristles")
     found = stickslip.json("report", "bag")
     for measure in ("amplitude", "period", "stick_fraction", "regime"):
         assert found[measure] == run["report"][measure], measure

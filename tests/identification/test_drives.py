@@ -167,16 +167,6 @@ def test_the_exponent_of_a_decay(
         assert abs(each.value - true[name]) < _FAR * each.standard_error, name
 
 
-def test_rate_and_state_friction_is_recovered() -> None:
-    own = study.record("rate_state", "ramp", seed=0, duration=2.5)
-    found = identify([own], "rate_state", {"normal_force": study.NORMAL_FORCE})
-    assert {"friction.direct_effect", "friction.slip_distance"} < {*found.fitted}
-    true = study.truth("rate_state", "ramp")
-    for name, each in found.fitted.items():
-        assert abs(each.value - true[name]) < _FAR * each.standard_error, name
-        assert each.standard_error < 0.2 * true[name], name
-
-
 def test_what_stick_slip_at_one_belt_speed_tells(stick: Findings) -> None:
     """A slide on a belt that moves forward slips backward."""
     check_constants(stick, study.truth("stribeck", "stick"))

@@ -21,6 +21,7 @@ MEMORY = {"friction.law": "lugre", "belt_speed": -0.04}
         ({**STATIC, "sensor.velocity": "exact"}, 0.04, SampleAssumptions(0.0, noisy=False)),
         (MEMORY, 0.0, SampleAssumptions(None, noisy=False)),
         (MEMORY, 0.05, SampleAssumptions(5e-4, noisy=False)),
+        ({**MEMORY, "friction.law": "rate_state"}, 0.05, SampleAssumptions(5e-4, noisy=False)),
         ({**MEMORY, **ENCODER}, 0.05, SampleAssumptions(5e-4, noisy=True)),
     ],
 )

@@ -12,7 +12,7 @@ interpolation nor a kink of the equations costs accuracy.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from math import asinh, exp, floor, log, pi, sin
+from math import pi, sin
 from typing import Any
 
 import numpy as np
@@ -130,44 +130,6 @@ class MaxwellSlip(Law):
         return [0.0] * self.elements
 
 
-@dataclass(frozen=True)
-class RateState:
-    """The memory is the age th, s, as its logarithm.
-
-    The second number of a mode counts the factors of a thousand by which the speed has fallen: near
-    zero the steps of a solver are shorter than the rounding of a time that starts earlier.
-    """
-
-    kinetic: float
-    direct: float
-    evolution: float
-    distance: float
-    reference: float
-
-    def coefficient(self, v: float, z: Sequence[float], mode: Mode) -> float:
-        psi = self.kinetic + self.evolution * (log(self.reference / self.distance) + z[0])
-        return self.direct * asinh(v / (2.0 * self.reference) * exp(psi / self.direct))
-
-    def rates(self, v: float, z: Sequence[float], mode: Mode) -> Sequence[float]:
-        return [exp(-z[0]) - mode[0] * v / self.distance]
-
-    def mode(self, s: float, v: float, z: Sequence[float]) -> Mode:
-        fallen = log(1e-3 * self.distance / max(s * v, 1e-300)) / log(1e3)
-        return (s, float(min(max(floor(fallen) + 1, 0), 6)))
-
-    def guards(self, v: float, z: Sequence[float], mode: Mode) -> list[tuple[float, Mode]]:
-        s, steps = mode
-        threshold = self.distance * 1e-3**steps * 1e-3  # of the order of a slow speed, in m/s
-        fallen = log(max(s * v, 1e-300) / threshold)
-        found = [(fallen, (s, steps + 1.0))] if steps < 6.0 else []
-        if steps:
-            found.append((log(3e4) - fallen, (s, steps - 1.0)))
-        return found
-
-    def start(self, v: float) -> list[float]:
-        return [log(self.distance / max(abs(v), self.reference))]
-
-
 class LostError(Exception):
     """The solver has lost the motion: it must not be compared with."""
 
@@ -202,8 +164,7 @@ class MemoryDrive:
         v = velocity - self.belt_speed
         law = self.law(v)
         state = np.array([position, v, *law.start(v)])
-        speed = 1e-20 if isinstance(law, RateState) else self._speed
-        self._atol = 1e-3 * self.rtol * np.array([self._length, speed, *self._scales(law)])
+        self._atol = 1e-3 * self.rtol * np.array([self._length, self._speed, *self._scales(law)])
         if v == 0.0:
             mode = self._reversed(state)
         else:
@@ -218,8 +179,6 @@ class MemoryDrive:
         return states
 
     def _scales(self, law: Any) -> list[float]:
-        if isinstance(law, RateState):
-            return [1e3]
         return [law.curve(0.0) / law.stiffness] * len(law.start(0.0))
 
     def _reversed(self, state: Array) -> Mode:

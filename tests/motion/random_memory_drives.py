@@ -8,7 +8,7 @@ from math import sqrt
 from typing import Any
 
 import numpy as np
-from scipy.integrate import DOP853, Radau
+from scipy.integrate import DOP853
 
 from stickslip_ros.model import friction
 from stickslip_ros.model.drive import Drive
@@ -17,7 +17,7 @@ from tests.motion import memory_reference
 from tests.motion.memory_reference import Array, Curve, MemoryDrive
 from tests.motion.random_drives import Random, Units, random_law, random_units
 
-LAWS = ("dahl", "lugre", "elasto_plastic", "maxwell_slip", "rate_state")
+LAWS = ("dahl", "lugre", "elasto_plastic", "maxwell_slip")
 CURVES = ("exponential", "exponent", "stribeck", "coulomb", "table")
 PERIODS = 20
 SAMPLES = 4
@@ -41,16 +41,6 @@ def random_memory_law(
 ) -> tuple[Any, Any]:
     """Return a law, and one direction of the reference; `shared` is equal in both directions."""
     length, speed, rate = units.length, units.speed, units.rate
-    if name == "rate_state":
-        direct = float(draw.uniform(0.01, 0.05))
-        numbers = {
-            "kinetic": float(draw.uniform(0.2, 0.5)),
-            "direct_effect": direct,
-            "evolution_effect": direct * float(draw.uniform(0.5, 2.5)),
-            "slip_distance": shared["length"] * length,
-            "reference_speed": shared["speed"] * speed,
-        }
-        return friction.RateState(**numbers), memory_reference.RateState(*numbers.values())
     stiffness = shared["stiffness"] / length
     if name == "dahl":
         static = float(draw.uniform(0.3, 0.6))
@@ -92,7 +82,6 @@ class RandomMemoryDrive:
     def reference(self, rtol: float) -> Array:
         """Return position and velocity at `times` by scipy."""
         drive = self.drive
-        solver = Radau if isinstance(self.forward, memory_reference.RateState) else DOP853
         return MemoryDrive(
             drive.mass,
             drive.damping,
@@ -101,7 +90,7 @@ class RandomMemoryDrive:
             drive.belt_speed,
             self.forward,
             self.backward,
-            solver=solver,
+            solver=DOP853,
             rtol=rtol,
         ).run(self.position, self.velocity, self.times)
 
@@ -130,9 +119,8 @@ def random_memory_drive(law: str, seed: int) -> RandomMemoryDrive:
         "damping": float(draw.uniform(0.0, 1.0)),
         "elements": float(draw.integers(1, 6)),
         "attraction": float(10.0 ** draw.uniform(0.5, 2.0)),
-        "length": float(10.0 ** draw.uniform(-3.0, -1.5)),
-        "speed": float(10.0 ** draw.uniform(-6.0, -4.0)),
     }
+    draw.uniform(size=2)  # as when the committed results were made
     curve = CURVES[seed % len(CURVES)]
     made, forward = random_memory_law(law, draw, units, shared, curve)
     backward = forward

@@ -1,4 +1,4 @@
-"""Presliding: hysteresis, drift and creep of a slide that no spring holds, below break-away.
+"""Presliding: hysteresis and drift of a slide that no spring holds, below break-away.
 
 Strong damping lets the slide follow each step of the force in one direction. Friction that does not
 depend on the rate then has no other path than for a slow force, and the formulas hold exactly.
@@ -21,7 +21,6 @@ from stickslip_ros.model.friction import (
     FrictionObserver,
     LuGre,
     MaxwellSlip,
-    RateState,
 )
 from stickslip_ros.model.signals import NO_SIGNAL, step
 from stickslip_ros.motion import Motion
@@ -94,26 +93,6 @@ def test_a_load_below_break_away_moves_a_dahl_contact_by_its_logarithm() -> None
     """From z' = v (1 - S z/f_c): S x = -f_c ln(1 - 0.9), 2.303 f_c."""
     (found,) = displacements(Dahl(COEFFICIENT, STIFFNESS), [0.9 * LIMIT], hold=100.0)
     assert found == pytest.approx(DEFLECTION * log(10.0), rel=1e-9)
-
-
-@pytest.mark.parametrize("load", [0.5, 0.55, 0.6])
-def test_a_rate_and_state_contact_creeps_logarithmically(load: float) -> None:
-    """With a = b the age grows at the rate 1 - q, q = exp((load - f_0)/a), and v = q L/th."""
-    effect, length, reference = 0.02, 1e-5, 1e-6
-    law = RateState(0.6, effect, effect, length, reference)
-    drive = Drive(1.0, 0.0, 0.0, NORMAL, 0.0, law)
-    motion, times = Motion(drive, 0.0, 0.0), [1.0, 10.0, 1000.0]
-    motion.force = load * NORMAL
-    rate = exp((load - 0.6) / effect)
-    for before, time in zip([0.0, *times], times, strict=False):
-        motion.advance(time - before)
-        age = length / reference + (1.0 - rate) * time
-        if rate == 1.0:
-            expected = rate * reference * time
-        else:
-            expected = rate * length / (1.0 - rate) * log(age * reference / length)
-        if age > 0.0 and (1.0 - rate) * time > -0.9 * length / reference:
-            assert motion.position == pytest.approx(expected, rel=1e-6)
 
 
 @pytest.mark.parametrize("by_signal", [True, False])

@@ -57,6 +57,16 @@ def test_a_file_that_is_no_parameter_file(tmp_path: Path) -> None:
         assert fragment in message
 
 
+def test_a_law_of_earlier_versions_is_named_before_its_constants(tmp_path: Path) -> None:
+    path = scenario_file(
+        tmp_path, section("/**/plant", "{friction.law: rate_state, friction.direct_effect: 0.01}")
+    )
+    assert refusal(path) == (
+        f"{path}, plant: friction.law = 'rate_state' is invalid: the last versions that had this "
+        "law are those of 0.2.0 before its release"
+    )
+
+
 def test_every_bad_value_is_named(tmp_path: Path) -> None:
     message = refusal(
         scenario_file(tmp_path, section("/**/plant", "{mass: 0, damping: -1, rate: 10}"))

@@ -8,9 +8,7 @@ import pytest
 
 from stickslip_ros.measures import CycleMeter
 from stickslip_ros.model.control import Washout
-from stickslip_ros.model.dimensionless_drive import POSITION, SPEED
 from stickslip_ros.model.drive import Drive
-from stickslip_ros.model.drive_system import SLIP
 from stickslip_ros.model.friction import (
     Dahl,
     ElastoPlastic,
@@ -18,16 +16,12 @@ from stickslip_ros.model.friction import (
     FrictionLaw,
     LuGre,
     MaxwellSlip,
-    RateState,
 )
-from stickslip_ros.model.hybrid import Mode
-from stickslip_ros.model.plain_drive import drive_system
 from stickslip_ros.motion import RecordedMotion
-from stickslip_ros.motion.compiled_flow import parameter_values
 from stickslip_ros.theory.critical_gains import critical_gains, limit_cycle_from_hopf
 from stickslip_ros.theory.hopf import hopf_points
 from stickslip_ros.theory.limit_cycles import limit_cycles
-from stickslip_ros.theory.linear import equilibria, expand
+from stickslip_ros.theory.linear import expand
 from stickslip_ros.theory.shooting import LimitCycle, shoot
 
 CURVE = Exponential(static=0.4, kinetic=0.25, decay_speed=0.02)
@@ -35,7 +29,6 @@ FEED = Drive(100.0, 200.0, 1e6, 1000.0, 0.04, LuGre(CURVE, 1e5, 100.0))
 """The slide of a machine tool, with bristles of 4 um."""
 MAXWELL_SLIP = replace(FEED, friction=MaxwellSlip(CURVE, 1e5, 3, 1000.0))
 ELASTO_PLASTIC = replace(FEED, friction=ElastoPlastic(CURVE, 1e5, 100.0))
-CREEPING = Drive(1.0, 0.05, 1.0, 1.0, 0.03, RateState(0.3, 0.005, 0.02, 1e-4, 1e-6))
 GAINS = Washout(20.0, linear_gain=-3000.0, cubic_gain=0.0)
 
 LAWS = [
@@ -43,7 +36,6 @@ LAWS = [
     ELASTO_PLASTIC.friction,
     MAXWELL_SLIP.friction,
     Dahl(0.4, 1e5),
-    RateState(0.3, 0.01, 0.03, 1e-4, 1e-6),
 ]
 
 
@@ -75,28 +67,6 @@ def test_the_jacobian_is_the_derivative_of_the_motion(law: FrictionLaw) -> None:
             ends.append(np.array([motion.position, motion.velocity]) / units[:2])
         found = (ends[0] - ends[1]) / (2.0 * size)
         np.testing.assert_allclose(found, expected[:2, column], rtol=2e-4, atol=2e-4)
-
-
-@pytest.mark.parametrize("damping", [0.0, 0.2])
-def test_the_critical_stiffness_of_rate_and_state(damping: float) -> None:
-    """Rice and Ruina, J. Appl. Mech. 50, 1983: k_c = (N (b-a) - c V)/L (1 + m V^2/((N a + c V) L)).
-
-    Without damping it is N (b-a)/L (1 + m V^2/(N a L)).
-    """
-    a, b, length = 0.01, 0.03, 1e-4
-    law = RateState(0.6, a, b, length, 1e-6)
-    drive = Drive(2.0, damping, 350.0, 1.5, 0.01, law)
-    point, *others = hopf_points(drive)
-    speed, drag = point.belt_speed, damping * point.belt_speed
-    inertia = drive.mass * speed**2 / ((drive.normal_force * a + drag) * length)
-    critical = (drive.normal_force * (b - a) - drag) / length * (1.0 + inertia)
-    assert critical == pytest.approx(drive.stiffness, rel=1e-6)
-    # Where damping balances the friction that falls, fast slip becomes stable again.
-    balance = [drive.normal_force * (b - a) / damping] if damping else []
-    assert [each.belt_speed for each in others] == pytest.approx(balance, rel=1e-3)
-    slower = expand(replace(drive, belt_speed=0.99 * speed))
-    faster = expand(replace(drive, belt_speed=1.01 * speed))
-    assert (slower.stable, faster.stable) == (True, False)
 
 
 def test_stiff_bristles_have_the_hopf_speed_of_the_curve() -> None:
@@ -176,25 +146,6 @@ def test_the_multiplier_of_an_unstable_cycle() -> None:
     assert not unstable.stable
     assert abs(unstable.multipliers[0]) > 1.0
     assert by_differences(drive, unstable) == pytest.approx(unstable.multipliers[0].real, rel=1e-3)
-
-
-def test_a_cycle_that_creeps() -> None:
-    cycles = [cycle for cycle in limit_cycles(CREEPING) if cycle.stable]
-    assert len(cycles) == 1
-    amplitude, period, _ = cycle_by_simulation(CREEPING, 300.0)
-    measures = cycles[0].measures
-    assert (measures.amplitude, measures.period) == pytest.approx((amplitude, period), rel=1e-8)
-    multiplier = cycles[0].multipliers[0].real
-    assert by_differences(CREEPING, cycles[0]) == pytest.approx(multiplier, abs=1e-4)
-
-
-def test_the_equilibrium_of_a_creeping_slide_has_no_speed() -> None:
-    system = drive_system(CREEPING)
-    mode = Mode(SLIP, (-1.0,))  # rounding of the speed, which differs by processor, has a sign
-    parameters = parameter_values(system, mode, [0.0] * len(system.inputs))
-    state = equilibria(system, parameters[:, np.newaxis])
-    assert state[SPEED, 0] == 0.0
-    assert state[POSITION, 0] != 0.0
 
 
 def test_a_cycle_from_the_hopf_point_of_the_gain() -> None:

@@ -1,11 +1,6 @@
 """The friction laws, each with an entry in `LAWS`."""
 
-from stickslip_ros.model.friction.base import (
-    FrictionCreep,
-    FrictionLaw,
-    FrictionMemory,
-    SteadyFriction,
-)
+from stickslip_ros.model.friction.base import FrictionLaw, FrictionMemory, SteadyFriction
 from stickslip_ros.model.friction.coulomb import Coulomb
 from stickslip_ros.model.friction.dahl import Dahl
 from stickslip_ros.model.friction.directional import Directional
@@ -15,7 +10,6 @@ from stickslip_ros.model.friction.linear import Linear
 from stickslip_ros.model.friction.lugre import CurveFollower, LuGre, SteadyPart
 from stickslip_ros.model.friction.maxwell_slip import MaxwellSlip
 from stickslip_ros.model.friction.observer import FrictionObserver
-from stickslip_ros.model.friction.rate_state import RateState
 from stickslip_ros.model.friction.stiction import Stiction
 from stickslip_ros.model.friction.stribeck import Stribeck
 from stickslip_ros.model.friction.table import Table
@@ -33,7 +27,6 @@ LAWS: dict[str, type[FrictionLaw]] = {
         LuGre,
         ElastoPlastic,
         MaxwellSlip,
-        RateState,
     )
 }
 """Every friction law by the name it has in parameters.
@@ -41,22 +34,26 @@ LAWS: dict[str, type[FrictionLaw]] = {
 `stickslip_ros.scenarios.parameters` adds those of other packages, found by their entry points.
 """
 
+WITHDRAWN = {
+    "rate_state": "the last versions that had this law are those of 0.2.0 before its release"
+}
+"""Laws, with a memory, of bags and scenarios of earlier versions: what to say of each."""
+
 __all__ = [
     "LAWS",
+    "WITHDRAWN",
     "Coulomb",
     "CurveFollower",
     "Dahl",
     "Directional",
     "ElastoPlastic",
     "Exponential",
-    "FrictionCreep",
     "FrictionLaw",
     "FrictionMemory",
     "FrictionObserver",
     "Linear",
     "LuGre",
     "MaxwellSlip",
-    "RateState",
     "SteadyFriction",
     "SteadyPart",
     "Stiction",

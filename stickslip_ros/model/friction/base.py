@@ -1,4 +1,4 @@
-"""The base of the friction laws: friction in steady slip, its memory and its creep."""
+"""The base of the friction laws: friction in steady slip, and its memory."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
@@ -255,63 +255,16 @@ class FrictionMemory(SteadyFriction):
         return self.switches_at(relative_speed, sign, memory)
 
 
-class FrictionCreep(FrictionMemory):
-    """The creep of a law whose viscosity grows without bound as the slide slows down.
-
-    Such a law gives all three; by default there is no creep.
-    """
-
-    @property
-    def rate_sensitivity(self) -> Any:
-        """Increase of |mu| where the speed grows e-fold at constant memory, in creep.
-
-        Zero for a law without creep.
-        """
-        return 0.0
-
-    def creep_speed(self, coefficient: Any, sign: Any, memory: Values) -> Any:
-        """Return the relative speed at which friction has a coefficient: the inverse of `friction`.
-
-        Parameters
-        ----------
-        coefficient : float or expression
-            Coefficient with the sign of the force on the slide, dimensionless.
-        sign, memory
-            As in `friction`.
-
-        Returns
-        -------
-        float or expression
-            Speed v_r of the slide relative to the belt, m/s.
-        """
-        raise NotImplementedError
-
-    def creep_limit(self, relative_speed: Any, sign: Any, memory: Values) -> Any:
-        """Return `rate_sensitivity` divided by the viscosity -d mu/d v_r.
-
-        Parameters
-        ----------
-        relative_speed, sign, memory
-            As in `friction`.
-
-        Returns
-        -------
-        float or expression
-            Speed, m/s, above zero; |v_r| where the coefficient is logarithmic.
-        """
-        raise NotImplementedError
-
-
 @dataclass(frozen=True)
-class FrictionLaw(FrictionCreep):
+class FrictionLaw(FrictionMemory):
     """Friction law: the friction coefficient as a function of the relative speed.
 
     A law is a frozen dataclass of its constants, each described by `constant`. Its equations are
     written once; they accept floats, numpy arrays and heyoka expressions, and so do the constants.
     Coefficients have the sign of the force on the slide: below zero while v_r > 0.
 
-    What a law gives is said by `SteadyFriction`, for one with a memory or in pieces also by
-    `FrictionMemory`, and for one that creeps by `FrictionCreep`.
+    What a law gives is said by `SteadyFriction`, and for one with a memory or in pieces also by
+    `FrictionMemory`.
 
     Examples
     --------

@@ -73,8 +73,6 @@ class Directional(FrictionLaw):
     switches_at = _of_direction(FrictionLaw.switches_at)
     switches_after = _of_direction(FrictionLaw.switches_after)
     switches_following = _of_direction(FrictionLaw.switches_following)
-    creep_speed = _of_direction(FrictionLaw.creep_speed)
-    creep_limit = _of_direction(FrictionLaw.creep_limit)
 
     def __post_init__(self) -> None:
         if type(self.forward) is not type(self.reverse):
@@ -96,11 +94,6 @@ class Directional(FrictionLaw):
     def characteristic_speed(self) -> float:
         """The smaller one of both laws, m/s."""
         return min(self.forward.characteristic_speed, self.reverse.characteristic_speed)
-
-    @property
-    def rate_sensitivity(self) -> Any:
-        """The smaller one of both laws."""
-        return min(self.forward.rate_sensitivity, self.reverse.rate_sensitivity)
 
     def warning(self) -> str | None:
         """Return the warning of either law; see `SteadyFriction.warning`."""
