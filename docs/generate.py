@@ -20,7 +20,7 @@ from stickslip_ros.record.topics import TOPICS
 from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, NodeParameters, ReplayParameters
 from stickslip_ros.studies.stability import stability
-from stickslip_ros.theory.closed_forms import CubicLoop
+from stickslip_ros.theory.linear import expand
 
 HERE = Path(__file__).parent
 PAGES = (
@@ -148,14 +148,14 @@ def numbers() -> Iterator[str]:
     """Yield what `stickslip stability paper` finds, with the symbols of the page."""
     scenario = load_scenario("paper")
     found, _ = stability(scenario)
-    cubic = CubicLoop.from_drive(scenario.plant.as_drive())
-    assert cubic is not None
+    drive = scenario.plant.as_drive().dimensionless
+    drop, speed = drive.friction.static - drive.friction.minimum, drive.friction.minimum_speed
     opened, closed, sampled = (found[f"{loop}_loop"] for loop in ("open", "closed", "sampled"))
     (cycle,), sticking = opened["limit_cycles"], found["sticking"]
     rows: dict[str, Any] = {
-        "$a$, $b$": (cubic.slope, cubic.cubic),
+        "$a$, $b$": (1.5 * drop / speed, 0.5 * drop / speed**3),
         "equilibrium $X_0$, eq. 6": found["equilibrium_position"],
-        "trace $p$, eq. 8": cubic.trace,
+        "trace $p$, eq. 8": float(expand(drive).jacobian.trace()),
         "eigenvalues of the open loop": _complex(opened["eigenvalues"]),
         "critical feed speed (Hopf) $v_{b1}$": opened["hopf_speeds"],
         "$d \\mathrm{Re} \\lambda / d v_0$ there, eq. 11": opened["crossing_speeds"],

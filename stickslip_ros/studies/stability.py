@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from math import copysign, inf, isclose, isnan
+from math import inf, isclose, isnan
 from operator import attrgetter
 from typing import Any, NamedTuple, TypeVar, cast
 
@@ -13,11 +13,11 @@ from stickslip_ros.model.actuator import IDEAL_ACTUATOR
 from stickslip_ros.model.control import ControlLaw
 from stickslip_ros.model.dimensionless_drive import POSITION, SPEED
 from stickslip_ros.model.drive import Drive
+from stickslip_ros.model.friction import Stribeck
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.scenarios.parameters import PlantParameters
 from stickslip_ros.text import quantity
 from stickslip_ros.theory.bifurcation_branches import BifurcationBranches
-from stickslip_ros.theory.closed_forms import CubicLoop
 from stickslip_ros.theory.critical_gains import (
     critical_gains,
     limit_cycle_from_hopf,
@@ -40,6 +40,7 @@ from stickslip_ros.theory.linear_system import (
 )
 from stickslip_ros.theory.requirements import (
     AUTONOMOUS,
+    ONE_DEGREE,
     ONE_MASS,
     SMOOTH,
     NotCoveredError,
@@ -84,16 +85,17 @@ def stability(scenario: Scenario) -> tuple[Section, Notes]:
     require("the theory of stability", drive, AUTONOMOUS)
     law, (expansion, lack) = scenario.control_law, _covered(lambda: expand(drive))
     position = drive.equilibrium_position if expansion else None
-    return _separated(
+    found, notes = _separated(
         {
             "equilibrium_position": _Noted(position, lack or _held(drive)),
             "open_loop": _open_loop(drive, expansion, lack),
             "sticking": _sticking(drive),
             "closed_loop": _closed_loop(drive, law, plant),
             "sampled_loop": _sampled_loop(drive, law, plant),
-            "closed_forms": _closed_forms(drive, law),
         }
     )
+    forms, more = _separated({"closed_forms": _closed_forms(drive, found)})
+    return found | forms, notes | more
 
 
 def _separated(found: Section) -> tuple[Section, Notes]:
@@ -332,40 +334,27 @@ def _sampled_gains(loop: LinearSampledLoop, law: ControlLaw) -> tuple[_Noted, _N
     return _Noted(critical, reason), _Noted(stable, reason)
 
 
-def _closed_forms(drive: Drive, law: ControlLaw | None) -> Section | _Noted:
-    """Return the closed forms of the cubic Stribeck law, in the same units; omit missing ones."""
-    cubic, lack = _covered(lambda: CubicLoop.from_drive(drive))
-    if cubic is None:
-        return _Noted(
-            None, lack or _held(drive) or "closed forms exist for the cubic Stribeck law only"
-        )
-    speed, force = drive.speed_scale, drive.normal_force
-    gains = gains_of(law)
-
+def _closed_forms(drive: Drive, found: Section) -> Section | _Noted:
+    """Return the quantities with a closed form under the cubic Stribeck law, of those found."""
+    _, lack = _covered(lambda: require("the closed form", drive, *ONE_DEGREE))
+    lack = lack or _held(drive)
+    if lack is None and not isinstance(drive.friction, Stribeck):
+        lack = "closed forms exist for the cubic Stribeck law only"
+    if lack is not None:
+        return _Noted(None, lack)
+    opened, closed = found["open_loop"], found["closed_loop"]
     forms: Section = {
-        "equilibrium_position": copysign(drive.length_scale, drive.belt_speed) * cubic.equilibrium
-        + (drive.bias_force + drive.guide_damping * drive.belt_speed) / drive.stiffness,
-        "first_lyapunov_coefficient": cubic.first_lyapunov_coefficient,
-        "hopf_speed": _scaled(cubic.hopf_speed, speed),
-        "crossing_speed": _scaled(cubic.crossing_speed, drive.angular_frequency / speed),
-        "onset_speed_approximate": _scaled(cubic.sticking_onset, speed),
+        "equilibrium_position": found["equilibrium_position"],
+        **{
+            name: next(iter(opened[f"{name}s"]), None)
+            for name in ("first_lyapunov_coefficient", "hopf_speed", "crossing_speed")
+        },
+        "onset_speed_approximate": found["sticking"]["onset_speed_approximate"],
+        "critical_linear_gain": closed["critical_linear_gain"],
+        "critical_lyapunov_coefficient": closed["first_lyapunov_coefficient"],
+        "critical_cubic_gain": closed["critical_cubic_gain"],
     }
-    if gains is not None:
-        dimensionless = gains.scaled(drive)
-        corner = dimensionless.corner_frequency
-        linear, cubic_gain = cubic.critical_linear_gain(corner), cubic.critical_cubic_gain(corner)
-        forms |= {
-            "critical_linear_gain": _scaled(linear, force / speed),
-            "critical_lyapunov_coefficient": cubic.critical_lyapunov_coefficient(
-                corner, dimensionless.cubic_gain
-            ),
-            "critical_cubic_gain": _scaled(cubic_gain, force / speed**3),
-        }
     return {name: form for name, form in forms.items() if form is not None}
-
-
-def _scaled(value: float | None, unit: float) -> float | None:
-    return None if value is None else value * unit
 
 
 def _cycle(cycle: LimitCycle) -> Section:

@@ -11,6 +11,7 @@ from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.studies.stability import stability as theory_of
 from stickslip_ros.text import finite
 from tests.app.conftest import Run
+from tests.theory.closed_forms import CubicLoop
 
 
 def stability(stickslip: Run, *arguments: str) -> dict[str, Any]:
@@ -35,18 +36,24 @@ def test_the_papers_drive(stickslip: Run) -> None:
     assert (cycle["stable"], cycle["regime"]) == (True, "pure_slip")
     assert found["sampled_loop"]["critical_linear_gain"] == pytest.approx(-0.0396, abs=2e-3)
     assert found["sticking"]["onset_speed"] == pytest.approx(0.44466141)
-    forms = found["closed_forms"]
-    for value, form in (
-        (found["equilibrium_position"], forms["equilibrium_position"]),
-        (open_loop["hopf_speeds"][0], forms["hopf_speed"]),
-        (open_loop["crossing_speeds"][0], forms["crossing_speed"]),
-        (open_loop["first_lyapunov_coefficients"][0], forms["first_lyapunov_coefficient"]),
-        (found["sticking"]["onset_speed_approximate"], forms["onset_speed_approximate"]),
-        (closed_loop["critical_linear_gain"], forms["critical_linear_gain"]),
-        (closed_loop["first_lyapunov_coefficient"], forms["critical_lyapunov_coefficient"]),
-        (closed_loop["critical_cubic_gain"], forms["critical_cubic_gain"]),
-    ):
-        assert value == pytest.approx(form, rel=1e-12)
+    scenario = load_scenario("paper", ["plant.belt_speed=0.49", "plant.damping=0.01"])
+    cubic, gains = CubicLoop.from_drive(scenario.plant.as_drive()), scenario.control_law
+    corner = gains.corner_frequency
+    assert found["closed_forms"] == pytest.approx(
+        {
+            "equilibrium_position": cubic.equilibrium,
+            "hopf_speed": cubic.hopf_speed,
+            "crossing_speed": cubic.crossing_speed,
+            "first_lyapunov_coefficient": cubic.first_lyapunov_coefficient,
+            "onset_speed_approximate": cubic.sticking_onset,
+            "critical_linear_gain": cubic.critical_linear_gain(corner),
+            "critical_lyapunov_coefficient": cubic.critical_lyapunov_coefficient(
+                corner, gains.cubic_gain
+            ),
+            "critical_cubic_gain": cubic.critical_cubic_gain(corner),
+        },
+        rel=1e-12,
+    )
     assert found["notes"].keys() == {"closed_loop.limit_cycles"}
     assert found["scenario"]["plant"]["belt_speed"] == 0.49
     assert found["overrides"] == ["plant.belt_speed=0.49", "plant.damping=0.01"]

@@ -17,11 +17,11 @@ from stickslip_ros.show.style import STYLES
 from stickslip_ros.studies.design import Task
 from stickslip_ros.studies.washout_design import WashoutDesign, design_washout
 from stickslip_ros.theory.bifurcation_branches import BifurcationBranches
-from stickslip_ros.theory.closed_forms import CubicLoop
 from stickslip_ros.theory.linear_sampled_loop import LinearSampledLoop
 from stickslip_ros.theory.stability_map import CriticalGainCurves, StabilityMap
 from tests.drives import FEED_DRIVE, PAPER
 from tests.show.texts import faults, in_styles, legend_texts
+from tests.theory.closed_forms import CubicLoop
 
 GAINS = Washout(20.0, -3000.0, 0.0)
 

@@ -12,11 +12,11 @@ from stickslip_ros.model.control import Washout
 from stickslip_ros.model.drive import Drive
 from stickslip_ros.model.friction import Exponential, Linear
 from stickslip_ros.motion.variational import ShootingMotion
-from stickslip_ros.theory.closed_forms import CubicLoop
 from stickslip_ros.theory.critical_gains import critical_gains, limit_cycle_from_hopf
 from stickslip_ros.theory.limit_cycles import limit_cycle_of_run
 from stickslip_ros.theory.linear import expand
 from tests.drives import PAPER, settled
+from tests.theory.closed_forms import CubicLoop
 from tests.theory.test_hopf import cubic_drives
 
 

@@ -12,11 +12,11 @@ from stickslip_ros.model.control import Washout
 from stickslip_ros.model.drive import Drive
 from stickslip_ros.model.friction import Coulomb, Exponential, Linear, Stribeck
 from stickslip_ros.motion import RecordedMotion
-from stickslip_ros.theory.closed_forms import CubicLoop
 from stickslip_ros.theory.critical_gains import critical_gains
 from stickslip_ros.theory.hopf import hopf_points
 from stickslip_ros.theory.linear import expand, hurwitz_determinants, jacobians
 from tests.drives import PAPER, settled
+from tests.theory.closed_forms import CubicLoop
 
 cubic_drives = st.builds(
     lambda mass, stiffness, normal_force, damping, belt_speed, static, drop, speed: Drive(

@@ -20,7 +20,6 @@ from stickslip_ros.model.sensor import EXACT_SENSOR, MeasuredVelocity, Sensor
 from stickslip_ros.motion import Motion
 from stickslip_ros.motion.controller import Controller, answer
 from stickslip_ros.motion.sampled_loop import LOCKSTEP_START, SampledLoop
-from stickslip_ros.theory.closed_forms import CubicLoop
 from stickslip_ros.theory.linear_sampled_loop import (
     LONGEST_DELAY,
     LinearSampledLoop,
@@ -29,6 +28,7 @@ from stickslip_ros.theory.linear_sampled_loop import (
 from tests.drives import FEED_DRIVE, PAPER
 from tests.examples import examples
 from tests.parts import Switching
+from tests.theory.closed_forms import CubicLoop
 
 
 def loop_of(

@@ -12,7 +12,6 @@ from stickslip_ros.model.sensor import MeasuredVelocity, Sensor
 from stickslip_ros.motion import Motion, RecordedMotion
 from stickslip_ros.motion.controller import Controller, answer
 from stickslip_ros.motion.sampled_loop import SampledLoop
-from stickslip_ros.theory.closed_forms import CubicLoop
 from stickslip_ros.theory.hopf import hopf_points
 from stickslip_ros.theory.limit_cycles import limit_cycle_of_run, limit_cycles
 from stickslip_ros.theory.linear import expand
@@ -46,7 +45,7 @@ def test_without_a_position_loop_there_is_no_equilibrium(law: ControlLaw | None)
 
 
 def test_what_needs_an_ideal_motor_says_so() -> None:
-    for refused in (CubicLoop.from_drive, sticking_onset, limit_cycles):
+    for refused in (sticking_onset, limit_cycles):
         with pytest.raises(NotCoveredError, match="needs an ideal motor: the motor of the drive"):
             refused(DRIVE)
 

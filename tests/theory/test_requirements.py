@@ -12,7 +12,6 @@ from stickslip_ros.model.control import Washout
 from stickslip_ros.model.drive import Drive
 from stickslip_ros.model.friction import Dahl
 from stickslip_ros.model.signals import sine
-from stickslip_ros.theory.closed_forms import CubicLoop
 from stickslip_ros.theory.critical_gains import critical_gains, limit_cycle_from_hopf
 from stickslip_ros.theory.cycle_bounds import (
     averaged_growth,
@@ -78,9 +77,7 @@ REFUSED = [
     *((*each, "load") for each in COVERED_GAINS),
     *((*each, "memory") for each in WITHOUT_MEMORY),
     *((*each, lack) for each in SYMMETRIC for lack in ("one way", "load")),
-    ("the closed form", CubicLoop.from_drive, "load"),
     *((*each, "spring") for each in (*SMOOTH, *COVERED_GAINS, *SYMMETRIC)),
-    ("the closed form", CubicLoop.from_drive, "spring"),
     ("the release by the belt", release_position, "spring"),
     ("the loading by the belt", loading_time, "spring"),
     ("the loading by the belt", longest_return, "spring"),

@@ -11,28 +11,11 @@ from typing import Self
 
 from stickslip_ros.model.drive import Drive
 from stickslip_ros.model.friction import Stribeck
-from stickslip_ros.theory.requirements import ONE_DEGREE, require
 
 
 @dataclass(frozen=True)
 class CubicLoop:
-    """Drive with the cubic Stribeck law, by its dimensionless coefficients.
-
-    Examples
-    --------
-    The system of the paper:
-
-    >>> from stickslip_ros.model.drive import Drive
-    >>> from stickslip_ros.model.friction import Stribeck
-    >>> from stickslip_ros.theory.closed_forms import CubicLoop
-    >>> drive = Drive(mass=1.0, damping=0.02, stiffness=1.0, normal_force=1.0,
-    ...               belt_speed=0.4, friction=Stribeck(0.4, 0.25, 0.5))
-    >>> cubic = CubicLoop.from_drive(drive)
-    >>> round(cubic.trace, 6), round(cubic.hopf_speed, 6)
-    (0.142, 0.488763)
-    >>> round(cubic.critical_linear_gain(2.0), 6)
-    -0.935296
-    """
+    """Drive with the cubic Stribeck law, by its dimensionless coefficients."""
 
     static: float
     """Static coefficient mu_s."""
@@ -49,22 +32,8 @@ class CubicLoop:
     def from_drive(cls, drive: Drive) -> Self | None:
         """Return the coefficients of a drive.
 
-        Parameters
-        ----------
-        drive : Drive
-            Drive in SI units.
-
-        Returns
-        -------
-        CubicLoop or None
-            Dimensionless coefficients; None if the drive has another law or its belt is at rest.
-
-        Raises
-        ------
-        InvalidInputError
-            If belt or load follow a signal, or the drive has no spring.
+        None if it has another law or its belt is at rest.
         """
-        require("the closed form", drive, *ONE_DEGREE)
         law = drive.dimensionless.friction
         if not isinstance(law, Stribeck) or drive.belt_speed == 0.0:
             return None
@@ -110,18 +79,7 @@ class CubicLoop:
         return None if self.hopf_speed is None else sqrt(0.8) * self.hopf_speed
 
     def critical_linear_gain(self, corner_frequency: float) -> float | None:
-        """Return the critical linear gain k1* = d - p - d / (1 - p d), from eq. 21.
-
-        Parameters
-        ----------
-        corner_frequency : float
-            Cutoff frequency d, dimensionless.
-
-        Returns
-        -------
-        float or None
-            k1*, dimensionless; None for p d >= 1.
-        """
+        """Return the critical linear gain k1* = d - p - d / (1 - p d), from eq. 21."""
         d, p = corner_frequency, self.trace
         return None if p * d >= 1.0 else d - p - d / (1.0 - p * d)
 
@@ -132,35 +90,12 @@ class CubicLoop:
         D = s^2 + 1 - s (p + k1 H) and N = 3 b v0 y^2 - b y^3 + k2 (H y)^3. At first order
         y = r cos(w t), w^2 = 1 - p d. The square drives the second harmonic. Its beat with the
         first harmonic and the cubes make up the slow change of r.
-
-        Parameters
-        ----------
-        corner_frequency : float
-            Cutoff frequency d, dimensionless.
-        cubic : float
-            Cubic gain k2, dimensionless.
-
-        Returns
-        -------
-        float or None
-            First Lyapunov coefficient sigma, dimensionless; None for p d >= 1.
         """
         terms = self._critical_lyapunov_terms(corner_frequency)
         return None if terms is None else terms[0] + cubic * terms[1]
 
     def critical_cubic_gain(self, corner_frequency: float) -> float | None:
-        """Return the cubic gain at which `critical_lyapunov_coefficient` changes sign.
-
-        Parameters
-        ----------
-        corner_frequency : float
-            Cutoff frequency d, dimensionless.
-
-        Returns
-        -------
-        float or None
-            Cubic gain k2, dimensionless; None for p d >= 1.
-        """
+        """Return the cubic gain at which `critical_lyapunov_coefficient` changes sign."""
         terms = self._critical_lyapunov_terms(corner_frequency)
         return None if terms is None else -terms[0] / terms[1]
 
