@@ -178,6 +178,6 @@ def _moving_weight(
     left_out[:START] = left_out[-END:] = True
     taper = np.hanning(round(_TAPER * width) + 2)
     reach = round((_REACH + 0.5 * _TAPER) * width)
-    away = 1.0 - maximum_filter1d(left_out.astype(float), 2 * reach + 1)
+    away: FloatArray = 1.0 - maximum_filter1d(left_out.astype(float), 2 * reach + 1)
     weight: FloatArray = np.convolve(away, taper / np.sum(taper), "same")
     return weight[START:-END]

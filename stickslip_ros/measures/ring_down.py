@@ -112,25 +112,20 @@ def _fit(
     belt_speed, omega, amplitude, prior = float(np.mean(belt)), float(shape[1]), 0.0, 1.0
     if float(np.ptp(belt)) > _BELT_CHANGE * belt_speed:
         return None
-    steps = np.diag(omega * np.array([1e-5, 1e-6, 1e-5]))
+    steps = omega * np.array([1e-5, 1e-6, 1e-5])
     design = np.empty((0, 0))
-    linear = np.linalg.lstsq(_columns(time, shape), x)[0]
+    linear = _least_squares(_columns(time, shape), x)
     for _ in range(12):
         amplitude = float(np.hypot(*linear[2:]))
         least = max(abs(shape[0]), _DAMPING_RATIO * omega)
         prior = _AMPLITUDE_EFFECT * least * (omega * amplitude * size / belt_speed) ** 2
-        slopes = [
-            (_columns(time, shape + each) - _columns(time, shape - each)) @ linear / (2.0 * each[k])
-            for k, each in enumerate(steps)
-        ]
-        design = np.column_stack([*slopes, _columns(time, shape)])
+        design = _design(time, shape, linear, steps)
         row = np.zeros(design.shape[1])
         row[2] = noise / prior
         residual = np.append(x - design[:, 3:] @ linear, -shape[2] * row[2])
-        change = np.linalg.lstsq(np.vstack([design, row]), residual)[0][:3]
-        limits = omega * np.array([0.02, 0.02, 0.002]) + np.array([0.0, 0.0, abs(shape[0]) / 4.0])
-        shape = shape + np.clip(change, -limits, limits)
-        linear = np.linalg.lstsq(_columns(time, shape), x)[0]
+        change = _least_squares(np.vstack([design, row]), residual)[:3]
+        shape = shape + _limited(change, omega, abs(float(shape[0])))
+        linear = _least_squares(_columns(time, shape), x)
         if np.all(np.abs(change) < 1e-7 * omega):
             break
     residual = x - _columns(time, shape) @ linear
@@ -154,6 +149,27 @@ def _fit(
     frequency = float(shape[1]) / turns, float(errors[1]) / turns
     decay = float(shape[0]), float(errors[0])
     return RingDown(0.0, float(time[-1]), belt_speed, *decay, *frequency, amplitude * size)
+
+
+def _least_squares(design: FloatArray, wanted: FloatArray) -> FloatArray:
+    return np.asarray(np.linalg.lstsq(design, wanted)[0], np.float64)
+
+
+def _design(
+    time: FloatArray, shape: FloatArray, linear: FloatArray, steps: FloatArray
+) -> FloatArray:
+    """Return the derivatives of the fit by its shape, from differences, and its columns."""
+    slopes = [
+        (_columns(time, shape + each) - _columns(time, shape - each)) @ linear / (2.0 * step)
+        for step, each in zip(steps, np.diag(steps), strict=True)
+    ]
+    return np.column_stack([*slopes, _columns(time, shape)])
+
+
+def _limited(change: FloatArray, omega: float, decay: float) -> FloatArray:
+    """Return a change of the shape within what the next step bears."""
+    limits = omega * np.array([0.02, 0.02, 0.002]) + np.array([0.0, 0.0, decay / 4.0])
+    return np.clip(change, -limits, limits)
 
 
 def _columns(time: FloatArray, shape: FloatArray) -> FloatArray:

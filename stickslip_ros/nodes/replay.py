@@ -13,14 +13,14 @@ from functools import partial
 from typing import Any
 
 from rclpy.duration import Duration
-from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
+from rclpy.lifecycle import LifecycleState
 from rclpy.publisher import Publisher
 from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 
 from stickslip_ros.errors import RunError
 from stickslip_ros.nodes.base.endpoints import message_class
-from stickslip_ros.nodes.base.managed import ERROR, OK, WARN, Diagnosis, ManagedNode
+from stickslip_ros.nodes.base.managed import ERROR, OK, WARN, Diagnosis, ManagedNode, Transition
 from stickslip_ros.nodes.base.process import ros_session, run_node, run_until_stopped
 from stickslip_ros.nodes.pacing import FlowWindow
 from stickslip_ros.nodes.replaying.player import Message, Player
@@ -222,7 +222,7 @@ class _OneReplay(ReplayNode):
         super().connect()
         self._offering(sorted(self._writers))
 
-    def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
+    def on_error(self, state: LifecycleState) -> Transition:
         self.end_process(RunError("the replay failed for the reason above"))
         return super().on_error(state)
 

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable
 from functools import partial
 from math import inf
-from typing import Any, TypeVar
+from typing import Any, TypeAlias, TypeVar
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.duration import Duration
@@ -31,6 +31,9 @@ from stickslip_ros.nodes.base.scheduling import schedule_process
 from stickslip_ros.nodes.base.spinner import steady_clock
 from stickslip_ros.record.topics import DIAGNOSTICS, RECORDED, Topic
 from stickslip_ros.scenarios import full_name
+
+Transition: TypeAlias = Any
+"""A `TransitionCallbackReturn`, which is compiled and has no types."""
 
 MessageT = TypeVar("MessageT")
 ThingT = TypeVar("ThingT")
@@ -258,12 +261,12 @@ class ManagedNode(PollingNode, ParameterNode[ParametersT], ABC):
         if not self.stopped.done():
             self.stopped.set_result(reason)
 
-    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
+    def on_configure(self, state: LifecycleState) -> Transition:
         """Connect."""
         self._waiting = False
         return self._transition(self.connect, "configured")
 
-    def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
+    def on_activate(self, state: LifecycleState) -> Transition:
         """Start, if the nodes in wait_for are connected."""
         if self._is_waiting():
             return TransitionCallbackReturn.FAILURE
@@ -275,21 +278,21 @@ class ManagedNode(PollingNode, ParameterNode[ParametersT], ABC):
         self.active = result is TransitionCallbackReturn.SUCCESS
         return result
 
-    def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
+    def on_deactivate(self, state: LifecycleState) -> Transition:
         """Stop."""
         return self._transition(self._stop_and_tell, "paused")
 
-    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
+    def on_cleanup(self, state: LifecycleState) -> Transition:
         """Disconnect."""
         return self._transition(self._disconnect, "cleaned up")
 
-    def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
+    def on_shutdown(self, state: LifecycleState) -> Transition:
         """Stop if need be, and disconnect."""
         if self.active:
             self._transition(self._stop_and_tell)
         return self._transition(self._disconnect)
 
-    def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
+    def on_error(self, state: LifecycleState) -> Transition:
         """Disconnect, to start again."""
         return self._transition(self._disconnect)
 
@@ -304,7 +307,7 @@ class ManagedNode(PollingNode, ParameterNode[ParametersT], ABC):
         for thing in list(self._kept):
             self.release(thing)
 
-    def _transition(self, action: Callable[[], None], done: str = "") -> TransitionCallbackReturn:
+    def _transition(self, action: Callable[[], None], done: str = "") -> Transition:
         """Run the action of a transition, and log the new state."""
         try:
             action()
