@@ -70,6 +70,7 @@ def test_a_search_ends_with_the_best_so_far() -> None:
     assert found.candidates[0].remark == OUT_OF_TIME
 
 
+@pytest.mark.long
 def test_a_law_that_another_excels_gets_no_further_constants() -> None:
     own = study.record("coulomb", "ramp", seed=7, duration=1.5, delay=2e-3)
     task = LawSearch([own], {"normal_force": study.NORMAL_FORCE}, TimeLimit())
@@ -79,6 +80,7 @@ def test_a_law_that_another_excels_gets_no_further_constants() -> None:
     assert task.extended(near, 1e-3 * least) is near[0]
 
 
+@pytest.mark.long
 def test_the_search_of_a_law_leaves_time_for_others() -> None:
     own = study.record("stribeck", "taps", seed=1, duration=1.5)
     limit = TimeLimit(600.0)
@@ -135,6 +137,7 @@ def test_a_force_that_lags_moves_the_slide_as_that_of_its_actuator(lag: float) -
     assert found == pytest.approx(position, abs=1e-3 * study.RESOLUTION)
 
 
+@pytest.mark.long
 def test_static_above_kinetic_friction_is_recovered() -> None:
     """A slide that never sticks tells no static friction."""
     fixed = {"normal_force": study.NORMAL_FORCE, "mass": study.MASS}

@@ -76,6 +76,7 @@ def test_a_part_of_the_study_agrees_with_it(case: study.Case) -> None:
             assert row[name]["covered"] >= 0.6
 
 
+@pytest.mark.long
 def test_a_slide_that_nearly_reaches_the_belt_speed_does_not_stick() -> None:
     """Without noise, the error of the fit's form would tell a stick of a few microseconds."""
     found = [measured(samples(0.044, count)) for count in (1500, 1700, 2000)]

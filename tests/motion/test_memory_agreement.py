@@ -26,7 +26,7 @@ STORED: dict[str, dict[str, Any]] = json.loads(
 @pytest.mark.parametrize(
     ("law", "seed"),
     [
-        pytest.param(law, seed, marks=[pytest.mark.long] * (number > 1))
+        pytest.param(law, seed, marks=[pytest.mark.long] * (number > 0))
         for law, seeds in STORED.items()
         for number, seed in enumerate(seeds)
     ],

@@ -41,7 +41,6 @@ LAWS: dict[str, FrictionLaw] = {
     "lugre": LuGre(CURVE, bristle_stiffness=2e4, bristle_damping=1.0),
     "maxwell_slip": MaxwellSlip(CURVE, bristle_stiffness=2e4, elements=2),
 }
-QUICK = ("coulomb", "stiction", "dahl")
 START = (1e-4, -0.01)
 PERIOD = 1e-3
 FORCES = np.repeat(60.0 * np.random.default_rng(0).normal(size=30), 10).tolist()
@@ -72,9 +71,7 @@ def followed(motion: Any, read: Callable[[Any], Any]) -> FloatArray:
 @pytest.mark.parametrize(
     ("law", "moves"),
     [
-        pytest.param(
-            law, i % 2 == 0, marks=[pytest.mark.long] * (law not in ("coulomb", "stiction", "dahl"))
-        )
+        pytest.param(law, i % 2 == 0, marks=[pytest.mark.long] * (law != "coulomb"))
         for i, law in enumerate(LAWS)
     ],
 )

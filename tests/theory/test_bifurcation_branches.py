@@ -69,6 +69,7 @@ def test_the_equilibrium_changes_stability_at_the_hopf_point(ahead: BifurcationB
         assert np.array_equal(branch.least, branch.greatest)
 
 
+@pytest.mark.long
 def test_an_unstable_branch_joins_the_hopf_point_and_the_fold(
     subcritical: BifurcationBranches,
 ) -> None:
@@ -86,6 +87,7 @@ def test_an_unstable_branch_joins_the_hopf_point_and_the_fold(
     assert fold == pytest.approx(subcritical.sticking_onset, rel=2e-3)
 
 
+@pytest.mark.long
 def test_around_covers_the_fold_beyond_the_hopf_point(subcritical: BifurcationBranches) -> None:
     end = float(subcritical.belt_speeds[-1])
     assert subcritical.folds[-1] < end

@@ -50,8 +50,7 @@ def test_what_needs_an_ideal_motor_says_so() -> None:
             refused(DRIVE)
 
 
-@pytest.mark.parametrize("delay", [0.0, 1.3e-3])
-@pytest.mark.parametrize("spans", [0, 2])
+@pytest.mark.parametrize(("spans", "delay"), [(0, 0.0), (2, 1.3e-3)])
 @pytest.mark.parametrize(
     "law",
     [
@@ -124,6 +123,7 @@ def test_a_difference_of_the_motor_is_a_part_of_the_loop() -> None:
     assert radii[0] > 5.0 * radii[1] > 25.0 * radii[2]
 
 
+@pytest.mark.long
 def test_a_hopf_point_is_where_small_deviations_begin_to_grow() -> None:
     (point,) = hopf_points(DRIVE, CASCADE)
     for share, grows in ((0.95, True), (1.05, False)):
