@@ -53,6 +53,7 @@ from stickslip_ros.record.chunk import (
 from stickslip_ros.record.compression import LARGEST, unpack
 
 ParsedT = TypeVar("ParsedT")
+NamedT = TypeVar("NamedT", Metadata, Attachment)
 DefinitionT = TypeVar("DefinitionT", Schema, Channel)
 
 _INDEX_ENTRY = 16
@@ -85,6 +86,11 @@ class _Record(NamedTuple):
     start: int
     end: int
     chunk: OpenChunk | None = None
+
+    @property
+    def begin(self) -> int:
+        """Where the content begins."""
+        return self.start + HEAD.size
 
 
 class McapFile:
@@ -150,15 +156,11 @@ class McapFile:
 
     def tables(self, name: str | None = None) -> Iterator[Metadata]:
         """Yield the readable metadata records, of this name or all, in file order."""
-        for found in self._parsed(self._tables, Opcode.METADATA, Metadata.read, LARGEST_TABLE):
-            if name in (None, found.name):
-                yield found
+        return self._named(name, self._tables, Opcode.METADATA, Metadata.read, LARGEST_TABLE)
 
     def attachments(self, name: str | None = None) -> Iterator[Attachment]:
         """Yield the readable attachments, of this name or all, in file order."""
-        for found in self._parsed(self._attachments, Opcode.ATTACHMENT, Attachment.read, LARGEST):
-            if name in (None, found.name):
-                yield found
+        return self._named(name, self._attachments, Opcode.ATTACHMENT, Attachment.read, LARGEST)
 
     def blocks(self, channels: Collection[int]) -> Iterator[MessageBlock]:
         """Yield the messages on these channels in file order, one chunk at a time.
@@ -196,15 +198,15 @@ class McapFile:
         ends_well = self._read_summary()
         # A summary need not repeat the definitions.
         if not (ends_well and self.channels and not self._undefined):
-            for opcode, start, end, chunk in self._records():
-                if chunk is not None:
+            for record in self._records():
+                if record.chunk is not None:
                     self._chunked = True
-                    for kind, content in chunk.definitions:
-                        self._note(kind, start, content, checked=True)
-                elif opcode in _INVENTORY:
-                    begin = start + HEAD.size
-                    content = self._read(begin, min(end, begin + LARGEST_TABLE))
-                    self._note(opcode, start, content, checked=False)
+                    for opcode, content in record.chunk.definitions:
+                        self._note(opcode, record.start, content, checked=True)
+                elif record.opcode in _INVENTORY:
+                    end = min(record.end, record.begin + LARGEST_TABLE)
+                    content = self._read(record.begin, end)
+                    self._note(record.opcode, record.start, content, checked=False)
         return begins_well and ends_well
 
     @property
@@ -294,9 +296,9 @@ class McapFile:
                     searched = position + 1
                     record = record._replace(chunk=self._opened(record))
                     searched = record.end
-                elif record.opcode == Opcode.MESSAGE:
-                    self._check_loose(record)
-                elif record.opcode not in _OPCODES:
+                elif record.opcode not in _OPCODES or (
+                    record.opcode == Opcode.MESSAGE and not self._is_loose(record)
+                ):
                     raise DamageError
             except DamageError:
                 # A record without a checksum may have covered the beginning of a chunk.
@@ -316,21 +318,18 @@ class McapFile:
         opcode, length = HEAD.unpack(head) if len(head) == HEAD.size else (0, 0)
         return _Record(opcode if begin + length <= self._size else 0, start, begin + length)
 
-    def _check_loose(self, record: _Record) -> None:
-        """Raise DamageError for a message that is none."""
-        begin = record.start + HEAD.size
-        channel = int.from_bytes(self._read(begin, begin + 2), "little")
-        sound = channel in self.channels and MESSAGE_LENGTH <= record.end - begin <= LARGEST
+    def _is_loose(self, record: _Record) -> bool:
+        """Whether a record is a message outside chunks."""
+        channel = int.from_bytes(self._read(record.begin, record.begin + 2), "little")
+        sound = channel in self.channels and MESSAGE_LENGTH <= record.end - record.begin <= LARGEST
         # If a file has chunks, all messages are in them; this is damaged data.
-        if self._chunked or not sound:
-            raise DamageError
+        return sound and not self._chunked
 
     def _opened(self, record: _Record) -> OpenChunk:
         """Return the content of a chunk; raise DamageError if it is damaged."""
-        begin = record.start + HEAD.size
-        if record.end - begin > LARGEST + _CHUNK_HEAD_SIZE:
+        if record.end - record.begin > LARGEST + _CHUNK_HEAD_SIZE:
             raise DamageError
-        chunk = _parse(Chunk.read, self._read(begin, record.end))
+        chunk = _parse(Chunk.read, self._read(record.begin, record.end))
         data = unpack(chunk.compression, chunk.data, chunk.uncompressed_size)
         if data is None or chunk.uncompressed_crc not in (0, zlib.crc32(data)):
             raise DamageError
@@ -341,7 +340,7 @@ class McapFile:
         offsets = [np.empty(0, np.int64)]
         room = len(data) // MESSAGE_SIZE * _INDEX_ENTRY
         while (record := self._record(position)).opcode == Opcode.MESSAGE_INDEX:
-            begin = position + HEAD.size + 6  # behind channel and size of the entries
+            begin = record.begin + 6  # behind channel and size of the entries
             room -= record.end - begin
             if (record.end - begin) % _INDEX_ENTRY or room < 0:
                 return np.empty(0, np.int64)
@@ -363,21 +362,25 @@ class McapFile:
             position += WINDOW
         return self._size
 
-    def _parsed(
-        self, places: set[int], opcode: int, read: Callable[[ReadDataStream], ParsedT], largest: int
-    ) -> Iterator[ParsedT]:
-        """Yield what the records of an opcode at these places hold, in file order."""
-        for start in sorted(places):
-            record = self._record(start)
+    def _named(
+        self,
+        name: str | None,
+        places: Collection[int],
+        opcode: Opcode,
+        read: Callable[[ReadDataStream], NamedT],
+        largest: int,
+    ) -> Iterator[NamedT]:
+        for record in map(self._record, sorted(places)):
             if record.opcode != opcode:
                 continue
             try:
-                begin = start + HEAD.size
-                if record.end - begin > largest:
+                if record.end - record.begin > largest:
                     raise DamageError
-                yield _parse(read, self._read(begin, record.end))
+                found = _parse(read, self._read(record.begin, record.end))
+                if name in (None, found.name):
+                    yield found
             except DamageError:
-                self._add_gap(start, record.end)
+                self._add_gap(record.start, record.end)
 
     def _read(self, start: int, end: int) -> bytes:
         try:
