@@ -103,10 +103,10 @@ def main() -> int:
     parser.add_argument("--write", action="store_true", help=f"write {FILE.name}")
     arguments = parser.parse_args()
     known = json.loads(FILE.read_text(encoding="utf-8"))
-    others = known["made_with"].items() ^ made_with().items()
+    others = made_with().items() - known["made_with"].items()
     if others and not arguments.write:
-        names = ", ".join(sorted({name for name, _ in others}))
-        print(f"{FILE.name} holds for another {names}: --write replaces its hashes by your own")
+        found = ", ".join(f"{name} {value}" for name, value in sorted(others))
+        print(f"{FILE.name} does not hold for {found}: --write replaces its hashes by your own")
         return LACKING
     hashes: dict[str, str] = {}
     reference = Path(__file__).parents[1] / "bags" / "reference"
@@ -126,7 +126,7 @@ def main() -> int:
 
 def made_with() -> dict[str, str]:
     """Return what the last bits depend on: numpy and OpenBLAS choose by the instruction sets."""
-    extensions = np.show_config(mode="dicts")["SIMD Extensions"]["found"]
+    extensions = np.show_config(mode="dicts")["SIMD Extensions"].get("found", [])
     processor = " ".join([platform.machine(), *extensions])
     found = {"processor": processor, "libm": " ".join(platform.libc_ver()), **versions()}
     del found["stickslip_ros"]  # what is compared
