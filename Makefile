@@ -104,6 +104,15 @@ lint: setup
 	$(BIN)/ruff format --check
 	$(BIN)/pyright --pythonpath $(BIN)/python
 
+# Numbers as a processor without AVX and FMA rounds them, for BLAS, numpy and the C library choose
+# by the processor; heyoka cannot be told. It finds bounds that hold on one processor by luck.
+.PHONY: test-sse
+test-sse: setup
+	OPENBLAS_CORETYPE=Nehalem NPY_DISABLE_CPU_FEATURES='X86_V3 X86_V4 AVX512_ICL AVX512_SPR' \
+		GLIBC_TUNABLES=glibc.cpu.hwcaps=-AVX512F,-AVX2,-FMA,-FMA4 \
+		$(BIN)/python -m pytest tests/motion tests/theory --timeout=600 --numprocesses=3 \
+		--dist=worksteal -m 'not long and not hypothesis' $(PYTEST_OPTIONS)
+
 # A table, and the same as JSON; needs a quiet machine. What lacks a browser, say, is skipped (77).
 bench: setup
 	@mkdir -p build
