@@ -72,6 +72,10 @@ class RunMeter:
         """Number of forces reported as dropped."""
         self.timing: Timing | None = None
         """How well the run kept its time; None while it is not known."""
+        self.published: int | None = None
+        """Number of samples published while the run was recorded; None while it is not known."""
+        self.unmeasured = 0
+        """Number of samples that were recorded and are not measured."""
         self._settler = ForceSettler()
         self._observer = observer
 
@@ -99,6 +103,10 @@ class RunMeter:
         """
         motion, timing = self.motion, self.timing
         notes: list[str] = []
+        samples = motion.samples + self.unmeasured
+        lost = max(motion.lost_samples - self.unmeasured, (self.published or 0) - samples, 0)
+        if self.unmeasured:
+            notes.append(f"{self.unmeasured} of the samples are recorded, and not measured")
         if timing is not None and (complaint := timing.warning()):
             doubt = "" if timing.in_time else "the regime is doubtful: "
             notes.append(doubt + complaint)
@@ -114,8 +122,8 @@ class RunMeter:
             "late_forces": None if timing is None else timing.late_forces,
             "missed_deadlines": None if timing is None else timing.missed_deadlines,
             "in_time": None if timing is None else timing.in_time,
-            "samples": motion.samples,
-            "lost_samples": motion.lost_samples,
+            "samples": samples,
+            "lost_samples": lost,
             "duration": motion.duration,
             "notes": [*notes, *motion.notes(measures)],
         }

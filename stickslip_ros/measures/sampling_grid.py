@@ -81,9 +81,10 @@ class SamplingGrid:
             steps, self._period = np.array(self._first), _period_of(np.array(self._first))
             self._covered = self._periods = self._missing = 0
         periods = np.rint(steps / self._period)
-        self._missing += int(periods.sum()) - len(steps)
         # A gap off the grid tells nothing of the period, a late sample on no grid does.
         used = self.on_grid(steps) | (periods == 1.0)
+        # A long one among the first steps, off the grid, is before a segment, and no loss.
+        self._missing += int((periods - 1.0)[used | (periods <= LONGEST_GAP)].sum())
         self._covered += int(steps[used].sum())
         self._periods += int(periods[used].sum())
         if self._count == self._next_estimate:

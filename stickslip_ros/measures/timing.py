@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-_NOTABLE_SHARE = 0.01
+NOTABLE_SHARE = 0.01
 """Share of the forces or samples above which it matters that they came late."""
 
 
@@ -18,7 +18,7 @@ class Timing(NamedTuple):
     @property
     def in_time(self) -> bool:
         """Whether at most 1 % of the forces came late."""
-        return self.late_forces <= _NOTABLE_SHARE * self.samples
+        return self.late_forces <= NOTABLE_SHARE * self.samples
 
     def warning(self, which: str = "") -> str:
         """Return what came late in more than 1 % of the samples, and a remedy; else nothing.
@@ -26,12 +26,12 @@ class Timing(NamedTuple):
         `which` says of which samples, as in "latest ".
         """
         found = [
-            f"{100.0 * count / self.samples:.2g} % of the {which}{what}"
+            f"{percentage(count / self.samples)} of the {which}{what}"
             for count, what in (
                 (self.late_forces, "forces came late or not at all"),
                 (self.missed_deadlines, "samples missed their deadlines"),
             )
-            if count > _NOTABLE_SHARE * self.samples
+            if count > NOTABLE_SHARE * self.samples
         ]
         if not found:
             return ""
@@ -39,3 +39,8 @@ class Timing(NamedTuple):
             f"{' and '.join(found)}: lower rate or real_time_factor, close other busy programs, "
             "set pace to lockstep, or see that the controller answers"
         )
+
+
+def percentage(share: float) -> str:
+    """Return a share as a percentage with two significant digits."""
+    return f"{float(f'{100.0 * share:.2g}'):g} %"

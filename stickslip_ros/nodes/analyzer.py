@@ -20,7 +20,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.qos import ReliabilityPolicy
-from rclpy.serialization import serialize_message
+from rclpy.serialization import deserialize_message, serialize_message
+from rclpy.subscription import Subscription
 from std_msgs.msg import Float64
 
 from stickslip_ros.arrays import IntArray
@@ -38,7 +39,7 @@ from stickslip_ros.nodes.base.clients import (
     ServiceCall,
     parameters_call,
 )
-from stickslip_ros.nodes.base.endpoints import qos_profile, timed_messages
+from stickslip_ros.nodes.base.endpoints import qos_profile, timed_messages, waiting_messages
 from stickslip_ros.nodes.base.managed import (
     ERROR,
     FIRST_STAMP,
@@ -72,6 +73,7 @@ from stickslip_ros.record.topics import (
     RECORDED,
     RECORDED_IF_PUBLISHED,
     RECORDED_TOPICS,
+    RECORDER_DEPTH,
     REFERENCE,
     STICK_FRACTION,
     Topic,
@@ -114,7 +116,7 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
             check_new_bag(self._next_bag())
         self._limit_cycle = [self.advertise(t) for t in (AMPLITUDE, STICK_FRACTION, FREQUENCY)]
         self._stability = {topic: self.advertise(topic) for topic in (DECAY_RATE, ONSET_SPEED)}
-        self.subscribe(DIAGNOSTICS, self._note_timing)
+        self._health = self.subscribe(DIAGNOSTICS, self._note_timing)
         self._channels: dict[str, int] = {}
         # Messages are taken in batches: single ones would each wake a thread and find cold caches.
         self._batch_period = min(0.02, self.parameters.flush_period / 2.0)
@@ -154,31 +156,38 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
             self._force: [],
             DROPPED_FORCE: [],
         }
+        self._behind = False
         self._listening = {
-            topic: self.keep(self.create_polled_subscription(topic, qos_profile(topic)))
+            topic: self._listen(topic)
             for topic in reversed(self._topics)  # joint states last, see `missing_peers`
         }
+        self._listens_since = time.time_ns()
         self._look_for_controllers()
         self._periodic = [
             self.keep(self.every(self._batch_period, partial(self._if_active, self._take_in))),
-            self.keep(self.every(0.1, partial(self._if_active, self._measure))),
+            self.keep(self.every(0.1, partial(self._if_active, self._measure_unless_behind))),
         ]
 
     def stop(self) -> None:
-        """Measure the remaining samples, close the bag with its report, and log the report."""
-        self._take_in()
+        """Take in what waits, close the bag with its report, and log the report."""
+        for _ in range(RECORDER_DEPTH // DEEP + 1):  # a publisher may go on
+            self._take_in()
+            self._measure()
+            if not self._behind:
+                break
         if self._meter.dropped:
             time.sleep(VERDICT_TIME)
             self._write(self._take(DROPPED_FORCE))
         self._measure()
         self._meter.finish()
+        timing = self._counted_timing()
         report = self._meter.report()
         for end in (self._recorded, *self._listening.values(), *self._periodic):
             self.release(end)
         for call in self._parameter_calls.values():
             call.close()
-        if self._meter.timing is not None:
-            self._keep("stickslip_ros/timing", self._meter.timing._asdict())
+        if timing:
+            self._keep("stickslip_ros/timing", timing)
         self._keep("stickslip_ros/report", report)
         self._record(Recorder.close)
         self._recorder = None
@@ -210,7 +219,7 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
             return ERROR, self._bag_failure, values
         complaints = [self.dropped.complaint, *self.duplicate_publishers(*self._topics)]
         if report["lost_samples"]:
-            complaints.append("samples were lost")
+            complaints.append(f"{report['lost_samples']} samples were lost")
         if near:
             complaints.append(f"vibration may start near this feed: {stability}")
         return diagnosis(complaints, values)
@@ -223,6 +232,7 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
     def _take_in(self) -> None:
         """Record the messages received since the last call, and keep them for the measures."""
         taken = {topic: self._take(topic) for topic in self._topics}
+        self._behind = any(len(messages) >= DEEP for messages in taken.values())
         for topic in RECORDED_IF_PUBLISHED:
             if topic.name not in self._published and (
                 taken[topic] or self._listening[topic].get_publisher_count() > 0
@@ -243,6 +253,12 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         if now + self._batch_period >= self._flushed_at + self.parameters.flush_period:
             self._flushed_at = now
             self._record(Recorder.flush)
+
+    def _listen(
+        self, topic: Topic[Any], reliability: ReliabilityPolicy = ReliabilityPolicy.RELIABLE
+    ) -> Subscription:
+        qos = qos_profile(topic, RECORDER_DEPTH, reliability)
+        return self.keep(self.create_polled_subscription(topic, qos))
 
     def _take(self, topic: Topic[Any]) -> list[_Message]:
         """Take the waiting messages of a topic; drop those without a valid stamp."""
@@ -321,6 +337,29 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
             before is None or self._meter.timing[1:] != before[1:]
         ):
             self._keep("stickslip_ros/timing", self._meter.timing._asdict())
+
+    def _counted_timing(self) -> dict[str, int]:
+        """Return the counts of the plant for the bag, none if it told none.
+
+        What it published counts only if it started while this recorder listened. The stamps of
+        lockstep are no time of day, and do not tell that.
+        """
+        for message in waiting_messages(self._health):
+            self._note_timing(deserialize_message(message, DiagnosticArray))
+        if self._meter.timing is None:
+            return {}
+        counts = self._meter.timing._asdict()
+        if all(int(first) >= self._listens_since for first in self._timings):
+            self._meter.published = counts["published"] = self._meter.timing.samples
+        return counts
+
+    def _measure_unless_behind(self) -> None:
+        """Measure what was taken in, or give it up while more waits to be recorded."""
+        if self._behind:
+            self._meter.unmeasured += len(self._to_measure[JOINT_STATES])
+            self._to_measure = {topic: [] for topic in self._to_measure}
+        else:
+            self._measure()
 
     def _measure(self) -> None:
         states, efforts = self._measured(
@@ -413,8 +452,7 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
             )
             if best_effort and listening.qos_profile.reliability == ReliabilityPolicy.RELIABLE:
                 self.release(listening)
-                qos = qos_profile(topic, reliability=ReliabilityPolicy.BEST_EFFORT)
-                self._listening[topic] = self.keep(self.create_polled_subscription(topic, qos))
+                self._listening[topic] = self._listen(topic, ReliabilityPolicy.BEST_EFFORT)
 
     def _next_bag(self) -> Path:
         before = self._bags_opened[self.parameters.bag]

@@ -19,6 +19,7 @@ from stickslip_ros.nodes.base.managed import (
     FAILURE,
     FINISHED,
     FIRST_STAMP,
+    FORECAST,
     NEWEST_STAMP,
     OK,
     Diagnosis,
@@ -26,6 +27,7 @@ from stickslip_ros.nodes.base.managed import (
     diagnosis,
 )
 from stickslip_ros.nodes.base.process import run_node
+from stickslip_ros.nodes.forecast import FORECAST_DURATION, Forecast
 from stickslip_ros.nodes.pacing import NO_FORCE, LockstepPacer, RealtimePacer, TimingMonitor
 from stickslip_ros.record.codec import (
     MOTOR,
@@ -105,6 +107,7 @@ class PlantNode(ManagedNode[PlantParameters]):
             hold_late=realtime,
             overtaken=lambda stamp, force: self._dropped_force.publish(pack_wrench(stamp, force)),
         )
+        self._forecast: Forecast | None = None
         if realtime:
             self._pacer = RealtimePacer(
                 self._loop,
@@ -114,6 +117,10 @@ class PlantNode(ManagedNode[PlantParameters]):
                 parameters.real_time_factor,
                 self.call_soon,
             )
+            long = parameters.duration > FORECAST_DURATION * parameters.real_time_factor
+            if long and parameters.command_rule != "newest":
+                rate = parameters.rate * parameters.real_time_factor
+                self._forecast = Forecast(rate, self._pacer.deadline)
         else:
             self._pacer = LockstepPacer(self._loop, self._publish, self._end, self)
         last = inf
@@ -174,6 +181,8 @@ class PlantNode(ManagedNode[PlantParameters]):
             **self.dropped.values,
             **{f"dropped: {reason}": count for reason, count in loop.dropped.items()},
         }
+        if self._forecast is not None and self._forecast.sentence:
+            values[FORECAST] = self._forecast.sentence
         if loop.unbounded:
             return ERROR, "the motion diverges (regime unbounded)", values
         if pacer.failure:
@@ -252,6 +261,8 @@ class PlantNode(ManagedNode[PlantParameters]):
                 verdict = self._loop.command(force, self._pacer.instant)
             else:
                 verdict = self._loop.offer(stamp, force)
+        if self._forecast is not None and stamp <= self._loop.sample.stamp:
+            self._forecast.answered(self._loop.number(stamp))
         if verdict is Verdict.SUPERSEDED:
             self._superseded += 1
         elif verdict is not Verdict.ACCEPTED:

@@ -125,6 +125,8 @@ def report_of_recording(
             reading=reading_at_recording(recording, stick_speed),
         )
         meter.timing = _timing_of_recording(recording)
+        if start <= 0.0 and end == inf:
+            meter.published = _published_at_recording(recording)
         run = _RunReader(meter, start, end, observer, take, slips)
         # Measuring each chunk by itself would take twice as long.
         for block in recording.blocks(least=20_000):
@@ -315,6 +317,13 @@ def _timing_of_recording(recording: Recording | TableRecording) -> Timing | None
     except (KeyError, ValueError):
         return None
     return timing if min(timing) >= 0 and max(timing) == timing.samples else None
+
+
+def _published_at_recording(recording: Recording | TableRecording) -> int | None:
+    kept = recording.metadata("stickslip_ros/timing") or {}
+    with suppress(KeyError, ValueError):
+        return int(kept["published"])
+    return None
 
 
 def _window_at_recording(recording: Recording | TableRecording) -> int:

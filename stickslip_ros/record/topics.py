@@ -18,6 +18,8 @@ MessageT = TypeVar("MessageT")
 
 DEEP = 4_900
 """Messages queued for a reader that falls behind; above 5,000, Fast DDS delays the writer."""
+RECORDER_DEPTH = 20_000
+"""Messages of a topic that wait in the analyzer; each takes about a kilobyte."""
 
 HISTORY, RELIABILITY, DURABILITY = "keep_last", "reliable", "volatile"
 """Quality of service of all topics, besides the depth of the history; rosbag2's names."""

@@ -103,6 +103,16 @@ def test_a_loss_at_the_start_is_counted_once_the_period_is_known() -> None:
     assert meter.lost_samples == 1
 
 
+def test_the_time_after_a_single_sample_is_no_loss_unless_it_is_on_the_grid() -> None:
+    samples = still(np.array([0, *(4_162_345_678 + 1_000_000 * np.arange(100))]))
+    assert fed(samples).lost_samples == 0
+    meter = fed(samples[:1])
+    for row in range(1, 101):
+        meter.feed(samples[row : row + 1])
+    assert meter.lost_samples == 0
+    assert fed(still(stamps(1000, 200))[np.array([0, *range(100, 200)])]).lost_samples == 99
+
+
 def test_measures_bridge_what_was_lost() -> None:
     samples = limit_cycle()
     kept = np.random.default_rng(1).random(len(samples.stamp)) > 0.1

@@ -77,6 +77,7 @@ def test_a_deadline_is_missed_when_the_next_one_has_passed(
         (9, 10, ""),
         (410, 0, "41 % of the latest forces came late"),
         (0, 280, "28 % of the latest samples missed their deadlines"),
+        (1000, 0, "100 % of the latest forces came late"),
         (410, 280, "41 % of the latest forces came late or not at all and 28 %"),
     ],
 )

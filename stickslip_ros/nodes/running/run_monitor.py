@@ -8,7 +8,7 @@ from std_msgs.msg import Header
 
 from stickslip_ros.nodes.base.clients import ACTIVE, NEXT_TRANSITION
 from stickslip_ros.nodes.base.endpoints import qos_profile
-from stickslip_ros.nodes.base.managed import FAILURE, FINISHED, NEWEST_STAMP, STATE
+from stickslip_ros.nodes.base.managed import FAILURE, FINISHED, FORECAST, NEWEST_STAMP, STATE
 from stickslip_ros.record.topics import DIAGNOSTICS, RECORDED
 from stickslip_ros.scenarios import full_name
 from stickslip_ros.stamps import NANOSECONDS
@@ -45,7 +45,7 @@ class RunMonitor:
         """Whether the run is ending: a plant that stops then is not paused."""
         self._fail, self._notify, self._on_simulated_time = fail, notify, on_simulated_time
         self._plant_name = full_name(node.get_namespace(), "plant")
-        self._paused = False
+        self._paused = self._forecast_told = False
         self._first_recorded: int | None = None
         node.create_subscription(
             DiagnosticArray, DIAGNOSTICS.name, self._on_diagnostics, qos_profile(DIAGNOSTICS)
@@ -64,6 +64,9 @@ class RunMonitor:
                 self._follow_plant(self.plant.get(STATE))
 
     def _follow_plant(self, state: str | None) -> None:
+        if FORECAST in self.plant and not self._forecast_told:
+            self._forecast_told = True
+            self._notify(self.plant[FORECAST])
         if FAILURE in self.plant:
             self._fail(f"the plant could not continue: {self.plant[FAILURE]}")
         if state == ACTIVE:

@@ -1,0 +1,53 @@
+"""An analyzer that falls behind in real time: what it records, and what it tells as lost."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from diagnostic_msgs.msg import DiagnosticStatus
+
+from stickslip_ros.arrays import IntArray
+from stickslip_ros.nodes.analyzer import AnalyzerNode
+from stickslip_ros.nodes.base.managed import STATE
+from stickslip_ros.nodes.plant import PlantNode
+from stickslip_ros.record.reader import Recording
+from stickslip_ros.record.report import report_of_recording
+from stickslip_ros.record.topics import DEEP, RECORDER_DEPTH
+from tests.nodes.graph import Graph, wait_for
+
+RATE = 5000.0
+
+
+def stamps_of(bag: Path) -> IntArray:
+    with Recording(bag) as recording:
+        assert recording.complete
+        return recording.joint_states.stamp
+
+
+@pytest.mark.parametrize("samples", [3 * DEEP, RECORDER_DEPTH + 2 * DEEP])
+def test_what_waits_up_to_the_bound_is_recorded_and_beyond_it_is_counted(
+    graph: Graph, tmp_path: Path, samples: int
+) -> None:
+    """Only the plant's own thread runs until it has published all samples."""
+    bag = tmp_path / "bag"
+    health = graph.health("plant")
+    graph.add(AnalyzerNode, bag=str(bag))
+    parameters = {"rate": RATE, "expects_control": False, "duration": (samples - 1) / RATE}
+    plant = graph.add(PlantNode, pace="realtime", wait_for=["analyzer"], **parameters)
+    graph.wait_until(lambda: plant.active, "the plant starts")
+    wait_for(lambda: plant.diagnose()[2]["samples"] == samples, "all samples are published")
+    graph.wait_until(lambda: is_paused(health), "the plant tells its counts")
+    graph.deactivate("analyzer")
+
+    counts, stamps, report = plant.diagnose()[2], stamps_of(bag), report_of_recording(bag)
+    missing = np.rint(np.diff(stamps, prepend=counts["first_stamp"]) * RATE * 1e-9) - 1
+    missing[0] += 1
+    assert stamps[-1] == counts["newest_stamp"]
+    assert report["samples"] == len(stamps) == samples - missing.sum()
+    assert report["lost_samples"] == missing.sum()
+    assert bool(report["lost_samples"]) == (samples > RECORDER_DEPTH)
+    assert len(stamps) >= min(samples, RECORDER_DEPTH)
+
+
+def is_paused(health: list[DiagnosticStatus]) -> bool:
+    return bool(health) and {v.key: v.value for v in health[-1].values}[STATE] == "inactive"
