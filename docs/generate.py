@@ -20,7 +20,6 @@ from stickslip_ros.record.topics import TOPICS
 from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, NodeParameters, ReplayParameters
 from stickslip_ros.studies.stability import stability
-from stickslip_ros.theory.linear import expand
 
 HERE = Path(__file__).parent
 PAGES = (
@@ -155,7 +154,7 @@ def numbers() -> Iterator[str]:
     rows: dict[str, Any] = {
         "$a$, $b$": (1.5 * drop / speed, 0.5 * drop / speed**3),
         "equilibrium $X_0$, eq. 6": found["equilibrium_position"],
-        "trace $p$, eq. 8": float(expand(drive).jacobian.trace()),
+        "trace $p$, eq. 8": float(opened["eigenvalues"].sum().real),
         "eigenvalues of the open loop": _complex(opened["eigenvalues"]),
         "critical feed speed (Hopf) $v_{b1}$": opened["hopf_speeds"],
         "$d \\mathrm{Re} \\lambda / d v_0$ there, eq. 11": opened["crossing_speeds"],
