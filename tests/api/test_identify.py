@@ -25,12 +25,6 @@ def test_the_constants_of_exact_samples(model: ss.Model) -> None:
     assert "plant.bias_force" in model.unidentified
 
 
-def test_it_prints_and_plots(model: ss.Model) -> None:
-    assert "plant.friction.minimum_speed" in repr(model)
-    assert "<table>" in model._repr_html_()
-    assert len(model.plot().axes) == 6
-
-
 def test_the_scenario_of_a_model(model: ss.Model, tmp_path: Path) -> None:
     saved = model.save(tmp_path / "drive.yaml")
     assert saved.plant.stiffness == pytest.approx(1e6, rel=1e-6)

@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
 
 import stickslip_ros as ss
 from stickslip_ros.errors import InvalidInputError
@@ -65,10 +64,3 @@ def test_a_part_is_that_of_the_report() -> None:
     assert len(found.forces) == 1000
     with pytest.raises(InvalidInputError, match="is empty"):
         ss.read_bag(REFERENCE, start=2.0, end=1.0)
-
-
-def test_it_prints_and_plots(found: ss.RecordedRun) -> None:
-    assert repr(found).splitlines()[0] == str(REFERENCE)
-    assert "325.8 µm" in repr(found)
-    assert "325.8 µm" in found._repr_html_()  # pyright: ignore
-    assert isinstance(found.plot(), Figure)

@@ -64,12 +64,6 @@ def test_short_runs() -> None:
     assert isinstance(run.plot(), Figure)
 
 
-def test_the_default_duration_is_that_of_the_command() -> None:
-    assert ss.simulate(ss.scenario("paper", duration=2.0)).duration == 2.0
-    drive = ss.scenario("paper", rate=1.0)
-    assert ss.simulate(drive).duration == pytest.approx(200 * 2 * np.pi)
-
-
 def test_what_cannot_be_simulated_is_refused(feed_run: ss.Run) -> None:
     for duration in (-1.0, float("nan"), float("inf"), 1e308):
         with pytest.raises(InvalidInputError, match="must be from 0 to"):

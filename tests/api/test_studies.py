@@ -10,30 +10,11 @@ from matplotlib.figure import Figure
 import stickslip_ros as ss
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.measures.cycle_measures import Regime
-from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.studies.basin import Basins
-from stickslip_ros.studies.plan import Axis
-from stickslip_ros.studies.runner import compute_columns
-from stickslip_ros.studies.settling import SettlingOptions
-from stickslip_ros.studies.study import COLUMNS, MEASURES, sweep_study
+from stickslip_ros.studies.study import COLUMNS, MEASURES
 
 FREE = ss.scenario("paper", expects_control=False)
 SHORT: dict[str, Any] = {"transient": 20.0, "cycles": 2}
-
-
-def test_a_sweep_is_that_of_the_command() -> None:
-    study = sweep_study(
-        load_scenario("paper", ["plant.expects_control=false"]),
-        [Axis("plant.belt_speed", 0.3, 0.5, 3)],
-        settling=SettlingOptions(20.0, cycles=2),
-    )
-    expected = compute_columns(study)
-    for found in (
-        ss.sweep(FREE, belt_speed=(0.3, 0.5, 3), **SHORT),
-        ss.sweep(FREE, "plant.belt_speed=0.3:0.5:3", **SHORT),
-    ):
-        assert found.scenario is FREE
-        assert list(found.columns.points()) == list(expected.points())
 
 
 def test_a_sweep_prints_plots_and_knows_its_transitions() -> None:

@@ -10,21 +10,6 @@ from matplotlib.figure import Figure
 import stickslip_ros as ss
 from stickslip_ros.errors import InvalidInputError, RunError
 from stickslip_ros.scenarios.files import load_scenario
-from stickslip_ros.studies.stability import stability
-from stickslip_ros.text import finite
-
-
-def test_stability_is_that_of_the_command() -> None:
-    found, notes = stability(ss.scenario("paper"))
-    ours = ss.stability("paper")
-    assert finite({**vars(ours), "scenario": None}) == finite(
-        {**found, "notes": notes, "scenario": None}
-    )
-    assert repr(ours).splitlines()[0] == "paper, by theory"
-    assert "critical feed speeds (Hopf)" in repr(ours)
-    assert ours._repr_html_().count("<table>") == 2  # pyright: ignore
-    assert isinstance(ours.plot(), Figure)
-
 
 DELAYED = {"force_delay": 0.0025, "actuator_time_constant": 2e-3}
 DIFFERENCE = {"sensor_velocity": "difference", "sensor_difference_samples": 3}

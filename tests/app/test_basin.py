@@ -50,15 +50,6 @@ def test_the_shares_are_those_of_the_table(stickslip: Run, tmp_path: Path, drive
     assert (tmp_path / "basin.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_without_ranges_the_starts_are_around_the_equilibrium(stickslip: Run) -> None:
-    done = stickslip(
-        "basin", "paper", "--no-control", "--sample", "5", "-p", "plant.belt_speed=0.6"
-    )
-    assert done.returncode == 0, done.stderr
-    for text in ("paper, 5 starts", "equilibrium", "5", "1.0000", "0.0000"):
-        assert text in done.stdout
-
-
 def test_a_long_one_says_what_would_be_quicker(
     stickslip: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:

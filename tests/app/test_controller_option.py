@@ -29,19 +29,6 @@ def test_the_law_is_simulated(stickslip: Run, two: str) -> None:
     assert amplitude(*VELOCITY) < 0.05 < 0.1 < amplitude(*VELOCITY, *gain)
 
 
-def test_without_control_no_controller_has_to_be_named(stickslip: Run, two: str) -> None:
-    assert stickslip("simulate", two, "--no-control", "--duration", "1").returncode == 0
-
-
-def test_show_has_the_controller_in_use(stickslip: Run, two: str) -> None:
-    shown = stickslip.json("show", two, *VELOCITY)["parameters"]
-    assert list(shown) == ["plant", "velocity_feedback_controller", "analyzer"]
-    gain = shown["velocity_feedback_controller"]["velocity_gain"]
-    assert (gain["value"], gain["source"], gain["unit"]) == (-0.5, "file", "N s/m")
-    lines = [line.split() for line in stickslip("show", two, *VELOCITY).stdout.splitlines()]
-    assert ["velocity_gain", "-0.5", "file"] in lines  # dimensionless
-
-
 @pytest.mark.process
 @pytest.mark.parametrize("how", [["--composed"], pytest.param([], marks=pytest.mark.long)])
 def test_the_law_runs_as_a_node(stickslip: Run, two: str, how: list[str]) -> None:

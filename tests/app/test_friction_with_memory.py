@@ -5,7 +5,6 @@ from typing import Any
 
 import pytest
 
-import stickslip_ros as ss
 from tests.app.conftest import Run
 
 LAWS: Mapping[str, Mapping[str, float]] = {
@@ -50,29 +49,3 @@ def test_a_law_that_is_not_passive_is_told(stickslip: Run) -> None:
     assert "viscous = 0 s/m is 60 s/m below" in told.stderr
     passive = options("lugre", viscous=61.0)
     assert stickslip("simulate", "feed_drive", *passive, "--duration", "0.1").stderr == ""
-
-
-def scenario(**others: Any) -> ss.Scenario:
-    values = {f"friction_{name}": value for name, value in {**LAWS["lugre"], **CURVE}.items()}
-    return ss.scenario(
-        "feed_drive", friction_law="lugre", expects_control=False, **values, **others
-    )
-
-
-@pytest.mark.long
-def test_a_sweep_shows_the_hysteresis_of_a_subcritical_hopf_point() -> None:
-    """Above the Hopf speed of 72.49 mm/s rest and stick-slip are both stable."""
-    found = ss.sweep(scenario(), belt_speed=(0.07, 0.078, 5), carry="both").to_pandas()
-    assert {"up", "down"} <= set(found["direction"])
-    above = found[found["belt_speed"] > 0.0725]
-    up, down = (above[above["direction"] == way]["amplitude"] for way in ("up", "down"))
-    assert up.max() > 3e-4
-    assert down.max() < 1e-4
-
-
-@pytest.mark.long
-def test_the_gains_of_a_design_hold_in_its_trials() -> None:
-    proposal = ss.design(ss.scenario(scenario(), expects_control=True), belt_speed=(0.02, 0.05))
-    assert (
-        proposal.scenario.controller.control_law.linear_gain < -848.0
-    )  # the critical gain at 40 mm/s

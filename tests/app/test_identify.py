@@ -138,15 +138,6 @@ def test_a_model_in_python_is_saved_and_checked(
     model.save(tmp_path / "found.yaml")
 
 
-def test_all_constants_are_given(stickslip: Run) -> None:
-    known = {"mass": 100, "damping": 200, "stiffness": 1e6, "normal_force": 1000}
-    known |= {"bias_force": 0.0, "friction.static": 0.4, "friction.viscous": 0.1}
-    given = [f"--fix=plant.{name}={value}" for name, value in known.items()]
-    found = stickslip.json("identify", REFERENCE, "--to", "0.6", "--law", "coulomb", *given)
-    assert found["parameters"] == {}
-    assert set(found["curves"][0]["standard_error"]) == {0.0}
-
-
 @pytest.mark.long
 def test_units_that_are_wrong_are_noted(stickslip: Run, log: Path) -> None:
     columns = "time=t,position=x*1e3,force=u*2,reference=r*1e3"
@@ -162,3 +153,19 @@ def test_laws_that_predict_worse_say_by_how_much(stickslip: Run, log: Path) -> N
     assert re.search(r"coulomb .* predicts worse, by \d+\.\d standard errors", done.stdout)
     assert "table and table" not in done.stdout
     assert "exponential and table predict" not in done.stdout
+
+
+def test_a_map_gives_friction_alone(stickslip: Run, tmp_path: Path) -> None:
+    speed = np.geomspace(0.001, 0.2, 20)
+    force = (20.0 + 10.0 * np.exp(-speed / 0.01) + 60.0 * speed) / 2.0
+    rows = np.column_stack([[*speed, *-speed], [*force, *-force]])
+    table = written(tmp_path / "map.csv", rows, "v,f")
+    arguments = ("identify", str(table), "--map", "--columns", "velocity=v,force=f*2")
+    done = stickslip(*arguments, "--plot", "map.png")
+    assert done.returncode == 0
+    assert "law exponential" in done.stdout
+    assert "40 pairs" in done.stdout
+    assert (tmp_path / "map.png").stat().st_size > 1000
+    assert "s/rad" in stickslip(*arguments, "--rotary").stdout
+    model = ss.friction_map(table, columns={"velocity": "v", "force": "f*2"})
+    assert stickslip.json(*arguments) == model.to_dict()

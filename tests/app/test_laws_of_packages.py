@@ -199,21 +199,6 @@ def test_its_theory_is_that_of_the_law(with_packages: Run) -> None:
     assert both["open_loop"]["hopf_speeds"] != pytest.approx(speeds, rel=1e-3)
 
 
-@pytest.mark.long
-def test_its_constants_are_checked(with_packages: Run, stickslip: Run) -> None:
-    for override, refusal in (
-        ("reverse.static=0.05", "kinetic = 0.1 must not exceed friction.reverse.static = 0.05"),
-        ("decay_speed=0.0", "decay_speed = 0.0 is invalid: must be a finite number"),
-    ):
-        done = with_packages("simulate", LUBRICATED, "-p", f"plant.friction.{override}")
-        assert (done.returncode, done.stdout) == (2, "")
-        assert refusal in done.stderr
-        assert done.stderr.count("\n") == 1
-    done = stickslip("simulate", LUBRICATED)  # without the package
-    assert (done.returncode, done.stdout) == (2, "")
-    assert "friction.law = 'hess_soom' is invalid: must be one of" in done.stderr
-
-
 POINTS = ("--json", "--transient", "2", "--cycles", "3")
 SWEEP = ("sweep", "paper", "--over", "plant.belt_speed=0.3:0.4:2", *POINTS)
 BASIN = ("basin", "paper", "--position=-1:1:2", "--velocity=-1:1:2", *POINTS)

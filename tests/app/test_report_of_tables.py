@@ -55,15 +55,6 @@ def test_any_other_table_is_measured_with_its_columns(stickslip: Run, log: Path)
     assert recorded.plot() is not None
 
 
-def test_what_a_sensor_tells_is_measured(stickslip: Run, tmp_path: Path) -> None:
-    scenario = ss.scenario("feed_drive", expects_control=False, sensor_position_resolution=1e-4)
-    table = ss.simulate(scenario, duration=1.0).to_pandas().reset_index()
-    table.to_csv(tmp_path / "log.csv", index=False)
-    recorded = ss.read_table(tmp_path / "log.csv")
-    steps = recorded.samples.position / 1e-4
-    assert steps == pytest.approx(np.rint(steps), abs=1e-9)
-
-
 def test_slips_are_told_one_by_one(stickslip: Run, tmp_path: Path) -> None:
     """A tooth each second, 1 mm high."""
     time = np.arange(8000) * 1e-3

@@ -34,6 +34,7 @@ def free() -> ss.Scenario:
 
 
 KNOWN = {"plant.mass": 100.0, "plant.damping": 200.0}
+LAWS = ["washout", "velocity_feedback"]
 NOISY = "plant.sensor.position_noise=1e-6"
 
 CASES: dict[str, tuple[tuple[str, ...], Callable[[str], Result]]] = {
@@ -59,6 +60,33 @@ CASES: dict[str, tuple[tuple[str, ...], Callable[[str], Result]]] = {
         (LOG, "--law", "stribeck", *(f"--fix={n}={v}" for n, v in KNOWN.items()), "--check", LOG),
         lambda log: ss.identify(log, law="stribeck", fixed=KNOWN, check=[log]),
     ),
+    "compare": (
+        (
+            "feed_drive",
+            "--controllers",
+            ",".join(LAWS),
+            "--given",
+            "washout",
+            "--duration",
+            "0.6",
+            "--disturbances",
+            "step",
+            "--seeds",
+            "2",
+            "--spread",
+            "0.1",
+        ),
+        lambda _: ss.compare(
+            "feed_drive",
+            LAWS,
+            disturbances="step",
+            given="washout",
+            seeds=2,
+            spread=0.1,
+            duration=0.6,
+        ),
+    ),
+    "margin": ((LOG,), lambda log: ss.margin(log)),
     "report": ((REFERENCE,), lambda _: ss.read_bag(REFERENCE)),
     "report, of two": (
         (REFERENCE, LOG),
@@ -165,6 +193,7 @@ def test_each_has_its_verdict_and_its_tables(
     [
         ("design", "linear gain"),
         ("identify", "95 % interval"),
+        ("compare", "Comparison of control laws"),
         ("basin", "stick-slip 100.0%"),
         ("stability", "without control: unstable; sampled loop: stable"),
         ("report, of two", f"{REFERENCE}: stick-slip, not steady: decaying"),

@@ -110,3 +110,13 @@ def test_no_default_is_reported_for_a_varied_parameter(stickslip: Run, tmp_path:
     (line,) = stickslip("sweep", "mine.yaml", *over).stderr.splitlines()
     assert "plant.stiffness = 1.0 N/m" in line
     assert "belt_speed" not in line
+
+
+def test_a_sweep_of_an_axis_measures_the_forced_cycles(stickslip: Run) -> None:
+    over = "plant.disturbance.amplitude=10:60:2"
+    points = stickslip.json("sweep", "axis", "--over", over)
+    assert points["regime"] == ["stuck", "stick_slip"]
+    assert points["amplitude"] == pytest.approx([0.0, 28.98e-6], rel=1e-3)
+    still, moving = ([round(each, 12) for each in turns] for turns in points["turning_points"])
+    assert (len(set(still)), len(set(moving))) == (1, 2)
+    assert len(moving) < 40  # a rest is one turning point

@@ -1,6 +1,5 @@
 """Nodes that were started one by one are killed, stopped, continued and restarted."""
 
-import random
 import signal
 import subprocess
 from collections.abc import Generator, Sequence
@@ -192,28 +191,3 @@ def test_in_real_time_what_a_stop_costs_is_counted(trio: Trio) -> None:
     assert (steps > 0).all()
     assert (steps % PERIOD == 0).all()
     assert report_of_recording(trio.bags[0])["lost_samples"] == gaps(stamp)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("pace", ["lockstep", "realtime"])
-def test_a_monkey_among_them(trio: Trio, pace: str) -> None:
-    chance = random.Random(6)
-    trio.plant |= {"pace": pace, "reply_timeout": 1.0}
-    for _ in range(6):
-        for node in chance.sample(NODES, chance.choice([1, 1, 1, 2, 3])):
-            if trio.is_there(node):
-                trio.send(node, chance.choice([signal.SIGKILL, signal.SIGSTOP, signal.SIGCONT]))
-            else:
-                trio.start(node)
-        trio.graph.run_for(chance.choice([0.1, 0.5, 1.0, 2.0]))
-    for node in NODES:
-        if trio.is_there(node):
-            trio.send(node, signal.SIGCONT)
-        else:
-            trio.start(node)
-    trio.wait_for_closed_loop()
-    trio.end()
-    assert report_of_recording(trio.bags[-1])["complete"]
-    for bag in trio.bags:
-        if len(stamp := stamps(bag)) > 0:
-            assert report_of_recording(bag)["lost_samples"] == gaps(stamp)

@@ -67,15 +67,6 @@ def test_a_law_of_earlier_versions_is_named_before_its_constants(tmp_path: Path)
     )
 
 
-def test_every_bad_value_is_named(tmp_path: Path) -> None:
-    message = refusal(
-        scenario_file(tmp_path, section("/**/plant", "{mass: 0, damping: -1, rate: 10}"))
-    )
-    assert "mass = 0 " in message
-    assert "damping = -1 " in message
-    assert "rate" not in message
-
-
 def test_values_that_do_not_go_together(tmp_path: Path) -> None:
     for parameters, *fragments in (
         ("{friction: {static: 0.1}}", "minimum = 0.25", "static = 0.1"),
