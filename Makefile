@@ -132,7 +132,7 @@ reproduction: setup
 
 # The picture of the dashboard in README.md; needs a browser, and a machine that has time for it.
 screenshot: setup
-	$(BIN)/python -m tests.app.screenshot docs
+	$(BIN)/python -m docs.screenshot docs
 
 clean:
 	rm -rf .venv .venv-* build install log dist *.egg-info .pytest_cache .ruff_cache .hypothesis

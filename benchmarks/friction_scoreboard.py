@@ -28,11 +28,11 @@ from typing import Any
 import numpy as np
 from scipy.integrate import DOP853, solve_ivp
 
+from benchmarks.memory_reference import Array, Law, MemoryDrive
 from stickslip_ros.model.drive import Drive
 from stickslip_ros.model.friction import ElastoPlastic, Exponential, LuGre
 from stickslip_ros.motion import Motion
 from stickslip_ros.versions import versions
-from tests.motion.memory_reference import Array, Law, MemoryDrive
 
 TURNS = 3
 SAMPLES = 57

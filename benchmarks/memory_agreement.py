@@ -1,7 +1,7 @@
 """Do the motions of random drives whose friction has a memory agree with scipy's solvers?
 
 Thirty drives for each law, every other one with friction by direction, on static laws of several
-kinds as curves. `tests/motion/memory_reference.py` has the reference: the equations as
+kinds as curves. `benchmarks/memory_reference.py` has the reference: the equations as
 their sources have them, and events of its own. DOP853 solves them at rtol 1e-12. The motions last
 20 natural periods, with 4 samples in each.
 
@@ -26,9 +26,9 @@ from time import process_time
 from timeit import Timer
 from typing import Any
 
+from benchmarks.memory_reference import LostError
 from stickslip_ros.errors import StickslipError
 from stickslip_ros.versions import versions
-from tests.motion.memory_reference import LostError
 from tests.motion.random_memory_drives import (
     LAWS,
     PERIODS,

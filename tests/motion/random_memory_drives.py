@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 from scipy.integrate import DOP853
 
+from benchmarks import memory_reference
+from benchmarks.memory_reference import Array, Curve, MemoryDrive
 from stickslip_ros.model import friction
 from stickslip_ros.model.drive import Drive
 from stickslip_ros.motion import Motion
-from tests.motion import memory_reference
-from tests.motion.memory_reference import Array, Curve, MemoryDrive
 from tests.motion.random_drives import Random, Units, random_law, random_units
 
 LAWS = ("dahl", "lugre", "elasto_plastic", "maxwell_slip")

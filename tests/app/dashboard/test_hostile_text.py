@@ -1,5 +1,9 @@
-"""Hostile names and texts in a real browser: they are shown as text, and nothing of them runs."""
+"""Hostile names and texts: they are shown as text, and nothing of them runs.
 
+What the page parses, or runs, is a literal; and so it is in a real browser.
+"""
+
+import ast
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from urllib.parse import urlsplit
@@ -16,8 +20,6 @@ from stickslip_ros.record.codec import pack_joint_state
 from stickslip_ros.record.topics import DIAGNOSTICS, JOINT_STATES
 from tests.app.dashboard.test_page import Served, Start, browser  # noqa: F401 - a fixture used here
 from tests.nodes.graph import PATIENCE, Graph, wait_for
-
-pytestmark = pytest.mark.long
 
 RUN = "window.ran=1;fetch('http://evil.invalid/')"
 PAYLOADS = [
@@ -64,6 +66,7 @@ def _is_foreign(url: str) -> bool:
     return urlsplit(url).hostname not in ("127.0.0.1", None)
 
 
+@pytest.mark.long
 def test_nothing_that_a_node_publishes_runs(
     start_stickslip: Start, graph: Graph, guarded: tuple[Page, list[str]]
 ) -> None:
@@ -116,6 +119,7 @@ def test_nothing_that_a_node_publishes_runs(
     assert "Traceback" not in "".join(served.said)
 
 
+@pytest.mark.long
 def test_nothing_in_the_name_of_a_bag_runs(
     start_stickslip: Start, guarded: tuple[Page, list[str]], tmp_path: Path
 ) -> None:
@@ -150,6 +154,7 @@ PARSED = [
 ]
 
 
+@pytest.mark.long
 def test_the_policy_alone_stops_what_is_parsed(
     start_stickslip: Start, guarded: tuple[Page, list[str]]
 ) -> None:
@@ -164,3 +169,50 @@ def test_the_policy_alone_stops_what_is_parsed(
             page.evaluate("document.querySelector('#go')?.click()")
     assert page.evaluate("window.ran") is None
     assert served.end() == 130
+
+
+MODULES = sorted((Path(__file__).parents[3] / "stickslip_ros/app/dashboard").glob("*.py"))
+
+LITERALS = {
+    *("props", "style", "classes", "html", "markdown", "code", "mermaid", "restructured_text"),
+    *("add_head_html", "add_body_html", "add_css", "add_slot", "run_javascript"),
+}
+"""Methods of NiceGUI whose arguments are props, HTML, a template or a script."""
+
+PAGE_JS = ast.unparse(
+    ast.parse(
+        "ui.run_javascript(f\"stickslip.{function}({', '.join(map(json.dumps, arguments))})\")"
+    )
+)
+"""The one exception: a function of page.js, with JSON as its arguments."""
+
+
+def offences(code: str) -> list[str]:
+    """Return the calls in which something else than a literal is parsed or run."""
+    found: list[str] = []
+    for call in [node for node in ast.walk(ast.parse(code)) if isinstance(node, ast.Call)]:
+        name = call.func.attr if isinstance(call.func, ast.Attribute) else ""
+        given = call.args if name in LITERALS else []
+        given += [k.value for k in call.keywords if k.arg == "js_handler"]
+        if not all(isinstance(each, ast.Constant) for each in given):
+            found.append(ast.unparse(call))
+    return [each for each in found if each != PAGE_JS]
+
+
+def test_only_literals_are_parsed_and_text_comes_as_json() -> None:
+    texts = {path.name: path.read_text(encoding="utf-8") for path in MODULES}
+    assert {name: offences(text) for name, text in texts.items()} == {name: [] for name in texts}
+    assert [name for name, text in texts.items() if PAGE_JS in ast.unparse(ast.parse(text))] == [
+        "elements.py"
+    ]
+
+
+def test_what_parses_text_is_noticed() -> None:
+    for code in (
+        "element.props(f'label=\"{name}\"')",
+        "element.style('color: ' + colour)",
+        "ui.html(text)",
+        "ui.run_javascript(f'show({name!r})')",
+        "element.on('click', js_handler=f'() => show({name})')",
+    ):
+        assert offences(code), code

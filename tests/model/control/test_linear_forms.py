@@ -1,6 +1,5 @@
-"""The linear form of each law against finite differences: of the law, and of the running loop."""
+"""The linear form of each law against finite differences of its answers."""
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -9,7 +8,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.model.actuator import Actuator
 from stickslip_ros.model.control import (
     CONTROL_LAWS,
     NO_REFERENCE,
@@ -17,22 +15,15 @@ from stickslip_ros.model.control import (
     DisturbanceObserver,
     FrictionFeedforward,
     Pid,
-    Reference,
     SlidingMode,
     VelocityFeedback,
     Washout,
 )
 from stickslip_ros.model.drive import Drive
 from stickslip_ros.model.friction import Stribeck
-from stickslip_ros.model.sensor import MeasuredVelocity, Sensor
-from stickslip_ros.motion import Motion
-from stickslip_ros.motion.controller import Controller, answer
-from stickslip_ros.motion.sampled_loop import SampledLoop
 from stickslip_ros.samples import Sample
-from stickslip_ros.theory.linear_sampled_loop import LinearSampledLoop
 
 DRIVE = Drive(100.0, 200.0, 1e6, 1000.0, 0.03, Stribeck(0.4, 0.25, 0.05))
-RATE = 1000.0
 PID: dict[str, Any] = {"position_gain": 2e5, "integral_gain": 3e6, "velocity_gain": 4e3}
 LAWS = [
     Washout(20.0, linear_gain=-3000.0, cubic_gain=0.0),
@@ -80,37 +71,3 @@ def test_all_laws_with_a_linear_form_are_tested() -> None:
     defaults = {name: law().linear_feedback(1e-3) for name, law in CONTROL_LAWS.items()}
     own = {*(law.name for law in LAWS), "cascade"}  # in test_cascade.py
     assert own == {name for name, form in defaults.items() if form}
-
-
-@pytest.mark.parametrize("law", LAWS, ids=lambda law: law.name)
-@pytest.mark.parametrize("delay", [0.0, 1.3e-3])
-def test_the_loop_is_that_of_the_running_one(law: ControlLaw, delay: float) -> None:
-    """The distance of runs that start beside each other obeys the characteristic polynomial."""
-    sensor = Sensor(velocity=MeasuredVelocity.DIFFERENCE, difference_samples=2)
-    drive = replace(DRIVE, actuator=Actuator(time_constant=5e-4))
-    loop = LinearSampledLoop.from_drive(drive, RATE, delay, sensor)
-    assert loop is not None
-    rest, step, count = drive.equilibrium_position, 1e-7, 60
-
-    def run(start: float) -> FloatArray:
-        motion = Motion(drive, rest + start, 0.0)
-        running = SampledLoop(motion, RATE, 10**9, force_delay=delay, sensor=sensor)
-        controller = Controller(law, lambda time: Reference(rest, 0.0, 0.0))
-        seen: list[float] = []
-        for _ in range(count):
-            seen.append(motion.position - rest)
-            answer(running, controller)
-            running.advance()
-        return np.array(seen)
-
-    distance = (run(step) - run(-step)) / (2.0 * step)
-
-    def residue(matrix: FloatArray) -> float:
-        polynomial = np.poly(matrix)
-        # The difference for the velocity spans fewer samples at the start.
-        found = np.convolve(distance, polynomial, mode="valid")[3:]
-        size = np.abs(polynomial).sum() * np.abs(distance).max()
-        return float(np.abs(found).max() / size)
-
-    assert residue(loop.transition_matrix(law)) < 1e-6
-    assert residue(loop.transition_matrix(replace(law, **{law.tuned[-1]: 1.1}))) > 1e-5

@@ -1,4 +1,4 @@
-"""Take the screenshots of the dashboard for the docs: `python -m tests.app.screenshot DIRECTORY`.
+"""Take the screenshots of the dashboard for the docs: `python -m docs.screenshot DIRECTORY`.
 
 dashboard.png is for README.md and docs/dashboard.md, dashboard-dark.png for the latter.
 """
