@@ -27,15 +27,15 @@ from timeit import Timer
 from typing import Any
 
 from benchmarks.memory_reference import LostError
-from stickslip_ros.errors import StickslipError
-from stickslip_ros.versions import versions
-from tests.motion.random_memory_drives import (
+from benchmarks.random_memory_drives import (
     LAWS,
     PERIODS,
     SAMPLES,
     STORED_EVERY,
     random_memory_drive,
 )
+from stickslip_ros.errors import StickslipError
+from stickslip_ros.versions import versions
 
 REQUIRED = dict.fromkeys(LAWS, 1e-8)
 RTOL = dict.fromkeys(LAWS, 1e-12)

@@ -103,13 +103,3 @@ def test_a_design_runs_and_keeps_to_its_limit() -> None:
     assert frame.attrs["units"]["peak_force"] == "N"
     assert isinstance(one.plot(), Figure)
     assert one.margins is not None
-
-
-def test_without_a_proposal_it_says_why() -> None:
-    found = ss.design("feed_drive", belt_speed=0.04, force_limit=1e-3)
-    assert found.controller is None
-    assert "nothing to propose" in repr(found)
-    with pytest.raises(RunError, match="there is nothing to propose: "):
-        _ = found.scenario
-    with pytest.raises(RunError, match="there is nothing to propose: "):
-        found.plot()

@@ -1,6 +1,5 @@
 """`stickslip report` of tables: our own CSV files, and those of others."""
 
-import re
 from pathlib import Path
 
 import numpy as np
@@ -35,24 +34,6 @@ def test_our_own_table_is_measured_as_the_samples_of_a_run(stickslip: Run, log: 
     faster = ss.read_table(log, belt_speed=0.09)
     assert set(faster.samples.belt_velocity) == {0.09}
     assert faster.measures.regime == "pure_slip"
-
-
-def test_any_other_table_is_measured_with_its_columns(stickslip: Run, log: Path) -> None:
-    columns = "time=time,position=position,velocity=velocity,belt_velocity=0.04,force=velocity*-2"
-    done = stickslip("report", str(log), "--columns", columns, "--plot", "log.png", "--from", "1")
-    assert done.returncode == 0, done.stderr
-    assert "stick-slip" in done.stdout
-    assert "434.1" in done.stdout
-    recorded = ss.read_table(log, dict(part.split("=") for part in columns.split(",")))
-    assert recorded.measures.regime == "stick_slip"
-    assert recorded.forces.force == pytest.approx(-2.0 * recorded.samples.velocity)
-    assert len(recorded.to_pandas()) == 2001
-    rotary = stickslip("report", str(log), "--columns", columns, "--rotary").stdout
-    assert "434.1 µrad" in rotary
-    assert not re.search(r"\d [mµn]?(m|m/s|N)$", rotary, re.MULTILINE)
-    angles = ss.read_table(log, dict(part.split("=") for part in columns.split(",")), rotary=True)
-    assert angles.to_pandas().attrs["units"]["position"] == "rad"
-    assert recorded.plot() is not None
 
 
 def test_slips_are_told_one_by_one(stickslip: Run, tmp_path: Path) -> None:

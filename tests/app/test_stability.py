@@ -122,14 +122,6 @@ def test_coexisting_cycles_are_told_apart(stickslip: Run, monkeypatch: pytest.Mo
     assert "2, stable" in done.stdout
 
 
-def test_the_map_is_drawn(stickslip: Run, tmp_path: Path) -> None:
-    rate = ("-p", "plant.rate=20", "-p", "plant.force_delay=0.05")
-    done = stickslip("stability", "paper", *rate, "--plot", "map.png", "--json")
-    assert done.returncode == 0, done.stderr
-    assert json.loads(done.stdout)["sampled_loop"]["spectral_radius"] > 0.0
-    assert (tmp_path / "map.png").read_bytes().startswith(b"\x89PNG")
-
-
 def test_without_control_the_bifurcation_diagram_is_drawn(stickslip: Run, tmp_path: Path) -> None:
     paper = ("--style", "paper", "--no-title")
     done = stickslip("stability", "paper", "--no-control", "--plot", "diagram.png", *paper)

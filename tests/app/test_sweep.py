@@ -1,14 +1,11 @@
 """`stickslip sweep`: tables, figures, and interrupted sweeps."""
 
-import csv
-import json
 import signal
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-import stickslip_ros as ss
 from stickslip_ros.studies import runner
 from tests.app.conftest import Run, Start, ended
 from tests.nodes.graph import wait_for
@@ -17,40 +14,11 @@ FREE = ("sweep", "paper", "--no-control", "--transient", "100")
 SPEEDS = ("--over", "plant.belt_speed=0.2:0.6:5")
 
 
-def test_the_table_has_what_python_returns(stickslip: Run, tmp_path: Path) -> None:
-    both = (*FREE, *SPEEDS, "--carry", "both")
-    done = stickslip(*both, "--out", "table.csv", "--plot", "diagram.png")
-    assert done.returncode == 0, done.stderr
-    found = ss.sweep(
-        ss.scenario("paper", controller=None), belt_speed=(0.2, 0.6, 5), carry="both", transient=100
-    ).to_pandas()
-    with (tmp_path / "table.csv").open(newline="") as file:
-        rows = list(csv.DictReader(file))
-    assert [float(row["plant.belt_speed"]) for row in rows] == found["belt_speed"].tolist()
-    assert [float(row["amplitude"]) for row in rows] == found["amplitude"].tolist()
-    for name in ("direction", "regime"):
-        assert [row[name] for row in rows] == found[name].tolist()
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["diagram.png", "table.csv"]
-    for text in ("stick-slip", "0.2 to 0.4", "equilibrium"):
-        assert text in done.stdout
-    found = stickslip.json(*both, "--out", "table.json")
-    assert found == json.loads((tmp_path / "table.json").read_text())
-
-
 def test_rounding_is_shown_as_zero(stickslip: Run) -> None:
     over = ("--over", "plant.belt_speed=0.002:0.06:3", "--transient", "400")
     done = stickslip("sweep", "feed_drive", *over)
     (line,) = (line for line in done.stdout.splitlines() if line.startswith("equilibrium"))
     assert line.split()[-3:] == ["0", "m", "0"]
-
-
-@pytest.mark.usefixtures("coarse_maps")
-def test_a_map_is_drawn(stickslip: Run, tmp_path: Path) -> None:
-    over = ("--over", "plant.damping=0.01:0.1:2", "--over", "plant.belt_speed=0.2:0.6:3")
-    done = stickslip(*FREE, *over, "--plot", "map.svg", "--colour", "stick_fraction")
-    assert done.returncode == 0, done.stderr
-    assert "stick fraction" in (tmp_path / "map.svg").read_text()
-    assert "stick-slip" in done.stdout
 
 
 def test_a_table_that_came_meanwhile_is_left_alone_and_the_points_are_kept(

@@ -13,7 +13,7 @@ import pytest
 
 from benchmarks import memory_agreement
 from benchmarks.memory_agreement import REQUIRED, Result, compared, report
-from tests.motion.random_memory_drives import LAWS, STORED_EVERY, random_memory_drive
+from benchmarks.random_memory_drives import LAWS, STORED_EVERY, random_memory_drive
 
 FOUND: dict[str, Any] = json.loads(
     (Path(memory_agreement.__file__).parent / "memory_agreement.json").read_text(encoding="utf-8")

@@ -1,7 +1,6 @@
 """Comparison of control laws: its cases, their outcomes, and that it is resumed."""
 
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,10 +11,8 @@ from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.model.control import VelocityFeedback
 from stickslip_ros.scenarios.files import Scenario, load_scenario
 from stickslip_ros.studies.case_outcome import Disturbance, simulate_case
-from stickslip_ros.studies.comparison import Cases, Comparison, Outcomes, compared, drawn
-from stickslip_ros.studies.journal import Journal
+from stickslip_ros.studies.comparison import Cases, Comparison, compared, drawn
 from stickslip_ros.studies.plan import Axis
-from stickslip_ros.studies.runner import run
 from stickslip_ros.studies.study import compute
 
 LAWS = "washout,velocity_feedback"
@@ -100,24 +97,6 @@ def test_all_laws_meet_the_same_drives_and_the_same_noise() -> None:
     ]
     assert 0.8 <= min(factors) < 0.81
     assert 1.19 < max(factors) <= 1.2
-
-
-def test_an_interrupted_comparison_continues_and_gives_the_same_table(tmp_path: Path) -> None:
-    study = comparison(spread=0.1)
-    whole = Outcomes(study.plan.size)
-    with Journal(study, None, whole) as journal:
-        run(journal)
-    path = tmp_path / "part"
-    with Journal(study, path, Outcomes(study.plan.size)) as journal:
-        journal.add(compute(study, [0, 1, 5], None))
-    rest = Outcomes(study.plan.size)
-    with Journal(study, path, rest) as journal:
-        assert journal.count == 3
-        run(journal)
-    assert rest.rows == whole.rows
-    other = replace(study, plan=replace(study.plan, spread=0.2))
-    with pytest.raises(InvalidInputError, match="another study"):
-        Journal(other, path, Outcomes(study.plan.size))
 
 
 def test_a_case_that_fails_is_a_row_with_its_reason() -> None:
