@@ -92,19 +92,6 @@ def test_the_stable_gains_are_those_with_a_spectral_radius_below_one(
     assert np.array_equal(inside[decided], (rates > 0.0)[decided])
 
 
-@given(speeds, rates, st.floats(0.0, 4.0), corners)
-@examples(quick=15, thorough=40)
-def test_at_an_end_a_multiplier_is_on_the_unit_circle(
-    belt_speed: float, rate: float, periods: float, corner_frequency: float
-) -> None:
-    loop = loop_of(replace(PAPER, belt_speed=belt_speed), rate, periods / rate)
-    for interval in loop.stable_linear_gains(corner_frequency):
-        for end in interval:
-            if end != 0.0 and abs(end) < 1e3:
-                gains = Washout(corner_frequency, end, 0.0)
-                assert loop.spectral_radius(gains) == pytest.approx(1.0, abs=1e-9)
-
-
 @pytest.mark.parametrize("drive", NEUTRAL)
 @pytest.mark.parametrize(("rate", "force_delay"), [(100.0, 0.0), (0.2354, 4.2438), (1e6, 1e-5)])
 def test_without_any_damping_zero_is_the_critical_gain(

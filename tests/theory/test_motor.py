@@ -161,23 +161,3 @@ def test_the_cycle_of_a_run_is_that_of_the_motion_and_its_multiplier_the_decay()
     )  # fmt: skip
     assert again is not None
     np.testing.assert_allclose(again.multipliers, cycle.multipliers, atol=1e-6)
-
-
-@pytest.mark.long
-def test_behind_a_heavy_motor_that_is_held_the_cycle_is_that_of_an_ideal_one() -> None:
-    """The error falls as one over the mass of the motor."""
-    ideal = settled(RecordedMotion(FEED_DRIVE, 0.0, 0.0), 100, 20)
-    assert ideal.period is not None
-    assert ideal.midpoint is not None
-    errors = []
-    for mass in (1e3, 1e4, 1e5, 1e6, 1e7):
-        law = VelocityFeedback(-6.0 * mass, -9.0 * mass, feedback="motor")  # 3 rad/s
-        bent = ideal.midpoint * FEED_DRIVE.stiffness / (9.0 * mass)
-        drive = replace(FEED_DRIVE, motor=Motor(mass=mass))
-        motion = RecordedMotion(drive, 0.0, 0.0, law)
-        motion.restart(-bent, 0.0, motor=(-bent, 0.0))
-        measures = settled(motion, 300, 20)
-        assert measures.period is not None
-        errors.append(abs(measures.period - ideal.period) / ideal.period)
-    ratios = np.array(errors[:-1]) / errors[1:]
-    assert np.all((ratios > 5.0) & (ratios < 20.0))

@@ -10,6 +10,17 @@ from stickslip_ros.motion.controller import Controller
 from stickslip_ros.samples import Sample
 
 BELT_SPEED = 0.03
+PID_AND_CURVE = {
+    "position_gain": 3e5,
+    "integral_gain": 4e6,
+    "velocity_gain": 2e3,
+    "nominal_mass": 90.0,
+    "kinetic_force": 250.0,
+    "static_force": 400.0,
+    "decay_speed": 0.02,
+    "viscous_damping": 150.0,
+}
+"""Constants that laws which know of friction share."""
 
 
 class Record(NamedTuple):

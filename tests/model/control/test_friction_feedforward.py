@@ -11,19 +11,15 @@ from stickslip_ros.model.friction import (
     LuGre,
     Stribeck,
 )
-from tests.model.control.answers import BELT_SPEED, answers, assert_same, random_record
-
-LAW = FrictionFeedforward(
-    position_gain=3e5,
-    integral_gain=4e6,
-    velocity_gain=2e3,
-    nominal_mass=90.0,
-    kinetic_force=250.0,
-    static_force=400.0,
-    decay_speed=0.02,
-    exponent=1.7,
-    viscous_damping=150.0,
+from tests.model.control.answers import (
+    BELT_SPEED,
+    PID_AND_CURVE,
+    answers,
+    assert_same,
+    random_record,
 )
+
+LAW = FrictionFeedforward(**PID_AND_CURVE, exponent=1.7)
 
 
 @pytest.mark.parametrize("seed", range(5))

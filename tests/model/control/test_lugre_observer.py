@@ -5,18 +5,17 @@ from scipy.linalg import expm
 from stickslip_ros.model.control import LugreObserver
 from stickslip_ros.model.drive import Drive
 from stickslip_ros.model.friction import Exponential, LuGre
-from tests.model.control.answers import BELT_SPEED, answers, assert_same, random_record
+from tests.model.control.answers import (
+    BELT_SPEED,
+    PID_AND_CURVE,
+    answers,
+    assert_same,
+    random_record,
+)
 
 LAW = LugreObserver(
-    position_gain=3e5,
-    integral_gain=4e6,
-    velocity_gain=2e3,
-    nominal_mass=90.0,
-    kinetic_force=250.0,
-    static_force=400.0,
-    decay_speed=0.02,
+    **PID_AND_CURVE,
     exponent=2.0,
-    viscous_damping=150.0,
     bristle_stiffness=4e7,
     bristle_damping=1e4,
     observer_gain=3.0,
