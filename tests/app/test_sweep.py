@@ -14,13 +14,6 @@ FREE = ("sweep", "paper", "--no-control", "--transient", "100")
 SPEEDS = ("--over", "plant.belt_speed=0.2:0.6:5")
 
 
-def test_rounding_is_shown_as_zero(stickslip: Run) -> None:
-    over = ("--over", "plant.belt_speed=0.002:0.06:3", "--transient", "400")
-    done = stickslip("sweep", "feed_drive", *over)
-    (line,) = (line for line in done.stdout.splitlines() if line.startswith("equilibrium"))
-    assert line.split()[-3:] == ["0", "m", "0"]
-
-
 def test_a_table_that_came_meanwhile_is_left_alone_and_the_points_are_kept(
     stickslip: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
