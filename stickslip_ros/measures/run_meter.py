@@ -106,7 +106,7 @@ class RunMeter:
         samples = motion.samples + self.unmeasured
         lost = max(motion.lost_samples - self.unmeasured, (self.published or 0) - samples, 0)
         if self.unmeasured:
-            notes.append(f"{self.unmeasured} of the samples are recorded, and not measured")
+            notes.append(f"{self.unmeasured} of the samples are recorded, and not measured here")
         if timing is not None and (complaint := timing.warning()):
             doubt = "" if timing.in_time else "the regime is doubtful: "
             notes.append(doubt + complaint)

@@ -349,7 +349,7 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         if self._meter.timing is None:
             return {}
         counts = self._meter.timing._asdict()
-        if all(int(first) >= self._listens_since for first in self._timings):
+        if all(number_in(first) >= self._listens_since for first in self._timings):
             self._meter.published = counts["published"] = self._meter.timing.samples
         return counts
 

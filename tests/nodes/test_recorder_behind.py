@@ -24,6 +24,12 @@ def stamps_of(bag: Path) -> IntArray:
         return recording.joint_states.stamp
 
 
+def counts_of_analyzer(bag: Path) -> tuple[str, str]:
+    with Recording(bag) as recording:
+        stored = recording.metadata("stickslip_ros/report") or {}
+    return stored["samples"], stored["lost_samples"]
+
+
 @pytest.mark.parametrize("samples", [3 * DEEP, RECORDER_DEPTH + 2 * DEEP])
 def test_what_waits_up_to_the_bound_is_recorded_and_beyond_it_is_counted(
     graph: Graph, tmp_path: Path, samples: int
@@ -45,6 +51,7 @@ def test_what_waits_up_to_the_bound_is_recorded_and_beyond_it_is_counted(
     assert stamps[-1] == counts["newest_stamp"]
     assert report["samples"] == len(stamps) == samples - missing.sum()
     assert report["lost_samples"] == missing.sum()
+    assert counts_of_analyzer(bag) == (str(report["samples"]), str(report["lost_samples"]))
     assert bool(report["lost_samples"]) == (samples > RECORDER_DEPTH)
     assert len(stamps) >= min(samples, RECORDER_DEPTH)
 
