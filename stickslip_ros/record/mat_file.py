@@ -82,7 +82,12 @@ def _of_hdf5(content: bytes) -> Iterator[tuple[str, Any]]:
     import h5py
 
     def of_group(prefix: str, group: Any) -> Iterator[tuple[str, Any]]:
-        for name, each in group.items():
+        for name in group:
+            if not isinstance(group.get(name, getlink=True), h5py.HardLink):
+                sys.exit(f"{prefix}{name} is a link: it may point to another file")
+            each = group[name]
+            if isinstance(each, h5py.Dataset) and (each.external or each.is_virtual):
+                sys.exit(f"{prefix}{name} is stored in another file")
             if isinstance(each, h5py.Group):
                 yield from of_group(f"{prefix}{name}.", each)
             elif each.dtype.kind in "biuf":
