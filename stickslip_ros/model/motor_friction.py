@@ -84,8 +84,7 @@ class MotorFrictionSystem(DriveSystem):
         if sign != 0.0 and state[self._y] != belt_speed:
             return
         held, limit = self.motor_held(mode, instant), self._holding_force
-        size = abs(state[POSITION]) + abs(state[self._x]) + abs(held) + limit
-        margin = 8.0 * ulp(size + abs(self.control_force(instant)))
+        margin = self._rounding(instant)
         # A motor ahead needs less friction.
         if sign == 0.0:
             if abs(held) > limit - margin:
@@ -109,6 +108,9 @@ class MotorFrictionSystem(DriveSystem):
         if sign * (instant.state[self._y] - belt_speed) > 0.0:
             return mode
         instant.state[self._y] = belt_speed  # without the rounding of the integration
+        held = self.motor_held(mode, instant)
+        if sign != 0.0 and -sign * held >= self._holding_force - self._rounding(instant):
+            return mode  # just released: rounding must not lead back
         found = self._resting_sign(mode, instant)
         return mode if found == sign else self._with_motor(mode, found)
 
@@ -118,6 +120,14 @@ class MotorFrictionSystem(DriveSystem):
         if abs(held) <= self._holding_force:
             return 0.0
         return -copysign(1.0, held)
+
+    def _rounding(self, instant: Instant) -> float:
+        """Return what rounding may add to the dry friction that the motor needs."""
+        state, drive = instant.state, self.drive
+        stretch = drive.stiffness * (abs(state[POSITION]) + abs(state[self._x]))
+        rate = drive.damping * (abs(state[SPEED]) + abs(state[self._y]))
+        force = abs(self.control_force(instant)) + self._holding_force
+        return 8.0 * ulp(stretch + rate + force)
 
     def _motor_sign(self, mode: Mode) -> float:
         return mode.switches[self._parts.motor.start]
