@@ -408,6 +408,9 @@ def recorded_drive(bag: Path, namespace: str | None = None) -> Drive | None:
             if name in PlantParameters().known
         }
         known = {path: as_pairs(json.loads(text)) for path, text in curves.items()}
+        named = {each for name, each in values.items() if name.endswith(".file") and each}
+        if not named <= known.keys():
+            return None  # a bag must not have other files of its reader read
         plant = PlantParameters().changed(values, str(bag), known)
     except (ValueError, RecursionError, InvalidInputError):
         return None

@@ -114,12 +114,13 @@ def _topic_entry(channel: Channel, type_name: str) -> dict[str, Any]:
 def offered_profiles(qos: str) -> list[Any]:
     """Return the QoS profiles in rosbag2's YAML; empty if other recorders wrote something else.
 
-    A text that is far too long or uses aliases is not read.
+    A text that is far too long, uses aliases or has values that YAML cannot write is not read.
     """
     if len(qos) > _LARGEST_QOS or "*" in qos:
         return []
     try:
         profiles = yaml.safe_load(qos)
+        yaml.dump(profiles, Dumper=_DUMPER).encode()  # not a lone surrogate, nor a huge integer
     except Exception:  # a file of another recorder may hold anything
         return []
     return profiles if isinstance(profiles, list) else []

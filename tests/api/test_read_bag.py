@@ -1,5 +1,6 @@
 """Recorded runs as objects."""
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -7,8 +8,10 @@ import numpy as np
 import pytest
 
 import stickslip_ros as ss
+from stickslip_ros.api.recordings import recorded_drive
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.record.reader import Recording
+from stickslip_ros.record.recorder import Recorder
 from stickslip_ros.record.report import report_of_recording
 
 REFERENCE = Path(__file__).parents[2] / "bags" / "reference"
@@ -64,3 +67,17 @@ def test_a_part_is_that_of_the_report() -> None:
     assert len(found.forces) == 1000
     with pytest.raises(InvalidInputError, match="is empty"):
         ss.read_bag(REFERENCE, start=2.0, end=1.0)
+
+
+@pytest.mark.parametrize("group", ["friction", "disturbance"])
+def test_a_bag_does_not_have_other_files_read(group: str, tmp_path: Path) -> None:
+    """Numbers in a file of the reader would end up in figures of whoever wrote the bag."""
+    own = tmp_path / "own.csv"
+    own.write_text("0,0.4\n1,0.3\n")
+    kind = {"friction": "law", "disturbance": "kind"}[group]
+    parameters = {f"{group}.{kind}": '"table"', f"{group}.file": f'"{own}"'}
+    with Recorder(tmp_path / "bag") as recorder:
+        everything = ss.scenario("feed_drive").plant.flat()
+        given = {name: json.dumps(value) for name, value in everything.items()}
+        recorder.add_metadata("stickslip_ros/plant", given | parameters)
+    assert recorded_drive(tmp_path / "bag") is None

@@ -398,3 +398,13 @@ def test_what_is_damaged_or_of_a_false_size_is_not_unpacked() -> None:
     with pytest.raises(DamageError):
         MessageBlock(bytes(20), np.array([0]))
     assert offered_profiles("&a [*a]") == offered_profiles("a: [") == []
+
+
+@pytest.mark.parametrize(
+    "profiles",
+    ['["\\ud800"]', f"- {{depth: 0x{'f' * 50_000}}}", f"- {{depth: 0b{'1' * 50_000}}}",
+     f"- {{depth: {'1:' * 20_000}1}}"],
+    ids=["surrogate", "hexadecimal", "binary", "base 60"],
+)  # fmt: skip
+def test_profiles_that_yaml_cannot_write_are_left_out(profiles: str) -> None:
+    assert offered_profiles(profiles) == []

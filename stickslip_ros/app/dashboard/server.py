@@ -21,6 +21,7 @@ from stickslip_ros.app.dashboard import DEFAULT_PORT, LARGEST_PORT
 from stickslip_ros.app.dashboard.frames import Frames
 from stickslip_ros.app.dashboard.listener import ListenerNode
 from stickslip_ros.app.dashboard.page import Pages
+from stickslip_ros.app.dashboard.web_log import WebLog
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.nodes.base.process import ros_session
 from stickslip_ros.nodes.base.spinner import Spinner, spin
@@ -63,8 +64,7 @@ def serve(
         listener.command = command
         frames: Frames = Frames(listener)
         with _running(spinner, listener):
-            for name in ("asyncio", "nicegui"):
-                logging.getLogger(name).addFilter(_in_one_line)
+            logging.basicConfig(handlers=[WebLog()], level=logging.WARNING, force=True)
             app = FastAPI(openapi_url=None)
             _keep_others_out(app)
             pages = Pages(app, listener, frames)
@@ -80,6 +80,7 @@ def serve(
             print(f"dashboard of {namespace}, {reach}: http://{host}:{port}", file=sys.stderr)
             config = uvicorn.Config(
                 app,
+                log_config=None,  # that of this process
                 log_level="warning",
                 timeout_graceful_shutdown=1,
                 ws_per_message_deflate=False,  # slower than the loopback
@@ -119,13 +120,6 @@ def _keep_others_out(app: FastAPI) -> None:
         response.headers["Content-Security-Policy"] = policy
         response.headers["X-Content-Type-Options"] = "nosniff"
         return response
-
-
-def _in_one_line(record: logging.LogRecord) -> bool:
-    """Have NiceGUI, which checks no message, name an error without where it occurred."""
-    if record.exc_info:
-        record.msg, record.args, record.exc_info = repr(record.exc_info[1]), (), None
-    return True
 
 
 def _exit(*_: object) -> None:

@@ -1,7 +1,5 @@
 """Answers of the server to requests and messages that no page sends: no traceback."""
 
-import logging
-import sys
 from itertools import product
 from typing import Any
 
@@ -12,7 +10,6 @@ from starlette.websockets import WebSocketDisconnect
 
 from stickslip_ros.app.dashboard.frames import Frames
 from stickslip_ros.app.dashboard.page import Pages
-from stickslip_ros.app.dashboard.server import _in_one_line
 from tests.app.dashboard.test_frames import fed
 
 ORIGIN = {"origin": "http://testserver"}
@@ -50,14 +47,3 @@ def test_a_frame_that_no_page_sends_ends_the_connection(client: TestClient) -> N
             send(message)
             with pytest.raises(WebSocketDisconnect):
                 socket.receive_bytes()
-
-
-def test_what_nicegui_logs_of_a_message_is_one_line() -> None:
-    try:
-        float("abc\n")
-    except ValueError:
-        record = logging.LogRecord("nicegui", logging.ERROR, "", 0, "%s", (1,), sys.exc_info())
-    assert _in_one_line(record)
-    line = logging.Formatter().format(record)
-    assert line.startswith("ValueError(")
-    assert "\n" not in line
