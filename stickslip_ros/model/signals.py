@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from math import cos, inf, isfinite, pi
+from math import cos, inf, isclose, isfinite, pi
 from math import sin as float_sin
 from typing import Any, NamedTuple
 
@@ -13,6 +13,10 @@ from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.model.constants import Scales
 from stickslip_ros.model.functions import sin
 from stickslip_ros.samples import NO_REFERENCE, Reference
+from stickslip_ros.stamps import STAMP_ROUNDING
+
+_ROUNDING = 2.0**-49
+"""Share of the time by which rounding may put a corner beside a sample that is meant to be it."""
 
 
 class Piece(NamedTuple):
@@ -88,11 +92,11 @@ class Signal:
         Parameters
         ----------
         time : float
-            Time, s.
+            Time between two stamps, s: what starts within their rounding after it has started.
         """
         if not self.pieces:
             return NO_REFERENCE
-        origin, _, slope, swing, rate, _ = piece = self.switches_at(time)
+        origin, _, slope, swing, rate, _ = piece = self.switches_at(time + STAMP_ROUNDING)
         turn = rate * (time - origin)
         return Reference(
             float(self.value(time, piece)),
@@ -187,24 +191,15 @@ class Signal:
     def held(self, period: float) -> "Signal":
         """Return the signal to read at whole periods and to hold between.
 
-        What is constant or a sine starts at the sample nearest to its start, and lasts for a whole
-        number of samples.
+        It never acts before its start, but from the first sample at or after it on. A corner beside
+        a sample by no more than rounding is at the sample.
 
         Parameters
         ----------
         period : float
             Sample period, s.
         """
-        sample, now = 0, 0.0
-        pieces: list[Piece] = []
-        for piece, following in pairwise((*self.pieces, _held(0.0, inf))):
-            end = piece.end
-            jumps = piece[1:5] != following[1:5] and piece.slope == following.slope == 0.0
-            if end < inf and jumps:
-                sample += round((end - now) / period)
-                now, end = end, sample * period
-            pieces.append(piece._replace(end=end))
-        return Signal(_of_some_length(pieces))
+        return Signal(_of_some_length(_on_grid(piece, period) for piece in self.pieces))
 
     @cached_property
     def _ends(self) -> Sequence[float]:
@@ -415,6 +410,14 @@ def _of_some_length(pieces: Iterable[Piece]) -> tuple[Piece, ...]:
         if piece.end > (found[-1].end if found else -inf):
             found.append(piece)
     return tuple(found)
+
+
+def _on_grid(piece: Piece, period: float) -> Piece:
+    """Return a piece that ends at a sample if that is so but for rounding."""
+    if piece.end == inf:
+        return piece
+    sample = round(piece.end / period) * period
+    return piece._replace(end=sample) if isclose(piece.end, sample, rel_tol=_ROUNDING) else piece
 
 
 def _held(value: float, end: float) -> Piece:

@@ -10,6 +10,7 @@ from stickslip_ros.errors import RunError, in_words
 from stickslip_ros.model.control import NO_REFERENCE, ControlLaw, Reference
 from stickslip_ros.motion.sampled_loop import SampledLoop
 from stickslip_ros.samples import Sample
+from stickslip_ros.stamps import STAMP_ROUNDING
 from stickslip_ros.text import shown
 
 _STATE = "which must be a tuple of finite numbers, as many at every sample"
@@ -114,7 +115,7 @@ class Controller:
         if not fits:
             raise _failure(law, since, f"its state is {shown(state)}, {_STATE}")
         self._stamp, self.state, self._older = stamp, state, None
-        if since < law.start_after:
+        if since < law.start_after - STAMP_ROUNDING:
             return 0.0
         limit = law.force_limit
         if isinstance(force, float) and -limit < force < limit:
@@ -137,7 +138,8 @@ class Controller:
             Whether both hold.
         """
         since = (stamp - self._first_stamp) * 1e-9
-        return self._stamp == stamp - period and since >= self.law.start_after
+        acts = since >= self.law.start_after - STAMP_ROUNDING
+        return self._stamp == stamp - period and acts
 
     def skip(self, stamp: int, state: tuple[float, ...]) -> None:
         """Continue after samples that were answered elsewhere.

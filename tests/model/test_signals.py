@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from fractions import Fraction
 from itertools import pairwise
-from math import inf, nan, pi, sin
+from math import ceil, inf, nan, pi, sin
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -188,14 +188,27 @@ def test_a_held_step_on_the_grid_lasts_for_its_samples(first: int, count: int, r
 @given(st.integers(0, 10**6), st.integers(1, 5000))
 @example(start=55_000, rate=100)
 @example(start=65_000, rate=100)
-def test_a_held_impulse_is_the_sample_nearest_to_its_start(start: int, rate: int) -> None:
-    """The start in microseconds; midway between two samples either is the nearest."""
+def test_a_held_impulse_is_the_first_sample_from_its_start_on(start: int, rate: int) -> None:
+    """The start in microseconds."""
     period = 1.0 / rate
     held = impulse(1.0, period, start * 1e-6).held(period)
-    around = Fraction(start * rate, 10**6)
-    candidates = range(max(0, int(around) - 2), int(around) + 4)
-    (acting,) = [n for n in candidates if held.at(n * period) == 1.0]
-    assert abs(acting - around) <= Fraction(1, 2)
+    first = ceil(Fraction(start * rate, 10**6))
+    assert [n for n in range(max(0, first - 2), first + 4) if held.at(n * period)] == [first]
+
+
+@given(st.integers(1, 2_000), st.integers(1, 9_000))
+def test_a_reference_starts_at_the_sample_that_is_its_start(number: int, rate: int) -> None:
+    """The time of a sample is that of its stamp, a whole number of nanoseconds."""
+    signal = step(1.0, number / rate)
+    times = [round(sample * 1e9 / rate) * 1e-9 for sample in (number - 1, number)]
+    assert [signal.reference(time).position for time in times] == [0.0, 1.0]
+
+
+@given(st.floats(0.0, 5.0), st.floats(1e-3, 1.0))
+def test_a_held_sine_is_zero_before_its_start(start: float, period: float) -> None:
+    held = sine(1.0, start, frequency=0.01 / period).held(period)
+    samples = range(max(0, int(start / period) - 3), int(start / period) + 1)
+    assert all(held.at(n * period) == 0.0 for n in samples if n * period < start * (1.0 - 1e-12))
 
 
 def test_a_held_sine_starts_from_zero() -> None:

@@ -120,7 +120,8 @@ def test_force_limit_and_start_after_hold_for_any_law(
     samples = samples_of(moves)
     for sample in samples:
         force = free.answer(sample)
-        acts = (sample.stamp - samples[0].stamp) * 1e-9 >= start
+        since = (sample.stamp - samples[0].stamp) * 1e-9
+        acts = since >= start - 1e-9  # a stamp is a whole number of nanoseconds
         assert limited.answer(sample) == (max(-limit, min(limit, force)) if acts else 0.0)
         assert limited.state == free.state
 
@@ -260,3 +261,13 @@ def test_the_sample_after_a_failure_continues_from_the_last_good_one() -> None:
     with pytest.raises(RunError, match=r"fails at 1\.5 s: ZeroDivisionError"):
         controller.answer(at(2500 * MILLISECOND, velocity=0.5))
     assert controller.answer(at(3000 * MILLISECOND)) == 2.0
+
+
+@pytest.mark.parametrize("rate", [3000, 7000, 9999])
+def test_a_force_acts_at_the_sample_that_is_its_start(rate: int) -> None:
+    """The stamp of that sample is rounded to a whole nanosecond, up or down."""
+    law = VelocityFeedback(-1.0, start_after=1.0 / rate)
+    stamps = [0, round(1e9 / rate)]
+    samples = [Sample(stamp, 0.0, 1.0, 0.0, 0.0, 0.0) for stamp in stamps]
+    controller = Controller(law)
+    assert [controller.answer(each) for each in samples] == [0.0, -1.0]
