@@ -19,11 +19,9 @@ from stickslip_ros.motion.short_step import (
 
 STEPS_PER_UNIT = 10_000
 """Integration steps that a motion may take for each unit of time, in the long run."""
-_SPARE_STEPS = 4_000_000
-"""Steps that it may take in addition: seconds of work, a thousand times the usual number."""
-_MOST_STEPS = 1e18
-"""Largest number of steps that heyoka accepts."""
-_STEPS_OF_A_PHASE = 10
+_SPARE_STEPS = 300_000
+"""Steps that it may take in addition: at most a second of work."""
+_STEPS_OF_A_PHASE = 20
 """Number of steps that the work around the integration of one phase is worth."""
 _SHORTEST_REPEATED = 16.0
 """Duration of an advance above which its phases may be known: others have two cycles or fewer."""
@@ -58,7 +56,9 @@ class HybridMotion:
         """Start at time zero with all inputs at zero."""
         self.unbounded = False
         """Whether the motion is unbounded; then it does not advance any further."""
-        self._steps_left = _SPARE_STEPS
+        self._steps, self._steps_left = 0, _SPARE_STEPS
+        self._steps_per_unit = inf
+        """Steps for each unit of time, if these are fewer than `STEPS_PER_UNIT`."""
         self._detail, self._watched = detail, bool(detail)
         self._derives = Detail.DERIVATIVES in detail
         self._integrators = IntegratorPool()
@@ -143,11 +143,7 @@ class HybridMotion:
             self._pass_shortly(duration)
             return
         system, instant, watched = self._system, self._instant, self._watched
-        # Without `min` and further calls: each costs a twentieth of a step of the sampled loop.
-        if self._steps_left > _SPARE_STEPS:
-            self._steps_left = _SPARE_STEPS
-        steps = STEPS_PER_UNIT * duration
-        self._steps_left += STEPS_PER_ADVANCE + int(steps if steps < _MOST_STEPS else _MOST_STEPS)
+        self._steps_left += STEPS_PER_ADVANCE
         mode = system.settled(self._mode, instant)
         if mode is not self._mode:
             self._enter(mode)
@@ -166,6 +162,7 @@ class HybridMotion:
             if flow is None:
                 guard, elapsed = system.closed_form(mode, instant, end - now)
                 now = end if guard is None else now + elapsed
+                self._take_steps(_STEPS_OF_A_PHASE, elapsed)
             else:
                 taylor = flow.taylor
                 if clocked:
@@ -178,9 +175,8 @@ class HybridMotion:
                 until = end - self._begun
                 if limits_steps:
                     longest = min(system.longest_step(instant), LONGEST_STEP)
-                reached = taylor.propagate_until(until, self._steps_left, longest)
-                outcome, elapsed = reached[0].value, taylor.time
-                self._steps_left -= reached[3] + _STEPS_OF_A_PHASE
+                outcome = self._propagate(flow, until, longest)
+                elapsed = taylor.time
                 if outcome == NO_EVENT:
                     now = end
                 else:
@@ -188,9 +184,6 @@ class HybridMotion:
                     if outcome == _NOT_FINITE:
                         self._overflow(flow)
                         guard = _DIVERGENCE
-                    elif self._steps_left <= 0:
-                        flow.take_marks()  # of a phase that is not reported
-                        raise TooManyStepsError
                     elif outcome == _STEP_LIMIT:  # the rates leave a step no length
                         guard, now = _DIVERGENCE, self._begun + elapsed
                     else:
@@ -229,6 +222,34 @@ class HybridMotion:
                     continue
             self._enter(mode)
 
+    def _propagate(self, flow: CompiledFlow, until: float, longest: float) -> int:
+        """Integrate up to a time or a guard; return the outcome."""
+        taylor, work = flow.taylor, _STEPS_OF_A_PHASE
+        while True:
+            before, most = taylor.time, self._steps_left
+            reached = taylor.propagate_until(until, most, longest)
+            outcome, steps = reached[0].value, reached[3]
+            try:
+                self._take_steps(work + steps, taylor.time - before)
+            except TooManyStepsError:
+                taylor.reset_cooldowns()
+                flow.take_marks()  # of a phase that is not reported
+                raise
+            if outcome != _STEP_LIMIT or steps < most:
+                return outcome
+            work = 0
+
+    def _take_steps(self, steps: int, elapsed: float) -> None:
+        """Count steps that took the motion on for a time; raise TooManyStepsError beyond a bound.
+
+        A motion that stays within it in the long run may save steps for a while that needs more.
+        """
+        self._steps += steps
+        left = self._steps_left - steps + min(STEPS_PER_UNIT, self._steps_per_unit) * elapsed
+        self._steps_left = _SPARE_STEPS if left > _SPARE_STEPS else int(left)
+        if left < 1.0:
+            raise TooManyStepsError
+
     def _repeat(self, recurrence: Recurrence, now: float, latest: float) -> float:
         """Continue with the known phases that `latest` does not shorten; return the time then."""
         for phase in recurrence.phases():
@@ -264,7 +285,6 @@ class HybridMotion:
 
     def _pass_shortly(self, duration: float) -> None:
         """Take note of a short step."""
-        self._steps_left += STEPS_PER_ADVANCE  # saved for those that are not short
         if self._watched:
             self._begun = 0.0
             self._pass(self._mode, None, self._mode, duration)

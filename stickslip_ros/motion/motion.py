@@ -22,8 +22,10 @@ from stickslip_ros.motion.hybrid_motion import (
     HybridMotion,
     TooManyStepsError,
 )
-from stickslip_ros.motion.short_step import STEPS_PER_ADVANCE
 from stickslip_ros.samples import MotorSample
+
+_STEPS_PER_SECOND = 1e8
+"""Integration steps that a motion may take for each second, in the long run: minutes of work."""
 
 _LARGEST_FORCE = 1e100
 """Largest dimensionless force; a larger one is clipped to it: both make the motion unbounded."""
@@ -126,6 +128,7 @@ class Motion(HybridMotion):
         # Those of the drive take longer to look up.
         self._frequency, self._length = drive.angular_frequency, drive.length_scale
         self._speed, self._weight = drive.speed_scale, drive.normal_force
+        self._steps_per_unit = _STEPS_PER_SECOND / self._frequency
         self._one_force = len(self._system.inputs) == 1
 
     @property
@@ -357,7 +360,6 @@ class Motion(HybridMotion):
         """
         self._instant.state[:] = array("d", state)
         self.force = force
-        self._steps_left += advances * STEPS_PER_ADVANCE
         for _ in range(advances):  # with the rounding of single ones
             self._pass_time(duration)
 
@@ -390,9 +392,12 @@ class Motion(HybridMotion):
         try:
             self._advance(duration * self._frequency)
         except TooManyStepsError:
+            steps, time = STEPS_PER_UNIT, 1.0 / self._frequency
+            if self._steps_per_unit < steps:
+                steps, time = _STEPS_PER_SECOND, 1.0
             raise RunError(
                 "the motion is too stiff to be followed: it takes more than "
-                f"{STEPS_PER_UNIT} steps of integration for {1.0 / self._frequency:g} s"
+                f"{steps:.0f} steps of integration for {time:g} s"
             ) from None
         self._pass_time(duration)
 

@@ -241,14 +241,14 @@ class ShootingMotion(VariationalMotion):
     def _begin(self, now: float, end: float) -> float:
         # Start from the identity: heyoka's error is relative to the largest of the variables.
         self._integrated(self._flow)[:] = np.eye(self.order)
-        self._begun, self._steps_before = now, self._steps_left
+        self._begun, self._steps_before = now, self._steps
         return min(end, now + _LONGEST_SLIP) if self._mode.flow == SLIP else end
 
     def _pass(self, mode: Mode, guard: int | None, following: Mode | None, now: float) -> None:
         self._found = self._integrated(self._flow) @ self._found
         super()._pass(mode, guard, following, now)
         if not self._system.sticks:
-            self._effort += _EFFORT_OF_A_STEP * (self._steps_before - self._steps_left)
+            self._effort += _EFFORT_OF_A_STEP * (self._steps - self._steps_before)
         elif mode.flow == SLIP:
             # What follows may have set the speed, beyond that of the belt.
             state = self.state if guard is None else self._at_guard
