@@ -79,12 +79,12 @@ class TwoMasses:
     both_stick: float = 0.0
     """Time for which both bodies stick."""
 
-    def run(self, times: Array) -> Array:
-        """Return x, x', X, X', z at times, which increase, from rest at zero."""
+    def run(self, times: Array, start: Sequence[float] = (0.0,) * 5) -> Array:
+        """Return x, x', X, X', z at times, which increase; by default from rest at zero."""
         self._time = (self.stiffness * (1.0 / self.mass + 1.0 / self.motor_mass)) ** -0.5
         self._unit = self.normal_force * self._time / self.mass
         found = np.empty((len(times), 5))
-        state, now, self._piece = np.zeros(5), 0.0, self.pieces[0]
+        state, now, self._piece = np.array(start), 0.0, self.pieces[0]
         mode = self._mode(state)
         for piece in self.pieces:
             jumps = piece.belt_speed != self._piece.belt_speed
