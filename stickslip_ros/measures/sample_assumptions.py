@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.measures.breakpoints import STICK_SHARE
 from stickslip_ros.model.drive import UNBOUNDED_SPEED, Drive
-from stickslip_ros.model.friction import LAWS, WITHDRAWN
+from stickslip_ros.model.friction import LAWS, WITHDRAWN, Coulomb
 from stickslip_ros.model.sensor import Sensor
 
 
@@ -91,6 +91,8 @@ def _unbounded_speed(plant: Mapping[str, Any]) -> float:
     try:
         names = "mass", "stiffness", "normal_force"
         constants: dict[str, Any] = {name: float(plant[name]) for name in names}
-        return UNBOUNDED_SPEED * Drive(damping=0.0, belt_speed=0.0, **constants).speed_scale
+        law = Coulomb(static=float(plant.get("friction.static", 0.0)))  # a table has none
+        drive = Drive(damping=0.0, belt_speed=0.0, friction=law, **constants)
+        return UNBOUNDED_SPEED * drive.speed_scale
     except (ArithmeticError, InvalidInputError, LookupError, TypeError, ValueError):
         return inf

@@ -2,8 +2,8 @@
 
 from dataclasses import KW_ONLY, dataclass, field, replace
 from functools import cached_property
-from math import inf, pi, sqrt
-from typing import Self
+from math import inf, log2, pi, sqrt
+from typing import Any, Self
 
 from typing_extensions import override
 
@@ -16,6 +16,9 @@ from stickslip_ros.model.signals import NO_SIGNAL, Signal
 
 UNBOUNDED_SPEED = 1e3
 """Dimensionless speed of the slide above which the motion counts as unbounded, and ends."""
+
+_USUAL_COEFFICIENTS, _USUAL_COEFFICIENT = (2.0**-10, 2.0**3), 0.4
+"""Static coefficients with which the normal force is the unit of force, and the middle of them."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +59,9 @@ class Drive(DriveConstants):
     Damping of the guide adds the force -c_g (x' - v_belt). With a `Motor` of finite mass, k and c
     act between slide and motor, and u on the motor.
     The scales make it dimensionless, eq. 2: X'' + 2 beta X' + X = mu(X' - v0) + U.
-    A drive with m = k = N = 1 is the dimensionless system itself. Without a spring, k = 0, the term
+    Only N mu acts: with coefficients far from usual ones, such as those of N = 1 N, the unit of
+    force is another part of the friction. A drive with m = k = N = 1 is the dimensionless system
+    itself. Without a spring, k = 0, the term
     X vanishes, and the unit of speed is 1 m/s.
 
     Examples
@@ -96,7 +101,7 @@ class Drive(DriveConstants):
         Without a spring it is N/(m V) with the scale of speed V = 1 m/s.
         """
         if not self.has_spring:
-            return self.normal_force / self.mass
+            return self.force_scale / self.mass
         return sqrt(self.stiffness / self.mass)
 
     @property
@@ -120,11 +125,21 @@ class Drive(DriveConstants):
         return max(abs(self.belt_speed + end) for end in self.belt.bounds)
 
     @cached_property
+    def force_scale(self) -> float:
+        """Scale of force, N: N, times a power of two for a law of unusual coefficients."""
+        static = float(max(self.friction.limits))
+        if static == 0.0 or _USUAL_COEFFICIENTS[0] <= static <= _USUAL_COEFFICIENTS[1]:
+            return self.normal_force
+        factor = 2.0 ** round(log2(static / _USUAL_COEFFICIENT))
+        known = self.friction.multiplied(1.0 / factor) is not None
+        return self.normal_force * factor if known else self.normal_force
+
+    @cached_property
     def length_scale(self) -> float:
         """Scale of length L = N/k, m; without a spring V/w0 = m V^2/N."""
         if not self.has_spring:
-            return self.mass / self.normal_force
-        return self.normal_force / self.stiffness
+            return self.mass / self.force_scale
+        return self.force_scale / self.stiffness
 
     @cached_property
     def speed_scale(self) -> float:
@@ -136,30 +151,35 @@ class Drive(DriveConstants):
     @cached_property
     def scales(self) -> Scales:
         """Units in which the drive is dimensionless."""
-        return Scales(self.length_scale, self.speed_scale, self.normal_force)
+        return Scales(self.length_scale, self.speed_scale, self.force_scale)
 
     @cached_property
     def dimensionless(self) -> Self:
         """The same drive in these units, eq. 2: m = k = N = 1, or k = 0 without a spring."""
-        if self.is_dimensionless:
+        if self.is_dimensionless and self.force_scale == 1.0:
             return self
+        scales = self.scales
+        friction: FrictionLaw | None = self.friction.scaled(scales.speed, scales.length)
+        if self.force_scale != self.normal_force:
+            friction = friction.multiplied(self.normal_force / self.force_scale)
+            assert friction is not None
         return self._scaled(
             mass=1.0,
             damping=self._coefficient(self.damping),
             stiffness=1.0 if self.has_spring else 0.0,
             normal_force=1.0,
+            friction=friction,
+            load=self.load.scaled(replace(scales, force=self.normal_force), "N"),
         )
 
-    def _scaled(self, **own: float) -> Self:
+    def _scaled(self, **own: Any) -> Self:
         """Return the drive in its scales, with these values of constants."""
         scales = self.scales
         return replace(
             self,
             belt_speed=self.belt_speed / scales.speed,
             bias_force=self.bias_force / scales.force,
-            friction=self.friction.scaled(scales.speed, scales.length),
             belt=self.belt.scaled(scales, "m/s"),
-            load=self.load.scaled(scales, "N"),
             actuator=scaled(self.actuator, scales),
             motor=None if self.motor is None else scaled(self.motor, scales),
             guide_damping=self.guide_damping * scales.factor("N s/m"),
@@ -178,7 +198,9 @@ class Drive(DriveConstants):
             raise InvalidInputError(
                 "stiffness = 0 N/m: without a spring the slide has no equilibrium position"
             )
-        by_friction = float(self.friction.at_rest(self.belt_speed)) * self.length_scale
+        by_friction = float(self.friction.at_rest(self.belt_speed)) * (
+            self.normal_force / self.stiffness
+        )
         dragged = self.bias_force + self.guide_damping * self.belt_speed
         return by_friction + dragged / self.stiffness
 
@@ -192,7 +214,7 @@ class Drive(DriveConstants):
 
     def _coefficient(self, damping: float) -> float:
         if not self.has_spring:
-            return damping / self.normal_force
+            return damping / self.force_scale
         return damping / sqrt(self.stiffness * self.mass)
 
 
@@ -219,6 +241,11 @@ class ScaledDrive(Drive):
 
     @cached_property
     @override
+    def force_scale(self) -> float:
+        return self.unit.force_scale
+
+    @cached_property
+    @override
     def speed_scale(self) -> float:
         return self.unit.speed_scale
 
@@ -235,6 +262,8 @@ class ScaledDrive(Drive):
             damping=self.damping * self.scales.speed / self.scales.force,
             stiffness=self.stiffness / self.unit.stiffness,
             normal_force=self.normal_force / self.scales.force,
+            friction=self.friction.scaled(self.scales.speed, self.scales.length),
+            load=self.load.scaled(self.scales, "N"),
         )
 
 

@@ -127,7 +127,7 @@ class Motion(HybridMotion):
         drive = self._drive
         # Those of the drive take longer to look up.
         self._frequency, self._length = drive.angular_frequency, drive.length_scale
-        self._speed, self._weight = drive.speed_scale, drive.normal_force
+        self._speed, self._weight = drive.speed_scale, drive.force_scale
         self._steps_per_unit = _STEPS_PER_SECOND / self._frequency
         self._one_force = len(self._system.inputs) == 1
 
@@ -207,7 +207,7 @@ class Motion(HybridMotion):
     @property
     def force(self) -> float:
         """Held force on slide or motor, N; an actuator with states receives it as its command."""
-        return self._instant.inputs[0] * self._drive.normal_force
+        return self._instant.inputs[0] * self._drive.force_scale
 
     @force.setter
     def force(self, force: float) -> None:
@@ -224,14 +224,14 @@ class Motion(HybridMotion):
             Disturbance force on the slide, N.
         """
         if len(self._instant.inputs) > 1:
-            if disturbance != self._instant.inputs[1] * self._drive.normal_force:
+            if disturbance != self._instant.inputs[1] * self._drive.force_scale:
                 self._hold(1, disturbance)
         else:
             control += disturbance
         self._hold(0, control)
 
     def _hold(self, number: int, force: float) -> None:
-        scaled = force / self._drive.normal_force
+        scaled = force / self._drive.force_scale
         if not -_LARGEST_FORCE <= scaled <= _LARGEST_FORCE:
             scaled = max(-_LARGEST_FORCE, min(_LARGEST_FORCE, scaled))
         self._instant.inputs[number] = scaled
@@ -243,12 +243,12 @@ class Motion(HybridMotion):
     @property
     def disturbance(self) -> float:
         """Held disturbance force, N; 0 where it is a part of `force`, without actuator or motor."""
-        return sum(self._instant.inputs[1:]) * self._drive.normal_force
+        return sum(self._instant.inputs[1:]) * self._drive.force_scale
 
     @property
     def applied_force(self) -> float:
         """Present force on slide or motor, N: the held one, or that of continuous control."""
-        return self._system.control_force(self._instant) * self._drive.normal_force
+        return self._system.control_force(self._instant) * self._drive.force_scale
 
     @property
     def control_state(self) -> tuple[float, ...]:
@@ -312,7 +312,7 @@ class Motion(HybridMotion):
     def friction_force(self) -> float:
         """Friction force on the slide, N, with the force held so far."""
         scaled = self._system.friction_force(self._mode, self._instant)
-        return scaled * self._drive.normal_force
+        return scaled * self._drive.force_scale
 
     def advance_under(self, control: float, disturbance: float, duration: float) -> None:
         """Set the forces, and advance: the same as `set_forces` and `advance`, in less time.
@@ -440,7 +440,7 @@ class Motion(HybridMotion):
         if control is not None:
             self._put_control_state(state, control_state)
         if drive.actuator.states == old.actuator.states:
-            ratio = old.normal_force / drive.normal_force
+            ratio = old.force_scale / drive.force_scale
             state[system.actuator_states] = [each * ratio for each in lagging]
         if motor is not None:
             self._put_motor(state, motor)

@@ -101,7 +101,7 @@ class _Block:
             "elapsed": (loop.stamp(1) - loop.stamp(0)) * 1e-9,
             "length": drive.length_scale,
             "speed": drive.speed_scale,
-            "weight": drive.normal_force,
+            "weight": drive.force_scale,
             "belt_speed": drive.belt_speed,
             "step": step,
             "travel": system.belt_speed(mode, 0.0) * step,

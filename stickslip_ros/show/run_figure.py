@@ -338,7 +338,8 @@ class _OneRun(_Panels):
         if self._drive is not None and self._drive.has_spring and self._drive.motor is None:
             # On a belt at rest any position within the static friction is an equilibrium.
             belt = np.where(rows.belt_velocity == 0.0, np.nan, rows.belt_velocity)
-            by_friction = self._drive.friction.at_rest(belt) * self._drive.length_scale
+            bent = self._drive.normal_force / self._drive.stiffness
+            by_friction = self._drive.friction.at_rest(belt) * bent
             dragged = self._drive.bias_force + self._drive.guide_damping * belt
             rest = by_friction + dragged / self._drive.stiffness
             draw_line(position, pane, (rows.time, rest), length, gap, **_REST)

@@ -170,7 +170,7 @@ def default_axes(scenario: Scenario, count: int) -> tuple[Axis, Axis]:
             "plant.stiffness = 0 N/m: without a spring no range of starts follows from the drive, "
             "so both position and velocity must be given"
         )
-    bent = max(drive.friction.limits) * drive.length_scale
+    bent = max(drive.friction.limits) * (drive.normal_force / drive.stiffness)
     reach = 2.0 * max(abs(drive.belt_speed) / drive.angular_frequency, bent)
     middle, speed = drive.equilibrium_position, reach * drive.angular_frequency
     return (

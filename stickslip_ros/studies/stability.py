@@ -117,7 +117,7 @@ def _held(drive: Drive) -> str | None:
     """Return why a drive has no single equilibrium; None if its belt moves."""
     if drive.belt_speed:
         return None
-    reach = float(max(drive.friction.limits)) * drive.length_scale
+    reach = float(max(drive.friction.limits)) * (drive.normal_force / drive.stiffness)
     shown = f"{reach:.4g}" if drive.is_dimensionless else quantity(reach, "m")
     return (
         "the belt is at rest, and friction holds the slide anywhere within mu_s N / k = "

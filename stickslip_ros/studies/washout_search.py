@@ -50,7 +50,7 @@ class Candidates:
         )
         self.loops = Loops([loop for loop in loops if loop is not None])
         # Twice the gain that settles without overshoot: a larger one does not damp faster.
-        unit = task.drive.normal_force / task.drive.speed_scale
+        unit = task.drive.force_scale / task.drive.speed_scale
         self._largest_gain = (4.0 + 2.0 * self.loops.steepest) * unit
         self._cubic_coefficient = _cubic_coefficient(task.drive)
         self._peaks: dict[float, float] = {}
@@ -172,7 +172,7 @@ def _cubic_coefficient(drive: Drive) -> float:
     """Return the coefficient of the falling cubic friction at high speed, N s^3/m^3, or zero."""
     law, high = drive.dimensionless.friction, 1e6
     coefficient = -float(law.coefficient(high, 1.0)) / high**3
-    return coefficient * drive.normal_force / drive.speed_scale**3 if coefficient > 1e-6 else 0.0
+    return coefficient * drive.force_scale / drive.speed_scale**3 if coefficient > 1e-6 else 0.0
 
 
 @dataclass(frozen=True)

@@ -60,7 +60,7 @@ def critical_gains(drive: Drive, gains: ContinuousControl) -> CriticalGains | No
         If belt or load follow a signal, or the drive has no spring.
     """
     require("the critical gain", drive, *ONE_DEGREE)
-    own, unit = gains_of(gains), drive.normal_force / drive.speed_scale
+    own, unit = gains_of(gains), drive.force_scale / drive.speed_scale
     if own is None:
         return None
     without, with_unit = (expand(drive, replace(own, linear_gain=each)) for each in (0.0, unit))
@@ -76,7 +76,7 @@ def critical_gains(drive: Drive, gains: ContinuousControl) -> CriticalGains | No
     sigma = _sigma(drive, critical)
     # sigma is affine in the cubic gain: only the third derivatives contain it, linearly. With a
     # large one the rounding of the other terms does not matter.
-    large = 1e9 * drive.normal_force / drive.speed_scale**3
+    large = 1e9 * drive.force_scale / drive.speed_scale**3
     without, with_large = (
         _sigma(drive, replace(critical, cubic_gain=cubic)) for cubic in (0.0, large)
     )

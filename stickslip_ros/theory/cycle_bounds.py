@@ -75,7 +75,8 @@ def loading_time(drive: Drive) -> float:
     """
     require("the loading by the belt", drive, SPRING)
     forward, backward = drive.friction.limits
-    return (forward + backward) * drive.length_scale / abs(drive.belt_speed)
+    bent = (forward + backward) * (drive.normal_force / drive.stiffness)
+    return bent / abs(drive.belt_speed)
 
 
 def follow(motion: RecordedMotion) -> Iterator[Breakpoints]:

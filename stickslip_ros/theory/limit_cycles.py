@@ -299,5 +299,5 @@ def _outermost(drive: Drive) -> float:
     belt_speed = abs(drive.belt_speed) / drive.speed_scale
     amplitudes = np.geomspace(belt_speed, UNBOUNDED_SPEED, 200)
     growing = amplitudes[averaged_growth(drive, belt_speed, amplitudes) > 0.0]
-    by_friction = 10.0 * (belt_speed + drive.friction.static)
+    by_friction = 10.0 * (belt_speed + drive.dimensionless.friction.static)
     return max(by_friction, 2.0 * float(growing.max(initial=0.0)))

@@ -245,7 +245,7 @@ class LinearSampledLoop:
             self.difference_samples,
         )
         return boundary.stable_intervals(
-            self.drive.normal_force / self.drive.speed_scale,
+            self.drive.force_scale / self.drive.speed_scale,
             lambda gain: float(self._radii(corner_frequency, np.array([gain]))[0]),
         )
 
@@ -386,8 +386,8 @@ class LinearSampledLoop:
                 seen[3, motor] = 1.0 / (of_motor * self.period)
                 seen[3, -1] = -seen[3, motor]
         units = np.resize([drive.length_scale, drive.speed_scale], len(seen))
-        forces[..., 0, :] = (feedback.direct * units / drive.normal_force) @ seen
-        forces[..., 0, own] = feedback.output * drive.speed_scale / drive.normal_force
+        forces[..., 0, :] = (feedback.direct * units / drive.force_scale) @ seen
+        forces[..., 0, own] = feedback.output * drive.speed_scale / drive.force_scale
         forces[..., 1:, first:past] = np.eye(under_way)
         matrix[..., :order, :order] = slide
         matrix[..., :order, :] += starting[:, None] * forces[..., whole, None, :]

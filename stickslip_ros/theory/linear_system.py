@@ -83,5 +83,5 @@ def _system(
     """Return the system with a matrix, and the effect of a disturbance force of one."""
     outputs = np.zeros((2, len(names)))
     outputs[0, POSITION], outputs[1, SPEED] = drive.length_scale, drive.speed_scale
-    inputs = forced[:, np.newaxis] / drive.normal_force
+    inputs = forced[:, np.newaxis] / drive.force_scale
     return LinearSystem(names, matrix, inputs, outputs, np.zeros((2, 1)), period)

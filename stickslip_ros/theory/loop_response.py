@@ -54,7 +54,7 @@ class PlantResponse:
         # What a newton does to the state until the next sample.
         forces = np.zeros((order, 2))
         forces[:, 0] = effect[:, seen] / drive.length_scale
-        forces[: len(loop.disturbed), 1] = loop.disturbed / drive.normal_force
+        forces[: len(loop.disturbed), 1] = loop.disturbed / drive.force_scale
         responses = np.linalg.solve(z[:, None, None] * np.eye(order) - open_loop, forces)
         states: ComplexArray = responses.astype(np.complex128)
         rows: list[ComplexArray] = []

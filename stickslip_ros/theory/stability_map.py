@@ -41,7 +41,7 @@ class StabilityMap:
                 continuous[row] = critical.linear
         needed = loop.critical_linear_gain(gains.corner_frequency) or 0.0
         far = 2.0 * (
-            gains.linear_gain or needed or -loop.drive.normal_force / loop.drive.speed_scale
+            gains.linear_gain or needed or -loop.drive.force_scale / loop.drive.speed_scale
         )
         linear = np.sort(np.linspace(far, -0.25 * far, points))
         decay_rates = loop.coarsened().decay_rates(corners, linear)

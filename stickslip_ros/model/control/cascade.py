@@ -134,7 +134,7 @@ class Cascade(ControlLaw, TwoBodyControl):
 
     @override
     def state_scales(self, drive: Drive) -> Sequence[float]:
-        return drive.normal_force, *self.washout.state_scales(drive)
+        return drive.force_scale, *self.washout.state_scales(drive)
 
     def bound(self, speed: Any) -> Any:
         """Return infinity: no bound is known; see `ContinuousControl.bound`."""

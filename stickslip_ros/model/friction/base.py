@@ -33,6 +33,8 @@ class SteadyFriction(ABC):
     """Installed package whose entry point names the law; empty for a law of this package."""
     nonsmooth: ClassVar[bool] = False
     """Whether friction has no second derivative in steady slip: no Lyapunov coefficient exists."""
+    proportional: ClassVar[Sequence[str]]
+    """Constants that friction is proportional to, all together; optional."""
     direction_independent: ClassVar[Sequence[str]] = ()
     """Constants that must be the same in both directions of slip: otherwise friction would jump."""
 
@@ -321,6 +323,18 @@ class FrictionLaw(FrictionMemory):
             Coefficient with the sign of the force on the slide, dimensionless.
         """
         return self.coefficient(-belt_speed, -np.sign(belt_speed))
+
+    def multiplied(self, factor: float) -> Self | None:
+        """Return the law with another size of friction; None if `proportional` does not say how.
+
+        Parameters
+        ----------
+        factor : float
+            What all coefficients are multiplied by.
+        """
+        if "proportional" not in vars(type(self)):  # a class derived from one that says it
+            return None
+        return replace(self, **{name: factor * getattr(self, name) for name in self.proportional})
 
     @property
     def dry(self) -> Self:

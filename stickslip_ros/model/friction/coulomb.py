@@ -1,5 +1,6 @@
 """The Coulomb law of the paper."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -21,6 +22,7 @@ class Coulomb(FrictionLaw):
     """
 
     name: ClassVar[str] = "coulomb"
+    proportional: ClassVar[Sequence[str]] = ("static", "viscous")
 
     viscous: Any = constant(0.0, "Increase of the coefficient with speed.", "s/m", simplifies=True)
 

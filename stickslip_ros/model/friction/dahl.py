@@ -32,6 +32,7 @@ class Dahl(FrictionLaw):
     """
 
     name: ClassVar[str] = "dahl"
+    proportional: ClassVar[Sequence[str]] = ("static", "bristle_stiffness")
     states: ClassVar[Mapping[str, str | None]] = {"z": "m"}
     direction_independent: ClassVar[Sequence[str]] = ("bristle_stiffness",)
 

@@ -113,6 +113,13 @@ class Directional(FrictionLaw):
         return refusal and re.sub(rf"\b({names})(?= = )", r"reverse.\1", refusal)
 
     @override
+    def multiplied(self, factor: float) -> Self | None:
+        forward, reverse = (law.multiplied(factor) for law in (self.forward, self.reverse))
+        if forward is None or reverse is None:
+            return None
+        return replace(self, forward=forward, reverse=reverse)
+
+    @override
     def scaled(self, speed: float, length: float = 1.0) -> Self:
         return replace(
             self,

@@ -38,6 +38,7 @@ class ElastoPlastic(LuGre):
     """
 
     name: ClassVar[str] = "elasto_plastic"
+    proportional: ClassVar[Sequence[str]] = ("bristle_stiffness", "bristle_damping")
     nonsmooth: ClassVar[bool] = True
     own_switches: ClassVar[Sequence[str]] = ("elastic", "plastic", "limit")
 

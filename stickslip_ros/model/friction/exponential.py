@@ -1,5 +1,6 @@
 """The exponential law: a Stribeck curve that is not the paper's."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -26,6 +27,7 @@ class Exponential(FrictionLaw):
     """
 
     name: ClassVar[str] = "exponential"
+    proportional: ClassVar[Sequence[str]] = ("static", "kinetic", "viscous")
 
     kinetic: Any = constant(0.25, "Kinetic coefficient mu_k.", at_least=0.0)
     decay_speed: Any = constant(

@@ -1,5 +1,6 @@
 """The linear law of the paper."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import copysign, inf
 from typing import Any, ClassVar
@@ -22,6 +23,7 @@ class Linear(FrictionLaw):
     """
 
     name: ClassVar[str] = "linear"
+    proportional: ClassVar[Sequence[str]] = ("static", "slope")
 
     slope: Any = constant(0.45, "Decrease of the coefficient with relative speed.", "s/m")
 

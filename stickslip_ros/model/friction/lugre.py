@@ -6,6 +6,8 @@ from functools import cached_property
 from math import exp
 from typing import Any, ClassVar, Self
 
+from typing_extensions import override
+
 from stickslip_ros.model.constants import constant
 from stickslip_ros.model.friction.base import FrictionLaw, Numbers, Values
 from stickslip_ros.model.friction.exponential import Exponential
@@ -36,6 +38,7 @@ class SteadyPart(FrictionLaw):
     """The friction of another law in steady slip, its curve, as a law without a memory."""
 
     static: ClassVar[Any]  # type: ignore[misc]
+    proportional: ClassVar[Sequence[str]] = ()
 
     curve: FrictionLaw = field(default_factory=Exponential)
     """Law that gives the friction in steady slip."""
@@ -58,6 +61,12 @@ class SteadyPart(FrictionLaw):
     def coefficient(self, relative_speed: Any, sign: Any) -> Any:
         """Return that of the curve; see `SteadyFriction.coefficient`."""
         return self.curve.coefficient(relative_speed, sign)
+
+    @override
+    def multiplied(self, factor: float) -> Self | None:
+        """Return the same law, and its curve, with another size; see `FrictionLaw.multiplied`."""
+        own, curve = super().multiplied(factor), self.curve.multiplied(factor)
+        return None if own is None or curve is None else replace(own, curve=curve)
 
     def scaled(self, speed: float, length: float = 1.0) -> Self:
         """Return the same law, and its curve, in other units; see `FrictionLaw.scaled`."""
@@ -166,6 +175,7 @@ class LuGre(CurveFollower):
     """
 
     name: ClassVar[str] = "lugre"
+    proportional: ClassVar[Sequence[str]] = ("bristle_stiffness", "bristle_damping")
     states: ClassVar[Mapping[str, str | None]] = {"z": "m"}
 
     bristle_damping: Any = constant(

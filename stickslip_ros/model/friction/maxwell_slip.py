@@ -1,6 +1,6 @@
 """The generalised Maxwell-slip law."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import exp
 from typing import Any, ClassVar
@@ -35,6 +35,7 @@ class MaxwellSlip(CurveFollower):
     """
 
     name: ClassVar[str] = "maxwell_slip"
+    proportional: ClassVar[Sequence[str]] = ("bristle_stiffness", "attraction")
     states: ClassVar[Mapping[str, str | None]] = {"z1": "m", "z2": "m", "z3": "m", "z4": "m"}
 
     elements: Any = constant(

@@ -1,5 +1,6 @@
 """Coulomb friction with stiction."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -25,6 +26,7 @@ class Stiction(FrictionLaw):
     """
 
     name: ClassVar[str] = "stiction"
+    proportional: ClassVar[Sequence[str]] = ("static", "kinetic", "viscous")
 
     kinetic: Any = constant(0.25, "Kinetic coefficient mu_k.", at_least=0.0)
     viscous: Any = constant(0.0, "Increase of the coefficient with speed.", "s/m", simplifies=True)

@@ -1,5 +1,6 @@
 """The cubic Stribeck law of the paper (eq. 3)."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import inf
 from typing import Any, ClassVar
@@ -25,6 +26,7 @@ class Stribeck(FrictionLaw):
     """
 
     name: ClassVar[str] = "stribeck"
+    proportional: ClassVar[Sequence[str]] = ("static", "minimum")
 
     minimum: Any = constant(0.25, "Smallest kinetic coefficient mu_m.", at_least=0.0)
     minimum_speed: Any = constant(

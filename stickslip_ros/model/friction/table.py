@@ -45,6 +45,10 @@ class Table(FrictionLaw):
             object.__setattr__(self, "static", first)
 
     @override
+    def multiplied(self, factor: float) -> Self:
+        return replace(self, points=tuple((speed, factor * each) for speed, each in self.points))
+
+    @override
     def coefficient(self, relative_speed: Any, sign: Any) -> Any:
         speed = np.asarray(relative_speed * sign)
         piece = np.maximum(np.searchsorted(self._speeds, speed, side="right") - 1, 0)
