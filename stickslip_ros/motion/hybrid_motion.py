@@ -245,7 +245,8 @@ class HybridMotion:
         A motion that stays within it in the long run may save steps for a while that needs more.
         """
         self._steps += steps
-        left = self._steps_left - steps + min(STEPS_PER_UNIT, self._steps_per_unit) * elapsed
+        per_unit = min(STEPS_PER_UNIT, self._steps_per_unit)
+        left = self._steps_left - steps + (per_unit * elapsed if elapsed > 0.0 else 0.0)  # not NaN
         self._steps_left = _SPARE_STEPS if left > _SPARE_STEPS else int(left)
         if left < 1.0:
             raise TooManyStepsError
