@@ -2,9 +2,6 @@
 
 import json
 import os
-import signal
-import subprocess
-import sys
 import tracemalloc
 from dataclasses import replace
 from pathlib import Path
@@ -76,45 +73,22 @@ def test_resumed_in_other_pieces_it_is_as_undisturbed(
     assert resumed(study, path) == (study.plan.size, expected)
 
 
-_BEGIN = """
-import sys
-from pathlib import Path
-from stickslip_ros.studies import runner
-from stickslip_ros.studies.journal import Journal
-from tests.studies.studies import speeds
-from stickslip_ros.studies.plan import Continuation
+def test_what_is_told_to_be_done_is_in_the_file(
+    path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A process that is killed loses nothing that it has told."""
+    study = speeds(9, carry=Continuation.UP)
+    pieces_of(monkeypatch, 3)
+    found: list[tuple[float, int]] = []
 
-runner._LARGEST_TASK = 3
-with Journal(speeds(10_000, carry=Continuation.UP), Path(sys.argv[1])) as journal:
-    runner.run(journal, progress=lambda done: print(done, flush=True))
-"""
+    def progress(done: float) -> None:
+        (copy := path.with_name("copy")).write_bytes(path.read_bytes())
+        with Journal(study, copy) as journal:
+            found.append((done, journal.count))
 
-
-@pytest.mark.process
-def test_killed_it_goes_on_from_what_is_in_the_file(path: Path) -> None:
-    study = speeds(10_000, carry=Continuation.UP)
-    with subprocess.Popen(
-        [sys.executable, "-c", _BEGIN, path],
-        stdout=subprocess.PIPE,
-        text=True,
-        cwd=Path(__file__).parents[2],
-    ) as process:
-        reported = next(count for count in map(int, process.stdout) if count >= 9)
-        process.send_signal(signal.SIGKILL)
-        process.wait()
-        reported = max([reported, *map(int, process.stdout)])
     with Journal(study, path) as journal:
-        # It tells of a piece when that is in the file.
-        assert reported <= journal.count <= reported + 3
-        with pytest.raises(KeyboardInterrupt):
-            runner.run(journal, progress=stop_at(journal.count + 6))
-        found = list(journal.columns.points())
-    with Journal(study) as journal:
-        with pytest.raises(KeyboardInterrupt):
-            runner.run(journal, progress=stop_at(len(found)))
-        expected = list(journal.columns.points())
-    assert len(found) >= reported + 6
-    assert expected[: len(found)] == found
+        runner.run(journal, progress=progress)
+    assert found == [(done, done) for done in (0, 3, 6, 9)]
 
 
 @pytest.mark.parametrize("step", [97, pytest.param(1, marks=pytest.mark.long)])

@@ -164,17 +164,6 @@ def test_every_point_is_carried_on_once_from_its_neighbour(
         assert [value[-1] for value in values] == in_order
 
 
-def test_both_directions_have_the_same_values_and_a_chain_begins_at_its_own_end() -> None:
-    grid = Grid(tuple(AXES[:2]), Continuation.BOTH)
-    one_way = grid.size // 2
-    assert [grid.direction(index) for index in (0, one_way - 1)] == [Continuation.UP] * 2
-    assert [grid.direction(index) for index in (one_way, grid.size - 1)] == [Continuation.DOWN] * 2
-    for index in range(one_way):
-        assert grid.values(index) == grid.values(index + one_way)
-    up, down = Grid((AXES[0],), Continuation.BOTH).chains()
-    assert ([*up], [*down]) == ([0, 1, 2, 3], [7, 6, 5, 4])
-
-
 def test_a_grid_refuses_one_parameter_twice_and_too_many_points() -> None:
     with pytest.raises(InvalidInputError, match="belt_speed: must be different parameters"):
         Grid((AXES[0], Axis(SPEED, 0.0, 1.0, 2)))

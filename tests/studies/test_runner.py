@@ -42,6 +42,7 @@ STUDIES = {
     "sampled": Study(
         paper("plant.rate=20.0", "plant.force_jitter=0.1"), Grid((GAIN,), Continuation.UP), SHORT
     ),
+    "continuous": Study(paper(), Grid((GAIN,)), SHORT, continuous=True),
 }
 """Among whose points some are refused and some run away."""
 
@@ -51,7 +52,6 @@ class Shuffled(Executor):
 
     def __init__(self, seed: int = 0) -> None:
         self.most_pending = 0
-        self.submitted: list[tuple[int, ...]] = []
         self._random = random.Random(seed)
         self._pending: list[tuple[Future[Any], Callable[[], Any]]] = []
         self._unfinished = 0
@@ -64,7 +64,6 @@ class Shuffled(Executor):
         future: Future[Any] = Future()
         with self._changed:
             self._pending.append((future, lambda: task(*arguments)))
-            self.submitted.append(tuple(arguments[1]))
             self._unfinished += 1
             self.most_pending = max(self.most_pending, self._unfinished)
             self._changed.notify()
@@ -130,18 +129,6 @@ def test_in_processes_the_points_are_the_same() -> None:
     with local_processes(2) as processes:
         for name in ("up and down", "sampled"):
             assert computed(STUDIES[name], processes) == at_once(STUDIES[name])
-
-
-@pytest.mark.parametrize("carry", [None, Continuation.UP])
-def test_an_executor_never_has_more_tasks_than_asked_for(carry: Continuation | None) -> None:
-    axes = (Axis("plant.friction.minimum", 0.1, 0.3, 8), Axis("plant.belt_speed", 0.2, 0.6, 3))
-    study = Study(free(), Grid(axes, carry), SHORT)
-    for in_flight in (1, 4):
-        with Shuffled() as executor:
-            computed(study, executor, in_flight)
-            assert executor.most_pending == in_flight
-            tasks = sorted(index for task in executor.submitted for index in task)
-            assert tasks == list(range(study.plan.size))
 
 
 def test_an_executor_must_be_allowed_a_task() -> None:

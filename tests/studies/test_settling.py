@@ -5,10 +5,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
-from stickslip_ros.errors import InvalidInputError, RunError
+from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.measures.cycle_measures import Regime
 from stickslip_ros.model.control import Washout
 from stickslip_ros.model.friction import Coulomb, Exponential, Linear, LuGre
@@ -69,75 +67,6 @@ def _case(*overrides: str, continuous: bool = False, **drive: Any) -> Controlled
         paper("plant.rate=20.0", *overrides), continuous=continuous
     )
     return replace(case, drive=replace(case.drive, **drive))
-
-
-STIFF = ControlledDrive(replace(PAPER, damping=1e9))
-MIXED: list[tuple[ControlledDrive, MotionState]] = [
-    (ControlledDrive(PAPER), REST),
-    (ControlledDrive(FEED_DRIVE), MotionState(1e-4, 0.02)),
-    (ControlledDrive(replace(PAPER, friction=Coulomb(0.4))), MotionState(1.0, -0.3)),
-    (
-        ControlledDrive(replace(PAPER, friction=Exponential(0.4, 0.25, 0.1, 0.0), stiffness=2.0)),
-        REST,
-    ),
-    (ControlledDrive(replace(PAPER, friction=Linear(0.4, 0.9), belt_speed=0.2)), REST),  # runs away
-    (ControlledDrive(replace(PAPER, belt_speed=0.0)), MotionState(2.0, 0.0)),
-    (ControlledDrive(replace(PAPER, belt_speed=-0.3)), REST),
-    (STIFF, REST),
-    (_case(*WEAK), REST),
-    (
-        _case(*WEAK, "plant.force_delay=0.07", "plant.force_jitter=0.09"),
-        MotionState(0.0, 0.2, (0.1, 0.0)),
-    ),
-    (_case("washout_controller.linear_gain=50.0"), REST),  # runs away
-    (
-        _case(
-            "plant.expects_control=false",
-            "plant.disturbance.kind=sine",
-            "plant.disturbance.amplitude=0.2",
-        ),
-        REST,
-    ),
-    (_case(*WEAK, continuous=True), REST),
-    (
-        _case(*WEAK, "washout_controller.start_after=7.0", continuous=True),
-        MotionState(0.1, 0.2, (-0.3,)),
-    ),
-    (_case("washout_controller.linear_gain=50.0", continuous=True), REST),  # runs away
-    (_case(continuous=True, friction=Exponential(0.4, 0.25, 0.1, 0.0)), MotionState(0.3, 0.1)),
-    (_case(continuous=True, damping=1e9), REST),  # too stiff
-]
-"""Laws, units, control and ends of every kind."""
-
-
-def _found(case: ControlledDrive, start: MotionState) -> object:
-    try:
-        settled = settling.settle(case, start, SettlingOptions(5.0, 2, 2))
-    except RunError as error:
-        return str(error)
-    return settled._replace(turning_points=settled.turning_points.tolist())  # pyright: ignore
-
-
-@pytest.fixture(scope="module")
-def alone() -> list[object]:
-    """Results of the mixed cases, of every kind, when their integrators are new."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("stickslip_ros.motion.hybrid_motion._SPARE_STEPS", 1000)
-        alone = [_found(*mixed) for mixed in MIXED]
-    regimes = {found.measures.regime for found in alone if isinstance(found, Settled)}
-    assert regimes >= {Regime.STICK_SLIP, Regime.STUCK, Regime.UNBOUNDED, Regime.PURE_SLIP}
-    assert sum(isinstance(found, str) and "too stiff" in found for found in alone) == 2
-    return alone
-
-
-@pytest.mark.long
-@given(order=st.permutations(range(len(MIXED))))
-@settings(max_examples=4)
-def test_what_was_followed_before_changes_no_bit(alone: list[object], order: list[int]) -> None:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("stickslip_ros.motion.hybrid_motion._SPARE_STEPS", 1000)
-        for number in order:
-            assert _found(*MIXED[number]) == alone[number]
 
 
 @pytest.mark.parametrize(

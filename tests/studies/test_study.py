@@ -186,13 +186,6 @@ def test_a_study_of_which_only_one_corner_can_be_is_not_refused(carry: Continuat
             assert sum(point.reason is None for point in corners) == 1
 
 
-def test_what_continuous_control_does_not_have_is_a_row_with_the_reason() -> None:
-    delay = Axis("plant.force_delay", 0.0, 0.1, 2)
-    one, other = points(sweep_study(paper(), [delay], settling=SHORT, continuous=True))
-    assert one.reason is None
-    assert "plant.force_delay = 0.1 is refused" in (other.reason or "")
-
-
 def test_control_that_starts_late_acts_from_the_second_point_of_a_chain_on() -> None:
     """After 500 s without control, the vibration decays further from point to point."""
     washout = ("washout_controller.start_after=500", "washout_controller.linear_gain=-2")

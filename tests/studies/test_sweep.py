@@ -3,31 +3,14 @@
 import pytest
 
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.measures.cycle_measures import Regime
 from stickslip_ros.studies.plan import Axis
-from stickslip_ros.studies.runner import compute_columns
 from stickslip_ros.studies.study import sweep_study
-from stickslip_ros.theory.critical_gains import critical_gains
 from tests.studies.studies import free, paper
 
 SPEED = Axis("plant.belt_speed", 0.2, 0.4, 3)
 DAMPING = Axis("plant.damping", 0.01, 0.03, 3)
 STATIC = Axis("plant.friction.static", 0.4, 0.5, 2)
 GAIN = Axis("washout_controller.linear_gain", -2.0, 0.0, 6)
-
-
-def test_over_the_gain_the_vibration_ends_where_theory_has_it() -> None:
-    scenario = paper("washout_controller.cubic_gain=0.0")
-    found = compute_columns(sweep_study(scenario, [GAIN], continuous=True))
-    drive = scenario.plant.as_drive()
-    critical = critical_gains(drive, scenario.washout_controller.control_law)
-    rests = found.values[GAIN.parameter] < critical.linear
-    assert 0 < rests.sum() < GAIN.count
-    assert (found.regime[rests] == Regime.EQUILIBRIUM).all()
-    assert found.midpoint[rests] == pytest.approx(drive.equilibrium_position, rel=1e-6)
-    assert set(found.regime[~rests]) == {Regime.PURE_SLIP, Regime.STICK_SLIP}
-    without = compute_columns(sweep_study(free(), [SPEED]))
-    assert found.amplitude[-1] == pytest.approx(without.amplitude[-1], rel=1e-9)
 
 
 def test_what_is_no_sweep_is_refused() -> None:

@@ -30,14 +30,6 @@ def test_a_proposal_holds_in_simulation_and_its_file_has_the_gains() -> None:
     assert found.plot().axes
 
 
-def test_a_limit_that_is_too_low_is_told() -> None:
-    weak = load_scenario("feed_drive", controller="velocity_feedback").changed(
-        {"velocity_feedback_controller.force_limit": 5.0}
-    )
-    found = design_by_rule(Task.from_scenario(weak, (0.03, 0.03)))
-    assert "the peak force" in (found.remark or "")
-
-
 def test_an_axis_without_a_spring_gets_gains_for_a_feed() -> None:
     axis = load_scenario("axis", controller="pid")
     found = design_by_rule(Task.from_scenario(axis, (0.01, 0.01)))
