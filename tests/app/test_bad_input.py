@@ -5,10 +5,12 @@ import shlex
 from collections.abc import Mapping
 from contextlib import chdir
 from pathlib import Path
+from threading import TIMEOUT_MAX
 
 import numpy as np
 import pytest
 
+from stickslip_ros.app import output
 from stickslip_ros.app.main import main
 from tests.app.conftest import Run
 from tests.record.runs import STAMPS, record
@@ -202,8 +204,9 @@ REFUSED: Mapping[str, Mapping[str, str]] = {
 
 
 @pytest.fixture
-def inputs(tmp_path: Path) -> None:
-    """Files that the refused calls name."""
+def inputs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Files that the refused calls name; no line of progress, however slow the machine is."""
+    monkeypatch.setattr(output, "_LINE_INTERVAL", TIMEOUT_MAX)
     record(tmp_path / "bag", STAMPS[::333])
     (tmp_path / "empty").mkdir()
     os.mkfifo(tmp_path / "pipe.png")

@@ -111,11 +111,3 @@ def test_what_cannot_be_written_in_the_end_costs_no_result(
     assert json.loads(done.stdout)["linear_gain"] is not None
     line = done.stderr.splitlines()[-1]
     assert f"{option} below/{file}: cannot be written" in line
-
-
-def test_another_law_gets_its_gains_by_the_rule(stickslip: Run) -> None:
-    options = ("--controller", "velocity_feedback", "--belt-speed", "0.04")
-    done = stickslip("design", "feed_drive", *options, "--out", "gains.yaml", "--plot", "bode.png")
-    assert done.returncode == 0, done.stderr
-    assert "delay margin" in done.stdout
-    assert "equilibrium" in stickslip("simulate", "gains.yaml", "--duration", "2").stdout

@@ -9,7 +9,7 @@ import pytest
 import stickslip_ros as ss
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.identification import scenario
-from tests.app.conftest import REFERENCE, Run
+from tests.app.conftest import Run
 from tests.identification.axis_record import record
 from tests.record.runs import full_disk
 
@@ -89,17 +89,6 @@ def test_recordings_that_are_checked(stickslip: Run, log: Path) -> None:
 
 
 @pytest.mark.long
-def test_a_bag_of_a_loop_is_identified(stickslip: Run) -> None:
-    known = ("--fix", "plant.mass=100", "--fix", "plant.damping=200")
-    known += ("--fix", "plant.normal_force=1000")
-    given = ("--to", "1", "--law", "stribeck", *known)
-    found = stickslip.json("identify", REFERENCE, *given)["parameters"]
-    assert found["plant.stiffness"]["value"] == pytest.approx(1e6, rel=1e-3)
-    assert found["plant.friction.static"]["value"] == pytest.approx(0.4, rel=1e-2)
-    assert found["plant.friction.minimum"]["value"] == pytest.approx(0.25, rel=1e-2)
-
-
-@pytest.mark.long
 def test_a_memory_in_both_directions_becomes_a_scenario(stickslip: Run, log: Path) -> None:
     given = ("--columns", _COLUMNS, "--law", "lugre", "--out", "found.yaml")
     found = stickslip.json("identify", "axis.csv", *given)
@@ -136,14 +125,6 @@ def test_a_model_in_python_is_saved_and_checked(
         model.save(tmp_path / "found.yaml")
     assert {*tmp_path.iterdir()} == before
     model.save(tmp_path / "found.yaml")
-
-
-@pytest.mark.long
-def test_units_that_are_wrong_are_noted(stickslip: Run, log: Path) -> None:
-    columns = "time=t,position=x*1e3,force=u*2,reference=r*1e3"
-    done = stickslip("identify", "axis.csv", "--columns", columns, "--law", "coulomb")
-    assert done.returncode == 0, done.stderr
-    assert "check the units of time, position and belt velocity" in done.stdout
 
 
 @pytest.mark.long

@@ -36,7 +36,6 @@ Install = Callable[..., None]
 
 BROKEN = "cannot be imported: ModuleNotFoundError: No module named 'no_such'\n"
 LUBRICATED = "lubricated_drive.yaml"
-RELAY = ("feed_drive", "--controller", "relay_brake")
 STRENGTH = ("--controller", "brake", "-p", "brake_controller.strength=0.3")
 
 
@@ -71,25 +70,29 @@ def test_the_example_of_friction_can_be_installed(
 
 
 @pytest.mark.parametrize(
-    ("own", "foreign"),
+    ("command", "own", "foreign"),
     [
-        (
-            "--no-control -p plant.friction.law=linear -p plant.friction.slope=0.3",
-            "--no-control -p plant.friction.law=falling -p plant.friction.fall=0.3",
+        *(
+            (
+                command,
+                "--no-control -p plant.friction.law=linear -p plant.friction.slope=0.3",
+                "--no-control -p plant.friction.law=falling -p plant.friction.fall=0.3",
+            )
+            for command in ("simulate paper --duration 100", "stability paper")
         ),
         (
+            "simulate paper --duration 100",
             "--controller velocity_feedback -p velocity_feedback_controller.velocity_gain=-0.3",
             "--controller brake -p brake_controller.strength=0.3",
         ),
     ],
 )
 @pytest.mark.long
-def test_a_law_of_another_package_is_simulated_like_one_of_this(
-    with_packages: Run, stickslip: Run, own: str, foreign: str
+def test_a_law_of_another_package_gives_what_one_of_this_does(
+    with_packages: Run, stickslip: Run, command: str, own: str, foreign: str
 ) -> None:
-    arguments = ("simulate", "paper", "--duration", "100")
-    expected = stickslip.json(*arguments, *own.split())
-    found = with_packages.json(*arguments, *foreign.split())
+    expected = stickslip.json(*command.split(), *own.split())
+    found = with_packages.json(*command.split(), *foreign.split())
     provenance = {"scenario", "overrides", "versions"}
     assert {**found, **dict.fromkeys(provenance)} == {**expected, **dict.fromkeys(provenance)}
 
@@ -143,21 +146,6 @@ def test_a_control_law_of_another_package_runs_as_a_node(
     assert found["report"]["peak_force"] > 0.0
 
 
-@pytest.mark.long
-def test_the_relay_brake_suppresses_the_vibration(with_packages: Run) -> None:
-    force = "relay_brake_controller.braking_force"
-    braked = with_packages.json("simulate", *RELAY, "--duration", "5")
-    assert braked["regime"] == "equilibrium"
-    swept = with_packages.json("sweep", *RELAY, "--over", f"{force}=0:120:3")
-    assert swept["regime"] == ["stick_slip", "equilibrium", "equilibrium"]
-    refused = with_packages("simulate", *RELAY, "--continuous-control")
-    assert refused.returncode == 2
-    assert (
-        "--continuous-control: the control law relay_brake is defined for samples"
-        in (refused.stderr.splitlines()[-1])
-    )
-
-
 def hess_soom(static: float, decay_speed: float) -> Curve:
     return lambda w: 0.1 + (static - 0.1) / (1.0 + (w / decay_speed) ** 2) + 0.4 * w
 
@@ -185,18 +173,6 @@ def test_a_lubricated_drive_moves_as_its_law_says(with_packages: Run, tmp_path: 
         found = np.array([float(row[name]) for row in rows])
         expected = getattr(reference, name)
         assert np.abs(found - expected).max() < 1e-9 * np.ptp(expected)
-
-
-@pytest.mark.long
-def test_its_theory_is_that_of_the_law(with_packages: Run) -> None:
-    same = [f"-p=plant.friction.reverse.{name}=nan" for name in ("static", "decay_speed")]
-    one = with_packages.json("stability", LUBRICATED, "--no-control", *same)
-    # Friction falls by as much as the damper takes: c = N d/dw [0.2 / (1 + w^2/s^2) + 0.4 w].
-    w = np.roots([1.0, 0.0, 2.0 * 0.02**2, -2.0 * 0.2 * 0.02**2 / 0.6, 0.02**4])
-    speeds = sorted(w[(abs(w.imag) < 1e-12) & (w.real > 0.0)].real)
-    assert one["open_loop"]["hopf_speeds"] == pytest.approx(speeds, rel=1e-9)
-    both = with_packages.json("stability", LUBRICATED)
-    assert both["open_loop"]["hopf_speeds"] != pytest.approx(speeds, rel=1e-3)
 
 
 POINTS = ("--json", "--transient", "2", "--cycles", "3")

@@ -28,18 +28,6 @@ def test_it_says_what_it_waits_for_plays_to_the_end_and_is_done(
         assert heard[topic] == [message for _, message in messages[50:]]
 
 
-def test_ctrl_c_ends_a_loop(
-    start_stickslip: Start,
-    graph: Graph,
-    tmp_path: Path,
-) -> None:
-    record_states(tmp_path / "bag", 20)
-    states = graph.listen(JOINT_STATES, raw=True)
-    process = start_stickslip("replay", "bag", "--loop", "--topics", STATES)
-    graph.wait_until(lambda: len(states) > 45, "the third pass")
-    ended(process, 130, signal.SIGINT)
-
-
 def test_ctrl_c_ends_the_wait_for_a_reader(start_stickslip: Start, tmp_path: Path) -> None:
     record_states(tmp_path / "bag", 20)
     process = start_stickslip("replay", "bag")

@@ -170,25 +170,6 @@ def test_a_name_is_text(stickslip: Run, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("arguments", "texts"),
-    [
-        (("report", REFERENCE), ("decaying", "washout_controller", "0.1.0")),
-        (
-            ("sweep", *FREE, "--over", "plant.belt_speed=0.3:0.5:3"),
-            ("stick-slip at", "of 3 points", "plant.belt_speed"),
-        ),
-    ],
-    ids=["report", "sweep"],
-)
-def test_each_has_its_verdict_and_its_tables(
-    arguments: tuple[str, ...], texts: tuple[str, ...], stickslip: Run, tmp_path: Path
-) -> None:
-    found = page(stickslip, tmp_path, *arguments)
-    assert all(text in found.text for text in texts)
-    assert found.tags.count("svg") == 2
-
-
-@pytest.mark.parametrize(
     ("name", "verdict"),
     [
         ("design", "linear gain"),
@@ -196,6 +177,8 @@ def test_each_has_its_verdict_and_its_tables(
         ("compare", "Comparison of control laws"),
         ("basin", "stick-slip 100.0%"),
         ("stability", "without control: unstable; sampled loop: stable"),
+        ("sweep", "stick-slip at"),
+        ("report", "decaying"),
         ("report, of two", f"{REFERENCE}: stick-slip, not steady: decaying"),
     ],
 )

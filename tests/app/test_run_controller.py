@@ -1,20 +1,17 @@
 """`stickslip run` with a user's controller: a node that does not depend on this package."""
 
 import json
-import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from diagnostic_msgs.msg import DiagnosticArray
 
 from stickslip_ros.record.reader import Recording
-from stickslip_ros.record.topics import DIAGNOSTICS
 from tests.app.conftest import Run, Start, ended
 from tests.app.test_run import children, command, is_complete, is_running, wait_for_samples
-from tests.nodes.graph import Graph, wait_for
+from tests.nodes.graph import wait_for
 from tests.testing import controllers
 
 pytestmark = pytest.mark.process
@@ -56,29 +53,6 @@ def install(
 def read_until(process: subprocess.Popen[str], text: str) -> str:
     """Return the first line on standard error, from now on, that has the text."""
     return next((line for line in process.stderr if text in line), "")
-
-
-def payloads(bag: Path) -> dict[str, list[bytes]]:
-    with Recording(bag) as recording:
-        return {
-            topic: [payload for _, _, payload in recording.messages(f"/feed_drive/{topic}")]
-            for topic in ("joint_states", "control_force")
-        }
-
-
-@pytest.mark.long
-def test_ours_started_as_that_of_others_gives_the_same_bytes(
-    stickslip: Run, tmp_path: Path
-) -> None:
-    ours = ("--controller", "stickslip_ros/washout_controller_node")
-    arguments = ("paper", "-p", "washout_controller.linear_gain=-0.5", "--duration", "5")
-    for bag, how in {"plain": (), "processes": ours, "composed": (*ours, "--composed")}.items():
-        done = stickslip("run", *arguments, "--bag", bag, *how)
-        assert done.returncode == 0, done.stderr
-    plain = payloads(tmp_path / "plain")
-    assert [len(messages) for messages in plain.values()] == [501, 501]
-    assert payloads(tmp_path / "processes") == plain
-    assert payloads(tmp_path / "composed") == plain
 
 
 SCENARIO = """
@@ -231,30 +205,3 @@ def test_an_external_controller_is_waited_for(
     result = json.loads(output)
     assert (result["samples"], result["late_forces"]) == (201, 0)
     assert (result["controller"], result["controller_command"]) == ("/feed_drive/damper", None)
-
-
-@pytest.mark.long
-def test_an_external_controller_may_die_and_return(
-    start_stickslip: Start,
-    start_damper: Callable[..., subprocess.Popen[bytes]],
-    graph: Graph,
-    tmp_path: Path,
-) -> None:
-    health = graph.listen(DIAGNOSTICS)
-    impatient = ("-p", "plant.reply_timeout=3.0", "-p", "analyzer.flush_period=0.2")
-    first = start_damper()
-    process = start_stickslip("run", "paper", "--external-controller", "--bag", "bag", *impatient)
-    wait_for_samples(process, tmp_path / "bag")
-    first.kill()
-    assert "continuing without" in read_until(process, "no control force arrives")
-    graph.wait_until(lambda: "no control" in words_of_plant(health), "it is diagnosed")
-    start_damper()
-    graph.wait_until(lambda: "no control" not in words_of_plant(health), "it is taken back")
-    _, errors = ended(process, 130, signal.SIGINT)
-    assert "no control force arrives" not in errors
-
-
-def words_of_plant(health: list[DiagnosticArray]) -> str:
-    """Return what the plant has last said of itself."""
-    told = [s.message for array in health for s in array.status if s.name == "/feed_drive/plant"]
-    return told[-1] if told else ""

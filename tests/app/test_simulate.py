@@ -143,16 +143,3 @@ def test_defaults_are_reported_once(stickslip: Run, tmp_path: Path) -> None:
     assert json.loads(based.stdout)["scenario"]["plant"]["normal_force"] == 1000.0
     (line,) = stickslip(*call, "--no-control").stderr.splitlines()
     assert "washout_controller" not in line
-
-
-@pytest.mark.long
-def test_the_servo_of_an_axis_gives_way_by_what_exceeds_the_friction(
-    stickslip: Run, tmp_path: Path
-) -> None:
-    measures = stickslip.json("simulate", "axis", "--plot", "axis.png")
-    # The largest force less the mean friction, over the gain of the position.
-    amplitude = (60.0 - (20.144 + 20.6277) / 2.0) / 1370728.4554
-    assert measures["amplitude"] == pytest.approx(amplitude, rel=0.01)
-    assert measures["period"] == pytest.approx(1.0, rel=1e-9)
-    assert (measures["regime"], measures["steady"]) == ("stick_slip", True)
-    assert (tmp_path / "axis.png").stat().st_size > 10_000

@@ -1,11 +1,9 @@
 """`stickslip stability`: the paper's values, and the reasons for missing values."""
 
 import json
-from pathlib import Path
 from typing import Any
 
 import pytest
-from PIL import Image
 
 from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.studies.stability import stability as theory_of
@@ -86,12 +84,14 @@ def test_what_does_not_exist_is_null_for_a_reason(overrides: list[str]) -> None:
     assert None not in (found["closed_forms"] or {}).values()
 
 
-def test_that_jitter_is_left_out_is_said_where_it_matters() -> None:
-    jitter = "plant.force_jitter=0.1"
-    with_it, notes = theory_of(load_scenario("paper", [jitter]))
-    without, _ = theory_of(load_scenario("paper", []))
-    assert finite(with_it) == finite(without)
-    assert "force_jitter is omitted" in notes["sampled_loop"]
+def test_what_is_left_out_is_said_where_it_matters() -> None:
+    jitter, encoder = "plant.force_jitter=0.1", "plant.sensor.position_resolution=1e-6"
+    without, _ = theory_of(load_scenario("paper"))
+    for override in (jitter, encoder):
+        with_it, notes = theory_of(load_scenario("paper", [override]))
+        assert finite(with_it) == finite(without)
+        assert f"{override[6:].split('=')[0]} is omitted" in notes["sampled_loop"]
+    assert notes["closed_loop"].startswith("sensor and actuator are omitted")
     _, notes = theory_of(load_scenario("paper", [jitter, "plant.expects_control=false"]))
     assert notes["sampled_loop"] == "the scenario has no controller"
 
@@ -120,15 +120,6 @@ def test_coexisting_cycles_are_told_apart(stickslip: Run, monkeypatch: pytest.Mo
     done = stickslip("stability", "paper", *law)
     assert "1, unstable" in done.stdout
     assert "2, stable" in done.stdout
-
-
-def test_without_control_the_bifurcation_diagram_is_drawn(stickslip: Run, tmp_path: Path) -> None:
-    paper = ("--style", "paper", "--no-title")
-    done = stickslip("stability", "paper", "--no-control", "--plot", "diagram.png", *paper)
-    assert done.returncode == 0, done.stderr
-    with Image.open(tmp_path / "diagram.png") as image:
-        assert image.width == pytest.approx(85.0 / 25.4 * 300.0, abs=1.0)
-        assert image.info["dpi"] == pytest.approx((300.0, 300.0), rel=1e-3)
 
 
 def test_what_cannot_be_drawn_is_refused_before_anything_is_computed(

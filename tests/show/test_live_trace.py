@@ -79,18 +79,6 @@ def test_a_single_sample_out_of_many_is_seen_for_as_long_as_the_window() -> None
     assert seen == {block: 300 <= block < 800 for block in seen}
 
 
-def test_memory_stays_bounded_however_long_it_is_fed() -> None:
-    trace = LiveTrace(1e6)
-    for block in range(100):
-        position = np.sin(np.arange(5000) + 5000.0 * block)
-        begin = block * 5 * SECOND
-        trace.feed(states(range(begin, begin + 5 * SECOND, 1_000_000), position), NO_FORCES)
-    frame = trace.frame(1e6, 1e6, 10_000_000)
-    assert len(frame.position.x) < 250_000  # of 500,000
-    assert np.nanmax(frame.position.y) > 0.99
-    assert frame.position.x[0] == pytest.approx(-frame.end)
-
-
 def test_stamps_that_do_not_continue_restart_the_trace() -> None:
     trace = LiveTrace(1e3)
     trace.feed(states(range(10 * SECOND, 11 * SECOND, 1_000_000), np.ones(1000)), NO_FORCES)
