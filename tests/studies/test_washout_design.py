@@ -9,16 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from stickslip_ros.measures.cycle_measures import Measures, Regime
-from stickslip_ros.measures.cycle_meter import CycleMeter
+import stickslip_ros as ss
+from stickslip_ros.measures.cycle_measures import Regime
 from stickslip_ros.model.control import Washout
-from stickslip_ros.model.drive import Drive
 from stickslip_ros.model.friction import Coulomb
-from stickslip_ros.motion import RecordedMotion
-from stickslip_ros.motion.controller import Controller
-from stickslip_ros.motion.sampled_loop import LOCKSTEP_START, SampledLoop
-from stickslip_ros.motion.simulation import simulate_sampled
-from stickslip_ros.samples import Sample
 from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.studies.design import Task
 from stickslip_ros.studies.washout_design import WashoutDesign, design_washout
@@ -44,48 +38,28 @@ def designed(**values: Any) -> WashoutDesign:
 AT_40 = (0.04, 0.04)
 
 
-class RecordingController(Controller):
-    """Keeps the largest force it asked for."""
-
-    peak = 0.0
-
-    def answer(self, sample: Sample) -> float | None:
-        force = super().answer(sample)
-        self.peak = max(self.peak, abs(force or 0.0))
-        return force
-
-
-def controlled(
-    drive: Drive, delay: float, controller: Washout, duration: float
-) -> tuple[Measures, float]:
-    """Run the drive from rest, the controller coming on as it says; return measures and peak."""
-    motion = RecordedMotion(drive, 0.0, 0.0)
-    loop = SampledLoop(motion, 1000.0, LOCKSTEP_START, force_delay=delay)
-    washout = RecordingController(controller)
-    measures = simulate_sampled(loop, motion, washout, duration, CycleMeter(5))
-    return measures, washout.peak
-
-
 def proposal(found: WashoutDesign) -> Washout:
     assert found.controller is not None, found.remark
     return found.controller
+
+
+def unlimited(found: WashoutDesign, **values: float) -> ss.Scenario:
+    """Return a scenario with the proposal, whose force is not limited."""
+    assert found.scenario is not None
+    return ss.scenario(found.scenario, force_limit=inf, window=5, **values)
 
 
 def check_from_its_own_limit_cycle(**values: Any) -> None:
     """Check that the proposal brings the drive to rest, at speeds that were checked and others."""
     found = designed(**values)
     task = found.task
-    controller = proposal(found)
+    start = 2.0 + proposal(found).start_after
+    longest = max(check.settling_time or 0.0 for check in found.checks)
     for speed in (*task.belt_speeds, sum(task.belt_speeds) / 2.0):
-        drive = replace(task.drive, belt_speed=speed)
-        start = 2.0 + controller.start_after
-        longest = max(check.settling_time or 0.0 for check in found.checks)
-        late = replace(controller, start_after=start, force_limit=inf)
-        measures, peak = controlled(
-            drive, values.get("force_delay", 0.0), late, start + 5.0 * longest + 1.0
-        )
-        assert measures.regime is Regime.EQUILIBRIUM
-        assert 0.0 < peak <= task.force_limit
+        scenario = unlimited(found, belt_speed=speed, start_after=start)
+        run = ss.simulate(scenario, start + 5.0 * longest + 1.0)
+        assert run.measures.regime is Regime.EQUILIBRIUM
+        assert 0.0 < np.abs(run.trajectory.control_force).max() <= task.force_limit
 
 
 def test_a_proposal_brings_the_drive_to_rest_about_as_predicted() -> None:
@@ -158,15 +132,12 @@ def test_a_tighter_limit_is_slower_and_in_the_end_there_is_nothing() -> None:
 
 def test_the_cubic_gain_is_within_what_the_friction_law_bears() -> None:
     """The law's own, (mu_s - mu_m) N / (2 v_m^3), is 6e5 N s^3/m^3."""
-    controller = proposal(designed(force_limit=100.0))
-    assert 0.0 <= controller.cubic_gain <= 3e5
+    found = designed(force_limit=100.0)
+    assert 0.0 <= proposal(found).cubic_gain <= 3e5
     # From any speed it comes back, even with a force that is not limited.
     for speed in (0.3, -3.0, 30.0):
-        motion = RecordedMotion(FEED_DRIVE, 0.0, speed)
-        loop = SampledLoop(motion, 1000.0, LOCKSTEP_START)
-        free = replace(controller, force_limit=inf, start_after=0.0)
-        measures = simulate_sampled(loop, motion, Controller(free), 8.0, CycleMeter(5))
-        assert measures.regime is Regime.EQUILIBRIUM
+        free = unlimited(found, initial_velocity=speed, start_after=0.0)
+        assert ss.simulate(free, 8.0).measures.regime is Regime.EQUILIBRIUM
 
 
 @pytest.mark.parametrize(
