@@ -75,10 +75,7 @@ def test_without_vibration_nothing_is_simulated(stickslip: Run) -> None:
     assert "--out" not in done.stdout
 
 
-def test_no_proposal_is_a_result_with_a_reason(
-    stickslip: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(DESIGN, once())
+def test_no_proposal_is_a_result_with_a_reason(stickslip: Run, tmp_path: Path) -> None:
     limit = ("-p", "washout_controller.force_limit=5", "--belt-speed", "0.04")
     done = stickslip("design", "feed_drive", *limit, "--out", "gains.yaml", "--plot", "map.png")
     assert done.returncode == 0, done.stderr
@@ -88,10 +85,6 @@ def test_no_proposal_is_a_result_with_a_reason(
     options = "--plot map.png: not drawn", "--out gains.yaml: not written"
     for line, option in zip(lines, options, strict=True):
         assert option in line
-    found = stickslip.json("design", "feed_drive", *limit)
-    for name in ("linear_gain", "parameter_file", "decay_rate", "settling_time"):
-        assert found[name] is None
-    assert "too small" in found["remark"]
 
 
 @pytest.mark.parametrize(("option", "file"), [("--out", "x.yaml"), ("--plot", "x.png")])

@@ -92,16 +92,6 @@ def test_what_a_bag_lacks_is_said(stickslip: Run, tmp_path: Path) -> None:
     assert "it is not recorded what drive it was: no equilibrium, no friction law" in shown
 
 
-def test_a_damaged_bag_is_repaired(stickslip: Run, tmp_path: Path) -> None:
-    record(tmp_path / "bag")
-    file = tmp_path / "bag" / "bag_0.mcap"
-    file.write_bytes(file.read_bytes()[:-3000])
-    done = stickslip("repair", "bag", "sound")
-    assert done.returncode == 0
-    assert "is incomplete: " in done.stdout
-    assert stickslip.json("repair", "sound", "again")["missing"] == []
-
-
 @pytest.mark.parametrize("parameters", [{"mass": "[" * 100_000}, {"mass": "-1", "rate": "NaN"}])
 def test_parameters_that_are_none_are_no_drive(
     stickslip: Run, tmp_path: Path, parameters: dict[str, str]

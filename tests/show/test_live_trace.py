@@ -64,21 +64,6 @@ def test_whatever_the_blocks_and_the_buckets_peaks_and_ends_are_shown(
     assert len(frame.position.x) <= 4 * (buckets + 1)
 
 
-def test_a_single_sample_out_of_many_is_seen_for_as_long_as_the_window() -> None:
-    trace = LiveTrace(1000.0)
-    seen = {}
-    for block in range(900):
-        position = np.zeros(1000)
-        if block == 300:
-            position[321] = 7.0
-        begin = block * SECOND
-        trace.feed(states(range(begin, begin + SECOND, 1_000_000), position), NO_FORCES)
-        if block % 100 in (0, 99):
-            frame = trace.frame(500.0, 1.0, 300)
-            seen[block] = float(frame.position.y.max()) == 7.0
-    assert seen == {block: 300 <= block < 800 for block in seen}
-
-
 def test_stamps_that_do_not_continue_restart_the_trace() -> None:
     trace = LiveTrace(1e3)
     trace.feed(states(range(10 * SECOND, 11 * SECOND, 1_000_000), np.ones(1000)), NO_FORCES)

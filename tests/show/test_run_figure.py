@@ -171,21 +171,6 @@ def test_the_shade_is_the_share_of_time_that_it_sticks(limit_cycle: Drawn) -> No
     )
 
 
-def test_the_shade_of_whole_cycles_is_the_stick_fraction_of_the_report() -> None:
-    for end in (1.5, 1.9):
-        history = RunHistory()
-        report = report_of_recording(REFERENCE, end=end, observer=history)
-        motion, count = history.motion, report["cycles"]
-        ends = history.cycles[0][-count:]
-        starts = np.append(ends[0] - report["period"], ends[:-1])
-        starts[0] = motion.time[np.argmin(np.abs(motion.time - starts[0]))]
-        shares = [
-            np.diff(np.interp(cycle, motion.time, motion.stick_time)) / np.diff(cycle)
-            for cycle in zip(starts, ends, strict=True)
-        ]
-        assert np.mean(shares) == pytest.approx(report["stick_fraction"], rel=1e-9)
-
-
 def test_the_end_is_the_last_cycles(limit_cycle: Drawn) -> None:
     start, end = limit_cycle.panel(POSITION_END).get_xlim()
     assert end - start == pytest.approx(LAST_CYCLES * limit_cycle.measures.period, rel=0.01)

