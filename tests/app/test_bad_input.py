@@ -58,7 +58,6 @@ REFUSED: Mapping[str, Mapping[str, str]] = {
         f"{LAW}lugre -p plant.friction.curve=linear": "must be at least 1e-12 at every speed",
         f"{LAW}elasto_plastic -p plant.friction.break_away=1": "at least 0 and below 1",
         f"{LAW}maxwell_slip -p plant.friction.elements=30": "at least 1 and at most 20",
-        f"{LAW}rate_state": "is invalid: the last versions that had this law are those of 0.2.0",
         f"{LAW}dahl -p plant.friction.bristle_stiffness=0": "must be a finite number above 0 1/m",
         f"{LAW}dahl -p plant.friction.static=0": "must be at least 1e-12 for law dahl",
         f"{LAW}dahl -p plant.friction.elements=1.5": "must be a whole number",
@@ -130,6 +129,7 @@ REFUSED: Mapping[str, Mapping[str, str]] = {
         f"{SPEEDS} --plot diagram.jpg": "--plot diagram.jpg: must end in one of",
         f"{SPEEDS} --workers 0": "'0' is not a number of processes",
         f"{SPEEDS} --dask nowhere": "--dask nowhere: no scheduler found",
+        f"{SPEEDS} --dask ???": "--dask ???: ",
         f"{LOOSE} --over plant.damping=1:2:2": (
             "because a drive without a spring has no natural period"
         ),

@@ -73,10 +73,3 @@ def test_both_directions_are_refused(logs: list[str], stickslip: Run, tmp_path: 
     back = tmp_path / "back.csv"
     ss.simulate(drive, duration=2.0).to_pandas().to_csv(back)
     assert "both directions" in stickslip("margin", logs[0], str(back)).stderr
-
-
-def test_a_machine_that_vibrates_gives_no_number(stickslip: Run) -> None:
-    reference = Path(__file__).parents[2] / "bags" / "reference"
-    done = stickslip("margin", str(reference), "--to", "4.9")
-    assert done.returncode == 0
-    assert "vibrates already" in done.stdout

@@ -1,4 +1,4 @@
-"""Sensors and actuators through commands, nodes, bags and studies."""
+"""Sensors and actuators in Python: what they tell, and what a design leaves with them."""
 
 import numpy as np
 import pytest

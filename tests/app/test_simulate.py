@@ -10,8 +10,6 @@ import pytest
 import stickslip_ros as ss
 from tests.app.conftest import Run
 
-RUNNING_AWAY = "-p plant.friction.law=linear -p plant.friction.slope=0.9 -p plant.belt_speed=0.2"
-
 
 @pytest.mark.parametrize(
     "control", ["--no-control", pytest.param("--continuous-control", marks=pytest.mark.long)]
@@ -42,21 +40,6 @@ def test_a_figure_of_a_disturbed_run_says_so(stickslip: Run, tmp_path: Path) -> 
     figure = (tmp_path / "run.svg").read_text(encoding="utf-8")
     assert "control force and disturbance<" in figure
     assert "control switched on" not in figure
-
-
-def test_it_says_whether_the_motion_was_steady(stickslip: Run) -> None:
-    for arguments, expected in {
-        "feed_drive --no-control": ("stick_slip", True, None),
-        "feed_drive --duration 5.3": ("stick_slip", False, "decaying"),
-        "feed_drive -p plant.rate=200": ("equilibrium", True, None),
-        "feed_drive --continuous-control": ("equilibrium", True, None),
-        "paper -p plant.belt_speed=0 --no-control": ("stuck", True, None),
-        "paper --no-control --duration 15": ("stick_slip", None, None),
-        "paper --no-control --duration 3": (None, None, None),
-        f"paper --no-control {RUNNING_AWAY}": ("unbounded", True, None),
-    }.items():
-        found = stickslip.json("simulate", *arguments.split())
-        assert (found["regime"], found["steady"], found["trend"]) == expected, arguments
 
 
 def rows_of(path: Path) -> list[dict[str, float]]:

@@ -12,9 +12,7 @@ from pathlib import Path
 import distributed
 import pytest
 
-from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.scenarios.files import load_scenario
-from stickslip_ros.studies import runner
 from stickslip_ros.studies.journal import Journal
 from stickslip_ros.studies.plan import Axis, Continuation
 from stickslip_ros.studies.runner import WorkersDiedError, dask_executor, run
@@ -132,13 +130,3 @@ def test_a_scheduler_that_dies_is_an_error_and_what_was_done_is_kept(cluster: Cl
         assert 0 < journal.count < asked.plan.size
         run(journal)
         assert journal.count == asked.plan.size
-
-
-def test_what_is_no_scheduler_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(runner, "_DASK_TIMEOUT", "1s")
-    for address, message in (
-        ("tcp://127.0.0.1:9", r"^tcp://127.0.0.1:9: no scheduler"),
-        ("???", r"^\?\?\?: "),
-    ):
-        with pytest.raises(InvalidInputError, match=message), dask_executor(address):
-            pass

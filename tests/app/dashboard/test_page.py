@@ -366,13 +366,6 @@ def test_what_is_mistyped_is_refused_and_a_run_that_diverges_says_so(
         field.hover()
         field.focus()
         page.mouse.wheel(0, 500)
-    page.get_by_label("another parameter").click()
-    page.get_by_role("option", name="plant.bias_force = 0 N").click()
-    page.get_by_label("value", exact=True).fill("-5e9")
-    page.get_by_role("button", name="Set", exact=True).click()
-    expect(
-        alerts.filter(has_text="-5 GN is invalid: must be at most 10 kN in size")
-    ).to_be_visible()
     # What was refused, or scrolled over, has changed nothing: the gain is the only change.
     gain = page.get_by_label("cubic gain, value")
     gain.fill("9")  # MN s^3/m^3: the force grows faster than what damps the slide
