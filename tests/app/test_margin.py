@@ -60,8 +60,6 @@ def test_a_sentence_says_what_would_tell_it(logs: list[str], stickslip: Run) -> 
     assert "the onset of vibration cannot be told" in done.stdout
     assert "a run at another feed, such as" in done.stdout
     assert "no family" not in done.stdout
-    done = stickslip("margin", logs[0], "--belt-speed", "0")
-    assert "the belt is at rest" in done.stdout
     done = stickslip("margin", logs[0], "--belt-speed", "0", "--plot", "x.png")
     assert done.returncode == 2
     assert "there is no decay to draw" in done.stderr

@@ -73,14 +73,6 @@ def test_a_picture_changes_nothing_of_the_report(stickslip: Run, tmp_path: Path)
     assert "stick-slip" not in " ".join(texts(tmp_path / "run.svg"))
 
 
-def test_a_part_without_a_cycle_says_so(stickslip: Run, tmp_path: Path) -> None:
-    done = stickslip("report", REFERENCE, "--from", "1", "--to", "1.02", "--plot", "run.svg")
-    assert "no whole cycle was completed in 0.019 s: the natural period is 62.83 ms" in done.stdout
-    shown = texts(tmp_path / "run.svg")
-    assert "each cycle" not in shown
-    assert "1.01" in shown
-
-
 def test_what_a_bag_lacks_is_said(stickslip: Run, tmp_path: Path) -> None:
     record(tmp_path / "bag")
     (tmp_path / "bag" / "metadata.yaml").unlink()

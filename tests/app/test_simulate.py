@@ -2,7 +2,6 @@
 
 import csv
 import json
-import re
 from pathlib import Path
 
 import pytest
@@ -102,13 +101,6 @@ def test_where_nothing_is_measured_it_says_why(stickslip: Run) -> None:
         lines = done.stdout.splitlines()
         assert "no whole cycle" in lines[1]
         assert why in lines[-1]
-
-
-def test_the_dimensionless_drive_has_no_units(stickslip: Run) -> None:
-    lines = stickslip("simulate", "paper", "--no-control", "--duration", "100").stdout.splitlines()
-    assert lines[0] == "paper, 100"
-    assert [line.split()[-1] for line in lines[1:4]] == ["stick-slip", "0.4341", "0.4144"]
-    assert all(len(re.split("  +", line)[1].split()) == 1 for line in lines[1:])
 
 
 def test_defaults_are_reported_once(stickslip: Run, tmp_path: Path) -> None:

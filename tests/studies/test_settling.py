@@ -92,14 +92,6 @@ def test_a_loop_settles_on_what_simulate_measures(
     assert settled.period == pytest.approx(measures.period, rel=near)
 
 
-def _in_two_halves(case: ControlledDrive) -> tuple[Settled, Settled]:
-    """Return what a motion comes to at once, and carried on from its first half."""
-    start = MotionState(0.1, 0.05)
-    once = settle(case, start, SettlingOptions(4.0, 1, 2))
-    half = settle(case, start, SettlingOptions(4.0, 1))
-    return once, settle(case, half.end, SettlingOptions(4.0, 1))
-
-
 @pytest.mark.parametrize("continuous", [False, True], ids=["sampled", "continuous"])
 def test_the_filter_is_carried_on(continuous: bool) -> None:
     # Neither steady nor at rest after the first half.
@@ -110,17 +102,14 @@ def test_the_filter_is_carried_on(continuous: bool) -> None:
         "plant.belt_speed=0.3",
         continuous=continuous,
     )
-    once, halves = _in_two_halves(case)
+    start, short = MotionState(0.1, 0.05), SettlingOptions(4.0, 1)
+    once, half = settle(case, start, replace(short, patience=2)), settle(case, start, short).end
+    halves, rested = (settle(case, each, short) for each in (half, replace(half, control=None)))
     # What the force was at the last sample is forgotten, and a sample is a small part of d.
     exact = 1e-9 if continuous else 1e-3
     assert halves.end.position == pytest.approx(once.end.position, abs=exact)
     assert halves.end.velocity == pytest.approx(once.end.velocity, abs=exact)
     assert halves.end.control == pytest.approx(once.end.control, abs=exact)
-    rested = settle(
-        case,
-        replace(settle(case, MotionState(0.1, 0.05), SettlingOptions(4.0, 1)).end, control=None),
-        SettlingOptions(4.0, 1),
-    )
     assert rested.end.control != pytest.approx(once.end.control, abs=10 * exact)
 
 

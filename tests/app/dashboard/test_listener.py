@@ -4,7 +4,7 @@ from functools import partial
 
 import numpy as np
 import pytest
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rcl_interfaces.msg import Parameter as ParameterMessage
 from rcl_interfaces.msg import ParameterEvent, ParameterValue
 from rclpy.parameter import Parameter
@@ -176,6 +176,21 @@ def test_a_single_value_is_not_all_that_is_known(graph: Graph, observer: Listene
     assert observer.parameters["plant"] == {}
 
 
+def test_any_number_in_diagnostics_is_accepted(observer: ListenerNode) -> None:
+    observer.parameters = observer.parameters | {"plant": {"rate": 1e-6}}
+    keys = "answered", "samples", "late_forces"
+    for number in ("٣", "²", "abc", "nan", "-1", "9" * 400, "9" * 5000, ""):
+        figures = [KeyValue(key=key, value=number) for key in keys]
+        status = [
+            DiagnosticStatus(name=f"/test/{node}", values=figures, level=b"\xff")
+            for node in ("plant", "washout_controller")
+        ]
+        for _ in range(2):
+            observer._on_diagnostics(DiagnosticArray(status=status))
+        assert observer.acts_in == 0.0
+        assert observer.health["plant"].figures["samples"] == number
+
+
 def test_the_controller_is_the_one_that_is_heard(graph: Graph, observer: ListenerNode) -> None:
     assert observer.controller == "washout_controller"
     assert set(observer.health) == {"analyzer", "plant"}
@@ -185,6 +200,14 @@ def test_the_controller_is_the_one_that_is_heard(graph: Graph, observer: Listene
     graph.wait_until(lambda: observer.parameters[observer.controller], "its parameters")
     assert observer.parameters[observer.controller]["velocity_gain"] == -0.25
     assert set(observer.health) == {"analyzer", "plant", "velocity_feedback_controller"}
+
+
+def test_reset_puts_the_motion_back(graph: Graph, observer: ListenerNode, shown: Shown) -> None:
+    run_loop(graph, observer, expects_control=False, **{"initial.position": 0.5})
+    graph.wait_until(lambda: abs(shown.position[-1] - 0.5) > 0.05, "the slide has moved")
+    before = len(shown.position)
+    assert not outcome(graph, observer.reset())
+    graph.wait_until(lambda: 0.5 in shown.position[before:], "the initial position again")
 
 
 @pytest.mark.parametrize("pace", ["realtime", "lockstep"])
@@ -251,3 +274,17 @@ def test_a_push_ends_with_the_observer(graph: Graph, observer: ListenerNode) -> 
     graph.wait_until(lambda: [m.wrench.force.x for m in applied][-1:] == [0.05], "the force")
     observer.close()
     graph.wait_until(lambda: applied[-1].wrench.force.x == 0.0, "no force")
+
+
+def test_a_node_that_falls_silent_and_comes_back_is_shown_as_that(
+    graph: Graph, observer: ListenerNode, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(listener_module, "SILENCE", 1.0)
+    plant = graph.add(PlantNode, pace="realtime", expects_control=False)
+    graph.wait_until(lambda: observer.health["plant"].state == "active", "the plant")
+    graph.executor.remove_node(plant)
+    graph.wait_until(lambda: observer.health["plant"].state == SILENT, "silence")
+    graph.executor.add_node(plant)
+    graph.wait_until(lambda: observer.health["plant"].state == "active", "the plant again")
+    events = [each.text for each in observer.events]
+    assert events.index("plant silent") < events.index("plant is back, active")
