@@ -35,16 +35,6 @@ class Table:
 
     `len(table)` is the number of rows. `table[rows]` is a table of the selected rows, where `rows`
     is a slice, a boolean array or an array of indices.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from stickslip_ros.samples import ForceColumns
-    >>> forces = ForceColumns(np.array([0, 1_000_000]), np.array([0.5, -2.0]))  # ns, N
-    >>> len(forces)
-    2
-    >>> forces[forces.force > 0.0].stamp.tolist()
-    [0]
     """
 
     def __len__(self) -> int:

@@ -98,17 +98,7 @@ NO_REFERENCE = Reference()
 
 @dataclass(frozen=True, eq=False)
 class SampleColumns(Table):
-    """Consecutive samples: the fields of `Sample` as arrays of shape (samples,).
-
-    Examples
-    --------
-    >>> from stickslip_ros.record.reader import Recording
-    >>> with Recording("bags/reference") as recording:
-    ...     states = recording.joint_states
-    >>> time = (states.stamp - states.stamp[0]) * 1e-9  # s
-    >>> len(states[time < 0.01])
-    10
-    """
+    """Consecutive samples: the fields of `Sample` as arrays of shape (samples,)."""
 
     stamp: IntArray
     """Stamps, ns."""
@@ -192,16 +182,7 @@ class ReferenceColumns(Table):
 
 @dataclass(frozen=True, eq=False)
 class ForceColumns(Table):
-    """Consecutive control or disturbance forces, as arrays of shape (forces,).
-
-    Examples
-    --------
-    >>> from stickslip_ros.record.reader import Recording
-    >>> with Recording("bags/reference") as recording:
-    ...     forces = recording.control_forces
-    >>> len(forces) == len(forces.force)
-    True
-    """
+    """Consecutive control or disturbance forces, as arrays of shape (forces,)."""
 
     stamp: IntArray
     """Stamps, ns."""

@@ -226,23 +226,6 @@ def simulate_continuous(
     ------
     RunError
         If the motion is so stiff that it would take too many steps.
-
-    Examples
-    --------
-    A washout controller without sampling suppresses the vibration:
-
-    >>> from stickslip_ros.motion.simulation import simulate_continuous
-    >>> from stickslip_ros.measures import CycleMeter
-    >>> from stickslip_ros.model.control import Washout
-    >>> from stickslip_ros.model.drive import Drive
-    >>> from stickslip_ros.model.friction import Stribeck
-    >>> from stickslip_ros.motion import RecordedMotion
-    >>> drive = Drive(mass=100.0, damping=200.0, stiffness=1e6, normal_force=1000.0,
-    ...               belt_speed=0.04, friction=Stribeck(0.4, 0.25, 0.05))
-    >>> washout = Washout(20.0, linear_gain=-3000.0, cubic_gain=0.0)
-    >>> motion = RecordedMotion(drive, 0.0, 0.0, control=washout)
-    >>> simulate_continuous(motion, washout, 5.0, CycleMeter(20)).regime.value
-    'equilibrium'
     """
     drive = motion.drive
     # Without a spring as many blocks and steps as in 200 natural periods.

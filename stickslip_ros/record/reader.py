@@ -55,16 +55,7 @@ _Decode = Callable[[bytes, IntArray, IntArray], tuple[ColumnsT, Refused]]
 
 
 class RunBlock(NamedTuple):
-    """A part of a recorded run, from one chunk of its bag; each column set may be empty.
-
-    Examples
-    --------
-    >>> from stickslip_ros.record.reader import Recording
-    >>> with Recording("bags/reference") as recording:
-    ...     block = next(recording.blocks())
-    >>> len(block.joint_states) > 0
-    True
-    """
+    """A part of a recorded run, from one chunk of its bag; each column set may be empty."""
 
     joint_states: SampleColumns
     """Joint states in the order of the file."""

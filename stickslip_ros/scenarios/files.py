@@ -216,15 +216,6 @@ def parameter_file(values: Mapping[str, Mapping[str, Any]]) -> str:
     -------
     str
         The text, in YAML.
-
-    Examples
-    --------
-    >>> print(parameter_file({"plant": {"mass": 80.0, "pace": "realtime"}}))
-    "/**/plant":
-      "ros__parameters":
-        "mass": 80.0
-        "pace": "realtime"
-    <BLANKLINE>
     """
     sections = {
         f"/**/{node}": {

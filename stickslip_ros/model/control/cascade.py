@@ -32,12 +32,6 @@ class Cascade(ControlLaw, TwoBodyControl):
     slide. For samples, I is a sum of rectangles, and does not grow while u is beyond its limit.
     With Kp = Ki = m_f = 0 the law is the washout, with k1 = k2 = 0 the cascade of feed drives
     (Gross, Hamann, Wiegaertner, Electrical Feed Drives in Automation, 2001).
-
-    Examples
-    --------
-    >>> from stickslip_ros.model.control import Cascade
-    >>> Cascade(position_gain=50.0, linear_gain=-100.0).washout.linear_gain
-    -100.0
     """
 
     name: ClassVar[str] = "cascade"

@@ -24,20 +24,6 @@ class DisturbanceObserver(FeedbackLaw):
     measured acceleration: d_e = g m x' - p with p' = g (u + d_e). (K. Ohnishi, M. Shibata,
     T. Murakami, Motion control for advanced mechatronics, IEEE/ASME Transactions on Mechatronics
     1(1), 1996.) The filter is exact for samples that are held; it knows the force limit.
-
-    Examples
-    --------
-    >>> from stickslip_ros.motion.controller import Controller
-    >>> from stickslip_ros.model.control import DisturbanceObserver
-    >>> from stickslip_ros.samples import Sample
-    >>> law = DisturbanceObserver(
-    ...     nominal_mass=100.0, bandwidth=50.0, position_gain=0.0, velocity_gain=0.0
-    ... )
-    >>> observer = Controller(law)
-    >>> observer.answer(Sample(0, 0.0, 0.0, 0.0, 0.0, 0.04))
-    0.0
-    >>> round(observer.answer(Sample(1_000_000, 0.0, 0.01, 0.0, 0.0, 0.04)), 6)
-    -50.0
     """
 
     name: ClassVar[str] = "disturbance_observer"

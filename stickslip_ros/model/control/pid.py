@@ -22,17 +22,6 @@ class Pid(FeedbackLaw):
     not a difference of errors. The integral is a sum over the samples. Beyond `force_limit` it
     follows what the limit leaves of the force, by back-calculation (K. J. Astrom, T. Hagglund,
     Advanced PID Control, 2006, section 3.5), with the time constant `tracking_time`.
-
-    Examples
-    --------
-    >>> from stickslip_ros.motion.controller import Controller
-    >>> from stickslip_ros.model.control import Pid
-    >>> from stickslip_ros.samples import Sample
-    >>> pid = Controller(Pid(position_gain=1e6, integral_gain=1e7, velocity_gain=2e3))
-    >>> pid.answer(Sample(0, 1e-4, 0.0, 0.0, 0.0, 0.04))
-    -100.0
-    >>> pid.answer(Sample(1_000_000, 1e-4, 0.01, 0.0, 0.0, 0.04))
-    -121.0
     """
 
     name: ClassVar[str] = "pid"

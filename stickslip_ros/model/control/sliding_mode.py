@@ -26,17 +26,6 @@ class SlidingMode(FeedbackLaw):
     from sample to sample (J.-J. E. Slotine, W. Li, Applied Nonlinear Control, 1991, section 7.2).
     With B = 0 the force switches. Within the layer the law is linear, with the gains K L/B and
     K/B + m L; a rest outside, where K is too small, is not.
-
-    Examples
-    --------
-    >>> from stickslip_ros.motion.controller import Controller
-    >>> from stickslip_ros.model.control import SlidingMode
-    >>> from stickslip_ros.samples import Sample
-    >>> law = SlidingMode(
-    ...     nominal_mass=100.0, slope=50.0, switching_force=500.0, boundary_layer=0.01
-    ... )
-    >>> Controller(law).answer(Sample(0, 1e-4, 0.0, 0.0, 0.0, 0.04))
-    -250.0
     """
 
     name: ClassVar[str] = "sliding_mode"

@@ -25,15 +25,6 @@ class VelocityFeedback(FeedbackLaw, ContinuousControl):
 
     A negative velocity gain is a damper between the slide and the frame. A position gain moves the
     equilibrium.
-
-    Examples
-    --------
-    >>> from stickslip_ros.motion.controller import Controller
-    >>> from stickslip_ros.model.control import VelocityFeedback
-    >>> from stickslip_ros.samples import Reference, Sample
-    >>> controller = Controller(VelocityFeedback(velocity_gain=-500.0))
-    >>> controller.answer(Sample(0, 1e-4, 0.04, 0.0, 0.0, 0.04))
-    -20.0
     """
 
     name: ClassVar[str] = "velocity_feedback"
