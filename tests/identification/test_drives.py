@@ -438,10 +438,3 @@ def test_several_records_tell_more_than_one() -> None:
     records = [study.record("exponential", "ramp", seed, duration=2.0) for seed in (1, 2)]
     one, both = identify(records[:1], "exponential"), identify(records, "exponential")
     assert both.fitted["mass"].standard_error < one.fitted["mass"].standard_error
-
-
-@pytest.mark.long
-def test_a_constant_that_is_fixed_is_not_fitted() -> None:
-    own = study.record("exponential", "stick", 1, 2.0)
-    found = identify([own], "exponential", {"mass": 100.0, "friction.kinetic": 250.0})
-    assert "friction.kinetic" not in found.fitted

@@ -14,8 +14,6 @@ from stickslip_ros.model.plain_drive import drive_system
 from stickslip_ros.motion import Motion
 from tests.drives import PAPER
 
-LAW = Table(((0.0, 0.4), (0.1, 0.3), (0.3, 0.32), (0.5, 0.25)))
-
 
 @st.composite
 def tables(draw: st.DrawFn) -> Table:
@@ -66,16 +64,6 @@ def test_a_piece_leads_to_its_neighbors(law: Table, speed: float) -> None:
         assert law.switches_after(0, 1.0, law.switches_after(1, 1.0, piece)) == piece
     if not first:
         assert law.switches_after(0, 1.0, piece)[1] == lower
-
-
-def test_it_is_constant_beyond_the_last_point() -> None:
-    assert LAW.coefficient(0.5, 1.0) == LAW.coefficient(50.0, 1.0) == -0.25
-    lower, _, _, last, *cubic = LAW.switches_at(50.0, 1.0, ())
-    assert (lower, last, cubic) == (0.5, 1.0, [0.25, 0.0, 0.0, 0.0])
-
-
-def test_a_scaled_table_has_scaled_speeds() -> None:
-    assert LAW.scaled(0.5).points == ((0.0, 0.4), (0.2, 0.3), (0.6, 0.32), (1.0, 0.25))
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ from stickslip_ros.model.drive import Drive
 from stickslip_ros.model.friction import LAWS as FRICTION_LAWS
 from stickslip_ros.model.friction import Coulomb, Exponential
 from stickslip_ros.model.signals import SIGNALS, Signal, ramp, sine, step, trapezoid
-from stickslip_ros.motion import Motion, RecordedMotion
+from stickslip_ros.motion import Motion
 from stickslip_ros.motion.sampled_loop import SampledLoop
 from tests.drives import PAPER
 from tests.motion import dop853
@@ -63,24 +63,6 @@ def test_a_slide_breaks_loose_from_an_accelerating_belt_by_a_law_with_an_exponen
 ) -> None:
     """Its relative speed is zero to rounding there, and may be below."""
     check(drive_of_place(seed, "exponent", "ramp", "belt"))
-
-
-def release(motion: Motion, longest: float) -> float:
-    """Return the time at which a sticking slide breaks loose, from the first change of mode."""
-    assert motion.sticking
-    motion.advance(longest)
-    found = motion.take_breakpoints()
-    slipping = np.flatnonzero(~found.sticking[1:])
-    return float(found.time[slipping[0]])
-
-
-def test_a_slide_on_an_accelerating_belt_feels_its_inertia() -> None:
-    """It sticks while m a + k a t^2/2 is below the friction that holds it."""
-    acceleration = 0.1
-    belt = ramp(amplitude=1.0, duration=1.0 / acceleration)
-    motion = RecordedMotion(replace(REST, belt=belt), 0.0, 0.0)
-    held = 0.4 - acceleration
-    assert release(motion, 5.0) == pytest.approx((2.0 * held / acceleration) ** 0.5, abs=1e-9)
 
 
 @pytest.mark.parametrize(("height", "sticks"), [(0.39, True), (0.41, False), (-0.41, False)])

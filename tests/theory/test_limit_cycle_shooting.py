@@ -3,11 +3,9 @@
 from dataclasses import replace
 from math import exp
 
-import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.integrate import solve_ivp
 
 from stickslip_ros.measures.cycle_measures import Regime
 from stickslip_ros.measures.cycle_meter import CycleMeter
@@ -67,23 +65,6 @@ def test_the_reference_cycles_and_no_others(cycle: drives.LimitCycle) -> None:
     check(mirrored, cycle._replace(midpoint=-cycle.midpoint), 1.0, 1.0)
     in_si = replace(FEED_DRIVE, belt_speed=cycle.belt_speed / 10.0)
     check(limit_cycles(in_si), cycle, 1e-3, 1e-2)
-
-
-def test_the_multiplier_of_pure_slip_is_the_exponential_of_the_integrated_trace() -> None:
-    (cycle,) = limit_cycles(replace(PAPER, belt_speed=0.46))
-
-    def slope(_: float, state: np.ndarray) -> list[float]:
-        x, y, _ = state
-        v = y - 0.46
-        friction = 0.4 + 0.45 * v - 0.6 * v**3
-        return [y, friction - 0.02 * y - x, 0.45 - 1.8 * v**2 - 0.02]
-
-    start = [cycle.position, 0.0, 0.0]
-    solution = solve_ivp(slope, (0.0, cycle.period), start, "DOP853", rtol=1e-12, atol=1e-14)
-    x, y, integral = solution.y[:, -1]
-    assert x == pytest.approx(cycle.position, abs=1e-10)
-    assert y == pytest.approx(0.0, abs=1e-10)
-    assert cycle.multipliers == pytest.approx([exp(integral)], rel=1e-9)
 
 
 @pytest.mark.parametrize("drive", [replace(PAPER, belt_speed=0.46), SUDDEN, FALLING])

@@ -109,20 +109,6 @@ def test_the_sampled_loop_moves_as_its_matrix_says(
     assert error.max() < 1e-6
 
 
-def test_a_difference_of_the_motor_is_a_part_of_the_loop() -> None:
-    """As the difference spans less time, the loop is that with an exact velocity."""
-    radii = []
-    for rate in (1e3, 1e4, 1e5):
-        sensor = Sensor(velocity=MeasuredVelocity.DIFFERENCE)
-        loops = [
-            LinearSampledLoop.from_drive(DRIVE, rate, 0.0, *sensors)
-            for sensors in ((), (sensor, sensor))
-        ]
-        exact, told = (loop.decay_rate(HOLDING) for loop in loops if loop is not None)
-        radii.append(abs(told - exact))
-    assert radii[0] > 5.0 * radii[1] > 25.0 * radii[2]
-
-
 @pytest.mark.long
 def test_a_hopf_point_is_where_small_deviations_begin_to_grow() -> None:
     (point,) = hopf_points(DRIVE, CASCADE)
