@@ -1,6 +1,5 @@
 """A law given by a table: its points, its shape, its motion and its theory."""
 
-from dataclasses import replace
 from math import inf, nan
 from typing import Any
 
@@ -10,9 +9,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from stickslip_ros.model.friction import Table
-from stickslip_ros.model.plain_drive import drive_system
-from stickslip_ros.motion import Motion
-from tests.drives import PAPER
 
 
 @st.composite
@@ -88,16 +84,3 @@ def test_a_piece_leads_to_its_neighbors(law: Table, speed: float) -> None:
 )
 def test_points_that_make_no_table_are_refused(points: Any, refusal: str) -> None:
     assert Table(points).refusal() == refusal
-
-
-def test_a_table_is_compiled_once_for_every_table() -> None:
-    """And each has its own limit of sticking."""
-    structures = {drive_system(replace(PAPER, friction=law)).structure for law in TWO}
-    assert len(structures) == 1
-    for law in TWO:
-        motion = Motion(replace(PAPER, friction=law), 0.0, 0.4)
-        motion.advance(law.static / 0.4)
-        assert motion.position == pytest.approx(law.static - 0.02 * 0.4, rel=0.05)
-
-
-TWO = [Table(((0.0, 0.4), (0.5, 0.3))), Table(((0.0, 0.8), (0.1, 0.5), (0.5, 0.3)))]

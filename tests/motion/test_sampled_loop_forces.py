@@ -106,27 +106,14 @@ def test_a_late_force_that_a_newer_one_replaces_before_it_acts_is_told() -> None
     assert dict(loop.dropped) == {Verdict.OVERTAKEN: 2}
 
 
-def test_lockstep_goes_on_without_force_where_none_comes() -> None:
-    loop = Loop()
-    loop.answer(0, 0.5)
-    loop.advance()
-    assert (loop.acting, loop.late_forces) == (0.5, 0)
-    loop.advance()
-    assert (loop.acting, loop.late_forces) == (0.0, 1)
-    loop.advance()
-    assert (loop.acting, loop.late_forces) == (0.0, 2)
-
-
-def test_lockstep_hopes_for_an_answer_until_one_fails_to_come() -> None:
+def test_lockstep_goes_on_without_force_and_without_hope_where_none_comes() -> None:
     loop = Loop()
     assert loop.controller_present
     loop.answer(0, 0.5)
-    loop.advance()
-    assert loop.controller_present
-    loop.advance()
-    assert not loop.controller_present
-    loop.advance()
-    assert not loop.controller_present
+    for acting, late in ((0.5, 0), (0.0, 1), (0.0, 2)):
+        loop.advance()
+        assert (loop.acting, loop.late_forces) == (acting, late)
+        assert loop.controller_present == (late == 0)
 
 
 @pytest.mark.parametrize("late", [False, True])
