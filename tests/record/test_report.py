@@ -1,16 +1,35 @@
 import pytest
+from mcap.writer import CompressionType
+from rclpy.serialization import serialize_message
+from sensor_msgs.msg import JointState
 
 from stickslip_ros.errors import BagError, InvalidInputError
 from stickslip_ros.record.recorder import Recorder
 from stickslip_ros.record.report import report_of_recording
 from tests.record.runs import (
     PERIOD,
+    SECOND,
     STAMPS,
     STATES,
+    foreign_file,
+    motion,
     record,
     state,
     write_bag,
 )
+
+
+def foreign_state(stamp):
+    """Return the same as another program may publish it."""
+    position, velocity = motion(stamp / SECOND)
+    message = JointState(
+        name=["gripper", "belt", "slide"],
+        position=[7.0, 0.0, position],
+        velocity=[8.0, 20.0, velocity],
+    )
+    message.header.frame_id = "machine"
+    message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp, SECOND)
+    return serialize_message(message)
 
 
 def test_a_run_and_its_parts_are_measured(tmp_path):
@@ -93,6 +112,23 @@ def test_a_bag_of_nothing_of_ours_is_refused_with_its_topics(tmp_path):
         report_of_recording(tmp_path / "bag")
     with pytest.raises(BagError, match="in /b that can be read"):
         report_of_recording(tmp_path / "bag", namespace="/b")
+
+
+def test_other_recorders_layouts_and_messages_give_the_same_report(tmp_path):
+    """Joints in another order and among others, no efforts, late log times, other topics."""
+    record(tmp_path / "bag", forces=[])
+    path = tmp_path / "foreign.mcap"
+    with foreign_file(path, compression=CompressionType.ZSTD, chunk_size=10_000) as writer:
+        schema = writer.register_schema("sensor_msgs/msg/JointState", "ros2msg", b"")
+        other = writer.register_schema("std_msgs/msg/Float64", "ros2msg", b"")
+        channel = writer.register_channel(STATES, "cdr", schema)
+        noise = writer.register_channel("/noise", "cdr", other)
+        for stamp in STAMPS:
+            late = stamp + 12_345
+            message = foreign_state(stamp) if stamp % 3 else state(stamp)
+            writer.add_message(channel, late, message, late)
+            writer.add_message(noise, late, bytes(12), late)
+    assert report_of_recording(path) == report_of_recording(tmp_path / "bag")
 
 
 def test_a_growing_bag_is_measured_as_far_as_it_goes(tmp_path):
