@@ -7,23 +7,10 @@ from stickslip_ros.measures.noise import rises
 
 
 def settling_time(distance: FloatArray, allowed: float, start: float, rate: float) -> float | None:
-    """Return the time from `start` on until a distance stays at most what is allowed.
+    """Return the time from `start` on, s, until a distance stays at most `allowed`.
 
-    Parameters
-    ----------
-    distance : ndarray
-        Distance from the rest, shape (samples,).
-    allowed : float
-        Largest distance of what has settled.
-    start : float
-        Time from which on it may settle, s.
-    rate : float
-        Samples per second, Hz.
-
-    Returns
-    -------
-    float or None
-        Time, s; None if the last distance is too large.
+    `distance` is that from the rest, shape (samples,), at `rate` samples per second. None if its
+    last value is larger.
     """
     beyond = np.flatnonzero(distance > allowed)
     if len(beyond) and beyond[-1] == len(distance) - 1:
@@ -33,25 +20,12 @@ def settling_time(distance: FloatArray, allowed: float, start: float, rate: floa
 
 
 def hunting(error: FloatArray, least: float, rate: float) -> tuple[float, float | None]:
-    """Return amplitude and period of a vibration about the reference.
+    """Return amplitude (m) and mean period (s) of a vibration about the reference.
 
-    A swing counts where it passes a third of the amplitude on either side of the middle.
-
-    Parameters
-    ----------
-    error : ndarray
-        Displacement from the reference, m, shape (samples,).
-    least : float
-        Least amplitude, m, that is hunting.
-    rate : float
-        Samples per second, Hz.
-
-    Returns
-    -------
-    amplitude : float
-        Half the range, m; 0 if it is less, or if there are not two whole periods.
-    period : float or None
-        Mean period, s; None without hunting.
+    `error` is the displacement from the reference, m, shape (samples,), at `rate` samples per
+    second. A swing counts where it passes a third of the amplitude on either side of the middle.
+    The amplitude, half the range, is 0 and the period None if it is not above `least` (m), or if
+    there are not two whole periods.
     """
     amplitude = float(np.ptp(error)) / 2.0
     middle = error - (error.max() + error.min()) / 2.0

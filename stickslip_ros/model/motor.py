@@ -30,18 +30,7 @@ class Motor:
         return not (isinstance(force, int | float) and force == 0.0)
 
     def reduced(self, mass: float) -> float:
-        """Return the mass that vibrates at sqrt(k/mass) as this motor and a slide against it do.
-
-        Parameters
-        ----------
-        mass : float
-            Mass of the slide, kg.
-
-        Returns
-        -------
-        float
-            Mass, kg: m M/(m + M).
-        """
+        """Return m M/(m + M), kg: what vibrates at sqrt(k/mass) as motor and slide (kg) do."""
         return 1.0 / (1.0 / mass + 1.0 / self.mass)
 
     def natural_frequency(self, mass: float, stiffness: float) -> float:

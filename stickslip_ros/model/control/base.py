@@ -203,21 +203,11 @@ class TwoBodyControl(ContinuousControl):
 def seen_by(
     control: ContinuousControl, position: Any, speed: Any, motor: Sequence[Any]
 ) -> tuple[Any, Any]:
-    """Return the position and the speed that a control receives.
+    """Return the position and the speed that a control receives, or a pair of each.
 
-    Parameters
-    ----------
-    control : ContinuousControl
-        Control; one that is no `TwoBodyControl` feeds back the body that its `feedback` names.
-    position, speed : float, array or expression
-        Displacement x and speed y of the slide.
-    motor : sequence
-        Displacement and speed of the motor; empty if it is ideal.
-
-    Returns
-    -------
-    tuple
-        Position and speed, or a pair of each.
+    Position and speed, numbers or expressions, are those of the slide. `motor` has those of the
+    motor; it is empty if that is ideal. A control that is no `TwoBodyControl` feeds back the body
+    that its `feedback` names.
     """
     far = (motor[0], motor[1]) if len(motor) else (position, speed)
     if TwoBodyControl in type(control).__mro__:  # a sixth of the time that the protocol takes
