@@ -159,8 +159,8 @@ class Trajectories:
                 return np.array([system.constants[name] for name in system.free_constants])
 
             of_constants = by_coordinates(of_system)
-            units = 1.0 / drive.length_scale, 1.0 / drive.speed_scale
             scaled, delay = in_units_of(drive, drive), values[DELAY]
+            units = 1.0 / scaled.length_scale, 1.0 / scaled.speed_scale
             runs = (
                 run
                 for predictor, parts, begun in self._by_record(values, starts)
@@ -176,7 +176,7 @@ class Trajectories:
                             steady_memory(other, *speeds)
                         )
                     )
-                    derivatives += rows[:, MEMORY:order] @ memory / drive.length_scale
+                    derivatives += rows[:, MEMORY:order] @ memory / scaled.length_scale
                 outputs[part] = found
                 by_names[part, [names.index(name) for name in own]] = derivatives
                 by_start[part] = rows[:, :2] * units

@@ -227,7 +227,7 @@ class ScaledDrive(Drive):
     """
 
     unit: Drive = field(kw_only=True)
-    """The drive that gives the units; with a spring."""
+    """The drive that gives the units; with a spring. Its normal force is the unit of force."""
 
     @cached_property
     @override
@@ -236,23 +236,13 @@ class ScaledDrive(Drive):
 
     @cached_property
     @override
-    def length_scale(self) -> float:
-        return self.unit.length_scale
-
-    @cached_property
-    @override
     def force_scale(self) -> float:
-        return self.unit.force_scale
+        return self.unit.normal_force
 
     @cached_property
     @override
-    def speed_scale(self) -> float:
-        return self.unit.speed_scale
-
-    @cached_property
-    @override
-    def scales(self) -> Scales:
-        return self.unit.scales
+    def length_scale(self) -> float:
+        return self.unit.normal_force / self.unit.stiffness
 
     @cached_property
     @override

@@ -5,13 +5,13 @@ import threading
 import time
 from collections.abc import Callable
 from functools import partial
-from math import inf, isfinite, nan
+from math import isfinite, nan
 from typing import Any
 
 from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 
-from stickslip_ros.errors import MessageError
+from stickslip_ros.errors import InvalidInputError, MessageError
 from stickslip_ros.motion.motion import Motion
 from stickslip_ros.motion.sampled_loop import LOCKSTEP_START, Verdict
 from stickslip_ros.nodes.base.managed import (
@@ -50,7 +50,7 @@ from stickslip_ros.record.topics import (
 )
 from stickslip_ros.samples import Sample
 from stickslip_ros.scenarios.parameters import Pace, PlantParameters
-from stickslip_ros.stamps import NANOSECONDS
+from stickslip_ros.stamps import END_OF_TIME, NANOSECONDS
 
 
 class PlantNode(ManagedNode[PlantParameters]):
@@ -107,6 +107,12 @@ class PlantNode(ManagedNode[PlantParameters]):
             hold_late=realtime,
             overtaken=lambda stamp, force: self._dropped_force.publish(pack_wrench(stamp, force)),
         )
+        latest = END_OF_TIME - NANOSECONDS
+        stampable = self._loop.number(latest) - 1
+        if stampable < 0:
+            raise InvalidInputError(
+                f"no stamps are left after {latest // NANOSECONDS} s: restart the node"
+            )
         self._forecast: Forecast | None = None
         if realtime:
             self._pacer = RealtimePacer(
@@ -123,10 +129,10 @@ class PlantNode(ManagedNode[PlantParameters]):
                 self._forecast = Forecast(rate, self._pacer.deadline)
         else:
             self._pacer = LockstepPacer(self._loop, self._publish, self._end, self)
-        last = inf
+        last = stampable
         if parameters.last_sample is not None:
             due = parameters.last_sample - round(self.elapsed * parameters.rate)
-            last = max(due, 0)
+            last = min(max(due, 0), stampable)
         self._has_started = True
         self._pacer.start(last)
 
