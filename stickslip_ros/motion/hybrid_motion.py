@@ -19,9 +19,9 @@ from stickslip_ros.motion.short_step import (
 
 STEPS_PER_UNIT = 10_000
 """Integration steps that a motion may take for each unit of time, in the long run."""
-_SPARE_STEPS = 300_000
-"""Steps that it may take in addition: at most a second of work."""
-_STEPS_OF_A_PHASE = 20
+_SPARE_STEPS = 4_000_000
+"""Steps that it may take in addition: seconds of work."""
+_STEPS_OF_A_PHASE = 50
 """Number of steps that the work around the integration of one phase is worth."""
 _SHORTEST_REPEATED = 16.0
 """Duration of an advance above which its phases may be known: others have two cycles or fewer."""
