@@ -104,7 +104,9 @@ class RunMeter:
         motion, timing = self.motion, self.timing
         notes: list[str] = []
         samples = motion.samples + self.unmeasured
-        lost = max(motion.lost_samples - self.unmeasured, (self.published or 0) - samples, 0)
+        lost: int | None = None
+        if not motion.mixed:
+            lost = max(motion.lost_samples - self.unmeasured, (self.published or 0) - samples, 0)
         if self.unmeasured:
             notes.append(f"{self.unmeasured} of the samples are recorded, and not measured here")
         if timing is not None and (complaint := timing.warning()):
@@ -124,6 +126,6 @@ class RunMeter:
             "in_time": None if timing is None else timing.in_time,
             "samples": samples,
             "lost_samples": lost,
-            "duration": motion.duration,
+            "duration": None if motion.mixed else motion.duration,
             "notes": [*notes, *motion.notes(measures)],
         }

@@ -1,6 +1,7 @@
 """How the samples of a plant are to be read, by what is known of it."""
 
 from collections.abc import Mapping
+from contextlib import suppress
 from math import inf
 from typing import Any, NamedTuple
 
@@ -9,6 +10,7 @@ from stickslip_ros.measures.breakpoints import STICK_SHARE
 from stickslip_ros.model.drive import UNBOUNDED_SPEED, Drive
 from stickslip_ros.model.friction import LAWS, WITHDRAWN, Coulomb
 from stickslip_ros.model.sensor import Sensor
+from stickslip_ros.stamps import NANOSECONDS
 
 
 class SampleAssumptions(NamedTuple):
@@ -25,6 +27,8 @@ class SampleAssumptions(NamedTuple):
     """Whether belt, load, disturbance or reference vary: then nothing is a drift."""
     unbounded_speed: float = inf
     """Speed of the slide, m/s, at which a plant ends a motion that diverges."""
+    period: float | None = None
+    """Time between the stamps of a plant, ns; None where it is not known."""
 
 
 EXACT = SampleAssumptions()
@@ -56,6 +60,7 @@ def reading_of(
         *_resolution(plant),
         any(k.endswith(".kind") and str(kind) in CHANGING_KINDS for k, kind in plant.items()),
         _unbounded_speed(plant),
+        _period(plant),
     )
     return known if given is None else known._replace(stick_speed=given, noisy=False)
 
@@ -84,6 +89,13 @@ def _resolution(plant: Mapping[str, Any]) -> tuple[bool | None, float]:
     except (ArithmeticError, TypeError, ValueError):
         return None, 0.0
     return (not sensor.exact, within) if known else (None, 0.0)
+
+
+def _period(plant: Mapping[str, Any]) -> float | None:
+    with suppress(ArithmeticError, LookupError, TypeError, ValueError):
+        period = NANOSECONDS / float(plant["rate"])
+        return period if 1.0 <= period < inf else None
+    return None
 
 
 def _unbounded_speed(plant: Mapping[str, Any]) -> float:

@@ -22,13 +22,14 @@ from stickslip_ros.measures.cycle_measures import (
     Measures,
     Regime,
     with_drift,
+    without_cycles,
 )
 from stickslip_ros.measures.cycle_meter import CycleMeter
 from stickslip_ros.measures.drift import Drift
 from stickslip_ros.measures.noise import FEW_SAMPLES
 from stickslip_ros.measures.noisy_meter import NoisyCycleMeter
 from stickslip_ros.measures.sample_assumptions import EXACT, SampleAssumptions
-from stickslip_ros.measures.sampling_grid import LONGEST_GAP, SamplingGrid
+from stickslip_ros.measures.sampling_grid import LONGEST_GAP, SamplingGrid, whole
 from stickslip_ros.samples import SampleColumns
 from stickslip_ros.stamps import NANOSECONDS
 from stickslip_ros.text import quantity
@@ -41,6 +42,9 @@ which they disagree."""
 _EDGE_ERROR = 0.03
 """Standard error of the stick of a cycle of exact samples, in sample periods: its edges are
 interpolated, and the rounding is alike in all cycles."""
+
+_FEW_STRAYS, _STRAY_SHARE = 10, 0.01
+"""Number and share of samples off the grid of the plant up to which it may have been restarted."""
 
 NOT_JUDGED = "belt, load, disturbance or reference vary: a drift is not judged"
 """Note on measures that do not say whether they drift."""
@@ -102,6 +106,7 @@ class SampleMeter:
         """Number of samples so far."""
         self.steps_back = 0
         """Number of samples whose stamp is not later than the previous one."""
+        self._strays = 0  # those, and others that are not whole periods after the previous one
         self.mean_cycle: MeanCycle | None = None
         """Fit of the last `measures`; None for exact samples and cycles that are not alike."""
         self._observer = observer
@@ -130,7 +135,10 @@ class SampleMeter:
             samples = self._last.followed_by(samples)
         if len(samples) == 0:
             return []
-        self.steps_back += np.count_nonzero(samples.stamp[1:] <= samples.stamp[:-1])
+        steps, period = np.diff(samples.stamp), self.reading.period
+        self.steps_back += np.count_nonzero(steps <= 0)
+        astray = steps <= 0 if period is None else ~whole(steps, period)
+        self._strays += int(np.count_nonzero(astray))
         cycles: list[Cycle] = []
         starts = [0, *self._grid.cuts(samples.stamp)]
         for start, end in zip(starts, [*starts[1:], len(samples)], strict=True):
@@ -145,6 +153,11 @@ class SampleMeter:
             cycles += self._feed_segment(segment)
         self._last = samples[-1:]
         return cycles
+
+    @property
+    def mixed(self) -> bool:
+        """Whether the samples are those of several plants, whose motion is not known."""
+        return self._strays > max(_FEW_STRAYS, _STRAY_SHARE * self.samples)
 
     @property
     def lost_samples(self) -> int:
@@ -173,6 +186,9 @@ class SampleMeter:
         With `quick`, cycles under noise are measured one by one instead of together, which takes a
         thousandth of the time and is less accurate.
         """
+        if self.mixed:
+            self.mean_cycle = None
+            return without_cycles(None, None)
         limit = UNBOUNDED_BELT_SPEEDS * self._fastest_belt
         # The last sample of a plant whose motion diverges has just that speed.
         ended = self._fastest >= (1.0 - 1e-9) * self.reading.unbounded_speed
@@ -196,6 +212,12 @@ class SampleMeter:
 
     def notes(self, measures: Measures) -> list[str]:
         """Return sentences that say why these measures, its last ones, may be wrong."""
+        if self.mixed:
+            return [
+                f"{self._strays} of {self.samples} samples are not whole periods after the one "
+                "before, as where several plants publish on one topic: motion, duration and lost "
+                "samples are not known"
+            ]
         notes: list[str] = []
         if self.steps_back:
             notes.append(

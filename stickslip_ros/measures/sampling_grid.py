@@ -71,7 +71,7 @@ class SamplingGrid:
 
     def on_grid(self, steps: IntArray) -> BoolArray:
         """Return which steps (ns) are a whole number of periods, within the rounding of stamps."""
-        return _whole(steps, self._period)
+        return whole(steps, self._period)
 
     def _follow(self, steps: IntArray) -> None:
         """Count some of the steps up to the next gap."""
@@ -110,12 +110,13 @@ class SamplingGrid:
 def _period_of(steps: IntArray) -> float:
     """Return the period of a few steps (ns): the shortest one if it divides all others."""
     shortest = float(steps.min())
-    if steps.max() <= _LONGEST_LOSS * shortest and _whole(steps, shortest).all():
+    if steps.max() <= _LONGEST_LOSS * shortest and whole(steps, shortest).all():
         return float(steps.sum() / np.rint(steps / shortest).sum())
     middle = np.sort(steps)[(len(steps) - 1) // 2]
     return float(np.mean(steps[np.rint(steps / middle) == 1.0]))
 
 
-def _whole(steps: IntArray, period: float) -> BoolArray:
+def whole(steps: IntArray, period: float) -> BoolArray:
+    """Return which steps are one or more whole periods, ns, within the rounding of stamps."""
     periods = np.rint(steps / period)
     return (periods >= 1.0) & (np.abs(steps - periods * period) <= periods + 1.0)

@@ -356,6 +356,8 @@ class MotionReader:
             what = f"rounded to {quantity(self._step / NANOSECONDS, 's')}"
         else:
             return
+        if self.own and not unfilled:
+            what += ", or those of several plants"
         count = self._zero if unfilled else self._standing
         raise BagError(
             f"stamps of the joint states {self._where} are {what}: {count} of {self._samples} are "

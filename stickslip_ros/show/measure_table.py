@@ -82,7 +82,7 @@ def report_tables(
 def report_sentences(report: Mapping[str, Any], drive: Drive | None) -> list[str]:
     """Return what a recording lacks, what makes its measures doubtful, and why it has no regime."""
     sentences = [*report["missing"], *report["notes"]]
-    if report["samples"] > 0 and not report["cycles"]:
+    if report["samples"] > 0 and not report["cycles"] and report["duration"] is not None:
         reason = why_no_cycle(report["regime"], report["duration"], drive)
         sentences += [] if reason is None else [reason]
     return sentences
@@ -141,6 +141,8 @@ def _row(
 def _shown(name: str, values: Mapping[str, Any], units: Units) -> Any:
     """Return the value to print; for a regime also whether it is steady, and doubtful."""
     value = values.get(name)
+    if name == "regime" and values.get("duration", 0.0) is None:
+        return "not known"
     if name == "regime":
         trend = trend_text(values, units.text)
         motion = f"{Regime.label(value)}{_MEANING.get(value, '')}"

@@ -51,3 +51,10 @@ def test_whether_a_sensor_errs_that_there_cannot_be_is_found_from_the_samples(
     change: dict[str, Any],
 ) -> None:
     assert reading_of({**STATIC, **ENCODER, **change}).noisy is None
+
+
+@pytest.mark.parametrize(
+    ("rate", "period"), [(400.0, 2.5e6), (0.0, None), ("fast", None), (1e300, None)]
+)
+def test_the_period_of_the_stamps_is_that_of_the_rate(rate: Any, period: float | None) -> None:
+    assert reading_of({**STATIC, "rate": rate}).period == period

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.measures.cycle_measures import Regime
 from stickslip_ros.measures.run_meter import RunMeter
-from stickslip_ros.measures.sample_assumptions import UNKNOWN, SampleAssumptions, reading_of
+from stickslip_ros.measures.sample_assumptions import EXACT, UNKNOWN, SampleAssumptions, reading_of
 from stickslip_ros.measures.sample_meter import SampleMeter
 from stickslip_ros.motion.motion import Motion
 from stickslip_ros.samples import SampleColumns
@@ -352,16 +352,32 @@ def test_no_samples_are_an_error(rows: list[tuple[int, float, float, float]], si
     assert np.isfinite([figure for figure in measured if isinstance(figure, float)]).all()
 
 
-@pytest.mark.parametrize("size", [1, 7, 400])
-def test_two_publishers_on_one_topic_are_noted(size: int) -> None:
-    stamp = stamps(100, 200)
-    both = still(np.stack([stamp, stamp - SECOND // 2]).T.ravel())
-    meter = RunMeter(window=20)
-    for first in range(0, len(both.stamp), size):
+@pytest.mark.parametrize("size", [1, 7, 13000])
+@pytest.mark.parametrize(("shift", "strays"), [(-SECOND // 2, 1), (SECOND // 300, 2)])
+def test_the_motion_of_two_plants_on_one_topic_is_not_known(
+    size: int, shift: int, strays: int
+) -> None:
+    """Their stamps go back, or come in order where both plants are in time."""
+    one = limit_cycle()[:200] if size == 1 else limit_cycle()
+    both = one.followed_by(later(one, shift))
+    both = both[np.arange(2 * len(one)).reshape(2, -1).T.ravel()]
+    meter = RunMeter(window=20, reading=EXACT._replace(period=1e7))
+    for first in range(0, len(both), size):
         meter.motion.feed(both[first : first + size])
-    (note,) = meter.report()["notes"]
-    assert "200 of 400 samples" in note
-    assert "the samples of several plants are mixed" in note
+    report = meter.report()
+    unknown = ("regime", "amplitude", "period", "lost_samples", "duration", "steady")
+    assert {name: report[name] for name in unknown} == dict.fromkeys(unknown)
+    (note,) = report["notes"]
+    number = strays * len(one) - (strays == 2)
+    assert f"{number} of {2 * len(one)} samples are not whole periods after" in note
+    assert "several plants publish on one topic" in note
+
+
+def test_a_plant_that_is_restarted_nine_times_is_measured() -> None:
+    one = limit_cycle()
+    meter = fed(one.followed_by(*[one] * 9), EXACT._replace(period=1e7))
+    assert meter.measures().regime is Regime.STICK_SLIP
+    assert not meter.mixed
 
 
 def noisy(samples: SampleColumns, error: float) -> SampleColumns:

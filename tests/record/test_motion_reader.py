@@ -158,6 +158,17 @@ def test_stamps_that_stand_are_refused_and_the_log_has_others(
         assert recording.missing == []
 
 
+def test_stamps_that_stand_may_be_those_of_several_plants(tmp_path: Path) -> None:
+    names = ["slide", "belt"]
+    messages = [
+        (STATES, each, state(each, names, [x, 0.0], [0.0, BELT]))
+        for each, x in zip(np.repeat(STEP * np.arange(1, 200), 2).tolist(), POSITION, strict=False)
+    ]
+    write_bag(tmp_path / "bag", messages)
+    with pytest.raises(BagError, match="are rounded to 1 ms, or those of several plants"):
+        report_of_recording(tmp_path / "bag")
+
+
 def test_stamps_that_one_of_two_sources_lacks_are_refused(tmp_path: Path) -> None:
     stamps = {i: recorded(i) * (i % 2) for i in range(len(TIME))}
     messages = [axis(i, x, stamp=stamps[i]) for i, x in enumerate(POSITION.tolist())]
