@@ -3,12 +3,14 @@
 import errno
 import os
 import shutil
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from contextlib import contextmanager, suppress
 from io import TextIOWrapper
 from pathlib import Path
 from stat import S_ISREG
 from typing import BinaryIO
+
+from stickslip_ros.interrupts import interrupts_wait
 
 
 def open_regular(path: Path | str, *, links: bool = True) -> BinaryIO:
@@ -32,9 +34,12 @@ def open_regular(path: Path | str, *, links: bool = True) -> BinaryIO:
 
 
 @contextmanager
-def written(path: Path, *, replace: bool = False) -> Generator[TextIOWrapper]:
+def written(
+    path: Path, *, replace: bool = False, then: Callable[[], object] = lambda: None
+) -> Generator[TextIOWrapper]:
     """Provide a UTF-8 file that becomes the one at `path`, flushed to the disk, at the end.
 
+    It is followed by `then`, which removes what is of no use any more: no SIGINT comes in between.
     If the block fails, `path` stays as it was. Bytes go to the file's `buffer`. Raises OSError if
     it cannot be written, or if there is a file at `path` by then that is not to `replace`.
     """
@@ -47,8 +52,10 @@ def written(path: Path, *, replace: bool = False) -> Generator[TextIOWrapper]:
             os.fsync(stream.fileno())
         with suppress(OSError):
             shutil.copymode(path, part)
-        if not replace and path.exists():
-            raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST), str(path))
-        part.replace(path)
+        with interrupts_wait():
+            if not replace and path.exists():
+                raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST), str(path))
+            part.replace(path)
+            then()
     finally:
         part.unlink(missing_ok=True)

@@ -1,8 +1,11 @@
-"""Handle SIGINT while a process of this package is still importing."""
+"""Handle SIGINT while a process of this package is still importing, or puts a file in its place."""
 
 import os
 import signal
 import sys
+from collections.abc import Generator
+from contextlib import contextmanager
+from threading import current_thread, main_thread
 from types import FrameType
 
 NODE_SCRIPTS = (
@@ -49,3 +52,19 @@ def _raise_after_import(number: int, frame: FrameType | None) -> None:
 
     signal.signal(signal.SIGALRM, interrupt)
     signal.setitimer(signal.ITIMER_REAL, _IMPORT_TIME)
+
+
+@contextmanager
+def interrupts_wait() -> Generator[None]:
+    """Let a SIGINT that comes during this block count only after it."""
+    if current_thread() is not main_thread():  # which alone gets signals, and may set handlers
+        yield
+        return
+    came: list[int] = []
+    before = signal.signal(signal.SIGINT, lambda number, _: came.append(number))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before or signal.SIG_DFL)
+        if came:
+            signal.raise_signal(signal.SIGINT)

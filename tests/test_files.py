@@ -1,6 +1,7 @@
 """Reading regular files only, and writing files whole or not at all."""
 
 import os
+import signal
 import stat
 from pathlib import Path
 
@@ -56,6 +57,19 @@ def test_a_block_that_fails_changes_nothing(tmp_path: Path) -> None:
             _write_half(path)
     assert os.listdir(tmp_path) == ["old"]
     assert old.read_text() == "old"
+
+
+def test_an_interrupt_waits_until_what_follows_a_file_is_done(tmp_path: Path) -> None:
+    done: list[None] = []
+
+    def follow() -> None:
+        signal.raise_signal(signal.SIGINT)
+        done.append(None)
+
+    with pytest.raises(KeyboardInterrupt), written(tmp_path / "file", then=follow):
+        pass
+    assert done
+    assert os.listdir(tmp_path) == ["file"]
 
 
 def test_a_file_that_came_in_between_is_left(tmp_path: Path) -> None:

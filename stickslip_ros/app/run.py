@@ -211,6 +211,8 @@ def record(
             raise RunError(f"{error}; {_state_of(bag)}") from None
     try:
         return _values(bag, outcome.controller, outcome.plant), outcome.interrupted
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt(f"{_state_of(bag)}; the nodes have ended") from None
     except BagError as error:
         if outcome.interrupted:  # before the first sample
             left = f"; {bag} holds nothing" if bag.exists() else ""

@@ -1,6 +1,8 @@
 """A complete scenario of an identified drive."""
 
 from collections.abc import Mapping
+from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -31,25 +33,21 @@ def written_scenario(found: Findings, path: Path) -> list[Path]:
     laws = by_group(found.drive.friction)
     curves: list[Path] = []
     files: dict[str, str] = {}
-    try:
+    with ExitStack() as undo:
         for group, law in laws.items():
             curve = law.curve if isinstance(law, CurveFollower) else law
             if isinstance(curve, Table):
                 file = curve_files(path)["reverse" in group]
-                with written(file) as stream:
-                    stream.writelines(f"{w!r},{size!r}\n" for w, size in curve.points)
+                with written(file, then=partial(undo.callback, file.unlink, missing_ok=True)) as to:
+                    to.writelines(f"{w!r},{size!r}\n" for w, size in curve.points)
                 curves.append(file)
                 files[f"plant.{group}file"] = str(file.absolute())
         # A scenario reads its curves: it can only be made when they are written.
         text = commented_file(_scenario(found, laws, files), _heading(found, path))
         for file in curves:
             text = text.replace(str(file.absolute()), file.name)
-        with written(path) as stream:
+        with written(path, then=undo.pop_all) as stream:
             stream.write(text)
-    except BaseException:
-        for file in curves:
-            file.unlink(missing_ok=True)
-        raise
     return [path, *curves]
 
 

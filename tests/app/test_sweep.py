@@ -1,11 +1,13 @@
 """`stickslip sweep`: tables, figures, and interrupted sweeps."""
 
+import os
 import signal
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from stickslip_ros.app import study_command
 from stickslip_ros.studies import runner
 from tests.app.conftest import Run, Start, ended
 from tests.nodes.graph import wait_for
@@ -62,6 +64,28 @@ def test_interrupted_it_keeps_what_is_done_and_goes_on_from_there(
         assert done.returncode == 0, done.stderr
     assert (tmp_path / "table.csv").read_bytes() == (tmp_path / "whole.csv").read_bytes()
     assert not part.exists()
+
+
+@pytest.mark.parametrize("when", ["replaced", "printed"])
+def test_interrupted_after_its_table_is_written_it_leaves_no_journal(
+    stickslip: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, when: str
+) -> None:
+    def print_result(*_: object) -> None:
+        signal.raise_signal(signal.SIGINT)
+
+    def replace(part: Path, table: Path) -> None:
+        os.replace(part, table)
+        signal.raise_signal(signal.SIGINT)
+
+    with monkeypatch.context() as patch:
+        if when == "printed":
+            patch.setattr(study_command, "print_result", print_result)
+        else:
+            patch.setattr(Path, "replace", replace)
+        done = stickslip(*FREE, *SPEEDS, "--out", "table.csv")
+    assert done.returncode == 130
+    assert done.stderr == "stickslip sweep: interrupted: table.csv is written\n"
+    assert [path.name for path in tmp_path.iterdir()] == ["table.csv"]
 
 
 def test_no_default_is_reported_for_a_varied_parameter(stickslip: Run, tmp_path: Path) -> None:
