@@ -35,6 +35,7 @@ from stickslip_ros.scenarios import DEFAULT_NAMESPACE, Pace
 from stickslip_ros.text import number_in
 
 if TYPE_CHECKING:
+    from stickslip_ros.nodes.running.bringup import RunOutcome
     from stickslip_ros.scenarios.files import Scenario
 
 
@@ -137,7 +138,8 @@ def run(arguments: argparse.Namespace) -> int:
             *_limit_of_machine(scenario, results),
         )
     if not results["report"]["complete"]:
-        raise RunError(f"the bag {bag} could not be written to its end")
+        why = results["report"]["missing"][0]
+        raise RunError(f"the bag {bag} could not be written to its end: {why}")
     if interrupted:
         tell(f"stickslip run: interrupted: the bag {bag} is closed; the nodes have ended")
         return INTERRUPTED
@@ -193,7 +195,7 @@ def record(
     duration = scenario.plant.duration
     total = duration if duration < float("inf") else None
     with loading_ros():
-        from stickslip_ros.nodes.running.bringup import run_nodes
+        from stickslip_ros.nodes.running.bringup import NothingRecordedError, run_nodes
     with progress_bar(f"running {scenario.name}", total) as progress:
         try:
             outcome = run_nodes(
@@ -207,17 +209,19 @@ def record(
             )
         except NamespaceInUseError as error:
             raise InvalidInputError(f"{error}: give this one another, by --namespace") from None
+        except NothingRecordedError as error:
+            raise RunError(f"{error}; nothing was recorded") from None
         except RunError as error:
             raise RunError(f"{error}; {_state_of(bag)}") from None
     try:
-        return _values(bag, outcome.controller, outcome.plant), outcome.interrupted
+        return _values(bag, outcome), outcome.interrupted
     except KeyboardInterrupt:
         raise KeyboardInterrupt(f"{_state_of(bag)}; the nodes have ended") from None
     except BagError as error:
         if outcome.interrupted:  # before the first sample
             left = f"; {bag} holds nothing" if bag.exists() else ""
             raise KeyboardInterrupt(f"nothing was recorded{left}; the nodes have ended") from None
-        raise RunError(str(error)) from None
+        raise RunError(outcome.recording_failure or str(error)) from None
 
 
 def _again(words: Sequence[str]) -> str:
@@ -282,13 +286,16 @@ def _other_controller(arguments: argparse.Namespace) -> list[str] | None:
     return [] if arguments.external_controller else None
 
 
-def _values(bag: Path, controller: str | None, plant: Mapping[str, str]) -> dict[str, Any]:
+def _values(bag: Path, outcome: "RunOutcome") -> dict[str, Any]:
     from stickslip_ros.record.report import report_of_recording
 
-    report = report_of_recording(bag)
+    report, plant = report_of_recording(bag), outcome.plant
+    if outcome.recording_failure:
+        missing = [outcome.recording_failure, *report["missing"]]
+        report = {**report, "complete": False, "missing": missing}
     return {
         "bag": str(bag),
-        "controller": controller,
+        "controller": outcome.controller,
         "report": report,
         "samples": report["samples"],
         "lost_samples": report["lost_samples"],

@@ -42,6 +42,7 @@ from stickslip_ros.nodes.base.clients import (
 from stickslip_ros.nodes.base.endpoints import qos_profile, timed_messages, waiting_messages
 from stickslip_ros.nodes.base.managed import (
     ERROR,
+    FAILURE,
     FIRST_STAMP,
     OK,
     STATE,
@@ -216,7 +217,7 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         stability, near = self._watch.status(self.parameters.onset_margin)
         values = {**counts, "stability": stability, **self.dropped.values, **notes, **bag}
         if self._bag_failure:
-            return ERROR, self._bag_failure, values
+            return ERROR, self._bag_failure, {**values, FAILURE: self._bag_failure}
         complaints = [self.dropped.complaint, *self.duplicate_publishers(*self._topics)]
         if report["lost_samples"]:
             complaints.append(f"{report['lost_samples']} samples were lost")

@@ -55,7 +55,9 @@ NEWEST_STAMP = "newest_stamp"
 FORECAST = "forecast"
 """Key of the plant's forecast of which forces will be late."""
 FAILURE = "failure"
-"""Key of the reason why the plant could not continue, if it could not."""
+"""Key of the reason why the plant, or the recording, could not continue, if it could not."""
+REFUSAL = "refusal"
+"""Key of the reason why the last transition of a node has failed."""
 FINISHED = "finished"
 """Key of whether the plant has paused by itself, not on request."""
 
@@ -120,7 +122,7 @@ class ManagedNode(PollingNode, ParameterNode[ParametersT], ABC):
         self._kept: list[Any] = []
         self.read_last: Publisher | None = None
         """Publisher whose topic recorders subscribe to last; None if they read only one."""
-        self._last_refusal = ""
+        self._refusal = ""
         self._waiting = False
         for service in self.services:  # those of rclpy
             service.callback = partial(_answered, self.get_logger(), service.callback)
@@ -224,6 +226,8 @@ class ManagedNode(PollingNode, ParameterNode[ParametersT], ABC):
     def publish_diagnostics(self) -> None:
         """Publish the node's health."""
         level, message, values = self.diagnose()
+        if self._refusal:
+            level, message, values = ERROR, self._refusal, {**values, REFUSAL: self._refusal}
         status = DiagnosticStatus(
             level=level,
             name=self.get_fully_qualified_name(),
@@ -316,17 +320,24 @@ class ManagedNode(PollingNode, ParameterNode[ParametersT], ABC):
         except InvalidInputError as error:
             if self._autostart_timer is not None:
                 self.end_process(error)
-            elif str(error) != self._last_refusal:  # the request may be repeated many times
-                self._last_refusal = str(error)
-                self.get_logger().error(self._last_refusal)
+            elif str(error) != self._refusal:  # the request may be repeated many times
+                self.get_logger().error(str(error))
+            self._refuse(str(error))
             return TransitionCallbackReturn.FAILURE
         except Exception as error:  # rclpy would ignore it silently
             self.get_logger().error(f"{type(error).__name__}: {error}")
+            self._refuse(f"{type(error).__name__}: {error}")
             self._end_autostart()
             return TransitionCallbackReturn.ERROR
         if done:
+            self._refusal = ""
             self.get_logger().info(done)
         return TransitionCallbackReturn.SUCCESS
+
+    def _refuse(self, reason: str) -> None:
+        """Publish why a transition fails; whoever has asked for it learns only that it does."""
+        self._refusal = reason
+        self.publish_diagnostics()
 
     def _is_waiting(self) -> bool:
         """Return whether a node is missing; log its name, once until this node is active."""

@@ -48,6 +48,12 @@ class RunOutcome:
     """The plant's last values, as in its diagnostics."""
     controller: str | None
     """Full name of the node that was the controller."""
+    recording_failure: str
+    """Why the analyzer could not continue to record; empty if it could."""
+
+
+class NothingRecordedError(RunError):
+    """A run failed before its analyzer could record: a bag of that name is of another one."""
 
 
 def node_parameters(scenario: Scenario, bag: Path) -> dict[str, dict[str, Any]]:
@@ -83,9 +89,9 @@ def run_nodes(
     `controller` is the command (executable and arguments) of a user's controller that replaces
     ours; a managed (lifecycle) node is configured and activated. If the command is empty, the
     plant waits for a controller that is started elsewhere.
-    Every node is deactivated, and the bag is closed, before this returns or raises RunError (a node
-    died, or did not become ready). Raises InvalidInputError if the namespace has another run, or
-    ROS refuses the settings of the environment.
+    Every node is deactivated, and the bag is closed, before this returns or raises RunError: a node
+    died, or did not become ready (NothingRecordedError before it records). Raises InvalidInputError
+    if the namespace has another run, or ROS refuses the settings of the environment.
     """
     with (
         lock_namespace(namespace, domain_of_environment()),
@@ -168,8 +174,9 @@ class _Supervisor:
         finally:
             self._bring_down()
         if self._failure is not None:
-            raise RunError(self._failure)
-        return RunOutcome(self._stop.done(), self._monitor.plant, self._controller)
+            raise (RunError if "analyzer" in self._active else NothingRecordedError)(self._failure)
+        failure = self._monitor.recording_failure
+        return RunOutcome(self._stop.done(), self._monitor.plant, self._controller, failure)
 
     def _is_ended(self) -> bool:
         return self._stop.done() or self._failure is not None
@@ -223,12 +230,19 @@ class _Supervisor:
             self._take_through(client.name, Transition.TRANSITION_CONFIGURE)
 
     def _take_through(self, node: str, transition: int) -> None:
-        """Take a node through a transition; repeat the request while the node refuses it."""
+        """Take a node through a transition; repeat the request while it waits for other nodes."""
+        name, refusals = full_name(self._namespace, node), self._monitor.refusals
         ready = self._spinner.spin_until(
-            lambda: self._change_state(node, transition), _READY_TIMEOUT, period=0.02
+            lambda: self._change_state(node, transition) or bool(refusals.get(name)),
+            _READY_TIMEOUT,
+            period=0.02,
         )
-        if not ready and not self._is_ended():
-            self._fail(f"{node} did not become ready within {_READY_TIMEOUT:g} s")
+        if refusals.get(name):
+            self._fail(f"{node} could not start: {refusals[name]}")
+        elif not ready and not self._is_ended():
+            named = [full_name(ns, n) for n, ns in self._node.get_node_names_and_namespaces()]
+            why = ": another node has its name" if named.count(name) > 1 else ""
+            self._fail(f"{node} did not become ready within {_READY_TIMEOUT:g} s{why}")
 
     def _connect_user_controller(self, command: Sequence[str]) -> None:
         """Wait for the user's controller; our nodes are activated once connected to it.
@@ -314,6 +328,8 @@ class _Supervisor:
                 self._deactivate(node)
             if node == "plant" and not self._is_dead(node):
                 self._spinner.spin_until(lambda: self._monitor.plant_stopped, timeout=2.0)
+            if node == "analyzer" and not self._is_dead(node):
+                self._spinner.spin_until(lambda: self._monitor.recording_ended, timeout=2.0)
         for name in self._processes.end():
             self._notify(f"the node {name} did not end within {EXIT_TIMEOUT:g} s: killed")
 

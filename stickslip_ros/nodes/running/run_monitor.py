@@ -8,7 +8,14 @@ from std_msgs.msg import Header
 
 from stickslip_ros.nodes.base.clients import ACTIVE, NEXT_TRANSITION
 from stickslip_ros.nodes.base.endpoints import qos_profile
-from stickslip_ros.nodes.base.managed import FAILURE, FINISHED, FORECAST, NEWEST_STAMP, STATE
+from stickslip_ros.nodes.base.managed import (
+    FAILURE,
+    FINISHED,
+    FORECAST,
+    NEWEST_STAMP,
+    REFUSAL,
+    STATE,
+)
 from stickslip_ros.record.topics import DIAGNOSTICS, RECORDED
 from stickslip_ros.scenarios import full_name
 from stickslip_ros.stamps import NANOSECONDS
@@ -22,7 +29,7 @@ Notify = Callable[[str], None]
 
 
 class RunMonitor:
-    """Subscribes to the plant's diagnostics and to the progress of the recording."""
+    """Subscribes to the diagnostics of the nodes and to the progress of the recording."""
 
     def __init__(
         self,
@@ -44,7 +51,15 @@ class RunMonitor:
         self.ending = False
         """Whether the run is ending: a plant that stops then is not paused."""
         self._fail, self._notify, self._on_simulated_time = fail, notify, on_simulated_time
-        self._plant_name = full_name(node.get_namespace(), "plant")
+        self.recording_failure = ""
+        """Why the analyzer could not continue to record; empty if it could."""
+        self.recording_ended: bool = False
+        """Whether the analyzer has published its last values after it was active."""
+        self.refusals: dict[str, str] = {}
+        """Why the last transition of each node has failed, by full name; empty if it has not."""
+        self._plant_name, self._analyzer_name = (
+            full_name(node.get_namespace(), name) for name in ("plant", "analyzer")
+        )
         self._paused = self._forecast_told = False
         self._first_recorded: int | None = None
         node.create_subscription(
@@ -59,9 +74,14 @@ class RunMonitor:
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
         for status in message.status:
+            values = {entry.key: entry.value for entry in status.values}
+            self.refusals[status.name] = values.get(REFUSAL, "")
             if status.name == self._plant_name:
-                self.plant = {entry.key: entry.value for entry in status.values}
-                self._follow_plant(self.plant.get(STATE))
+                self.plant = values
+                self._follow_plant(values.get(STATE))
+            elif status.name == self._analyzer_name:
+                self.recording_failure = values.get(FAILURE, self.recording_failure)
+                self.recording_ended |= values.get(STATE) == "deactivating"
 
     def _follow_plant(self, state: str | None) -> None:
         if FORECAST in self.plant and not self._forecast_told:
