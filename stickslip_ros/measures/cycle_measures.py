@@ -142,9 +142,10 @@ class Measures(CycleMeasures[float | None]):
     steady: bool | None = None
     """Whether the motion has settled; None if there is too little data.
 
-    The amplitudes of the measured cycles, at least three, differ by a thousandth at most, and
-    nothing drifts. A rest is steady once it has lasted for as many cycles as the window has, if
-    small cycles around it do not grow. An unbounded motion is steady, too.
+    The amplitudes of the measured cycles, at least three, differ by a thousandth at most, as does
+    their mean from the amplitude that they tend to, where that is known, and nothing drifts. A rest
+    is steady once it has lasted for as many cycles as the window has, if small cycles around it do
+    not grow. An unbounded motion is steady, too.
     """
     trend: Trend | None = None
     """How the motion changes; None unless `steady` is False."""

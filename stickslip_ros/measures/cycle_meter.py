@@ -27,7 +27,14 @@ from stickslip_ros.measures.cycle_measures import (
 from stickslip_ros.measures.drift import Drift
 
 STEADY_CHANGE = 1e-3
-"""Largest relative difference between the amplitudes of the measured cycles of a steady motion."""
+"""Largest relative difference between the amplitudes of the measured cycles of a steady motion, and
+between their mean and the amplitude that they tend to."""
+
+_CYCLES_TO_COME = 1000.0
+"""Number of cycles to come in which a change that slows down no more counts."""
+
+_RATIO_ERROR = 0.1
+"""Largest error of 1 - q with which differences follow a geometric sequence of the ratio q."""
 
 GRAZING_FRACTION = 1e-8
 """Stick fraction up to which a cycle counts as touching the belt speed without sticking.
@@ -133,7 +140,7 @@ class CycleMeter:
         self.unbounded = False
         """Whether the motion is reported as one that diverges."""
         self._cycles: deque[Cycle] = deque(maxlen=window)
-        self._amplitudes: deque[float] = deque(maxlen=max(window, LEAST_CYCLES))
+        self._amplitudes: deque[float] = deque(maxlen=max(window, LEAST_CYCLES + 1))
         self._belt_speed = self._fastest_belt = 0.0
         self._fastest = 0.0
         self.ends: list[float] = []
@@ -231,12 +238,22 @@ class CycleMeter:
             return without_cycles(recent, Regime.EQUILIBRIUM, steady=steady)
         means = CycleMeans.over(self._cycles)
         resting = means.cycle.velocity_amplitude < self._equilibrium_speed
-        share = STEADY_CHANGE
-        if self.drift.resolution > 0.0:  # what the sensor tells differs from cycle to cycle
-            share = max(STEADY_CHANGE_UNDER_NOISE, self.drift.resolution / max(self._amplitudes))
-        trend = _trend(self._amplitudes, resting, share)
+        trend = _trend(self._amplitudes, resting, self._steady_share)
         steady = trend is None if len(self._amplitudes) >= LEAST_CYCLES else None
         return means.measures(resting, steady, trend)
+
+    @property
+    def repeats(self) -> bool:
+        """Whether the amplitudes agree as those of a steady motion, whatever they tend to."""
+        return _agree(self._amplitudes, self._steady_share)
+
+    @property
+    def _steady_share(self) -> float:
+        """Share of the amplitude by which the cycles of a steady motion may differ."""
+        if self.drift.resolution == 0.0 or not self._amplitudes:
+            return STEADY_CHANGE
+        # What the sensor tells differs from cycle to cycle.
+        return max(STEADY_CHANGE_UNDER_NOISE, self.drift.resolution / max(self._amplitudes))
 
     def _held(self, at_rest: bool) -> Cycle | None:
         """Return the motion of three cycles and since, or only since; None beyond `within`."""
@@ -311,14 +328,44 @@ def _trend(amplitudes: Sequence[float], resting: bool, share: float) -> Trend | 
     """
     if len(amplitudes) < LEAST_CYCLES:
         return None
-    first, last = amplitudes[0], amplitudes[-1]
+    first, last, largest = amplitudes[0], amplitudes[-1], max(amplitudes)
     grows = last - first > share * first
+    to_come = _change_to_come(amplitudes)
     if resting:
+        grows |= to_come > STEADY_CHANGE * largest
         monotone = all(before < after for before, after in pairwise(amplitudes))
         return Trend.GROWING if grows and monotone else None
-    largest = max(amplitudes)
-    if largest - min(amplitudes) <= share * largest:
-        return None
+    if _agree(amplitudes, share):
+        if abs(to_come) <= STEADY_CHANGE * largest:
+            return None
+        return Trend.GROWING if to_come > 0.0 else Trend.DECAYING
     if grows:
         return Trend.GROWING
     return Trend.DECAYING if first - last > share * first else Trend.VARYING
+
+
+def _agree(amplitudes: Sequence[float], share: float) -> bool:
+    largest = max(amplitudes, default=0.0)
+    return largest - min(amplitudes, default=0.0) <= share * largest
+
+
+def _change_to_come(amplitudes: Sequence[float]) -> float:
+    """Return by how much the amplitude will differ from the mean of these; 0 if that is not known.
+
+    Where the differences d between thirds of the window are a geometric sequence of the ratio q,
+    the last amplitude will still change by d q / (1 - q), as in Aitken's extrapolation. Beats,
+    disturbances and noise have no such ratio.
+    """
+    third = (len(amplitudes) - 1) // 3
+    if third == 0:
+        return 0.0
+    ends = [amplitudes[-1 - number * third] for number in (3, 2, 1, 0)]
+    first, second, last = (after - before for before, after in pairwise(ends))
+    if not first * second > 0.0 or not second * last > 0.0:
+        return 0.0
+    ratio = last / second
+    if abs(ratio - second / first) > _RATIO_ERROR * abs(1.0 - ratio):
+        return 0.0
+    most = _CYCLES_TO_COME / third
+    left = last * (min(ratio / (1.0 - ratio), most) if ratio < 1.0 else most)
+    return amplitudes[-1] + left - sum(amplitudes) / len(amplitudes)

@@ -30,12 +30,16 @@ class SettlingOptions:
     patience: int = 1
     """Largest number of repetitions of both, 1 to 1e6. They end when the motion is steady and two
     results are the same: near an unstable cycle a motion may seem steady for a while."""
+    extensions: int = 4
+    """Largest number of further repetitions, 0 to 1e6, while the cycles are alike but their
+    amplitude tends to another value, as near a Hopf bifurcation."""
 
     def __post_init__(self) -> None:
         for shown, value, least in (
             (f"a transient of {self.transient:g} natural periods", self.transient, 0),
             (f"{self.cycles} cycles to measure", self.cycles, 1),
             (f"a patience of {self.patience} transients", self.patience, 1),
+            (f"{self.extensions} extensions", self.extensions, 0),
         ):
             if not least <= value <= LONGEST:
                 raise InvalidInputError(f"{shown}: must be from {least} to {LONGEST:g}")

@@ -10,7 +10,7 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.measures.cycle_measures import LEAST_CYCLES, RESTS, Measures, Regime
+from stickslip_ros.measures.cycle_measures import LEAST_CYCLES, RESTS, Measures, Regime, Trend
 from stickslip_ros.measures.cycle_meter import CycleMeter
 from stickslip_ros.measures.sample_meter import MeasuredMotion
 from stickslip_ros.model.constants import constants_of
@@ -26,6 +26,9 @@ from stickslip_ros.theory.cycle_bounds import loading_time, release_position
 
 CYCLES = (Regime.STICK_SLIP, Regime.PURE_SLIP)
 """Regimes of a limit cycle, which has an amplitude."""
+
+_LEAST_CYCLES = LEAST_CYCLES + 1
+"""Number of cycles from which it is known how much they will still change."""
 
 
 @dataclass(frozen=True)
@@ -201,7 +204,7 @@ def settle(case: ControlledDrive, start: MotionState, settling: SettlingOptions)
         loading = min(loading, 50.0 * period)
         transient += loading
     # The first and the last cycle are incomplete.
-    cycles = max(settling.cycles, LEAST_CYCLES) + 2
+    cycles = max(settling.cycles, _LEAST_CYCLES) + 2
     block, longest = cycles * period, cycles * (period + loading)
     if not drive.has_spring:  # forces alone make its cycles
         block = longest = case.duration
@@ -242,12 +245,16 @@ def settle(case: ControlledDrive, start: MotionState, settling: SettlingOptions)
             section.meter.unbounded = True
         return section
 
-    section = observe()
-    for _ in range(settling.patience - 1):
-        before, section = section.measures, observe()
-        measures = section.measures
-        if _is_settled(measures) and _alike(before, measures, section.meter.drift.resolution):
+    section, measures = observe(), None
+    for number in range(1, settling.patience + settling.extensions):
+        before, measures = measures, section.measures
+        if number < settling.patience:
+            alike = before is not None and _alike(before, measures, section.meter.drift.resolution)
+            if _is_settled(measures) and alike:
+                break
+        elif measures.trend not in (Trend.GROWING, Trend.DECAYING) or not section.meter.repeats:
             break
+        section = observe()
     state = motion.control_state if control is not None else None
     if controller is not None and loop is not None:
         answer(loop, controller)
@@ -287,7 +294,7 @@ class _Section:
     def __init__(self, meter: CycleMeter, cycles: int, *, once: bool = False) -> None:
         """Measure at least `cycles`; keep a turning point `once` if the slide sticks there."""
         self.meter = meter
-        self._missing, self._once = max(cycles, LEAST_CYCLES), once
+        self._missing, self._once = max(cycles, _LEAST_CYCLES), once
         self._sections = [np.empty(0)]
         self._measures: Measures | None = None
 

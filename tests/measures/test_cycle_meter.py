@@ -1,4 +1,4 @@
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import cache
 from math import nan, pi
@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from stickslip_ros.arrays import FloatArray
 from stickslip_ros.measures.breakpoints import Breakpoints
 from stickslip_ros.measures.cycle_measures import Cycle, Measures, Regime, Trend
 from stickslip_ros.measures.cycle_meter import CycleMeter
@@ -247,6 +248,11 @@ def course(*amplitudes: float) -> Breakpoints:
     return replace(breakpoints, position=position, velocity=velocity)
 
 
+def _changing(change: float, ratio: float) -> FloatArray:
+    """Return amplitudes: the first difference is `change`, each next one in a ratio to it."""
+    return 1.0 + change * np.cumsum(ratio ** np.arange(7))
+
+
 @pytest.mark.parametrize(
     ("amplitudes", "steady", "trend"),
     [
@@ -256,10 +262,15 @@ def course(*amplitudes: float) -> Breakpoints:
         ([1.0, 0.8, 0.6, 0.4], False, Trend.DECAYING),
         ([0.4, 0.6, 0.8], False, Trend.GROWING),
         ([1.0, 0.8, 1.0, 0.8, 1.0], False, Trend.VARYING),
+        (_changing(-1e-4, 0.98), False, Trend.DECAYING),
+        (_changing(-1e-4, 1.02), False, Trend.DECAYING),
+        (_changing(-1e-4, 0.8), True, None),
+        (_changing(-1e-4, -0.98), True, None),
+        (1.0 + 2e-4 * np.sin(0.1 * np.arange(8)), True, None),
     ],
 )
 def test_a_motion_is_steady_while_its_amplitude_stays(
-    amplitudes: list[float], steady: bool | None, trend: Trend | None
+    amplitudes: Sequence[float], steady: bool | None, trend: Trend | None
 ) -> None:
     measures = measured(course(*amplitudes), 1.0)
     assert measures.regime is Regime.PURE_SLIP

@@ -140,7 +140,7 @@ def test_the_arrays_of_a_grid_are_row_major_over_the_values_of_its_axes(
         assert bits([found]) == bits([columns.amplitude[place]])
     assert read["scenario"] == {"plant.mass": 1.0}
     assert read["plan"]["carry"] == "both"
-    assert read["course"] == {"transient": 5.0, "cycles": 2, "patience": 1}
+    assert read["course"] == {"transient": 5.0, "cycles": 2, "patience": 1, "extensions": 4}
     assert read["continuous_control"] is False
 
 
