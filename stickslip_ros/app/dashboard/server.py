@@ -1,6 +1,5 @@
 """Serve the page, loopback only, next to the ROS node that listens for it."""
 
-import logging
 import signal
 import socket
 import sys
@@ -21,7 +20,7 @@ from stickslip_ros.app.dashboard import DEFAULT_PORT, LARGEST_PORT
 from stickslip_ros.app.dashboard.frames import Frames
 from stickslip_ros.app.dashboard.listener import ListenerNode
 from stickslip_ros.app.dashboard.page import Pages
-from stickslip_ros.app.dashboard.web_log import WebLog
+from stickslip_ros.app.dashboard.web_log import log_here_alone
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.nodes.base.process import ros_session
 from stickslip_ros.nodes.base.spinner import Spinner, spin
@@ -64,7 +63,7 @@ def serve(
         listener.command = command
         frames: Frames = Frames(listener)
         with _running(spinner, listener):
-            logging.basicConfig(handlers=[WebLog()], level=logging.WARNING, force=True)
+            log_here_alone()
             app = FastAPI(openapi_url=None)
             _keep_others_out(app)
             pages = Pages(app, listener, frames)

@@ -25,6 +25,8 @@ class WebLog(logging.StreamHandler[TextIO]):
     def format(self, record: logging.LogRecord) -> str:
         """Return a message on one line, with control characters escaped."""
         text, error = record.getMessage().strip(), record.exc_info and record.exc_info[1]
+        if error and _of_a_message(error):
+            text = "a client sent a message that no page sends"
         if error:
             text = repr(error) if text == str(error).strip() else f"{text}: {error!r}"
         line = printable(text)
@@ -32,6 +34,8 @@ class WebLog(logging.StreamHandler[TextIO]):
 
     def emit(self, record: logging.LogRecord) -> None:
         """Print a message, unless there were too many in this period."""
+        if record.name == "nicegui" and record.stack_info:
+            return  # a page was updated that has been closed: nobody misses it
         now = monotonic()
         if now - self._begun >= _PERIOD:
             self._begun, self._lines = now, 0
@@ -41,3 +45,19 @@ class WebLog(logging.StreamHandler[TextIO]):
         elif self._lines == _MOST_LINES + 1:
             self.stream.write(f"further messages within {_PERIOD:.0f} s are not shown\n")
             self.flush()
+
+
+def _of_a_message(error: BaseException) -> bool:
+    """Return whether an error was raised where the libraries read the messages of a page."""
+    last = error.__traceback__
+    while last is not None and last.tb_next is not None:
+        last = last.tb_next
+    module = "" if last is None else str(last.tb_frame.f_globals.get("__name__"))
+    return module.partition(".")[0] in ("engineio", "socketio")
+
+
+def log_here_alone() -> None:
+    """Let what all libraries log go through one `WebLog`; some have handlers of their own."""
+    logging.basicConfig(handlers=[WebLog()], level=logging.WARNING, force=True)
+    for name in logging.root.manager.loggerDict:
+        logging.getLogger(name).handlers.clear()

@@ -1,13 +1,16 @@
 """Messages of the web libraries: what a peer sends cannot control the terminal, or fill it."""
 
 import logging
+import sys
 from collections.abc import Iterator
 from io import StringIO
 
 import pytest
+from nicegui import core
+from socketio.packet import Packet
 
 from stickslip_ros.app.dashboard import web_log
-from stickslip_ros.app.dashboard.web_log import WebLog
+from stickslip_ros.app.dashboard.web_log import WebLog, log_here_alone
 
 
 @pytest.fixture
@@ -36,11 +39,37 @@ def test_an_error_is_one_line_without_where_it_occurred(printed: StringIO) -> No
     except ValueError as error:
         logger.exception(error)
         logger.exception("Exception in ASGI application\n")
-    logger.warning("the client is gone", stack_info=True)
+    logger.warning("somewhere", stack_info=True)
     first, second, third = printed.getvalue().splitlines()
     assert first.startswith("ValueError(")
     assert second.startswith("Exception in ASGI application: ValueError(")
-    assert third == "the client is gone"
+    assert third == "somewhere"
+
+
+def test_a_message_that_no_page_sends_is_named_as_that_and_once(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """By a logger of a library, too, which has a handler of its own."""
+    logger, before = logging.getLogger("engineio.server"), logging.root.handlers[:]
+    assert core.sio.eio.logger is logger
+    logger.addHandler(logging.StreamHandler(sys.stderr))
+    log_here_alone()
+    try:
+        Packet(encoded_packet=b"\0\1")
+    except ValueError:
+        logger.exception("message async handler error")
+    finally:
+        logging.root.handlers[:] = before
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("a client sent a message that no page sends: ValueError(")
+
+
+def test_a_page_that_is_updated_when_it_is_closed_is_not_told_of(printed: StringIO) -> None:
+    (handler,) = logging.getLogger("web").handlers
+    logging.getLogger("nicegui").addHandler(handler)
+    logging.getLogger("nicegui").warning("Client has been deleted", stack_info=True)
+    logging.getLogger("nicegui").removeHandler(handler)
+    assert printed.getvalue() == ""
 
 
 def test_requests_do_not_fill_the_terminal(
