@@ -14,7 +14,7 @@ from stickslip_ros import nodes
 from stickslip_ros.record.reader import Recording
 from stickslip_ros.record.topics import JOINT_STATES
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, ReplayParameters
-from tests.nodes.graph import PATIENCE, Graph
+from tests.nodes.graph import PATIENCE, Graph, wait_for
 from tests.nodes.processes import Processes
 
 
@@ -55,6 +55,19 @@ def test_nodes_started_singly_close_the_loop_and_the_bag(
     assert count > 300
     assert states.stamp.tolist() == [1_000_000_000 + n * 10_000_000 for n in range(count)]
     assert states.belt_velocity.tolist() == [1.0] * count
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_node_that_closes_ignores_further_signals(
+    processes: Processes, number: signal.Signals
+) -> None:
+    """Of which `timeout` and `ros2 launch` send more than one."""
+    plant = processes.piped("plant", "-r", "__ns:=/test", "-p", "expects_control:=false")
+    assert plant.stderr is not None
+    while "active" not in plant.stderr.readline():
+        assert plant.poll() is None
+    wait_for(lambda: plant.send_signal(number) or plant.poll() is not None, "it ends")
+    assert plant.returncode == 0, plant.stderr.read()
 
 
 def test_a_parameter_file_without_a_section_for_the_node_is_named(

@@ -35,7 +35,7 @@ from stickslip_ros.nodes.base.network import (
     this_machine_only,
 )
 from stickslip_ros.nodes.base.parameters import first_line
-from stickslip_ros.nodes.base.spinner import Spinner, spin, stop_on_signals
+from stickslip_ros.nodes.base.spinner import Spinner, ignore_stop_signals, spin, stop_on_signals
 from stickslip_ros.scenarios.parameters import NodeParameters
 from stickslip_ros.scenarios.sections import read_file, section_matches
 from stickslip_ros.standard_streams import open_closed_streams
@@ -124,7 +124,10 @@ def run_node(make: Callable[[], ManagedNode[Any]], parameters: NodeParameters) -
         with ros_session(sys.argv) as spinner:
             node = make()
             _warn_of_unread_files(node)
-            run_until_stopped(spinner, node)
+            try:
+                run_until_stopped(spinner, node)
+            finally:  # `timeout` and `ros2 launch` send more than one
+                ignore_stop_signals()
         return 0
     except StickslipError as error:
         print(f"{parser.prog}: {error}", file=sys.stderr)

@@ -28,6 +28,8 @@ from rclpy.timer import Timer
 _CLOCK_SET = 0.01
 """Change of the system's clock, s, after which what waits by it is woken."""
 
+_STOP_SIGNALS = signal.SIGINT, signal.SIGTERM, signal.SIGHUP
+
 
 class Spinner:
     """Runs its nodes until a condition holds, a timeout ends, or the wait is cut short."""
@@ -112,18 +114,21 @@ def stop_on_signals(executor: Executor, *stopped: Future) -> None:
         # The interrupted code may hold the lock of a future: completing it here would never end.
         executor.create_task(complete)
 
-    numbers = [signal.SIGINT, signal.SIGTERM]
-    if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:
-        numbers.append(signal.SIGHUP)
-    for number in numbers:
-        signal.signal(number, stop)
+    for number in _STOP_SIGNALS:
+        if number != signal.SIGHUP or signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, stop)
+
+
+def ignore_stop_signals() -> None:
+    """Let no further SIGINT, SIGTERM or SIGHUP kill a process that is about to end."""
+    for number in _STOP_SIGNALS:
+        signal.signal(number, signal.SIG_IGN)
 
 
 @contextmanager
 def signal_handlers_kept() -> Generator[None]:
     """Restore the present handlers of the signals that end or suspend a run; a context manager."""
-    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGTSTP)
-    before = {number: signal.getsignal(number) for number in numbers}
+    before = {number: signal.getsignal(number) for number in (*_STOP_SIGNALS, signal.SIGTSTP)}
     try:
         yield
     finally:
