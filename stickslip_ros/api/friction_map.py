@@ -13,9 +13,9 @@ from stickslip_ros.api.results import Parts, Result
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.identification.fit import Estimate
 from stickslip_ros.identification.friction_map import FittedCurve, fitted_curves
+from stickslip_ros.record.table_columns import TableFormat
 from stickslip_ros.record.table_file import table_of
 from stickslip_ros.record.table_quantities import speed_and_force
-from stickslip_ros.record.text_table import TableFormat
 from stickslip_ros.show.identification_table import constants_table
 from stickslip_ros.show.quantities import SI, Units
 
@@ -150,7 +150,7 @@ def friction_map(
     >>> found.law, round(found.parameters["plant.friction.viscous"].value, 3)
     ('coulomb', 80.0)
     """
-    form, paths = TableFormat(decimal, skip, encoding), [*map(Path, tables)]
+    form, paths = TableFormat(decimal, skip, encoding, rotary), [*map(Path, tables)]
     found = [speed_and_force(table_of(path, form), columns) for path in paths]
     velocity, force = (
         np.concatenate([each.values[name] for each in found]) for name in ("velocity", "force")

@@ -21,7 +21,7 @@ from stickslip_ros.identification.recordings import read_all, read_records
 from stickslip_ros.identification.scenario import written_scenario
 from stickslip_ros.model.drive import Drive
 from stickslip_ros.record.motion_reader import BagLayout
-from stickslip_ros.record.text_table import TableFormat
+from stickslip_ros.record.table_columns import TableFormat
 from stickslip_ros.scenarios.files import Scenario, load_scenario
 from stickslip_ros.show.identification_table import identification_tables
 from stickslip_ros.show.quantities import SI, Units
@@ -290,7 +290,7 @@ def identify(
         end=end,
         namespace=namespace,
         belt_speed=belt_speed,
-        form=TableFormat(decimal, skip, encoding),
+        form=TableFormat(decimal, skip, encoding, rotary),
         layout=BagLayout(joint, belt_joint, states_topic, force_topic, time, force),
     )
     own = [record for path in fitted for record in read[path]]

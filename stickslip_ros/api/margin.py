@@ -141,7 +141,7 @@ def margin(
     if not 0.0 <= margin < 1.0:
         raise InvalidInputError(f"margin = {margin} is invalid: must be at least 0 and below 1")
     paths, units = [*dict.fromkeys(map(Path, recordings))], Units(rotary=rotary)
-    read = read_all(paths, columns, **with_forms(options))
+    read = read_all(paths, columns, **with_forms({**options, "rotary": rotary}))
     records = [record for path in paths for record in read[path]]
     if {-1.0, 1.0} <= {float(np.sign(record.belt_velocity.mean())) for record in records}:
         raise InvalidInputError("the belt moves in both directions: friction may differ in them")

@@ -21,8 +21,8 @@ from stickslip_ros.quantities import Quantity, quantities_of
 from stickslip_ros.record.motion_reader import BagLayout
 from stickslip_ros.record.reader import Recording
 from stickslip_ros.record.report import report_of_recording
+from stickslip_ros.record.table_columns import TableFormat
 from stickslip_ros.record.table_file import is_table
-from stickslip_ros.record.text_table import TableFormat
 from stickslip_ros.samples import NO_FORCES, NO_SAMPLES, ForceColumns, SampleColumns
 from stickslip_ros.scenarios.curve_file import CURVES, as_pairs
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, PlantParameters
@@ -275,7 +275,7 @@ def read_table(
     columns : mapping, optional
         Where the file has `time`, `position`, `velocity`, `force`, `belt_velocity` and
         `friction_force`: columns and numbers with + - * /, brackets and `unwrap(column, turn)`,
-        in SI units. A column by itself is converted, if the table has its unit. By default it
+        in SI units. What has no number in it is converted, if the table has its unit. By default it
         is a file of `stickslip simulate --out`.
     start, end : float
         Part to read, s from the first sample.
@@ -325,7 +325,9 @@ def read_table(
         belt_speed=belt_speed,
         rotary=rotary,
         slips=slips,
-        form=TableFormat(decimal, skip, encoding),
+        decimal=decimal,
+        skip=skip,
+        encoding=encoding,
     )
 
 
@@ -363,7 +365,7 @@ def recorded_run(
         length="rad" if rotary else "m",
         observer=observer,
         **taking,
-        **with_forms(options),
+        **with_forms({**options, "rotary": rotary}),
     )
     drive = None if table else recorded_drive(path, namespace)
     return RecordedRun(

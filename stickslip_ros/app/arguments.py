@@ -101,8 +101,8 @@ def add_reading(parser: argparse.ArgumentParser) -> None:
         help="where a table has time, position, velocity, force, belt_velocity, friction_force, "
         "disturbance and reference: columns and numbers with + - * /, brackets and unwrap(column, "
         "turn), in SI units, as in time=t,position=(cmd-x)*1e-3,belt_velocity=0.04; 'a name' in "
-        "quotes, #2 for the second column; a column by itself is converted, if the table has its "
-        "unit",
+        "quotes, #2 for the second column; what has no number in it is converted, if the table has "
+        "its unit",
     )
     parser.add_argument(
         "--decimal", metavar="MARK", help="decimal mark of a table, . or , (default: found)"
@@ -150,10 +150,10 @@ def add_reading(parser: argparse.ArgumentParser) -> None:
 def reading_of(arguments: argparse.Namespace) -> dict[str, Any]:
     """Return how recordings are read, by the names that the functions of the API have for it."""
     from stickslip_ros.record.motion_reader import BagLayout
-    from stickslip_ros.record.text_table import TableFormat
+    from stickslip_ros.record.table_columns import TableFormat
 
     names = [each.name for kind in (TableFormat, BagLayout) for each in fields(kind)]
-    names += ["rotary", "start", "end", "namespace", "belt_speed"]
+    names += ["start", "end", "namespace", "belt_speed"]
     columns = _columns_of(arguments.columns)
     return {"columns": columns} | {name: getattr(arguments, name) for name in names}
 

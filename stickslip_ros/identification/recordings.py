@@ -18,10 +18,9 @@ from stickslip_ros.model.actuator import Actuator
 from stickslip_ros.record.motion_reader import ANY_LAYOUT, BagLayout
 from stickslip_ros.record.reader import Recording
 from stickslip_ros.record.table_clock import stamps_of
-from stickslip_ros.record.table_columns import Table
+from stickslip_ros.record.table_columns import ANY_FORM, Table, TableFormat
 from stickslip_ros.record.table_file import is_table, table_of
 from stickslip_ros.record.table_quantities import quantities_of
-from stickslip_ros.record.text_table import ANY_FORM, TableFormat
 from stickslip_ros.samples import ForceColumns
 from stickslip_ros.stamps import NANOSECONDS
 

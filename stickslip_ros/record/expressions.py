@@ -24,6 +24,7 @@ _OPERATIONS: Mapping[type[ast.AST], Callable[..., Any]] = {
     ast.UAdd: np.positive,
     ast.USub: np.negative,
 }
+_SUMS = (ast.Name, ast.Load, ast.UnaryOp, ast.BinOp, ast.Add, ast.Sub, ast.UAdd, ast.USub)
 _NUMBERS = {"nan": np.nan, "inf": np.inf}
 _ALLOWED = (
     "must be columns and numbers with + - * /, brackets and unwrap(column, turn); other names "
@@ -52,7 +53,7 @@ class Expression:
 
     text: str
     bare: bool
-    """Whether it is the name of a column and nothing else."""
+    """Whether it is a column, or a sum or difference of columns: a number in it converts it."""
     places: tuple[int, ...]
     """The columns in it."""
     _tree: ast.expr
@@ -83,7 +84,8 @@ class Expression:
             for node in ast.walk(tree):
                 if isinstance(node, ast.Name) and node.id not in {*by_name, *_NUMBERS, "unwrap"}:
                     raise InvalidInputError(_unknown(source, node.id, columns))
-            found = cls(text, isinstance(tree, ast.Name) and bool(places), tuple(places), tree)
+            bare = all(isinstance(node, _SUMS) for node in ast.walk(tree))
+            found = cls(text, bare and bool(places), tuple(places), tree)
             found.value([np.zeros(1)] * len(places))
         except (MemoryError, RecursionError, SyntaxError, TypeError, ValueError) as error:
             if isinstance(error, InvalidInputError):

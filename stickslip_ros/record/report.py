@@ -21,8 +21,8 @@ from stickslip_ros.measures.timing import Timing
 from stickslip_ros.record.motion_reader import ANY_LAYOUT, BagLayout
 from stickslip_ros.record.reader import Recording
 from stickslip_ros.record.table_clock import LONGEST
+from stickslip_ros.record.table_columns import ANY_FORM, TableFormat
 from stickslip_ros.record.table_file import TableRecording, is_table, read_table
-from stickslip_ros.record.text_table import ANY_FORM, TableFormat
 from stickslip_ros.record.topics import CONTROL_FORCE, JOINT_STATES
 from stickslip_ros.samples import ForceColumns, SampleColumns
 from stickslip_ros.stamps import NANOSECONDS

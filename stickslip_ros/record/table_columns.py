@@ -1,13 +1,15 @@
 """The columns of a table in a file, whatever its format."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Generator, Mapping, Sequence
+from collections.abc import Collection, Generator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from stickslip_ros.errors import BagError, InvalidInputError
 from stickslip_ros.record.expressions import Expression, listed
+from stickslip_ros.text import shown
 
 _OWN_COLUMNS = {
     "time": ("time",),
@@ -20,16 +22,54 @@ _OWN_COLUMNS = {
 """Columns of the files that `stickslip simulate --out` writes; the first one that exists."""
 
 
+@dataclass(frozen=True)
+class TableFormat:
+    """What is known of the form of a table; what is None is found from the table."""
+
+    decimal: str | None = None
+    """Decimal mark of a text, a point or a comma."""
+    skip: int | None = None
+    """Number of lines of a text before the names or, without names, the rows."""
+    encoding: str | None = None
+    """Encoding of a text, as Python names them."""
+    rotary: bool = False
+    """Whether displacements are angles, and forces torques."""
+
+    def __post_init__(self) -> None:
+        """Refuse what no table has."""
+        if self.decimal not in (None, ".", ","):
+            raise InvalidInputError(f"decimal = {shown(self.decimal)} is invalid: must be . or ,")
+        if self.skip is not None and self.skip < 0:
+            raise InvalidInputError(f"skip = {self.skip} is invalid: must be at least 0")
+        try:
+            "1".encode(self.encoding or "utf-8").decode(self.encoding or "utf-8")
+        except (LookupError, ValueError):
+            raise InvalidInputError(
+                f"encoding = {shown(self.encoding)} is invalid: must be one of Python's, such as "
+                "utf-8, utf-16, cp1252"
+            ) from None
+
+
+ANY_FORM = TableFormat()
+"""Nothing is known of the form."""
+
+
 class Table(ABC):
     """A table of a file: what its columns are, and how they are read."""
 
     path: Path
+    form: TableFormat
+    """What is known of its form."""
     columns: Mapping[str, int]
     """Places of the columns by name; a column has several names, such as `x` and `#2`."""
     names: Sequence[str]
     """Name of each column; empty if it has none."""
     units: Sequence[str]
-    """Units that the table has for its columns; empty where it has none."""
+    """Cells of the columns in a line of units; empty without one."""
+    clocks: Collection[int] = ()
+    """Places of the columns that are dates or times of day, once they are read: they are in s."""
+    period: tuple[float, float] | None = None
+    """Period of the rows that a line above them tells, s and in its own unit."""
 
     @property
     def notes(self) -> Sequence[str]:

@@ -13,10 +13,9 @@ from stickslip_ros.files import open_regular
 from stickslip_ros.record.mat_file import is_mat, vectors_of
 from stickslip_ros.record.reader import RunBlock
 from stickslip_ros.record.table_clock import stamps_of
-from stickslip_ros.record.table_columns import Table, reading_file
+from stickslip_ros.record.table_columns import ANY_FORM, Table, TableFormat, reading_file
 from stickslip_ros.record.table_quantities import Quantities, differences, quantities_of
-from stickslip_ros.record.text_table import ANY_FORM, TableFormat, TextTable
-from stickslip_ros.record.units import unit_of
+from stickslip_ros.record.text_table import TextTable
 from stickslip_ros.samples import ForceColumns, SampleColumns
 
 TABLE_SUFFIXES = (".csv", ".mat", ".txt", ".dat", ".tsv", ".log", ".asc")
@@ -32,9 +31,9 @@ _MOST_NUMBERS = 1 << 24
 class MatTable(Table):
     """The vectors of a MAT file."""
 
-    def __init__(self, path: Path, vectors: Mapping[str, FloatArray]) -> None:
+    def __init__(self, path: Path, form: TableFormat, vectors: Mapping[str, FloatArray]) -> None:
         """Take the vectors by name."""
-        self.path, self.names, self.units = path, [*vectors], [*map(unit_of, vectors)]
+        self.path, self.form, self.names, self.units = path, form, [*vectors], [""] * len(vectors)
         self.columns = {name: place for place, name in enumerate(vectors)}
         self._vectors = [*vectors.values()]
 
@@ -65,7 +64,7 @@ def table_of(path: Path, form: TableFormat = ANY_FORM) -> Table:
         vectors = vectors_of(stream, _MOST_NUMBERS)
         if not vectors:
             raise ValueError("it has no column")
-        return MatTable(path, vectors)
+        return MatTable(path, form, vectors)
 
 
 @dataclass(frozen=True)
@@ -112,8 +111,8 @@ def read_table(
 ) -> TableRecording:
     r"""Read a recording from a table: a text such as a CSV file, or a MAT file.
 
-    `columns` has, for some of `QUANTITIES`, an `Expression` of columns and numbers in SI units. A
-    column by itself is converted, if the table has its unit. By default the file is one of
+    `columns` has, for some of `QUANTITIES`, an `Expression` of columns and numbers in SI units. What
+    has no number in it is converted, if the table has its unit. By default the file is one of
     `stickslip simulate --out`. A `belt_speed` is in place of a column. A velocity that is not given
     is the difference of the positions beside each sample. A belt whose velocity is not given is at
     rest. `form` is what is known of the form of a text.

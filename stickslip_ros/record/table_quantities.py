@@ -3,7 +3,7 @@
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from math import nan
+from math import isnan, nan
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,7 +15,7 @@ from stickslip_ros.record.expressions import Expression
 from stickslip_ros.record.faults import Jumps, shift_note, velocity_fault
 from stickslip_ros.record.table_clock import even_times
 from stickslip_ros.record.table_columns import Table, reading_file
-from stickslip_ros.record.units import NO_UNITS, unit_factor
+from stickslip_ros.record.units import Unit, units_in
 from stickslip_ros.samples import LARGEST
 from stickslip_ros.text import must_be_one_of
 
@@ -165,9 +165,11 @@ class _Cells:
                 )
         notes = [*table.notes, *_lost_cells(table, columns, asked)]
         factors: dict[str, float] = {}
+        units: dict[str, Unit] = {}
         for name, each in asked.items():
-            factors[name], note = _factor(table, name, each)
-            notes += note
+            factors[name], found = _factor(table, name, each)
+            units |= found
+        notes += _units_notes(table, units)
         return cls(table, asked, columns, factors, notes)
 
     def value(self, name: str) -> FloatArray:
@@ -268,22 +270,51 @@ def _lost_cells(
         )
 
 
-def _factor(table: Table, kind: str, asked: Expression) -> tuple[float, list[str]]:
-    """Return what converts a column by itself to SI units, and sentences that say so."""
-    if not asked.bare or table.units[asked.places[0]].lower() in NO_UNITS:
-        return 1.0, []
-    given, unit = table.units[asked.places[0]], _UNITS.get(kind, "N")
-    name = f"{kind}, {table.name(asked.places[0])},"
-    factor = unit_factor(given, unit)
-    if factor is not None:
-        return factor, [] if factor == 1.0 else [f"{name} is in {given}, and converted to {unit}"]
-    rotary = ROTARY.get(unit, unit)
-    factor = unit_factor(given, rotary)
-    if factor is not None:
-        return factor, [
-            f"{name} is in {given}: what is in {unit} is in {rotary}, as --rotary shows"
-        ]
-    return 1.0, [f"{name} is in {given}, which is no unit of {kind}: it is taken as {unit}"]
+def _factor(table: Table, kind: str, asked: Expression) -> tuple[float, dict[str, Unit]]:
+    """Return what converts columns without a number to SI units, and the units by column.
+
+    Raises InvalidInputError if they have a unit of another quantity, several, or several readings.
+    """
+    places = [place for place in asked.places if place not in table.clocks] if asked.bare else []
+    found, target = dict[str, Unit](), _UNITS.get(kind, "N")
+    for place in places:
+        name = table.name(place).removeprefix("column ")
+        which = f"{table.path}: {kind}, {table.name(place)},"
+        column = f"#{place + 1}" if len(asked.places) == 1 else f"({asked.text})"
+        readings = units_in(table.names[place], table.units[place], target)
+        if len(readings) > 1:
+            texts = [f"{each.text or target} ({each.factor:g} {each.target})" for each in readings]
+            ways = [f"{kind}={column}*{each.factor:.12g}" for each in readings]
+            raise InvalidInputError(
+                f"{which} may be in {' or '.join(texts)}: {' or '.join(ways)} says which"
+            )
+        for each in readings:
+            si = ROTARY.get(target, target) if table.form.rotary else each.target
+            if isnan(each.factor) or each.target != si:
+                raise InvalidInputError(
+                    f"{which} is in {each.text}, which is no unit of {kind}"
+                    f"{' of a rotary axis' * (each.target != si)}: {kind}={column}*NUMBER "
+                    f"converts it, with the number of {si} in one of it"
+                )
+            found[name] = each
+    units = {each.factor for each in found.values()}
+    if len(units) > 1 or (found and len(found) < len(places) and units != {1.0}):
+        texts = [f"{name} in {each.text}" for name, each in found.items()]
+        raise InvalidInputError(
+            f"{table.path}: {kind} = {asked.text} is of different units, {', '.join(texts)}: a "
+            f"number for each converts it to {target}, as in #1*0.001-#2"
+        )
+    return next(iter(units), 1.0), found
+
+
+def _units_notes(table: Table, found: Mapping[str, Unit]) -> Iterator[str]:
+    """Yield sentences on the units of columns."""
+    if found:
+        units = [f"{name}: {each.text}" for name, each in found.items()]
+        yield f"units: {'; '.join(dict.fromkeys(units))}"
+    angles = [each.text for each in found.values() if each.target in ROTARY.values()]
+    if angles and not table.form.rotary:
+        yield f"{angles[0]} is of a rotary axis: what is in m is in rad, as --rotary shows"
 
 
 def _measurable(values: FloatArray) -> FloatArray:

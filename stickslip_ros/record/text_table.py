@@ -6,7 +6,6 @@ import os
 import re
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
 from io import StringIO, TextIOWrapper
 from itertools import islice
 from pathlib import Path
@@ -15,11 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.files import open_regular
-from stickslip_ros.record.table_columns import Table
-from stickslip_ros.record.units import are_units, unit_of, without_unit
-from stickslip_ros.text import shown
+from stickslip_ros.record.table_columns import Table, TableFormat
+from stickslip_ros.record.units import are_units, joined_units, period_in, without_unit
 
 _HEAD, _TAIL = 1 << 20, 10
 """Bytes from which the form is found; lines at their end that are rows, with or without more."""
@@ -41,42 +38,12 @@ _TIME = re.compile(
 _COMMENT = re.compile(r"^\s*(?:#|%|//)\s*")
 
 
-@dataclass(frozen=True)
-class TableFormat:
-    """What is known of the form of a text table; what is None is found from the table."""
-
-    decimal: str | None = None
-    """Decimal mark, a point or a comma."""
-    skip: int | None = None
-    """Number of lines on top before the names or, without names, the rows."""
-    encoding: str | None = None
-    """Encoding, as Python names them."""
-
-    def __post_init__(self) -> None:
-        """Refuse what no table has."""
-        if self.decimal not in (None, ".", ","):
-            raise InvalidInputError(f"decimal = {shown(self.decimal)} is invalid: must be . or ,")
-        if self.skip is not None and self.skip < 0:
-            raise InvalidInputError(f"skip = {self.skip} is invalid: must be at least 0")
-        try:
-            "1".encode(self.encoding or "utf-8").decode(self.encoding or "utf-8")
-        except (LookupError, ValueError):
-            raise InvalidInputError(
-                f"encoding = {shown(self.encoding)} is invalid: must be one of Python's, such as "
-                "utf-8, utf-16, cp1252"
-            ) from None
-
-
-ANY_FORM = TableFormat()
-"""Nothing is known of the form."""
-
-
 class TextTable(Table):
     """A table as text, of which the form is known; its columns are read when they are needed."""
 
     def __init__(self, path: Path, given: TableFormat) -> None:
         """Find the form of a table; raises OSError and ValueError if the file has none."""
-        self.path, self._decimal = path, given.decimal
+        self.path, self.form, self._decimal = path, given, given.decimal
         with open_regular(path) as stream:
             if os.fstat(stream.fileno()).st_size > _LARGEST:
                 raise ValueError(f"it has more than {_LARGEST} bytes")
@@ -132,14 +99,16 @@ class TextTable(Table):
                 break
             start += 1
         names: list[tuple[int, list[str]]] = []  # lines of texts above, from the lowest
-        for place in range(start - 1, skip - 1, -1):
+        for place in range(start - 1, -1, -1):
             row = _cells(_COMMENT.sub("", lines[place]), self._separator)
-            if not lines[place].strip() and not names:
+            if not lines[place].strip() and not names and place >= skip:
                 continue
             texts, values = texts_and_values(row)
+            row = joined_units(row, width)
             if len(row) == width - 1 and not any(row[-1] for row in rows):
                 row.append("")  # a separator at the end of each row
-            if not names and not values and 1 < len(row) != width and self._separator != " ":
+            wrong = 1 < len(row) != width and self._separator != " " and place >= skip
+            if not names and not values and wrong:
                 raise ValueError(
                     f"line {place + 1} has {len(row)} names for {width} columns; with --skip "
                     f"{place + 1} they are #1 to #{width}"
@@ -148,19 +117,23 @@ class TextTable(Table):
                 break
             if not values:
                 names.append((place, row))
-        units = names.pop(0)[1] if len(names) > 1 and are_units(names[0][1]) else []
-        if names:
-            start = names[0][0] + 1 + (len(units) > 0)
+        self._skipped, self._units_line, units = names[0][0] if names else start, None, [""] * width
+        start = max(skip, names[0][0] + 1) if names else start
+        if len(names) > 1:
+            lower, upper = (are_units(row) for _, row in names[:2])
+            if lower or upper:
+                self._skipped = names[1][0]
+                place, units = names.pop(0 if lower else 1)
+                self._units_line = place + 1
         self.first, self.named = start, names[0][0] + 1 if names else None
         self.names = tuple(names[0][1]) if names else ("",) * width
-        self.units = tuple(units or map(unit_of, self.names))
+        self.units = tuple(units)
         self.columns = {f"#{place + 1}": place for place in range(width)}
         for names_of_columns in (self.names, map(without_unit, self.names)):
             for place, name in enumerate(names_of_columns):
                 if name:
                     self.columns.setdefault(name, place)
-        self._units_line = start if units else None
-        self._skipped = names[0][0] if names else start
+        self.period = next(filter(None, map(period_in, lines[skip:start])), None)
 
     @property
     def notes(self) -> list[str]:
@@ -234,6 +207,7 @@ class TextTable(Table):
         lines = [number for each in caught for number in _SKIPPED.findall(str(each.message))]
         self._refused = [self.first + int(number) for number in lines]
         self._omitted = sorted([*blank, *self._refused])
+        self.clocks = {place for place, each in parts.items() if each[0].dtype.kind in "mM"}
         return [_joined(parts.pop(place)) for place in places]
 
     def _values(self, cells: Any) -> Any:

@@ -1,47 +1,268 @@
-"""Units of the columns of a table: in their names or in a line of their own."""
+"""Units of the columns of a table: in their names or in a line of their own.
+
+A name has its unit in brackets (`x [mm]`), after a mark (`x / mm`, `x, mm`, `x in mm`), or as its
+last words (`x mm`, `x_mm`, `x.mm`, `xMM`). Those are one of the quantity: `v_m` has none.
+"""
 
 import re
-from collections.abc import Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Sequence
+from functools import cache
+from itertools import product
+from math import isnan, nan, tau
+from typing import NamedTuple
 
-from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.quantities import number_of
+from stickslip_ros.quantities import ROTARY, number_of
 
-_BRACKETED = re.compile(r"(.+?)\s*[\[(<{]\s*(.+?)\s*[\])>}]\s*")
-_SUFFIX = re.compile(r".+_((?:ns|us|µs|ms|nm|um|µm|mm|cm|mN|kN|deg)(?:_s)?)")
-NO_UNITS = ("", "-", "unit", "units", "einheit", "einheiten")
-_KINDS_OF_UNITS = ("s", "m", "m/s", "m/s^2", "N", "N m", "rad", "rad/s", "A", "V", "K", "Hz", "W")
+NO_UNITS = ("", "-", "1", "unit", "units", "einheit", "einheiten")
+_LONG = {"nano": "n", "micro": "u", "mikro": "u", "milli": "m", "mili": "m", "centi": "c",
+         "zenti": "c", "kilo": "k"}  # fmt: skip
+_ANY_LONG = "|".join(_LONG)
+_SPELLINGS = tuple(
+    (name, dimension, re.compile(f"({prefixes})?(?:{words})"))
+    for name, dimension, prefixes, words in (
+        ("m", "L", f"[numcdk]|{_ANY_LONG}", "m|m[eèé]t(?:ers?|res?|ros?|ri)"),
+        ("s", "T", f"[num]|{_ANY_LONG}", r"s|se[ckg](?:s|[ou]nd\w{0,2})?"),
+        ("N", "F", f"[umck]|da|{_ANY_LONG}", "n|newtons?"),
+        ("N m", "FL", "[umck]", "nm"),
+        ("N cm", "FL", "", "ncm"),
+        ("N mm", "FL", "", "nmm"),
+        ("rad", "R", f"[um]|{_ANY_LONG}", r"rad(?:s|ian\w*)?"),
+        ("turn/s", "R/T", "k", "hz|rps"),
+        ("turn/min", "R/T", "", "rpm|upm"),
+        ("m/s", "L/T", "m", "mps"),
+        ("inch", "L", "", "in|inch(?:es)?|zoll|pulgadas?|pouces?|pollic[ei]"),
+        ("ft", "L", "", "ft|foot|feet"),
+        ("thou", "L", "", "thou|mils?"),
+        ("micron", "L", "", "mi[ck]rons?"),
+        ("min", "T", "", r"min(?:s|ut\w{1,2})?"),
+        ("hour", "T", "", "h|hrs?|hours?|stunden?|horas?|heures?|or[ae]"),
+        ("day", "T", "", "d|days?|tage?"),
+        ("degree", "R", "", r"deg(?:s|r\w*)?|grad(?:i|os?)?"),
+        ("gon", "R", "", "gon|grad"),
+        ("turn", "R", "", "revs?|revolutions?|turns?|umdr(?:ehung(?:en)?)?|tours?|giri|vueltas?"),
+        ("arcsec", "R", "", "arcsec(?:onds?)?"),
+        ("arcmin", "R", "", "arcmin(?:utes?)?"),
+        ("kgf", "F", "", "kgf|kp"),
+        ("lbf", "F", "", "lbf"),
+        ("", "other", "[kum]", "[avwgk]|pa|bar|lbs?|oz|degc|°c|%"),
+    )
+)
+"""Units in machines' data: what pint calls them, their dimension, prefixes, and how people write
+them. Those without a name for pint are of other quantities."""
+_TURNS = ("r", "u", "tr")
+"""Turns in a ratio, as in U/min."""
+_DIMENSIONS = {"m": "L", "m/s": "L/T", "N": "F", "s": "T", "rad": "R", "rad/s": "R/T", "N m": "FL"}
+_COUNTS = re.compile(
+    r"counts?|cts|inc|incr(?:ements?)?|ink(?:r\w*)?|puls\w*|impuls\w*|pls|ticks?|steps|lsb|digits?|erpm"
+)
+"""Words for numbers of an encoder, a motor or a clock, of which only the owner knows the size."""
+_BRACKETED = re.compile(r"[\[(<{]\s*([^\[\](){}<>]*[^\[\](){}<>\s])\s*[\])>}]")
+_MARK = re.compile(r"\s*[/,]\s*|\s+(?:in|en|em)\s+")
+_START = re.compile(r"(?<![^\W_])(?=[^\W_])|(?<=[^\W\d_A-Z])(?=[A-Z])|(?<=\d)(?=[^\W\d_])")
+"""Where a word starts: after a mark, in PosMM, and after a number."""
+_DOUBTFUL, _DOUBTFUL_ALONE = ("in", "min", "h", "d"), ("cm", "dm")
+"""Units that may be other words at the end of a name, or where they are all of it."""
+
+
+_SAMPLING = re.compile(r"(?i)sampl|abtast|échantil|muestr|campion|zyklus|^\W*(?:interval|period)")
+"""Words for the sampling of a table."""
+
+
+class Unit(NamedTuple):
+    """A unit that a column may have."""
+
+    text: str
+    """As it is in the table; empty for none."""
+    factor: float
+    """What converts numbers to the SI unit; NaN if it is no unit of the quantity."""
+    target: str
+    """SI unit."""
+
+
+def units_in(name: str, given: str, target: str) -> list[Unit]:
+    """Return the unit of a column: none, one, or several if it has several readings.
+
+    `given` is its cell in a line of units, or empty; `target` the SI unit of the quantity for
+    linear motion; a unit of the same quantity of rotary motion is one, too.
+    """
+    stated, last = [*_stated(name, given, target)], [*_last(name, target)]
+    known, words = ([each for each in found if not isnan(each.factor)] for found in (stated, last))
+    found = known or words or [*stated, *last][:1]
+    return [*{each.factor: each for each in reversed(found)}.values()][::-1]
 
 
 def are_units(cells: Sequence[str]) -> bool:
     """Return whether the cells of a line are units, but for those that say so or are empty."""
     units = [cell.strip("[]()") for cell in cells if cell.strip("[]()").lower() not in NO_UNITS]
-    known = sum(any(unit_factor(unit, kind) for kind in _KINDS_OF_UNITS) for unit in units)
+    first = [unit.partition(" ")[0] for unit in units]
+    known = sum(
+        bool(_parsed(unit) or _counts(unit))
+        for unit in first
+        if len(unit) > 1 or unit in "msNAVKgh%"
+    )
     return 2 * known > len(units)
 
 
-def unit_of(name: str) -> str:
-    """Return the unit in the name of a column, in brackets or at its end, or nothing."""
-    if found := _BRACKETED.fullmatch(name):
-        return found[2]
-    found = _SUFFIX.fullmatch(name)
-    return found[1].replace("_s", "/s") if found else ""
-
-
 def without_unit(name: str) -> str:
-    """Return the name of a column without the unit in brackets, or nothing if it has none."""
-    found = _BRACKETED.fullmatch(name)
-    return found[1] if found else ""
+    """Return the name of a column without the unit in brackets or after a mark, or nothing."""
+    if found := re.fullmatch(rf"(.+?)\s*{_BRACKETED.pattern}\s*", name):
+        return found[1]
+    return next(
+        (name[: each.start()] for each in _MARK.finditer(name) if _parsed(name[each.end() :])), ""
+    )
 
 
-def unit_factor(unit: str, target: str) -> float | None:
-    """Return by what numbers of a unit are multiplied for another one, or None.
+def joined_units(cells: Sequence[str], width: int) -> list[str]:
+    """Return names, of which the separator has cut units off, as `x, mm`, if they are too many."""
+    names = [*cells]
+    for place in range(len(names) - 1, 0, -1):
+        if len(names) > width and _parsed(names[place]):
+            names[place - 1 : place + 1] = [", ".join(names[place - 1 : place + 1])]
+    return names
 
-    There is none for a unit of another kind. Of a text such as `mm ±1 µm` it is the first unit.
-    """
-    unit = unit.strip("[]() ").replace("°", "deg").replace("Nm", "N m")
-    for each in (unit, unit.partition(" ")[0]):
-        with suppress(InvalidInputError):
-            if each[:1].isalpha() or each[:2] == "1/":
-                return number_of("unit", f"1 {each}", target)
+
+def period_in(line: str) -> tuple[float, float] | None:
+    """Return the period of rows that a line of text tells, s and in its own unit, or None."""
+    if not _SAMPLING.search(line):
+        return None
+    number, unit = r"(?P<number>\d[\d.,]*(?:e-?\d+)?)", r"(?P<unit>[^\W\d_]+)"
+    for pattern in (rf"[\[(]\s*{unit}\s*[\])][\s,;:=\"]*{number}", rf"{number}\s*{unit}"):
+        for found in re.finditer(pattern, line):
+            value = float(found["number"].rstrip(",.").replace(",", "."))
+            for name, dimension in _parsed(found["unit"]):
+                if dimension == "T" and name not in ("min", "hour", "day"):
+                    return value * _factor(name, "s"), value
+                if name.endswith("turn/s") and value:
+                    return tau / (value * _factor(name, "rad/s")), nan
     return None
+
+
+def _stated(name: str, given: str, target: str) -> Iterator[Unit]:
+    """Yield the units in the line of units, or in a name in brackets or after a mark."""
+    cell, plain = given.strip().strip("[]()"), _BRACKETED.sub(" ", name).strip()
+    bracketed = _BRACKETED.findall(name)
+    marked = [plain[each.end() :] for each in _MARK.finditer(plain)]
+    for text in filter(None, [cell, *bracketed, *marked]):
+        first = text.partition(" ")[0]
+        if found := [*_read(text, target)] or [*_read(first, target)]:
+            yield from found
+        elif text.lower() not in NO_UNITS and first.casefold() not in _DOUBTFUL:
+            letters = len(re.findall(r"[^\W\d_]", text))
+            unit = _parsed(text) or _parsed(first) or _counts(text)
+            certain = text == cell or f"[{text}]" in name.replace(" ", "")
+            if (unit and (letters > 1 or text not in marked)) or (certain and letters > 1):
+                yield Unit(text, nan, target)
+
+
+def _last(name: str, target: str) -> Iterator[Unit]:
+    """Yield what the last words of a name may be, or words between, or counts."""
+    name = _BRACKETED.sub(" ", name).strip()
+    starts = [found.start() for found in _START.finditer(name)]
+    for start in starts[-4:]:
+        text, before = name[start:], name[:start]
+        if found := [*_read(text, target)]:
+            yield from found
+            if text.casefold() in (_DOUBTFUL if before else _DOUBTFUL + _DOUBTFUL_ALONE):
+                yield Unit("", 1.0, target)
+            if text[0].isdigit():  # a number of units, or of the column
+                yield from _read(text.lstrip("0123456789."), target)
+            return
+    words = [
+        name[start:end].strip(" _-.,;:/#")
+        for start, end in zip(starts, [*starts[1:], len(name)], strict=False)
+    ]
+    whole = {dimension for start in starts[-3:-1] for _, dimension in _parsed(name[start:])}
+    if not whole & {*_DIMENSIONS.values()}:
+        for word in words[:-1]:
+            if len(word) > 1 and word.casefold() != "in" and (found := [*_read(word, target)]):
+                yield from found
+                if word.casefold() in _DOUBTFUL:
+                    yield Unit("", 1.0, target)
+    yield from (Unit(word, nan, target) for word in words if _counts(word))
+
+
+def _counts(text: str) -> bool:
+    words = re.findall(r"[^\W\d_]+", text.casefold())
+    return any(map(_COUNTS.fullmatch, words))
+
+
+def _read(text: str, target: str) -> Iterator[Unit]:
+    """Yield the readings of a text, with or without a number, as a unit of a quantity."""
+    number = re.match(r"\d[\d.]*(?:e-?\d+)?(?=\s*[^\W\d_])", text)
+    unit = text[number.end() :].strip() if number else text
+    scale = float(number[0]) if number and number[0].count(".") < 2 else 1.0
+    for each in dict.fromkeys((target, ROTARY.get(target, target))):
+        for name, dimension in _parsed(unit):
+            if dimension == _DIMENSIONS[each]:
+                yield Unit(text, scale * _factor(name, each), each)
+
+
+@cache
+def _factor(unit: str, target: str) -> float:
+    """Return by what numbers of a unit are multiplied for another one."""
+    if unit == target:
+        return 1.0
+    if "turn" in unit:
+        return tau * number_of("unit", f"1 {unit}", target.replace("rad", "turn"))
+    return number_of("unit", f"1 {unit}", target)
+
+
+@cache
+def _parsed(text: str) -> tuple[tuple[str, str], ...]:
+    """Return the readings of a text as a unit: what pint calls it, and its dimension."""
+    plain = re.sub("[µμ]", "u", text).replace("°", "deg").replace("⁻¹", "-1").replace("%", " % ")
+    plain = re.sub(r"(?i)(?<![^\W\d_])(?:per|pro|por|par)(?![^\W\d_])", "/", plain)
+    if len(plain) > 40 or not re.fullmatch(r"[\w\s/.*·⋅^%²-]+", plain):
+        return ()
+    sides: list[list[str]] = [[], []]
+    below, words = 0, re.findall(r"[^\W\d_²]+|%|/|-1|\d+|²", plain)
+    for number, word in enumerate(words):
+        if word == "/":
+            below = 1
+        elif word == "-1" and sides[0]:
+            sides[1].append(sides[0].pop())
+        elif not (word == "1" and not number and len(words) > 1):
+            sides[below].append(word)
+    over, under = sides
+    if not 1 <= len(over) + len(under) <= 3:
+        return ()
+    ratio = bool(under)
+    found = [
+        *_composed(
+            [_spelled(each, ratio) for each in over], [_spelled(each, False) for each in under]
+        )
+    ]
+    if len(over) == 2 and not under:
+        found += _composed([_spelled(over[0], True)], [_spelled(over[1], False)])
+    return tuple(found)
+
+
+def _composed(
+    over: Sequence[list[tuple[str, str]]], under: Sequence[list[tuple[str, str]]]
+) -> Iterator[tuple[str, str]]:
+    """Yield the ratios of products of units; of turns, where nothing is above."""
+    for each in product(product(*over), product(*under)):
+        above, below = ("".join(sorted(dimension for _, dimension in side)) for side in each)
+        unit = " ".join(name for name, _ in each[0]) + "".join(f"/{name}" for name, _ in each[1])
+        if not over:
+            yield f"turn{unit}", f"R/{below}"
+            if unit == "/s":
+                yield "rad/s", "R/T"
+        else:
+            yield unit, f"{above}/{below}" if under else above
+
+
+@cache
+def _spelled(word: str, ratio: bool) -> list[tuple[str, str]]:
+    """Return what a word may be among units: what pint calls it, and its dimension."""
+    lower = word.casefold()
+    if ratio and lower in _TURNS:
+        return [("turn", "R")]
+    found: list[tuple[str, str]] = []
+    for name, dimension, pattern in _SPELLINGS:
+        if match := pattern.fullmatch(lower):
+            prefix = _LONG.get(match[1] or "", match[1] or "")
+            found.append((prefix + name, dimension))
+            if prefix + name == "mN" and word != "mN":
+                found.append(("MN", dimension))
+    return [each for each in found if each[0] != "gon" or word != "Grad"]

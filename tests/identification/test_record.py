@@ -11,8 +11,7 @@ from stickslip_ros.identification.even_clock import evenly_spaced
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.recordings import read_all, read_records
 from stickslip_ros.record.codec import pack_joint_state, pack_reference, pack_wrench
-from stickslip_ros.record.table_columns import Table
-from stickslip_ros.record.text_table import TableFormat
+from stickslip_ros.record.table_columns import Table, TableFormat
 from stickslip_ros.samples import Reference
 from tests.record.runs import FORCES, STATES, write_bag
 

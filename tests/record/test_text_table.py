@@ -1,5 +1,6 @@
 """The forms of tables as text: each is found, read to the last digit, and said."""
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -7,8 +8,8 @@ import numpy as np
 import pytest
 
 from stickslip_ros.errors import BagError, InvalidInputError
+from stickslip_ros.record.table_columns import ANY_FORM, TableFormat
 from stickslip_ros.record.table_file import TableRecording, read_table
-from stickslip_ros.record.text_table import ANY_FORM, TableFormat
 
 TIME = np.arange(200) * 5e-4
 POSITION = np.round(1e-3 * np.sin(40.0 * TIME), 9)
@@ -65,10 +66,11 @@ def test_the_form_of_a_table_is_found(
 @pytest.mark.parametrize(
     ("before", "sentence"),
     [
-        ("x [mm]", "position, column x [mm], is in mm, and converted to m"),
-        ("x_mm", "position, column x_mm, is in mm, and converted to m"),
-        ("x (deg)", "position, column x (deg), is in deg: what is in m is in rad"),
-        ("x [inc]", "position, column x [inc], is in inc, which is no unit of position"),
+        ("x [mm]", "units: x [mm]: mm"),
+        ("x_mm", "units: x_mm: mm"),
+        ("x / mm", "units: x / mm: mm"),
+        ("x, mm", "units: x, mm: mm"),
+        ("x (deg)", "deg is of a rotary axis: what is in m is in rad, as --rotary shows"),
     ],
 )
 def test_a_unit_is_used_for_a_column_by_itself_and_said(
@@ -77,10 +79,72 @@ def test_a_unit_is_used_for_a_column_by_itself_and_said(
     text = f"t,{before}\n" + rows()
     found = read(tmp_path, text, "t", before)
     assert any(sentence in note for note in found.notes)
-    scale = {"x [mm]": 1e-3, "x_mm": 1e-3, "x (deg)": np.pi / 180.0}.get(before, 1.0)
+    scale = np.pi / 180.0 if "deg" in before else 1e-3
     assert found.samples.position == pytest.approx(POSITION * scale)
+    by_number = read(tmp_path, text, "#1", "#2")
+    assert by_number.samples.position.tolist() == found.samples.position.tolist()
     as_said = read(tmp_path, text, "t", f"'{before}'*1.0")
     assert as_said.samples.position.tolist() == POSITION.tolist()
+
+
+@pytest.mark.parametrize(
+    ("name", "position", "way"),
+    [
+        ("x [inc]", "x [inc]", "is in inc, which is no unit of position: position=#2*NUMBER"),
+        ("x_in", "#2", "in in (0.0254 m) or m (1 m): position=#2*0.0254 or position=#2*1 says"),
+        ("x [mm]", "#2-t [s]", "is in s, which is no unit of position: position=(#2-t [s])*NUMBER"),
+    ],
+)
+def test_a_unit_that_is_not_sure_is_refused_with_a_way(
+    tmp_path: Path, name: str, position: str, way: str
+) -> None:
+    text = f"t [s],{name}\n" + rows()
+    with pytest.raises(InvalidInputError, match=re.escape(way)):
+        read(tmp_path, text, "#1", position)
+    assert read(tmp_path, text, "#1", "#2*0.0254").samples.position == pytest.approx(
+        0.0254 * POSITION
+    )
+
+
+def test_a_difference_of_columns_has_their_unit(tmp_path: Path) -> None:
+    lines = [f"{t:.4f},{1e3 * x + 2:.9f},2" for t, x in zip(TIME, POSITION, strict=True)]
+    text = "t,act [mm],cmd [mm]\n" + "\n".join(lines)
+    found = read(tmp_path, text, "t", "act-cmd").samples.position
+    assert found == pytest.approx(POSITION, abs=1e-12)
+    with pytest.raises(
+        InvalidInputError, match=r"of different units, act \[mm\] in mm, cmd \[m\] in m:"
+    ):
+        read(tmp_path, text.replace("cmd [mm]", "cmd [m]"), "t", "act-cmd")
+
+
+def test_units_of_a_rotary_axis_are_asked_for(tmp_path: Path) -> None:
+    text = "t,x [mm],phi [deg]\n" + "".join(f"{n},{n},{n}\n" for n in range(20))
+    form = TableFormat(rotary=True)
+    found = read(tmp_path, text, "t", "phi", form)
+    assert not any("rotary" in note for note in found.notes)
+    with pytest.raises(InvalidInputError, match="no unit of position of a rotary axis"):
+        read(tmp_path, text, "t", "x", form)
+
+
+def test_times_of_day_have_no_unit(tmp_path: Path) -> None:
+    text = "Time / hh:mm:ss.ms,x\n" + "".join(f"10:00:00.{n:03d},{n}\n" for n in range(50))
+    stamps = read(tmp_path, text, "#1", "x").samples.stamp
+    assert stamps.tolist() == [1_000_000 * number for number in range(50)]
+
+
+def test_units_above_the_names_are_used(tmp_path: Path) -> None:
+    text = "Trace 1\nms;mm\nt;x\n" + "".join(f"{n / 2:g};{n}\n" for n in range(50))
+    found = read(tmp_path, text, "t", "x")
+    assert found.samples.stamp.tolist() == [500_000 * number for number in range(50)]
+    assert found.samples.position == pytest.approx(1e-3 * np.arange(50.0))
+    assert "the first line skipped, units in line 2" in found.notes[0]
+
+
+def test_units_are_those_of_skipped_names_too(tmp_path: Path) -> None:
+    text = "t [ms],x [mm]\n" + "".join(f"{n},{n}\n" for n in range(50))
+    found = read(tmp_path, text, "#1", "#2", TableFormat(skip=1))
+    assert found.samples.stamp.tolist() == [1_000_000 * number for number in range(50)]
+    assert found.samples.position == pytest.approx(1e-3 * np.arange(50.0))
 
 
 def test_units_below_the_names_are_used(tmp_path: Path) -> None:
