@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import inf
 from typing import Any, Protocol
 
 import numpy as np
@@ -11,9 +12,11 @@ from stickslip_ros.measures.control_forces import ForceMeter, ForceSettler
 from stickslip_ros.measures.cycle_fit import MeanCycle
 from stickslip_ros.measures.sample_assumptions import EXACT, SampleAssumptions
 from stickslip_ros.measures.sample_meter import MotionObserver, SampleMeter
+from stickslip_ros.measures.sampling_grid import LONGEST_GAP
 from stickslip_ros.measures.timing import Timing
 from stickslip_ros.samples import NO_FORCES, ForceColumns
 from stickslip_ros.stamps import NANOSECONDS
+from stickslip_ros.text import quantity
 
 
 @dataclass(frozen=True)
@@ -76,11 +79,14 @@ class RunMeter:
         """Number of samples published while the run was recorded; None while it is not known."""
         self.unmeasured = 0
         """Number of samples that were recorded and are not measured."""
+        self._first_force: float = inf  # stamp, ns
         self._settler = ForceSettler()
         self._observer = observer
 
     def feed_forces(self, forces: ForceColumns, dropped: ForceColumns) -> None:
         """Add the forces that follow, published and dropped."""
+        if len(forces):
+            self._first_force = min(self._first_force, int(forces.stamp.min()))
         self.force.feed(forces)
         self.motion.drift.force.feed(forces.stamp / NANOSECONDS, forces.force)
         self.dropped += len(dropped)
@@ -127,5 +133,20 @@ class RunMeter:
             "samples": samples,
             "lost_samples": lost,
             "duration": None if motion.mixed else motion.duration,
-            "notes": [*notes, *motion.notes(measures)],
+            "notes": [*notes, *self._force_notes(), *motion.notes(measures)],
         }
+
+    def _force_notes(self) -> list[str]:
+        """Return what the record lacks of the control forces, as far as their stamps tell."""
+        motion, first = self.motion, self._first_force
+        if motion.first is None or first == inf or motion.mixed:
+            return []
+        late = (first - motion.first) / NANOSECONDS
+        if late <= LONGEST_GAP * motion.duration / motion.samples:
+            return []
+        if late > motion.duration:
+            return ["the stamps of the control forces are later than those of all samples"]
+        return [
+            f"the first control force is {quantity(late, 's')} after the first sample: what acted "
+            "before is not recorded, and the peak control force may be larger"
+        ]

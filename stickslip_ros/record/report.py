@@ -125,6 +125,7 @@ def report_of_recording(
             reading=reading_at_recording(recording, stick_speed),
         )
         meter.timing = _timing_of_recording(recording)
+        plant = recording.metadata("stickslip_ros/plant") or {}
         if start <= 0.0 and end == inf:
             meter.published = _published_at_recording(recording)
         run = _RunReader(meter, start, end, observer, take, slips)
@@ -148,6 +149,11 @@ def report_of_recording(
             )
     report = run.report(path, length)
     notes = [*recording.notes, *report["notes"]]
+    if report["peak_force"] is None and plant.get("expects_control") == "true":
+        notes.append(
+            "the plant expects control, and no control force was recorded or is read: "
+            "--force-topic chooses another topic"
+        )
     if not run.has_states:
         missing.append("the bag holds no joint states: the motion is unknown")
     return {**report, "notes": notes, "complete": not missing, "missing": missing}

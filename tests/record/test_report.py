@@ -103,7 +103,11 @@ def test_what_a_bag_does_not_hold_is_not_measured_and_it_is_said(tmp_path):
     record(tmp_path / "states", forces=[])
     report = report_of_recording(tmp_path / "states")
     assert report["amplitude"] == pytest.approx(3.0, rel=1e-6)
-    assert (report["peak_force"], report["complete"]) == (None, True)
+    assert (report["peak_force"], report["complete"], report["notes"]) == (None, True, [])
+    expects = {"stickslip_ros/plant": {"expects_control": "true"}}
+    record(tmp_path / "controlled", forces=[], tables=expects)
+    (note,) = report_of_recording(tmp_path / "controlled")["notes"]
+    assert note.startswith("the plant expects control, and no control force was recorded")
 
 
 def test_a_bag_of_nothing_of_ours_is_refused_with_its_topics(tmp_path):
