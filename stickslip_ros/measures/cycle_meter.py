@@ -47,6 +47,9 @@ _NOISE = 1e-9
 """Speeds below this share of the belt speed, or of the highest speed so far, are rounding."""
 
 
+_TIME_ROUNDING = 1e-9
+"""Share of a duration by which the end of a part may be missed for rounding."""
+
 _Columns = Sequence["memoryview[Any]"]
 """Breakpoints as views: elements of arrays take several times as long, lists more memory."""
 
@@ -137,6 +140,8 @@ class CycleMeter:
         """Trends of the run, for its user to feed."""
         self.within = 0.0
         """Range, m, in which a slide counts as held."""
+        self.rounding = 0.0
+        """Speed, m/s, that is rounding where the belt is at rest."""
         self.unbounded = False
         """Whether the motion is reported as one that diverges."""
         self._cycles: deque[Cycle] = deque(maxlen=window)
@@ -228,14 +233,16 @@ class CycleMeter:
             return without_cycles(held, Regime.HELD, steady=trend is None, trend=trend)
         if not self._cycles or since_turn > STALE_PERIODS * period:
             recent = self._recent_motion()
+            moves = self._belt_speed != 0.0
             if (
                 recent is None
                 or recent.velocity_amplitude >= self._equilibrium_speed
-                or recent.stick_fraction > 0.0  # it sticks to a slow belt
+                or (moves and recent.stick_fraction > 0.0)  # it sticks to a slow belt
             ):
                 return without_cycles(None, None)
             steady = True if self._lasts(since_turn) else None
-            return without_cycles(recent, Regime.EQUILIBRIUM, steady=steady)
+            regime = Regime.EQUILIBRIUM if moves else Regime.STUCK
+            return without_cycles(recent, regime, steady=steady)
         means = CycleMeans.over(self._cycles)
         resting = means.cycle.velocity_amplitude < self._equilibrium_speed
         trend = _trend(self._amplitudes, resting, self._steady_share)
@@ -277,14 +284,15 @@ class CycleMeter:
     @property
     def _equilibrium_speed(self) -> float:
         if self._belt_speed == 0.0:
-            return 0.0
+            return self.rounding
         return EQUILIBRIUM_SPEED * self._fastest_belt
 
     def _upward_crossings(self, breakpoints: Breakpoints) -> list[int]:
         """Return the breakpoints at which the velocity changes from negative to positive."""
         speed = np.abs(breakpoints.velocity)
         self._fastest = max(self._fastest, float(speed[speed.argmax()]))
-        (moving,) = (speed > _NOISE * max(self._fastest, self._fastest_belt)).nonzero()
+        noise = max(_NOISE * max(self._fastest, self._fastest_belt), self.rounding)
+        (moving,) = (speed > noise).nonzero()
         if len(moving) == 0:
             return []
         directions = np.concatenate([[self._direction], np.sign(breakpoints.velocity[moving])])
@@ -305,6 +313,7 @@ class CycleMeter:
         while row < last:
             current = self._parts[-1]
             due = max(2.0 * current.start - start, earliest)
+            due -= _TIME_ROUNDING * (due - start)
             find = bisect_left if due > current.start else bisect_right
             doubled = find(columns[0], due, row + 1, last + 1)
             self._parts[-1] = current.followed_by(_Stretch.of(columns, row, min(doubled, last)))

@@ -141,6 +141,8 @@ class Drift:
 
     resolution = 0.0
     """Step of the sensor, m: a smaller change of position does not matter."""
+    rounding = 0.0
+    """Displacement, m, that is rounding."""
     judged = True
     """Whether a trend is a drift; not where a time profile or a reference varies."""
 
@@ -160,9 +162,10 @@ class Drift:
         span = _LEAST_PARTS / 2 * (period or 0.0)
         # Parts of cycles have other means than whole ones.
         position = self._midpoint if period else self.position
+        least = max(self.resolution, self.rounding)
         found = {
-            "position": position.rate(span, self.resolution),
-            "amplitude": self._amplitude.rate(span, self.resolution) if period else None,
+            "position": position.rate(span, least),
+            "amplitude": self._amplitude.rate(span, least) if period else None,
             "force": self.force.rate(span),
         }
         return {name: rate for name, rate in found.items() if rate is not None}

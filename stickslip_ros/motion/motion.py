@@ -504,6 +504,8 @@ class RecordedMotion(Motion):
         self._first_detail = self._recorded_detail if recording else Detail.STATES
         self._recording = Detail.MARKS in self._first_detail
         self._recorded: list[tuple[float, float, float, bool]] = []
+        self._ends_in_phase = False
+        self._divided: list[int] = []
         self._passed: list[_Point] = []
         self._breakpoint_time = 0.0
         self._stick_speed, self._peak, self._was_slow = stick_speed, 0.0, False
@@ -533,6 +535,16 @@ class RecordedMotion(Motion):
         self._recording = recording
         self._set_detail(self._recorded_detail if recording else Detail.STATES)
         self._append_present()
+
+    def divide(self) -> None:
+        """Note that the end of the last advance only divides a longer one; see `measure_block`."""
+        if self._ends_in_phase:
+            self._divided.append(len(self._recorded) - 1)
+
+    def take_divisions(self) -> list[int]:
+        """Return the rows of the breakpoints, not yet taken, that only divide an advance."""
+        divided, self._divided = self._divided, []
+        return divided
 
     def take_breakpoints(self) -> Breakpoints:
         """Return the breakpoints recorded since the last call, and clear them.
@@ -575,6 +587,7 @@ class RecordedMotion(Motion):
     def _pass(self, mode: Mode, guard: int | None, following: Mode | None, now: float) -> None:
         if not self._recording:
             return
+        self._ends_in_phase = guard is None and following is mode
         state, sticks, begun = self._instant.state, self._system.sticks, self._begun
         marks = [] if self._flow is None else self._flow.take_marks()
         self._passed = passed = list[_Point]()

@@ -10,7 +10,7 @@ from stickslip_ros.measures.cycle_meter import CycleMeter
 from stickslip_ros.measures.run_meter import RunObserver
 from stickslip_ros.measures.sample_meter import MeasuredMotion, MotionObserver, SampleMeter
 from stickslip_ros.model.control import ControlLaw
-from stickslip_ros.motion import Motion, RecordedMotion
+from stickslip_ros.motion import RecordedMotion
 from stickslip_ros.motion.controller import Controller, answer
 from stickslip_ros.motion.sampled_loop import SampledLoop
 from stickslip_ros.motion.tick_blocks import LEAST_TICKS, TickBlocks
@@ -25,10 +25,16 @@ _STEPS_PER_PERIOD = 60
 """Least number of steps in a natural period: a line through their ends then shows the motion."""
 
 
+_ROUNDING = 1e-12
+"""Rounding of the motion, in length and speed scales, with a few digits to spare."""
+
+
 class MotionTracer:
     """Advances a motion in short steps, and passes its forces and the motion to an observer."""
 
-    def __init__(self, motion: Motion, observer: RunObserver, longest_period: float = inf) -> None:
+    def __init__(
+        self, motion: RecordedMotion, observer: RunObserver, longest_period: float = inf
+    ) -> None:
         """Trace a motion; the steps are parts of its natural period, of at most this one (s)."""
         self._motion, self._observer, self._longest_period = motion, observer, longest_period
         self._now = 0.0
@@ -47,9 +53,11 @@ class MotionTracer:
         motion = self._motion
         period = min(motion.drive.natural_period, self._longest_period)
         steps = max(1, ceil(duration / period * _STEPS_PER_PERIOD))
-        for _ in range(steps):
+        for number in range(steps):
             if motion.unbounded:
                 break
+            if number > 0:
+                motion.divide()
             start, force = self._now, motion.applied_force
             motion.advance(duration / steps)
             self._now += duration / steps
@@ -73,10 +81,19 @@ class MotionTracer:
 def measure_block(
     motion: RecordedMotion, meter: CycleMeter, observer: MotionObserver | None
 ) -> None:
-    """Feed a meter, and an observer, with what `motion` has recorded since the last call."""
-    breakpoints, drive = motion.take_breakpoints(), motion.drive
-    cycles = meter.feed(breakpoints, motion.belt_speed, drive.fastest_belt)
-    meter.drift.position.feed(breakpoints.time, breakpoints.position)
+    """Feed a meter, and an observer, with what `motion` has recorded since the last call.
+
+    The meter does not receive the breakpoints that only divide an advance: what it measures does
+    not depend on whether the motion is drawn, or its samples are taken.
+    """
+    divisions, breakpoints, drive = motion.take_divisions(), motion.take_breakpoints(), motion.drive
+    meter.rounding = _ROUNDING * drive.speed_scale
+    meter.drift.rounding = _ROUNDING * drive.length_scale
+    measured = breakpoints
+    if divisions:
+        measured = breakpoints[np.delete(np.arange(len(breakpoints)), divisions)]
+    cycles = meter.feed(measured, motion.belt_speed, drive.fastest_belt)
+    meter.drift.position.feed(measured.time, measured.position)
     meter.drift.feed_cycles(meter.ends, cycles)
     if observer is not None:
         belt_velocity = np.full(len(breakpoints), drive.belt_speed)

@@ -13,7 +13,7 @@ from stickslip_ros.quantities import Quantity, quantities_of
 from stickslip_ros.samples import Sample
 
 if TYPE_CHECKING:
-    from stickslip_ros.motion.motion import Motion
+    from stickslip_ros.motion.motion import Motion, RecordedMotion
 
 _ROUNDING = 1e-6
 """Share of a period by which a sample may be missed for rounding."""
@@ -132,7 +132,7 @@ class SampleRecorder(ABC):
         self._number = number + 1
 
     def sampling(
-        self, motion: "Motion", advance: Callable[[float], None]
+        self, motion: "RecordedMotion", advance: Callable[[float], None]
     ) -> Callable[[float], None]:
         """Return an `advance` (s) of a motion without sampled loop that stops to take samples."""
 
@@ -143,6 +143,8 @@ class SampleRecorder(ABC):
                 stop = min(self._number / self._rate, end)
                 advance(stop - self._now)
                 self._now = stop
+                if stop < end:
+                    motion.divide()
 
         return advance_and_take
 
