@@ -2,7 +2,7 @@
 
 Thirty drives for each friction law and each course, without and with friction by direction in
 turns. The course acts on the belt, on the load, as a disturbance, or on one of them while courses
-of other kinds act on the other two. `tests/motion/dop853.py` has the reference: the same
+of other kinds act on the other two. `benchmarks/dop853.py` has the reference: the same
 equations, written again, with events of its own, at rtol 1e-13. The motions last 20 natural
 periods, with 20 samples in each.
 
@@ -27,10 +27,8 @@ from typing import Any
 
 import numpy as np
 
-from stickslip_ros.errors import StickslipError
-from stickslip_ros.versions import versions
-from tests.motion.dop853 import LostError
-from tests.motion.random_drives import (
+from benchmarks.dop853 import LostError
+from benchmarks.random_drives import (
     KINDS,
     LAWS,
     PERIODS,
@@ -40,6 +38,8 @@ from tests.motion.random_drives import (
     drive_of_place,
     sticks_of,
 )
+from stickslip_ros.errors import StickslipError
+from stickslip_ros.versions import versions
 
 REQUIRED = 1e-7
 ACCURATE = 1e-8

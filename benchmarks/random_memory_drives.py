@@ -12,10 +12,10 @@ from scipy.integrate import DOP853
 
 from benchmarks import memory_reference
 from benchmarks.memory_reference import Array, Curve, MemoryDrive
+from benchmarks.random_drives import Random, Units, random_law, random_units
 from stickslip_ros.model import friction
 from stickslip_ros.model.drive import Drive
 from stickslip_ros.motion import Motion
-from tests.motion.random_drives import Random, Units, random_law, random_units
 
 LAWS = ("dahl", "lugre", "elasto_plastic", "maxwell_slip")
 CURVES = ("exponential", "exponent", "stribeck", "coulomb", "table")

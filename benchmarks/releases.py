@@ -1,7 +1,7 @@
 """Do slide and motor leave the guide as scipy's DOP853 says?
 
 2,000 random drives of two bodies whose dry friction holds them at the guide and releases them, of
-`tests/motion/random_releases.py`. The error is the largest difference of a position or a velocity
+`benchmarks/random_releases.py`. The error is the largest difference of a position or a velocity
 at an instant, in shares of the displacement and of the speed that static friction gives. A drive
 whose motion is not followed, or has an error of 1e-9 or more, is listed with the difference of the
 references of two tolerances.
@@ -17,8 +17,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from benchmarks.random_releases import released
 from stickslip_ros.errors import StickslipError
-from tests.motion.random_releases import released
 
 REQUIRED = 1e-9
 DRIVES = 2000

@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 
 import stickslip_ros as ss
+from benchmarks.dop853 import Curve, Dop853Drive, none
 from stickslip_ros.errors import RunError
 from stickslip_ros.model.constants import constant
 from stickslip_ros.model.control import CONTROL_LAWS, ControlLaw, VelocityFeedback
@@ -28,7 +29,6 @@ from stickslip_ros.scenarios.parameters import (
 )
 from tests.app.conftest import Run, RunOfItsOwn
 from tests.docs.page import CHECKOUT
-from tests.motion.dop853 import Curve, Dop853Drive, none
 from tests.scenarios.foreign_laws import BRAKE, FALLING, write_example, write_package
 
 Install = Callable[..., None]

@@ -7,7 +7,7 @@ from typing import Any
 
 from benchmarks import agreement
 from benchmarks.agreement import Case, cases, compared, report, table
-from tests.motion.random_drives import KINDS, LAWS, PLACES
+from benchmarks.random_drives import KINDS, LAWS, PLACES
 
 FOUND: dict[str, Any] = json.loads(
     (Path(agreement.__file__).parent / "agreement.json").read_text(encoding="utf-8")

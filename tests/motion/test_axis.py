@@ -6,13 +6,7 @@ from math import expm1, inf, log, log1p, nextafter
 import numpy as np
 import pytest
 
-from stickslip_ros.model import signals
-from stickslip_ros.model.drive import Drive
-from stickslip_ros.model.friction import Coulomb, Directional, Exponential
-from stickslip_ros.motion import Motion
-from stickslip_ros.motion.sampled_loop import SampledLoop
-from tests.drives import FEED_DRIVE
-from tests.motion.dop853 import (
+from benchmarks.dop853 import (
     Curve,
     Dop853Drive,
     Signal,
@@ -21,6 +15,12 @@ from tests.motion.dop853 import (
     none,
     sine,
 )
+from stickslip_ros.model import signals
+from stickslip_ros.model.drive import Drive
+from stickslip_ros.model.friction import Coulomb, Directional, Exponential
+from stickslip_ros.motion import Motion
+from stickslip_ros.motion.sampled_loop import SampledLoop
+from tests.drives import FEED_DRIVE
 
 # Of Janot, Gautier, Brunot, 2019: friction in N over 1000 N, and an offset.
 AXIS = Drive(

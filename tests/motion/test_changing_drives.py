@@ -8,16 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from stickslip_ros.errors import RunError
-from stickslip_ros.model.drive import Drive
-from stickslip_ros.model.friction import LAWS as FRICTION_LAWS
-from stickslip_ros.model.friction import Coulomb, Exponential
-from stickslip_ros.model.signals import SIGNALS, Signal, ramp, sine, step, trapezoid
-from stickslip_ros.motion import Motion
-from stickslip_ros.motion.sampled_loop import SampledLoop
-from tests.drives import PAPER
-from tests.motion import dop853
-from tests.motion.random_drives import (
+from benchmarks import dop853
+from benchmarks.random_drives import (
     KINDS,
     LAWS,
     NONE,
@@ -29,6 +21,14 @@ from tests.motion.random_drives import (
     drive_of_place,
     sticks_of,
 )
+from stickslip_ros.errors import RunError
+from stickslip_ros.model.drive import Drive
+from stickslip_ros.model.friction import LAWS as FRICTION_LAWS
+from stickslip_ros.model.friction import Coulomb, Exponential
+from stickslip_ros.model.signals import SIGNALS, Signal, ramp, sine, step, trapezoid
+from stickslip_ros.motion import Motion
+from stickslip_ros.motion.sampled_loop import SampledLoop
+from tests.drives import PAPER
 
 REST = Drive(1.0, 0.0, 1.0, 1.0, 0.0, Coulomb(0.4))
 

@@ -5,6 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks import dop853
+from benchmarks.dop853 import Dop853Drive, Signal
+from benchmarks.random_drives import (
+    sticks_of,
+    without_short,
+)
 from stickslip_ros.model.drive import Drive
 from stickslip_ros.model.friction import (
     Coulomb,
@@ -17,12 +23,6 @@ from stickslip_ros.model.friction import (
 )
 from stickslip_ros.motion import Motion, RecordedMotion
 from tests.drives import PAPER
-from tests.motion import dop853
-from tests.motion.dop853 import Dop853Drive, Signal
-from tests.motion.random_drives import (
-    sticks_of,
-    without_short,
-)
 
 SAME = [
     (Stribeck(0.4, 0.25, 0.5), dop853.stribeck(0.4, 0.25, 0.5)),

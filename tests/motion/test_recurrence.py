@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from benchmarks import random_memory_drives
+from benchmarks import random_drives, random_memory_drives
 from stickslip_ros.model.control import Washout
 from stickslip_ros.model.drive import Drive
 from stickslip_ros.model.hybrid import Mode
@@ -17,7 +17,6 @@ from stickslip_ros.motion import RecordedMotion, hybrid_motion
 from stickslip_ros.motion.recurrence import Recurrence
 from tests.drives import PAPER
 from tests.examples import examples
-from tests.motion import random_drives
 
 
 def drive_of(law: str, seed: int) -> Drive:

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import stickslip_ros as ss
+from benchmarks.random_releases import released
 from stickslip_ros.motion import Motion
-from tests.motion.random_releases import released
 
 
 def test_a_motor_that_friction_just_holds_is_released() -> None:

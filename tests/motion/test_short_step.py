@@ -6,13 +6,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from benchmarks import random_drives
 from stickslip_ros.model.control import Washout
 from stickslip_ros.model.sensor import Sensor
 from stickslip_ros.motion import RecordedMotion, hybrid_motion
 from stickslip_ros.motion.controller import Controller
 from stickslip_ros.motion.sampled_loop import SampledLoop
 from tests.examples import examples
-from tests.motion import random_drives
 
 PARTS: dict[str, dict[str, Any]] = {
     "plain": {},

@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from typing_extensions import override
 
+from benchmarks.random_drives import random_law
 from stickslip_ros.errors import RunError
 from stickslip_ros.measures import CycleMeter
 from stickslip_ros.model.actuator import Actuator
@@ -31,7 +32,6 @@ from stickslip_ros.motion.sampled_loop import SampledLoop
 from stickslip_ros.motion.simulation import simulate_sampled
 from stickslip_ros.motion.tick_blocks import TickBlocks
 from tests.examples import examples
-from tests.motion.random_drives import random_law
 
 RATE = 1000.0
 LAWS = ("stribeck", "coulomb", "linear", "stiction", "directional")

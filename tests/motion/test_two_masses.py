@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
+from benchmarks.two_masses import Array, Bristles, Curve, Piece, TwoMasses
 from stickslip_ros.model.drive import Drive
 from stickslip_ros.model.friction import Coulomb, Dahl, Exponential, FrictionLaw, LuGre
 from stickslip_ros.model.motor import Motor
 from stickslip_ros.model.signals import NO_SIGNAL, step
 from stickslip_ros.motion import Motion
-from tests.motion.two_masses import Array, Bristles, Curve, Piece, TwoMasses
 
 PIECES, SAMPLES = 10, 8
 LAWS = ("coulomb", "exponential", "lugre", "dahl")

@@ -41,7 +41,7 @@ def linear(static: float, slope: float) -> Curve:
 
 
 def stribeck(static: float, minimum: float, minimum_speed: float) -> Curve:
-    """The paper's cubic, which is lowest at `minimum_speed`."""
+    """Return the paper's cubic, which is lowest at `minimum_speed`."""
     a = 3.0 * (static - minimum) / (2.0 * minimum_speed)
     b = (static - minimum) / (2.0 * minimum_speed**3)
     return lambda w: static - a * w + b * w**3
@@ -141,7 +141,7 @@ def none() -> Signal:
 
 
 def step(amplitude: float, start: float, duration: float) -> Signal:
-    """A on [start, start + duration); an impulse is a step of one sample."""
+    """Return A on [start, start + duration); an impulse is a step of one sample."""
     return Signal([level(-inf, 0.0), level(start, amplitude), level(start + duration, 0.0)])
 
 

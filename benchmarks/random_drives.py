@@ -11,6 +11,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from benchmarks import dop853
+from benchmarks.dop853 import Array, Curve, Dop853Drive, Solution
 from stickslip_ros.measures.breakpoints import Breakpoints
 from stickslip_ros.model.drive import Drive
 from stickslip_ros.model.friction import (
@@ -25,8 +27,6 @@ from stickslip_ros.model.friction import (
 from stickslip_ros.model.signals import NO_SIGNAL, SIGNALS, Signal, table
 from stickslip_ros.motion import RecordedMotion
 from stickslip_ros.motion.sampled_loop import SampledLoop
-from tests.motion import dop853
-from tests.motion.dop853 import Array, Curve, Dop853Drive, Solution
 
 KINDS = ("step", "impulse", "ramp", "sine", "trapezoid", "table")
 LAWS = ("stribeck", "coulomb", "linear", "exponential", "exponent", "table")

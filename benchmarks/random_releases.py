@@ -8,12 +8,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from benchmarks.two_masses import Array, Curve, Piece, TwoMasses
 from stickslip_ros.errors import RunError
 from stickslip_ros.model.drive import Drive
 from stickslip_ros.model.friction import Coulomb, Exponential
 from stickslip_ros.model.motor import Motor
 from stickslip_ros.motion import Motion
-from tests.motion.two_masses import Array, Curve, Piece, TwoMasses
 
 PIECES, SAMPLES = 4, 3
 """Constant forces of a motion, and instants in each at which it is compared."""
@@ -33,7 +33,7 @@ class Released(NamedTuple):
         return np.array([*own, *own]) * float(self.drive.friction.static)
 
     def motion(self) -> Array:
-        """The states at the times, as the package finds them; raises RunError."""
+        """Return the states at the times, as the package finds them; raises RunError."""
         x, v, far, rate = self.start
         motion, now, found = Motion(self.drive, 0.0, 0.0), 0.0, []
         motion.restart(x, v, motor=(far, rate))
@@ -53,7 +53,7 @@ class Released(NamedTuple):
         return np.array(found)
 
     def solution(self, rtol: float = 1e-13) -> Array:
-        """The same by scipy's DOP853."""
+        """Return the same by scipy's DOP853."""
         self.independent.rtol = rtol
         return self.independent.run(self.times, (*self.start, 0.0))[:, :4]
 
