@@ -1,6 +1,7 @@
 """The critical gains of the washout controller, and the limit cycle that starts there."""
 
 from dataclasses import replace
+from math import sqrt
 
 import numpy as np
 import pytest
@@ -10,27 +11,58 @@ from hypothesis import strategies as st
 from stickslip_ros.measures.cycle_measures import Regime
 from stickslip_ros.model.control import Washout
 from stickslip_ros.model.drive import Drive
-from stickslip_ros.model.friction import Exponential, Linear
+from stickslip_ros.model.friction import Exponential, Linear, Stribeck
 from stickslip_ros.motion.variational import ShootingMotion
 from stickslip_ros.theory.critical_gains import critical_gains, limit_cycle_from_hopf
+from stickslip_ros.theory.hopf import hopf_points
 from stickslip_ros.theory.limit_cycles import limit_cycle_of_run
 from stickslip_ros.theory.linear import expand
 from tests.drives import PAPER, settled
 from tests.theory.closed_forms import CubicLoop
-from tests.theory.test_hopf import cubic_drives
+
+cubic_drives = st.builds(
+    lambda mass, stiffness, normal_force, damping, belt_speed, static, drop, speed: Drive(
+        mass=mass,
+        damping=damping * sqrt(stiffness * mass),
+        stiffness=stiffness,
+        normal_force=normal_force,
+        belt_speed=belt_speed * normal_force / sqrt(stiffness * mass),
+        friction=Stribeck(
+            static, static * (1.0 - drop), speed * normal_force / sqrt(stiffness * mass)
+        ),
+    ),
+    mass=st.floats(0.1, 1e3),
+    stiffness=st.floats(0.1, 1e6),
+    normal_force=st.floats(0.1, 1e4),
+    damping=st.floats(0.0, 0.5),
+    belt_speed=st.floats(0.05, 1.0),
+    static=st.floats(0.1, 1.0),
+    drop=st.floats(0.1, 1.0),
+    speed=st.floats(0.2, 1.0),
+)
 
 
 @given(cubic_drives, st.floats(0.05, 5.0), st.floats(-10.0, 10.0))
 def test_the_general_theory_agrees_with_the_closed_forms(
     drive: Drive, corner_frequency: float, cubic: float
 ) -> None:
+    forms, expansion = CubicLoop.from_drive(drive), expand(drive)
+    assert expansion.equilibrium[0] == pytest.approx(forms.equilibrium, rel=1e-12, abs=1e-12)
+    assert expansion.jacobian[1, 1] == pytest.approx(forms.trace, rel=1e-12, abs=1e-12)
     force, speed = drive.normal_force, drive.speed_scale
-    gains = Washout(corner_frequency * drive.angular_frequency, 0.0, cubic * force / speed**3)
-    forms = CubicLoop.from_drive(drive)
-    expected = forms.critical_linear_gain(corner_frequency)
-    critical = critical_gains(drive, gains)
+    if forms.hopf_speed is None or forms.hopf_speed > 1e-5:  # lower ones are not looked for
+        points = hopf_points(drive)
+        assert (forms.hopf_speed is None) == (points == [])
+        for point in points:
+            found = point.belt_speed / speed, point.crossing_speed * speed / drive.angular_frequency
+            assert found == pytest.approx((forms.hopf_speed, forms.crossing_speed), rel=1e-12)
+            sigma = point.first_lyapunov_coefficient
+            assert sigma == pytest.approx(forms.first_lyapunov_coefficient, rel=1e-12)
+
     # Next to where no gain stabilises any more, everything is steep.
     assume(abs(1.0 - forms.trace * corner_frequency) > 0.1)
+    gains = Washout(corner_frequency * drive.angular_frequency, 0.0, cubic * force / speed**3)
+    critical, expected = critical_gains(drive, gains), forms.critical_linear_gain(corner_frequency)
     if expected is None:
         assert critical is None
         return

@@ -1,7 +1,6 @@
 """The stick-slip onset speed, by averaging and in the motion."""
 
 from dataclasses import replace
-from math import sqrt
 
 import numpy as np
 import pytest
@@ -17,14 +16,9 @@ from stickslip_ros.theory.cycle_bounds import averaged_growth
 from stickslip_ros.theory.limit_cycles import limit_cycles
 from stickslip_ros.theory.sticking import sticking_onset
 from tests.drives import FEED_DRIVE, PAPER
+from tests.theory.closed_forms import CubicLoop
 
 SUDDEN = replace(PAPER, friction=Exponential(0.4, 0.25, 0.05, 0.0))
-
-
-def hopf_speed(damping: float, static: float, minimum: float, minimum_speed: float) -> float:
-    """v_b1 of the cubic law, eq. 9; `damping` is 2 beta."""
-    slope = 1.5 * (static - minimum) / minimum_speed
-    return minimum_speed * sqrt(1.0 - damping / slope)
 
 
 def sticks(drive: Drive) -> bool:
@@ -38,9 +32,9 @@ def sticks(drive: Drive) -> bool:
 
 @pytest.mark.parametrize("damping", [0.0, 0.01, 0.02, 0.4])
 def test_averaging_of_the_cubic_law_has_a_closed_form(damping: float) -> None:
-    onset = sticking_onset(replace(PAPER, damping=damping))
-    expected = sqrt(0.8) * hopf_speed(damping, 0.4, 0.25, 0.5)
-    assert onset.approximate == pytest.approx(expected, rel=1e-12)
+    drive = replace(PAPER, damping=damping)
+    expected = CubicLoop.from_drive(drive).sticking_onset
+    assert sticking_onset(drive).approximate == pytest.approx(expected, rel=1e-12)
 
 
 @pytest.mark.parametrize("law", [PAPER.friction, SUDDEN.friction, Linear(0.4, 0.3)])
@@ -110,10 +104,10 @@ def test_sticking_ends_near_the_minimum_of_friction_where_the_law_is_stiff(
     minimum_speed: float,
 ) -> None:
     """The slide then creeps along the law, and only its falling branch throws it off."""
-    onset = sticking_onset(replace(PAPER, friction=Stribeck(0.4, 0.25, minimum_speed)))
-    hopf = hopf_speed(0.02, 0.4, 0.25, minimum_speed)
-    assert onset.approximate == pytest.approx(sqrt(0.8) * hopf)
-    assert onset.exact == pytest.approx(hopf, rel=1e-4)
+    drive = replace(PAPER, friction=Stribeck(0.4, 0.25, minimum_speed))
+    onset, cubic = sticking_onset(drive), CubicLoop.from_drive(drive)
+    assert onset.approximate == pytest.approx(cubic.sticking_onset)
+    assert onset.exact == pytest.approx(cubic.hopf_speed, rel=1e-4)
 
 
 @pytest.mark.long
