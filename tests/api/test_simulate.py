@@ -120,3 +120,17 @@ def test_what_makes_the_measures_doubtful_is_noted() -> None:
     assert ss.simulate("feed_profile", duration=0.5).notes == [
         "belt, load, disturbance or reference vary: a drift is not judged"
     ]
+
+
+def test_a_run_has_the_truth_and_what_is_told() -> None:
+    run = ss.simulate(
+        ss.scenario("feed_drive", sensor_position_resolution=1e-4, sensor_velocity="difference"),
+        duration=1.0,
+    )
+    assert run.truth.amplitude == ss.simulate("feed_drive", duration=1.0).measures.amplitude
+    table = run.to_pandas()
+    told = table["measured_position"].to_numpy()
+    assert told == pytest.approx(table["position"].to_numpy(), abs=0.5001e-4)
+    assert told / 1e-4 == pytest.approx(np.rint(told / 1e-4), abs=1e-9)
+    assert table.attrs["units"]["measured_velocity"] == "m/s"
+    assert repr(run).splitlines()[1].split() == ["measured", "true"]

@@ -54,34 +54,6 @@ def with_packages(process_environment: dict[str, str], tmp_path: Path) -> Run:
     return RunOfItsOwn(tmp_path, process_environment)
 
 
-@pytest.mark.parametrize(
-    ("command", "own", "foreign"),
-    [
-        *(
-            (
-                command,
-                "--no-control -p plant.friction.law=linear -p plant.friction.slope=0.3",
-                "--no-control -p plant.friction.law=falling -p plant.friction.fall=0.3",
-            )
-            for command in ("simulate paper --duration 100", "stability paper")
-        ),
-        (
-            "simulate paper --duration 100",
-            "--controller velocity_feedback -p velocity_feedback_controller.velocity_gain=-0.3",
-            "--controller brake -p brake_controller.strength=0.3",
-        ),
-    ],
-)
-@pytest.mark.long
-def test_a_law_of_another_package_gives_what_one_of_this_does(
-    with_packages: Run, stickslip: Run, command: str, own: str, foreign: str
-) -> None:
-    expected = stickslip.json(*command.split(), *own.split())
-    found = with_packages.json(*command.split(), *foreign.split())
-    provenance = {"scenario", "overrides", "versions"}
-    assert {**found, **dict.fromkeys(provenance)} == {**expected, **dict.fromkeys(provenance)}
-
-
 def test_the_list_has_the_laws_of_other_packages_and_says_which_are_refused(
     with_packages: Run,
 ) -> None:

@@ -35,6 +35,7 @@ def free() -> ss.Scenario:
 
 KNOWN = {"plant.mass": 100.0, "plant.damping": 200.0}
 LAWS = ["washout", "velocity_feedback"]
+DISTURBED: dict[str, Any] = {"disturbances": "step", "seeds": 2, "spread": 0.1}
 NOISY = "plant.sensor.position_noise=1e-6"
 
 CASES: dict[str, tuple[tuple[str, ...], Callable[[str], Result]]] = {
@@ -63,28 +64,17 @@ CASES: dict[str, tuple[tuple[str, ...], Callable[[str], Result]]] = {
     "compare": (
         (
             "feed_drive",
-            "--controllers",
-            ",".join(LAWS),
-            "--given",
-            "washout",
-            "--duration",
-            "0.6",
-            "--disturbances",
-            "step",
-            "--seeds",
-            "2",
-            "--spread",
-            "0.1",
+            *[
+                "--controllers",
+                "washout,velocity_feedback",
+                "--given",
+                "washout",
+                "--duration",
+                "0.6",
+            ],
+            *["--disturbances", "step", "--seeds", "2", "--spread", "0.1"],
         ),
-        lambda _: ss.compare(
-            "feed_drive",
-            LAWS,
-            disturbances="step",
-            given="washout",
-            seeds=2,
-            spread=0.1,
-            duration=0.6,
-        ),
+        lambda _: ss.compare("feed_drive", LAWS, given="washout", duration=0.6, **DISTURBED),
     ),
     "margin": ((LOG,), lambda log: ss.margin(log)),
     "report": ((REFERENCE,), lambda _: ss.read_bag(REFERENCE)),

@@ -13,6 +13,7 @@ import pytest
 
 import stickslip_ros as ss
 from benchmarks import identification as study
+from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.identification.even_clock import evenly_spaced
 from stickslip_ros.identification.filtered import filtered
@@ -45,11 +46,18 @@ def stick() -> Findings:
     return identify([study.record("stribeck", "stick", seed=7, duration=2.5)], "stribeck", fixed)
 
 
+def check_errors(found: Findings, true: Mapping[str, float], *names: str) -> None:
+    """Check that constants, or those of some names, are within their errors."""
+    assert found.fitted
+    for name in names or found.fitted:
+        each = found.fitted[name]
+        assert abs(each.value - true[name]) < _FAR * each.standard_error, name
+
+
 def check_constants(found: Findings, true: Mapping[str, float]) -> None:
     """Check that constants are within their errors, and that these are small."""
-    assert found.fitted
+    check_errors(found, true)
     for name, each in found.fitted.items():
-        assert abs(each.value - true[name]) < _FAR * each.standard_error, name
         assert each.standard_error < 0.05 * max(abs(true[name]), 1e-3), name
     assert notes(found) == []
 
@@ -99,8 +107,7 @@ def test_a_force_that_is_late(delay: float, lag: float) -> None:
     own = study.record("stribeck", "taps", 1, 2.5, delay, lag)
     found = identify([own], "stribeck", {"normal_force": study.NORMAL_FORCE})
     true = study.truth("stribeck", "taps") | {"force_delay": delay, LAG: lag}
-    for name, each in found.fitted.items():
-        assert abs(each.value - true[name]) < _FAR * each.standard_error, name
+    check_errors(found, true)
     assert found.fitted["mass"].standard_error < 0.002 * study.MASS
     assert (found.chosen.delay > 0.0) == (delay > 0.0)
     assert (LAG in found.fitted) == (lag > 0.0)
@@ -146,8 +153,7 @@ def test_static_above_kinetic_friction_is_recovered() -> None:
         for kind in ("ramp", "stick")
     )
     true = study.truth("stiction", "ramp")
-    for name, each in found.fitted.items():
-        assert abs(each.value - true[name]) < _FAR * each.standard_error, name
+    check_errors(found, true)
     assert found.fitted["friction.static"].standard_error < 1e-3
     assert "fit alike" in unidentified(moving)["friction.static"]
 
@@ -166,8 +172,7 @@ def test_the_exponent_of_a_decay(
     assert found.drive.friction.exponent == pytest.approx(exponent, abs=0.1)
     assert ("friction.exponent" in found.fitted) == (exponent == 1.5)
     true = study.truth("exponential", "stick")
-    for name, each in found.fitted.items():
-        assert abs(each.value - true[name]) < _FAR * each.standard_error, name
+    check_errors(found, true)
 
 
 def test_what_stick_slip_at_one_belt_speed_tells(stick: Findings) -> None:
@@ -281,13 +286,11 @@ def test_friction_by_direction() -> None:
     for number, (group, each) in enumerate(
         (("friction.", law.forward), ("friction.reverse.", law.reverse))
     ):
-        for name in ("static", "viscous"):
-            estimate = found.fitted[group + name]
-            away = abs(estimate.value - getattr(each, name))
-            assert away < _FAR * estimate.standard_error, group + name
+        true = {group + name: getattr(each, name) for name in ("static", "viscous")}
+        check_errors(found, true, *true)
         curve = found.curves[number]
-        true = 1000.0 * (each.static + each.viscous * curve.speed)
-        assert curve.force == pytest.approx(true, rel=0.01)
+        force = 1000.0 * (each.static + each.viscous * curve.speed)
+        assert curve.force == pytest.approx(force, rel=0.01)
         assert (curve.standard_error > 0.0).all()
 
 
@@ -303,32 +306,33 @@ def reversing(law: FrictionLaw) -> Record:
     times = np.arange(0.0, 1.51, 0.25)
     speeds = 0.03 * (-1.0) ** np.arange(len(times))
     belt = table(list(zip(times.tolist(), speeds.tolist(), strict=True)))
-    motion = Motion(Drive(100.0, 0.0, 1e6, 1000.0, 0.0, law, belt=belt), 1e-4, 0.0)
-    count = 1500
-    force, position = np.zeros(count), np.empty(count)
-    for number in range(0, count, 150):
-        force[number : number + 20] = random.uniform(-150.0, 150.0)
-    for number in range(count):
-        position[number] = round(motion.position / 1e-6) * 1e-6
-        motion.force = float(force[number])
-        motion.advance(1e-3)
+    drive = Drive(100.0, 0.0, 1e6, 1000.0, 0.0, law, belt=belt)
+    force, position, _ = tapped(drive, 1500, 150, 1e-6, random)
     return Record(
-        "to and fro", 1e-3, position, np.interp(1e-3 * np.arange(count), times, speeds), force
+        "to and fro", 1e-3, position, np.interp(1e-3 * np.arange(1500), times, speeds), force
     )
 
 
-def test_a_measured_velocity_tells_more() -> None:
-    motion = Motion(Drive(100.0, 0.0, 1e6, 1000.0, 0.03, study.LAWS["coulomb"]), 1e-4, 0.0)
-    random, count = np.random.default_rng(2), 3000
+def tapped(
+    drive: Drive, count: int, every: int, resolution: float, random: np.random.Generator
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the forces of taps, and positions and velocities of a drive under them, at 1 kHz."""
+    motion = Motion(drive, 1e-4, 0.0)
     force, position, velocity = np.zeros(count), np.empty(count), np.empty(count)
-    for number in range(0, count, 200):
+    for number in range(0, count, every):
         force[number : number + 20] = random.uniform(-150.0, 150.0)
     for number in range(count):
-        position[number] = round(motion.position / 5e-6) * 5e-6
+        position[number] = round(motion.position / resolution) * resolution
         velocity[number] = motion.velocity + 1e-4 * random.normal()
         motion.force = float(force[number])
         motion.advance(1e-3)
-    without = Record("log", 1e-3, position, np.full(count, 0.03), force)
+    return force, position, velocity
+
+
+def test_a_measured_velocity_tells_more() -> None:
+    drive = Drive(100.0, 0.0, 1e6, 1000.0, 0.03, study.LAWS["coulomb"])
+    force, position, velocity = tapped(drive, 3000, 200, 5e-6, np.random.default_rng(2))
+    without = Record("log", 1e-3, position, np.full(3000, 0.03), force)
     fits = [
         identify([each], "coulomb", {"normal_force": 1000.0})
         for each in (without, replace(without, velocity=velocity))
@@ -336,8 +340,7 @@ def test_a_measured_velocity_tells_more() -> None:
     errors = [each.fitted["friction.static"].standard_error for each in fits]
     assert errors[1] < 0.8 * errors[0]
     for found in fits:
-        away = found.fitted["friction.static"].value - study.LAWS["coulomb"].static
-        assert abs(away) < _FAR * found.fitted["friction.static"].standard_error
+        check_errors(found, {"friction.static": study.LAWS["coulomb"].static}, "friction.static")
 
 
 @pytest.mark.long
@@ -382,9 +385,7 @@ def test_missing_samples_are_not_measured() -> None:
     found = identify(evenly_spaced("log", stamp, columns), "stribeck", {"mass": study.MASS})
     assert "33 % of the samples of log are missing" in notes(found)[0]
     true = study.truth("stribeck", "stick")
-    for name in ("stiffness", "friction.minimum_speed"):
-        estimate = found.fitted[name]
-        assert abs(estimate.value - true[name]) < _FAR * estimate.standard_error, name
+    check_errors(found, true, "stiffness", "friction.minimum_speed")
 
 
 @pytest.mark.long
@@ -429,8 +430,7 @@ def test_bristles_are_told_and_their_constants_recovered() -> None:
     assert found.law == "lugre"
     assert "friction.bristle_stiffness" in found.fitted
     true = study.truth("lugre", "taps")
-    for name, each in found.fitted.items():
-        assert abs(each.value - true[name]) < _FAR * each.standard_error, name
+    check_errors(found, true)
 
 
 @pytest.mark.long

@@ -122,10 +122,16 @@ def test_a_disturbance_that_is_asked_for_acts_from_the_next_sample_until_the_nex
     assert acting(loop, motion, 2) == [-0.25, 0.0]
 
 
-def test_the_delay_is_that_of_the_control_force_only() -> None:
+def test_disturbances_and_control_add_up_and_only_control_is_delayed() -> None:
+    """A new disturbance of the scenario acts from the next sample on."""
     motion = Motion(PAPER, 0.0, 0.0)
     loop = SampledLoop(motion, 10.0, SECOND, force_delay=0.3, disturbance=step(0.5, start=0.1))
-    assert acting(loop, motion, 3) == [0.0, 0.5, 0.5]
+    loop.offer(loop.sample.stamp, 2.0)
+    assert acting(loop, motion, 2) == [0.0, 0.5]
+    loop.disturb(0.25)
+    loop.follow_disturbance(step(0.125))
+    assert loop.disturbance == 0.5
+    assert acting(loop, motion, 2) == [0.5, 2.375]
 
 
 def test_a_new_drive_acts_from_the_next_sample() -> None:
@@ -163,25 +169,6 @@ def test_a_reset_puts_the_slide_back_at_the_next_sample_while_time_goes_on() -> 
     sample = loop.advance()
     fresh.advance(0.1)
     assert (sample.position, sample.velocity) == (fresh.position, fresh.velocity)
-
-
-def test_disturbances_and_control_add_up() -> None:
-    motion = Motion(PAPER, 0.0, 0.0)
-    loop = SampledLoop(motion, 10.0, SECOND, disturbance=step(0.5))
-    loop.disturb(0.25)
-    loop.advance()
-    loop.offer(loop.sample.stamp, 2.0)
-    loop.advance()
-    assert motion.force == 2.75
-
-
-def test_a_new_disturbance_of_the_scenario_acts_from_the_next_sample() -> None:
-    motion = Motion(PAPER, 0.0, 0.0)
-    loop = SampledLoop(motion, 10.0, SECOND)
-    loop.advance()
-    loop.follow_disturbance(step(0.5))
-    assert loop.disturbance == 0.0
-    assert acting(loop, motion, 2) == [0.0, 0.5]
 
 
 def test_drive_and_position_may_change_at_once() -> None:

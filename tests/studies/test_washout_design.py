@@ -227,3 +227,23 @@ def test_it_is_the_same_every_time_and_progress_reaches_the_end() -> None:
     assert (first.controller, first.checks) == (second.controller, second.checks)
     assert shares == sorted(shares)
     assert shares[-1] == 1.0
+
+
+def test_it_is_tried_with_sensor_and_actuator_and_tells_what_they_leave() -> None:
+    """It stays within the limit of the actuator, even if the controller has none."""
+    encoder = {"sensor_position_resolution": 1e-6, "sensor_velocity": "difference"}
+    scenario = ss.scenario("feed_drive", **encoder, actuator_limit=200.0)
+    (check,) = ss.design(scenario, belt_speed=(0.03, 0.03)).checks
+    assert 0.0 < check.rest.amplitude < 5e-6
+    assert 0.0 < check.rest.rms_force < check.rest.peak_force
+    assert check.settling_time is not None
+    assert check.peak_force < 200.0
+
+
+@pytest.mark.long
+def test_a_coarse_actuator_leaves_a_vibration() -> None:
+    coarse = ss.scenario("feed_drive", actuator_limit=200.0, actuator_resolution=20.0)
+    remark = ss.design(coarse, belt_speed=(0.04, 0.04)).remark
+    assert "does not decay to 1 % with the noise and rounding of sensor and actuator" in remark
+    (check,) = ss.design("feed_drive", belt_speed=(0.03, 0.03)).checks
+    assert check.rest is None

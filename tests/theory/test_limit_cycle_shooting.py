@@ -110,27 +110,18 @@ def test_two_cycles_close_together_are_both_found(below: float) -> None:
     assert limit_cycles(replace(SUDDEN, belt_speed=onset * (1.0 + below))) == []
 
 
-@pytest.mark.parametrize(
-    "drive",
-    [
-        replace(PAPER, belt_speed=0.0),
-        replace(PAPER, belt_speed=0.5),
-        replace(PAPER, damping=3.0),
-        replace(PAPER, friction=Coulomb(0.4)),
-        replace(PAPER, friction=Coulomb(0.4), damping=0.0),
-        replace(PAPER, friction=Linear(0.4, 0.9)),
-        replace(PAPER, friction=Linear(0.4, 2.5)),
-    ],
-    ids=[
-        "belt at rest",
-        "above the Hopf speed",
-        "overdamped",
-        "damped",
-        "a continuum of orbits",
-        "runs away",
-        "runs away without turning",
-    ],
-)
+WITHOUT_CYCLE = {
+    "belt at rest": replace(PAPER, belt_speed=0.0),
+    "above the Hopf speed": replace(PAPER, belt_speed=0.5),
+    "overdamped": replace(PAPER, damping=3.0),
+    "damped": replace(PAPER, friction=Coulomb(0.4)),
+    "a continuum of orbits": replace(PAPER, friction=Coulomb(0.4), damping=0.0),
+    "runs away": replace(PAPER, friction=Linear(0.4, 0.9)),
+    "runs away without turning": replace(PAPER, friction=Linear(0.4, 2.5)),
+}
+
+
+@pytest.mark.parametrize("drive", WITHOUT_CYCLE.values(), ids=WITHOUT_CYCLE)
 def test_where_there_is_no_limit_cycle(drive: Drive) -> None:
     assert limit_cycles(drive) == []
     assert shoot(drive, 0.0, drive.natural_period) is None
