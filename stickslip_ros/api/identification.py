@@ -221,6 +221,9 @@ def identify(
     decimal: str | None = None,
     skip: int | None = None,
     encoding: str | None = None,
+    period: float | None = None,
+    where: str | None = None,
+    session: int | None = None,
     rotary: bool = False,
     check: Sequence[Path | str] = (),
     progress: Callable[[str], None] = lambda _: None,
@@ -246,7 +249,7 @@ def identify(
         Belt speed, m/s, in place of what the recordings have.
     joint, belt_joint, states_topic, force_topic, time, force : optional
         Where bags of another machine have motion and force, as for `read_bag`.
-    decimal, skip, encoding : optional
+    decimal, skip, encoding, period, where, session : optional
         Form of the tables, as for `read_table`.
     rotary : bool, optional
         Whether displacements are angles, rad, and forces torques, N m: they are shown as such.
@@ -290,7 +293,7 @@ def identify(
         end=end,
         namespace=namespace,
         belt_speed=belt_speed,
-        form=TableFormat(decimal, skip, encoding, rotary),
+        form=TableFormat(decimal, skip, encoding, rotary, period, where, session),
         layout=BagLayout(joint, belt_joint, states_topic, force_topic, time, force),
     )
     own = [record for path in fitted for record in read[path]]

@@ -265,6 +265,9 @@ def read_table(
     decimal: str | None = None,
     skip: int | None = None,
     encoding: str | None = None,
+    period: float | None = None,
+    where: str | None = None,
+    session: int | None = None,
 ) -> RecordedRun:
     """Read a run from a table as text, such as a CSV file, or a MAT file, and measure it.
 
@@ -290,6 +293,13 @@ def read_table(
         What counts as a slip; by default slips are not looked for.
     decimal, skip, encoding : optional
         Decimal mark, number of lines on top, and encoding of a text; found by default.
+    period : float, optional
+        Time from row to row, s, where `columns` has no time; by default the one that a line above
+        the rows tells.
+    where : str, optional
+        Rows of a text that are read, as in `"joint_name=elbow"`; by default all.
+    session : int, optional
+        Which session is read, from 1, if the time starts again.
 
     Returns
     -------
@@ -328,6 +338,9 @@ def read_table(
         decimal=decimal,
         skip=skip,
         encoding=encoding,
+        period=period,
+        where=where,
+        session=session,
     )
 
 

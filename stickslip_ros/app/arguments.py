@@ -117,6 +117,23 @@ def add_reading(parser: argparse.ArgumentParser) -> None:
         "--encoding", metavar="NAME", help="encoding of a table, as utf-16 (default: found)"
     )
     parser.add_argument(
+        "--period",
+        type=seconds,
+        metavar="S",
+        help="time from row to row of a table without times, as 2ms (default: found above them)",
+    )
+    parser.add_argument(
+        "--where",
+        metavar="COLUMN=VALUE",
+        help="rows of a table that are read, as joint_name=elbow (default: all)",
+    )
+    parser.add_argument(
+        "--session",
+        type=whole("a whole number from {} to {}", 1, 1_000_000),
+        metavar="N",
+        help="which session of a table is read, where the time starts again",
+    )
+    parser.add_argument(
         "--rotary",
         action="store_true",
         help="show displacements as angles, rad, and forces as torques, N m",

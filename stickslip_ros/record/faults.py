@@ -44,12 +44,12 @@ class Wrap:
 class Jumps:
     """Steps of a signal that are ten times as large as most of those before, or after."""
 
-    def __init__(self, signal: FloatArray) -> None:
-        """Find the jumps of a signal; they are also larger than steps of an encoder."""
+    def __init__(self, signal: FloatArray, rounding: float = 0.0) -> None:
+        """Find the jumps of a signal; they are larger than a rounding and encoder steps, too."""
         self._signal, self._unit = signal, _unit(signal)
         part = signal[:: 1 + len(signal) // _MOST_WINDOWS]
         low, high = np.quantile(part, [0.01, 0.99]) if len(part) else (0.0, 0.0)
-        least = max(_STEEPER * self._unit, _LEAST_SHARE * float(high - low))
+        least = max(_STEEPER * max(self._unit, rounding), _LEAST_SHARE * float(high - low))
         found = [
             part.start + np.flatnonzero(np.abs(np.diff(signal[part])) > least)
             for part in windows(len(signal), 1)
@@ -126,10 +126,10 @@ class Jumps:
         return Wrap(turn, rows + 1) if np.ptp(np.sign(turns)) else None
 
 
-def shift_note(size: float, place: str) -> str:
+def shift_note(size: float, place: str, unit: str = "m") -> str:
     """Return a sentence on a jump from which the positions do not come back."""
     return (
-        f"the position jumps by {quantity(float(f'{size:.3g}'), 'm')}, {place}, and does not come "
+        f"the position jumps by {quantity(float(f'{size:.3g}'), unit)}, {place}, and does not come "
         "back, as after a new zero or lost counts: --to or --from takes one side"
     )
 

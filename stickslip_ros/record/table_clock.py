@@ -1,11 +1,14 @@
 """The times of a table: whether they are rounded, what they were before, and their stamps."""
 
+from math import nan
 from pathlib import Path
 
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray, IntArray, windows
 from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.record.expressions import Expression
+from stickslip_ros.record.table_columns import Table
 from stickslip_ros.stamps import NANOSECONDS
 from stickslip_ros.text import quantity
 
@@ -16,6 +19,88 @@ _FEWEST, _MOST = 10, 100_000
 _COARSE_SHARE, _COMMON_SHARE, _MULTIPLE = 0.02, 0.02, 1e-3
 """Least step of a rounding, as a share of the period; share of the steps of time from which one is
 usual: others are gaps and lost rows; distance of a multiple, in steps of the rounding."""
+_TURNS = [
+    float(f"{turn}e{power}")
+    for turn in (86_400, *(2**bits for bits in (8, 16, 24, 31, 32)))
+    for power in (-9, -6, -3, 0, 3, 6, 9)
+]
+"""Turns of clocks and counters, in any units."""
+_MOST_SESSIONS, _TURNING_SHARE, _SAME_STEP = 20, 0.3, 0.01
+"""Most sessions of a table; share of rows with the time of the row before, from which several rows
+have the same; relative difference of the same steps."""
+
+
+def in_order(
+    table: Table, clock: Expression, factor: float, time: FloatArray, rows: range | IntArray
+) -> range | IntArray:
+    """Return the rows of the session that was chosen, or all.
+
+    `time` is in the unit of the table, s times `factor`. Raises InvalidInputError with a way where
+    it goes back.
+    """
+    picked = time if isinstance(rows, range) else time[rows]
+    back = np.flatnonzero(picked[1:] < picked[:-1]) + 1
+    bounds, session = [0, *back.tolist(), len(picked)], table.form.session
+    if session is not None:
+        if session >= len(bounds):
+            raise InvalidInputError(
+                f"session = {session} is invalid: {table.path} has {len(bounds) - 1}"
+            )
+        return np.asarray(rows)[bounds[session - 1] : bounds[session]]
+    if not len(back):
+        return rows
+    before, after = float(picked[back[0] - 1]), float(picked[back[0]])
+    step = before - float(picked[max(0, back[0] - 2)])
+    turn = next((each for each in _TURNS if abs(before + step - after - each) < 1.5 * step), None)
+    what = f"goes back {len(back)} times, the first time at {table.line(int(rows[back[0]]))}"
+    if turn:
+        column = table.number(clock.places[0]) if clock.bare else clock.text
+        way = "" if factor == 1.0 else f"*{factor:.12g}"
+        what += f", as a counter that wraps: time=unwrap({column}, {turn:.12g}){way}"
+    elif len(back) == 1 and abs(1e3 * after - before - step) < 1.5 * step:
+        what += (
+            f", from {before:g} to {after:g}: --decimal {',.'[table.decimal == ',']} reads it as "
+        )
+        what += f"{1e3 * after:g}"
+    elif len(back) <= _MOST_SESSIONS:
+        sizes = " and ".join(map(str, np.diff(bounds)))
+        what += f", where a session of its own starts: --session 1 takes the first of {sizes} rows"
+    else:
+        what += ": rows must be in the order of time"
+    raise InvalidInputError(f"{table.path}: the time {what}")
+
+
+def check_turns(table: Table, time: FloatArray) -> None:
+    """Refuse rows of several joints that have the same times."""
+    same = np.count_nonzero(time[1:] == time[:-1])
+    if table.turns is None or table.form.where is not None or same < _TURNING_SHARE * len(time):
+        return
+    name, turn = table.turns
+    raise InvalidInputError(
+        f"{table.path}: each time is that of several rows, in which {name} is "
+        f"{' and '.join(turn[:_MOST_SESSIONS])}: --where '{name}={turn[0]}' takes one"
+    )
+
+
+def unit_of_steps(
+    step: float, period: tuple[float, float] | None, column: str
+) -> tuple[float, list[str]]:
+    """Return the unit of times without one, s, by their usual step, and sentences on it.
+
+    `period` is that of the rows in s and in a unit of the table, if that is told.
+    """
+    lasting, own = period or (nan, nan)
+    if own != lasting and abs(step - own) < _SAME_STEP * own:
+        text = quantity(lasting, "s")
+        return lasting / own, [
+            f"the time is converted: steps of {own:g} are {text} by a line above"
+        ]
+    if step < 1.0:
+        return 1.0, []
+    return 1.0, [
+        f"the time has no unit and counts in s, {quantity(step, 's')} from row to row: in ms it is "
+        f"time={column}*0.001"
+    ]
 
 
 def even_times(time: FloatArray) -> tuple[FloatArray, list[str]]:

@@ -4,6 +4,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Collection, Generator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,9 @@ _OWN_COLUMNS = {
 }
 """Columns of the files that `stickslip simulate --out` writes; the first one that exists."""
 
+ROW = -1
+"""Place of the number of a row, which every table has."""
+
 
 @dataclass(frozen=True)
 class TableFormat:
@@ -34,6 +38,12 @@ class TableFormat:
     """Encoding of a text, as Python names them."""
     rotary: bool = False
     """Whether displacements are angles, and forces torques."""
+    period: float | None = None
+    """Time from row to row, s, of a table without times."""
+    where: str | None = None
+    """Column and value of the rows that are read, as in `joint=elbow`."""
+    session: int | None = None
+    """Which one of the sessions is read; each starts where the time does again."""
 
     def __post_init__(self) -> None:
         """Refuse what no table has."""
@@ -41,6 +51,10 @@ class TableFormat:
             raise InvalidInputError(f"decimal = {shown(self.decimal)} is invalid: must be . or ,")
         if self.skip is not None and self.skip < 0:
             raise InvalidInputError(f"skip = {self.skip} is invalid: must be at least 0")
+        if self.period is not None and not 0.0 < self.period < inf:
+            raise InvalidInputError(f"period = {self.period} is invalid: must be above 0 s")
+        if self.session is not None and self.session < 1:
+            raise InvalidInputError(f"session = {self.session} is invalid: must be at least 1")
         try:
             "1".encode(self.encoding or "utf-8").decode(self.encoding or "utf-8")
         except (LookupError, ValueError):
@@ -70,6 +84,10 @@ class Table(ABC):
     """Places of the columns that are dates or times of day, once they are read: they are in s."""
     period: tuple[float, float] | None = None
     """Period of the rows that a line above them tells, s and in its own unit."""
+    turns: tuple[str, Sequence[str]] | None = None
+    """A column whose values take turns in the first rows, such as the names of joints."""
+    decimal = "."
+    """Decimal mark."""
 
     @property
     def notes(self) -> Sequence[str]:
@@ -98,7 +116,12 @@ class Table(ABC):
     def name(self, place: int) -> str:
         """Return the name of a column for a message."""
         names = (name for name, each in self.columns.items() if each == place and name[:1] != "#")
-        return f"column {next(names, f'#{place + 1}')}"
+        return f"column {next(names, self.number(place))}"
+
+    def number(self, place: int) -> str:
+        """Return the number of a column, as expressions have it."""
+        numbers = (name for name, each in self.columns.items() if each == place and name[:1] == "#")
+        return next(numbers, f"#{place + 1}")
 
     @property
     def own_columns(self) -> dict[str, str]:

@@ -39,6 +39,8 @@ class MatTable(Table):
 
     def read(self, places: Sequence[int]) -> list[FloatArray]:
         """Return vectors by their places."""
+        if self.form.where is not None:
+            raise InvalidInputError(f"{self.path}: where = {self.form.where} needs a text")
         return [self._vectors[place] for place in places]
 
     def line(self, row: int) -> str:
@@ -111,8 +113,8 @@ def read_table(
 ) -> TableRecording:
     r"""Read a recording from a table: a text such as a CSV file, or a MAT file.
 
-    `columns` has, for some of `QUANTITIES`, an `Expression` of columns and numbers in SI units. What
-    has no number in it is converted, if the table has its unit. By default the file is one of
+    `columns` has, for some of `QUANTITIES`, an `Expression` of columns and numbers in SI units.
+    What has no number in it is converted, if the table has its unit. By default the file is one of
     `stickslip simulate --out`. A `belt_speed` is in place of a column. A velocity that is not given
     is the difference of the positions beside each sample. A belt whose velocity is not given is at
     rest. `form` is what is known of the form of a text.

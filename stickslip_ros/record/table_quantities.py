@@ -3,7 +3,7 @@
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from math import isnan, nan
+from math import isnan, log2, nan
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,11 +13,11 @@ from stickslip_ros.errors import BagError, InvalidInputError
 from stickslip_ros.quantities import ROTARY
 from stickslip_ros.record.expressions import Expression
 from stickslip_ros.record.faults import Jumps, shift_note, velocity_fault
-from stickslip_ros.record.table_clock import even_times
-from stickslip_ros.record.table_columns import Table, reading_file
+from stickslip_ros.record.table_clock import check_turns, even_times, in_order, unit_of_steps
+from stickslip_ros.record.table_columns import ROW, Table, reading_file
 from stickslip_ros.record.units import Unit, units_in
 from stickslip_ros.samples import LARGEST
-from stickslip_ros.text import must_be_one_of
+from stickslip_ros.text import must_be_one_of, quantity
 
 QUANTITIES = (
     "time",
@@ -38,6 +38,8 @@ _FORCES = ("force", "disturbance", "friction_force")
 _MERGED_SHARE, _BETWEEN_SHARE = 0.3, 0.05
 """Share of the rows with a position that lack another quantity, from which it was recorded between
 them; fewest of its values, as a share of the positions."""
+_SMALLEST_TURN = 128.0
+"""Least jump of a counter that wraps, in its own unit."""
 _NUMBER = re.compile(r"_?\d*$")
 """What the names of several columns of times differ by: Time_1 and Time_2."""
 
@@ -67,7 +69,8 @@ def quantities_of(
     columns = table.own_columns if columns is None else columns
     if belt_speed is not None:
         columns = {**columns, "belt_velocity": repr(float(belt_speed))}
-    asked = _asked(table, columns, ("time", "position"))
+    needed = "velocity" if "position" not in columns and "velocity" in columns else "position"
+    asked = _asked(table, columns, ("time", needed))
     clock = asked["time"].places
     if not clock:
         raise InvalidInputError(f"{table.path}: time = {columns['time']} must be a column")
@@ -76,7 +79,8 @@ def quantities_of(
     notes = cells.notes
     times, rows = cells.times(clock, clocks.values())
     time = _picked(times[clock], rows)
-    _check_order(table, time, rows)
+    check_turns(table, time)
+    part = rows if table.form.session else range(len(times[clock]))
     values: dict[str, FloatArray] = {}
     for name in [name for name in asked if name != "time"]:
         value, own = cells.value(name), times[clocks[name]]
@@ -85,17 +89,27 @@ def quantities_of(
                 value if value.shape == own.shape else np.full(own.shape, value), rows
             )
         else:
+            value = value if value.shape == own.shape else np.full(own.shape, value)
+            own, value = (_picked(each, part) for each in (own, value))
             values[name] = _at(time, own, value, hold=name in _FORCES)
             notes.append(f"{name} has times of its own, those of column #{clocks[name][0] + 1}")
-    present = np.isfinite(values["position"])
+    present = np.isfinite(values[needed])
     if not present.any():
-        text = asked["position"].text
-        raise InvalidInputError(f"{table.path}: no row has a time and a position, {text}")
+        raise InvalidInputError(
+            f"{table.path}: no row has a time and a {needed}, {asked[needed].text}"
+        )
     for name in [name for name in values if name not in ("position", "velocity")]:
         values[name], note = _merged(name, time, values[name], present)
         notes += note
     values["time"], note = even_times(time)
     notes += note
+    if needed == "velocity":
+        at, velocity = values["time"][present], values["velocity"][present]
+        moved = np.cumsum(np.append(0.0, (velocity[1:] + velocity[:-1]) / 2.0 * np.diff(at)))
+        values["position"] = np.full(len(present), nan)
+        values["position"][present] = moved
+        notes.append("the position is not recorded: it is the integral of the velocity")
+        return Quantities(values, notes)
     notes += _without_lost_positions(cells, values, rows)
     if "velocity" in values:
         notes += _without_lost_velocities(table, values, rows)
@@ -136,6 +150,8 @@ class _Cells:
     """By place."""
     factors: Mapping[str, float]
     """By quantity."""
+    unknown_unit: bool
+    """Whether times are those of a column without a unit."""
     notes: list[str]
 
     @classmethod
@@ -151,9 +167,12 @@ class _Cells:
         The length of the table is that of the leading ones; others of another length are refused.
         """
         places = [each.places for each in asked.values()]
-        used = sorted({place for each in (*places, *others) for place in each})
+        used = sorted({place for each in (*places, *others) for place in each} - {ROW})
         with reading_file(table.path):
             columns = dict(zip(used, table.read(used), strict=True))
+        if ROW in leading:
+            rows = max((len(column) for column in columns.values()), default=0)
+            columns[ROW] = np.arange(rows, dtype=np.float64)
         rows = max((len(columns[place]) for place in leading), default=0)
         if not rows:
             raise BagError(f"{table.path}: the file cannot be read: it has no rows")
@@ -166,17 +185,48 @@ class _Cells:
         notes = [*table.notes, *_lost_cells(table, columns, asked)]
         factors: dict[str, float] = {}
         units: dict[str, Unit] = {}
+        unknown_unit = False
         for name, each in asked.items():
             factors[name], found = _factor(table, name, each)
             units |= found
+            if name == "time" and each.bare and not found:
+                unknown_unit = each.places[0] not in table.clocks
+            if name == "time" and ROW in each.places:
+                by = "--period" if table.form.period else "a line above them"
+                text = quantity(float(each.text[4:]), "s")
+                notes.append(f"the rows have no time: by {by} they are {text} apart")
         notes += _units_notes(table, units)
-        return cls(table, asked, columns, factors, notes)
+        return cls(table, asked, columns, factors, unknown_unit, notes)
 
     def value(self, name: str) -> FloatArray:
         """Return a quantity, or its only value, in SI units."""
         asked, factor = self.asked[name], self.factors[name]
         value = asked.value([np.asarray(self.columns[place], float) for place in asked.places])
         return _measurable(value if factor == 1.0 else value * factor)
+
+    def rounding(self, name: str) -> float:
+        """Return how much a quantity, linear in its columns, errs by the last digits of these."""
+        asked = self.asked[name]
+        rows = np.zeros((len(asked.places), 1 + len(asked.places)))  # no column, and each by itself
+        for number, place in enumerate(asked.places):
+            rows[number, 1 + number] = np.spacing(np.nanmax(np.abs(self.columns[place])))
+        values = asked.value([*rows]) * self.factors[name]
+        return float(np.sum(np.abs(values - values[0])))
+
+    def unwrapped(self, name: str, row: int) -> str:
+        """Return the expression that unwraps a column which jumps by a power of 2, or nothing."""
+        asked, factor = self.asked[name], self.factors[name]
+        (place, *others), known = asked.places, self.table.columns
+        column = np.asarray(self.columns[place], float)
+        steps = np.abs(np.diff(column[max(0, row - 9) : row + 9]))
+        jump = abs(column[row] - column[row - 1])
+        turn = 2.0 ** round(log2(jump)) if jump > _SMALLEST_TURN else 0.0
+        if others or abs(turn - jump) > 2.0 * np.max(steps, where=steps < jump, initial=0.0):
+            return ""
+        names = [each for each in known if known[each] == place and each in asked.text]
+        unwrapped = f"unwrap({self.table.number(place)}, {turn:.0f})"
+        text = unwrapped if asked.bare else asked.text.replace(names[0], unwrapped, 1)
+        return f"{name}={text}" + f"*{factor:.12g}" * (factor != 1.0)
 
     def times(
         self, clock: tuple[int, ...], others: Iterable[tuple[int, ...]]
@@ -191,6 +241,11 @@ class _Cells:
         rows = range(len(known)) if known.all() else np.flatnonzero(known)
         if not len(rows):
             raise InvalidInputError(f"{self.table.path}: no time is a finite number")
+        rows = in_order(self.table, asked, factor, found[clock], rows)
+        if self.unknown_unit:
+            step = float(np.median(np.diff(_picked(found[clock], rows)))) if len(rows) > 1 else 0.0
+            factor, note = unit_of_steps(step, self.table.period, self.table.number(clock[0]))
+            self.notes.extend(note)
         first = found[clock][rows[0]]
         for places, each in found.items():
             since = each - first if first else each
@@ -205,17 +260,24 @@ def _asked(
     for name in columns:
         if name not in QUANTITIES:
             raise InvalidInputError(f"column {name} is invalid: {must_be_one_of(name, QUANTITIES)}")
-    lacking = [name for name in needed if name not in columns]
+    period = table.form.period or (table.period or (None,))[0]
+    if table.form.period is not None and "time" in columns:
+        raise InvalidInputError(f"{table.path}: period is for a table without times")
+    lacking = [name for name in needed if name not in columns and (name != "time" or not period)]
     if lacking:
         pairs = "; pairs of velocity and force are read by identify --map" * (
             {"velocity", "force"} == {*columns}
         )
+        ways = "; --period gives the time from row to row" * ("time" in lacking and not pairs)
         raise InvalidInputError(
-            f"{table.path}: no column is given for {' and '.join(lacking)}{pairs}"
+            f"{table.path}: no column is given for {' and '.join(lacking)}{pairs}{ways}"
         )
-    return {
+    asked = {
         name: Expression.read(table.path, text, table.columns) for name, text in columns.items()
     }
+    if "time" in needed and "time" not in columns:
+        asked["time"] = Expression.read(table.path, f"row*{period!r}", {"row": ROW})
+    return asked
 
 
 def _clocks(table: Table, clock: tuple[int, ...], asked: Expression) -> tuple[int, ...]:
@@ -225,7 +287,7 @@ def _clocks(table: Table, clock: tuple[int, ...], asked: Expression) -> tuple[in
     like it, such as Time_2 after Time_1.
     """
     stems, first = [_NUMBER.sub("", name) for name in table.names], clock[0]
-    if len(clock) > 1 or not stems[first]:
+    if len(clock) > 1 or first == ROW or not stems[first]:
         return clock
     alike = [place for place, stem in enumerate(stems) if stem == stems[first]]
     own = {
@@ -240,17 +302,6 @@ def _times(clock: Expression, cells: Sequence[Any]) -> Any:
     counts = len(cells) > 1 or cells[0].dtype.kind == "i"
     exact = np.longdouble if counts else float  # a float has no digits for ns since 1970
     return clock.value([np.asarray(each, exact) for each in cells])
-
-
-def _check_order(table: Table, time: FloatArray, rows: range | IntArray) -> None:
-    """Refuse times that go back."""
-    back = np.flatnonzero(time[1:] < time[:-1])
-    if len(back):
-        raise InvalidInputError(
-            f"{table.path}: the time goes back {len(back)} times, the first time at "
-            f"{table.line(int(rows[back[0] + 1]))}: rows must be in the order of time; a counter "
-            "that wraps is time=unwrap(column, turn)"
-        )
 
 
 def _lost_cells(
@@ -280,7 +331,7 @@ def _factor(table: Table, kind: str, asked: Expression) -> tuple[float, dict[str
     for place in places:
         name = table.name(place).removeprefix("column ")
         which = f"{table.path}: {kind}, {table.name(place)},"
-        column = f"#{place + 1}" if len(asked.places) == 1 else f"({asked.text})"
+        column = table.number(place) if len(asked.places) == 1 else f"({asked.text})"
         readings = units_in(table.names[place], table.units[place], target)
         if len(readings) > 1:
             texts = [f"{each.text or target} ({each.factor:g} {each.target})" for each in readings]
@@ -348,7 +399,7 @@ def _without_lost_positions(
     found: range | IntArray = range(len(position))
     if not present.all():
         found = np.flatnonzero(present)
-    jumps = Jumps(_picked(position, found))
+    jumps = Jumps(_picked(position, found), cells.rounding("position"))
 
     def line(row: Any) -> str:
         return table.line(int(rows[found[row]]))
@@ -371,7 +422,13 @@ def _without_lost_positions(
             f"{len(lost)} rows, the first is {line(lost[0])}: they are left out"
         )
     for row, size in jumps.shifts():
-        yield shift_note(size, f"at {line(row)}, {time[found[row]]:.6g} s after the first row")
+        way = cells.unwrapped("position", int(rows[found[row]]))
+        if way:
+            raise InvalidInputError(
+                f"{table.path}: the position jumps as a counter that wraps, at {line(row)}: {way}"
+            )
+        place = f"at {line(row)}, {time[found[row]]:.6g} s after the first row"
+        yield shift_note(size, place, "rad" if table.form.rotary else "m")
 
 
 def _without_lost_velocities(

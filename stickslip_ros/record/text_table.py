@@ -6,20 +6,27 @@ import os
 import re
 import warnings
 from collections.abc import Sequence
+from contextlib import suppress
 from io import StringIO, TextIOWrapper
 from itertools import islice
+from math import nan
 from pathlib import Path
 from statistics import mode
 from typing import Any
 
 import numpy as np
 
+from stickslip_ros.arrays import IntArray
+from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.files import open_regular
+from stickslip_ros.record.expressions import listed
 from stickslip_ros.record.table_columns import Table, TableFormat
 from stickslip_ros.record.units import are_units, joined_units, period_in, without_unit
+from stickslip_ros.text import shown
 
-_HEAD, _TAIL = 1 << 20, 10
-"""Bytes from which the form is found; lines at their end that are rows, with or without more."""
+_HEAD, _TAIL, _TOP = 1 << 20, 10, 100
+"""Bytes from which the form is found; lines at their end that are rows, with or without more; lines
+above the rows that may tell their period, and first rows that are looked at."""
 _LARGEST, _MOST_NUMBERS, _MOST_COLUMNS, _CHUNK = 1 << 33, 1 << 28, 10_000, 1 << 18
 """Bytes of a file, numbers in the columns that are used, columns, and cells that are read at once.
 """
@@ -56,6 +63,7 @@ class TextTable(Table):
         if len(head) == _HEAD and len(lines) > 1:
             del lines[-1]  # a part of a line
         self._seen_decimal = "."
+        self._kept: IntArray | None = None
         self._omitted: list[int] = []
         self._refused: list[int] = []
         self._find(lines, given.skip or 0)
@@ -74,12 +82,14 @@ class TextTable(Table):
         marks = {
             mark for row in rows for cell in row if _is_value(cell) for mark in ".," if mark in cell
         }
-        self._expected_decimal = self._decimal or ("," if marks == {","} else ".")
+        self.decimal = self._decimal or ("," if marks == {","} else ".")
         numeric = [
             _is_value(each[-1]) or sum(map(_is_value, each)) > sum(map(_is_text, each))
             for each in zip(*rows, strict=True)
         ]
-        if width < 2 or sum(numeric) < 2:
+        self.period = next(filter(None, map(period_in, lines[:_TOP])), None)
+        fewest = 2 if self.form.period is None and self.period is None else 1
+        if width < fewest or sum(numeric) < fewest:
             raise ValueError(
                 "it has no rows of two numbers or more, whatever the separator; options say its "
                 "--decimal mark, the lines to --skip and its --encoding"
@@ -128,12 +138,31 @@ class TextTable(Table):
         self.first, self.named = start, names[0][0] + 1 if names else None
         self.names = tuple(names[0][1]) if names else ("",) * width
         self.units = tuple(units)
-        self.columns = {f"#{place + 1}": place for place in range(width)}
+        labels = {
+            place: rows[0][place]
+            for place in range(0 if names else width - 1)
+            if not numeric[place] and numeric[place + 1] and len({row[place] for row in rows}) == 1
+        }
+        values = [place for place in range(width) if place not in labels]
+        self.names = tuple(labels.get(place - 1, name) for place, name in enumerate(self.names))
+        self._labelled = len(labels) > 0
+        self.columns = {f"#{number}": place for number, place in enumerate(values, start=1)}
         for names_of_columns in (self.names, map(without_unit, self.names)):
             for place, name in enumerate(names_of_columns):
                 if name:
                     self.columns.setdefault(name, place)
-        self.period = next(filter(None, map(period_in, lines[skip:start])), None)
+        first = [_cells(line, self._separator) for line in lines[start : start + _TOP]]
+        self._top = [row for row in first if len(row) == width]
+        self.turns = next(filter(None, map(self._turn, range(width))), None)
+
+    def _turn(self, place: int) -> tuple[str, list[str]] | None:
+        """Return the values of a column that take turns, and its name."""
+        cells = [row[place] for row in self._top]
+        turn = [*dict.fromkeys(cells)]
+        in_turn = all(cell == turn[row % len(turn)] for row, cell in enumerate(cells))
+        if not (in_turn and 1 < len(turn) <= len(cells) // 2):
+            return None
+        return self.name(place).removeprefix("column "), turn
 
     @property
     def notes(self) -> list[str]:
@@ -144,7 +173,8 @@ class TextTable(Table):
             *([] if self._encoding.startswith("utf-8") else [f"text in {self._encoding}"]),
             *([f"the first {self._skipped} lines skipped"] if self._skipped > 1 else []),
             *(["the first line skipped"] if self._skipped == 1 else []),
-            *([] if self.named else [f"no names: the columns are #1 to #{self.width}"]),
+            *([f"the names in each row: {listed(self.columns)}"] if self._labelled else []),
+            *([] if any(self.names) else [f"no names: the columns are #1 to #{self.width}"]),
             *([f"units in line {self._units_line}"] if self._units_line else []),
         ]
         notes = [f"the table is read with {', '.join(taken)}"] if taken else []
@@ -157,6 +187,8 @@ class TextTable(Table):
 
     def line(self, row: int) -> str:
         """Return where a row is, for a message."""
+        if self._kept is not None:
+            return f"line {self.first + 1 + self._kept[row]}"
         line = self.first + 1 + row
         for each in self._omitted:
             line += each <= line
@@ -170,6 +202,8 @@ class TextTable(Table):
         # From 3.1 on this is the default, and naming it is deprecated.
         exact: Any = {} if version >= (3, 1) else {"float_precision": "round_trip"}
         parts: dict[int, list[Any]] = {place: [] for place in places}
+        which, value, number = self._where()
+        kept: list[Any] = []
         blank: list[int] = []
         with (
             open_regular(self.path) as stream,
@@ -185,7 +219,7 @@ class TextTable(Table):
                 names=range(self.width),
                 index_col=False,
                 sep=r"\s+" if self._separator == " " else self._separator,
-                decimal=self._expected_decimal,
+                decimal=self.decimal,
                 skipinitialspace=self._has_blanks,
                 skip_blank_lines=False,
                 on_bad_lines="warn",
@@ -202,20 +236,47 @@ class TextTable(Table):
                     empty = frame.isna().all(axis=1)
                     blank += [self.first + 1 + row for row in frame.index[empty]]
                     frame = frame[~empty]
+                if which is not None:
+                    text = frame[which].astype(str).str.strip(" \t'\"")
+                    same = pd.to_numeric(text, errors="coerce") == number
+                    frame = frame[(text == value) | same]
+                    kept.append(frame.index.to_numpy())
                 for place in places:
                     parts[place].append(self._values(frame[place]))
+        if which is not None:
+            self._kept = np.concatenate(kept)
+            if not len(self._kept):
+                values = dict.fromkeys(row[which] for row in self._top)
+                raise InvalidInputError(
+                    f"{self.path}: no row has {self.form.where}; {self.name(which)} has "
+                    f"{listed(dict.fromkeys(values, 0))}"
+                )
         lines = [number for each in caught for number in _SKIPPED.findall(str(each.message))]
         self._refused = [self.first + int(number) for number in lines]
         self._omitted = sorted([*blank, *self._refused])
         self.clocks = {place for place, each in parts.items() if each[0].dtype.kind in "mM"}
         return [_joined(parts.pop(place)) for place in places]
 
+    def _where(self) -> tuple[int | None, str, float]:
+        """Return the column and the value, also as a number, of the rows that are read."""
+        if self.form.where is None:
+            return None, "", nan
+        name, _, value = (each.strip(" '\"") for each in self.form.where.rpartition("="))
+        if name not in self.columns:
+            raise InvalidInputError(
+                f"where = {shown(self.form.where)} is invalid: must be COLUMN=VALUE, with one of "
+                f"{listed(self.columns)}"
+            )
+        with suppress(ValueError):
+            return self.columns[name], value, float(value)
+        return self.columns[name], value, nan
+
     def _values(self, cells: Any) -> Any:
         """Return numbers, or instants, of a column as pandas has read it."""
         import pandas as pd
 
         if cells.dtype.kind in "iuf":
-            if cells.dtype.kind == "f" and self._expected_decimal == ",":
+            if cells.dtype.kind == "f" and self.decimal == ",":
                 self._seen_decimal = ","
             return np.array(cells)
         if cells.dtype.kind == "b":

@@ -216,6 +216,125 @@ def test_rounded_times_of_an_uneven_clock_are_said(tmp_path: Path) -> None:
         assert any("velocities err by 20%" in note for note in notes) == said
 
 
+def test_the_names_are_between_the_values(tmp_path: Path) -> None:
+    lines = [f"\naxis.0.f-error {x:+.9f} axis.0.vel {n % 7:+d} " for n, x in enumerate(POSITION)]
+    path = tmp_path / "halscope.log"
+    path.write_text("Sampling period is 500000 ns \n" + "".join(f"{line}\n" for line in lines))
+    for position in ("axis.0.f-error", "#1"):
+        found = read_table(path, {"position": position})
+        assert found.samples.position.tolist() == POSITION.tolist()
+        assert found.samples.stamp.tolist() == [500_000 * number for number in range(200)]
+    assert "the names in each row: axis.0.f-error, axis.0.vel" in found.notes[0]
+    assert "the rows have no time: by a line above them they are 500 µs apart" in found.notes
+
+
+def test_a_table_without_times_needs_a_period(tmp_path: Path) -> None:
+    path = tmp_path / "log.txt"
+    path.write_text("".join(f"{x:.9f}\n" for x in POSITION))
+    found = read_table(path, {"position": "#1"}, form=TableFormat(period=5e-4))
+    assert found.samples.position.tolist() == POSITION.tolist()
+    assert found.samples.stamp.tolist() == [500_000 * number for number in range(200)]
+    path.write_text("t,x\n" + rows())
+    with pytest.raises(InvalidInputError, match="no column is given for time; --period gives"):
+        read_table(path, {"position": "x"})
+    with pytest.raises(InvalidInputError, match="period is for a table without times"):
+        read_table(path, {"time": "t", "position": "x"}, form=TableFormat(period=5e-4))
+
+
+def test_times_are_in_the_unit_of_the_period_on_top(tmp_path: Path) -> None:
+    top = "SampleTime[ms]\t2\tSampleTime[ms]\t2\n\n"
+    body = "".join(f"{2 * n}\t{n}\t{2 * n}\t0\n" for n in range(50))
+    found = read(tmp_path, top + body, "#1", "#2")
+    assert found.samples.stamp.tolist() == [2_000_000 * number for number in range(50)]
+    assert "the time is converted: steps of 2 are 2 ms by a line above" in found.notes
+    found = read(tmp_path, body, "#1", "#2")
+    assert any("no unit and counts in s, 2 s from row to row" in note for note in found.notes)
+
+
+def test_a_position_that_is_not_recorded_is_the_integral_of_the_velocity(tmp_path: Path) -> None:
+    lines = [f"{n * 1e-3:.3f},{'' if n == 50 else 600 * n}" for n in range(100)]
+    path = tmp_path / "log.csv"
+    path.write_text("t,n [1/min]\n" + "\n".join(lines))
+    columns = {"time": "t", "velocity": "#2"}
+    found = read_table(path, columns, form=TableFormat(rotary=True))
+    turn = 2.0 * np.pi
+    assert found.samples.velocity[7] == pytest.approx(70.0 * turn)
+    known = found.samples[found.samples.is_valid]
+    assert len(known) == 99
+    assert known.position[-1] == pytest.approx(0.5 * 10.0 * turn * 99**2 * 1e-3)
+    assert "the position is not recorded: it is the integral of the velocity" in found.notes
+
+
+def test_rows_of_one_joint_are_read(tmp_path: Path) -> None:
+    joints = [*enumerate(("arm", "7", "x = y"))]
+    lines = [f"{n * 1e-3:.3f},{name},{n + 10 * k}" for n in range(90) for k, name in joints]
+    path, columns = tmp_path / "log.csv", {"time": "t", "position": "x"}
+    path.write_text("t,joint,x\n\n" + "\n".join(lines).replace("5,arm,55", "5,arm,-"))
+    with pytest.raises(InvalidInputError, match="joint is arm and 7 and x = y: --where 'joint"):
+        read_table(path, columns)
+    for number, name in enumerate(("arm", "7.0")):
+        found = read_table(path, columns, form=TableFormat(where=f"joint={name}"))
+        same = found.samples.position == np.arange(90.0) + 10.0 * number
+        assert np.count_nonzero(same) == 90 - (not number)
+        assert any("the first is line 168" in note for note in found.notes) == (not number)
+    for where, sentence in (
+        ("joint=leg", "no row has joint=leg; column joint has arm, 7, x = y"),
+        ("axis=arm", "must be COLUMN=VALUE, with one of t, joint, x"),
+    ):
+        with pytest.raises(InvalidInputError, match=sentence):
+            read_table(path, columns, form=TableFormat(where=where))
+
+
+def test_sessions_are_read_one_by_one(tmp_path: Path) -> None:
+    times = [*range(40), *range(9)]
+    lines = [f"{t},{n},{n + 0.5},{-n}" for n, t in enumerate(times)]
+    path, columns = tmp_path / "log.csv", {"time": "Name", "position": "x", "force": "F"}
+    path.write_text("Name,x,Name,F\n" + "\n".join(lines))
+    with pytest.raises(InvalidInputError, match="line 42, where a session of its own starts: --"):
+        read_table(path, columns)
+    found = read_table(path, columns, form=TableFormat(session=2))
+    assert found.samples.position.tolist() == [*range(40, 49)]
+    assert found.samples.stamp.tolist() == [10**9 * number for number in range(9)]
+    with pytest.raises(InvalidInputError, match=r"session = 3 is invalid: .* has 2"):
+        read_table(path, columns, form=TableFormat(session=3))
+
+
+@pytest.mark.parametrize(
+    ("times", "time", "way"),
+    [
+        ([(86_399_990 + n) % 86_400_000 for n in range(40)], "t [ms]", "#1, 86400000)*0.001"),
+        ([(65_500 + n) % 65_536 for n in range(80)], "#1*1e-3*1", "#1*1e-3*1, 65.536)"),
+        ([f"{n:,}".replace(",", ".") for n in range(990, 1050)], "#1", "--decimal , reads it as 1"),
+    ],
+)
+def test_times_that_go_back_are_refused_with_a_way(
+    tmp_path: Path, times: list[Any], time: str, way: str
+) -> None:
+    text = "t [ms];x\n" + "".join(f"{each};{n}\n" for n, each in enumerate(times))
+    with pytest.raises(InvalidInputError, match=re.escape(way)) as refused:
+        read(tmp_path, text, time, "x")
+    form = TableFormat(decimal=",") if "decimal" in way else ANY_FORM
+    said = str(refused.value).partition("time=")[2]
+    found = read(tmp_path, text, said or time, "x", form).samples
+    assert found.stamp.tolist() == [1_000_000 * number for number in range(len(times))]
+
+
+def test_a_counter_that_wraps_once_is_refused_with_the_expression(tmp_path: Path) -> None:
+    counts = [(2**32 - 900 + 20 * max(0, n - 50) * (n > 80)) % 2**32 for n in range(200)]
+    text = "t,n\n" + "".join(f"{n * 1e-3:.3f},{each}\n" for n, each in enumerate(counts))
+    with pytest.raises(InvalidInputError, match="as a counter that wraps") as refused:
+        read(tmp_path, text, "t", "n*1e-9")
+    said = str(refused.value).partition("position=")[2]
+    assert np.ptp(read(tmp_path, text, "t", said).samples.position) == pytest.approx(2980e-9)
+
+
+def test_differences_of_decimals_do_not_jump(tmp_path: Path) -> None:
+    commands = [(n, 4e-5 * min(n, 2500)) for n in range(3000)]
+    lines = [f"{n * 2e-3:.4f},{cmd:.8f},{cmd - 4e-5:.8f}" for n, cmd in commands]
+    found = read(tmp_path, "t,cmd,act\n" + "\n".join(lines), "t", "cmd-act")
+    assert found.notes == ("the velocity is not recorded: it is the difference of the positions",)
+
+
 def test_a_table_that_gives_no_sample_is_refused(tmp_path: Path) -> None:
     (tmp_path / "log.csv").write_text("t,x,b\n0,1,\n1,2,\n2,,3\n")
     with pytest.raises(InvalidInputError, match="no position has a number of belt_velocity"):
