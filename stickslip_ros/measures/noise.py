@@ -69,17 +69,19 @@ def import_for_noise() -> None:
         import_module(name)
 
 
-def encoder_step(signal: FloatArray) -> float:
+def encoder_step(signal: FloatArray, rounding: float = PRECISION) -> float:
     """Return the step that all values of a signal are whole multiples of apart; 0 without one.
 
     It is the smallest distance of two levels, if the others are multiples of it within a thousandth
-    of a step.
+    of a step. Values that differ by less than a share of the largest, the `rounding`, are of one
+    level.
     """
-    levels = np.diff(np.unique(signal))
-    if len(levels) == 0 or levels.min() <= PRECISION * float(np.abs(signal).max()):
+    apart = np.diff(np.unique(signal))
+    apart = apart[apart > rounding * float(np.abs(signal).max())]
+    if len(apart) == 0:
         return 0.0
-    steps = levels / levels.min()
-    return float(levels.min()) if np.abs(steps - np.rint(steps)).max() < _STEP_DEVIATION else 0.0
+    steps = apart / apart.min()
+    return float(apart.min()) if np.abs(steps - np.rint(steps)).max() < _STEP_DEVIATION else 0.0
 
 
 def resolved(step: float, noise: float = 0.0) -> float:

@@ -1,0 +1,372 @@
+"""Rests and moves: the measures of a slide that rests and slips, from its positions.
+
+Relative to the guide a slide rests or moves. It rests where two means beside each other differ by
+less than half of what the slide travels on average in their distance (the Haar wavelet: S. Mallat
+and W. L. Hwang, Singularity detection and processing with wavelets, IEEE Transactions on
+Information Theory 38, 1992). The means are so long that step and noise of the sensor do not hide
+this travel. Cycles are what repeats from release to release. At an edge the distance from the rest
+grows with a power of time; the edge is where that power extrapolates to zero, and what the powers
+that fit differ by is part of its error.
+"""
+
+from dataclasses import dataclass, replace
+from math import ceil, hypot, inf, sqrt
+from typing import NamedTuple
+
+import numpy as np
+
+from stickslip_ros.arrays import FloatArray
+from stickslip_ros.measures.cycle_measures import Cycle, CycleMeans
+from stickslip_ros.measures.noise import FEWEST_SAMPLES, encoder_step, white_noise
+
+_TAIL, _GROWTH = 8192, 4
+"""Number of last samples in which cycles are looked for first, and its growth while they are few.
+"""
+_LOOK = 4096
+"""Number of last samples from which noise and step are estimated."""
+_ROUNDING = 1e-9
+"""Rounding of numbers in tables, as a share of the largest."""
+_REST_SHARE = 0.5
+"""Share of the mean speed up to which a slide may rest."""
+_STEPS, _DEVIATIONS = 1.3, 3.5
+"""Travel between two means, in steps of the encoder, and the change of them that is no rest, in
+their standard deviations, at least."""
+_FEWEST_REACHES = 16
+"""Number of samples, in lengths of a mean, from which rests are looked for."""
+_LEAST_STEPS, _LEAST_NOISES, _LEAST_SHARE = 3.5, 5.0, 0.1
+"""Travel between two rests, in steps, standard deviations and large slips, that is a slip."""
+_MAIN_SHARE = 0.35
+"""Travel of a slip, in large ones, from which it is a main slip, from which a cycle may begin."""
+_LONG_GAP = 3.0
+"""Time between two releases, in periods, after which cycles begin again."""
+_FEWEST_CYCLES = 3
+"""Number of cycles that repeat."""
+_EDGE_STEPS, _EDGE_NOISES, _EDGE_FLOOR, _EDGE_SHARE = 0.6, 4.0, 1e-3, 0.25
+"""Distance from a rest, in steps, standard deviations and slips, that is none; share of a slip to
+which its edges are fitted."""
+_RELEASE_POWERS, _LANDING_POWERS = (2.0, 3.0, 4.0, 6.0), (1.5, 2.0, 2.5)
+"""Powers of time with which the distance from a rest may grow: a friction that falls at once leaves
+a constant force, one that falls with the speed lets the motion grow slowly."""
+_EDGE_ERROR, _SLIP_ERROR = 0.3, 0.03
+"""Least standard error of an edge, in sample periods and slip times."""
+_CORE = 0.15
+"""Share of a rest at its edges that does not count for its speed."""
+_CREEP, _CREEP_ERROR, _PASSING = 0.03, 0.02, 4.0
+"""Speed in the rests, in mean speeds, and its standard error up to which they are rests; errors
+from which the slide passes."""
+_SMOOTH_SHARE, _WIDEST = 0.1, 40
+"""Half of the width of the smoothing parabola, in slip times, and in samples at most."""
+
+
+@dataclass(frozen=True)
+class StickSlip(CycleMeans):
+    """Means over the last cycles of a slide that rests and slips."""
+
+    start: float
+    """Release from which the first of these cycles begins, s."""
+    end: float
+    """Release with which the last of them ends, s."""
+    feed: float
+    """Mean velocity of the slide relative to the guide in these cycles, m/s."""
+    creep: float
+    """Velocity relative to the guide in the rests, in mean speeds."""
+    creep_error: float
+    """Its standard error."""
+
+    @property
+    def rests(self) -> bool:
+        """Whether the slide is known to rest."""
+        return abs(self.creep) <= _CREEP and self.creep_error <= _CREEP_ERROR
+
+    @property
+    def passes(self) -> bool:
+        """Whether the slide is known to move on in what looks like rests."""
+        return abs(self.creep) > max(_CREEP, _PASSING * self.creep_error)
+
+
+class _Slip(NamedTuple):
+    release: float
+    landing: float
+    errors: tuple[float, float]
+    travel: float
+
+    @property
+    def duration(self) -> float:
+        return self.landing - self.release
+
+
+def stick_slip(
+    time: FloatArray, position: FloatArray, belt_velocity: float, most_cycles: int, step: float
+) -> StickSlip | None:
+    """Return the measures of the last cycles of a slide that rests and slips; None without them.
+
+    Positions, m, at times, s, are seen from where the belt, or the guide, has this velocity, m/s;
+    without one, the mean velocity of the cycles is taken from them. `step` is that of the encoder,
+    m, or 0: one that shows relative to the guide only is found.
+    """
+    count = _TAIL
+    while True:
+        part = slice(max(len(time) - count, 0), None)
+        found = _measured(time[part], position[part], belt_velocity, most_cycles, step)
+        if count >= len(time) or (found is not None and len(found.amplitudes) >= most_cycles):
+            return found
+        count *= _GROWTH
+
+
+def _measured(
+    time: FloatArray, position: FloatArray, belt_velocity: float, most_cycles: int, step: float
+) -> StickSlip | None:
+    if len(time) < FEWEST_SAMPLES or not time[-1] > time[0]:
+        return None
+    relative = position - belt_velocity * (time - time[0])
+    step = step or encoder_step(relative[-_LOOK:], _ROUNDING)
+    noise = white_noise(relative[-_LOOK:])
+    speed = abs(belt_velocity) or _mean_speed(time, relative, max(step, 6.0 * noise))
+    slips = _slips(time, relative, speed, noise, step)
+    starts = _cycle_starts(slips)[-most_cycles - 1 :]
+    if len(starts) <= _FEWEST_CYCLES:
+        return None
+    used = slips[starts[0] : starts[-1]]
+    release = np.array([slips[each].release for each in starts])
+    period = float(release[-1] - release[0]) / (len(release) - 1)
+    durations = np.add.reduceat([slip.duration for slip in used], np.array(starts[:-1]) - starts[0])
+    shares = 1.0 - durations / np.diff(release)
+    travel = float(np.sum([slip.travel for slip in used]))
+    feed = travel / float(release[-1] - release[0])
+    if not belt_velocity:
+        position = position - feed * (time - time[0])
+    rows = np.searchsorted(time, release)
+    width = float(np.median([slip.duration for slip in used])) * _SMOOTH_SHARE
+    reach = int(min(width * (len(time) - 1) / float(time[-1] - time[0]), _WIDEST))
+    extremes = _extremes(time, position, rows.tolist(), reach)
+    cycle, errors = _means(extremes, release, shares)
+    edges = np.mean([slip.errors for slip in used], axis=0) * len(used) / len(shares) / period
+    sure = hypot(errors.stick_fraction, float(np.hypot(*edges)))
+    errors = replace(
+        errors,
+        amplitude=hypot(errors.amplitude, max(step, noise) / sqrt(8.0 * len(shares))),
+        midpoint=hypot(errors.midpoint, max(step, noise) / sqrt(8.0 * len(shares))),
+        stick_fraction=sure,
+    )
+    creep, creep_error = _creep(time, relative, used, noise, step)
+    if creep_error == inf:
+        return None
+    unit = abs(belt_velocity) or speed
+    return StickSlip(
+        cycle=cycle,
+        errors=errors,
+        sticks=True,
+        amplitudes=extremes[0],
+        start=float(release[0]),
+        end=float(release[-1]),
+        feed=feed,
+        creep=creep / unit,
+        creep_error=creep_error / unit,
+    )
+
+
+def _mean_speed(time: FloatArray, position: FloatArray, least: float) -> float:
+    """Return the mean speed of what moves by more than `least`, m, to and fro, m/s."""
+    block = max(len(position) // 4096, 1)
+    course = position[: len(position) // block * block].reshape(-1, block).mean(axis=1).tolist()
+    path, held = 0.0, course[0]
+    for each in course:
+        if abs(each - held) > least:
+            path += abs(each - held)
+            held = each
+    return path / float(time[-1] - time[0])
+
+
+def _rests(position: FloatArray, reach: int, most: float) -> list[tuple[int, int]]:
+    """Return the first and last rows of the rests among positions.
+
+    The means over `reach` positions before and after a row of a rest differ by at most `most`.
+    """
+    total = np.concatenate([[0.0], np.cumsum(position - position[0])])
+    change = total[2 * reach :] - 2.0 * total[reach:-reach] + total[: -2 * reach]
+    still = np.abs(change) <= most * reach
+    turns = np.flatnonzero(np.diff(still, prepend=False, append=False)).reshape(-1, 2)
+    apart: list[tuple[int, int]] = []
+    for first, last in (turns + [0, 2 * reach - 2]).tolist():
+        if apart and apart[-1][1] >= first:
+            middle = (apart[-1][1] + first) // 2
+            apart[-1] = apart[-1][0], middle
+            first = middle + 1
+        if last > first:
+            apart.append((first, last))
+    return apart
+
+
+def _slips(
+    time: FloatArray, position: FloatArray, speed: float, noise: float, step: float
+) -> list[_Slip]:
+    """Return the moves between two rests."""
+    period = float(time[-1] - time[0]) / (len(time) - 1)
+    travel = speed * period
+    if travel <= 0.0:
+        return []
+    by_noise = (_DEVIATIONS * sqrt(2.0) * noise / (_REST_SHARE * travel)) ** (2.0 / 3.0)
+    reach = max(by_noise, _STEPS * step / travel, 2.0)
+    if len(time) < _FEWEST_REACHES * reach:
+        return []
+    reach = ceil(reach)
+    found = _rests(position, reach, _REST_SHARE * travel * reach)
+    if len(found) < 2:
+        return []
+    inner = [slice((3 * a + b) // 4, max((a + 3 * b) // 4, (3 * a + b) // 4 + 1)) for a, b in found]
+    level = [float(np.mean(position[each])) for each in inner]
+    jumps = np.abs(np.diff(level))
+    large = float(np.mean(jumps[jumps >= np.quantile(jumps, 0.9) / 2.0]))
+    least = max(_LEAST_STEPS * step, _LEAST_NOISES * noise, _LEAST_SHARE * large)
+    # Between its slips a slide creeps, and seems to rest more than once.
+    first, last, longest = [0], [0], [0]
+    for each in range(1, len(found)):
+        if abs(level[each] - level[longest[-1]]) > least:
+            for rows in (first, last, longest):
+                rows.append(each)
+        else:
+            last[-1] = each
+            if np.ptp(found[each]) > np.ptp(found[longest[-1]]):
+                longest[-1] = each
+    near = max(_EDGE_STEPS * step, _EDGE_NOISES * noise)
+    slips: list[_Slip] = []
+    for before in range(len(first) - 1):
+        rows = [found[first[each]][0] + found[last[each]][1] for each in (before, before + 1)]
+        levels = level[longest[before]], level[longest[before + 1]]
+        slips.append(_slip(time, position, rows[0] // 2, rows[1] // 2, levels, near))
+    return slips
+
+
+def _slip(
+    time: FloatArray,
+    position: FloatArray,
+    first: int,
+    last: int,
+    levels: tuple[float, float],
+    near: float,
+) -> _Slip:
+    """Return the slip between rows in the middle of two rests with these levels, m."""
+    travel = levels[1] - levels[0]
+    size = abs(travel)
+    course = (position[first : last + 1] - levels[0]) * (1.0 if travel > 0.0 else -1.0)
+    middle = int(np.argmax(course > size / 2.0))
+    near = max(near, _EDGE_FLOOR * size)
+    start, start_error = _edge(course[: middle + 1], near, size, _RELEASE_POWERS)
+    end, end_error = _edge(size - course[middle:][::-1], near, size, _LANDING_POWERS)
+    rows = np.arange(last - first + 1)
+    release, landing = np.interp([start, len(rows) - 1 - end], rows, time[first : last + 1])
+    least = _SLIP_ERROR * float(landing - release)
+    period = float(time[last] - time[first]) / max(last - first, 1)
+    errors = hypot(start_error * period, least), hypot(end_error * period, least)
+    return _Slip(float(release), float(landing), errors, travel)
+
+
+def _edge(
+    course: FloatArray, near: float, size: float, powers: tuple[float, ...]
+) -> tuple[float, float]:
+    """Return the row at which a course leaves zero on its way to a slip of this size; its error."""
+    inside = np.flatnonzero(course <= near)
+    last = int(inside[-1]) if len(inside) else 0
+    beyond = np.flatnonzero(course[last + 1 :] > near + _EDGE_SHARE * size)
+    rows = np.arange(last + 1, min(last + 2 + int(beyond[0]) if len(beyond) else len(course), len(course)))
+    if len(rows) < 3:
+        return last + 0.5, hypot(_EDGE_ERROR, 0.3)
+    values = np.maximum(course[rows], 0.0)
+    middle = float(np.mean(rows))
+    edges, squares = np.empty(len(powers)), np.empty(len(powers))
+    for each, power in enumerate(powers):
+        root = values ** (1.0 / power)
+        offset = float(np.mean(root))
+        slope = float((rows - middle) @ root) / float((rows - middle) @ (rows - middle))
+        edges[each] = middle - offset / slope if slope > 0.0 else last
+        fitted = np.maximum(offset + slope * (rows - middle), 0.0) ** power
+        squares[each] = np.sum((fitted - values) ** 2) + (near / 3.0) ** 2
+    edges = np.clip(edges, 0.0, last + 1.0)
+    weight = (squares.min() / squares) ** 2
+    weight /= weight.sum()
+    mean = float(weight @ edges)
+    return mean, hypot(_EDGE_ERROR, sqrt(float(weight @ (edges - mean) ** 2)))
+
+
+def _cycle_starts(slips: list[_Slip]) -> list[int]:
+    """Return the slips with which the last cycles begin, and the one with which they end.
+
+    Where main slips to and fro take turns, two of them are a cycle.
+    """
+    if not slips:
+        return []
+    travel = np.array([slip.travel for slip in slips])
+    sizes = np.abs(travel)
+    large = float(np.mean(sizes[sizes >= np.quantile(sizes, 0.9) / 2.0]))
+    main = np.flatnonzero(sizes >= _MAIN_SHARE * large)
+    forward = travel[main] > 0.0
+    turns = np.count_nonzero(forward[1:] != forward[:-1])
+    if turns > len(main) // 2:
+        main = main[forward]
+        forward = forward[forward]
+    release = np.array([slips[each].release for each in main])
+    if len(main) <= _FEWEST_CYCLES:
+        return []
+    gaps = np.diff(release)
+    breaks = (gaps > _LONG_GAP * np.median(gaps)) | (forward[1:] != forward[:-1])
+    parts = np.split(main, np.flatnonzero(breaks) + 1)
+    return next((each.tolist() for each in parts[::-1] if len(each) > _FEWEST_CYCLES), [])
+
+
+def _extremes(
+    time: FloatArray, position: FloatArray, rows: list[int], reach: int
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return amplitude, velocity amplitude and midpoint of each cycle between two of the rows.
+
+    Displacement and velocity are those of the parabola through the samples within `reach` (Savitzky
+    and Golay, Analytical Chemistry 36, 1964).
+    """
+    reach = max(reach, 1)
+    lags = np.arange(-reach, reach + 1)
+    powers = np.linalg.pinv(np.vander(lags, min(3, 2 * reach + 1), increasing=True).astype(float))
+    first, last = max(rows[0] - reach, 0), rows[-1] + reach + 1
+    period = float(time[-1] - time[0]) / (len(time) - 1)
+    part = np.pad(position[first:last] - position[first], reach, mode="edge")
+    smooth = position[first:last] if reach < 2 else np.convolve(part, powers[0][::-1], "valid") + position[first]
+    speed = np.convolve(part, powers[1][::-1], "valid") / period
+    amplitudes = np.empty((3, len(rows) - 1))
+    for each, (start, end) in enumerate(zip(rows, rows[1:], strict=False)):
+        inside = slice(start - first, end - first + 1)
+        high, low = float(smooth[inside].max()), float(smooth[inside].min())
+        amplitudes[:, each] = (high - low) / 2.0, np.ptp(speed[inside]) / 2.0, (high + low) / 2.0
+    return amplitudes[0], amplitudes[1], amplitudes[2]
+
+
+def _means(
+    extremes: tuple[FloatArray, FloatArray, FloatArray], release: FloatArray, shares: FloatArray
+) -> tuple[Cycle, Cycle]:
+    """Return the means over cycles, and their standard errors."""
+    periods = np.diff(release)
+    count = len(periods)
+    columns = [*extremes, periods, 1.0 / periods, shares]
+    amplitude, velocity, middle, period, frequency, share = (
+        float(np.std(each, ddof=1)) / sqrt(count) for each in columns
+    )
+    errors = Cycle(amplitude, velocity, middle, period, frequency, share)
+    mean = [float(np.mean(each)) for each in columns]
+    weighted = float(shares @ periods) / float(periods.sum())
+    cycle = Cycle(mean[0], mean[1], mean[2], mean[3], 1.0 / mean[3], weighted)
+    return cycle, errors
+
+
+def _creep(
+    time: FloatArray, position: FloatArray, slips: list[_Slip], noise: float, step: float
+) -> tuple[float, float]:
+    """Return the mean velocity in the rests between slips, m/s, and its standard error."""
+    products = squares = lasting = 0.0
+    for before, after in zip(slips, slips[1:], strict=False):
+        margin = _CORE * (after.release - before.landing)
+        first, last = np.searchsorted(time, [before.landing + margin, after.release - margin])
+        if last - first >= 2:
+            part = time[first:last] - float(np.mean(time[first:last]))
+            products += float(part @ position[first:last])
+            squares += float(part @ part)
+            lasting += float(part[-1] - part[0])
+    if squares <= 0.0 or lasting <= 0.0:
+        return 0.0, inf
+    return products / squares, hypot(noise / sqrt(squares), step / lasting)
