@@ -7,9 +7,11 @@ import numpy as np
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.measures.cycle_measures import LEAST_CYCLES
 from stickslip_ros.measures.noise import rises
+from stickslip_ros.measures.segmentation import stick_slip
 from stickslip_ros.samples import SampleColumns
 from stickslip_ros.stamps import NANOSECONDS
 
+_MOST_CYCLES = 1_000_000
 _PASSES = 4
 """Passes in which the feed is corrected."""
 _BACK_SHARE = 1.1
@@ -56,7 +58,9 @@ def relative_to_feed(samples: SampleColumns) -> tuple[SampleColumns, float]:
     if not len(known) or known.belt_velocity.any():
         return samples, 0.0
     time = (samples.stamp - samples.stamp[0]) / NANOSECONDS
-    feed = mean_feed(time[samples.is_valid], known.position)
+    time_known = time[samples.is_valid]
+    slips = stick_slip(time_known, known.position, 0.0, _MOST_CYCLES, 0.0)
+    feed = slips.feed if slips is not None else mean_feed(time_known, known.position)
     if feed is None:
         return samples, 0.0
     moved = replace(

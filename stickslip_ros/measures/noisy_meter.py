@@ -14,6 +14,7 @@ from stickslip_ros.measures.noise import (
 )
 from stickslip_ros.measures.noisy_samples import NoisySamples
 from stickslip_ros.measures.noisy_window import REVERSAL, NoisyWindow
+from stickslip_ros.measures.segmentation import ROUNDING
 from stickslip_ros.measures.single_cycles import (
     cycle_between,
     fit_reach,
@@ -34,7 +35,9 @@ _LOOK_LENGTH = 2048
 _MOST_SAMPLES = 400_000
 """Number of samples up to which the cycles of a window are kept."""
 _WITHOUT_CYCLES = 8192
-"""Number of samples that are kept before the first cycle."""
+"""Number of samples in which the first cycle is looked for."""
+_HELD = 131_072
+"""Number of samples that are kept at least: cycles with long rests show no reversals."""
 _MARGIN = 64
 """Number of samples that are kept before the window, for the fits at its start."""
 _ROUNDING_SHARE = 1e-7
@@ -85,6 +88,9 @@ class NoisyCycleMeter:
         if count < 3:
             return
         noise, step = white_noise(position), encoder_step(position)
+        if belt.any():  # the encoder may be that of a guide at rest
+            course = position - float(belt[-1]) * (recent.time - recent.time[0])
+            step = max(step, encoder_step(course, ROUNDING))
         moved = float(np.ptp(medians(position)))
         if noise > max(_ROUNDING_SHARE * moved, PRECISION * float(np.abs(position).max())):
             window.noise, self.noisy = noise, True
@@ -104,7 +110,7 @@ class NoisyCycleMeter:
         """Return the cycles that the samples since the last one complete."""
         last, noise = self.window.last, self.window.noise
         samples, cycles, lows = last.samples, last.cycles, last.lows
-        first = samples.row(lows[-1].time) if lows else 0
+        first = samples.row(lows[-1].time) if lows else max(len(samples) - _WITHOUT_CYCLES, 0)
         if len(samples) - first > _WITHOUT_CYCLES and self.window.run % _LOOK_INTERVAL:
             return []
         size = 2.0 * cycles[-1].amplitude if cycles and not last.resting else 0.0
@@ -126,8 +132,9 @@ class NoisyCycleMeter:
                 lows.pop()
             lows.append(end)
         # Drop the samples before the window.
-        row = samples.row(lows[0].time) if lows else len(samples) - _WITHOUT_CYCLES
-        row = min(max(row, len(samples) - _MOST_SAMPLES) - _MARGIN, len(samples) - _LOOK_LENGTH)
+        row = samples.row(lows[0].time) if lows else len(samples)
+        row = min(row - _MARGIN, len(samples) - _HELD)
+        row = max(row, len(samples) - _MOST_SAMPLES)
         if row > 0:
             last.drop_first(row)
         return completed

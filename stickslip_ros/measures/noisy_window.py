@@ -11,6 +11,7 @@ from stickslip_ros.measures.cycle_fit import MeanCycle, fit_mean_cycle
 from stickslip_ros.measures.cycle_measures import (
     EQUILIBRIUM_SPEED,
     LEAST_CYCLES,
+    STALE_PERIODS,
     STEADY_CHANGE_UNDER_NOISE,
     Cycle,
     CycleMeans,
@@ -29,6 +30,7 @@ from stickslip_ros.measures.noise import (
     strongest_line,
 )
 from stickslip_ros.measures.noisy_samples import LastCycles, NoisySamples
+from stickslip_ros.measures.segmentation import StickSlip, stick_slip
 from stickslip_ros.measures.single_cycles import LEAST_STICK
 from stickslip_ros.measures.slips import regime_by_slips
 
@@ -40,6 +42,9 @@ _SHORTEST, _LONGEST = 128, 2048
 """Least and largest number of samples of the last part of a run, unless its cycles are longer."""
 _QUANTUM = 1.73
 """Resolution of an encoder with a noise of half of it, in standard deviations of the two."""
+_REFINED_SHARE, _SAME_PERIOD = 0.5, 0.01
+"""Stick fraction up to which a fit of the mean cycle refines it, if the periods agree within this
+share."""
 _SLIP_SHARE = 0.1
 """Share of the belt speed by which a slide at rest may seem to move."""
 
@@ -94,9 +99,46 @@ class NoisyWindow:
     def measures(self, *, quick: bool = False) -> tuple[Measures, MeanCycle | None]:
         """Return the measures, and the mean cycle if the cycles are alike.
 
-        Where the reversals do not show cycles, a line of the spectrum may. With `quick`, means over
-        single cycles will do.
+        Rests and slips tell first; the fit of a mean cycle refines short sticks. Where the
+        reversals do not show cycles, a line of the spectrum may. With `quick`, means over single
+        cycles will do.
         """
+        segmented = self.stick_slip()
+        if segmented is None or segmented.passes:
+            return self._by_reversals(quick=quick)
+        if not segmented.rests:
+            found = self.segmented(segmented)
+            return replace(found, regime=None, stick_fraction=None), None
+        share, error = segmented.cycle.stick_fraction, segmented.errors.stick_fraction
+        if not quick and share < _REFINED_SHARE:
+            found, fit = self._by_reversals()
+            alike = fit is not None and fit.errors is not None
+            alike = alike and abs(fit.cycle.period / segmented.cycle.period - 1.0) < _SAME_PERIOD
+            if alike and abs(fit.cycle.stick_fraction - share) < 3.0 * hypot(
+                error, fit.errors.stick_fraction
+            ):
+                return found, fit
+        return self.segmented(segmented), None
+
+    def stick_slip(self) -> StickSlip | None:
+        """Return the rests and slips that go on at the end of the run; None without them."""
+        samples = self.last.samples
+        if len(samples) < FEWEST_SAMPLES or self.stick_speed > 0.0:
+            return None
+        belt = float(samples.belt[-1])
+        if float(np.ptp(samples.belt)) > 1e-6 * abs(belt):
+            return None
+        found = stick_slip(samples.time, samples.position, belt, self.most_cycles, self.step)
+        if found is None:
+            return None
+        since = float(samples.time[-1]) - found.end
+        return found if since <= STALE_PERIODS * found.cycle.period else None
+
+    def segmented(self, found: StickSlip) -> Measures:
+        """Return the measures of rests and slips."""
+        return found.measures(False, *self._trend(found.amplitudes))
+
+    def _by_reversals(self, *, quick: bool = False) -> tuple[Measures, MeanCycle | None]:
         recent, resting, part = self._recent, self.last.resting, self.last
         # Few samples after a gap tell less than the cycles before it.
         enough = len(recent) >= (1 if self.before is None else FEWEST_SAMPLES)
@@ -153,13 +195,19 @@ class NoisyWindow:
 
     def _found(self, samples: NoisySamples, means: CycleMeans, noise: float) -> Measures:
         """Return the measures of cycles in samples with this noise, m."""
-        enough, size = len(means.amplitudes) >= LEAST_CYCLES, means.cycle.amplitude
-        trend = trend_under_noise(means.amplitudes, self.noise, self.step) if enough else None
+        size = means.cycle.amplitude
         if noise < self.step / 2.0 and size < _FEW_STEPS * self.step:
             means = replace(means, errors=None)
         moving = float(samples.belt[-1]) != 0.0
         slow = means.cycle.velocity_amplitude < EQUILIBRIUM_SPEED * self.fastest_belt
-        return means.measures(moving and slow, trend is None if enough else None, trend)
+        return means.measures(moving and slow, *self._trend(means.amplitudes))
+
+    def _trend(self, amplitudes: FloatArray) -> tuple[bool | None, Trend | None]:
+        """Return whether cycles are steady, and how they change."""
+        if len(amplitudes) < LEAST_CYCLES:
+            return None, None
+        trend = trend_under_noise(amplitudes, self.noise, self.step)
+        return trend is None, trend
 
     def _rest(self, samples: NoisySamples, regime: Regime = Regime.EQUILIBRIUM) -> Measures:
         cycles = self.last.cycles

@@ -30,6 +30,7 @@ from stickslip_ros.measures.noise import FEW_SAMPLES
 from stickslip_ros.measures.noisy_meter import NoisyCycleMeter
 from stickslip_ros.measures.sample_assumptions import EXACT, SampleAssumptions
 from stickslip_ros.measures.sampling_grid import LONGEST_GAP, SamplingGrid, whole
+from stickslip_ros.measures.segmentation import StickSlip
 from stickslip_ros.samples import SampleColumns
 from stickslip_ros.stamps import NANOSECONDS
 from stickslip_ros.text import quantity
@@ -39,6 +40,8 @@ _LASTING_SAMPLES = 4
 _LEAST_ERRORS, _LEAST_SHARE = 4.0, 1e-3
 """Difference between the velocities of stick and belt, in standard errors and in belt speeds, above
 which they disagree."""
+_SAME_PERIOD = 0.01
+"""Relative difference of two periods that are the same."""
 _EDGE_ERROR = 0.03
 """Standard error of the stick of a cycle of exact samples, in sample periods: its edges are
 interpolated, and the rounding is alike in all cycles."""
@@ -204,6 +207,9 @@ class SampleMeter:
         self.mean_cycle = None
         if unbounded or not (self.noisy or few):
             found = self._meter.measures()
+            segmented = None if unbounded or not self._may_rest else window.stick_slip()
+            if segmented is not None and segmented.rests and not _agree(found, segmented):
+                return window.segmented(segmented)
             if found.errors is not None and found.stick_fraction:
                 error = max(found.errors["stick_fraction"], _EDGE_ERROR / self._per_cycle)
                 found = replace(found, errors={**found.errors, "stick_fraction": error})
@@ -275,7 +281,7 @@ class SampleMeter:
             cycles = self._meter.feed(breakpoints, float(belt[-1]), self._fastest_belt)
             if cycles and len(time) > 1:
                 self._per_cycle = cycles[-1].period / float(np.median(np.diff(time)))
-        if given is not False or self._per_cycle < FEW_SAMPLES:
+        if given is not False or self._fastest_belt == 0.0 or self._per_cycle < FEW_SAMPLES:
             under_noise = self._noisy_meter.feed(
                 time[new], samples.position[new], samples.velocity[new], belt[new]
             )
@@ -299,6 +305,15 @@ class SampleMeter:
         return cycles
 
     @property
+    def _may_rest(self) -> bool:
+        """Whether rests and slips are looked for in samples that seem to be exact.
+
+        The velocities of other machines are filtered, and those on a guide at rest are not those of
+        a belt.
+        """
+        return self.reading.noisy is None or self._fastest_belt == 0.0
+
+    @property
     def _stick_speed(self) -> float:
         given = self.reading.stick_speed
         return STICK_SHARE * (self._fastest_belt or self._fastest_slip) if given is None else given
@@ -314,3 +329,12 @@ class SampleMeter:
             rows = sliding_window_view(velocity, count)
             lasting = max(float(rows.min(axis=1).max()), -float(rows.max(axis=1).min()))
             self._lasting_speed = max(self._lasting_speed, lasting)
+
+
+def _agree(found: Measures, segmented: StickSlip) -> bool:
+    """Return whether measures of exact samples are those of the rests and slips."""
+    if found.stick_fraction is None or not found.period:
+        return False
+    apart = abs(found.stick_fraction - segmented.cycle.stick_fraction)
+    same = abs(found.period / segmented.cycle.period - 1.0) < _SAME_PERIOD
+    return same and apart < 3.0 * segmented.errors.stick_fraction

@@ -24,7 +24,7 @@ _TAIL, _GROWTH = 8192, 4
 """
 _LOOK = 4096
 """Number of last samples from which noise and step are estimated."""
-_ROUNDING = 1e-9
+ROUNDING = 1e-9
 """Rounding of numbers in tables, as a share of the largest."""
 _REST_SHARE = 0.5
 """Share of the mean speed up to which a slide may rest."""
@@ -102,7 +102,7 @@ def stick_slip(
 
     Positions, m, at times, s, are seen from where the belt, or the guide, has this velocity, m/s;
     without one, the mean velocity of the cycles is taken from them. `step` is that of the encoder,
-    m, or 0: one that shows relative to the guide only is found.
+    m, or 0: one that only shows relative to the guide is found.
     """
     count = _TAIL
     while True:
@@ -119,7 +119,7 @@ def _measured(
     if len(time) < FEWEST_SAMPLES or not time[-1] > time[0]:
         return None
     relative = position - belt_velocity * (time - time[0])
-    step = step or encoder_step(relative[-_LOOK:], _ROUNDING)
+    step = max(step, encoder_step(relative[-_LOOK:], ROUNDING))
     noise = white_noise(relative[-_LOOK:])
     speed = abs(belt_velocity) or _mean_speed(time, relative, max(step, 6.0 * noise))
     slips = _slips(time, relative, speed, noise, step)
