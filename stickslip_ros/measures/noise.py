@@ -27,6 +27,8 @@ PRECISION = 1e-12
 """Noise below this share of the largest values is rounding of the numbers, not of a sensor."""
 _STEP_DEVIATION = 1e-3
 """Largest deviation of whole numbers of steps."""
+_DIVISIONS = 3
+"""Number of divisions in which a step is found."""
 _RANGE = 6.0
 """Range of the noise, in standard deviations."""
 
@@ -69,19 +71,26 @@ def import_for_noise() -> None:
         import_module(name)
 
 
-def encoder_step(signal: FloatArray, rounding: float = PRECISION) -> float:
+def encoder_step(signal: FloatArray, rounding: float = 0.0) -> float:
     """Return the step that all values of a signal are whole multiples of apart; 0 without one.
 
-    It is the smallest distance of two levels, if the others are multiples of it within a thousandth
-    of a step. Values that differ by less than a share of the largest, the `rounding`, are of one
+    It is the smallest distance of two levels, or of two such distances, if the others are multiples
+    of it within a thousandth of a step (Euclid's algorithm). Values that differ by less than a share of the largest, the `rounding`, are of one
     level.
     """
-    apart = np.diff(np.unique(signal))
-    apart = apart[apart > rounding * float(np.abs(signal).max())]
-    if len(apart) == 0:
-        return 0.0
-    steps = apart / apart.min()
-    return float(apart.min()) if np.abs(steps - np.rint(steps)).max() < _STEP_DEVIATION else 0.0
+    largest = float(np.abs(signal).max(initial=0.0))
+    levels = np.diff(np.unique(signal))
+    levels = levels[levels > rounding * largest]
+    for _ in range(_DIVISIONS):
+        if len(levels) == 0 or levels.min() <= max(rounding, PRECISION) * largest:
+            return 0.0
+        step = float(levels.min())
+        rest = np.abs(levels - np.rint(levels / step) * step)
+        if rest.max() < _STEP_DEVIATION * step:
+            return step
+        # What moves on evenly passes several steps from sample to sample: 13 or 14, say.
+        levels = np.append(levels, rest[rest >= _STEP_DEVIATION * step])
+    return 0.0
 
 
 def resolved(step: float, noise: float = 0.0) -> float:

@@ -42,9 +42,8 @@ _SHORTEST, _LONGEST = 128, 2048
 """Least and largest number of samples of the last part of a run, unless its cycles are longer."""
 _QUANTUM = 1.73
 """Resolution of an encoder with a noise of half of it, in standard deviations of the two."""
-_REFINED_SHARE, _SAME_PERIOD = 0.5, 0.01
-"""Stick fraction up to which a fit of the mean cycle refines it, if the periods agree within this
-share."""
+_REFINED_SHARE = 0.5
+"""Stick fraction up to which a fit of the mean cycle refines it."""
 _SLIP_SHARE = 0.1
 """Share of the belt speed by which a slide at rest may seem to move."""
 
@@ -106,19 +105,15 @@ class NoisyWindow:
         segmented = self.stick_slip()
         if segmented is None or segmented.passes:
             return self._by_reversals(quick=quick)
+        refined, fit = None, None
+        if segmented.cycle.stick_fraction < _REFINED_SHARE:
+            refined, fit = self._by_reversals(quick=quick)
+        if refined is not None and segmented.agrees(refined):
+            return refined, fit
+        found = self.segmented(segmented)
         if not segmented.rests:
-            found = self.segmented(segmented)
-            return replace(found, regime=None, stick_fraction=None), None
-        share, error = segmented.cycle.stick_fraction, segmented.errors.stick_fraction
-        if not quick and share < _REFINED_SHARE:
-            found, fit = self._by_reversals()
-            alike = fit is not None and fit.errors is not None
-            alike = alike and abs(fit.cycle.period / segmented.cycle.period - 1.0) < _SAME_PERIOD
-            if alike and abs(fit.cycle.stick_fraction - share) < 3.0 * hypot(
-                error, fit.errors.stick_fraction
-            ):
-                return found, fit
-        return self.segmented(segmented), None
+            found = replace(found, regime=None, stick_fraction=None)
+        return found, None
 
     def stick_slip(self) -> StickSlip | None:
         """Return the rests and slips that go on at the end of the run; None without them."""

@@ -30,7 +30,6 @@ from stickslip_ros.measures.noise import FEW_SAMPLES
 from stickslip_ros.measures.noisy_meter import NoisyCycleMeter
 from stickslip_ros.measures.sample_assumptions import EXACT, SampleAssumptions
 from stickslip_ros.measures.sampling_grid import LONGEST_GAP, SamplingGrid, whole
-from stickslip_ros.measures.segmentation import StickSlip
 from stickslip_ros.samples import SampleColumns
 from stickslip_ros.stamps import NANOSECONDS
 from stickslip_ros.text import quantity
@@ -40,8 +39,6 @@ _LASTING_SAMPLES = 4
 _LEAST_ERRORS, _LEAST_SHARE = 4.0, 1e-3
 """Difference between the velocities of stick and belt, in standard errors and in belt speeds, above
 which they disagree."""
-_SAME_PERIOD = 0.01
-"""Relative difference of two periods that are the same."""
 _EDGE_ERROR = 0.03
 """Standard error of the stick of a cycle of exact samples, in sample periods: its edges are
 interpolated, and the rounding is alike in all cycles."""
@@ -208,7 +205,7 @@ class SampleMeter:
         if unbounded or not (self.noisy or few):
             found = self._meter.measures()
             segmented = None if unbounded or not self._may_rest else window.stick_slip()
-            if segmented is not None and segmented.rests and not _agree(found, segmented):
+            if segmented is not None and segmented.rests and not segmented.agrees(found):
                 return window.segmented(segmented)
             if found.errors is not None and found.stick_fraction:
                 error = max(found.errors["stick_fraction"], _EDGE_ERROR / self._per_cycle)
@@ -329,12 +326,3 @@ class SampleMeter:
             rows = sliding_window_view(velocity, count)
             lasting = max(float(rows.min(axis=1).max()), -float(rows.max(axis=1).min()))
             self._lasting_speed = max(self._lasting_speed, lasting)
-
-
-def _agree(found: Measures, segmented: StickSlip) -> bool:
-    """Return whether measures of exact samples are those of the rests and slips."""
-    if found.stick_fraction is None or not found.period:
-        return False
-    apart = abs(found.stick_fraction - segmented.cycle.stick_fraction)
-    same = abs(found.period / segmented.cycle.period - 1.0) < _SAME_PERIOD
-    return same and apart < 3.0 * segmented.errors.stick_fraction

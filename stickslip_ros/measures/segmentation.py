@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.measures.cycle_measures import Cycle, CycleMeans
+from stickslip_ros.measures.cycle_measures import Cycle, CycleMeans, Measures
 from stickslip_ros.measures.noise import FEWEST_SAMPLES, encoder_step, white_noise
 
 _TAIL, _GROWTH = 8192, 4
@@ -54,6 +54,9 @@ _CORE = 0.15
 _CREEP, _CREEP_ERROR, _PASSING = 0.03, 0.02, 4.0
 """Speed in the rests, in mean speeds, and its standard error up to which they are rests; errors
 from which the slide passes."""
+_SAME_PERIOD, _SURE = 0.01, 3.0
+"""Relative difference of the periods, and of the stick fractions in standard errors, of the same
+cycles."""
 _SMOOTH_SHARE, _WIDEST = 0.1, 40
 """Half of the width of the smoothing parabola, in slip times, and in samples at most."""
 
@@ -62,6 +65,7 @@ _SMOOTH_SHARE, _WIDEST = 0.1, 40
 class StickSlip(CycleMeans):
     """Means over the last cycles of a slide that rests and slips."""
 
+    errors: Cycle
     start: float
     """Release from which the first of these cycles begins, s."""
     end: float
@@ -82,6 +86,15 @@ class StickSlip(CycleMeans):
     def passes(self) -> bool:
         """Whether the slide is known to move on in what looks like rests."""
         return abs(self.creep) > max(_CREEP, _PASSING * self.creep_error)
+
+    def agrees(self, found: Measures) -> bool:
+        """Return whether measures that were found otherwise are those of the same cycles."""
+        if found.stick_fraction is None or not found.period:
+            return False
+        share, error = self.cycle.stick_fraction, self.errors.stick_fraction
+        error = hypot(error, (found.errors or {}).get("stick_fraction", 0.0))
+        same = abs(found.period / self.cycle.period - 1.0) < _SAME_PERIOD
+        return same and abs(found.stick_fraction - share) < _SURE * error
 
 
 class _Slip(NamedTuple):
