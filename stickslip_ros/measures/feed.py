@@ -1,4 +1,4 @@
-"""The mean feed of a slide that advances on a guide at rest, such as the table of a machine."""
+"""The part of a recording in which a machine moves, and the frame in which its slide vibrates."""
 
 from dataclasses import replace
 
@@ -6,12 +6,15 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.measures.cycle_measures import LEAST_CYCLES
-from stickslip_ros.measures.noise import rises
-from stickslip_ros.measures.segmentation import stick_slip
+from stickslip_ros.measures.noise import PRECISION, encoder_step, rises, white_noise
+from stickslip_ros.measures.segmentation import moves, stick_slip
 from stickslip_ros.samples import SampleColumns
 from stickslip_ros.stamps import NANOSECONDS
 
 _MOST_CYCLES = 1_000_000
+_FEWEST, _LOOK, _BLOCKS, _RANGE = 32, 4096, 8192, 8.0
+"""Samples at an end from which a standstill is told, from which noise and step are estimated;
+positions that are compared; range of the noise, in standard deviations."""
 _PASSES = 4
 """Passes in which the feed is corrected."""
 _BACK_SHARE = 1.1
@@ -49,6 +52,34 @@ def mean_feed(time: FloatArray, position: FloatArray) -> float | None:
     return feed
 
 
+def moving_part(samples: SampleColumns) -> slice:
+    """Return the rows between the standstills before and after a motion, all where there are none.
+
+    A standstill is twice as long as any stretch in between in which the position stays.
+    """
+    rows = np.flatnonzero(samples.is_valid)
+    if len(rows) < _FEWEST:
+        return slice(0, len(samples))
+    position = samples.position[rows]
+    noise = white_noise(position[: len(position) // 2][-_LOOK:])
+    least = max(1.5 * encoder_step(position[-_LOOK:]), _RANGE * noise)
+    least = max(least, PRECISION * float(np.abs(position).max()))
+    stays = max(len(position) // _BLOCKS, 1)
+    ends = [float(np.median(part)) for part in (position[:_FEWEST], position[-_FEWEST:])]
+    first, last = (
+        int(np.argmax(np.abs(course - end) > least))
+        for course, end in zip((position, position[::-1]), ends, strict=True)
+    )
+    last = len(position) - 1 - last
+    changes = np.flatnonzero(moves(position[first : last + 1 : stays], least)) * stays
+    if len(changes) < 2 or last - first < _FEWEST:
+        return slice(0, len(samples))
+    longest = 2 * max(int(np.diff(changes).max()), _FEWEST)
+    begin = rows[first] if first > longest else 0
+    end = rows[last] + 1 if len(position) - 1 - last > longest else len(samples)
+    return slice(int(begin), int(end))
+
+
 def relative_to_feed(samples: SampleColumns) -> tuple[SampleColumns, float]:
     """Return samples relative to the mean feed, if there is one, and the feed, m/s; 0 without.
 
@@ -61,7 +92,7 @@ def relative_to_feed(samples: SampleColumns) -> tuple[SampleColumns, float]:
     time_known = time[samples.is_valid]
     slips = stick_slip(time_known, known.position, 0.0, _MOST_CYCLES, 0.0)
     feed = slips.feed if slips is not None else mean_feed(time_known, known.position)
-    if feed is None:
+    if not feed:
         return samples, 0.0
     moved = replace(
         samples,

@@ -75,8 +75,8 @@ def encoder_step(signal: FloatArray, rounding: float = 0.0) -> float:
     """Return the step that all values of a signal are whole multiples of apart; 0 without one.
 
     It is the smallest distance of two levels, or of two such distances, if the others are multiples
-    of it within a thousandth of a step (Euclid's algorithm). Values that differ by less than a share of the largest, the `rounding`, are of one
-    level.
+    of it within a thousandth of a step (Euclid's algorithm). Values that differ by less than a
+    share of the largest, the `rounding`, are of one level.
     """
     largest = float(np.abs(signal).max(initial=0.0))
     levels = np.diff(np.unique(signal))

@@ -30,7 +30,7 @@ from stickslip_ros.measures.noise import (
     strongest_line,
 )
 from stickslip_ros.measures.noisy_samples import LastCycles, NoisySamples
-from stickslip_ros.measures.segmentation import StickSlip, stick_slip
+from stickslip_ros.measures.segmentation import StickSlip, resting_velocity, stick_slip
 from stickslip_ros.measures.single_cycles import LEAST_STICK
 from stickslip_ros.measures.slips import regime_by_slips
 
@@ -44,6 +44,8 @@ _QUANTUM = 1.73
 """Resolution of an encoder with a noise of half of it, in standard deviations of the two."""
 _REFINED_SHARE = 0.5
 """Stick fraction up to which a fit of the mean cycle refines it."""
+_SAME_VELOCITY, _REST_SHARE = 0.05, 0.2
+"""Relative difference of two velocities of a guide that are the same; share of rests on another."""
 _SLIP_SHARE = 0.1
 """Share of the belt speed by which a slide at rest may seem to move."""
 
@@ -128,6 +130,23 @@ class NoisyWindow:
             return None
         since = float(samples.time[-1]) - found.end
         return found if since <= STALE_PERIODS * found.cycle.period else None
+
+    def other_guide(self) -> tuple[float, float] | None:
+        """Return the velocity relative to which a slide rests that does not rest on its belt.
+
+        Also the share of the time in which it does. None where there is no other one.
+        """
+        samples, lows = self.last.samples, self.last.lows
+        samples = samples[samples.row(lows[0].time) if lows else 0 :]
+        if len(samples) < FEWEST_SAMPLES:
+            return None
+        belt = float(samples.belt[-1])
+        velocity = resting_velocity(samples.time, samples.position)
+        if abs(velocity - belt) <= _SAME_VELOCITY * max(abs(velocity), abs(belt)):
+            return None
+        found = stick_slip(samples.time, samples.position, velocity, self.most_cycles, self.step)
+        share = 0.0 if found is None or not found.rests else found.cycle.stick_fraction
+        return (velocity, share) if share > _REST_SHARE else None
 
     def segmented(self, found: StickSlip) -> Measures:
         """Return the measures of rests and slips."""

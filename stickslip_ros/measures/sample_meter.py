@@ -216,6 +216,14 @@ class SampleMeter:
         self.drift.judged = not (self.reading.varies or self._belt_varies)
         return with_drift(found, self.drift)
 
+    @property
+    def other_guide(self) -> tuple[float, float] | None:
+        """Velocity, m/s, relative to which the slide rests, if it is not that of the belt.
+
+        Behind it is the share of the time in which it does; None where there is none.
+        """
+        return self._noisy_meter.window.other_guide()
+
     def notes(self, measures: Measures) -> list[str]:
         """Return sentences that say why these measures, its last ones, may be wrong."""
         if self.mixed:

@@ -10,18 +10,21 @@ that fit differ by is part of its error.
 """
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from math import ceil, hypot, inf, sqrt
 from typing import NamedTuple
 
 import numpy as np
 
-from stickslip_ros.arrays import FloatArray
+from stickslip_ros.arrays import BoolArray, FloatArray
 from stickslip_ros.measures.cycle_measures import Cycle, CycleMeans, Measures
 from stickslip_ros.measures.noise import FEWEST_SAMPLES, encoder_step, white_noise
 
 _TAIL, _GROWTH = 8192, 4
 """Number of last samples in which cycles are looked for first, and its growth while they are few.
 """
+_BLOCKS = 4096
+"""Number of means of positions from which the mean speed is taken."""
 _LOOK = 4096
 """Number of last samples from which noise and step are estimated."""
 ROUNDING = 1e-9
@@ -31,6 +34,11 @@ _REST_SHARE = 0.5
 _STEPS, _DEVIATIONS = 1.3, 3.5
 """Travel between two means, in steps of the encoder, and the change of them that is no rest, in
 their standard deviations, at least."""
+_MOST = 1e9
+"""Largest number of positions in a mean."""
+_SHORTH, _NEGLIGIBLE = 0.2, 0.05
+"""Share of the velocities that are alike while a slide rests; speed, in mean speeds, that is none.
+"""
 _FEWEST_REACHES = 16
 """Number of samples, in lengths of a mean, from which rests are looked for."""
 _LEAST_STEPS, _LEAST_NOISES, _LEAST_SHARE = 3.5, 5.0, 0.1
@@ -57,6 +65,8 @@ from which the slide passes."""
 _SAME_PERIOD, _SURE = 0.01, 3.0
 """Relative difference of the periods, and of the stick fractions in standard errors, of the same
 cycles."""
+_NO_FEED = 0.02
+"""Travel on, as a share of that to and fro, that is none."""
 _SMOOTH_SHARE, _WIDEST = 0.1, 40
 """Half of the width of the smoothing parabola, in slip times, and in samples at most."""
 
@@ -126,6 +136,28 @@ def stick_slip(
         count *= _GROWTH
 
 
+def resting_velocity(time: FloatArray, position: FloatArray) -> float:
+    """Return the velocity, m/s, that positions, m, at times, s, have for longest.
+
+    One that is small against the mean speed is 0. It is the mean of the shortest interval with a fifth of the velocities, by the change of two
+    means (the shorth: D. F. Andrews et al., Robust Estimates of Location, 1972).
+    """
+    noise = white_noise(position[-_LOOK:])
+    step = encoder_step(position[-_LOOK:])
+    speed = _mean_speed(time, position, max(step, 6.0 * noise))
+    period = float(time[-1] - time[0]) / (len(time) - 1)
+    reach = _reach(speed * period, noise, step)
+    if speed == 0.0 or len(time) < _FEWEST_REACHES * reach:
+        return 0.0
+    total = np.concatenate([[0.0], np.cumsum(position - position[0])])
+    change = total[2 * reach :] - 2.0 * total[reach:-reach] + total[: -2 * reach]
+    change = np.sort(change)
+    count = int(len(change) * _SHORTH)
+    first = int(np.argmin(change[count:] - change[: len(change) - count]))
+    velocity = float(np.mean(change[first : first + count + 1])) / (reach**2 * period)
+    return velocity if abs(velocity) > _NEGLIGIBLE * speed else 0.0
+
+
 def _measured(
     time: FloatArray, position: FloatArray, belt_velocity: float, most_cycles: int, step: float
 ) -> StickSlip | None:
@@ -146,6 +178,8 @@ def _measured(
     shares = 1.0 - durations / np.diff(release)
     travel = float(np.sum([slip.travel for slip in used]))
     feed = travel / float(release[-1] - release[0])
+    if abs(travel) < _NO_FEED * float(np.sum([abs(slip.travel) for slip in used])):
+        feed = 0.0
     if not belt_velocity:
         position = position - feed * (time - time[0])
     rows = np.searchsorted(time, release)
@@ -180,14 +214,31 @@ def _measured(
 
 def _mean_speed(time: FloatArray, position: FloatArray, least: float) -> float:
     """Return the mean speed of what moves by more than `least`, m, to and fro, m/s."""
-    block = max(len(position) // 4096, 1)
-    course = position[: len(position) // block * block].reshape(-1, block).mean(axis=1).tolist()
-    path, held = 0.0, course[0]
-    for each in course:
-        if abs(each - held) > least:
-            path += abs(each - held)
+    block = max(len(position) // _BLOCKS, 1)
+    course = position[: len(position) // block * block].reshape(-1, block).mean(axis=1)
+    changes = np.flatnonzero(moves(course, least))
+    return float(np.abs(np.diff(course[changes])).sum()) / float(time[-1] - time[0])
+
+
+def moves(course: FloatArray, least: float) -> BoolArray:
+    """Return where a course is by more than `least` away from where it last was that."""
+    moved, held = [True], float(course[0])
+    for each in course[1:].tolist():
+        moved.append(abs(each - held) > least)
+        if moved[-1]:
             held = each
-    return path / float(time[-1] - time[0])
+    return np.array(moved)
+
+
+def _reach(travel: float, noise: float, step: float) -> int:
+    """Return the number of positions in each of two means between which a slide rests or moves.
+
+    `travel` is the mean distance between two samples, m.
+    """
+    if travel <= 0.0:
+        return 0
+    by_noise = (_DEVIATIONS * sqrt(2.0) * noise / (_REST_SHARE * travel)) ** (2.0 / 3.0)
+    return ceil(min(max(by_noise, _STEPS * step / travel, 2.0), _MOST))
 
 
 def _rests(position: FloatArray, reach: int, most: float) -> list[tuple[int, int]]:
@@ -200,7 +251,7 @@ def _rests(position: FloatArray, reach: int, most: float) -> list[tuple[int, int
     still = np.abs(change) <= most * reach
     turns = np.flatnonzero(np.diff(still, prepend=False, append=False)).reshape(-1, 2)
     apart: list[tuple[int, int]] = []
-    for first, last in (turns + [0, 2 * reach - 2]).tolist():
+    for first, last in (turns + np.array([0, 2 * reach - 2])).tolist():
         if apart and apart[-1][1] >= first:
             middle = (apart[-1][1] + first) // 2
             apart[-1] = apart[-1][0], middle
@@ -218,11 +269,9 @@ def _slips(
     travel = speed * period
     if travel <= 0.0:
         return []
-    by_noise = (_DEVIATIONS * sqrt(2.0) * noise / (_REST_SHARE * travel)) ** (2.0 / 3.0)
-    reach = max(by_noise, _STEPS * step / travel, 2.0)
+    reach = _reach(travel, noise, step)
     if len(time) < _FEWEST_REACHES * reach:
         return []
-    reach = ceil(reach)
     found = _rests(position, reach, _REST_SHARE * travel * reach)
     if len(found) < 2:
         return []
@@ -281,7 +330,9 @@ def _edge(
     inside = np.flatnonzero(course <= near)
     last = int(inside[-1]) if len(inside) else 0
     beyond = np.flatnonzero(course[last + 1 :] > near + _EDGE_SHARE * size)
-    rows = np.arange(last + 1, min(last + 2 + int(beyond[0]) if len(beyond) else len(course), len(course)))
+    rows = np.arange(
+        last + 1, min(last + 2 + int(beyond[0]) if len(beyond) else len(course), len(course))
+    )
     if len(rows) < 3:
         return last + 0.5, hypot(_EDGE_ERROR, 0.3)
     values = np.maximum(course[rows], 0.0)
@@ -340,10 +391,14 @@ def _extremes(
     first, last = max(rows[0] - reach, 0), rows[-1] + reach + 1
     period = float(time[-1] - time[0]) / (len(time) - 1)
     part = np.pad(position[first:last] - position[first], reach, mode="edge")
-    smooth = position[first:last] if reach < 2 else np.convolve(part, powers[0][::-1], "valid") + position[first]
+    smooth = (
+        position[first:last]
+        if reach < 2
+        else np.convolve(part, powers[0][::-1], "valid") + position[first]
+    )
     speed = np.convolve(part, powers[1][::-1], "valid") / period
     amplitudes = np.empty((3, len(rows) - 1))
-    for each, (start, end) in enumerate(zip(rows, rows[1:], strict=False)):
+    for each, (start, end) in enumerate(pairwise(rows)):
         inside = slice(start - first, end - first + 1)
         high, low = float(smooth[inside].max()), float(smooth[inside].min())
         amplitudes[:, each] = (high - low) / 2.0, np.ptp(speed[inside]) / 2.0, (high + low) / 2.0
@@ -372,7 +427,7 @@ def _creep(
 ) -> tuple[float, float]:
     """Return the mean velocity in the rests between slips, m/s, and its standard error."""
     products = squares = lasting = 0.0
-    for before, after in zip(slips, slips[1:], strict=False):
+    for before, after in pairwise(slips):
         margin = _CORE * (after.release - before.landing)
         first, last = np.searchsorted(time, [before.landing + margin, after.release - margin])
         if last - first >= 2:

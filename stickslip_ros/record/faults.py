@@ -6,7 +6,7 @@ from math import pi
 import numpy as np
 
 from stickslip_ros.arrays import BoolArray, FloatArray, IntArray, rms, windows
-from stickslip_ros.measures.noise import white_noise
+from stickslip_ros.measures.noise import PRECISION, white_noise
 from stickslip_ros.text import quantity
 
 _STEEPER = 10.0
@@ -50,6 +50,7 @@ class Jumps:
         part = signal[:: 1 + len(signal) // _MOST_WINDOWS]
         low, high = np.quantile(part, [0.01, 0.99]) if len(part) else (0.0, 0.0)
         least = max(_STEEPER * max(self._unit, rounding), _LEAST_SHARE * float(high - low))
+        least = max(least, PRECISION * float(np.abs(part).max(initial=0.0)))
         found = [
             part.start + np.flatnonzero(np.abs(np.diff(signal[part])) > least)
             for part in windows(len(signal), 1)
@@ -134,6 +135,36 @@ def shift_note(size: float, place: str, unit: str = "m") -> str:
     )
 
 
+def lost_velocities(
+    time: FloatArray, position: FloatArray, velocity: FloatArray
+) -> tuple[str | None, BoolArray]:
+    """Return how velocities contradict positions, as `velocity_fault` has it, and which jump.
+
+    A velocity that jumps away and back, and less so by the positions, is not that of the motion.
+    """
+    spikes = np.zeros(len(time), np.bool_)
+    spikes[Jumps(velocity).dropouts()] = True
+    if spikes.any():
+        between = np.interp(time, time[~spikes], velocity[~spikes])
+        by_position = differences(time, position)
+        spikes &= np.abs(velocity - by_position) > np.abs(between - by_position)
+    return velocity_fault(time[~spikes], position[~spikes], velocity[~spikes]), spikes
+
+
+def differences(time: FloatArray, position: FloatArray) -> FloatArray:
+    """Return the velocity at each time, by the positions on both sides; NaN where time stands."""
+    velocity = np.zeros(len(time))
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        for part in windows(len(time), 2):  # of a long array at once takes four times as long
+            at, moved = time[part], position[part]
+            velocity[part][1:-1] = (moved[2:] - moved[:-2]) / (at[2:] - at[:-2])
+        if len(time) > 1:
+            for place, (before, after) in {0: (0, 1), -1: (-2, -1)}.items():
+                moved, lasting = (each[after] - each[before] for each in (position, time))
+                velocity[place] = moved / lasting
+    return velocity
+
+
 def velocity_fault(time: FloatArray, position: FloatArray, velocity: FloatArray) -> str | None:
     """Return how velocities contradict positions, as "is 1000 times ..."; None if they do not.
 
@@ -153,12 +184,12 @@ def velocity_fault(time: FloatArray, position: FloatArray, velocity: FloatArray)
     change = velocity[rows + _WINDOW] - velocity[rows]
     both, square = float(by_velocity @ moved), float(by_velocity @ by_velocity)
     sizes = rms(moved) * rms(by_velocity)
+    if not velocity.any() and rms(moved) > _STEEPER * _noise_of(position):
+        return "is 0 throughout"
     if not sizes or rms(by_half - by_velocity) > _UNKNOWN_SHARE * rms(by_velocity):
         return None
     if abs(both) < _CORRELATION * sizes * len(rows):
-        part = position[:_MOST_WINDOWS]
-        noise = max(white_noise(part), _unit(part))
-        clear = rms(moved - by_velocity) > _STEEPER * noise
+        clear = rms(moved - by_velocity) > _STEEPER * _noise_of(position)
         return "does not follow the positions" if clear else None
     ratios = np.array([both / square, float(moved @ moved) / both])
     if both < 0.0 or np.all(ratios > _RATIO) or np.all(ratios < 1.0 / _RATIO):
@@ -170,6 +201,12 @@ def velocity_fault(time: FloatArray, position: FloatArray, velocity: FloatArray)
         side = "later" if delay > 0.0 else "earlier"
         return f"is {quantity(float(f'{abs(delay):.2g}'), 's')} {side} than that of the positions"
     return None
+
+
+def _noise_of(position: FloatArray) -> float:
+    """Return the noise of positions, or the step of their encoder if it is larger, m."""
+    part = position[:_MOST_WINDOWS]
+    return max(white_noise(part), _unit(part))
 
 
 def _integral(time: FloatArray, velocity: FloatArray, rows: IntArray, stride: int) -> FloatArray:

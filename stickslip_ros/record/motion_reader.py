@@ -21,7 +21,7 @@ from stickslip_ros.record.codec import (
     joint_names,
     joint_state_layout,
 )
-from stickslip_ros.record.faults import MOST_SHIFTS, Jumps, shift_note
+from stickslip_ros.record.faults import MOST_SHIFTS, Jumps, differences, lost_velocities, shift_note
 from stickslip_ros.samples import ForceColumns, SampleColumns
 from stickslip_ros.stamps import NANOSECONDS
 from stickslip_ros.text import must_be_one_of, printable, quantity, shown
@@ -141,6 +141,7 @@ class MotionReader:
         self._last: SampleColumns | None = None
         self._left_out = Counter[str]()
         self._shifts: list[tuple[int, float]] = []
+        self._fault = ""
         self._samples = self._standing = self._zero = self._step = 0
         self._first_stamp: int | None = None
         self._last_stamp = -1
@@ -164,6 +165,8 @@ class MotionReader:
             ]
         if not has_position:
             notes.append("the position is not recorded: it is the integral of the velocity")
+        elif self._fault:
+            notes.append(f"the velocity {self._fault}: it is the difference of the positions")
         elif self.estimated:
             notes.append("the velocity is not recorded: it is the difference of the positions")
         if self._belt_speed is None and self._layout.belt_joint is None:
@@ -201,6 +204,24 @@ class MotionReader:
             if self._layout.force == "effort":
                 forces = ForceColumns(samples.stamp, samples.friction_force)
             return self._completed(samples), forces, refused
+
+    def without_lost_velocities(self, samples: SampleColumns) -> SampleColumns:
+        """Return all samples of another machine with velocities that agree with the positions."""
+        if self._known != (True, True) or self.estimated:
+            return samples
+        valid = np.flatnonzero(samples.is_valid)
+        time = (samples.stamp[valid] - samples.stamp[:1]) / NANOSECONDS
+        position, own = samples.position[valid], samples.velocity[valid]
+        fault, spikes = lost_velocities(time, position, own)
+        velocity = samples.velocity.copy()
+        if fault is not None:
+            self.estimated, self._fault = True, fault
+            velocity[valid] = differences(time, position)
+        elif spikes.any():
+            why = "have a velocity that jumps away and back, as the positions do not,"
+            self._left_out[why] += int(np.count_nonzero(spikes))
+            velocity[valid] = np.interp(time, time[~spikes], own[~spikes])
+        return replace(samples, velocity=velocity)
 
     def _choose(self, messages: Messages) -> None:
         """Find the joint by the names in the first messages."""

@@ -265,7 +265,11 @@ class Recording(BagFiles):
                 gathered, count = [], 0
         self._check_clocks()
         if gathered:
-            yield _joined_blocks(gathered)
+            block = _joined_blocks(gathered)
+            if not motion.own:
+                states = motion.without_lost_velocities(block.joint_states)
+                block = block._replace(joint_states=states)
+            yield block
 
     @cached_property
     def _layout(self) -> BagLayout:

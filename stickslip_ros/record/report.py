@@ -13,7 +13,7 @@ import numpy as np
 from stickslip_ros.arrays import BoolArray, IntArray
 from stickslip_ros.errors import BagError, InvalidInputError
 from stickslip_ros.measures.cycle_measures import Regime
-from stickslip_ros.measures.feed import relative_to_feed
+from stickslip_ros.measures.feed import moving_part, relative_to_feed
 from stickslip_ros.measures.run_meter import RunAnalysis, RunMeter, RunObserver
 from stickslip_ros.measures.sample_assumptions import SampleAssumptions, reading_of
 from stickslip_ros.measures.slips import SlipMeter, SlipThreshold
@@ -175,6 +175,7 @@ class _RunReader:
         self.whole = False
         """Whether it is of another machine, and fed in one block."""
         self._feed = 0.0
+        self._notes: list[str] = []
         self._ends = f"from {start:g} s on" + ("" if end == inf else f" and before {end:g} s")
         self._slips = None if slips is None else (SlipMeter(slips), SlipMeter(slips))
         self._last_stamp = -1
@@ -199,6 +200,7 @@ class _RunReader:
             self._find_slips(part)
             self._take(part)
             if self.whole:
+                part = self._moving_part(part, first)
                 part, self._feed = relative_to_feed(part)
             self.meter.motion.feed(part)
             if self._observer is not None:
@@ -226,7 +228,7 @@ class _RunReader:
         if self._measured == 0:
             raise InvalidInputError(f"{path} holds no samples {self._ends}")
         report, slips = self.meter.report(), None
-        notes = report["notes"]
+        notes = [*self._notes, *report["notes"]]
         if self._feed:
             feed = quantity(self._feed, f"{length}/s")
             advance = quantity(abs(self._feed) * (report["period"] or 0.0), length)
@@ -235,7 +237,17 @@ class _RunReader:
                 f"the slide advances at {feed} on a guide at rest: the measures "
                 f"are those of its position less this feed, {advance} in a cycle",
             ]
-        if self.whole and report["regime"] == Regime.PURE_SLIP:
+        guide = self.meter.motion.other_guide if self.whole else None
+        if guide is not None and report["regime"] in (None, Regime.PURE_SLIP, Regime.STICK_SLIP):
+            velocity, share = guide
+            report = {**report, "regime": None, "stick_fraction": None}
+            of_what = f"a velocity of {quantity(velocity, f'{length}/s')}" if velocity else "rest"
+            notes = [
+                *notes,
+                f"the slide rests relative to a guide at {of_what} for {share:.0%} of the time, not "
+                "relative to the belt: the regime is known if the belt velocity is that of the guide",
+            ]
+        elif self.whole and report["regime"] == Regime.PURE_SLIP:
             steps = report["amplitude"] / (self.meter.motion.drift.resolution or float_info.min)
             each = report["period"] / report["duration"] * report["samples"]
             few = f"{steps:.2g} steps of the encoder in the amplitude" * (steps < _LEAST_STEPS)
@@ -259,6 +271,20 @@ class _RunReader:
         if self._observer is not None:
             self._observer.take_analysis(RunAnalysis(self.meter.motion.mean_cycle, slips))
         return {**report, "notes": notes, "slips": slips}
+
+    def _moving_part(self, part: SampleColumns, first: int) -> SampleColumns:
+        """Return the samples without the standstills before and after them."""
+        rows = moving_part(part)
+        moving = part[rows]
+        sides = " and ".join(["before"] * (rows.start > 0) + ["after"] * (rows.stop < len(part)))
+        if sides:
+            since, until = ((stamp - first) / NANOSECONDS for stamp in moving.stamp[[0, -1]])
+            whole = (part.stamp[-1] - first) / NANOSECONDS
+            self._notes.append(
+                f"the measures are those from {since:.4g} s to {until:.4g} s of {whole:.4g} s: "
+                f"{sides}, the position stands"
+            )
+        return moving
 
     def _find_slips(self, part: SampleColumns) -> None:
         if self._slips is None or len(part) == 0:

@@ -10,11 +10,12 @@ import numpy as np
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.files import open_regular
+from stickslip_ros.record.faults import differences
 from stickslip_ros.record.mat_file import is_mat, vectors_of
 from stickslip_ros.record.reader import RunBlock
 from stickslip_ros.record.table_clock import stamps_of
 from stickslip_ros.record.table_columns import ANY_FORM, Table, TableFormat, reading_file
-from stickslip_ros.record.table_quantities import Quantities, differences, quantities_of
+from stickslip_ros.record.table_quantities import Quantities, quantities_of
 from stickslip_ros.record.text_table import TextTable
 from stickslip_ros.samples import ForceColumns, SampleColumns
 

@@ -12,7 +12,7 @@ from stickslip_ros.arrays import BoolArray, FloatArray, IntArray, windows
 from stickslip_ros.errors import BagError, InvalidInputError
 from stickslip_ros.quantities import ROTARY
 from stickslip_ros.record.expressions import Expression
-from stickslip_ros.record.faults import Jumps, shift_note, velocity_fault
+from stickslip_ros.record.faults import Jumps, lost_velocities, shift_note
 from stickslip_ros.record.table_clock import check_turns, even_times, in_order, unit_of_steps
 from stickslip_ros.record.table_columns import ROW, Table, reading_file
 from stickslip_ros.record.units import Unit, units_in
@@ -124,20 +124,6 @@ def speed_and_force(table: Table, columns: Mapping[str, str]) -> Quantities:
     asked = _asked(table, columns, ("velocity", "force"))
     cells = _Cells.of(table, asked, asked["velocity"].places)
     return Quantities({name: np.atleast_1d(cells.value(name)) for name in asked}, cells.notes)
-
-
-def differences(time: FloatArray, position: FloatArray) -> FloatArray:
-    """Return the velocity at each time, by the positions on both sides; NaN where time stands."""
-    velocity = np.zeros(len(time))
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        for part in windows(len(time), 2):  # of a long array at once takes four times as long
-            at, moved = time[part], position[part]
-            velocity[part][1:-1] = (moved[2:] - moved[:-2]) / (at[2:] - at[:-2])
-        if len(time) > 1:
-            for place, (before, after) in {0: (0, 1), -1: (-2, -1)}.items():
-                moved, lasting = (each[after] - each[before] for each in (position, time))
-                velocity[place] = moved / lasting
-    return velocity
 
 
 @dataclass(frozen=True)
@@ -437,14 +423,7 @@ def _without_lost_velocities(
     """Leave out velocities that contradict the others or the positions; yield sentences on them."""
     position, velocity = values["position"], values["velocity"]
     both = np.flatnonzero(np.isfinite(position) & np.isfinite(velocity))
-    time, position, own = values["time"][both], position[both], velocity[both]
-    spikes = np.zeros(len(both), np.bool_)
-    spikes[Jumps(own).dropouts()] = True
-    if spikes.any():
-        between = np.interp(time, time[~spikes], own[~spikes])
-        by_position = differences(time, position)
-        spikes &= np.abs(own - by_position) > np.abs(between - by_position)
-    fault = velocity_fault(time[~spikes], position[~spikes], own[~spikes])
+    fault, spikes = lost_velocities(values["time"][both], position[both], velocity[both])
     if fault is not None:
         values["velocity"] = np.full(len(velocity), nan)
         yield f"the velocity {fault}: it is left out"
