@@ -15,6 +15,8 @@ _MOST_CYCLES = 1_000_000
 _FEWEST, _LOOK, _BLOCKS, _RANGE = 32, 4096, 8192, 8.0
 """Samples at an end from which a standstill is told, from which noise and step are estimated;
 positions that are compared; range of the noise, in standard deviations."""
+_SAME_FEED = 0.01
+"""Relative difference of two estimates of one feed."""
 _PASSES = 4
 """Passes in which the feed is corrected."""
 _BACK_SHARE = 1.1
@@ -91,7 +93,9 @@ def relative_to_feed(samples: SampleColumns) -> tuple[SampleColumns, float]:
     time = (samples.stamp - samples.stamp[0]) / NANOSECONDS
     time_known = time[samples.is_valid]
     slips = stick_slip(time_known, known.position, 0.0, _MOST_CYCLES, 0.0)
-    feed = slips.feed if slips is not None else mean_feed(time_known, known.position)
+    feed = mean_feed(time_known, known.position)
+    if slips is not None and abs((feed or 0.0) - slips.feed) > _SAME_FEED * abs(slips.feed):
+        feed = slips.feed
     if not feed:
         return samples, 0.0
     moved = replace(

@@ -250,6 +250,11 @@ class SampleMeter:
                 "the cycles are not alike: by their slips the slide sticks, for how long is not "
                 "known from single cycles (see --slips)"
             )
+        if measures.regime is None and measures.period is not None:
+            notes.append(
+                "the regime is not known: the positions do not tell whether the slide rests in its "
+                "cycles or moves slowly"
+            )
         mean, belt = self.mean_cycle, self._last.belt_velocity[-1] if self._last else 0.0
         if mean is not None and mean.stick is not None and not self._stick_speed:
             velocity, error = copysign(mean.stick.fit.belt_speed, belt), mean.stick.speed_error
