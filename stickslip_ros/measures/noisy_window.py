@@ -32,7 +32,6 @@ from stickslip_ros.measures.noise import (
 from stickslip_ros.measures.noisy_samples import LastCycles, NoisySamples
 from stickslip_ros.measures.segmentation import StickSlip, resting_velocity, stick_slip
 from stickslip_ros.measures.single_cycles import LEAST_STICK
-from stickslip_ros.measures.slips import regime_by_slips
 
 REVERSAL = 8.0
 """Least size of a reversal, in standard deviations of the noise."""
@@ -101,18 +100,18 @@ class NoisyWindow:
         """Return the measures, and the mean cycle if the cycles are alike.
 
         Rests and slips tell first; the fit of a mean cycle refines short sticks. Where the
-        reversals do not show cycles, a line of the spectrum may. With `quick`, means over single
-        cycles will do.
+        reversals do not show cycles, a line of the spectrum may. With `quick`, rests and slips, or
+        means over single cycles, will do.
         """
         segmented = self.stick_slip()
         if segmented is None or segmented.passes:
             return self._by_reversals(quick=quick)
-        refined, fit = None, None
-        if segmented.cycle.stick_fraction < _REFINED_SHARE:
-            refined, fit = self._by_reversals(quick=quick)
-        if refined is not None and segmented.agrees(refined):
-            return refined, fit
         found = self.segmented(segmented)
+        short = segmented.cycle.stick_fraction < _REFINED_SHARE
+        if not segmented.rests or (short and not quick):
+            refined, fit = self._by_reversals(quick=quick)
+            if segmented.agrees(refined):
+                return refined, fit
         if not segmented.rests:
             found = replace(found, regime=None, stick_fraction=None)
         return found, None
@@ -172,10 +171,10 @@ class NoisyWindow:
         fit = None if quick else self._fit(part.samples, [low.time for low in part.lows])
         if fit is not None:
             return self._found(part.samples, fit, fit.noise), fit
-        return self._unlike(part, by_slips=not quick), None
+        return self._unlike(part), None
 
-    def _unlike(self, part: LastCycles, *, by_slips: bool) -> Measures:
-        """Return the measures of cycles that are not alike, whose slips tell whether it sticks."""
+    def _unlike(self, part: LastCycles) -> Measures:
+        """Return the measures of cycles that are not alike."""
         # Half of the cycles: a single one may seem to stick for a moment.
         means = CycleMeans.over(part.cycles, 0.5)
         found = self._found(part.samples, means, self.noise)
@@ -183,16 +182,7 @@ class NoisyWindow:
         if found.errors and fastest > STICKING_SHARE * self.fastest_belt:
             error = hypot(found.errors["stick_fraction"], LEAST_STICK)
             found = replace(found, errors={**found.errors, "stick_fraction": error})
-        if not by_slips or found.regime not in (Regime.STICK_SLIP, Regime.PURE_SLIP):
-            return found
-        samples = part.samples[part.samples.row(part.lows[0].time) :]
-        sign = -1.0 if float(samples.belt[-1]) < 0.0 else 1.0
-        size = max(means.cycle.amplitude / 2.0, REVERSAL * max(self.noise, self.step))
-        regime = regime_by_slips(samples.time, sign * samples.position, size, means.cycle.period)
-        if regime in (None, found.regime):
-            return found
-        share = None if regime is Regime.STICK_SLIP else 0.0
-        return replace(found, regime=regime, stick_fraction=share)
+        return found
 
     def _by_line(self, samples: NoisySamples, line: float) -> tuple[Measures, MeanCycle | None]:
         """Return the measures of the cycles that a line of the spectrum shows."""

@@ -20,7 +20,6 @@ from stickslip_ros.measures.cycle_measures import (
     UNBOUNDED_BELT_SPEEDS,
     Cycle,
     Measures,
-    Regime,
     with_drift,
     without_cycles,
 )
@@ -244,11 +243,6 @@ class SampleMeter:
             notes.append(
                 f"the amplitude is only {measures.amplitude / step:.2g} steps of the encoder: the "
                 "standard errors are not known"
-            )
-        if measures.stick_fraction is None and measures.regime is Regime.STICK_SLIP:
-            notes.append(
-                "the cycles are not alike: by their slips the slide sticks, for how long is not "
-                "known from single cycles (see --slips)"
             )
         if measures.regime is None and measures.period is not None:
             notes.append(

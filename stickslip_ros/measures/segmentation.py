@@ -139,8 +139,9 @@ def stick_slip(
 def resting_velocity(time: FloatArray, position: FloatArray) -> float:
     """Return the velocity, m/s, that positions, m, at times, s, have for longest.
 
-    One that is small against the mean speed is 0. It is the mean of the shortest interval with a fifth of the velocities, by the change of two
-    means (the shorth: D. F. Andrews et al., Robust Estimates of Location, 1972).
+    One that is small against the mean speed is 0. It is the mean of the shortest interval with a
+    fifth of the velocities, by the change of two means (the shorth: D. F. Andrews et al., Robust
+    Estimates of Location, 1972).
     """
     noise = white_noise(position[-_LOOK:])
     step = encoder_step(position[-_LOOK:])

@@ -238,16 +238,6 @@ def regime_of(slips: Sequence[Slip]) -> Regime | None:
     return Regime.STICK_SLIP if longer else Regime.PURE_SLIP
 
 
-def regime_by_slips(
-    time: FloatArray, position: FloatArray, size: float, period: float
-) -> Regime | None:
-    """Return whether a motion sticks between slips of at least a `size`, m; None without two.
-
-    The `period`, s, is the mean time from slip to slip, and a quarter of it the longest slip.
-    """
-    return regime_of(SlipMeter(SlipThreshold(size, period / 4.0)).feed(time, position))
-
-
 def _distribution(values: FloatArray) -> dict[str, float] | None:
     values = values[np.isfinite(values)]
     if len(values) == 0:

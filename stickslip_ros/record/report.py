@@ -244,8 +244,8 @@ class _RunReader:
             of_what = f"a velocity of {quantity(velocity, f'{length}/s')}" if velocity else "rest"
             notes = [
                 *notes,
-                f"the slide rests relative to a guide at {of_what} for {share:.0%} of the time, not "
-                "relative to the belt: the regime is known if the belt velocity is that of the guide",
+                f"relative to a guide at {of_what} the slide rests {share:.0%} of the time, and "
+                "relative to the belt it does not: with this belt velocity the regime is known",
             ]
         elif self.whole and report["regime"] == Regime.PURE_SLIP:
             steps = report["amplitude"] / (self.meter.motion.drift.resolution or float_info.min)

@@ -12,7 +12,7 @@ from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.measures import Regime, slips
 from stickslip_ros.measures.sample_assumptions import SampleAssumptions
-from stickslip_ros.measures.slips import SlipMeter, SlipThreshold, regime_by_slips
+from stickslip_ros.measures.slips import SlipMeter, SlipThreshold
 from stickslip_ros.record.report import report_of_recording
 from stickslip_ros.record.table_file import read_table
 from tests.measures import records
@@ -166,12 +166,3 @@ def test_where_cycles_are_not_alike_rests_and_slips_tell_how_long_it_sticks(quic
     assert found.errors is not None
     assert 0.02 < found.errors["stick_fraction"] < 0.06
     assert found.stick_fraction == pytest.approx(0.727, abs=2 * found.errors["stick_fraction"])
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_slips_of_a_vibration_of_changing_size_do_not_stick(seed: int) -> None:
-    random, time = np.random.default_rng(seed), np.arange(5000) * 1e-3
-    size = np.interp(time, np.arange(6.0), random.uniform(0.7, 1.3, 6))
-    position = 1e-4 * size * np.sin(2.0 * np.pi * 10.0 * time)
-    assert regime_by_slips(time, position, 5e-5, 0.1) is Regime.PURE_SLIP
-    assert regime_by_slips(time[:120], position[:120], 5e-5, 0.1) is None
