@@ -93,6 +93,10 @@ class Decoder:
             return 0, 0  # an empty sequence has no padding either
         return self._advance(alignment=8, size=8 * count), count
 
+    def skip_duration(self) -> None:
+        """Skip a builtin_interfaces/msg/Duration."""
+        self._advance(alignment=4, size=8)
+
     def _advance(self, alignment: int, size: int) -> int:
         """Skip the next field and return where it starts."""
         offset = -(-(self._place - _ENCAPSULATION) // alignment) * alignment

@@ -285,17 +285,20 @@ def joint_state_layout(data: bytes) -> Layout:
     return joints.layout(SLIDE, BELT, MOTOR)
 
 
-def joint_names(data: bytes) -> list[str]:
-    """Return the names of the joints in a serialized joint state; raises MessageError."""
-    return _Joints(data, "joint state").names
+def joint_names(data: bytes, kind: str = "sensor_msgs/msg/JointState") -> list[str]:
+    """Return the names of the joints in a message of one of `STATE_TYPES`; raises MessageError."""
+    return STATE_TYPES[kind](data, "joint state").names
 
 
-def joint_layout(data: bytes, joint: str, belt: str | None) -> Layout:
-    """Return where a joint state has position, velocity and effort of a joint, and those of a belt.
+def joint_layout(
+    data: bytes, joint: str, belt: str | None, kind: str = "sensor_msgs/msg/JointState"
+) -> Layout:
+    """Return where a message has position, velocity and effort of a joint, and those of a belt.
 
-    What a message lacks is missing: each sequence may be empty, and a joint not among the names.
+    The message is of one of `STATE_TYPES`. What it lacks is missing: each sequence may be empty,
+    and a joint not among the names.
     """
-    joints = _Joints(data, "joint state")
+    joints = STATE_TYPES[kind](data, "joint state")
     joints.check_counts()
     return joints.layout(joint, belt, None)
 
@@ -313,11 +316,8 @@ class _Joints:
         """Raise MessageError for other bytes, and if a joint is needed and not there."""
         self._message = message = Decoder(data, kind)
         self._kind, self._stamp = kind, message.header_stamp()
-        number = message.count()
-        if number > _MOST_JOINTS:
-            raise MessageError(f"a {kind} has {number} joints; must be at most {_MOST_JOINTS}")
-        self.names = [message.string() for _ in range(number)]
-        self.sequences = [message.doubles(message.count()) for _ in range(3)]
+        self.names = self._strings()
+        self.sequences = self._sequences(message)
         """Where the positions, velocities and efforts are, and their counts."""
         missing = " and ".join(joint for joint in needed if joint not in self.names)
         if missing:
@@ -325,6 +325,17 @@ class _Joints:
                 f"a {kind} names the joints {reprlib.repr(self.names)}; {missing} must be among "
                 "them"
             )
+
+    def _strings(self) -> list[str]:
+        number = self._message.count()
+        if number > _MOST_JOINTS:
+            raise MessageError(
+                f"a {self._kind} has {number} joints; must be at most {_MOST_JOINTS}"
+            )
+        return [self._message.string() for _ in range(number)]
+
+    def _sequences(self, message: Decoder) -> list[tuple[int, int]]:
+        return [message.doubles(message.count()) for _ in range(3)]
 
     def check_counts(self, fields: int = 3, always: int = 0) -> None:
         """Refuse other numbers than one for each joint or, but for the first fields, none."""
@@ -350,6 +361,44 @@ class _Joints:
     def layout_of(self, *places: int | None) -> Layout:
         """Return the layout of places."""
         return Layout(self._message, self._stamp, places)
+
+
+class _DynamicJoints(_Joints):
+    """The joints in a control_msgs/msg/DynamicJointState: each with interfaces of its own."""
+
+    def _sequences(self, message: Decoder) -> list[tuple[int, int]]:
+        self._places: dict[tuple[int, str], int] = {}
+        for number in range(message.count()):
+            interfaces = self._strings()
+            start, count = message.doubles(message.count())
+            for place, name in enumerate(interfaces[:count]):
+                self._places[number, name] = start + 8 * place
+        return [(0, 0)] * 3
+
+    def place(self, field: int, joint: str | None) -> int | None:
+        if joint not in self.names:
+            return None
+        interface = ("position", "velocity", "effort")[field]
+        return self._places.get((self.names.index(joint), interface))
+
+
+class _ControllerJoints(_Joints):
+    """The joints in a control_msgs/msg/JointTrajectoryControllerState, as they were measured."""
+
+    def _sequences(self, message: Decoder) -> list[tuple[int, int]]:
+        for point in ("reference", "feedback"):  # desired and actual, in older versions
+            fields = [message.doubles(message.count()) for _ in range(4)]
+            if point == "reference":
+                message.skip_duration()
+        return [*fields[:2], fields[3]]
+
+
+STATE_TYPES = {
+    "sensor_msgs/msg/JointState": _Joints,
+    "control_msgs/msg/DynamicJointState": _DynamicJoints,
+    "control_msgs/msg/JointTrajectoryControllerState": _ControllerJoints,
+}
+"""What reads messages with the motion of joints, by their types."""
 
 
 def _wrench_layout(data: bytes) -> Layout:

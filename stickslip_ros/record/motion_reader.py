@@ -124,8 +124,13 @@ class MotionReader:
         layout: BagLayout = ANY_LAYOUT,
         belt_speed: float | None = None,
         source: str = "",
+        kind: str = "sensor_msgs/msg/JointState",
     ) -> None:
-        """Take topic and source, for messages to the user, and the belt speed (m/s) of no belt."""
+        """Take topic and source, for messages to the user, and the belt speed (m/s) of no belt.
+
+        `kind` is the type of the messages, one of `STATE_TYPES`.
+        """
+        self._kind = kind
         self.own = True
         """Whether the joint states are those of our plant."""
         self.estimated = False
@@ -229,10 +234,10 @@ class MotionReader:
         joint, belt, own = self._layout.joint, self._layout.belt_joint, False
         for begin, end in zip(messages.begin[:_SEEN], messages.end[:_SEEN], strict=True):
             try:
-                names = joint_names(messages.data[begin:end])
+                names = joint_names(messages.data[begin:end], self._kind)
             except MessageError:
                 continue
-            own |= SLIDE in names and BELT in names
+            own |= SLIDE in names and BELT in names and self._kind.startswith("sensor")
             known |= dict.fromkeys(names)
         if not known:
             return
@@ -257,16 +262,16 @@ class MotionReader:
                     )
                 )
         self.own = False
-        self._layout_of = partial(joint_layout, joint=self._joint, belt=belt)
+        self._layout_of = partial(joint_layout, joint=self._joint, belt=belt, kind=self._kind)
         if joint is None:
             self._layout_of = self._only_joint
 
     def _only_joint(self, data: bytes) -> Layout:
         """Return the layout of the only joint; refuse messages of others."""
-        names, belt = joint_names(data), self._layout.belt_joint
+        names, belt = joint_names(data, self._kind), self._layout.belt_joint
         if self._joint not in names and belt not in names:
             raise self._several([self._joint, *names])
-        return joint_layout(data, self._joint, belt)
+        return joint_layout(data, self._joint, belt, self._kind)
 
     def _several(self, names: Iterable[str]) -> BagError:
         return BagError(

@@ -17,6 +17,7 @@ from stickslip_ros.record.cdr import Messages, Refused
 from stickslip_ros.record.chunk import MessageBlock
 from stickslip_ros.record.codec import (
     FORCE_TYPES,
+    STATE_TYPES,
     force_layouts,
     joint_states_in,
     references_in,
@@ -319,7 +320,13 @@ class Recording(BagFiles):
         types = FORCE_TYPES if topic == CONTROL_FORCE else (topic.type_name,)
         if given is None:
             name = self._prefix + topic.name
-            return name if self.topics.get(name) in types else ""
+            if self.topics.get(name) in types:
+                return name
+            others = {*STATE_TYPES} - {topic.type_name} if topic == JOINT_STATES else ()
+            found = [each for each, kind in self.topics.items() if kind in others]
+            return found[0] if len(found) == 1 and self._namespace is None else ""
+        if topic == JOINT_STATES:
+            types = (*STATE_TYPES,)
         name = NumberedTopic.of(given).name
         if self.topics.get(name) not in types:
             allowed = [each for each, kind in self.topics.items() if kind in types]
@@ -345,7 +352,8 @@ class Recording(BagFiles):
         belt_speed = self._belt_speed
         if belt_speed is None:
             belt_speed = number_in(self._of_the_analyzer.get("belt_speed", "")) or None
-        return MotionReader(topic, self._layout, belt_speed, str(self.path))
+        kind = self.topics.get(topic, JOINT_STATES.type_name)
+        return MotionReader(topic, self._layout, belt_speed, str(self.path), kind)
 
     @cached_property
     def _states_and_efforts(self) -> tuple[SampleColumns, ForceColumns]:

@@ -3,6 +3,7 @@
 import random
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,6 +11,8 @@ from geometry_msgs.msg import WrenchStamped
 from hypothesis import given
 from hypothesis import strategies as st
 from rclpy.serialization import serialize_message
+from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, Float64MultiArray
 
@@ -298,7 +301,10 @@ def test_choices_that_a_bag_cannot_meet_are_refused(tmp_path: Path) -> None:
     for options, reason in (
         ({"force": "effort"}, "have no effort of axis: .* --force-topic names"),
         ({"force_topic": "/u"}, "force_topic = '/u' is refused: .* are /machine/commands, /mach"),
-        ({"states_topic": COMMANDS}, "states_topic = .* that are sensor_msgs/msg/JointState are"),
+        (
+            {"states_topic": COMMANDS},
+            "states_topic = .* that are sensor_msgs/msg/JointState, .* are /mach",
+        ),
         ({"force_topic": COMMANDS}, r"has 2 numbers: --force-topic 'NAME\[1\]' takes the first"),
         ({"force": "torque"}, "force = 'torque' is invalid: must be one of topic, effort"),
     ):
@@ -341,6 +347,76 @@ def test_a_jump_from_which_the_joint_does_not_come_back_is_said(tmp_path: Path) 
     run = ss.read_bag(tmp_path / "bag")
     assert "the position jumps by 50 mm, 0.2 s after the first sample" in run.report["notes"][0]
     assert np.array_equal(run.samples.position, shifted)
+
+
+DYNAMIC = (
+    "std_msgs/Header header\nstring[] joint_names\ncontrol_msgs/InterfaceValue[] interface_values\n"
+)
+CONTROLLER = "std_msgs/Header header\nstring[] joint_names\n" + "".join(
+    f"trajectory_msgs/JointTrajectoryPoint {point}\n"
+    for point in ("reference", "feedback", "error")
+)
+
+
+def of_ros2_control(path: Path, kind: str, chance: random.Random | None = None) -> None:
+    """Write a bag of a topic of ros2_control, damaged by chance; joint b moves by 1 m/s."""
+    store: Any = get_typestore(Stores.ROS2_JAZZY)
+    values = {"control_msgs/msg/InterfaceValue": "string[] interface_names\nfloat64[] values\n"}
+    definition = DYNAMIC if "Dynamic" in kind else CONTROLLER
+    for name, text in (values | {f"control_msgs/msg/{kind}": definition}).items():
+        store.register(get_types_from_msg(text, name))
+    of = {name.rpartition("/")[2]: each for name, each in store.types.items()}
+
+    def point(*fields: list[float]) -> Any:
+        sequences = [np.array(each) for each in (*fields, *[[]] * (4 - len(fields)))]
+        return of["JointTrajectoryPoint"](*sequences, of["Duration"](1, 2))
+
+    with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        topic = writer.add_connection("/states", f"control_msgs/msg/{kind}", typestore=store)
+        for number in range(150):
+            stamp, x = recorded(number), number * STEP * 1e-9
+            header = of["Header"](of["Time"](*divmod(stamp, 10**9)), "")
+            if "Dynamic" in kind:
+                interfaces, numbers = ["effort", "velocity", "position"], [7.0, 1.0, x]
+                joints = [(["position"], [5.0]), (interfaces, numbers)]
+                parts = [[of["InterfaceValue"](names, np.array(each)) for names, each in joints]]
+            else:
+                feedback = point([5.0, x], [0.0, 1.0], [], [0.0, 7.0])
+                parts = [point([9.0, 9.0], [9.0, 9.0]), feedback, point()]
+            message = of[kind](header, ["a", "b"], *parts)
+            data = bytearray(store.serialize_cdr(message, f"control_msgs/msg/{kind}"))
+            if chance:
+                data[chance.randrange(len(data))] = chance.randrange(256)
+            writer.write(topic, stamp, bytes(data))
+
+
+KINDS = ("DynamicJointState", "JointTrajectoryControllerState")
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_topics_of_ros2_control_are_joint_states(tmp_path: Path, kind: str) -> None:
+    of_ros2_control(tmp_path / "bag", kind)
+    for topic in (None, "/states"):
+        layout = BagLayout(joint="b", states_topic=topic, force="effort")
+        with Recording(tmp_path / "bag", layout=layout) as recording:
+            states, forces = recording.joint_states, recording.control_forces
+        assert states.position == pytest.approx(np.arange(150) * STEP * 1e-9)
+        assert set(states.velocity) == {1.0}
+        assert set(forces.force) == {7.0}
+    with pytest.raises(BagError, match="are of the joints a, b: --joint NAME must choose one"):
+        ss.read_bag(tmp_path / "bag")
+
+
+@examples(quick=4, thorough=200, deadline=None)
+@given(seed=st.integers(0, 2**32), kind=st.sampled_from(KINDS))
+def test_damaged_topics_of_ros2_control_are_measured_or_refused(
+    tmp_path_factory: pytest.TempPathFactory, seed: int, kind: str
+) -> None:
+    path = tmp_path_factory.mktemp("machine") / "bag"
+    of_ros2_control(path, kind, random.Random(seed))
+    with suppress(InvalidInputError):
+        report = report_of_recording(path, layout=BagLayout(joint="b"))
+        assert report["samples"] <= 150
 
 
 def machine(chance: random.Random) -> list[tuple[str, int, bytes]]:
