@@ -504,8 +504,9 @@ class RecordedMotion(Motion):
         self._first_detail = self._recorded_detail if recording else Detail.STATES
         self._recording = Detail.MARKS in self._first_detail
         self._recorded: list[tuple[float, float, float, bool]] = []
-        self._ends_in_phase = False
         self._divided: list[int] = []
+        self._ends_in_phase = False
+        """Whether the last breakpoint is not the end of a phase."""
         self._passed: list[_Point] = []
         self._breakpoint_time = 0.0
         self._stick_speed, self._peak, self._was_slow = stick_speed, 0.0, False
@@ -538,7 +539,7 @@ class RecordedMotion(Motion):
 
     def divide(self) -> None:
         """Note that the end of the last advance only divides a longer one; see `measure_block`."""
-        if self._ends_in_phase:
+        if self._recording and self._ends_in_phase:
             self._divided.append(len(self._recorded) - 1)
 
     def take_divisions(self) -> list[int]:

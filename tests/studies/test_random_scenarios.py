@@ -1,0 +1,48 @@
+"""What is said of a scenario does not depend on how it is asked."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from benchmarks import random_scenarios as benchmark
+from benchmarks.random_scenarios import report
+from tests.studies.random_scenarios import CHANGES, RandomScenario, differences, random_scenario
+
+FOUND: dict[str, Any] = json.loads(
+    (Path(benchmark.__file__).parent / "random_scenarios.json").read_text(encoding="utf-8")
+)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_no_change_alters_what_it_should_not(seed: int) -> None:
+    assert {name: differences(seed, name) for name in CHANGES} == {name: [] for name in CHANGES}
+
+
+def test_a_change_that_alters_the_motion_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    stiffer = random_scenario(2).changed(lambda name, v: 1.01 * v if name == "stiffness" else v)
+    altered = CHANGES["shared"]._replace(measures=lambda _: stiffer.measures())
+    monkeypatch.setitem(CHANGES, "shared", altered)
+    assert [each.partition(":")[0] for each in differences(2, "shared")] == [
+        "amplitude", "midpoint", "velocity_amplitude", "period", "stick_fraction",
+    ]  # fmt: skip
+
+
+def test_the_study_has_found_none_in_300_scenarios() -> None:
+    assert FOUND["scenarios"] == 300
+    assert FOUND["differing"] == []
+    assert FOUND["by_change"] == {name: {"compared": 300, "differing": 0} for name in CHANGES}
+    assert set(FOUND["regimes"]) >= {"stick_slip", "pure_slip", "equilibrium", "stuck"}
+
+
+def test_what_differs_is_listed() -> None:
+    found = report([(0, name, ["regime: a, b"] if name == "drawn" else []) for name in CHANGES], {})
+    assert found["by_change"]["drawn"] == {"compared": 1, "differing": 1}
+    assert found["differing"] == [{"seed": 0, "change": "drawn", "differences": ["regime: a, b"]}]
+
+
+def test_scenarios_are_the_same_each_time() -> None:
+    assert isinstance(random_scenario(5), RandomScenario)
+    assert random_scenario(5) == random_scenario(5)
+    assert len({random_scenario(seed).law for seed in range(7)}) == 7
