@@ -135,7 +135,7 @@ setup(
             "colcon-core>=0.20",  # the first that says which setuptools it works with
             "colcon-ros",
             "psutil",  # processor time of a dashboard and its browser (make bench)
-            "pyright",
+            "pyright[nodejs]",  # with a Node.js that is quicker than those of most machines
             "pytest-xdist",
             "ruff",
         ],

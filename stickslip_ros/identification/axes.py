@@ -98,17 +98,21 @@ class AxisTask:
         if self.rows.resting:
             fits = fit, self._fitted(law, self._rows(None)).validated()
             found = min(fits, key=lambda each: each.error)
-        period, tried = self.records[0].period, _DELAYS
-        for _ in range(2):
-            design, wanted = fit.system
-            changes = [self._forces(each * period) - fit.rows.force for each in tried.tolist()]
-            wanted = wanted[:, None] + np.column_stack(changes)
-            left = wanted - design @ np.linalg.lstsq(design, wanted, rcond=None)[0]
-            best = float(tried[np.argmin(np.sum(left * left, axis=0))])
-            fit = self._fitted(law, self._rows(best * period))
-            tried = best + _DELAY_STEPS
+        best = 0.0
+        for tried in (_DELAYS, _DELAY_STEPS):
+            best = self._best_delay(fit, best + tried)
+            fit = self._fitted(law, self._rows(best * self.records[0].period))
         fit = fit.validated()
         return fit if fit.error < _RESOLVED_ERROR_RATIO * found.error else found
+
+    def _best_delay(self, fit: Regression, tried: FloatArray) -> float:
+        """Return the delay, in samples, with which the errors of a fit are least."""
+        period = self.records[0].period
+        design, wanted = fit.system
+        changes = [self._forces(each * period) - fit.rows.force for each in tried.tolist()]
+        wanted = wanted[:, None] + np.column_stack(changes)
+        left = wanted - design @ np.linalg.lstsq(design, wanted, rcond=None)[0]
+        return float(tried[np.argmin(np.sum(left * left, axis=0))])
 
     def _with_memory(self, static: Regression, *, asked: bool) -> Regression:
         """Return the fit whose friction follows the table of another over a path."""

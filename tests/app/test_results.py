@@ -64,15 +64,8 @@ CASES: dict[str, tuple[tuple[str, ...], Callable[[str], Result]]] = {
     "compare": (
         (
             "feed_drive",
-            *[
-                "--controllers",
-                "washout,velocity_feedback",
-                "--given",
-                "washout",
-                "--duration",
-                "0.6",
-            ],
-            *["--disturbances", "step", "--seeds", "2", "--spread", "0.1"],
+            *("--controllers", ",".join(LAWS), "--given", "washout", "--duration", "0.6"),
+            *("--disturbances", "step", "--seeds", "2", "--spread", "0.1"),
         ),
         lambda _: ss.compare("feed_drive", LAWS, given="washout", duration=0.6, **DISTURBED),
     ),

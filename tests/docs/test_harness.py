@@ -2,7 +2,7 @@
 
 import pytest
 
-from tests.docs.page import DIRECTIVES, Block, directives_file, parse
+from tests.docs.page import Block, parse
 from tests.docs.test_pages import check_output, in_a_row
 
 PAGE = """\
@@ -59,12 +59,6 @@ def test_directives_go_to_the_block_that_they_name() -> None:
             directed if block is found[number] else {} for block in found
         ]
         assert found[number].line == (3, 11, 17)[number]
-
-
-def test_the_readme_and_the_index_of_the_docs_have_files_of_their_own() -> None:
-    assert directives_file("README.md") == DIRECTIVES / "README.toml"
-    assert directives_file("docs/README.md") == DIRECTIVES / "docs" / "README.toml"
-    assert directives_file("docs/how-to/colcon.md") == DIRECTIVES / "how-to" / "colcon.toml"
 
 
 def test_a_replacement_changes_what_is_run_or_is_refused() -> None:

@@ -157,11 +157,3 @@ def test_says_in_a_line_what_to_install_where_venv_is_missing(set_up, fake_pytho
     refused = set_up(fake_python("*ensurepip*", "exit 1"))
     assert refused.returncode != 0
     assert "-venv" in refused.stderr.splitlines()[0]
-
-
-def test_an_interrupted_environment_is_not_taken_as_done(set_up, fake_python, tmp_path):
-    half = tmp_path / "venv" / "bin" / "python"
-    python = fake_python("*--clear*", f"mkdir -p {half.parent}; ln -sf $(which false) {half}")
-    for _ in range(2):
-        assert set_up(python).returncode != 0
-        assert half.exists()
