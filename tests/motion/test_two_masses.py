@@ -26,27 +26,14 @@ def random_drive(seed: int, law: str) -> tuple[TwoMasses, Drive]:
     speed = normal / critical
     belt = random.choice([0.0, 0.3, -0.4, 0.8]) * speed
     curve = Curve(static, kinetic, random.uniform(0.2, 0.5) * speed)
-    friction: FrictionLaw
+    steady = Exponential(static, kinetic, curve.decay, viscous=0.0)
+    friction: FrictionLaw = Coulomb(static) if law == "coulomb" else steady
     described: Curve | Bristles = curve
-    if law == "coulomb":
-        friction = Coulomb(static=static, viscous=0.0)
-    elif law == "exponential":
-        friction = Exponential(
-            static=static, kinetic=kinetic, decay_speed=curve.decay, viscous=0.0, exponent=1.0
-        )
-    else:
+    if law in ("lugre", "dahl"):
         bristles = random.uniform(20.0, 60.0) * stiffness / normal
-        damping = 0.0 if law == "dahl" else 0.1 * critical / normal
-        described = Bristles(curve, bristles, damping)
-        if law == "dahl":
-            friction = Dahl(static=static, bristle_stiffness=bristles)
-        else:
-            steady = Exponential(
-                static=static, kinetic=kinetic, decay_speed=curve.decay, viscous=0.0, exponent=1.0
-            )
-            friction = LuGre(
-                curve=steady, bristle_stiffness=bristles, bristle_damping=damping
-            )  # fmt: skip
+        loss = 0.0 if law == "dahl" else 0.1 * critical / normal
+        described = Bristles(curve, bristles, loss)
+        friction = Dahl(static, bristles) if law == "dahl" else LuGre(steady, bristles, loss)
     motor = Motor(
         mass=own,
         damping=random.uniform(0.0, 0.1) * critical,
