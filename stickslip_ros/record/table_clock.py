@@ -73,9 +73,9 @@ def in_order(
 def check_turns(table: Table, time: FloatArray) -> None:
     """Refuse rows of several joints that have the same times."""
     same = np.count_nonzero(time[1:] == time[:-1])
-    if table.turns is None or table.form.where is not None or same < _TURNING_SHARE * len(time):
+    if same < _TURNING_SHARE * len(time) or table.form.where or not (found := table.turns):
         return
-    name, turn = table.turns
+    name, turn = found
     raise InvalidInputError(
         f"{table.path}: each time is that of several rows, in which {name} is "
         f"{' and '.join(turn[:_MOST_SESSIONS])}: --where '{name}={turn[0]}' takes one"

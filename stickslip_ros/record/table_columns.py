@@ -84,8 +84,6 @@ class Table(ABC):
     """Places of the columns that are dates or times of day, once they are read: they are in s."""
     period: tuple[float, float] | None = None
     """Period of the rows that a line above them tells, s and in its own unit."""
-    turns: tuple[str, Sequence[str]] | None = None
-    """A column whose values take turns in the first rows, such as the names of joints."""
     decimal = "."
     """Decimal mark."""
 
@@ -93,6 +91,11 @@ class Table(ABC):
     def notes(self) -> Sequence[str]:
         """Sentences on how the file was read so far."""
         return ()
+
+    @property
+    def turns(self) -> tuple[str, Sequence[str]] | None:
+        """A column whose values take turns in the first rows, such as the names of joints."""
+        return None
 
     @abstractmethod
     def read(self, places: Sequence[int]) -> list[Any]:

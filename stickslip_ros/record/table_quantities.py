@@ -3,7 +3,7 @@
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from math import isnan, log2, nan
+from math import isnan, nan
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -38,8 +38,8 @@ _FORCES = ("force", "disturbance", "friction_force")
 _MERGED_SHARE, _BETWEEN_SHARE = 0.3, 0.05
 """Share of the rows with a position that lack another quantity, from which it was recorded between
 them; fewest of its values, as a share of the positions."""
-_SMALLEST_TURN = 128.0
-"""Least jump of a counter that wraps, in its own unit."""
+_SMALLEST_TURN, _SAME_TURN = 256.0, 0.01
+"""Least turn of a counter that wraps once; relative difference of a jump from it."""
 _NUMBER = re.compile(r"_?\d*$")
 """What the names of several columns of times differ by: Time_1 and Time_2."""
 
@@ -195,23 +195,33 @@ class _Cells:
         asked = self.asked[name]
         rows = np.zeros((len(asked.places), 1 + len(asked.places)))  # no column, and each by itself
         for number, place in enumerate(asked.places):
-            rows[number, 1 + number] = np.spacing(np.nanmax(np.abs(self.columns[place])))
-        values = asked.value([*rows]) * self.factors[name]
-        return float(np.sum(np.abs(values - values[0])))
+            column = np.abs(self.columns[place])
+            largest = np.max(column, where=np.isfinite(column), initial=0.0)
+            rows[number, 1 + number] = np.spacing(largest)
+        values = np.atleast_1d(asked.value([*rows])) * self.factors[name]
+        with np.errstate(all="ignore"):
+            return float(np.nan_to_num(np.sum(np.abs(values - values[0])), posinf=0.0))
 
     def unwrapped(self, name: str, row: int) -> str:
-        """Return the expression that unwraps a column which jumps by a power of 2, or nothing."""
+        """Return the expression that unwraps a column which jumps by a power of 2, or nothing.
+
+        It must be of whole numbers.
+        """
         asked, factor = self.asked[name], self.factors[name]
-        (place, *others), known = asked.places, self.table.columns
-        column = np.asarray(self.columns[place], float)
-        steps = np.abs(np.diff(column[max(0, row - 9) : row + 9]))
-        jump = abs(column[row] - column[row - 1])
-        turn = 2.0 ** round(log2(jump)) if jump > _SMALLEST_TURN else 0.0
-        if others or abs(turn - jump) > 2.0 * np.max(steps, where=steps < jump, initial=0.0):
+        if len(asked.places) != 1:
             return ""
-        names = [each for each in known if known[each] == place and each in asked.text]
-        unwrapped = f"unwrap({self.table.number(place)}, {turn:.0f})"
-        text = unwrapped if asked.bare else asked.text.replace(names[0], unwrapped, 1)
+        (place,), known = asked.places, self.table.columns
+        near = np.asarray(self.columns[place], float)[max(0, row - 9) : row + 9]
+        jump = np.max(np.abs(np.diff(near)), initial=1.0)
+        turn = 2.0 ** np.rint(np.log2(jump))
+        same = abs(turn - jump) <= _SAME_TURN * turn
+        if turn < _SMALLEST_TURN or not same or np.any(near != np.rint(near)):
+            return ""
+        names = "|".join(re.escape(each) for each in known if known[each] == place)
+        text = f"unwrap({self.table.number(place)}, {turn:.0f})"
+        if not asked.bare:
+            column = rf"(?<![\w.])['\"]?(?:{names})(?!\w)['\"]?"
+            text = re.sub(column, text, asked.text, count=1)
         return f"{name}={text}" + f"*{factor:.12g}" * (factor != 1.0)
 
     def times(

@@ -7,6 +7,7 @@ import re
 import warnings
 from collections.abc import Sequence
 from contextlib import suppress
+from functools import cached_property
 from io import StringIO, TextIOWrapper
 from itertools import islice
 from math import nan
@@ -151,9 +152,18 @@ class TextTable(Table):
             for place, name in enumerate(names_of_columns):
                 if name:
                     self.columns.setdefault(name, place)
-        first = [_cells(line, self._separator) for line in lines[start : start + _TOP]]
-        self._top = [row for row in first if len(row) == width]
-        self.turns = next(filter(None, map(self._turn, range(width))), None)
+        self._top_lines = lines[start : start + _TOP]
+
+    @cached_property
+    def _top(self) -> list[list[str]]:
+        """The cells of the first rows."""
+        rows = [_cells(line, self._separator) for line in self._top_lines]
+        return [row for row in rows if len(row) == self.width]
+
+    @property
+    def turns(self) -> tuple[str, Sequence[str]] | None:
+        """A column whose values take turns in the first rows."""
+        return next(filter(None, map(self._turn, range(self.width))), None)
 
     def _turn(self, place: int) -> tuple[str, list[str]] | None:
         """Return the values of a column that take turns, and its name."""

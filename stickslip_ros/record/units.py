@@ -39,6 +39,7 @@ _SPELLINGS = tuple(
         ("day", "T", "", "d|days?|tage?"),
         ("degree", "R", "", r"deg(?:s|r\w*)?|grad(?:i|os?)?"),
         ("gon", "R", "", "gon|grad"),
+        ("turn", "turns", "", "r|u|tr"),
         ("turn", "R", "", "revs?|revolutions?|turns?|umdr(?:ehung(?:en)?)?|tours?|giri|vueltas?"),
         ("arcsec", "R", "", "arcsec(?:onds?)?"),
         ("arcmin", "R", "", "arcmin(?:utes?)?"),
@@ -48,9 +49,7 @@ _SPELLINGS = tuple(
     )
 )
 """Units in machines' data: what pint calls them, their dimension, prefixes, and how people write
-them. Those without a name for pint are of other quantities."""
-_TURNS = ("r", "u", "tr")
-"""Turns in a ratio, as in U/min."""
+them. Those without a name for pint are of other quantities; turns as in U/min only in a ratio."""
 _DIMENSIONS = {"m": "L", "m/s": "L/T", "N": "F", "s": "T", "rad": "R", "rad/s": "R/T", "N m": "FL"}
 _COUNTS = re.compile(
     r"counts?|cts|inc|incr(?:ements?)?|ink(?:r\w*)?|puls\w*|impuls\w*|pls|ticks?|steps|lsb|digits?|erpm"
@@ -62,8 +61,8 @@ _START = re.compile(r"(?<![^\W_])(?=[^\W_])|(?<=[^\W\d_A-Z])(?=[A-Z])|(?<=\d)(?=
 """Where a word starts: after a mark, in PosMM, and after a number."""
 _DOUBTFUL, _DOUBTFUL_ALONE = ("in", "min", "h", "d"), ("cm", "dm")
 """Units that may be other words at the end of a name, or where they are all of it."""
-
-
+_LONGEST = 200
+"""Characters of a name in which a unit is looked for."""
 _SAMPLING = re.compile(r"(?i)sampl|abtast|échantil|muestr|campion|zyklus|^\W*(?:interval|period)")
 """Words for the sampling of a table."""
 
@@ -85,7 +84,9 @@ def units_in(name: str, given: str, target: str) -> list[Unit]:
     `given` is its cell in a line of units, or empty; `target` the SI unit of the quantity for
     linear motion; a unit of the same quantity of rotary motion is one, too.
     """
-    stated, last = [*_stated(name, given, target)], [*_last(name, target)]
+    name = name[:_LONGEST]
+    plain = _BRACKETED.sub(" ", name).strip()
+    stated, last = [*_stated(name, plain, given, target)], [*_last(plain, target)]
     known, words = ([each for each in found if not isnan(each.factor)] for found in (stated, last))
     found = known or words or [*stated, *last][:1]
     return [*{each.factor: each for each in reversed(found)}.values()][::-1]
@@ -105,6 +106,7 @@ def are_units(cells: Sequence[str]) -> bool:
 
 def without_unit(name: str) -> str:
     """Return the name of a column without the unit in brackets or after a mark, or nothing."""
+    name = name[:_LONGEST]
     if found := re.fullmatch(rf"(.+?)\s*{_BRACKETED.pattern}\s*", name):
         return found[1]
     return next(
@@ -123,6 +125,7 @@ def joined_units(cells: Sequence[str], width: int) -> list[str]:
 
 def period_in(line: str) -> tuple[float, float] | None:
     """Return the period of rows that a line of text tells, s and in its own unit, or None."""
+    line = line[: 5 * _LONGEST]
     if not _SAMPLING.search(line):
         return None
     number, unit = r"(?P<number>\d[\d.,]*(?:e-?\d+)?)", r"(?P<unit>[^\W\d_]+)"
@@ -137,18 +140,18 @@ def period_in(line: str) -> tuple[float, float] | None:
     return None
 
 
-def _stated(name: str, given: str, target: str) -> Iterator[Unit]:
+def _stated(name: str, plain: str, given: str, target: str) -> Iterator[Unit]:
     """Yield the units in the line of units, or in a name in brackets or after a mark."""
-    cell, plain = given.strip().strip("[]()"), _BRACKETED.sub(" ", name).strip()
-    bracketed = _BRACKETED.findall(name)
+    cell, bracketed = given.strip().strip("[]()"), _BRACKETED.findall(name)
     marked = [plain[each.end() :] for each in _MARK.finditer(plain)]
     for text in filter(None, [cell, *bracketed, *marked]):
-        first = text.partition(" ")[0]
-        if found := [*_read(text, target)] or [*_read(first, target)]:
+        words = [each for each in text.split() if each.strip(".").casefold() not in _DOUBTFUL]
+        tried = [text, *words[:1]] if re.search(r"\d", text) else [text, *words[-1:], *words[:1]]
+        if found := next(filter(None, ([*_read(each, target)] for each in tried)), []):
             yield from found
-        elif text.lower() not in NO_UNITS and first.casefold() not in _DOUBTFUL:
+        elif text.lower() not in (*NO_UNITS, *_DOUBTFUL):
             letters = len(re.findall(r"[^\W\d_]", text))
-            unit = _parsed(text) or _parsed(first) or _counts(text)
+            unit = _parsed(text) or any(map(_parsed, words)) or _counts(text)
             certain = text == cell or f"[{text}]" in name.replace(" ", "")
             if (unit and (letters > 1 or text not in marked)) or (certain and letters > 1):
                 yield Unit(text, nan, target)
@@ -156,7 +159,6 @@ def _stated(name: str, given: str, target: str) -> Iterator[Unit]:
 
 def _last(name: str, target: str) -> Iterator[Unit]:
     """Yield what the last words of a name may be, or words between, or counts."""
-    name = _BRACKETED.sub(" ", name).strip()
     starts = [found.start() for found in _START.finditer(name)]
     for start in starts[-4:]:
         text, before = name[start:], name[:start]
@@ -188,9 +190,9 @@ def _counts(text: str) -> bool:
 
 def _read(text: str, target: str) -> Iterator[Unit]:
     """Yield the readings of a text, with or without a number, as a unit of a quantity."""
-    number = re.match(r"\d[\d.]*(?:e-?\d+)?(?=\s*[^\W\d_])", text)
+    number = re.match(r"\d+(?:[.,]\d+)?(?:e-?\d+)?(?=\s*[^\W\d_])", text)
     unit = text[number.end() :].strip() if number else text
-    scale = float(number[0]) if number and number[0].count(".") < 2 else 1.0
+    scale = float(number[0].replace(",", ".")) if number else 1.0
     for each in dict.fromkeys((target, ROTARY.get(target, target))):
         for name, dimension in _parsed(unit):
             if dimension == _DIMENSIONS[each]:
@@ -223,17 +225,12 @@ def _parsed(text: str) -> tuple[tuple[str, str], ...]:
             sides[1].append(sides[0].pop())
         elif not (word == "1" and not number and len(words) > 1):
             sides[below].append(word)
-    over, under = sides
+    over, under = ([_spelled(each) for each in side] for side in sides)
     if not 1 <= len(over) + len(under) <= 3:
         return ()
-    ratio = bool(under)
-    found = [
-        *_composed(
-            [_spelled(each, ratio) for each in over], [_spelled(each, False) for each in under]
-        )
-    ]
+    found = [*_composed(over, under)]
     if len(over) == 2 and not under:
-        found += _composed([_spelled(over[0], True)], [_spelled(over[1], False)])
+        found += _composed(over[:1], over[1:])
     return tuple(found)
 
 
@@ -244,20 +241,18 @@ def _composed(
     for each in product(product(*over), product(*under)):
         above, below = ("".join(sorted(dimension for _, dimension in side)) for side in each)
         unit = " ".join(name for name, _ in each[0]) + "".join(f"/{name}" for name, _ in each[1])
-        if not over:
-            yield f"turn{unit}", f"R/{below}"
-            if unit == "/s":
-                yield "rad/s", "R/T"
-        else:
-            yield unit, f"{above}/{below}" if under else above
+        if not under and above != "turns":
+            yield unit, above
+        elif under:
+            yield unit if over else f"turn{unit}", f"{above.replace('turns', 'R') or 'R'}/{below}"
+        if not over and unit == "/s":
+            yield "rad/s", "R/T"
 
 
 @cache
-def _spelled(word: str, ratio: bool) -> list[tuple[str, str]]:
+def _spelled(word: str) -> list[tuple[str, str]]:
     """Return what a word may be among units: what pint calls it, and its dimension."""
     lower = word.casefold()
-    if ratio and lower in _TURNS:
-        return [("turn", "R")]
     found: list[tuple[str, str]] = []
     for name, dimension, pattern in _SPELLINGS:
         if match := pattern.fullmatch(lower):

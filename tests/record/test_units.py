@@ -28,9 +28,9 @@ HEADERS = {
         "|x-mm|x_mm|x [mm]"
         "|x (mm)|x <mm>|X_MM|Position mm (act)|pos_mm_act|déplacement en mm|Posición (mm)"
         "|spostamento [mm]"
-        "|Weg in Millimeter|course (millimètres)|x [1e-3 m]|mm",
+        "|Weg in Millimeter|Weg (in mm)|course (millimètres)|x [1e-3 m]|mm",
         1e-6: "x [um]|x (µm)|x [micron]|vdcdt_um|Weg / µm",
-        1e-4: "x [0.1 mm]",
+        1e-4: "x [0.1 mm]|x (0,1 mm)",
         1e-2: "pos_cm",
         1e-9: "pos_nm",
         0.0254: "X [in]|X [inch]|x_inch|x / in|Position, in|position in inches|Weg in Zoll"
@@ -41,7 +41,8 @@ HEADERS = {
         DEGREE: "phi [Grad]|phi [°]|phi_deg|Winkel in Grad|angle (degrés)|angulo en grados",
         DOUBTFUL: "x_in|position_in|xIn|in|cm|phi [grad]|pos [inc]|Position [counts]|pos_counts"
         "|Encoder count|count"
-        "|Weg [Inkremente]|Droop pulses (by 1 pls.)|Position [V]|Pos [%]|Weg / mV|x_0.1um",
+        "|Weg [Inkremente]|Droop pulses (by 1 pls.)|Position [V]|Pos [%]|x (1/1000 mm)"
+        "|Weg / mV|x_0.1um|x (in 0.1 mm)",
         NO_UNIT: "x|pos|x_N|phi_h|pos_d|x_min|Position (min)|Position (X)|x_max|data[2]|pos_s|A"
         "|mu|accel_x|in_position",
     },
