@@ -1,5 +1,6 @@
 """Recordings of machines as tables: CSV files, and MAT files of MATLAB."""
 
+import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import nan
@@ -22,7 +23,19 @@ from stickslip_ros.samples import ForceColumns, SampleColumns
 TABLE_SUFFIXES = (".csv", ".mat", ".txt", ".dat", ".tsv", ".log", ".asc")
 """Ends of the names of files that are tables, whatever they hold."""
 
+_FORMATS = {
+    b"PK\x03\x04": "an archive, such as Excel and numpy write: save its table as CSV or MAT file",
+    b"TDSm": "TDMS: TdmsFile(path).as_dataframe().to_csv(table) of npTDMS converts it",
+    b"PAR1": "Parquet: pandas.read_parquet(path).to_csv(table) converts it",
+    b"#ROSBAG": "of ROS 1: rosbags-convert --dst-storage mcap --src FILE --dst FOLDER converts it",
+    b"RIFF": "sound: read it with scipy.io.wavfile, and save it by scipy.io.savemat",
+    ".json": "JSON: pandas.DataFrame(...).to_csv(table) writes a list of rows in it",
+    ".yaml": "YAML: `ros2 topic echo --csv TOPIC` writes rows, and `ros2 bag record` a bag",
+}
+"""What files of other tools are, by their first bytes or end, and how they become tables."""
 _BAG_SUFFIXES = (".mcap", ".db3")
+_START = 16
+"""First bytes that tell a format."""
 _MCAP = b"\x89MCAP"
 
 _MOST_NUMBERS = 1 << 24
@@ -63,6 +76,10 @@ def table_of(path: Path, form: TableFormat = ANY_FORM) -> Table:
     """Return the table in a text or MAT file; raises BagError."""
     with reading_file(path), open_regular(path) as stream:
         if not is_mat(path, stream):
+            start = os.pread(stream.fileno(), _START, 0)
+            for sign, what in _FORMATS.items():
+                if sign in (path.suffix.lower(), start[: len(sign)]):
+                    raise ValueError(f"it is {what}")
             return TextTable(path, form)
         vectors = vectors_of(stream, _MOST_NUMBERS)
         if not vectors:

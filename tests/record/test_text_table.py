@@ -397,6 +397,30 @@ def test_what_is_said_of_the_form_is_used(
     assert read(tmp_path, text, "a", "b", form).samples.position.tolist() == position
 
 
+@pytest.mark.parametrize(
+    ("name", "start", "way"),
+    [
+        (
+            "log.xlsx",
+            b"PK\x03\x04",
+            "such as Excel and numpy write: save its table as CSV",
+        ),
+        ("log.parquet", b"PAR1\0\1", "read_parquet"),
+        ("log.tdms", b"TDSm\0\1", "npTDMS converts it"),
+        ("ros1.bag", b"#ROSBAG V2.0\n", "rosbags-convert"),
+        ("log.wav", b"RIFF\0\1", "wavfile"),
+        ("log.json", b'{"rows": [[1, 2],', "pandas"),
+        ("log.yaml", b"header:\n  stamp:", "topic echo --csv"),
+    ],
+)
+def test_files_of_other_tools_are_refused_by_name(
+    tmp_path: Path, name: str, start: bytes, way: str
+) -> None:
+    (tmp_path / name).write_bytes(start + bytes(100))
+    with pytest.raises(BagError, match=way):
+        read_table(tmp_path / name, {"time": "t", "position": "x"})
+
+
 def test_what_is_no_table_is_refused_with_the_options(tmp_path: Path) -> None:
     texts = ("only words\nand more\n", "1\n2\n3\n", b"\0\1\2\3" * 100)
     for text in texts:
