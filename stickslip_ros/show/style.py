@@ -1,5 +1,6 @@
 """Common style of the figures: lines, fonts, colours and regimes, and how figures are saved."""
 
+import os
 import re
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -121,6 +122,7 @@ _PAGE_HEIGHT = 235.0 * _MILLIMETRE
 
 _REPRODUCIBLE = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
 """Metadata to omit by file type, so that the same figure gives the same file."""
+_DATE = "SOURCE_DATE_EPOCH"
 
 
 @dataclass(frozen=True)
@@ -329,7 +331,13 @@ def rendered(
         if outlines:
             mpl.rcParams["svg.fonttype"] = "path"
         getLogger("fontTools").setLevel(ERROR)  # of the fonts of matplotlib it tells their dates
-        figure.savefig(drawn, format=kind, dpi=dots_per_inch, metadata=_REPRODUCIBLE.get(kind))
+        # matplotlib fails at a wrong date of the environment, also where it writes none.
+        date = os.environ.pop(_DATE, None)
+        try:
+            figure.savefig(drawn, format=kind, dpi=dots_per_inch, metadata=_REPRODUCIBLE.get(kind))
+        finally:
+            if date is not None:
+                os.environ[_DATE] = date
     return drawn.getvalue()
 
 

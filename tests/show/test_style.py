@@ -1,5 +1,6 @@
 """How figures look, what their titles say, and how they are written to files."""
 
+import os
 from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
@@ -58,6 +59,18 @@ def test_a_users_own_settings_neither_matter_nor_change(tmp_path: Path) -> None:
         save(small_figure(), tmp_path / "other.svg")
         assert mpl.rcParams["font.size"] == 30.0
     assert (tmp_path / "one.svg").read_bytes() == (tmp_path / "other.svg").read_bytes()
+
+
+@pytest.mark.parametrize("ending", [".svg", ".pdf"])
+def test_a_date_of_the_environment_does_not_matter(
+    tmp_path: Path, ending: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path, again = tmp_path / f"one{ending}", tmp_path / f"other{ending}"
+    save(small_figure(), path)
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "x")
+    save(small_figure(), again)
+    assert path.read_bytes() == again.read_bytes()
+    assert os.environ["SOURCE_DATE_EPOCH"] == "x"
 
 
 def test_a_title_is_shown_as_it_is_within_the_figure() -> None:
