@@ -136,7 +136,8 @@ def margin(
     Raises
     ------
     InvalidInputError
-        If the margin is not allowed, or the belt moves in both directions.
+        If the margin is not allowed, the belt moves in both directions, or no recording has a
+        ring-down.
     """
     if not 0.0 <= margin < 1.0:
         raise InvalidInputError(f"margin = {margin} is invalid: must be at least 0 and below 1")
@@ -156,5 +157,7 @@ def margin(
         growing = [units.text(each.belt_speed, "m/s") for each in own if each.decay_rate <= 0.0]
         notes += [f"{record.name}: a vibration does not decay at {feed}" for feed in growing]
         found += own
+    if not found:
+        raise InvalidInputError("; ".join(notes))
     onset = onset_of(found, units.of_unit("m"))
     return Margin(paths, margin, onset, [*filter(None, [*notes, onset.advice])], units)

@@ -70,10 +70,9 @@ class Task:
             belt_speeds = (own * (1.0 - OWN_SPEED_RANGE), own * (1.0 + OWN_SPEED_RANGE))
         low, high = belt_speeds
         if not SMALLEST <= low <= high <= LARGEST:
-            raise InvalidInputError(
-                f"belt speeds {low:g} to {high:g} m/s: must be from {SMALLEST:g} to {LARGEST:g}, "
-                "the lower first"
-            )
+            ordered = SMALLEST <= high < low <= LARGEST
+            must = "the lower must be first" if ordered else f"must be above 0, at most {LARGEST:g}"
+            raise InvalidInputError(f"belt speeds {low:g} m/s to {high:g} m/s: {must}")
         return cls(scenario, (low, high), min(law.force_limit, plant.actuator.limit))
 
     @cached_property

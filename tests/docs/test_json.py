@@ -76,7 +76,6 @@ CALLS = [
     ("design_of_another_law", ("design", *RIG, "0.04", "--controller", "velocity_feedback")),
     ("compare", ("compare", "feed_drive", "--controllers", "washout", "--duration", "0.3")),
     ("identify", ("identify", REFERENCE, "--to", "0.6", "--law", "stribeck", *KNOWN)),
-    ("margin", ("margin", REFERENCE)),
     ("repair", ("repair", REFERENCE, "sound")),
     ("list", ("list",)),
     ("show", ("show", "feed_drive", "-p", "plant.mass=2")),

@@ -33,8 +33,10 @@ def test_of_a_scenario_it_is_that_scenario_with_the_gains(tmp_path: Path) -> Non
 
 def test_the_range_of_belt_speeds() -> None:
     scenario = load_scenario("feed_drive")
-    for belt_speeds in ((2.0, 1.0), (0.0, 1.0), (-1.0, 1.0), (0.1, inf)):
-        with pytest.raises(InvalidInputError, match="the lower first"):
+    with pytest.raises(InvalidInputError, match="2 m/s to 1 m/s: the lower must be first"):
+        Task.from_scenario(scenario, (2.0, 1.0))
+    for belt_speeds in ((0.0, 1.0), (-1.0, 1.0), (0.1, inf)):
+        with pytest.raises(InvalidInputError, match="must be above 0, at most"):
             Task.from_scenario(scenario, belt_speeds)
     with pytest.raises(InvalidInputError, match="must be given"):
         Task.from_scenario(scenario.overridden(["plant.belt_speed=0"]))
