@@ -14,6 +14,7 @@ import pytest
 from benchmarks import memory_agreement
 from benchmarks.memory_agreement import REQUIRED, Result, compared, report
 from benchmarks.random_memory_drives import LAWS, STORED_EVERY, random_memory_drive
+from stickslip_ros.model.friction import Directional
 
 FOUND: dict[str, Any] = json.loads(
     (Path(memory_agreement.__file__).parent / "memory_agreement.json").read_text(encoding="utf-8")
@@ -35,6 +36,20 @@ def test_a_motion_is_that_of_its_reference(law: str, seed: str) -> None:
     drive = random_memory_drive(law, int(seed))
     found = drive.motion()[::STORED_EVERY]
     assert drive.error(found, np.array(STORED[law][seed])) < REQUIRED[law]
+
+
+def test_many_elements_are_compiled_in_another_way_and_move_as_their_reference() -> None:
+    drive = random_memory_drive("maxwell_slip", 19)
+    ahead, back = (replace(each, elements=8) for each in (drive.forward, drive.backward))
+    law: Any = drive.drive.friction
+    both = (replace(each, elements=8) for each in (law.forward, law.reverse))
+    drive = replace(
+        drive,
+        drive=replace(drive.drive, friction=Directional(*both)),
+        forward=ahead,
+        backward=back,
+    )
+    assert drive.error(drive.motion(), drive.reference(1e-10)) < REQUIRED["maxwell_slip"]
 
 
 def test_there_are_references_of_every_law() -> None:
