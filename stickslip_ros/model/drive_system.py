@@ -13,6 +13,7 @@ from stickslip_ros.model import equations
 from stickslip_ros.model.control import ContinuousControl
 from stickslip_ros.model.dimensionless_drive import (
     LIFT_ROUNDING,
+    MEMORY,
     POSITION,
     SPEED,
     DimensionlessDrive,
@@ -305,7 +306,19 @@ class DriveSystem(DimensionlessDrive):
                 return
             if abs(held) < limit + margin:
                 state[POSITION] = x - sign * margin
+        elif self._is_at_rest(mode, instant):
+            return
         state[SPEED] = y + sign * max(ulp(belt_speed), ulp(1.0))
+
+    def _is_at_rest(self, mode: Mode, instant: Instant) -> bool:
+        """Return whether a slide with a memory stays where it is, on a belt that does not move."""
+        state, law, sign = instant.state, self.drive.friction, mode.switches[0]
+        if not self._steady or self._loaded or any(state[SPEED:MEMORY]):
+            return False
+        memory, own = self._memory(instant), mode.switches[self._parts.law]
+        rates = law.memory_rates(0.0, sign, memory, own)
+        force = self.friction_force(mode, instant) - self.held_force(mode, instant)
+        return not any((*rates, *state[self.control_states.start :], force))
 
     def longest_step(self, instant: Instant) -> float:
         """Return a time in which the speed changes by the law's characteristic speed at most.

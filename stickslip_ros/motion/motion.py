@@ -30,6 +30,12 @@ _STEPS_PER_SECOND = 1e8
 _LARGEST_FORCE = 1e100
 """Largest dimensionless force; a larger one is clipped to it: both make the motion unbounded."""
 
+_AT_REST, _FADED = 1e-300, 1e-280
+"""Dimensionless speed below which a slide that fades rests, and states below which are zero then.
+
+What fades would end among the numbers that a processor computes slowly, and never be zero.
+"""
+
 _SLOW_ROUNDING = 1e-9
 """Share of the speed at which a slide becomes slow that is rounding."""
 
@@ -130,6 +136,7 @@ class Motion(HybridMotion):
         self._speed, self._weight = drive.speed_scale, drive.force_scale
         self._steps_per_unit = _STEPS_PER_SECOND / self._frequency
         self._one_force = len(self._system.inputs) == 1
+        self._fades = not system.sticks
 
     @property
     def memory(self) -> tuple[float, ...]:
@@ -403,6 +410,9 @@ class Motion(HybridMotion):
 
     def _pass_time(self, duration: float) -> None:
         """Add a duration to the time; enter what a corner at its end leads to."""
+        if self._fades and 0.0 < abs(self._instant.state[SPEED]) < _AT_REST:
+            faded = (each if abs(each) > _FADED else 0.0 for each in self._instant.state)
+            self._instant.state[:] = array("d", faded)
         if not self._clocked:
             self._time += duration
             return

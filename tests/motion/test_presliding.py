@@ -73,6 +73,23 @@ def test_a_load_of_zero_mean_closes_its_loop(law: FrictionLaw) -> None:
     assert loops[1, 0] - loops[1, 1] > DEFLECTION
 
 
+@pytest.mark.parametrize("velocity", [0.0, 1e-3])
+@pytest.mark.parametrize(
+    "law",
+    [Dahl(0.4, 1e3), LuGre(Coulomb(0.4), 1e3, 30.0), MaxwellSlip(Coulomb(0.4), 1e3, 2, 100.0)],
+    ids=lambda law: law.name,
+)
+def test_a_slide_that_nothing_moves_rests(law: FrictionLaw, velocity: float) -> None:
+    motion = Motion(Drive(100.0, 200.0, 0.0, 1e3, 0.0, law), 0.0, velocity)
+    for _ in range(40):
+        motion.advance(1.0)
+    if velocity:
+        assert abs(motion.velocity) < 1e-10
+        assert motion.velocity == 0.0 or abs(motion.velocity) > 1e-300
+    else:
+        assert (motion.position, motion.velocity, motion.friction_force) == (0.0, 0.0, 0.0)
+
+
 def test_elements_close_a_loop_with_a_bias() -> None:
     found = displacements(MaxwellSlip(Coulomb(COEFFICIENT), STIFFNESS), [0.8, -0.2] * 6)
     loops = found.reshape(-1, 2)
