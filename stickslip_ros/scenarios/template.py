@@ -6,7 +6,7 @@ from math import isfinite
 from textwrap import wrap
 from typing import Any
 
-from stickslip_ros.model.constants import Parameter
+from stickslip_ros.model.constants import Changes, Parameter
 from stickslip_ros.scenarios import ros_yaml
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, NodeParameters
@@ -83,7 +83,8 @@ def _explained(parameter: Parameter) -> str:
         allowed = (
             f"{allowed}, or .nan: {parameter.unset}" if allowed else f".nan: {parameter.unset}"
         )
-    notes = ", ".join(filter(None, [parameter.unit, allowed]))
+    changed = "" if parameter.changes is Changes.LIVE else f"changed {parameter.changes}"
+    notes = ", ".join(filter(None, [parameter.unit, allowed, changed]))
     return f"{parameter.meaning} [{notes}]" if notes else parameter.meaning
 
 
