@@ -99,6 +99,20 @@ def test_parameters_that_are_none_are_no_drive(
     assert "friction law, with the range of this run" not in texts(tmp_path / "run.svg")
 
 
+def test_a_bag_whose_law_is_gone_is_reported_as_one_of_a_law_with_a_memory(
+    stickslip: Run, tmp_path: Path
+) -> None:
+    printed: list[str] = []
+    for law in ("rate_state", "lugre"):
+        plant = {"friction.law": f'"{law}"', "mass": "1.0", "stiffness": "10.0", "rate": "100.0"}
+        record(tmp_path / law, tables={"stickslip_ros/plant": plant})
+        done = stickslip("report", law, "--plot", f"{law}.svg", "--html", f"{law}.html")
+        assert done.returncode == 0, done.stderr
+        printed.append(done.stdout.partition("\n")[2])
+    assert printed[0] == printed[1]
+    assert "rate_state" in (tmp_path / "rate_state.html").read_text(encoding="utf-8")
+
+
 class Refused(WithoutArguments):
     """Answers each state with 128.6 N that no plant takes."""
 

@@ -1,5 +1,6 @@
 """Recorded runs for tests that need one."""
 
+from collections.abc import Mapping
 from contextlib import closing
 from pathlib import Path
 from typing import Any
@@ -18,14 +19,16 @@ STATES = "/test/joint_states"
 FORCES = "/test/control_force"
 
 
-def record_states(bag: Path, count: int, step: int = SECOND // 100) -> str:
+def record_states(
+    bag: Path, count: int, step: int = SECOND // 100, **contents: Mapping[str, Any]
+) -> str:
     """Write as many joint states and forces, `step` ns apart, from 1 s on; return the path."""
     messages: list[tuple[str, int, bytes]] = []
     for number in range(count):
         stamp = SECOND + number * step
         state = pack_joint_state(stamp, (number, 0.0), (0.1, 0.4), (0.0, 0.0))
         messages += [(STATES, stamp, state), (FORCES, stamp, pack_wrench(stamp, 0.5 * number))]
-    write_bag(bag, messages)
+    write_bag(bag, messages, **contents)
     return str(bag)
 
 
