@@ -51,11 +51,6 @@ class Table:
         ----------
         *others : Table
             Tables of the same class, in order.
-
-        Returns
-        -------
-        Table
-            A table of the same class with all rows; without `others`, this table itself.
         """
         if not others:
             return self

@@ -135,11 +135,6 @@ class SampleColumns(Table):
         ----------
         samples : sequence of Sample
             Consecutive samples.
-
-        Returns
-        -------
-        SampleColumns
-            Their columns.
         """
         stamp = np.array([sample.stamp for sample in samples], np.int64)
         none = np.nan, np.nan
@@ -148,13 +143,7 @@ class SampleColumns(Table):
         return cls(stamp, *others.T.copy())
 
     def samples(self) -> list[Sample]:
-        """Return the samples one by one.
-
-        Returns
-        -------
-        list of Sample
-            A sample for each row; with a motor where the samples have one.
-        """
+        """Return the samples one by one, with a motor where they have one."""
         slide = (column.tolist() for column in list(vars(self).values())[:6])
         motor = map(MotorSample, self.motor_position.tolist(), self.motor_velocity.tolist())
         return [*map(Sample, *slide, motor if self.has_motor else repeat(None))]

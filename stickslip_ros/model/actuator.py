@@ -66,11 +66,6 @@ class Actuator:
             Held force, see `limiter`.
         states : sequence of float or expression
             Values of `states`.
-
-        Returns
-        -------
-        sequence of float or expression
-            Rates.
         """
         return [(held - force) / self.time_constant for force in states]
 
@@ -83,11 +78,6 @@ class Actuator:
             Held force, see `limiter`.
         states : sequence of float or expression
             Values of `states`.
-
-        Returns
-        -------
-        float or expression
-            Force.
         """
         return states[0] if states else held
 

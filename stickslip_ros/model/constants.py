@@ -139,11 +139,6 @@ class Parameter:
         ----------
         value : bool, int, float, str or list of str
             Value of the parameter.
-
-        Returns
-        -------
-        bool
-            True if it is.
         """
         return value == self.default or (value != value and self.default != self.default)
 
@@ -286,18 +281,7 @@ def described_by(parameter: Parameter) -> Any:
 
 @cache
 def constants_of(part: type) -> Mapping[str, Parameter]:
-    """Return the constants of a part's class by name, in the order of their definition.
-
-    Parameters
-    ----------
-    part : type
-        Dataclass.
-
-    Returns
-    -------
-    mapping of str to Parameter
-        Description of each field made with `constant`.
-    """
+    """Return the constants of a part's class, a dataclass, by name, in the order of the fields."""
     return {
         each.name: replace(each.metadata[_KEY], name=each.name)
         for each in fields(part)

@@ -42,13 +42,6 @@ class Signal:
 
     `step`, `impulse`, `ramp`, `sine`, `trapezoid` and `table` make one. Belt speed and load follow
     it continuously, a disturbance holds it between samples, see `held`.
-
-    Examples
-    --------
-    >>> from stickslip_ros.model.signals import ramp
-    >>> signal = ramp(amplitude=0.04, start=1.0, duration=2.0)
-    >>> [signal.at(time) for time in (0.5, 2.0, 3.0)]
-    [0.0, 0.02, 0.04]
     """
 
     pieces: tuple[Piece, ...] = ()
@@ -237,13 +230,6 @@ def step(amplitude: float, start: float = 0.0, duration: float = inf) -> Signal:
         Time at which it starts, s.
     duration : float
         Time that it lasts, s.
-
-    Examples
-    --------
-    >>> from stickslip_ros.model.signals import step
-    >>> signal = step(amplitude=2.0, start=1.0, duration=3.0)
-    >>> [signal.at(time) for time in (0.5, 1.0, 3.9, 4.0)]
-    [0.0, 2.0, 2.0, 0.0]
     """
     return _signal(_held(0.0, start), _held(amplitude, start + duration), _held(0.0, inf))
 
@@ -300,13 +286,6 @@ def sine(
         Time that it lasts, s.
     frequency : float
         Frequency, Hz.
-
-    Examples
-    --------
-    >>> from stickslip_ros.model.signals import sine
-    >>> signal = sine(amplitude=2.0, start=1.0, frequency=0.5)
-    >>> [round(signal.at(time), 9) for time in (0.5, 1.5, 2.0, 2.5)]
-    [0.0, 2.0, 0.0, -2.0]
     """
     wave = Piece(start, 0.0, 0.0, amplitude, 2.0 * pi * frequency, start + duration)
     return _signal(_held(0.0, start), wave, _held(0.0, inf))
@@ -369,13 +348,6 @@ def table(points: Sequence[tuple[float, float]]) -> Signal:
     ------
     InvalidInputError
         If there are no points, they are not finite, or their times do not increase.
-
-    Examples
-    --------
-    >>> from stickslip_ros.model.signals import table
-    >>> signal = table([(1.0, 0.0), (3.0, 0.5)])
-    >>> [signal.at(time) for time in (0.0, 2.0, 9.0)]
-    [0.0, 0.25, 0.5]
     """
     if not points:
         raise InvalidInputError("the table has no points: must have at least one")

@@ -38,15 +38,6 @@ class Controller:
         default there is none.
     state : tuple of float, optional
         State of the law at the first sample. By default it is `ControlLaw.initial_state`.
-
-    Examples
-    --------
-    >>> from stickslip_ros.motion.controller import Controller
-    >>> from stickslip_ros.model.control import VelocityFeedback
-    >>> from stickslip_ros.samples import Sample
-    >>> controller = Controller(VelocityFeedback(velocity_gain=-500.0, force_limit=10.0))
-    >>> controller.answer(Sample(0, 0.0, 0.04, 0.0, 0.0, 0.04))
-    -10.0
     """
 
     def __init__(
@@ -131,11 +122,6 @@ class Controller:
             Stamp of the sample, ns.
         period : int
             Sample period, ns.
-
-        Returns
-        -------
-        bool
-            Whether both hold.
         """
         since = (stamp - self._first_stamp) * 1e-9
         acts = since >= self.law.start_after - STAMP_ROUNDING

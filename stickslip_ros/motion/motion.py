@@ -482,21 +482,6 @@ class RecordedMotion(Motion):
         speed, or, on a belt at rest, of the fastest relative speed so far.
     recording : bool, optional
         Whether breakpoints are recorded from the start; see the attribute.
-
-    Examples
-    --------
-    The turning points of a slide that starts at rest:
-
-    >>> from stickslip_ros.model.drive import Drive
-    >>> from stickslip_ros.model.friction import Stribeck
-    >>> from stickslip_ros.motion import RecordedMotion
-    >>> drive = Drive(mass=100.0, damping=200.0, stiffness=1e6, normal_force=1000.0,
-    ...               belt_speed=0.04, friction=Stribeck(0.4, 0.25, 0.05))
-    >>> motion = RecordedMotion(drive, position=0.0, velocity=0.0)
-    >>> motion.advance(0.1)
-    >>> breakpoints = motion.take_breakpoints()
-    >>> [round(1e6 * x) for x in breakpoints.position[breakpoints.velocity == 0.0][-3:]]
-    [671, -71, 760]
     """
 
     _recorded_detail: ClassVar[Detail] = Detail.MARKS

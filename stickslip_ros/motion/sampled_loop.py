@@ -92,24 +92,6 @@ class SampledLoop:
         and the force (N).
     advance : callable, optional
         Replaces the `advance_under` of `motion`, see `MotionTracer`.
-
-    Examples
-    --------
-    A velocity feedback of -500 N s/m at 1 kHz for 0.1 s:
-
-    >>> from stickslip_ros.motion.sampled_loop import SampledLoop
-    >>> from stickslip_ros.model.drive import Drive
-    >>> from stickslip_ros.model.friction import Stribeck
-    >>> from stickslip_ros.motion import Motion
-    >>> drive = Drive(mass=100.0, damping=200.0, stiffness=1e6, normal_force=1000.0,
-    ...               belt_speed=0.04, friction=Stribeck(0.4, 0.25, 0.05))
-    >>> loop = SampledLoop(Motion(drive, 0.0, 0.0), rate=1000.0, start=0)
-    >>> sample = loop.sample
-    >>> for _ in range(100):
-    ...     verdict = loop.offer(sample.stamp, -500.0 * sample.velocity)
-    ...     sample = loop.advance()
-    >>> sample.stamp, round(1e6 * sample.position, 1)
-    (100000000, 645.0)
     """
 
     def __init__(

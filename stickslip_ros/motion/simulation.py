@@ -136,35 +136,10 @@ def simulate_sampled(
     measured : SampleMeter, optional
         Receives the samples as the sensor measures them.
 
-    Returns
-    -------
-    Measures
-        Measures over the last whole cycles.
-
     Raises
     ------
     RunError
         If the motion is so stiff that it would take too many steps.
-
-    Examples
-    --------
-    A washout controller suppresses the vibration:
-
-    >>> from stickslip_ros.motion.sampled_loop import SampledLoop
-    >>> from stickslip_ros.motion.simulation import simulate_sampled
-    >>> from stickslip_ros.motion.controller import Controller
-    >>> from stickslip_ros.measures import CycleMeter
-    >>> from stickslip_ros.model.control import Washout
-    >>> from stickslip_ros.model.drive import Drive
-    >>> from stickslip_ros.model.friction import Stribeck
-    >>> from stickslip_ros.motion import RecordedMotion
-    >>> drive = Drive(mass=100.0, damping=200.0, stiffness=1e6, normal_force=1000.0,
-    ...               belt_speed=0.04, friction=Stribeck(0.4, 0.25, 0.05))
-    >>> motion = RecordedMotion(drive, position=0.0, velocity=0.0)
-    >>> loop = SampledLoop(motion, rate=1000.0, start=0)
-    >>> washout = Controller(Washout(20.0, linear_gain=-3000.0, cubic_gain=0.0))
-    >>> simulate_sampled(loop, motion, washout, 5.0, CycleMeter(20)).regime.value
-    'equilibrium'
     """
     samples, done = round(duration / loop.period), 0
     seen, present = [loop.sample], (loop.true_sample, loop.sample)
@@ -233,11 +208,6 @@ def simulate_continuous(
         Receives motion and forces in blocks.
     recorder : SampleRecorder, optional
         Takes samples at its rate.
-
-    Returns
-    -------
-    Measures
-        Measures over the last whole cycles.
 
     Raises
     ------

@@ -61,26 +61,10 @@ class BagFiles:
                 yield block, topic_of
 
     def messages(self, *topics: str) -> Iterator[tuple[str, int, bytes]]:
-        """Yield the serialized messages of some topics in file order.
+        """Yield topic, log time (ns) and CDR data of each message of these topics, in file order.
 
-        Parameters
-        ----------
-        *topics : str
-            Full names, such as `/feed_drive/joint_states`.
-
-        Yields
-        ------
-        topic : str
-            Full name of the topic.
-        log_time : int
-            ns.
-        data : bytes
-            The message, serialized as CDR.
-
-        Raises
-        ------
-        BagError
-            If the operating system fails to read the bag.
+        Topics have full names, such as `/feed_drive/joint_states`. Raises BagError if the operating
+        system fails to read the bag.
         """
         for block, topic_of in self.message_blocks(*topics):
             columns = (block.channel, block.log_time, block.begin, block.end)
@@ -88,17 +72,9 @@ class BagFiles:
                 yield topic_of[channel], stamp, block.data[begin:end]
 
     def offered_qos(self, topic: str) -> str:
-        """Return the QoS profiles that the recorded publishers of a topic offered.
+        """Return the QoS profiles that the recorded publishers of a topic (full name) offered.
 
-        Parameters
-        ----------
-        topic : str
-            Full name, such as `/feed_drive/joint_states`.
-
-        Returns
-        -------
-        str
-            rosbag2's YAML, a list with one profile for each publisher; empty if unknown.
+        They are rosbag2's YAML, a list with one profile for each publisher; empty if unknown.
         """
         found = [
             channel.metadata.get("offered_qos_profiles", "")
@@ -109,34 +85,12 @@ class BagFiles:
         return next(filter(None, found), "")
 
     def metadata(self, name: str) -> dict[str, str] | None:
-        """Return the last metadata table of a name in the bag.
-
-        Parameters
-        ----------
-        name : str
-            Name of the MCAP metadata record, such as `stickslip_ros/analyzer`.
-
-        Returns
-        -------
-        dict or None
-            The table, strings by strings; None if the bag has none of this name.
-        """
+        """Return the last metadata table of a name, such as `stickslip_ros/analyzer`, or None."""
         last = deque((table for file in self.files for table in file.tables(name)), maxlen=1)
         return last[0].metadata if last else None
 
     def attachment(self, name: str) -> bytes | None:
-        """Return the last attached file of a name in the bag.
-
-        Parameters
-        ----------
-        name : str
-            Name of the attachment.
-
-        Returns
-        -------
-        bytes or None
-            The content of the file; None if the bag has none of this name.
-        """
+        """Return the content of the last attached file of a name; None if there is none."""
         attachments = (found for file in self.files for found in file.attachments(name))
         last = deque(attachments, maxlen=1)
         return last[0].data if last else None

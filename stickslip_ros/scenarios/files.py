@@ -211,11 +211,6 @@ def parameter_file(values: Mapping[str, Mapping[str, Any]]) -> str:
     values : Mapping[str, Mapping[str, Any]]
         Values by node and flat name, as from `Scenario.as_dict`. Empty lists are omitted, because
         a parameter file cannot give their type.
-
-    Returns
-    -------
-    str
-        The text, in YAML.
     """
     sections = {
         f"/**/{node}": {

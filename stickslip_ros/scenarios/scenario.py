@@ -40,15 +40,6 @@ class Scenario:
     """The parameters of every node in one run, and their source.
 
     Create a scenario with `load_scenario`, and change it with `changed`.
-
-    Examples
-    --------
-    >>> from stickslip_ros.scenarios.files import load_scenario
-    >>> scenario = load_scenario("feed_drive", ["plant.belt_speed=0.03"])
-    >>> scenario.plant.mass, scenario.plant.belt_speed
-    (100.0, 0.03)
-    >>> scenario.changed({"plant.damping": 200.0}).plant.damping
-    200.0
     """
 
     name: str
@@ -148,13 +139,7 @@ class Scenario:
         return names
 
     def as_dict(self) -> dict[str, dict[str, Any]]:
-        """Return the parameters of every node.
-
-        Returns
-        -------
-        dict[str, dict[str, Any]]
-            Values by node and flat name, for example `["plant"]["friction.static"]`.
-        """
+        """Return the values by node and flat name, such as `["plant"]["friction.static"]`."""
         return {node: getattr(self, node).flat() for node in self.nodes}
 
     def provenance(self) -> dict[str, Any]:
@@ -187,11 +172,6 @@ class Scenario:
         values : Mapping[str, Any]
             New values by NODE.PARAMETER, such as `{"plant.belt_speed": 0.03}`.
 
-        Returns
-        -------
-        Scenario
-            The changed copy.
-
         Raises
         ------
         InvalidInputError
@@ -208,11 +188,6 @@ class Scenario:
             Texts NODE.PARAMETER=VALUE, the value written as in a scenario file.
         values : Mapping[str, Any], optional
             Further values by NODE.PARAMETER, which act after the texts.
-
-        Returns
-        -------
-        Scenario
-            The changed copy.
 
         Raises
         ------
@@ -249,11 +224,6 @@ class Scenario:
         law : str
             Name of the control law. Its parameters are those of the scenario file; the others have
             their defaults, except that a force limit follows.
-
-        Returns
-        -------
-        Scenario
-            The changed copy.
 
         Raises
         ------

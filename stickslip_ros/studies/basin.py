@@ -121,11 +121,6 @@ def basin_study(
     continuous : bool
         Whether the control acts without sampling (eq. 19).
 
-    Returns
-    -------
-    Study
-        The study, ready to be computed.
-
     Raises
     ------
     InvalidInputError

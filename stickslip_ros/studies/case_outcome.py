@@ -126,28 +126,12 @@ def is_positioning(scenario: Scenario) -> bool:
 def simulate_case(
     scenario: Scenario, duration: float, disturbance: Disturbance, tolerance: float
 ) -> Outcome:
-    """Return the outcome of the sampled loop of a scenario.
+    """Return the outcome, with the number 0, of the sampled loop of a scenario over a duration (s).
 
-    Parameters
-    ----------
-    scenario : Scenario
-        Scenario with the disturbance; its controller acts from the first sample on.
-    duration : float
-        Duration, s.
-    disturbance : Disturbance
-        The disturbance, for its end.
-    tolerance : float
-        What a law that holds may leave, as a share of the belt speed or the reference's motion.
-
-    Returns
-    -------
-    Outcome
-        Outcome with the number 0.
-
-    Raises
-    ------
-    StickslipError
-        If the law fails, or the motion is too stiff to be followed.
+    The controller of the scenario acts from the first sample on; `disturbance` is the scenario's,
+    for its end. A law that holds may leave `tolerance`, as a share of the belt speed or the
+    reference's motion. Raises StickslipError if the law fails, or the motion is too stiff to be
+    followed.
     """
     plant = scenario.plant
     drive, limit = plant.as_drive(), scenario.controller.control_law.force_limit

@@ -47,11 +47,6 @@ class Columns(CycleMeasures[FloatArray]):
         ----------
         plan : Grid or RandomSample
             The points of the study.
-
-        Returns
-        -------
-        Columns
-            One row for each point.
         """
         size = plan.size
         return cls(

@@ -112,10 +112,7 @@ class Comparison(PointStudy[Cases]):
     def scenario_of(self, number: int) -> Scenario:
         """Return the scenario of a case.
 
-        Raises
-        ------
-        InvalidInputError
-            If its values are out of bounds, or do not fit together.
+        Raises InvalidInputError if its values are out of bounds, or do not fit together.
         """
         plan, case = self.plan, self.plan.case(number)
         law = [*plan.laws][case.law]

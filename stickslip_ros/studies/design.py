@@ -40,11 +40,6 @@ class Task:
         belt_speeds : tuple[float, float], optional
             Lowest and highest belt speed, m/s; by default 10 % below and above the scenario's.
 
-        Returns
-        -------
-        Task
-            The task.
-
         Raises
         ------
         InvalidInputError

@@ -241,11 +241,6 @@ def sweep_study(
     continuous : bool
         Whether the control acts without sampling (eq. 19).
 
-    Returns
-    -------
-    Study
-        The study, ready to be computed.
-
     Raises
     ------
     InvalidInputError

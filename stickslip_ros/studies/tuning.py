@@ -202,25 +202,10 @@ class _Rule:
 def tune(scenario: Scenario, law: str, goal: Goal) -> Tuned:
     """Return the gains of a law for a scenario by the rule, see the module.
 
-    Parameters
-    ----------
-    scenario : Scenario
-        Scenario that gives drive, rate, delay and sensor.
-    law : str
-        Name of the control law. Its constants that are no gains are those of the scenario or
-        follow from the drive.
-    goal : Goal
-        The goal.
-
-    Returns
-    -------
-    Tuned
-        The gains; the remark says what of the goal they do not meet.
-
-    Raises
-    ------
-    InvalidInputError
-        If the law has no gains to tune, or no gains make all loops stable.
+    Drive, rate, delay and sensor are the scenario's. Constants of the law that are no gains are
+    those of the scenario or follow from the drive. The remark of the result says what of the goal
+    it does not meet. Raises InvalidInputError if the law has no gains to tune, or no gains make all
+    loops stable.
     """
     found = with_law(scenario, law, {}).controller.control_law
     if not found.tuned:

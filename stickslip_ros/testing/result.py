@@ -78,11 +78,6 @@ class RunResult:
         """Time of each sample since the first one of this run, s."""
         return (self.states.stamp - self.states.stamp[0]) * 1e-9
 
-    @property
-    def force_time(self) -> FloatArray:
-        """Time of the sample that each force answers, since the first sample of this run, s."""
-        return (self.forces.stamp - self.states.stamp[0]) * 1e-9
-
 
 def result_of(
     bag: Path, window: int, reading: SampleAssumptions, diagnostics: dict[str, Diagnostics]

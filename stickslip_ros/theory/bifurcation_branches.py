@@ -124,11 +124,6 @@ class BifurcationBranches:
         belt_speeds : ndarray
             Belt speeds in m/s, ascending and of one sign, at least two.
 
-        Returns
-        -------
-        BifurcationBranches
-            Branches, Hopf points and stick-slip onset speed.
-
         Raises
         ------
         InvalidInputError
@@ -159,11 +154,6 @@ class BifurcationBranches:
             Drive in SI units.
         points : int, optional
             Number of belt speeds at which cycles are searched for first.
-
-        Returns
-        -------
-        BifurcationBranches
-            Branches, Hopf points and stick-slip onset speed.
 
         Raises
         ------

@@ -68,19 +68,6 @@ def hopf_points(drive: Drive, control: ContinuousControl | None = None) -> list[
     ------
     InvalidInputError
         If belt or load follow a signal, or the drive has no spring.
-
-    Examples
-    --------
-    The system of the paper:
-
-    >>> from stickslip_ros.model.drive import Drive
-    >>> from stickslip_ros.model.friction import Stribeck
-    >>> from stickslip_ros.theory.hopf import hopf_points
-    >>> drive = Drive(mass=1.0, damping=0.02, stiffness=1.0, normal_force=1.0,
-    ...               belt_speed=0.4, friction=Stribeck(0.4, 0.25, 0.5))
-    >>> (point,) = hopf_points(drive)
-    >>> round(point.belt_speed, 6), point.supercritical
-    (0.488763, True)
     """
     require_equilibrium("the search for Hopf points", drive, control)
     smooth = SMOOTH.lack(drive) is None

@@ -121,19 +121,6 @@ def limit_cycles(drive: Drive) -> list[LimitCycle]:
     InvalidInputError
         If friction differs between the directions, belt or load follow a signal, or the drive has
         no spring.
-
-    Examples
-    --------
-    The system of the paper:
-
-    >>> from stickslip_ros.model.drive import Drive
-    >>> from stickslip_ros.model.friction import Stribeck
-    >>> from stickslip_ros.theory.limit_cycles import limit_cycles
-    >>> drive = Drive(mass=1.0, damping=0.02, stiffness=1.0, normal_force=1.0,
-    ...               belt_speed=0.4, friction=Stribeck(0.4, 0.25, 0.5))
-    >>> (cycle,) = limit_cycles(drive)
-    >>> round(cycle.measures.amplitude, 6), cycle.stable
-    (0.434086, True)
     """
     require("the search for limit cycles", drive, *ONE_DEGREE, SYMMETRIC)
     static = STATIC.lack(drive) is None

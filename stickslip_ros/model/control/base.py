@@ -24,17 +24,7 @@ TABLE, MOTOR = "table", "motor"
 def body(default: str, of_what: str) -> Any:
     """Describe the choice of a body, as the default of a field of a control law.
 
-    Parameters
-    ----------
-    default : str
-        `TABLE` or `MOTOR`.
-    of_what : str
-        What of the body is meant, as in "motion is fed back".
-
-    Returns
-    -------
-    dataclasses.Field
-        Field with this description.
+    `of_what` says what of the body is meant, as in "motion is fed back".
     """
     return constant(
         default, f"Body whose {of_what}: the slide (table) or the motor.", choices=(TABLE, MOTOR)
@@ -102,11 +92,6 @@ class ContinuousControl(Protocol):
         ----------
         drive : Drive
             Drive that defines the scales.
-
-        Returns
-        -------
-        ContinuousControl
-            The same control, dimensionless.
         """
         return self if drive.is_dimensionless else scaled(self, drive.scales)
 
@@ -138,11 +123,6 @@ class ContinuousControl(Protocol):
             Displacement x and speed y of the slide.
         states : sequence of float, array or expression
             Values of `states`.
-
-        Returns
-        -------
-        sequence
-            Rates, in the order of `states`.
         """
         ...
 
@@ -153,11 +133,6 @@ class ContinuousControl(Protocol):
         ----------
         position, speed, states
             As in `state_rates`.
-
-        Returns
-        -------
-        float, array or expression
-            Force.
         """
         ...
 
@@ -168,11 +143,6 @@ class ContinuousControl(Protocol):
         ----------
         drive : Drive
             Drive that defines the scales.
-
-        Returns
-        -------
-        sequence of float
-            Factors, in the order of `states`.
         """
         ...
 
@@ -372,11 +342,6 @@ class ControlLaw(ABC):
         ----------
         drive : Drive
             Drive that the law is to control.
-
-        Returns
-        -------
-        ControlLaw
-            By default the law itself.
         """
         return self
 

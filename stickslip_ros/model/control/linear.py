@@ -10,21 +10,10 @@ from stickslip_ros.samples import NO_REFERENCE, Sample
 
 
 def superposed(law: ControlLaw, states: int, period: float) -> LinearFeedback:
-    """Return the linear form of a law that is linear while its force is not limited.
+    """Return the linear form, without limit and reference, of a law with a number of states.
 
-    Parameters
-    ----------
-    law : ControlLaw
-        Law whose force and next state are linear in state, displacement and velocity.
-    states : int
-        Number of its states.
-    period : float
-        Sample period, s.
-
-    Returns
-    -------
-    LinearFeedback
-        The law before each sample, without limit and reference.
+    Force and next state must be linear in state, displacement and velocity while the force is not
+    limited; `period` is that of the samples, s.
     """
     free = replace(law, force_limit=inf)
     columns: list[list[float]] = []

@@ -87,11 +87,6 @@ class Pid(FeedbackLaw):
         ----------
         period : float
             Sample period, s.
-
-        Returns
-        -------
-        LinearFeedback
-            The linear part.
         """
         gains = {name: getattr(self, name) for name in Pid.tuned}
         return superposed(Pid(**gains), 1, period).of(self.feedback)

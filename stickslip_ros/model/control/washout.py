@@ -28,21 +28,6 @@ class Washout(FeedbackLaw, ContinuousControl):
     m. For held samples it is discretised exactly; the state is then kept as z = d w, the low-passed
     speed, z' = d (y - z), so that the output does not jump when the cutoff frequency changes. The
     filter starts at rest.
-
-    Examples
-    --------
-    >>> from stickslip_ros.motion.controller import Controller
-    >>> from stickslip_ros.model.control import Washout
-    >>> from stickslip_ros.samples import Reference, Sample
-    >>> law = Washout(corner_frequency=20.0, linear_gain=-3000.0, cubic_gain=0.0)
-    >>> law.force(0.01)
-    -30.0
-    >>> washout = Controller(law)
-    >>> sample = Sample(0, 0.0, 0.04, 0.0, 0.0, 0.04)
-    >>> washout.answer(sample)
-    0.0
-    >>> round(washout.answer(sample._replace(stamp=1_000_000, velocity=0.05)), 3)
-    -30.0
     """
 
     name: ClassVar[str] = "washout"

@@ -78,11 +78,7 @@ class SteadyFriction(ABC):
     def refusal(self) -> str | None:
         """Return a sentence that says which constants do not fit together, or None.
 
-        Returns
-        -------
-        str or None
-            Sentence with names, values and what is allowed; bounds of one constant are not its
-            subject.
+        It has names, values and what is allowed; bounds of one constant are not its subject.
         """
         return None
 
@@ -139,11 +135,6 @@ class FrictionMemory(SteadyFriction):
         ----------
         relative_speed, sign, memory, switches
             As in `friction`.
-
-        Returns
-        -------
-        sequence of float or expression
-            Rate of each of `states`.
         """
         return ()
 
@@ -360,21 +351,10 @@ class FrictionLaw(FrictionMemory):
             New unit of speed, m/s.
         length : float, optional
             New unit of length, m; a static law does not depend on it.
-
-        Returns
-        -------
-        FrictionLaw
-            Law of the same class.
         """
         return scaled(self, Scales(length, speed))
 
     @classmethod
     def constants(cls) -> tuple[str, ...]:
-        """Return the names of the law's constants.
-
-        Returns
-        -------
-        tuple of str
-            Names in the order of the dataclass fields.
-        """
+        """Return the names of the law's constants."""
         return tuple(each.name for each in fields(cls))

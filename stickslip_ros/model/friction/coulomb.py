@@ -12,14 +12,7 @@ from stickslip_ros.model.friction.base import FrictionLaw
 
 @dataclass(frozen=True)
 class Coulomb(FrictionLaw):
-    """Coulomb law (Fig. 8 of the paper), with viscous friction: mu = -s (mu_s + mu_v |v_r|).
-
-    Examples
-    --------
-    >>> from stickslip_ros.model.friction import Coulomb
-    >>> Coulomb(static=0.4).coefficient(-0.3, -1.0)
-    0.4
-    """
+    """Coulomb law (Fig. 8 of the paper), with viscous friction: mu = -s (mu_s + mu_v |v_r|)."""
 
     name: ClassVar[str] = "coulomb"
     proportional: ClassVar[Sequence[str]] = ("static", "viscous")

@@ -22,13 +22,6 @@ class Dahl(FrictionLaw):
     Steady friction is mu_s at every speed: no falling part, and therefore no vibration by itself.
     Friction depends on the path and not on time: a load below break-away does not creep, but every
     cycle of a load with a bias leaves a drift.
-
-    Examples
-    --------
-    >>> from stickslip_ros.model.friction import Dahl
-    >>> law = Dahl(static=0.4, bristle_stiffness=1000.0)
-    >>> law.friction(0.1, 1.0, (2e-4,), ())
-    -0.2
     """
 
     name: ClassVar[str] = "dahl"

@@ -45,15 +45,6 @@ class Directional(FrictionLaw):
     """Two friction laws of one class: for forward slip (v_r > 0) and for backward slip (v_r < 0).
 
     Its memory and its switches are those of the class: a change of direction keeps the memory.
-
-    Examples
-    --------
-    >>> from stickslip_ros.model.friction import Coulomb, Directional
-    >>> law = Directional(forward=Coulomb(static=0.4), reverse=Coulomb(static=0.3))
-    >>> law.coefficient(0.1, 1.0), law.coefficient(-0.1, -1.0)
-    (-0.4, 0.3)
-    >>> law.limits
-    (0.4, 0.3)
     """
 
     static: ClassVar[Any]  # type: ignore[misc]

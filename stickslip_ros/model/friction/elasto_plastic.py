@@ -27,14 +27,6 @@ class ElastoPlastic(LuGre):
 
     Below z_b the contact is elastic, so that it does not drift. In steady slip it has the friction
     of LuGre, and a first derivative, but no second one.
-
-    Examples
-    --------
-    >>> from stickslip_ros.model.friction import ElastoPlastic, Exponential
-    >>> law = ElastoPlastic(Exponential(static=0.4, kinetic=0.25), bristle_stiffness=1000.0)
-    >>> switches = law.switches_at(0.1, 1.0, (1e-4,))  # elastic: z' is the relative speed
-    >>> [float(each) for each in law.memory_rates(0.1, 1.0, (1e-4,), switches)]
-    [0.1]
     """
 
     name: ClassVar[str] = "elasto_plastic"

@@ -17,13 +17,6 @@ class Exponential(FrictionLaw):
 
     It is not in the paper. It is the usual form elsewhere (Armstrong-Helouvry et al., Automatica
     30, 1994). The exponent n is often 1 or 2.
-
-    Examples
-    --------
-    >>> from stickslip_ros.model.friction import Exponential
-    >>> law = Exponential(static=0.4, kinetic=0.25, decay_speed=0.5, viscous=0.0)
-    >>> round(float(law.coefficient(-0.5, -1.0)), 4)
-    0.3052
     """
 
     name: ClassVar[str] = "exponential"

@@ -13,14 +13,7 @@ from stickslip_ros.model.friction.base import FrictionLaw
 
 @dataclass(frozen=True)
 class Linear(FrictionLaw):
-    """Linear law (Fig. 9 of the paper): mu = -mu_s s + slope v_r; friction decreases with speed.
-
-    Examples
-    --------
-    >>> from stickslip_ros.model.friction import Linear
-    >>> round(Linear(static=0.4, slope=0.45).coefficient(-0.4, -1.0), 3)
-    0.22
-    """
+    """Linear law (Fig. 9 of the paper): mu = -mu_s s + slope v_r; friction decreases with speed."""
 
     name: ClassVar[str] = "linear"
     proportional: ClassVar[Sequence[str]] = ("static", "slope")

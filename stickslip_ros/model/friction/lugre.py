@@ -164,14 +164,6 @@ class LuGre(CurveFollower):
     A load with a bias below break-away drifts with every cycle, as with Dahl's law; real contacts
     do not. The law is passive only if mu_v > D (max g / min g - 1) (N. Barabanov, R. Ortega, IEEE
     Transactions on Automatic Control 45(4), 2000).
-
-    Examples
-    --------
-    >>> from stickslip_ros.model.friction import Exponential, LuGre
-    >>> curve = Exponential(static=0.4, kinetic=0.25, decay_speed=0.05)
-    >>> law = LuGre(curve, bristle_stiffness=1000.0, bristle_damping=0.0)
-    >>> float(law.friction(0.0, 1.0, (2e-4,), ()))
-    -0.2
     """
 
     name: ClassVar[str] = "lugre"

@@ -25,13 +25,6 @@ class MaxwellSlip(CurveFollower):
 
     Its presliding hysteresis does not depend on the rate, and closes whatever the bias: no drift.
     Friction lags behind a change of the speed by g/C. There is no damping of the contact.
-
-    Examples
-    --------
-    >>> from stickslip_ros.model.friction import Exponential, MaxwellSlip
-    >>> law = MaxwellSlip(Exponential(static=0.4, kinetic=0.25), elements=2)
-    >>> [round(each, 12) for each in law.stiffnesses]
-    [666.666666666667, 333.333333333333]
     """
 
     name: ClassVar[str] = "maxwell_slip"

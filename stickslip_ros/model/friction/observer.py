@@ -12,13 +12,6 @@ class FrictionObserver:
         Law in SI units; a static one has no memory, but may be used, too.
     memory : sequence of float, optional
         Values of its `states`; by default its initial memory at rest.
-
-    Examples
-    --------
-    >>> from stickslip_ros.model.friction import Dahl, FrictionObserver
-    >>> observer = FrictionObserver(Dahl(static=0.4, bristle_stiffness=1e5))
-    >>> round(observer.step(relative_speed=0.001, duration=0.001), 4)
-    -0.0885
     """
 
     def __init__(self, law: FrictionLaw, memory: Numbers | None = None) -> None:

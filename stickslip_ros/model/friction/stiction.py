@@ -16,13 +16,6 @@ class Stiction(FrictionLaw):
 
     It is not in the paper. It is the textbook law, with static above kinetic friction (H. Olsson et
     al., Friction models and friction compensation, European Journal of Control 4, 1998).
-
-    Examples
-    --------
-    >>> from stickslip_ros.model.friction import Stiction
-    >>> law = Stiction(static=0.4, kinetic=0.25)
-    >>> law.coefficient(-0.3, -1.0), law.limits
-    (0.25, (0.4, 0.4))
     """
 
     name: ClassVar[str] = "stiction"

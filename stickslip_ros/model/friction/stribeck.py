@@ -16,13 +16,6 @@ class Stribeck(FrictionLaw):
     """Cubic Stribeck law, eq. 3: mu = -mu_s s + a v_r - b v_r^3.
 
     a = 3 (mu_s - mu_m) / (2 v_m) and b = (mu_s - mu_m) / (2 v_m^3).
-
-    Examples
-    --------
-    >>> from stickslip_ros.model.friction import Stribeck
-    >>> law = Stribeck(static=0.4, minimum=0.25, minimum_speed=0.5)
-    >>> law.coefficient(-0.5, -1.0)
-    0.25
     """
 
     name: ClassVar[str] = "stribeck"

@@ -21,13 +21,6 @@ class Table(FrictionLaw):
     Between the points it is the cubic Hermite spline of Fritsch and Butland, SIAM J. Sci. Stat.
     Comput. 5, 1984 (PCHIP), which is continuously differentiable. Beyond the last point it is
     constant. The coefficient of the first point is the static one.
-
-    Examples
-    --------
-    >>> from stickslip_ros.model.friction import Table
-    >>> law = Table(points=((0.0, 0.4), (0.1, 0.3), (0.5, 0.25)))
-    >>> law.static, float(law.coefficient(-0.1, -1.0)), float(law.coefficient(2.0, 1.0))
-    (0.4, 0.3, -0.25)
     """
 
     name: ClassVar[str] = "table"
