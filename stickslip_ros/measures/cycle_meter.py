@@ -46,7 +46,6 @@ rounding the belt speed.
 _NOISE = 1e-9
 """Speeds below this share of the belt speed, or of the highest speed so far, are rounding."""
 
-
 _TIME_ROUNDING = 1e-9
 """Share of a duration by which the end of a part may be missed for rounding."""
 
@@ -291,7 +290,9 @@ class CycleMeter:
         """Return the breakpoints at which the velocity changes from negative to positive."""
         speed = np.abs(breakpoints.velocity)
         self._fastest = max(self._fastest, float(speed[speed.argmax()]))
-        noise = max(_NOISE * max(self._fastest, self._fastest_belt), self.rounding)
+        noise = _NOISE * max(self._fastest, self._fastest_belt)
+        if self._belt_speed == 0.0:
+            noise = max(noise, self.rounding)
         (moving,) = (speed > noise).nonzero()
         if len(moving) == 0:
             return []
