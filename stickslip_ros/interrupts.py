@@ -5,7 +5,6 @@ import signal
 import sys
 from collections.abc import Generator
 from contextlib import contextmanager
-from threading import current_thread, main_thread
 from types import FrameType
 
 NODE_SCRIPTS = (
@@ -57,11 +56,12 @@ def _raise_after_import(number: int, frame: FrameType | None) -> None:
 @contextmanager
 def interrupts_wait() -> Generator[None]:
     """Let a SIGINT that comes during this block count only after it."""
-    if current_thread() is not main_thread():  # which alone gets signals, and may set handlers
+    came: list[int] = []
+    try:
+        before = signal.signal(signal.SIGINT, lambda number, _: came.append(number))
+    except ValueError:  # only the main thread gets signals, and may set handlers
         yield
         return
-    came: list[int] = []
-    before = signal.signal(signal.SIGINT, lambda number, _: came.append(number))
     try:
         yield
     finally:

@@ -26,6 +26,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     given = words = sys.argv[1:] if arguments is None else list(arguments)
     command = " ".join(given[:1])
     further: list[str] = []
+    chosen: argparse.Namespace | None = None
     if command == "run" and "--" in given:  # what follows is for the controller
         end = given.index("--")
         given, further = given[:end], given[end + 1 :]
@@ -49,7 +50,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
         print(f"stickslip {command}: {error}", file=sys.stderr)
         status = 2 if isinstance(error, InvalidInputError) else 1
     except KeyboardInterrupt as error:
-        print(": ".join([f"stickslip {command}: interrupted", *error.args]), file=sys.stderr)
+        out = getattr(chosen, "out", None)
+        said = error.args or ([f"{out} is there"] if out is not None and out.exists() else [])
+        print(": ".join([f"stickslip {command}: interrupted", *said]), file=sys.stderr)
         status = INTERRUPTED
     except BrokenPipeError:  # the reader of our output has closed it
         sys.stdout = nowhere()

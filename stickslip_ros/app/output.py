@@ -6,7 +6,6 @@ import re
 import sys
 from collections.abc import Generator, Mapping
 from contextlib import contextmanager, nullcontext, suppress
-from pathlib import Path
 from threading import Event, Thread
 from time import monotonic
 from typing import TYPE_CHECKING, Any, Protocol
@@ -52,17 +51,6 @@ def coloured(help_text: str) -> str:
     text = re.sub(r"(?m)^(usage:|example:|[\w ]+:$)", "\033[1;34m\\1\033[0m", help_text)
     text = re.sub(r"(?<![\w-])--?[a-z][\w-]*", "\033[36m\\g<0>\033[0m", text)
     return re.sub(r"(?m)^  ([A-Za-z]+)(?=\s)", "  \033[32m\\1\033[0m", text)
-
-
-@contextmanager
-def telling_if_written(out: Path | None) -> Generator[None]:
-    """Tell, if this block is interrupted, whether its new file, if any, is there by then."""
-    try:
-        yield
-    except KeyboardInterrupt:
-        if out is None or not out.exists():
-            raise
-        raise KeyboardInterrupt(f"{out} is written") from None
 
 
 def print_json(values: Mapping[str, Any]) -> None:

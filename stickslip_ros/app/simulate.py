@@ -14,7 +14,7 @@ from stickslip_ros.app.arguments import (
     seconds,
     writing,
 )
-from stickslip_ros.app.output import progress_bar, telling_if_written
+from stickslip_ros.app.output import progress_bar
 from stickslip_ros.app.result import (
     add_results,
     check_results,
@@ -97,8 +97,7 @@ def run(arguments: argparse.Namespace) -> None:
             progress=progress,
         )
         write_results(arguments, found)
-    with telling_if_written(arguments.out):
-        print_result(arguments, found)
+    print_result(arguments, found)
 
 
 @contextmanager

@@ -16,7 +16,7 @@ from stickslip_ros.app.arguments import (
     whole,
     writing,
 )
-from stickslip_ros.app.output import progress_bar, tell, telling_if_written
+from stickslip_ros.app.output import progress_bar, tell
 from stickslip_ros.app.result import print_result, write_results
 from stickslip_ros.errors import InvalidInputError, RunError
 from stickslip_ros.files import written
@@ -177,14 +177,13 @@ def finish(
 
     The `options` are those of the result's `plot`.
     """
-    out: Path | None = arguments.out
     write_results(arguments, result, **options)
-    with telling_if_written(out):
-        if out is not None:
-            with writing("--out", out), written(out, then=journal.discard) as stream:
-                if out.suffix.lower() == ".csv":
-                    result.write_csv(stream)
-                else:
-                    result.write_json(stream)
-        print_result(arguments, result)
+    out: Path | None = arguments.out
+    if out is not None:
+        with writing("--out", out), written(out, then=journal.discard) as stream:
+            if out.suffix.lower() == ".csv":
+                result.write_csv(stream)
+            else:
+                result.write_json(stream)
+    print_result(arguments, result)
     journal.discard()

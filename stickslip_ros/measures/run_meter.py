@@ -137,11 +137,9 @@ class RunMeter:
         }
 
     def _force_notes(self) -> list[str]:
-        """Return what the record lacks of the control forces, as far as their stamps tell."""
-        motion, first = self.motion, self._first_force
-        if motion.first is None or first == inf or motion.mixed:
+        motion, late = self.motion, (self._first_force - self.motion.first) / NANOSECONDS
+        if motion.mixed or not motion.samples or late == inf:
             return []
-        late = (first - motion.first) / NANOSECONDS
         if late <= LONGEST_GAP * motion.duration / motion.samples:
             return []
         if late > motion.duration:

@@ -1,7 +1,6 @@
 """How the samples of a plant are to be read, by what is known of it."""
 
 from collections.abc import Mapping
-from contextlib import suppress
 from math import inf
 from typing import Any, NamedTuple
 
@@ -53,14 +52,14 @@ def reading_of(
     """
     if given is None and not plant:
         return UNKNOWN
-    name = str(plant.get("friction.law"))
+    name, rate = str(plant.get("friction.law")), plant.get("rate")
     has_memory = name in WITHDRAWN or (name in LAWS and bool(LAWS[name].states))
     known = SampleAssumptions(
         (STICK_SHARE * fastest_belt or None) if has_memory else 0.0,
         *_resolution(plant),
         any(k.endswith(".kind") and str(kind) in CHANGING_KINDS for k, kind in plant.items()),
         _unbounded_speed(plant),
-        _period(plant),
+        NANOSECONDS / rate if isinstance(rate, float) and 0.0 < rate <= NANOSECONDS else None,
     )
     return known if given is None else known._replace(stick_speed=given, noisy=False)
 
@@ -89,13 +88,6 @@ def _resolution(plant: Mapping[str, Any]) -> tuple[bool | None, float]:
     except (ArithmeticError, TypeError, ValueError):
         return None, 0.0
     return (not sensor.exact, within) if known else (None, 0.0)
-
-
-def _period(plant: Mapping[str, Any]) -> float | None:
-    with suppress(ArithmeticError, LookupError, TypeError, ValueError):
-        period = NANOSECONDS / float(plant["rate"])
-        return period if 1.0 <= period < inf else None
-    return None
 
 
 def _unbounded_speed(plant: Mapping[str, Any]) -> float:

@@ -103,8 +103,8 @@ class SampleMeter:
         """Stamp of time zero for the observer, ns."""
         self.samples = 0
         """Number of samples so far."""
-        self.first: int | None = None
-        """Stamp of the first one, ns; None before it."""
+        self.first = inf
+        """Stamp of the first one, ns; infinite before it."""
         self.steps_back = 0
         """Number of samples whose stamp is not later than the previous one."""
         self._strays = 0  # those, and others that are not whole periods after the previous one
@@ -136,7 +136,7 @@ class SampleMeter:
             samples = self._last.followed_by(samples)
         if len(samples) == 0:
             return []
-        self.first = int(samples.stamp[0]) if self.first is None else self.first
+        self.first = min(self.first, float(samples.stamp[0]))
         steps, period = np.diff(samples.stamp), self.reading.period
         self.steps_back += np.count_nonzero(steps <= 0)
         astray = steps <= 0 if period is None else ~whole(steps, period)

@@ -150,10 +150,7 @@ def report_of_recording(
     report = run.report(path, length)
     notes = [*recording.notes, *report["notes"]]
     if report["peak_force"] is None and plant.get("expects_control") == "true":
-        notes.append(
-            "the plant expects control, and no control force was recorded or is read: "
-            "--force-topic chooses another topic"
-        )
+        notes.append("the plant expects control, and no control force was recorded or is read")
     if not run.has_states:
         missing.append("the bag holds no joint states: the motion is unknown")
     return {**report, "notes": notes, "complete": not missing, "missing": missing}

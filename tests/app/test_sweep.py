@@ -84,7 +84,7 @@ def test_interrupted_after_its_table_is_written_it_leaves_no_journal(
             patch.setattr(Path, "replace", replace)
         done = stickslip(*FREE, *SPEEDS, "--out", "table.csv")
     assert done.returncode == 130
-    assert done.stderr == "stickslip sweep: interrupted: table.csv is written\n"
+    assert done.stderr == "stickslip sweep: interrupted: table.csv is there\n"
     assert [path.name for path in tmp_path.iterdir()] == ["table.csv"]
 
 

@@ -5,7 +5,9 @@ Whoever sends a request, such as a page of another web site, chooses parts of th
 
 import logging
 import sys
+from pathlib import Path
 from time import monotonic
+from traceback import extract_tb
 from typing import TextIO
 
 from stickslip_ros.text import printable
@@ -25,7 +27,8 @@ class WebLog(logging.StreamHandler[TextIO]):
     def format(self, record: logging.LogRecord) -> str:
         """Return a message on one line, with control characters escaped."""
         text, error = record.getMessage().strip(), record.exc_info and record.exc_info[1]
-        if error and _of_a_message(error):
+        frames = extract_tb(error.__traceback__)[-1:] if error else []
+        if any(Path(frame.filename).parent.name in ("engineio", "socketio") for frame in frames):
             text = "a client sent a message that no page sends"
         if error:
             text = repr(error) if text == str(error).strip() else f"{text}: {error!r}"
@@ -45,15 +48,6 @@ class WebLog(logging.StreamHandler[TextIO]):
         elif self._lines == _MOST_LINES + 1:
             self.stream.write(f"further messages within {_PERIOD:.0f} s are not shown\n")
             self.flush()
-
-
-def _of_a_message(error: BaseException) -> bool:
-    """Return whether an error was raised where the libraries read the messages of a page."""
-    last = error.__traceback__
-    while last is not None and last.tb_next is not None:
-        last = last.tb_next
-    module = "" if last is None else str(last.tb_frame.f_globals.get("__name__"))
-    return module.partition(".")[0] in ("engineio", "socketio")
 
 
 def log_here_alone() -> None:
