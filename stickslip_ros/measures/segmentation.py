@@ -59,12 +59,15 @@ _EDGE_ERROR, _SLIP_ERROR = 0.3, 0.03
 """Least standard error of an edge, in sample periods and slip times."""
 _CORE = 0.15
 """Share of a rest at its edges that does not count for its speed."""
-_CREEP, _CREEP_ERROR, _PASSING = 0.03, 0.02, 4.0
-"""Speed in the rests, in mean speeds, and its standard error up to which they are rests; errors
-from which the slide passes."""
+_LEAST_CREEP, _CREEP, _CREEP_ERROR, _PASSING = 0.01, 0.03, 0.02, 4.0
+"""Speed in the rests, in mean speeds, up to which they are rests, and up to which they are if it is
+within its error; largest standard error of it; errors from which the slide passes."""
 _SAME_PERIOD, _SURE = 0.01, 3.0
 """Relative difference of the periods, and of the stick fractions in standard errors, of the same
 cycles."""
+_LEAST_RIDE, _MOST_RIDE, _PASSES = 1e-3, 0.06, 3
+"""Velocity in the rests, in belt speeds, that may be an error of that of the belt; passes in which
+it is corrected."""
 _NO_FEED = 0.02
 """Travel on, as a share of that to and fro, that is none."""
 _SMOOTH_SHARE, _WIDEST = 0.1, 40
@@ -90,12 +93,19 @@ class StickSlip(CycleMeans):
     @property
     def rests(self) -> bool:
         """Whether the slide is known to rest."""
-        return abs(self.creep) <= _CREEP and self.creep_error <= _CREEP_ERROR
+        most = min(max(_LEAST_CREEP, _SURE * self.creep_error), _CREEP)
+        return abs(self.creep) <= most and self.creep_error <= _CREEP_ERROR
 
     @property
     def passes(self) -> bool:
         """Whether the slide is known to move on in what looks like rests."""
         return abs(self.creep) > max(_CREEP, _PASSING * self.creep_error)
+
+    @property
+    def rides(self) -> bool:
+        """Whether what looks like rests moves on slowly, as on a belt of another velocity."""
+        slow = _LEAST_RIDE < abs(self.creep) < _MOST_RIDE
+        return slow and abs(self.creep) > _SURE * self.creep_error
 
     def agrees(self, found: Measures) -> bool:
         """Return whether measures that were found otherwise are those of the same cycles."""
@@ -130,7 +140,15 @@ def stick_slip(
     count = _TAIL
     while True:
         part = slice(max(len(time) - count, 0), None)
-        found = _measured(time[part], position[part], belt_velocity, most_cycles, step)
+        samples = time[part], position[part]
+        found = _measured(*samples, belt_velocity, belt_velocity, most_cycles, step)
+        guide = belt_velocity
+        for _ in range(_PASSES):
+            if found is None or not belt_velocity or not found.rides:
+                break
+            # The velocity of the belt, or the scale of the positions, is a little wrong.
+            guide += found.creep * abs(belt_velocity)
+            found = _measured(*samples, belt_velocity, guide, most_cycles, step)
         if count >= len(time) or (found is not None and len(found.amplitudes) >= most_cycles):
             return found
         count *= _GROWTH
@@ -160,11 +178,16 @@ def resting_velocity(time: FloatArray, position: FloatArray) -> float:
 
 
 def _measured(
-    time: FloatArray, position: FloatArray, belt_velocity: float, most_cycles: int, step: float
+    time: FloatArray,
+    position: FloatArray,
+    belt_velocity: float,
+    guide_velocity: float,
+    most_cycles: int,
+    step: float,
 ) -> StickSlip | None:
     if len(time) < FEWEST_SAMPLES or not time[-1] > time[0]:
         return None
-    relative = position - belt_velocity * (time - time[0])
+    relative = position - guide_velocity * (time - time[0])
     step = max(step, encoder_step(relative[-_LOOK:], ROUNDING))
     noise = white_noise(relative[-_LOOK:])
     speed = abs(belt_velocity) or _mean_speed(time, relative, max(step, 6.0 * noise))
