@@ -293,13 +293,9 @@ def read_table(
         What counts as a slip; by default slips are not looked for.
     decimal, skip, encoding : optional
         Decimal mark, number of lines on top, and encoding of a text; found by default.
-    period : float, optional
-        Time from row to row, s, where `columns` has no time; by default the one that a line above
-        the rows tells.
-    where : str, optional
-        Rows of a text that are read, as in `"joint_name=elbow"`; by default all.
-    session : int, optional
-        Which session is read, from 1, if the time starts again.
+    period, where, session : optional
+        Time from row to row of a table without times, s, found by default in a line above them;
+        rows that are read, as in `"joint_name=elbow"`; which session, from 1, if time starts again.
 
     Returns
     -------

@@ -84,12 +84,10 @@ def quantities_of(
     values: dict[str, FloatArray] = {}
     for name in [name for name in asked if name != "time"]:
         value, own = cells.value(name), times[clocks[name]]
+        value = value if value.shape == own.shape else np.full(own.shape, value)
         if own is times[clock] or np.array_equal(own, times[clock], equal_nan=True):
-            values[name] = _picked(
-                value if value.shape == own.shape else np.full(own.shape, value), rows
-            )
+            values[name] = _picked(value, rows)
         else:
-            value = value if value.shape == own.shape else np.full(own.shape, value)
             own, value = (_picked(each, part) for each in (own, value))
             values[name] = _at(time, own, value, hold=name in _FORCES)
             notes.append(f"{name} has times of its own, those of column #{clocks[name][0] + 1}")
