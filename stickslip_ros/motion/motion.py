@@ -136,7 +136,7 @@ class Motion(HybridMotion):
         self._speed, self._weight = drive.speed_scale, drive.force_scale
         self._steps_per_unit = _STEPS_PER_SECOND / self._frequency
         self._one_force = len(self._system.inputs) == 1
-        self._fades = not system.sticks
+        self._fades = not self._system.sticks
 
     @property
     def memory(self) -> tuple[float, ...]:

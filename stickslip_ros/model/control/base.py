@@ -192,24 +192,6 @@ class ControlLaw(ABC):
     A law is a frozen dataclass of its constants, each described by `constant`, in SI units. Its
     state is a tuple of floats that it receives and returns. A `Controller` gives it one sample
     after the other; it limits the force to `force_limit`, and sends none during `start_after`.
-
-    Examples
-    --------
-    A law in one file:
-
-    >>> from dataclasses import dataclass
-    >>> from typing import ClassVar
-    >>> from stickslip_ros.model.constants import constant
-    >>> from stickslip_ros.model.control import ControlLaw
-    >>> @dataclass(frozen=True)
-    ... class Brake(ControlLaw):
-    ...     name: ClassVar[str] = "brake"
-    ...     gain: float = constant(1.0, "Force per velocity.", "N s/m", at_least=0.0)
-    ...
-    ...     def respond(self, state, elapsed, sample, reference):
-    ...         return -self.gain * sample.velocity, state
-    >>> sorted(Brake.constants())
-    ['force_limit', 'gain', 'start_after']
     """
 
     name: ClassVar[str]

@@ -258,26 +258,6 @@ class FrictionLaw(FrictionMemory):
 
     What a law gives is said by `SteadyFriction`, and for one with a memory or in pieces also by
     `FrictionMemory`.
-
-    Examples
-    --------
-    A law of your own:
-
-    >>> from dataclasses import dataclass
-    >>> from typing import Any
-    >>> from stickslip_ros.model.constants import constant
-    >>> from stickslip_ros.model.friction import FrictionLaw
-    >>> @dataclass(frozen=True)
-    ... class Viscous(FrictionLaw):
-    ...     name = "viscous"
-    ...     rise: Any = constant(0.1, "Increase of the coefficient with speed.", "s/m")
-    ...
-    ...     def coefficient(self, relative_speed, sign):
-    ...         return -self.static * sign - self.rise * relative_speed
-    >>> Viscous.constants()
-    ('static', 'rise')
-    >>> float(Viscous(static=0.3, rise=0.5).at_rest(0.1))
-    0.35
     """
 
     static: Any = constant(0.4, "Static (break-away) coefficient mu_s.", at_least=0.0)
