@@ -322,22 +322,18 @@ class ManagedNode(PollingNode, ParameterNode[ParametersT], ABC):
                 self.end_process(error)
             elif str(error) != self._refusal:  # the request may be repeated many times
                 self.get_logger().error(str(error))
-            self._refuse(str(error))
+            self._refusal = str(error)
+            self.publish_diagnostics()  # the answer to the request does not tell it
             return TransitionCallbackReturn.FAILURE
         except Exception as error:  # rclpy would ignore it silently
-            self.get_logger().error(f"{type(error).__name__}: {error}")
-            self._refuse(f"{type(error).__name__}: {error}")
+            self._refusal = f"{type(error).__name__}: {error}"
+            self.get_logger().error(self._refusal)
             self._end_autostart()
             return TransitionCallbackReturn.ERROR
         if done:
             self._refusal = ""
             self.get_logger().info(done)
         return TransitionCallbackReturn.SUCCESS
-
-    def _refuse(self, reason: str) -> None:
-        """Publish why a transition fails; whoever has asked for it learns only that it does."""
-        self._refusal = reason
-        self.publish_diagnostics()
 
     def _is_waiting(self) -> bool:
         """Return whether a node is missing; log its name, once until this node is active."""
