@@ -135,7 +135,9 @@ class NoisyWindow:
 
         Also the share of the time in which it does. None where there is no other one.
         """
-        samples, lows = self.last.samples, self.last.lows
+        own, samples, lows = self.stick_slip(), self.last.samples, self.last.lows
+        if own is not None and own.rests:
+            return None
         samples = samples[samples.row(lows[0].time) if lows else 0 :]
         if len(samples) < FEWEST_SAMPLES:
             return None

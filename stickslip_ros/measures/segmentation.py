@@ -79,6 +79,7 @@ class StickSlip(CycleMeans):
     """Means over the last cycles of a slide that rests and slips."""
 
     errors: Cycle
+    """Their standard errors, SI units, with those of the edges."""
     start: float
     """Release from which the first of these cycles begins, s."""
     end: float
