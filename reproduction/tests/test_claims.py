@@ -3,6 +3,7 @@
 import re
 from contextlib import suppress
 from dataclasses import replace
+from functools import cache
 from math import isfinite
 
 import numpy as np
@@ -65,14 +66,19 @@ def no_figure(number: int) -> PaperFigure:
     raise NoFigureError(number)
 
 
-@pytest.fixture(scope="module")
-def without_figures() -> dict[str, Finding]:
-    """The findings of those claims that need no figure."""
+@cache
+def findings_without_figures() -> dict[str, Finding]:
+    """Return the findings of those claims that need no figure."""
     found: dict[str, Finding] = {}
     for claim in CLAIMS:
         with suppress(NoFigureError):
             found[claim.identifier] = claim.check(Evidence(no_figure))
     return found
+
+
+@pytest.fixture(scope="module")
+def without_figures() -> dict[str, Finding]:
+    return findings_without_figures()
 
 
 def check_form(claim: Claim, finding: Finding) -> None:
