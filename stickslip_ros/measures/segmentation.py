@@ -95,7 +95,8 @@ class StickSlip(CycleMeans):
     def rests(self) -> bool:
         """Whether the slide is known to rest."""
         most = min(max(_LEAST_CREEP, _SURE * self.creep_error), _CREEP)
-        return abs(self.creep) <= most and self.creep_error <= _CREEP_ERROR
+        lasting = self.cycle.stick_fraction > _SURE * self.errors.stick_fraction
+        return lasting and abs(self.creep) <= most and self.creep_error <= _CREEP_ERROR
 
     @property
     def passes(self) -> bool:
