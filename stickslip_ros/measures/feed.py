@@ -73,8 +73,10 @@ def moving_part(samples: SampleColumns) -> slice:
         for course, end in zip((position, position[::-1]), ends, strict=True)
     )
     last = len(position) - 1 - last
+    if last - first < _FEWEST:
+        return slice(0, len(samples))
     changes = np.flatnonzero(moves(position[first : last + 1 : stays], least)) * stays
-    if len(changes) < 2 or last - first < _FEWEST:
+    if len(changes) < 2:
         return slice(0, len(samples))
     longest = 2 * max(int(np.diff(changes).max()), _FEWEST)
     begin = rows[first] if first > longest else 0

@@ -111,7 +111,7 @@ class NoisyCycleMeter:
         last, noise = self.window.last, self.window.noise
         samples, cycles, lows = last.samples, last.cycles, last.lows
         first = samples.row(lows[-1].time) if lows else max(len(samples) - _WITHOUT_CYCLES, 0)
-        if len(samples) - first > _WITHOUT_CYCLES and self.window.run % _LOOK_INTERVAL:
+        if len(samples) - first >= _WITHOUT_CYCLES and self.window.run % _LOOK_INTERVAL:
             return []
         size = 2.0 * cycles[-1].amplitude if cycles and not last.resting else 0.0
         least = max(REVERSAL * noise, _REVERSAL_SHARE * size)

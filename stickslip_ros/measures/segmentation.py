@@ -20,7 +20,7 @@ from stickslip_ros.arrays import BoolArray, FloatArray
 from stickslip_ros.measures.cycle_measures import Cycle, CycleMeans, Measures
 from stickslip_ros.measures.noise import FEWEST_SAMPLES, encoder_step, white_noise
 
-_TAIL, _GROWTH = 8192, 4
+_TAIL, _GROWTH = 2048, 4
 """Number of last samples in which cycles are looked for first, and its growth while they are few.
 """
 _BLOCKS = 4096
@@ -49,9 +49,9 @@ _LONG_GAP = 3.0
 """Time between two releases, in periods, after which cycles begin again."""
 _FEWEST_CYCLES = 3
 """Number of cycles that repeat."""
-_EDGE_STEPS, _EDGE_NOISES, _EDGE_FLOOR, _EDGE_SHARE = 0.6, 4.0, 1e-3, 0.25
-"""Distance from a rest, in steps, standard deviations and slips, that is none; share of a slip to
-which its edges are fitted."""
+_EDGE_STEPS, _EDGE_NOISES, _EDGE_FLOOR, _EDGE_SHARE, _EDGE_REACH = 0.6, 4.0, 1e-3, 0.25, 40.0
+"""Distance from a rest, in steps, standard deviations and slips, that is none; share of a slip, and
+number of such distances, to which its edges are fitted."""
 _RELEASE_POWERS, _LANDING_POWERS = (2.0, 3.0, 4.0, 6.0), (1.5, 2.0, 2.5)
 """Powers of time with which the distance from a rest may grow: a friction that falls at once leaves
 a constant force, one that falls with the speed lets the motion grow slowly."""
@@ -117,6 +117,19 @@ class StickSlip(CycleMeans):
         error = hypot(error, (found.errors or {}).get("stick_fraction", 0.0))
         same = abs(found.period / self.cycle.period - 1.0) < _SAME_PERIOD
         return same and abs(found.stick_fraction - share) < _SURE * error
+
+
+class _Move(NamedTuple):
+    """A move between two rests: their middle rows, the last row of the first, and levels, m."""
+
+    first: int
+    last: int
+    begin: int
+    levels: tuple[float, float]
+
+    @property
+    def travel(self) -> float:
+        return self.levels[1] - self.levels[0]
 
 
 class _Slip(NamedTuple):
@@ -187,18 +200,21 @@ def _measured(
     most_cycles: int,
     step: float,
 ) -> StickSlip | None:
-    if len(time) < FEWEST_SAMPLES or not time[-1] > time[0]:
+    goes_back = np.any(np.diff(time) < 0.0)
+    if len(time) < FEWEST_SAMPLES or goes_back or not time[-1] > time[0]:
         return None
     relative = position - guide_velocity * (time - time[0])
     step = max(step, encoder_step(relative[-_LOOK:], ROUNDING))
     noise = white_noise(relative[-_LOOK:])
     speed = abs(belt_velocity) or _mean_speed(time, relative, max(step, 6.0 * noise))
-    slips = _slips(time, relative, speed, noise, step)
-    starts = _cycle_starts(slips)[-most_cycles - 1 :]
+    course = _moves_between_rests(time, relative, speed, noise, step)
+    starts = _cycle_starts(time, course)[-most_cycles - 1 :]
     if len(starts) <= _FEWEST_CYCLES:
         return None
-    used = slips[starts[0] : starts[-1]]
-    release = np.array([slips[each].release for each in starts])
+    near = max(_EDGE_STEPS * step, _EDGE_NOISES * noise)
+    used = [_slip(time, relative, move, near) for move in course[starts[0] : starts[-1] + 1]]
+    release = np.array([used[each - starts[0]].release for each in starts])
+    del used[-1]
     period = float(release[-1] - release[0]) / (len(release) - 1)
     durations = np.add.reduceat([slip.duration for slip in used], np.array(starts[:-1]) - starts[0])
     shares = 1.0 - durations / np.diff(release)
@@ -287,9 +303,9 @@ def _rests(position: FloatArray, reach: int, most: float) -> list[tuple[int, int
     return apart
 
 
-def _slips(
+def _moves_between_rests(
     time: FloatArray, position: FloatArray, speed: float, noise: float, step: float
-) -> list[_Slip]:
+) -> list[_Move]:
     """Return the moves between two rests."""
     period = float(time[-1] - time[0]) / (len(time) - 1)
     travel = speed * period
@@ -316,25 +332,18 @@ def _slips(
             last[-1] = each
             if np.ptp(found[each]) > np.ptp(found[longest[-1]]):
                 longest[-1] = each
-    near = max(_EDGE_STEPS * step, _EDGE_NOISES * noise)
-    slips: list[_Slip] = []
+    course: list[_Move] = []
     for before in range(len(first) - 1):
         rows = [found[first[each]][0] + found[last[each]][1] for each in (before, before + 1)]
         levels = level[longest[before]], level[longest[before + 1]]
-        slips.append(_slip(time, position, rows[0] // 2, rows[1] // 2, levels, near))
-    return slips
+        course.append(_Move(rows[0] // 2, rows[1] // 2, found[last[before]][1], levels))
+    return course
 
 
-def _slip(
-    time: FloatArray,
-    position: FloatArray,
-    first: int,
-    last: int,
-    levels: tuple[float, float],
-    near: float,
-) -> _Slip:
-    """Return the slip between rows in the middle of two rests with these levels, m."""
-    travel = levels[1] - levels[0]
+def _slip(time: FloatArray, position: FloatArray, move: _Move, near: float) -> _Slip:
+    """Return the slip of a move, with its edges."""
+    first, last, _, levels = move
+    travel = move.travel
     size = abs(travel)
     course = (position[first : last + 1] - levels[0]) * (1.0 if travel > 0.0 else -1.0)
     middle = int(np.argmax(course > size / 2.0))
@@ -355,22 +364,21 @@ def _edge(
     """Return the row at which a course leaves zero on its way to a slip of this size; its error."""
     inside = np.flatnonzero(course <= near)
     last = int(inside[-1]) if len(inside) else 0
-    beyond = np.flatnonzero(course[last + 1 :] > near + _EDGE_SHARE * size)
-    rows = np.arange(
-        last + 1, min(last + 2 + int(beyond[0]) if len(beyond) else len(course), len(course))
-    )
+    far = near + min(_EDGE_SHARE * size, _EDGE_REACH * near)
+    beyond = np.flatnonzero(course[last + 1 :] > far)
+    end = last + 2 + int(beyond[0]) if len(beyond) else len(course)
+    rows = np.arange(last + 1, min(end, len(course)))
     if len(rows) < 3:
         return last + 0.5, hypot(_EDGE_ERROR, 0.3)
-    values = np.maximum(course[rows], 0.0)
-    middle = float(np.mean(rows))
-    edges, squares = np.empty(len(powers)), np.empty(len(powers))
-    for each, power in enumerate(powers):
-        root = values ** (1.0 / power)
-        offset = float(np.mean(root))
-        slope = float((rows - middle) @ root) / float((rows - middle) @ (rows - middle))
-        edges[each] = middle - offset / slope if slope > 0.0 else last
-        fitted = np.maximum(offset + slope * (rows - middle), 0.0) ** power
-        squares[each] = np.sum((fitted - values) ** 2) + (near / 3.0) ** 2
+    values, middle = np.maximum(course[rows], 0.0), (rows[0] + rows[-1]) / 2.0
+    lag, exponents = rows - middle, np.array(powers)[:, np.newaxis]
+    roots = values ** (1.0 / exponents)
+    offset, slope = roots.mean(axis=1), roots @ lag / (lag @ lag)
+    edges = np.full(len(powers), float(last))
+    np.divide(-offset, slope, out=edges, where=slope > 0.0)
+    edges[slope > 0.0] += middle
+    fitted = np.maximum(offset[:, np.newaxis] + slope[:, np.newaxis] * lag, 0.0) ** exponents
+    squares = np.sum((fitted - values) ** 2, axis=1) + (near / 3.0) ** 2
     edges = np.clip(edges, 0.0, last + 1.0)
     weight = (squares.min() / squares) ** 2
     weight /= weight.sum()
@@ -378,14 +386,14 @@ def _edge(
     return mean, hypot(_EDGE_ERROR, sqrt(float(weight @ (edges - mean) ** 2)))
 
 
-def _cycle_starts(slips: list[_Slip]) -> list[int]:
-    """Return the slips with which the last cycles begin, and the one with which they end.
+def _cycle_starts(time: FloatArray, course: list[_Move]) -> list[int]:
+    """Return the moves with which the last cycles begin, and the one with which they end.
 
-    Where main slips to and fro take turns, two of them are a cycle.
+    Where main moves to and fro take turns, two of them are a cycle.
     """
-    if not slips:
+    if not course:
         return []
-    travel = np.array([slip.travel for slip in slips])
+    travel = np.array([move.travel for move in course])
     sizes = np.abs(travel)
     large = float(np.mean(sizes[sizes >= np.quantile(sizes, 0.9) / 2.0]))
     main = np.flatnonzero(sizes >= _MAIN_SHARE * large)
@@ -394,7 +402,7 @@ def _cycle_starts(slips: list[_Slip]) -> list[int]:
     if turns > len(main) // 2:
         main = main[forward]
         forward = forward[forward]
-    release = np.array([slips[each].release for each in main])
+    release = time[[course[each].begin for each in main]]
     if len(main) <= _FEWEST_CYCLES:
         return []
     gaps = np.diff(release)

@@ -41,6 +41,7 @@ def test_safe_runs_tell_the_onset(logs: list[str], stickslip: Run, tmp_path: Pat
     assert "the least feed with a margin of 0.1" in done.stdout
     assert (tmp_path / "margin.png").stat().st_size > 1000
     assert "vibration starts at" in (tmp_path / "margin.html").read_text(encoding="utf-8")
+    assert all(line in done.stdout for line in repr(ss.margin(*logs)).splitlines())
     found = ss.margin(*logs, margin=0.2)
     lower, upper = found.onset.lower, found.onset.upper
     assert lower is not None

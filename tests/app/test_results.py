@@ -69,7 +69,6 @@ CASES: dict[str, tuple[tuple[str, ...], Callable[[str], Result]]] = {
         ),
         lambda _: ss.compare("feed_drive", LAWS, given="washout", duration=0.6, **DISTURBED),
     ),
-    "margin": ((LOG,), lambda log: ss.margin(log)),
     "report": ((REFERENCE,), lambda _: ss.read_bag(REFERENCE)),
     "report, of two": (
         (REFERENCE, LOG),

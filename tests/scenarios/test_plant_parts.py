@@ -49,5 +49,5 @@ def test_the_samples_of_a_sensor_that_errs_are_read_as_noisy() -> None:
         ([*encoder, "analyzer.stick_speed=0.001"], 0.001, False),
         ([*encoder, "plant.friction.law=dahl"], pytest.approx(4e-4), True),
     ):
-        expected = SampleAssumptions(stick_speed, noisy=noisy, unbounded_speed=100.0)
+        expected = SampleAssumptions(stick_speed, noisy=noisy, unbounded_speed=100.0, period=1e6)
         assert load_scenario("feed_drive", overrides).reading == expected

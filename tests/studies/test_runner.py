@@ -29,7 +29,7 @@ from tests.studies.studies import SHORT, free, paper, speeds, stop_at
 MINIMUM = Axis("plant.friction.minimum", 0.1, 0.6, 6)
 SPEED = Axis("plant.belt_speed", 0.05, 0.6, 4)
 SLOPE = Axis("plant.friction.slope", 0.1, 0.9, 4)
-GAIN = Axis("washout_controller.linear_gain", -1.0, 100.0, 5)
+GAIN = Axis("washout_controller.linear_gain", -1.0, 100.0, 6)
 
 STUDIES = {
     "each alone": Study(free(), Grid((MINIMUM, SPEED)), SHORT),
