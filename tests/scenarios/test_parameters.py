@@ -93,7 +93,8 @@ def values_of(draw: st.DrawFn, model: NodeParameters) -> dict[str, Any]:
         values |= {"friction.static": 1e6, "friction.reverse.static": 1e6}
     assume(values.get("friction.law") != "table")  # it needs a file
     values.pop("friction.curve", None)
-    values.pop("sensor.velocity", None)  # a difference has no noise of its own
+    for sensor in ("sensor", "motor.sensor"):
+        values.pop(f"{sensor}.velocity", None)  # a difference has no noise of its own
     for part in ("belt", "load", "disturbance"):
         values.pop(f"{part}.kind", None)  # it makes demands on the others
     if values.keys() & {"mass", "stiffness", "rate"}:
