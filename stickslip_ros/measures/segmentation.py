@@ -183,9 +183,7 @@ def resting_velocity(time: FloatArray, position: FloatArray) -> float:
     reach = _reach(speed * period, noise, step)
     if speed == 0.0 or len(time) < _FEWEST_REACHES * reach:
         return 0.0
-    total = np.concatenate([[0.0], np.cumsum(position - position[0])])
-    change = total[2 * reach :] - 2.0 * total[reach:-reach] + total[: -2 * reach]
-    change = np.sort(change)
+    change = np.sort(_changes(position, reach))
     count = int(len(change) * _SHORTH)
     first = int(np.argmin(change[count:] - change[: len(change) - count]))
     velocity = float(np.mean(change[first : first + count + 1])) / (reach**2 * period)
@@ -283,14 +281,18 @@ def _reach(travel: float, noise: float, step: float) -> int:
     return ceil(min(max(by_noise, _STEPS * step / travel, 2.0), _MOST))
 
 
+def _changes(position: FloatArray, reach: int) -> FloatArray:
+    """Return the sum of each `reach` positions less that of as many before."""
+    total = np.concatenate([[0.0], np.cumsum(position - position[0])])
+    return total[2 * reach :] - 2.0 * total[reach:-reach] + total[: -2 * reach]
+
+
 def _rests(position: FloatArray, reach: int, most: float) -> list[tuple[int, int]]:
     """Return the first and last rows of the rests among positions.
 
     The means over `reach` positions before and after a row of a rest differ by at most `most`.
     """
-    total = np.concatenate([[0.0], np.cumsum(position - position[0])])
-    change = total[2 * reach :] - 2.0 * total[reach:-reach] + total[: -2 * reach]
-    still = np.abs(change) <= most * reach
+    still = np.abs(_changes(position, reach)) <= most * reach
     turns = np.flatnonzero(np.diff(still, prepend=False, append=False)).reshape(-1, 2)
     apart: list[tuple[int, int]] = []
     for first, last in (turns + np.array([0, 2 * reach - 2])).tolist():
