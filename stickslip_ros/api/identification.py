@@ -20,7 +20,7 @@ from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.recordings import read_all, read_records
 from stickslip_ros.identification.scenario import written_scenario
 from stickslip_ros.model.drive import Drive
-from stickslip_ros.record.motion_reader import BagLayout
+from stickslip_ros.record.bag_layout import BagLayout
 from stickslip_ros.record.table_columns import TableFormat
 from stickslip_ros.scenarios.files import Scenario, load_scenario
 from stickslip_ros.show.identification_table import identification_tables

@@ -18,7 +18,7 @@ from stickslip_ros.measures.slips import SlipThreshold
 from stickslip_ros.model.drive import Drive
 from stickslip_ros.motion.trajectory import MotorTrajectory
 from stickslip_ros.quantities import Quantity, quantities_of
-from stickslip_ros.record.motion_reader import BagLayout
+from stickslip_ros.record.bag_layout import BagLayout
 from stickslip_ros.record.reader import Recording
 from stickslip_ros.record.report import report_of_recording
 from stickslip_ros.record.table_columns import TableFormat

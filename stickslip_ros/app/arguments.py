@@ -166,7 +166,7 @@ def add_reading(parser: argparse.ArgumentParser) -> None:
 
 def reading_of(arguments: argparse.Namespace) -> dict[str, Any]:
     """Return how recordings are read, by the names that the functions of the API have for it."""
-    from stickslip_ros.record.motion_reader import BagLayout
+    from stickslip_ros.record.bag_layout import BagLayout
     from stickslip_ros.record.table_columns import TableFormat
 
     names = [each.name for kind in (TableFormat, BagLayout) for each in fields(kind)]

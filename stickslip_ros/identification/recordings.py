@@ -15,7 +15,7 @@ from stickslip_ros.errors import BagError, InvalidInputError
 from stickslip_ros.identification.even_clock import evenly_spaced
 from stickslip_ros.identification.record import FEWEST, Record, lagged
 from stickslip_ros.model.actuator import Actuator
-from stickslip_ros.record.motion_reader import ANY_LAYOUT, BagLayout
+from stickslip_ros.record.bag_layout import ANY_LAYOUT, BagLayout
 from stickslip_ros.record.reader import Recording
 from stickslip_ros.record.table_clock import stamps_of
 from stickslip_ros.record.table_columns import ANY_FORM, Table, TableFormat

@@ -51,6 +51,7 @@ from stickslip_ros.nodes.base.managed import (
     diagnosis,
 )
 from stickslip_ros.nodes.base.process import run_node
+from stickslip_ros.record.bag_layout import BagLayout
 from stickslip_ros.record.cdr import Messages, Refused, joined
 from stickslip_ros.record.codec import (
     UNSTAMPED,
@@ -59,7 +60,8 @@ from stickslip_ros.record.codec import (
     unpack_header,
     wrenches_in,
 )
-from stickslip_ros.record.motion_reader import BagLayout, MotionReader, read_forces
+from stickslip_ros.record.force_reader import read_forces
+from stickslip_ros.record.motion_reader import MotionReader
 from stickslip_ros.record.recorder import Recorder, check_new_bag
 from stickslip_ros.record.topics import (
     AMPLITUDE,

@@ -7,21 +7,23 @@ from collections import deque
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, closing
 from pathlib import Path
-from typing import Self
+
+import numpy as np
+from typing_extensions import override
 
 from stickslip_ros.errors import BagError
-from stickslip_ros.record.chunk import MessageBlock
 from stickslip_ros.record.compression import unpack_file
 from stickslip_ros.record.mcap_file import McapFile
 from stickslip_ros.record.metadata import metadata_faults
+from stickslip_ros.record.source import Block, Source
 from stickslip_ros.text import printable
 
 _PACKED_SUFFIX = ".mcap.zstd"
 """Suffix of the files that rosbag2 compressed as a whole."""
 
 
-class BagFiles:
-    """The files of a bag that is open for reading; a context manager that closes it.
+class BagFiles(Source):
+    """The MCAP files of a bag.
 
     Raises BagError if `path` is not a bag, or a bag that is not stored as MCAP.
     """
@@ -29,7 +31,6 @@ class BagFiles:
     def __init__(self, path: Path | str) -> None:
         """Open the files of a bag directory, or one MCAP file."""
         self.path = Path(path)
-        """The bag directory, or the file."""
         self._unreadable: list[str] = []
         paths = _mcap_files(self.path)
         with ExitStack() as opened:
@@ -44,66 +45,53 @@ class BagFiles:
             for channel in file.channels.values()
             if channel.schema_id in file.schemas
         }
-        """Types by name, such as `sensor_msgs/msg/JointState` by `/feed_drive/joint_states`."""
+        accounts = [file.statistics for file in self.files]
+        known = [account for account in accounts if account is not None and account.message_count]
+        if known and None not in accounts:
+            start = min(account.message_start_time for account in known)
+            self.time_span = start, max(account.message_end_time for account in known)
 
     @property
+    @override
     def damage(self) -> list[str]:
-        """Sentences on an incomplete end and damaged files; further reading may find more."""
-        of_files = (sentence for file in self.files for sentence in file.damage)
-        return [*map(printable, (*self._metadata_faults, *self._unreadable, *of_files))]
+        in_files = (sentence for file in self.files for sentence in file.damage)
+        return [*map(printable, (*self._metadata_faults, *self._unreadable, *in_files))]
 
-    def message_blocks(self, *topics: str) -> Iterator[tuple[MessageBlock, dict[int, str]]]:
-        """Yield the messages of these topics chunk by chunk, and the topic of each channel."""
+    @override
+    def blocks(self, *topics: str) -> Iterator[Block]:
         for file in self.files:
-            channels = file.channels.items()
-            topic_of = {number: each.topic for number, each in channels if each.topic in topics}
-            for block in file.blocks(topic_of):
-                yield block, topic_of
+            topic_of = np.full(1 << 16, -1)
+            for number, channel in file.channels.items():
+                if channel.topic in topics:
+                    topic_of[number] = topics.index(channel.topic)
+            for block in file.blocks(np.flatnonzero(topic_of >= 0).tolist()):
+                topic = topic_of[block.channel]
+                yield Block(topics, topic, block.log_time, block.data, block.begin, block.end)
 
-    def messages(self, *topics: str) -> Iterator[tuple[str, int, bytes]]:
-        """Yield topic, log time (ns) and CDR data of each message of these topics, in file order.
-
-        Topics have full names, such as `/feed_drive/joint_states`. Raises BagError if the operating
-        system fails to read the bag.
-        """
-        for block, topic_of in self.message_blocks(*topics):
-            columns = (block.channel, block.log_time, block.begin, block.end)
-            for channel, stamp, begin, end in zip(*(c.tolist() for c in columns), strict=True):
-                yield topic_of[channel], stamp, block.data[begin:end]
-
+    @override
     def offered_qos(self, topic: str) -> str:
-        """Return the QoS profiles that the recorded publishers of a topic (full name) offered.
-
-        They are rosbag2's YAML, a list with one profile for each publisher; empty if unknown.
-        """
-        found = [
+        profiles = (
             channel.metadata.get("offered_qos_profiles", "")
             for file in self.files
             for channel in file.channels.values()
             if channel.topic == topic
-        ]
-        return next(filter(None, found), "")
+        )
+        return next(filter(None, profiles), "")
 
+    @override
     def metadata(self, name: str) -> dict[str, str] | None:
-        """Return the last metadata table of a name, such as `stickslip_ros/analyzer`, or None."""
         last = deque((table for file in self.files for table in file.tables(name)), maxlen=1)
         return last[0].metadata if last else None
 
+    @override
     def attachment(self, name: str) -> bytes | None:
-        """Return the content of the last attached file of a name; None if there is none."""
-        attachments = (found for file in self.files for found in file.attachments(name))
+        attachments = (content for file in self.files for content in file.attachments(name))
         last = deque(attachments, maxlen=1)
         return last[0].data if last else None
 
+    @override
     def close(self) -> None:
-        """Close the files."""
         self._opened.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *exception: object) -> None:
-        self.close()
 
     def _readable_files(self, paths: Sequence[Path]) -> Iterator[McapFile]:
         """Open the files; raise BagError if none can be read, otherwise list those that cannot."""

@@ -35,6 +35,10 @@ class Refused(NamedTuple):
     reason: str
     """Why the first one could not be read; empty if there is none."""
 
+    def followed_by(self, later: "Refused") -> "Refused":
+        """Return these messages and later ones."""
+        return Refused(self.number + later.number, self.reason or later.reason)
+
 
 class Messages(NamedTuple):
     """Serialized messages: `data[begin[i] : end[i]]`."""
@@ -182,7 +186,7 @@ def decode(
         try:
             layout = layout_of(data[begin[left[0]] : end[left[0]]])
         except MessageError as error:
-            refused = Refused(refused.number + 1, refused.reason or str(error))
+            refused = refused.followed_by(Refused(1, str(error)))
             left = left[1:]
             continue
         # If every message has its own structure, comparing all of them would take too long.

@@ -1,18 +1,16 @@
 """Motion and force in bags, and live topics, of machines other than ours."""
 
-import re
 from collections import Counter
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from math import nan
-from typing import NamedTuple, get_args
 
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray, IntArray
-from stickslip_ros.errors import BagError, InvalidInputError, MessageError
-from stickslip_ros.record import ForceSource, TimeSource
+from stickslip_ros.errors import BagError, MessageError
+from stickslip_ros.record.bag_layout import ANY_LAYOUT, BagLayout, NumberedTopic
 from stickslip_ros.record.cdr import Layout, Messages, Refused, decode
 from stickslip_ros.record.codec import (
     BELT,
@@ -24,7 +22,7 @@ from stickslip_ros.record.codec import (
 from stickslip_ros.record.faults import MOST_SHIFTS, Jumps, differences, lost_velocities, shift_note
 from stickslip_ros.samples import ForceColumns, SampleColumns
 from stickslip_ros.stamps import NANOSECONDS
-from stickslip_ros.text import must_be_one_of, printable, quantity, shown
+from stickslip_ros.text import printable, quantity, shown
 
 _SEEN, _MOST_NAMES = 1000, 20
 """Messages of which the joints are looked at first; names of joints in a message to the user."""
@@ -39,74 +37,6 @@ _FINEST = 10_000
 _JUMP = 10.0
 """Ratio of the distance to the next sample and to the one after it, from which two sources take
 turns."""
-_NUMBERED = re.compile(r"(.+)\[(\d+)\]")
-
-
-@dataclass(frozen=True)
-class BagLayout:
-    """Where bags of other machines have motion and force; what is not given is found.
-
-    Raises InvalidInputError if a time or a force is none of those allowed.
-    """
-
-    joint: str | None = None
-    """Joint that is the slide."""
-    belt_joint: str | None = None
-    """Joint that is the belt."""
-    states_topic: str | None = None
-    """Full name of the topic of joint states; with [2] behind it, of two sources the second."""
-    force_topic: str | None = None
-    """Full name of the topic of forces; with [2] behind it, the second number of an array."""
-    time: str = "header"
-    """`header`: the stamps in the messages; `log`: the times at which they were recorded."""
-    force: str = "topic"
-    """`topic`: the force is that of a topic; `effort`: it is the effort of the joint."""
-
-    def __post_init__(self) -> None:
-        for name, value, allowed in (
-            ("time", self.time, get_args(TimeSource)),
-            ("force", self.force, get_args(ForceSource)),
-        ):
-            if value not in allowed:
-                raise InvalidInputError(
-                    f"{name} = {shown(value)} is invalid: {must_be_one_of(str(value), allowed)}"
-                )
-
-
-ANY_LAYOUT = BagLayout()
-"""Nothing is known of the layout."""
-
-
-class NumberedTopic(NamedTuple):
-    """Name of a topic, and the number in brackets behind it."""
-
-    name: str
-    number: int | None
-
-    @classmethod
-    def of(cls, text: str) -> "NumberedTopic":
-        """Return the parts of a text."""
-        found = _NUMBERED.fullmatch(text)
-        return cls(found[1], int(found[2])) if found else cls(text, None)
-
-
-def read_forces(
-    layout_of: Callable[[bytes], Layout],
-    messages: Messages,
-    log_time: IntArray,
-    *,
-    by_log: bool = False,
-) -> tuple[ForceColumns, bool, Refused]:
-    """Return forces, whether one has no stamp, and what was refused.
-
-    Without a stamp a force has its log time; `by_log` all have.
-    """
-    rows, stamp, values, refused = decode(*messages, layout_of, 1)
-    known = np.isfinite(values[0])  # commands of other joints tell nothing
-    stamp, log_time = stamp[known], log_time[rows][known]
-    unstamped = (stamp == 0) | by_log
-    forces = ForceColumns(np.where(unstamped, log_time, stamp), values[0, known])
-    return forces, bool(unstamped.any()) and not by_log, refused
 
 
 class MotionReader:
@@ -139,7 +69,7 @@ class MotionReader:
         """Log time less stamp of the first sample, ns."""
         self._topic, self._layout, self._belt_speed = topic, layout, belt_speed
         self._where = f"on {topic} of {source}" if source else f"on {topic}"
-        self._source = NumberedTopic.of(layout.states_topic or "").number
+        self._source = NumberedTopic.parse(layout.states_topic or "").number
         self._joint = ""
         self._layout_of: Callable[[bytes], Layout] | None = None
         self._known: tuple[bool, bool] | None = None

@@ -18,7 +18,7 @@ from stickslip_ros.measures.run_meter import RunAnalysis, RunMeter, RunObserver
 from stickslip_ros.measures.sample_assumptions import SampleAssumptions, reading_of
 from stickslip_ros.measures.slips import SlipMeter, SlipThreshold
 from stickslip_ros.measures.timing import Timing
-from stickslip_ros.record.motion_reader import ANY_LAYOUT, BagLayout
+from stickslip_ros.record.bag_layout import ANY_LAYOUT, BagLayout
 from stickslip_ros.record.reader import Recording
 from stickslip_ros.record.table_clock import LONGEST
 from stickslip_ros.record.table_columns import ANY_FORM, TableFormat
@@ -131,10 +131,10 @@ def report_of_recording(
         run = _RunReader(meter, start, end, observer, take, slips)
         # Measuring each chunk by itself would take twice as long.
         for block in recording.blocks(least=20_000):
-            if recording.velocity_estimated and meter.motion.reading.noisy is None:
+            if block.velocity_estimated and meter.motion.reading.noisy is None:
                 meter.motion.reading = SampleAssumptions(noisy=True)
-            run.whole = recording.of_another_machine
-            run.feed(*block)
+            run.whole = block.of_another_machine
+            run.feed(*block[:3])
         run.finish()
         missing = recording.missing
         if run.first is None:

@@ -99,8 +99,6 @@ class TableRecording:
     """Whether the velocities are estimated from the positions."""
     notes: tuple[str, ...]
     """Sentences on what the table does not have."""
-    of_another_machine = True
-    """A table counts as recorded by another machine."""
     dropped_known = False
     """A table does not tell which forces did not act."""
 
@@ -115,8 +113,8 @@ class TableRecording:
         return []
 
     def blocks(self, least: int = 1) -> Iterator[RunBlock]:
-        """Yield the samples, the forces and no dropped forces."""
-        yield RunBlock(self.samples, self.forces, self.forces[:0])
+        """Yield samples, forces and no dropped forces, as recorded by another machine."""
+        yield RunBlock(self.samples, self.forces, self.forces[:0], True, self.velocity_estimated)
 
     def metadata(self, name: str) -> dict[str, str] | None:
         """Return None: a table has no metadata."""

@@ -20,7 +20,7 @@ import stickslip_ros as ss
 from benchmarks.measures_under_noise import motion
 from stickslip_ros.errors import BagError, InvalidInputError
 from stickslip_ros.measures.slips import SlipThreshold
-from stickslip_ros.record.motion_reader import BagLayout
+from stickslip_ros.record.bag_layout import BagLayout
 from stickslip_ros.record.reader import Recording
 from stickslip_ros.record.report import report_of_recording
 from tests.examples import examples
@@ -227,11 +227,12 @@ def test_velocities_that_some_messages_lack(tmp_path: Path, every: int, left_out
         ],
     )
     with Recording(tmp_path / "bag", belt_speed=BELT) as recording:
-        states = recording.joint_states
+        block = next(recording.blocks())
         notes = "".join(recording.notes)
+    states = block.joint_states
     assert len(states) == len(TIME) - left_out
     assert ("have no velocity and are left out" in notes) == (left_out > 0)
-    assert recording.velocity_estimated == (left_out == 0)
+    assert block.velocity_estimated == (left_out == 0)
     assert states.velocity == pytest.approx(VELOCITY[:: 2 if left_out else 1], abs=1e-3)
 
 

@@ -22,10 +22,10 @@ from rclpy.validate_full_topic_name import validate_full_topic_name
 from stickslip_ros.errors import BagError, InvalidInputError
 from stickslip_ros.nodes.base.endpoints import message_class
 from stickslip_ros.nodes.replaying.player import JITTER, Message, Timeline
+from stickslip_ros.record.bag_layout import ANY_LAYOUT, BagLayout
 from stickslip_ros.record.codec import pack_joint_state, pack_wrench
 from stickslip_ros.record.definitions import message_definition
 from stickslip_ros.record.metadata import offered_profiles
-from stickslip_ros.record.motion_reader import ANY_LAYOUT, BagLayout
 from stickslip_ros.record.reader import Recording
 from stickslip_ros.record.topics import CLOCK, CONTROL_FORCE, DEEP, JOINT_STATES, RECORDED
 from stickslip_ros.scenarios.parameters import ReplayParameters
@@ -177,16 +177,11 @@ class Selection:
         )
 
     def _known_length(self, recording: Recording) -> float:
-        accounts = [file.statistics for file in recording.files]
         if self._converted:  # its time is that of the stamps
             return self._parameters.duration
-        known = [account for account in accounts if account is not None and account.message_count]
-        rest = inf
-        if known and None not in accounts:
-            earliest = min(account.message_start_time for account in known)
-            latest = max(account.message_end_time for account in known)
-            if earliest >= self.first - JITTER:
-                rest = (latest - self.first) * 1e-9 - self._parameters.start
+        span, rest = recording.source.time_span, inf
+        if span is not None and span[0] >= self.first - JITTER:
+            rest = (span[1] - self.first) * 1e-9 - self._parameters.start
         return min(rest if rest >= 0.0 else inf, self._parameters.duration)
 
     def _refused(self, what: str, why: str) -> InvalidInputError:
