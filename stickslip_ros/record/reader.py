@@ -213,7 +213,7 @@ class Recording:
         listed in `missing`.
         """
         for reading in _RunReader(self._drive).blocks(least):
-            self._readings[JOINT_STATES.name] = reading
+            self._readings[JOINT_STATES.name] = replace(reading, columns=None)
             yield reading.columns
 
     @cached_property

@@ -365,7 +365,7 @@ def test_rows_between_those_of_the_positions_count(tmp_path: Path) -> None:
 def test_a_table_is_longer_than_what_is_looked_at_first(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("stickslip_ros.record.text_table._HEAD", 500)
+    monkeypatch.setattr("stickslip_ros.record.text_form._HEAD", 500)
     assert len(read(tmp_path, "t,x\n" + rows(), "t", "x").samples) == 200
     monkeypatch.setattr("stickslip_ros.record.text_table._LARGEST", 600)
     with pytest.raises(BagError, match="it has more than 600 bytes"):

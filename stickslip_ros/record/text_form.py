@@ -1,0 +1,304 @@
+"""The form of a table as text: separator, decimal mark, lines on top, names, units, first row."""
+
+import codecs
+import csv
+import os
+import re
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from io import StringIO
+from itertools import islice
+from pathlib import Path
+from statistics import mode
+
+from stickslip_ros.files import open_regular
+from stickslip_ros.record.expressions import listed
+from stickslip_ros.record.table_columns import TableFormat
+from stickslip_ros.record.units import are_units, joined_units, period_in, without_unit
+
+_HEAD, TAIL, _TOP = 1 << 20, 10, 100
+"""Bytes from which the form is found; lines at their end that are rows, with or without more; lines
+above the rows that may tell their period, and first rows that are looked at."""
+_LARGEST, _MOST_COLUMNS = 1 << 33, 10_000
+"""Bytes of a file, and columns."""
+
+_SEPARATORS = {"\t": "tabs", ";": "semicolons", "|": "|", " ": "spaces", ",": "commas"}
+_NUMBER = re.compile(
+    r"[-+]?(?:\d+(?:[.,]\d+)*\.?|[.,]\d+)(?:[eE][-+]?\d+)?|[-+]?(?:nan|inf|infinity)", re.IGNORECASE
+)
+_CLOCK = r"\d{1,2}:\d\d(?::\d\d(?:[.,:]\d+)?)?"
+TIME = re.compile(
+    rf"(?P<date>\d{{1,4}}([-./])\d{{1,2}}\2\d{{1,4}})(?:,?[T ] ?{_CLOCK})?"
+    rf"(?: ?[AP]M)?(?: ?Z|[+-]\d\d(?::?\d\d)?)?|{_CLOCK}(?: ?[AP]M)?",
+    re.IGNORECASE,
+)
+_COMMENT = re.compile(r"^\s*(?:#|%|//)\s*")
+_NO_NUMBERS = ("", "na", "n/a", "null", "none", "#n/a", "#na", "<na>")
+
+
+@dataclass(frozen=True)
+class TextForm:
+    """The form of a table as text."""
+
+    encoding: str
+    separator: str
+    has_blanks: bool
+    """Whether blanks follow separators."""
+    decimal: str
+    """Decimal mark."""
+    first: int
+    """Number of lines before the first row."""
+    skipped: int
+    """Number of lines before the names or, without names, the rows."""
+    names: tuple[str, ...]
+    """Name of each column; empty if it has none."""
+    units: tuple[str, ...]
+    """Cells of the columns in a line of units; empty without one."""
+    units_line: int | None
+    """Number of this line, from 1."""
+    columns: Mapping[str, int]
+    """Places of the columns by name and by number, without those of labels."""
+    labelled: bool
+    """Whether each row has names before its values."""
+    period: tuple[float, float] | None
+    """Period of the rows that a line above them tells, s and in its own unit."""
+    first_lines: Sequence[str]
+    """The first rows."""
+
+    @property
+    def width(self) -> int:
+        """Number of columns."""
+        return len(self.names)
+
+    @cached_property
+    def first_rows(self) -> list[list[str]]:
+        """The cells of the first rows."""
+        rows = [_cells(line, self.separator) for line in self.first_lines]
+        return [row for row in rows if len(row) == self.width]
+
+    def features(self, *, decimal_commas: bool) -> list[str]:
+        """Return what is not the usual, as phrases; decimal commas if they were seen."""
+        skipped = f"the first {self.skipped} lines" if self.skipped > 1 else "the first line"
+        return [
+            *([] if self.separator == "," else [f"{_SEPARATORS[self.separator]} as separators"]),
+            *(["decimal commas"] if decimal_commas else []),
+            *([] if self.encoding.startswith("utf-8") else [f"text in {self.encoding}"]),
+            *([f"{skipped} skipped"] if self.skipped else []),
+            *([f"the names in each row: {listed(self.columns)}"] if self.labelled else []),
+            *([] if any(self.names) else [f"no names: the columns are #1 to #{self.width}"]),
+            *([f"units in line {self.units_line}"] if self.units_line else []),
+        ]
+
+
+def form_of(path: Path, given: TableFormat) -> TextForm:
+    """Return the form of a table in a file; raises OSError and ValueError if it has none."""
+    with open_regular(path) as stream:
+        if os.fstat(stream.fileno()).st_size > _LARGEST:
+            raise ValueError(f"it has more than {_LARGEST} bytes")
+        head = stream.read(_HEAD)
+    encoding = given.encoding or _encoding_of(head)
+    text = head.decode(encoding, errors="replace")
+    if len(re.findall(r"[\x00-\x08\x0e-\x1f]", text)) > len(text) // 100:
+        raise ValueError("it is no text; say its encoding if it is, such as utf-16")
+    lines = [*StringIO(text, newline=None)]
+    if len(head) == _HEAD and len(lines) > 1:
+        del lines[-1]  # a part of a line
+    return _form_of_lines(lines, given, encoding)
+
+
+def _form_of_lines(lines: list[str], given: TableFormat, encoding: str) -> TextForm:
+    skip = given.skip or 0
+    body = _last_rows(lines[skip:])
+    width, numeric = body.width, body.numeric
+    period = next(filter(None, map(period_in, lines[:_TOP])), None)
+    fewest = 2 if given.period is None and period is None else 1
+    if width < fewest or sum(numeric) < fewest:
+        raise ValueError(
+            "it has no rows of two numbers or more, whatever the separator; options say its "
+            "--decimal mark, the lines to --skip and its --encoding"
+        )
+    if width > _MOST_COLUMNS:
+        raise ValueError(f"it has more than {_MOST_COLUMNS} columns")
+    rows_from = (place for place in range(skip, len(lines)) if body.is_row(lines[place]))
+    first = skipped = next(rows_from, max(skip, len(lines)))
+    above = _texts_above(lines, first, skip, body)
+    names, units, units_line = [""] * width, [""] * width, None
+    if above:
+        skipped, names = above[0]
+        first = max(skip, skipped + 1)
+    if len(above) > 1:
+        lower, upper = (are_units(row) for _, row in above[:2])
+        if lower or upper:
+            skipped = above[1][0]
+            place, units = above.pop(0 if lower else 1)
+            names, units_line = above[0][1], place + 1
+    labels = {} if above else body.labels
+    names = [labels.get(place - 1, name) for place, name in enumerate(names)]
+    blank = re.compile(f"(^|{re.escape(body.separator)}) ", re.MULTILINE)
+    return TextForm(
+        encoding=encoding,
+        separator=body.separator,
+        has_blanks=blank.search("".join(lines)) is not None,
+        decimal=given.decimal or body.decimal,
+        first=first,
+        skipped=skipped,
+        names=tuple(names),
+        units=tuple(units),
+        units_line=units_line,
+        columns=_columns(names, labels),
+        labelled=len(labels) > 0,
+        period=period,
+        first_lines=lines[first : first + _TOP],
+    )
+
+
+@dataclass(frozen=True)
+class _LastRows:
+    """Rows at the end of the head of a table: all of one width, and by them others are known."""
+
+    separator: str
+    cells: list[list[str]]
+
+    @property
+    def width(self) -> int:
+        """Number of columns."""
+        return len(self.cells[0])
+
+    @property
+    def decimal(self) -> str:
+        """The decimal mark: a comma if values have no other mark."""
+        values = (cell for row in self.cells for cell in row if _is_value(cell))
+        marks = {mark for cell in values for mark in ".," if mark in cell}
+        return "," if marks == {","} else "."
+
+    @cached_property
+    def numeric(self) -> list[bool]:
+        """Whether each column has numbers."""
+        return [
+            _is_value(column[-1]) or sum(map(_is_value, column)) > sum(map(_is_text, column))
+            for column in zip(*self.cells, strict=True)
+        ]
+
+    @property
+    def labels(self) -> dict[int, str]:
+        """Texts that are the same in all rows, each before a number, by their places."""
+        return {
+            place: text
+            for place, text in enumerate(self.cells[0][:-1])
+            if not self.numeric[place]
+            and self.numeric[place + 1]
+            and all(row[place] == text for row in self.cells)
+        }
+
+    def texts_and_values(self, row: list[str]) -> tuple[int, int]:
+        """Return the numbers of texts and of values that a row has in the columns of numbers."""
+        cells = [cell for cell, numeric in zip(row, self.numeric, strict=False) if numeric]
+        return sum(map(_is_text, cells)), sum(map(_is_value, cells))
+
+    def is_row(self, line: str) -> bool:
+        """Return whether a line is a row of the table."""
+        row = _cells(line, self.separator)
+        texts, values = self.texts_and_values(row)
+        return len(row) == self.width and values > 0 and texts == 0
+
+
+def _last_rows(lines: list[str]) -> _LastRows:
+    """Return the last rows, by the separator that makes most of them numbers."""
+    tail = [*islice(filter(str.strip, reversed(lines)), TAIL)][::-1]
+    if not tail:
+        raise ValueError("it is empty")
+    separator = max(_SEPARATORS, key=lambda mark: _likelihood(mark, tail, lines))
+    rows = [_cells(line, separator) for line in tail]
+    width = mode(map(len, rows))
+    return _LastRows(separator, [row for row in rows if len(row) == width])
+
+
+def _texts_above(
+    lines: list[str], first: int, skip: int, body: _LastRows
+) -> list[tuple[int, list[str]]]:
+    """Return lines of texts above the first row, from the lowest: places and cells."""
+    width, texts = body.width, list[tuple[int, list[str]]]()
+    for place in range(first - 1, -1, -1):
+        row = _cells(_COMMENT.sub("", lines[place]), body.separator)
+        if not lines[place].strip() and not texts and place >= skip:
+            continue
+        _, values = body.texts_and_values(row)
+        row = joined_units(row, width)
+        if len(row) == width - 1 and not any(cells[-1] for cells in body.cells):
+            row.append("")  # a separator at the end of each row
+        wrong = 1 < len(row) != width and body.separator != " " and place >= skip
+        if not texts and not values and wrong:
+            raise ValueError(
+                f"line {place + 1} has {len(row)} names for {width} columns; with --skip "
+                f"{place + 1} they are #1 to #{width}"
+            )
+        if len(row) != width or (values and texts) or (not values and not any(row)):
+            break
+        if not values:
+            texts.append((place, row))
+    return texts
+
+
+def _columns(names: Sequence[str], labels: Collection[int]) -> dict[str, int]:
+    """Return the places of columns by number, by name, and by name without a unit."""
+    places = [place for place in range(len(names)) if place not in labels]
+    columns = {f"#{number}": place for number, place in enumerate(places, start=1)}
+    for names_of_columns in (names, map(without_unit, names)):
+        for place, name in enumerate(names_of_columns):
+            if name:
+                columns.setdefault(name, place)
+    return columns
+
+
+def _encoding_of(head: bytes) -> str:
+    """Return the encoding of a text by its mark, its zeros, or whether it is UTF-8."""
+    if head.startswith(codecs.BOM_UTF8):
+        return "utf-8-sig"
+    if head.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return "utf-16"
+    for encoding, high in (("utf-16-le", head[1::2]), ("utf-16-be", head[::2])):
+        if 2 * high.count(0) > len(high):
+            return encoding
+    try:
+        codecs.getincrementaldecoder("utf-8")().decode(head)
+    except UnicodeDecodeError:
+        return "cp1252"
+    return "utf-8"
+
+
+def _likelihood(separator: str, tail: Sequence[str], lines: Sequence[str]) -> float:
+    """Return the share of numbers among the cells, and a little more for a line of names."""
+    rows = [_cells(line, separator) for line in tail]
+    width = mode(map(len, rows))
+    if width < 2:
+        return 0.0
+    cells = [cell for row in rows for cell in row]
+    values = sum(_is_value(cell) for row in rows if len(row) == width for cell in row)
+    named = any(
+        len(row) == width and all(map(_is_text, row))
+        for row in (_cells(_COMMENT.sub("", line), separator) for line in lines[:100])
+    )
+    empty = sum(not cell for cell in cells)
+    return values / max(1, len(cells) - empty) + 0.1 * named
+
+
+def _cells(line: str, separator: str) -> list[str]:
+    """Return the cells of a line, without the blanks around them."""
+    if separator == " ":
+        line = " ".join(line.split())
+    try:
+        cells = next(
+            csv.reader([line.strip("\r\n")], delimiter=separator, skipinitialspace=True), []
+        )
+    except csv.Error:
+        return [line]
+    return [cell.strip() for cell in cells]
+
+
+def _is_value(cell: str) -> bool:
+    return _NUMBER.fullmatch(cell) is not None or TIME.fullmatch(cell) is not None
+
+
+def _is_text(cell: str) -> bool:
+    return any(map(str.isalpha, cell)) and not _is_value(cell) and cell.lower() not in _NO_NUMBERS
