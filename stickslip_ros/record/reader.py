@@ -280,13 +280,13 @@ class _RunReader:
             run = self._decoded(block)
             gathered.append(run)
             count += sum(map(len, run))
-            if count >= least and self._motion.own:
+            if count >= least and not self._motion.of_another_machine:
                 yield self._reading(RunBlock(*_joined(gathered)))
                 gathered, count = [], 0
         self._check_clocks()
         if gathered:
             run = RunBlock(*_joined(gathered))
-            if not self._motion.own:
+            if self._motion.of_another_machine:
                 states = self._motion.without_lost_velocities(run.joint_states)
                 run = RunBlock(states, *run[1:3], True, self._motion.estimated)
             yield self._reading(run)
