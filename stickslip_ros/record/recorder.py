@@ -7,33 +7,27 @@ does this and everything else that must not block the caller.
 
 import os
 import tempfile
-import time
 from collections import deque
-from collections.abc import Callable, Collection, Generator, Mapping, Sequence
+from collections.abc import Callable, Collection, Generator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack, closing, contextmanager, suppress
-from dataclasses import replace
-from io import BufferedWriter, FileIO
-from math import inf
 from pathlib import Path
 from typing import Any, Literal, NoReturn, Self
 
 import yaml
-from mcap.data_stream import RecordBuilder
 from mcap.records import Channel, Schema
-from mcap.writer import CompressionType, Writer
+from mcap.writer import CompressionType
 
 from stickslip_ros.errors import BagError
 from stickslip_ros.record.bag_files import BagFiles
 from stickslip_ros.record.definitions import message_definition, type_hash
+from stickslip_ros.record.file_writer import LAST_STAMP, Definitions, FileWriter
 from stickslip_ros.record.mcap_file import McapFile
-from stickslip_ros.record.metadata import BagDescription, opening_information
+from stickslip_ros.record.metadata import BagDescription
 from stickslip_ros.record.topics import DURABILITY, HISTORY, RELIABILITY
 from stickslip_ros.stamps import NANOSECONDS
 
 Compression = Literal["lz4", "zstd", "none"]
-
-_LAST_STAMP = 2**63 - 1
 
 
 def offered_qos(depth: int) -> str:
@@ -72,41 +66,6 @@ def check_new_bag(path: Path) -> None:
         ) from None
 
 
-class _RecordStream(BufferedWriter):
-    """A new file that is written in whole records and can be truncated after the last one."""
-
-    def __init__(self, path: Path, on_full: Callable[[], None]) -> None:
-        super().__init__(FileIO(path, "xb"))
-        self.path = path
-        self.size = 0
-        """Bytes of the whole records that were passed to the operating system."""
-        self.limit = inf
-        """Size from which on the file is full."""
-        self._on_full = on_full
-
-    def write(self, records: Any, /) -> int:
-        written = super().write(records)
-        self.flush()
-        self.size += written
-        if self.size >= self.limit:
-            self._on_full()
-        return written
-
-    def sync(self) -> None:
-        """Sync the written data to the disk."""
-        os.fdatasync(self.fileno())
-
-    def cut(self) -> None:
-        """Truncate the file after its last whole record and close it, even if the disk fails."""
-        if self.closed:
-            return
-        with suppress(OSError):
-            os.ftruncate(self.fileno(), self.size)
-            self.sync()
-        with suppress(OSError):
-            self.raw.close()  # does not write the buffered half of a record
-
-
 class Recorder:
     """Write a bag message by message; a context manager that closes it.
 
@@ -134,11 +93,7 @@ class Recorder:
         self._max_size = max_bag_size
         self._max_duration = round(max_bag_duration * NANOSECONDS)
         self._description = BagDescription()
-        self._definitions: list[Schema | Channel] = []
-        self._definition_records = b""
-        self._schemas: list[Schema] = []
-        self._topics: list[str] = []
-        self._tables: dict[str, dict[str, str]] = {}
+        self._definitions = Definitions()
         self._files = 0
         missing = [parent for parent in self.directory.parents if not os.path.lexists(parent)]
         made = [*reversed(missing), self.directory]
@@ -164,7 +119,7 @@ class Recorder:
         its publisher offers. Raises BagError if the topic is already in the bag, its type is not
         installed, or the bag is closed or fails.
         """
-        if name in self._topics:
+        if name in self._definitions.topics:
             raise BagError(f"the topic {name} is already in the bag {self.directory}")
         definition = message_definition(type_name).encode()
         metadata = {
@@ -181,24 +136,9 @@ class Recorder:
         The ids in `channel` and `schema` are ignored. Raises BagError if the bag is closed or
         fails.
         """
-        new: list[Schema | Channel] = []
         with self._writing():
-            schema = replace(schema, id=0)
-            if schema not in self._schemas:
-                self._schemas.append(schema)
-                new.append(replace(schema, id=len(self._schemas)))
-            schema_id = self._schemas.index(schema) + 1
-            self._topics.append(channel.topic)
-            new.append(replace(channel, id=len(self._topics), schema_id=schema_id))
-            _register(self._writer, new)
-            builder = RecordBuilder()
-            for definition in new:
-                definition.write(builder)
-            records = builder.end()
-            self._stream.write(records)
-            self._definitions += new
-            self._definition_records += records
-        return len(self._topics)
+            self._definitions.add(channel, schema, self._file)
+        return len(self._definitions.topics)
 
     def write(
         self,
@@ -215,9 +155,9 @@ class Recorder:
         """
         if publish_time is None:
             publish_time = stamp
-        elif not 0 <= publish_time <= _LAST_STAMP:
+        elif not 0 <= publish_time <= LAST_STAMP:
             self._refuse_stamp(publish_time)
-        if not self._earliest <= stamp <= self._latest:
+        if not self._file.earliest <= stamp <= self._file.latest:
             self._make_room(stamp)
         try:
             self._add_message(channel, stamp, data, publish_time, sequence)
@@ -232,19 +172,10 @@ class Recorder:
         disk is raised at the next flush.
         """
         with self._writing():
-            self._writer.flush()
-            grown = self._stream.size - self._defined_size
-            # Repeated outside the chunks, in case the first are damaged: at most 2 % of a file.
-            if 0.02 * grown > len(self._definition_records):
-                self._stream.write(self._definition_records)
-                self._defined_size = self._stream.size
-            now = time.monotonic()
-            if self._stream.size > self._synced_size and now >= self._next_sync:
-                self._synced_size = self._stream.size
-                self._next_sync = now + 0.1  # s: a sync slows down the caller
-                # A sync that has not started yet includes this flush.
-                if self._sync is None or self._sync.running() or self._sync.done():
-                    self._sync = self._in_background(self._stream.sync)
+            must_sync = self._file.flush(self._definitions.records)
+            # A sync that has not started yet includes this flush.
+            if must_sync and (self._sync is None or self._sync.running() or self._sync.done()):
+                self._sync = self._in_background(self._file.stream.sync)
 
     def attach(
         self, name: str, data: bytes, media_type: str, log_time: int = 0, create_time: int = 0
@@ -254,7 +185,7 @@ class Recorder:
         Raises BagError if the bag is closed or fails.
         """
         with self._writing():
-            self._writer.add_attachment(create_time, log_time, name, media_type, data)
+            self._file.writer.add_attachment(create_time, log_time, name, media_type, data)
 
     def add_metadata(self, name: str, data: Mapping[str, str]) -> None:
         """Add a metadata table to the bag: to the current file and the following ones.
@@ -262,8 +193,8 @@ class Recorder:
         Raises BagError if the bag is closed or fails.
         """
         with self._writing():
-            self._tables[name] = dict(data)
-            self._writer.add_metadata(name, self._tables[name])
+            self._definitions.tables[name] = dict(data)
+            self._file.writer.add_metadata(name, self._definitions.tables[name])
 
     def close(self) -> None:
         """Finish the bag and sync it to the disk; do nothing if it is already closed.
@@ -273,7 +204,7 @@ class Recorder:
         if self._closed:
             return
         with self._writing():
-            self._in_background(self._finish, self._writer, self._stream)
+            self._in_background(self._finish, self._file)
             self._wait_for_tasks(at_most=0)
         self._end()
 
@@ -284,64 +215,31 @@ class Recorder:
         self.close()
 
     def _open_file(self) -> None:
-        """Start the next file with all known definitions and tables; leave none if this fails."""
+        """Start the next file."""
         path = self.directory / f"{self.directory.name}_{self._files}.mcap"
-        stream = _RecordStream(path, self._on_full)
-        try:
-            writer = Writer(stream, compression=self._compression)
-            writer.start(profile="ros2")
-            information = opening_information(path.name)
-            writer.add_metadata("rosbag2", {"serialized_metadata": information})
-            for name, table in self._tables.items():
-                writer.add_metadata(name, table)
-            _register(writer, self._definitions)
-            stream.write(self._definition_records)
-        except (OSError, ValueError):
-            stream.cut()
-            path.unlink()
-            raise
+        self._file = FileWriter(path, self._compression, self._definitions)
+        self._add_message = self._file.writer.add_message
         self._files += 1
-        self._stream, self._writer, self._add_message = stream, writer, writer.add_message
-        self._synced_size = 0
-        self._next_sync = 0.0
-        self._defined_size = stream.size
-        self._earliest = self._latest = _LAST_STAMP
 
     def _make_room(self, stamp: int) -> None:
         """Start another file if a message with this stamp does not belong in the current one."""
-        if not 0 <= stamp <= _LAST_STAMP:
+        if not 0 <= stamp <= LAST_STAMP:
             self._refuse_stamp(stamp)
-        if stamp > self._latest:
+        if stamp > self._file.latest:
             with self._writing():
                 self._wait_for_tasks(at_most=3)  # in case the disk is slower than the caller
-                self._writer.flush()
-                finished = self._writer, self._stream
-                self._stream.limit = inf
+                finished = self._file
+                finished.close_to_messages()
                 self._open_file()
-                self._in_background(self._finish, *finished)
+                self._in_background(self._finish, finished)
                 self._sync = None
-        if self._max_size and self._earliest == _LAST_STAMP:
-            # A file grows by whole chunks: a limit below its start still admits one chunk.
-            self._stream.limit = max(self._max_size, self._stream.size + 1)
-        self._earliest = min(stamp, self._earliest)
-        if self._max_duration:
-            self._latest = min(self._earliest + self._max_duration, _LAST_STAMP)
+        self._file.admit(stamp, self._max_size, self._max_duration)
 
-    def _on_full(self) -> None:
-        """Put the next message into a new file."""
-        self._latest = -1
-
-    def _finish(self, writer: Writer, stream: _RecordStream) -> None:
+    def _finish(self, file: FileWriter) -> None:
         """Complete a file and describe it; the following file, if any, already exists."""
-        try:
-            writer.finish()
-            stream.sync()
-            stream.close()
-        except OSError:
-            stream.cut()
-            raise
-        with closing(McapFile(stream.path)) as file:
-            self._description.add(file)
+        file.finish()
+        with closing(McapFile(file.stream.path)) as finished:
+            self._description.add(finished)
         self._description.write(self.directory)
         _sync_directories([self.directory])
 
@@ -368,10 +266,10 @@ class Recorder:
     def _fail(self, error: Exception) -> NoReturn:
         """Close the file as it is: nothing can be appended after half a record."""
         self._end()
-        self._stream.cut()
+        self._file.stream.cut()
         left = "it holds no message"  # the disk may have had no room for the first ones
         with suppress(BagError), BagFiles(self.directory) as bag:
-            if next(bag.messages(*self._topics), None) is not None:
+            if next(bag.messages(*self._definitions.topics), None) is not None:
                 left = "what was written so far can be read"
         raise BagError(
             f"the bag {self.directory} can no longer be written ({error}); {left}"
@@ -391,15 +289,6 @@ class Recorder:
 
     def _refuse(self, *_: object) -> NoReturn:
         raise BagError(f"the bag {self.directory} is closed")
-
-
-def _register(writer: Writer, definitions: Sequence[Schema | Channel]) -> None:
-    """Register definitions with a writer: the same order gives the same ids."""
-    for new in definitions:
-        if isinstance(new, Schema):
-            writer.register_schema(new.name, new.encoding, new.data)
-        else:
-            writer.register_channel(new.topic, new.message_encoding, new.schema_id, new.metadata)
 
 
 def _sync_directories(directories: Collection[Path]) -> None:
