@@ -19,6 +19,11 @@ EXECUTABLES = {
 
 ANALYSIS = ["control>=0.10.1", "xarray>=2024.6"]  # control: the first for numpy 2
 MATLAB = ["h5py>=3.11"]  # the first built for numpy 2
+FORMATS = [
+    "npTDMS>=1.9",  # the first for numpy 2
+    "openpyxl>=3.1",  # the oldest that pandas takes
+    "pyarrow>=16.1",  # the first built for numpy 2
+]
 DASHBOARD = ["contourpy", "fastapi", "nicegui>=3", "orjson", "uvicorn"]
 
 STUB = '#!/bin/sh\nexec "$(dirname "$0")/../../bin/$(basename "$0")" "$@"\n'
@@ -97,6 +102,8 @@ setup(
         "analysis": ANALYSIS,
         # MAT files of version 7.3.
         "matlab": MATLAB,
+        # Tables in the formats of other tools: Excel, Parquet, TDMS.
+        "formats": FORMATS,
         # A web page that shows a run (stickslip dashboard); all but NiceGUI are what it stands on.
         "dashboard": DASHBOARD,
         # Studies on a cluster (stickslip sweep --dask).
@@ -107,6 +114,7 @@ setup(
             *ANALYSIS,
             *DASHBOARD,
             *MATLAB,
+            *FORMATS,
             "axe-playwright-python",  # checks the dashboard for accessibility
             "distributed",
             "hypothesis",

@@ -1,4 +1,4 @@
-"""Recordings of machines as tables: CSV files, and MAT files of MATLAB."""
+"""Recordings of machines as tables: CSV files, and files of other tools."""
 
 import os
 from collections.abc import Iterator, Mapping, Sequence
@@ -12,7 +12,7 @@ from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.files import open_regular
 from stickslip_ros.record.faults import differences
-from stickslip_ros.record.mat_file import is_mat, vectors_of
+from stickslip_ros.record.foreign_file import format_of, read_foreign
 from stickslip_ros.record.reader import RunBlock
 from stickslip_ros.record.table_clock import stamps_of
 from stickslip_ros.record.table_columns import ANY_FORM, Table, TableFormat, reading_file
@@ -20,34 +20,40 @@ from stickslip_ros.record.table_quantities import Quantities, quantities_of
 from stickslip_ros.record.text_table import TextTable
 from stickslip_ros.samples import ForceColumns, SampleColumns
 
-TABLE_SUFFIXES = (".csv", ".mat", ".txt", ".dat", ".tsv", ".log", ".asc")
+TABLE_SUFFIXES = (
+    ".csv", ".mat", ".txt", ".dat", ".tsv", ".log", ".asc", ".xlsx", ".parquet", ".tdms", ".npz"
+)  # fmt: skip
 """Ends of the names of files that are tables, whatever they hold."""
 
-_FORMATS = {
-    b"PK\x03\x04": "an archive, such as Excel and numpy write: save its table as CSV or MAT file",
-    b"TDSm": "TDMS: TdmsFile(path).as_dataframe().to_csv(table) of npTDMS converts it",
-    b"PAR1": "Parquet: pandas.read_parquet(path).to_csv(table) converts it",
+_OTHERS = {
+    b"\xd0\xcf\x11\xe0": "an old workbook of Excel: save it as .xlsx",
     b"#ROSBAG": "of ROS 1: rosbags-convert --dst-storage mcap --src FILE --dst FOLDER converts it",
     b"RIFF": "sound: read it with scipy.io.wavfile, and save it by scipy.io.savemat",
     ".json": "JSON: pandas.DataFrame(...).to_csv(table) writes a list of rows in it",
-    ".yaml": "YAML: `ros2 topic echo --csv TOPIC` writes rows, and `ros2 bag record` a bag",
 }
-"""What files of other tools are, by their first bytes or end, and how they become tables."""
+"""What other files are, by their first bytes or end, and how they become tables."""
 _BAG_SUFFIXES = (".mcap", ".db3")
 _START = 16
 """First bytes that tell a format."""
 _MCAP = b"\x89MCAP"
 
 _MOST_NUMBERS = 1 << 24
-"""Numbers of a MAT file."""
+"""Numbers of a file of vectors."""
 
 
-class MatTable(Table):
-    """The vectors of a MAT file."""
+class VectorTable(Table):
+    """The vectors of a file, such as a MAT file."""
 
-    def __init__(self, path: Path, form: TableFormat, vectors: Mapping[str, FloatArray]) -> None:
-        """Take the vectors by name."""
-        self.path, self.form, self.names, self.units = path, form, [*vectors], [""] * len(vectors)
+    def __init__(
+        self,
+        path: Path,
+        form: TableFormat,
+        vectors: Mapping[str, FloatArray],
+        units: Mapping[str, str],
+    ) -> None:
+        """Take the vectors, and their units, by name."""
+        self.path, self.form, self.names = path, form, [*vectors]
+        self.units = [units[name] for name in vectors]
         self.columns = {name: place for place, name in enumerate(vectors)}
         self._vectors = [*vectors.values()]
 
@@ -73,18 +79,21 @@ def is_table(path: Path) -> bool:
 
 
 def table_of(path: Path, form: TableFormat = ANY_FORM) -> Table:
-    """Return the table in a text or MAT file; raises BagError."""
+    """Return the table in a text, or in a file of another tool; raises BagError."""
     with reading_file(path), open_regular(path) as stream:
-        if not is_mat(path, stream):
+        foreign = format_of(path, stream)
+        if foreign is None:
             start = os.pread(stream.fileno(), _START, 0)
-            for sign, what in _FORMATS.items():
+            for sign, what in _OTHERS.items():
                 if sign in (path.suffix.lower(), start[: len(sign)]):
                     raise ValueError(f"it is {what}")
             return TextTable(path, form)
-        vectors = vectors_of(stream, _MOST_NUMBERS)
-        if not vectors:
+        content = read_foreign(stream, foreign, _MOST_NUMBERS)
+        if content.text is not None:
+            return TextTable(path, form, content.text, content.notes)
+        if not content.vectors:
             raise ValueError("it has no column")
-        return MatTable(path, form, vectors)
+        return VectorTable(path, form, content.vectors, content.units)
 
 
 @dataclass(frozen=True)

@@ -7,10 +7,11 @@ import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from io import StringIO
+from io import BytesIO, StringIO
 from itertools import islice
 from pathlib import Path
 from statistics import mode
+from typing import BinaryIO
 
 from stickslip_ros.files import open_regular
 from stickslip_ros.record.expressions import listed
@@ -91,12 +92,20 @@ class TextForm:
         ]
 
 
-def form_of(path: Path, given: TableFormat) -> TextForm:
-    """Return the form of a table in a file; raises OSError and ValueError if it has none."""
-    with open_regular(path) as stream:
-        if os.fstat(stream.fileno()).st_size > _LARGEST:
-            raise ValueError(f"it has more than {_LARGEST} bytes")
-        head = stream.read(_HEAD)
+def opened(path: Path, content: bytes | None) -> BinaryIO:
+    """Open a text: that of a file or, given its content, what the file was converted to."""
+    if content is not None:
+        return BytesIO(content)
+    stream = open_regular(path)
+    if os.fstat(stream.fileno()).st_size > _LARGEST:
+        stream.close()
+        raise ValueError(f"it has more than {_LARGEST} bytes")
+    return stream
+
+
+def form_of(stream: BinaryIO, given: TableFormat) -> TextForm:
+    """Return the form of a table in an open text; raises OSError and ValueError if it has none."""
+    head = stream.read(_HEAD)
     encoding = given.encoding or _encoding_of(head)
     text = head.decode(encoding, errors="replace")
     if len(re.findall(r"[\x00-\x08\x0e-\x1f]", text)) > len(text) // 100:

@@ -15,10 +15,9 @@ from typing_extensions import override
 
 from stickslip_ros.arrays import IntArray
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.files import open_regular
 from stickslip_ros.record.expressions import listed
 from stickslip_ros.record.table_columns import Table, TableFormat
-from stickslip_ros.record.text_form import TAIL, TIME, form_of
+from stickslip_ros.record.text_form import TAIL, TIME, form_of, opened
 from stickslip_ros.text import shown
 
 _MOST_NUMBERS, _CHUNK = 1 << 28, 1 << 18
@@ -69,10 +68,20 @@ class _Wanted(NamedTuple):
 class TextTable(Table):
     """A table as text, of which the form is known; its columns are read when they are needed."""
 
-    def __init__(self, path: Path, given: TableFormat) -> None:
-        """Find the form of a table; raises OSError and ValueError if the file has none."""
-        self.path, self.form = path, given
-        self._text = text = form_of(path, given)
+    def __init__(
+        self,
+        path: Path,
+        given: TableFormat,
+        content: bytes | None = None,
+        notes: Sequence[str] = (),
+    ) -> None:
+        """Find the form of a table; raises OSError and ValueError if the file has none.
+
+        `content` is what a file of another format was converted to, with `notes` on how.
+        """
+        self.path, self.form, self._content, self._converted = path, given, content, notes
+        with opened(path, content) as stream:
+            self._text = text = form_of(stream, given)
         self.names, self.units, self.columns = text.names, text.units, text.columns
         self.decimal, self.period = text.decimal, text.period
         self._lines = _Lines(text.first + 1)
@@ -96,7 +105,9 @@ class TextTable(Table):
     @override
     def notes(self) -> list[str]:
         features = self._text.features(decimal_commas=self._decimal_commas)
-        notes = [f"the table is read with {', '.join(features)}"] if features else []
+        notes = [*self._converted]
+        if features:
+            notes.append(f"the table is read with {', '.join(features)}")
         if refused := self._lines.refused:
             notes.append(
                 f"{len(refused)} lines have more cells than the others and are left out, the "
@@ -149,7 +160,7 @@ class TextTable(Table):
         # From 3.1 on this is the default, and naming it is deprecated.
         exact: Any = {} if version >= (3, 1) else {"float_precision": "round_trip"}
         with (
-            open_regular(self.path) as stream,
+            opened(self.path, self._content) as stream,
             TextIOWrapper(stream, encoding=text.encoding, errors="replace", newline="") as file,
         ):
             for _ in range(text.first):

@@ -71,7 +71,7 @@ def test_holds_what_ros_looks_for(content, stem, checkout, executables):
 
 
 def test_names_its_extras(header):
-    extras = {"analysis", "dashboard", "dask", "dev", "docs", "matlab", "ros", "test"}
+    extras = {"analysis", "dashboard", "dask", "dev", "docs", "formats", "matlab", "ros", "test"}
     assert set(header.get_all("Provides-Extra")) == extras
     assert header["Requires-Python"] == ">=3.11"
 

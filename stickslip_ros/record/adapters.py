@@ -1,0 +1,188 @@
+"""Files of other tools, each read by its library: vectors with their units, or a table as text.
+
+A text is read like any other table. The libraries are imported where they are needed: which of them
+are installed is up to the user.
+"""
+
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from io import BytesIO
+from itertools import islice
+from typing import Any, NamedTuple
+from zipfile import BadZipFile, ZipFile
+
+import numpy as np
+
+Vectors = Iterator[tuple[str, str, Any]]
+"""Name, unit, or an empty one, and values of each vector."""
+
+_HDF5 = b"\x89HDF\r\n\x1a\n"
+"""First bytes of what a MAT file of version 7.3 has in it."""
+_MOST_LEVELS, _MOST_COLUMNS = 10, 1000
+"""Structures in structures, and columns of a matrix, or fields of a message, that are read."""
+
+
+class Adapter(NamedTuple):
+    """How a format is read."""
+
+    format: str
+    """Its name, with an article."""
+    package: str
+    """What has to be installed to read it, as pip names it."""
+    read: Callable[[bytes], Vectors | str]
+
+
+def _of_mat(content: bytes) -> Vectors:
+    return _of_hdf5(content) if _HDF5 in content[:1024] else _of_scipy(content)
+
+
+def _of_scipy(content: bytes) -> Vectors:
+    from scipy.io import loadmat
+
+    variables: Any = loadmat(BytesIO(content), squeeze_me=True)
+    for name, values in variables.items():
+        if name[:2] != "__":
+            yield from _vectors(name, values)
+
+
+def _of_hdf5(content: bytes) -> Vectors:
+    import h5py
+
+    def of_group(prefix: str, group: Any) -> Vectors:
+        for name in group:
+            if not isinstance(group.get(name, getlink=True), h5py.HardLink):
+                sys.exit(f"{prefix}{name} is a link: it may point to another file")
+            each = group[name]
+            if isinstance(each, h5py.Dataset) and (each.external or each.is_virtual):
+                sys.exit(f"{prefix}{name} is stored in another file")
+            if isinstance(each, h5py.Group):
+                yield from of_group(f"{prefix}{name}.", each)
+            elif each.dtype.kind in "biuf":
+                yield from _vectors(prefix + name, np.squeeze(each[()].T))
+
+    with h5py.File(BytesIO(content)) as file:
+        yield from of_group("", file)
+
+
+def _vectors(name: str, values: Any, depth: int = 0) -> Vectors:
+    """Yield the vectors of a variable: itself, columns of a matrix, fields of a structure."""
+    values = np.atleast_1d(values)
+    if values.dtype.names and values.size == 1 and depth < _MOST_LEVELS:
+        for field in values.dtype.names:
+            yield from _vectors(f"{name}.{field}", values[field].item(), depth + 1)
+    elif values.dtype.kind in "biuf" and values.ndim == 1:
+        yield name, "", values
+    elif values.dtype.kind in "biuf" and values.ndim == 2 and values.shape[1] <= _MOST_COLUMNS:
+        for number, column in enumerate(values.T, start=1):
+            yield f"{name}[{number}]", "", column
+
+
+def _of_archive(content: bytes) -> Vectors | str:
+    """Read what Excel and numpy write, which both are archives."""
+    try:
+        names = ZipFile(BytesIO(content)).namelist()
+    except BadZipFile:
+        sys.exit("it is damaged: the archive has no directory")
+    if "xl/workbook.xml" in names:
+        return _of_excel(content)
+    if not any(name.endswith(".npy") for name in names):
+        sys.exit("it is an archive, and neither of Excel (.xlsx) nor of numpy (.npz)")
+    return _of_numpy(content)
+
+
+def _of_numpy(content: bytes) -> Vectors:
+    with np.load(BytesIO(content), allow_pickle=False) as arrays:
+        for name in arrays:
+            yield from _vectors(name, np.squeeze(arrays[name]))
+
+
+def _of_excel(content: bytes) -> str:
+    import pandas as pd
+
+    sheets: Any = pd.read_excel(BytesIO(content), sheet_name=None, header=None, engine="openpyxl")
+    sizes: dict[str, int] = {name: sheet.size for name, sheet in sheets.items()}
+    name = max(sizes, key=sizes.__getitem__)
+    if sum(size > 0 for size in sizes.values()) > 1:
+        print(f"of {len(sheets)} sheets, {name} is read, the largest", file=sys.stderr)
+    return sheets[name].to_csv(header=False, index=False)
+
+
+def _of_parquet(content: bytes) -> str:
+    import pandas as pd
+
+    table: Any = pd.read_parquet(BytesIO(content), engine="pyarrow")
+    has_index = not isinstance(table.index, pd.RangeIndex)
+    return table.to_csv(index=has_index)
+
+
+def _of_tdms(content: bytes) -> Vectors:
+    from nptdms import TdmsFile
+
+    groups: Any = TdmsFile.read(BytesIO(content)).groups()
+    for group in groups:
+        prefix = f"{group.name}." if len(groups) > 1 else ""
+        for channel in group.channels():
+            values, properties = channel[:], channel.properties
+            if values.dtype.kind == "M":
+                values = (values - values[:1]) / np.timedelta64(1, "s")
+            if values.dtype.kind not in "biuf":
+                continue
+            if "wf_increment" in properties:  # a waveform has no channel of its times
+                offset = properties.get("wf_start_offset", 0.0)
+                instants = offset + properties["wf_increment"] * np.arange(len(values))
+                yield f"{prefix}{channel.name}.time", "s", instants
+            yield prefix + channel.name, str(properties.get("unit_string", "")), values
+
+
+def _of_yaml(content: bytes) -> str:
+    """Read messages as `ros2 topic echo` prints them, one a document."""
+    import pandas as pd
+    import yaml
+
+    loader: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+    messages: Any = yaml.load_all(content, loader)
+    rows = [
+        dict(islice(_fields("", each), _MOST_COLUMNS + 1))
+        for each in messages
+        if isinstance(each, Mapping)
+    ]
+    if any(len(row) > _MOST_COLUMNS for row in rows):
+        sys.exit(f"it has a message of more than {_MOST_COLUMNS} fields")
+    if not rows:
+        sys.exit("it is YAML, and has no messages as `ros2 topic echo` prints them")
+    return pd.DataFrame(rows).to_csv(index=False)
+
+
+def _fields(name: str, value: Any) -> Iterator[tuple[str, Any]]:
+    """Yield the fields of a message by their paths; elements of joints by the names of these."""
+    if isinstance(value, Mapping):
+        if {*value} == {"sec", "nanosec"}:
+            yield name, f"{value['sec']}.{value['nanosec']:09d}"
+            return
+        joints = value.get("name", value.get("joint_names"))
+        for key, each in value.items():
+            path = f"{name}.{key}" if name else str(key)
+            if isinstance(joints, list) and isinstance(each, list) and each is not joints:
+                keys = joints if len(each) == len(joints) else range(len(each))
+                for joint, element in zip(keys, each, strict=True):
+                    yield f"{path}.{joint}", element
+            else:
+                yield from _fields(path, each)
+    elif isinstance(value, list):
+        for number, each in enumerate(value):
+            yield from _fields(f"{name}[{number}]", each)
+    else:
+        yield name, value
+
+
+MAT = Adapter("a MAT file of version 7.3", "h5py", _of_mat)
+_YAML = Adapter("YAML", "PyYAML", _of_yaml)
+BY_START = {
+    b"MATLAB": MAT,
+    b"PK\x03\x04": Adapter("an Excel workbook", "openpyxl", _of_archive),
+    b"PAR1": Adapter("a Parquet file", "pyarrow", _of_parquet),
+    b"TDSm": Adapter("a TDMS file", "npTDMS", _of_tdms),
+}
+"""Adapters by the first bytes of a file."""
+BY_END = {".mat": MAT, ".yaml": _YAML, ".yml": _YAML}
+"""Adapters by the end of its name."""
