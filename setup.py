@@ -23,6 +23,7 @@ FORMATS = [
     "npTDMS>=1.9",  # the first for numpy 2
     "openpyxl>=3.1",  # the oldest that pandas takes
     "pyarrow>=16.1",  # the first built for numpy 2
+    "rosbags",
 ]
 DASHBOARD = ["contourpy", "fastapi", "nicegui>=3", "orjson", "uvicorn"]
 
@@ -102,7 +103,7 @@ setup(
         "analysis": ANALYSIS,
         # MAT files of version 7.3.
         "matlab": MATLAB,
-        # Tables in the formats of other tools: Excel, Parquet, TDMS.
+        # Recordings in the formats of other tools: Excel, Parquet, TDMS, sqlite3, ROS 1.
         "formats": FORMATS,
         # A web page that shows a run (stickslip dashboard); all but NiceGUI are what it stands on.
         "dashboard": DASHBOARD,
@@ -125,7 +126,6 @@ setup(
             "playwright",  # drives the browser of the system: no download of its own
             "pytest",
             "pytest-timeout",
-            "rosbags",
             "setuptools>=70.1",  # the first to make wheels unaided
         ],
         # The documentation as a web site (make site).

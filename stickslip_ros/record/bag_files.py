@@ -1,4 +1,7 @@
-"""The files of a bag: a directory of MCAP files in rosbag2's layout, or one such file."""
+"""The files of a bag: a directory of MCAP files in rosbag2's layout, or one such file.
+
+A bag of another format becomes one of these.
+"""
 
 import os
 import re
@@ -13,6 +16,7 @@ from typing_extensions import override
 
 from stickslip_ros.errors import BagError
 from stickslip_ros.record.compression import unpack_file
+from stickslip_ros.record.converted_bag import mcap_of
 from stickslip_ros.record.mcap_file import McapFile
 from stickslip_ros.record.metadata import metadata_faults
 from stickslip_ros.record.source import Block, Source
@@ -23,22 +27,20 @@ _PACKED_SUFFIX = ".mcap.zstd"
 
 
 class BagFiles(Source):
-    """The MCAP files of a bag.
-
-    Raises BagError if `path` is not a bag, or a bag that is not stored as MCAP.
-    """
+    """The MCAP files of a bag; raises BagError if `path` is not a bag."""
 
     def __init__(self, path: Path | str) -> None:
         """Open the files of a bag directory, or one MCAP file."""
         self.path = Path(path)
         self._unreadable: list[str] = []
-        paths = _mcap_files(self.path)
         with ExitStack() as opened:
+            place = mcap_of(self.path, opened)
+            paths = _mcap_files(place)
             files = self._readable_files([_unpacked(path, opened) for path in paths])
             self.files = [opened.enter_context(closing(file)) for file in files]
             """The MCAP files in order, without those that cannot be read."""
             self._opened = opened.pop_all()
-        self._metadata_faults = metadata_faults(self.path, paths) if self.path.is_dir() else []
+        self._metadata_faults = metadata_faults(place, paths) if place.is_dir() else []
         self.topics = {
             channel.topic: file.schemas[channel.schema_id].name
             for file in self.files
@@ -110,15 +112,9 @@ def _mcap_files(path: Path) -> list[Path]:
     """Return the files of a bag in the order in which they were recorded."""
     if not os.path.exists(path):
         raise BagError(f"the bag {path} does not exist")
-    files, sqlite = [path], path.suffix == ".db3"
+    files = [path]
     if path.is_dir():
         files = sorted([*path.glob("*.mcap"), *path.glob(f"*{_PACKED_SUFFIX}")], key=_place_in_bag)
-        sqlite = not files and any(path.glob("*.db3"))
-    if sqlite:
-        raise BagError(
-            f"the bag {path} is stored as sqlite3, and only MCAP can be read; "
-            "convert it with `ros2 bag convert`"
-        )
     if not files:
         raise BagError(f"the directory {path} is not a bag: it holds no .mcap file")
     return files

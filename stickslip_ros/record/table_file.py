@@ -11,6 +11,7 @@ import numpy as np
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.files import open_regular
+from stickslip_ros.record.converted_bag import OTHER_BAGS
 from stickslip_ros.record.faults import differences
 from stickslip_ros.record.foreign_file import format_of, read_foreign
 from stickslip_ros.record.reader import RunBlock
@@ -27,12 +28,11 @@ TABLE_SUFFIXES = (
 
 _OTHERS = {
     b"\xd0\xcf\x11\xe0": "an old workbook of Excel: save it as .xlsx",
-    b"#ROSBAG": "of ROS 1: rosbags-convert --dst-storage mcap --src FILE --dst FOLDER converts it",
     b"RIFF": "sound: read it with scipy.io.wavfile, and save it by scipy.io.savemat",
     ".json": "JSON: pandas.DataFrame(...).to_csv(table) writes a list of rows in it",
 }
 """What other files are, by their first bytes or end, and how they become tables."""
-_BAG_SUFFIXES = (".mcap", ".db3")
+_BAG_SUFFIXES = (".mcap", ".db3", ".bag")
 _START = 16
 """First bytes that tell a format."""
 _MCAP = b"\x89MCAP"
@@ -75,7 +75,7 @@ def is_table(path: Path) -> bool:
     if not path.is_file() or any(each in _BAG_SUFFIXES for each in path.suffixes):
         return False
     with reading_file(path), open_regular(path) as stream:
-        return not stream.read(len(_MCAP)).startswith(_MCAP)
+        return not stream.read(_START).startswith((_MCAP, *OTHER_BAGS))
 
 
 def table_of(path: Path, form: TableFormat = ANY_FORM) -> Table:

@@ -106,9 +106,9 @@ def test_the_manifest_tells_what_has_no_key():
     assert f"For to_xarray and to_control: {keyless} from PyPI." in text
     ((key,),) = (KEYS[name] for name in required("matlab"))
     assert f"For MAT files of version 7.3: {key}." in text
-    (key,) = set().union(*(KEYS[name] for name in required("formats")))
+    keys = ", ".join(sorted(set().union(*(KEYS[name] for name in required("formats")))))
     keyless = " and ".join(sorted(name for name in required("formats") if not KEYS[name]))
-    assert f"For tables of other tools: {key}, and {keyless} from PyPI." in text
+    assert f"For recordings of other tools: {keys}, and {keyless} from PyPI." in text
 
 
 def test_the_docs_install_in_a_workspace_all_that_is_asked_for():

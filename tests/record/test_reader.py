@@ -262,7 +262,6 @@ def test_forces_of_strangers_do_not_get_in_the_way(tmp_path):
 
 
 def test_what_is_no_bag_is_refused(tmp_path):
-    rosbags_bag(tmp_path / "sqlite", StoragePlugin.SQLITE3)
     (tmp_path / "empty").mkdir()
     (tmp_path / "directory" / "directory.mcap").mkdir(parents=True)
     (tmp_path / "file.txt").write_text("not a bag, but longer than a bag's beginning")
@@ -273,7 +272,6 @@ def test_what_is_no_bag_is_refused(tmp_path):
         ("does not exist", "nothing", "file.txt/bag", "nul\0nul", "long" * 100),
         ("holds no .mcap file", "empty"),
         ("not an MCAP file", "file.txt", "empty.mcap", "truncated.mcap"),
-        ("stored as sqlite3", "sqlite", "sqlite/sqlite.db3"),
         ("cannot be opened", "directory"),
         ("not a regular file", "pipe"),
     ):

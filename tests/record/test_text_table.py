@@ -401,7 +401,6 @@ def test_what_is_said_of_the_form_is_used(
     ("name", "start", "way"),
     [
         ("log.xls", b"\xd0\xcf\x11\xe0\0\1", "save it as .xlsx"),
-        ("ros1.bag", b"#ROSBAG V2.0\n", "rosbags-convert"),
         ("log.wav", b"RIFF\0\1", "wavfile"),
         ("log.json", b'{"rows": [[1, 2],', "pandas"),
     ],
