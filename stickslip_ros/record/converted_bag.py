@@ -1,20 +1,19 @@
-"""Bags of sqlite3 and of ROS 1 as MCAP, by rosbags in a process of its own."""
+"""Bags of sqlite3 and of ROS 1 as MCAP, by rosbags in a limited process."""
 
 import os
-import resource
-import subprocess
 import sys
 from contextlib import ExitStack, suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from stickslip_ros.errors import BagError
+from stickslip_ros.record.limited_process import limited, result_of
 
 _ROS_1, _SQLITE = b"#ROSBAG", b"SQLite"
 OTHER_BAGS = (_ROS_1, _SQLITE)
 """First bytes of the files of bags that are no MCAP."""
-_MEMORY, _TIME = 1 << 30, 600
-"""Bytes and seconds that converting a bag may take."""
+_TIME = 600
+"""Seconds that converting a bag may take."""
 
 
 def mcap_of(path: Path, opened: ExitStack) -> Path:
@@ -31,14 +30,10 @@ def mcap_of(path: Path, opened: ExitStack) -> Path:
     directory = opened.enter_context(TemporaryDirectory(prefix="stickslip_ros_"))
     target = Path(directory, path.stem)
     source = path.parent if path.suffix == ".db3" else path
-    command = [sys.executable, "-P", "-m", __name__, str(source), str(target)]
     try:
-        child = subprocess.run(command, capture_output=True, timeout=_TIME, check=False)
-    except subprocess.TimeoutExpired:
-        raise BagError(f"the bag {path} takes more than {_TIME} s to convert") from None
-    if child.returncode != 0:
-        reason = child.stderr.decode(errors="replace").strip().rpartition("\n")[2]
-        raise BagError(f"the bag {path} cannot be converted: {reason or 'it is damaged'}")
+        result_of(__name__, str(source), str(target), seconds=_TIME)
+    except ValueError as error:
+        raise BagError(f"the bag {path} cannot be converted: {error}") from None
     return target
 
 
@@ -49,18 +44,11 @@ def _start(path: Path) -> bytes:
 
 
 def _main(source: Path, target: Path) -> None:
-    resource.setrlimit(resource.RLIMIT_AS, (_MEMORY, _MEMORY))
-    try:
+    with limited("it is not MCAP; rosbags reads it: install rosbags, or use `ros2 bag convert`"):
         from rosbags.convert.cli import main
-    except ImportError:
-        sys.exit("it is not MCAP; rosbags reads it: install rosbags, or use `ros2 bag convert`")
-    sys.argv[1:] = ["--src", str(source), "--dst", str(target), "--dst-storage", "mcap"]
-    try:
+
+        sys.argv[1:] = ["--src", str(source), "--dst", str(target), "--dst-storage", "mcap"]
         main()
-    except MemoryError:
-        sys.exit(f"it takes more than {_MEMORY} bytes of memory")
-    except Exception as error:
-        sys.exit(f"it is damaged: {type(error).__name__}")
 
 
 if __name__ == "__main__":

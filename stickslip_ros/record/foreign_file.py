@@ -1,8 +1,6 @@
-"""Files of other tools, read in a process of its own: false sizes in a file can end it."""
+"""Files of other tools: a table as text, or vectors, from a limited process."""
 
 import os
-import resource
-import subprocess
 import sys
 from collections.abc import Mapping
 from io import BytesIO
@@ -13,11 +11,12 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.record.adapters import BY_END, BY_START
+from stickslip_ros.record.limited_process import limited, result_of
 
 _START = 16
 """First bytes that tell a format."""
-_MEMORY, _TIME = 1 << 30, 60
-"""Bytes and seconds that reading a file may take."""
+_TIME = 60
+"""Seconds that reading a file may take."""
 _TEXT = b"text:"
 """What comes before a table as text in what the process writes."""
 
@@ -46,21 +45,10 @@ def read_foreign(stream: BinaryIO, form: str, most: int) -> ForeignTable:
     matrix. Raises ValueError if the file cannot be read, or if its vectors have more than `most`
     numbers.
     """
-    paths = os.pathsep.join(filter(None, sys.path))
-    settings = {**os.environ, "PYTHONPATH": paths, "OPENBLAS_NUM_THREADS": "1"}
-    command = [sys.executable, "-P", "-m", __name__, form, str(most)]
-    try:
-        child = subprocess.run(
-            command, stdin=stream, capture_output=True, env=settings, timeout=_TIME, check=False
-        )
-    except subprocess.TimeoutExpired:
-        raise ValueError(f"it takes more than {_TIME} s") from None
-    said = child.stderr.decode(errors="replace").strip()
-    if child.returncode != 0:
-        raise ValueError(said.rpartition("\n")[2] or "it is damaged")
-    if child.stdout.startswith(_TEXT):
-        return ForeignTable(child.stdout[len(_TEXT) :], {}, {}, said.splitlines())
-    with np.load(BytesIO(child.stdout), allow_pickle=False) as arrays:
+    result = result_of(__name__, form, str(most), seconds=_TIME, stream=stream)
+    if result.output.startswith(_TEXT):
+        return ForeignTable(result.output[len(_TEXT) :], {}, {}, result.notes)
+    with np.load(BytesIO(result.output), allow_pickle=False) as arrays:
         names = {name.partition("=")[2]: name for name in arrays}
         vectors = {name: arrays[key] for name, key in names.items()}
     units = {name: key.partition("=")[0] for name, key in names.items()}
@@ -69,21 +57,14 @@ def read_foreign(stream: BinaryIO, form: str, most: int) -> ForeignTable:
 
 def _main(form: str, most: int) -> None:
     """Write what is in the file at standard input to standard output, as text or as numpy does."""
-    resource.setrlimit(resource.RLIMIT_AS, (_MEMORY, _MEMORY))
     adapter = BY_END.get(form) or BY_START[form.encode()]
-    try:
+    with limited(f"{adapter.format} is read by {adapter.package}: install it"):
         table = adapter.read(sys.stdin.buffer.read())
         if isinstance(table, str):
             sys.stdout.buffer.write(_TEXT + table.encode())
             return
         # With a sign in its name, for numpy takes some names itself.
         vectors = {f"{unit}={name}": values for name, unit, values in table}
-    except ImportError:
-        sys.exit(f"{adapter.format} is read by {adapter.package}: install it")
-    except MemoryError:
-        sys.exit(f"it takes more than {_MEMORY} bytes of memory")
-    except Exception as error:
-        sys.exit(f"it is damaged: {type(error).__name__}")
     if sum(map(len, vectors.values())) > most:
         sys.exit(f"it has more than {most} numbers")
     target = BytesIO()

@@ -1,0 +1,58 @@
+"""Files of other tools are read in a process of its own: false sizes in a file can end it."""
+
+import os
+import resource
+import subprocess
+import sys
+from collections.abc import Generator
+from contextlib import contextmanager
+from typing import BinaryIO, NamedTuple
+
+_MEMORY = 1 << 30
+"""Bytes that reading a file may take."""
+
+
+class Result(NamedTuple):
+    """What a process wrote."""
+
+    output: bytes
+    notes: list[str]
+
+
+def result_of(
+    module: str, *arguments: str, seconds: float, stream: BinaryIO | None = None
+) -> Result:
+    """Return what a module of the package writes as a process, with a stream as standard input.
+
+    Raises ValueError, with the last line that it wrote to standard error, if it fails.
+    """
+    paths = os.pathsep.join(filter(None, sys.path))
+    settings = {**os.environ, "PYTHONPATH": paths, "OPENBLAS_NUM_THREADS": "1"}
+    command = [sys.executable, "-P", "-m", module, *arguments]
+    try:
+        child = subprocess.run(
+            command, stdin=stream, capture_output=True, env=settings, timeout=seconds, check=False
+        )
+    except subprocess.TimeoutExpired:
+        raise ValueError(f"it takes more than {seconds} s") from None
+    lines = child.stderr.decode(errors="replace").strip().splitlines()
+    if child.returncode != 0:
+        raise ValueError(lines[-1] if lines else "it is damaged")
+    return Result(child.stdout, lines)
+
+
+@contextmanager
+def limited(libraries: str) -> Generator[None]:
+    """Limit the memory of this process, and end it with a sentence where reading a file fails.
+
+    `libraries` is that for missing ones.
+    """
+    resource.setrlimit(resource.RLIMIT_AS, (_MEMORY, _MEMORY))
+    try:
+        yield
+    except ImportError:
+        sys.exit(libraries)
+    except MemoryError:
+        sys.exit(f"it takes more than {_MEMORY} bytes of memory")
+    except Exception as error:
+        sys.exit(f"it is damaged: {type(error).__name__}")
