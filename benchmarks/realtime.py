@@ -81,7 +81,7 @@ class TimedPlant(ObservedPlant):
 
     def _on_force(self, unpack: Callable[[bytes], tuple[int, float]], message: bytes) -> None:
         super()._on_force(unpack, message)
-        self._answered = max(self._answered, self._loop.number(unpack_header(message)))
+        self._answered = max(self._answered, self._loop.stamps.number(unpack_header(message)))
 
 
 @contextmanager

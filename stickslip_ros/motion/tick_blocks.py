@@ -74,7 +74,7 @@ class TickBlocks:
     def advance(self, most: int) -> list[float]:
         """Advance by `most` ticks, or up to where a guard may be; return their forces, N."""
         loop, motion, controller = self._loop, self._motion, self._controller
-        first, period = loop.sample.stamp, loop.stamp(1) - loop.stamp(0)
+        first, period = loop.sample.stamp, loop.stamps.period.numerator
         if not controller.continues(first, period):
             return []
         _, mode, instant = motion.phase
@@ -98,7 +98,7 @@ class _Block:
         (system, mode, _), drive, order = motion.phase, motion.drive, _order(loop, motion)
         ticks, step = _COEFFICIENTS // order, loop.period * drive.angular_frequency
         own = {
-            "elapsed": (loop.stamp(1) - loop.stamp(0)) * 1e-9,
+            "elapsed": loop.stamps.period.numerator * 1e-9,
             "length": drive.length_scale,
             "speed": drive.speed_scale,
             "weight": drive.force_scale,

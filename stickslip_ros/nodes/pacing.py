@@ -249,7 +249,7 @@ class LockstepPacer(Pacer):
 
     @property
     def _awaits_force(self) -> bool:
-        return self._loop.controller_present and not self._loop.answered
+        return self._loop.answers.controller_present and not self._loop.answered
 
     def _watch(self) -> None:
         """Stop waiting for a controller or recorder that has held up the loop for too long."""
@@ -269,7 +269,7 @@ class LockstepPacer(Pacer):
         elif silent and self._holds and self._commander_exists():
             self._loop.hold()
         elif silent and patience_ends:
-            self._loop.controller_present = False
+            self._loop.answers.controller_present = False
             self._node.get_logger().warning(NO_FORCE)
         self._proceed()
 

@@ -12,8 +12,9 @@ from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 
 from stickslip_ros.errors import InvalidInputError, MessageError
+from stickslip_ros.motion.answers import Verdict
 from stickslip_ros.motion.motion import Motion
-from stickslip_ros.motion.sampled_loop import LOCKSTEP_START, Verdict
+from stickslip_ros.motion.sampled_loop import LOCKSTEP_START
 from stickslip_ros.nodes.base.managed import (
     ERROR,
     FAILURE,
@@ -108,7 +109,7 @@ class PlantNode(ManagedNode[PlantParameters]):
             overtaken=lambda stamp, force: self._dropped_force.publish(pack_wrench(stamp, force)),
         )
         latest = END_OF_TIME - NANOSECONDS
-        stampable = self._loop.number(latest) - 1
+        stampable = self._loop.stamps.number(latest) - 1
         if stampable < 0:
             raise InvalidInputError(
                 f"no stamps are left after {latest // NANOSECONDS} s: restart the node"
@@ -142,7 +143,7 @@ class PlantNode(ManagedNode[PlantParameters]):
         self._moved = True
         done = self._loop.sample_number * self._loop.period
         self.elapsed = 0.0 if self._pacer.finished else self.elapsed + done
-        self._next_start = self._loop.stamp(self._loop.sample_number + 1)
+        self._next_start = self._loop.stamps.stamp(self._loop.sample_number + 1)
         self._answerable = self._loop.sample.stamp
         super().stop()
 
@@ -174,18 +175,18 @@ class PlantNode(ManagedNode[PlantParameters]):
         loop, pacer = self._loop, self._pacer
         values = {
             "samples": loop.sample_number + 1,
-            FIRST_STAMP: loop.stamp(0),
+            FIRST_STAMP: loop.stamps.stamp(0),
             NEWEST_STAMP: loop.sample.stamp,
             FINISHED: pacer.finished,
-            "late_forces": loop.late_forces,
+            "late_forces": loop.answers.late_forces,
             "missed_deadlines": pacer.missed_deadlines,
             "largest_lateness": round(pacer.largest_lateness, 6),
             "steps_per_second": round(pacer.steps_per_second, 1),
-            "silent_samples": loop.silent_samples,
+            "silent_samples": loop.answers.silent_samples,
             "superseded": self._superseded,
             "disturbance_force": loop.disturbance,
             **self.dropped.values,
-            **{f"dropped: {reason}": count for reason, count in loop.dropped.items()},
+            **{f"dropped: {reason}": count for reason, count in loop.answers.dropped.items()},
         }
         if self._forecast is not None and self._forecast.sentence:
             values[FORECAST] = self._forecast.sentence
@@ -194,13 +195,13 @@ class PlantNode(ManagedNode[PlantParameters]):
         if pacer.failure:
             return ERROR, pacer.failure, {**values, FAILURE: pacer.failure}
         complaints = [pacer.complaint]
-        controlled = self.parameters.expects_control and loop.controller_present
+        controlled = self.parameters.expects_control and loop.answers.controller_present
         if self.parameters.expects_control and not controlled:
             complaints.append(NO_FORCE)
         complaints.append(
             self._timing.check(
                 loop.sample_number + 1,
-                loop.late_forces,
+                loop.answers.late_forces,
                 pacer.missed_deadlines,
                 controlled=controlled,
             )
@@ -268,7 +269,7 @@ class PlantNode(ManagedNode[PlantParameters]):
             else:
                 verdict = self._loop.offer(stamp, force)
         if self._forecast is not None and stamp <= self._loop.sample.stamp:
-            self._forecast.answered(self._loop.number(stamp))
+            self._forecast.answered(self._loop.stamps.number(stamp))
         if verdict is Verdict.SUPERSEDED:
             self._superseded += 1
         elif verdict is not Verdict.ACCEPTED:

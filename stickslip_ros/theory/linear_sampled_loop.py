@@ -20,7 +20,7 @@ from stickslip_ros.model.control import ControlLaw, LinearFeedback
 from stickslip_ros.model.dimensionless_drive import POSITION, SPEED
 from stickslip_ros.model.drive import Drive
 from stickslip_ros.model.sensor import EXACT_SENSOR, Sensor
-from stickslip_ros.motion.forces_under_way import whole_and_rest
+from stickslip_ros.motion.force_line import whole_and_rest
 from stickslip_ros.theory.gain_intervals import (
     GainBoundary,
     GainInterval,

@@ -14,8 +14,10 @@ from stickslip_ros.model.control import VelocityFeedback
 from stickslip_ros.model.sensor import Measure, Sensor
 from stickslip_ros.model.signals import sine, step
 from stickslip_ros.motion import Motion, RecordedMotion
+from stickslip_ros.motion.answers import Verdict
 from stickslip_ros.motion.controller import Controller
-from stickslip_ros.motion.sampled_loop import SampledLoop, Verdict
+from stickslip_ros.motion.sample_stamps import SampleStamps
+from stickslip_ros.motion.sampled_loop import SampledLoop
 from stickslip_ros.motion.simulation import simulate_sampled
 from stickslip_ros.motion.trajectory import TrajectoryRecorder
 from stickslip_ros.samples import Sample
@@ -24,23 +26,20 @@ from tests.parts import lag
 
 SECOND = 10**9
 
-MOTION = Motion(PAPER, 0.0, 0.0)
-"""For what does not advance."""
-
 
 @pytest.mark.parametrize("rate", [3, 7, 30, 60, 100, 1000, 30_000])
 @pytest.mark.parametrize("number", [0, 1, 2, 1000, 10**9, 10**9 + 1])
 @pytest.mark.parametrize("start", [SECOND, 1_700_000_000_123_456_789])
 def test_stamps_are_exact_for_ever(rate: int, number: int, start: int) -> None:
-    stamp = SampledLoop(MOTION, float(rate), start).stamp(number)
+    stamp = SampleStamps(start, float(rate)).stamp(number)
     # |stamp - (start + n 1e9 / f)| is half a nanosecond at most, in whole numbers.
     assert abs((stamp - start) * rate - number * SECOND) * 2 <= rate
 
 
 @given(st.floats(1e-3, 1e9), st.integers(0, 10**9))
 def test_a_stamp_has_one_number(rate: float, number: int) -> None:
-    loop = SampledLoop(MOTION, rate, SECOND)
-    assert loop.number(loop.stamp(number)) == number
+    stamps = SampleStamps(SECOND, rate)
+    assert stamps.number(stamps.stamp(number)) == number
 
 
 @pytest.mark.parametrize("rate", [3.0, 30.0, 1000.0])
@@ -55,7 +54,7 @@ def test_samples_are_a_period_apart(rate: float) -> None:
         free.advance(1.0 / rate)
         assert sample == loop.sample
         assert loop.sample_number == number
-        assert sample.stamp == loop.stamp(number)
+        assert sample.stamp == loop.stamps.stamp(number)
         assert (sample.position, sample.velocity) == (free.position, free.velocity)
 
 
@@ -311,7 +310,8 @@ def test_the_first_command_answers_a_sample_and_a_silent_one_holds_it() -> None:
     loop.hold()
     other.offer(other.sample.stamp, 5.0)
     assert loop.advance() == other.advance()
-    assert (loop.silent_samples, loop.late_forces, loop.dropped.total()) == (1, 0, 1)
+    answers = loop.answers
+    assert (answers.silent_samples, answers.late_forces, answers.dropped.total()) == (1, 0, 1)
 
 
 def test_a_command_with_an_instant_acts_from_then_until_the_next() -> None:
@@ -328,4 +328,4 @@ def test_a_command_with_an_instant_acts_from_then_until_the_next() -> None:
         expected.append(free.position)
     assert samples[0].position == pytest.approx(expected[1], rel=1e-12)
     assert samples[2].position == pytest.approx(expected[3], rel=1e-12)
-    assert loop.late_forces == 0
+    assert loop.answers.late_forces == 0

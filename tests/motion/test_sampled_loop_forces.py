@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from stickslip_ros.motion.answers import Verdict
 from stickslip_ros.motion.motion import Motion
-from stickslip_ros.motion.sampled_loop import SampledLoop, Verdict
+from stickslip_ros.motion.sampled_loop import SampledLoop
 from tests.drives import PAPER
 
 SECOND = 10**9
@@ -47,8 +48,8 @@ def test_a_force_acts_from_its_sample_to_the_next(realtime: bool) -> None:
         hand.advance(0.01)
         sample = loop.advance()
         assert (sample.position, sample.velocity) == (hand.position, hand.velocity)
-    assert loop.late_forces == 0
-    assert not loop.dropped
+    assert loop.answers.late_forces == 0
+    assert not loop.answers.dropped
 
 
 @paces
@@ -76,7 +77,7 @@ def test_a_bad_force_is_dropped(realtime: bool, stamp: int, force: float, verdic
     loop.advance_by(2)
     assert loop.offer(stamp, force) is verdict
     assert loop.offer(stamp, force) is verdict
-    assert dict(loop.dropped) == {verdict: 2}
+    assert dict(loop.answers.dropped) == {verdict: 2}
     assert not loop.answered
     # It leaves no trace.
     assert loop.answer(5, 0.75) is Verdict.ACCEPTED
@@ -88,7 +89,7 @@ def test_lockstep_takes_no_answer_to_a_sample_that_has_passed() -> None:
     loop = Loop()
     loop.advance_by(2)
     assert loop.answer(1, 0.5) is Verdict.TOO_LATE
-    assert dict(loop.dropped) == {Verdict.TOO_LATE: 1}
+    assert dict(loop.answers.dropped) == {Verdict.TOO_LATE: 1}
     loop.advance()
     assert loop.acting == 0.0
 
@@ -103,17 +104,17 @@ def test_a_late_force_that_a_newer_one_replaces_before_it_acts_is_told() -> None
     loop.advance()
     assert loop.acting == 3.5
     assert told == [(SECOND + PERIOD, 1.5), (SECOND + 2 * PERIOD, 2.5)]
-    assert dict(loop.dropped) == {Verdict.OVERTAKEN: 2}
+    assert dict(loop.answers.dropped) == {Verdict.OVERTAKEN: 2}
 
 
 def test_lockstep_goes_on_without_force_and_without_hope_where_none_comes() -> None:
     loop = Loop()
-    assert loop.controller_present
+    assert loop.answers.controller_present
     loop.answer(0, 0.5)
     for acting, late in ((0.5, 0), (0.0, 1), (0.0, 2)):
         loop.advance()
-        assert (loop.acting, loop.late_forces) == (acting, late)
-        assert loop.controller_present == (late == 0)
+        assert (loop.acting, loop.answers.late_forces) == (acting, late)
+        assert loop.answers.controller_present == (late == 0)
 
 
 @pytest.mark.parametrize("late", [False, True])
@@ -121,9 +122,9 @@ def test_lockstep_takes_its_controller_back(late: bool) -> None:
     """By an answer, also by one that comes too late: the next one may be in time."""
     loop = Loop()
     loop.advance_by(3)
-    assert not loop.controller_present
+    assert not loop.answers.controller_present
     assert loop.answer(2 if late else 3, 0.5) is (Verdict.TOO_LATE if late else Verdict.ACCEPTED)
-    assert loop.controller_present
+    assert loop.answers.controller_present
 
 
 @pytest.mark.parametrize(
@@ -133,18 +134,18 @@ def test_a_bad_force_does_not_bring_the_controller_back(stamp: int, force: float
     loop = Loop()
     loop.advance_by(3)
     loop.offer(stamp, force)
-    assert not loop.controller_present
+    assert not loop.answers.controller_present
 
 
 def test_realtime_holds_the_newest_force_and_counts_what_is_late() -> None:
     loop = Loop(realtime=True)
     loop.advance()
-    assert (loop.acting, loop.late_forces) == (0.0, 1)
+    assert (loop.acting, loop.answers.late_forces) == (0.0, 1)
     loop.answer(1, 0.5)
     loop.advance()
-    assert (loop.acting, loop.late_forces) == (0.5, 1)
+    assert (loop.acting, loop.answers.late_forces) == (0.5, 1)
     loop.advance_by(2)
-    assert (loop.acting, loop.late_forces) == (0.5, 3)
+    assert (loop.acting, loop.answers.late_forces) == (0.5, 3)
 
 
 def test_realtime_takes_a_late_answer_if_it_is_the_newest() -> None:
@@ -154,10 +155,10 @@ def test_realtime_takes_a_late_answer_if_it_is_the_newest() -> None:
     assert loop.answer(2, 0.75) is Verdict.ANSWERED
     assert not loop.answered
     loop.advance()
-    assert (loop.acting, loop.late_forces) == (0.5, 6)
+    assert (loop.acting, loop.answers.late_forces) == (0.5, 6)
     assert loop.answer(5, -0.25) is Verdict.ACCEPTED
     loop.advance()
-    assert (loop.acting, loop.late_forces) == (-0.25, 7)
+    assert (loop.acting, loop.answers.late_forces) == (-0.25, 7)
 
 
 def test_realtime_gives_a_force_up_that_is_too_old() -> None:
@@ -169,7 +170,7 @@ def test_realtime_gives_a_force_up_that_is_too_old() -> None:
         loop.advance()
         acting.append(loop.acting)
     assert acting == [0.5, 0.5, 0.5, 0.5, 0.0, 0.0]
-    assert loop.late_forces == 5
+    assert loop.answers.late_forces == 5
     assert loop.answer(5, 0.25) is Verdict.ACCEPTED
     loop.advance()
     assert loop.acting == 0.25
@@ -178,17 +179,17 @@ def test_realtime_gives_a_force_up_that_is_too_old() -> None:
 @paces
 def test_nothing_is_late_where_no_control_is_expected(realtime: bool) -> None:
     loop = Loop(realtime, expects_control=False)
-    assert not loop.controller_present
+    assert not loop.answers.controller_present
     loop.advance_by(5)
-    assert loop.late_forces == 0
-    assert not loop.controller_present
+    assert loop.answers.late_forces == 0
+    assert not loop.answers.controller_present
     # A stranger's force is taken all the same, and nobody waits for the next one.
     assert loop.answer(5, 0.5) is Verdict.ACCEPTED
     loop.advance()
     assert loop.acting == 0.5
-    assert not loop.controller_present
+    assert not loop.answers.controller_present
     loop.advance()
-    assert loop.late_forces == 0
+    assert loop.answers.late_forces == 0
 
 
 offers = st.tuples(
@@ -217,6 +218,6 @@ def test_whatever_is_offered_every_sample_is_finite(
         else:
             taken += loop.offer(*event) is Verdict.ACCEPTED
     offered = sum(event is not None for event in events)
-    overtaken = loop.dropped[Verdict.OVERTAKEN]
-    assert taken + loop.dropped.total() - overtaken == offered
+    overtaken = loop.answers.dropped[Verdict.OVERTAKEN]
+    assert taken + loop.answers.dropped.total() - overtaken == offered
     assert overtaken == len(told)

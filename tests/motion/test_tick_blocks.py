@@ -95,10 +95,10 @@ class Run:
     def exact(self) -> list[object]:
         """What does not depend on the integration."""
         loop, motion = self.loop, self.motion
-        sample = loop.sample
+        sample, answers = loop.sample, loop.answers
         return [
             *(sample.stamp, sample.belt_position, sample.belt_velocity, loop.sample_number),
-            *(loop.answered, loop.controller_present, loop.late_forces, loop.dropped),
+            *(loop.answered, answers.controller_present, answers.late_forces, answers.dropped),
             *(motion.sticking, motion.unbounded, motion.signal_time, motion.phase[1]),
         ]
 
