@@ -20,7 +20,7 @@ from stickslip_ros.model.dimensionless_drive import (
     stretched,
 )
 from stickslip_ros.model.drive import UNBOUNDED_SPEED, Drive
-from stickslip_ros.model.hybrid import Flow, Guard, Instant, Mode, with_switches
+from stickslip_ros.model.hybrid import TIME_ROUNDING, Flow, Guard, Instant, Mode, with_switches
 from stickslip_ros.model.signals import Signal
 
 SLIP, STICK = "slip", "stick"
@@ -35,9 +35,6 @@ starts on one. It also keeps rounding from leading back.
 
 SMALLEST_STEP = 2.0**-35
 """Speed below which a change of the belt speed at a corner, or a relative speed, is rounding."""
-
-TIME_ROUNDING = 2.0**-49
-"""Share of the time by which rounding may put a corner after an instant that is meant to be it."""
 
 UNSEEN = 2.0**-60
 """Factor of a series that has no part in the choice of steps."""

@@ -15,6 +15,9 @@ import heyoka as hy
 
 _Shared = TypeVar("_Shared")
 
+TIME_ROUNDING = 2.0**-49
+"""Share of the time by which rounding may put a corner after an instant that is meant to be it."""
+
 
 @dataclass(frozen=True, slots=True)
 class Mode:

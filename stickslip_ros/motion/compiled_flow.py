@@ -18,7 +18,7 @@ import heyoka as hy
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.model.hybrid import HybridSystem, Mode
+from stickslip_ros.model.hybrid import HybridSystem, Mode, Transition
 
 # heyoka warns on standard output, which is for results, where a marker's polynomial is only
 # rounding, as in equilibrium.
@@ -109,20 +109,60 @@ _Key = tuple[int, str, int]
 
 _shelves: dict[_Key, list[CompiledFlow]] = defaultdict(list)
 
+_Loaded = tuple[CompiledFlow | None, tuple[Transition, ...]]
+"""Integrator with the constants of the system, None with a closed form; where its guards lead."""
+
 
 class IntegratorPool:
     """The integrators that one motion has borrowed; they are given back when it ends."""
 
-    def __init__(self) -> None:
+    def __init__(self, detail: Detail) -> None:
+        """Borrow integrators of this detail; `use` tells of which system."""
         self._borrowed: dict[_Key, tuple[CompiledFlow, list[CompiledFlow]]] = {}
+        self._loaded: dict[Detail, dict[str, _Loaded]] = {}
+        self.set_detail(detail)
 
-    def flow(self, system: HybridSystem, name: str, detail: Detail) -> CompiledFlow:
+    def use(self, system: HybridSystem) -> None:
+        """Continue with the constants of a system."""
+        self._system = system
+        self._loaded.clear()
+        self.set_detail(self._detail)
+
+    def set_detail(self, detail: Detail) -> None:
+        """Continue with another detail."""
+        self._detail = detail
+        self.derive = Detail.DERIVATIVES in detail
+        """Whether derivatives are integrated."""
+        self._by_flow = self._loaded.setdefault(detail, {})
+
+    def set_constant(self, name: str, value: float) -> None:
+        """Set a constant of the system, also in the integrators."""
+        self._system.constants[name], index = value, self._system.index[name]
+        for by_flow in self._loaded.values():
+            for flow, _ in by_flow.values():
+                if flow is not None and index < len(flow.parameters):
+                    flow.parameters[index] = value
+
+    def flow_of(self, mode: Mode) -> _Loaded:
+        """Return the integrator of a mode, unless that has a closed form, and its transitions."""
+        return self._by_flow.get(mode.flow) or self._load(mode)
+
+    def _load(self, mode: Mode) -> _Loaded:
+        name, system, flow = mode.flow, self._system, None
+        if self.derive or not system.has_closed_form(mode):
+            flow = self._borrow(name, self._detail)
+            flow.load(system)
+        loaded = self._by_flow[name] = flow, system.shared_flow(name).transitions
+        return loaded
+
+    def _borrow(self, name: str, detail: Detail) -> CompiledFlow:
         """Return the integrator of a flow, compiled if there is none of this structure yet."""
+        system = self._system
         key = (system.structure, name, detail.value)
         if key in self._borrowed:
             return self._borrowed[key][0]
         if detail is Detail.MARKS and not system.shared_flow(name).marks:
-            return self.flow(system, name, Detail.STATES)
+            return self._borrow(name, Detail.STATES)
         shelf = _shelves[key]
         try:
             flow = shelf.pop()

@@ -2,12 +2,13 @@
 
 from array import array
 from math import inf
-from typing import Any
+from typing import Generic, TypeVar
 
 import heyoka as hy
 
-from stickslip_ros.model.hybrid import HybridSystem, Instant, Mode, Transition
+from stickslip_ros.model.hybrid import TIME_ROUNDING, HybridSystem, Instant, Mode
 from stickslip_ros.motion.compiled_flow import CompiledFlow, Detail, IntegratorPool
+from stickslip_ros.motion.phase import DIVERGENCE, Phase, PhaseObserver
 from stickslip_ros.motion.recurrence import Recurrence
 from stickslip_ros.motion.short_step import (
     LONGEST_STEP,
@@ -16,6 +17,8 @@ from stickslip_ros.motion.short_step import (
     ShortStep,
     short_step,
 )
+
+_System = TypeVar("_System", bound=HybridSystem)
 
 STEPS_PER_UNIT = 10_000
 """Integration steps that a motion may take for each unit of time, in the long run."""
@@ -26,22 +29,39 @@ _STEPS_OF_A_PHASE = 50
 _SHORTEST_REPEATED = 16.0
 """Duration of an advance above which its phases may be known: others have two cycles or fewer."""
 
-_DIVERGENCE = -1
-"""Stands for a guard where the rates exceed any bound."""
-
 _STEP_LIMIT = hy.taylor_outcome.step_limit.value
 _NOT_FINITE = hy.taylor_outcome.err_nf_state.value
-
-
-_Prepared = tuple[CompiledFlow | None, tuple[Transition, ...]]
-"""Integrator with the constants of the system, None with a closed form; where its guards lead."""
 
 
 class TooManyStepsError(Exception):
     """Raised when a motion is too stiff to be followed."""
 
 
-class HybridMotion:
+class StepBudget:
+    """Steps that a motion may take: so many for each unit of time, and some to spare."""
+
+    def __init__(self) -> None:
+        self.taken = 0
+        """Number of steps so far."""
+        self.left = _SPARE_STEPS
+        """Number of steps that it may take now."""
+        self.per_unit = inf
+        """Steps for each unit of time, if these are fewer than `STEPS_PER_UNIT`."""
+
+    def take(self, steps: int, elapsed: float) -> None:
+        """Count steps that took the motion on for a time; raise TooManyStepsError beyond a bound.
+
+        A motion that stays within it in the long run may save steps for a while that needs more.
+        """
+        self.taken += steps
+        per_unit = min(STEPS_PER_UNIT, self.per_unit)
+        left = self.left - steps + (per_unit * elapsed if elapsed > 0.0 else 0.0)  # not NaN
+        self.left = _SPARE_STEPS if left > _SPARE_STEPS else int(left)
+        if left < 1.0:
+            raise TooManyStepsError
+
+
+class HybridMotion(Generic[_System]):
     """Motion of a hybrid system: phases in its modes, and the transitions between them.
 
     heyoka's adaptive Taylor method integrates the flow of a mode and finds the instant at which the
@@ -50,68 +70,74 @@ class HybridMotion:
     the last bit, is not integrated again. All values are dimensionless.
     """
 
-    def __init__(
-        self, system: HybridSystem, state: list[float], detail: Detail = Detail.STATES
-    ) -> None:
+    def __init__(self, system: _System, state: list[float], detail: Detail = Detail.STATES) -> None:
         """Start at time zero with all inputs at zero."""
         self.unbounded = False
         """Whether the motion is unbounded; then it does not advance any further."""
-        self._steps, self._steps_left = 0, _SPARE_STEPS
-        self._steps_per_unit = inf
-        """Steps for each unit of time, if these are fewer than `STEPS_PER_UNIT`."""
-        self._detail, self._watched = detail, bool(detail)
-        self._derives = Detail.DERIVATIVES in detail
-        self._integrators = IntegratorPool()
-        self._flow: CompiledFlow | None = None
-        self._short_step: ShortStep | None = None
-        self._begun = 0.0
-        """Time of the motion, in the present advance, at which that of the integrator is zero."""
-        self._instant = Instant(memoryview(array("d")), [0.0] * len(system.inputs))
-        self._use(system)
-        self._set_state(state)
+        self.budget = StepBudget()
+        """Work that the motion may still take."""
+        self.observer: PhaseObserver[_System] | None = None
+        """Takes note of the phases, if there is one."""
+        self.instant = Instant(memoryview(array("d")), [0.0] * len(system.inputs))
+        """State, inputs and time of the system."""
+        self._integrators = IntegratorPool(detail)
+        self.use(system)
+        self.set_state(state)
 
-    def _use(self, system: HybridSystem) -> None:
-        """Continue with a system that has the same states; its mode is found by `_set_state`."""
-        self._system = system
-        self._clocked, self._switch_time = not system.autonomous, inf
-        self._prepared_by_detail: dict[Detail, dict[str, _Prepared]] = {}
-        self._prepared = self._prepared_by_detail.setdefault(self._detail, {})
+    def use(self, system: _System) -> None:
+        """Continue with a system that has the same states; its mode is found by `set_state`."""
+        self.system = system
+        """System in motion."""
+        self.clocked = not system.autonomous
+        """Whether the flows depend on the time."""
+        self._corner = inf
+        self._integrators.use(system)
 
-    def _set_constant(self, name: str, value: float) -> None:
+    def set_constant(self, name: str, value: float) -> None:
         """Set a constant of the system."""
-        if self._system.constants[name] == value:
-            return
-        self._system.constants[name], index = value, self._system.index[name]
-        for prepared in self._prepared_by_detail.values():
-            for flow, _ in prepared.values():
-                if flow is not None and index < len(flow.parameters):
-                    flow.parameters[index] = value
+        if self.system.constants[name] != value:
+            self._integrators.set_constant(name, value)
 
-    def _set_detail(self, detail: Detail) -> None:
-        """Continue with another detail."""
-        self._detail, self._watched = detail, bool(detail)
-        self._derives = Detail.DERIVATIVES in detail
-        self._prepared = self._prepared_by_detail.setdefault(detail, {})
-        self._enter(self._mode)
+    def watch(self, observer: PhaseObserver[_System] | None, detail: Detail) -> None:
+        """Continue with another observer and detail."""
+        self.observer = observer
+        self._integrators.set_detail(detail)
+        self.enter(self.mode)
 
-    def _set_state(self, state: list[float]) -> None:
+    def hold(self, number: int, value: float) -> None:
+        """Hold an input at a value."""
+        self.instant.inputs[number] = value
+        if self.flow is not None:
+            for used, index in self.flow.inputs:
+                if used == number:
+                    self.flow.parameters[index] = value
+
+    def set_state(self, state: list[float]) -> None:
         """Start again in the mode that a state gives."""
-        self._instant.state = memoryview(array("d", state))
-        self._enter(self._system.settled(None, self._instant))
-        self.unbounded = self._system.is_unbounded(self._instant)
+        self.instant.state = memoryview(array("d", state))
+        self.enter(self.system.settled(None, self.instant))
+        self.unbounded = self.system.is_unbounded(self.instant)
 
-    def _enter(self, mode: Mode) -> None:
+    def set_time(self, time: float) -> None:
+        """Set the time, and enter the mode that follows a corner there, or within its rounding."""
+        self.instant.time = time
+        if time + TIME_ROUNDING * time >= self._corner:
+            self.enter(self.system.switch_inputs(self.mode, self.instant))
+
+    def enter(self, mode: Mode) -> None:
         """Continue in a mode."""
-        self._mode, self._short_step = mode, None
-        if self._clocked:
-            self._switch_time = self._system.next_switch_time(mode)
-        prepared = self._prepared.get(mode.flow) or self._prepare(mode)
-        self._flow, self._transitions = prepared
-        flow = prepared[0]
+        self.mode = mode
+        """Mode of the system."""
+        self._short_step: ShortStep | None = None
+        if self.clocked:
+            self._corner = self.system.next_switch_time(mode)
+        self.flow, self._transitions = self._integrators.flow_of(mode)
+        """Integrator of the mode; None with a closed form."""
+        flow = self.flow
         if flow is None:
             return
-        instant, parameters = self._instant, flow.parameters
-        self._system.nudge_off_guard(mode, instant)
+        instant, parameters = self.instant, flow.parameters
+        self.system.nudge_off_guard(mode, instant)
         for number, index in flow.inputs:
             parameters[index] = instant.inputs[number]
         if mode is not flow.mode:
@@ -123,114 +149,124 @@ class HybridMotion:
             variables[:] = instant.state
             instant.state = variables
 
-    def _prepare(self, mode: Mode) -> _Prepared:
-        """Load the constants into the integrator of a mode's flow, unless it has a closed form."""
-        name, system, flow = mode.flow, self._system, None
-        if self._derives or not system.has_closed_form(mode):
-            flow = self._integrators.flow(system, name, self._detail)
-            flow.load(system)
-        prepared = self._prepared[name] = flow, system.shared_flow(name).transitions
-        return prepared
+    def step_shortly(self, duration: float, force: float | None = None) -> bool:
+        """Advance within the present phase by a step that is prepared; return if that was possible.
 
-    def _advance(self, duration: float) -> None:
-        """Integrate over a duration; stop early if the motion becomes unbounded."""
+        `force` replaces the first input.
+        """
         step = self._short_step
-        if step is None and duration <= _SHORTEST_REPEATED and not self._derives:
-            step = self._short_step = short_step(
-                self._system, self._mode, self._instant, self._flow, self._switch_time
+        if step is None or not step(duration, force):
+            return False
+        if self.observer is not None:
+            self._report(self.observer, Phase(self.mode, duration, None, self.mode))
+        return True
+
+    def advance(self, duration: float) -> None:
+        """Integrate over a duration; stop early if the motion becomes unbounded.
+
+        Raises TooManyStepsError beyond the budget.
+        """
+        derives = self._integrators.derive
+        if self._short_step is None and duration <= _SHORTEST_REPEATED and not derives:
+            self._short_step = short_step(
+                self.system, self.mode, self.instant, self.flow, self._corner
             )
-        if step is not None and step(duration, None):
-            self._pass_shortly(duration)
+        if self.step_shortly(duration):
             return
-        system, instant, watched = self._system, self._instant, self._watched
-        self._steps_left += STEPS_PER_ADVANCE
-        mode = system.settled(self._mode, instant)
-        if mode is not self._mode:
-            self._enter(mode)
-        epoch, now, elapsed, self._begun = instant.time, 0.0, 0.0, 0.0
-        limits_steps, clocked, has_parts = system.limits_steps, self._clocked, system.has_parts
-        longest = LONGEST_STEP if duration > LONGEST_STEP and not clocked else inf
-        repeats = duration > _SHORTEST_REPEATED and not (clocked or self._derives)
-        recurrence = Recurrence() if repeats else None
+        self.budget.left += STEPS_PER_ADVANCE
+        mode = self.system.settled(self.mode, self.instant)
+        if mode is not self.mode:
+            self.enter(mode)
+        recurrence = None
+        if duration > _SHORTEST_REPEATED and not (self.clocked or derives):
+            recurrence = Recurrence()
+        longest = LONGEST_STEP if duration > LONGEST_STEP and not self.clocked else inf
+        epoch, now = self.instant.time, 0.0
         while now < duration:
-            end, corner = duration, self._switch_time - epoch
-            if corner < end:
-                end = corner
-            if watched:
-                end = self._begin(now, end)
-            flow, guard = self._flow, None
-            if flow is None:
-                guard, elapsed = system.closed_form(mode, instant, end - now)
-                now = end if guard is None else now + elapsed
-                self._take_steps(_STEPS_OF_A_PHASE, elapsed)
-            else:
-                taylor = flow.taylor
-                if clocked:
-                    taylor.time = now
-                    if flow.epoch is not None:
-                        flow.parameters[flow.epoch] = epoch
-                else:  # a phase does not depend on when it starts
-                    self._begun = now
-                    taylor.time = 0.0
-                until = end - self._begun
-                if limits_steps:
-                    longest = min(system.longest_step(instant), LONGEST_STEP)
-                outcome = self._propagate(flow, until, longest)
-                elapsed = taylor.time
-                if outcome == NO_EVENT:
-                    now = end
-                else:
-                    taylor.reset_cooldowns()  # the next integration is another phase
-                    if outcome == _NOT_FINITE:
-                        self._overflow(flow)
-                        guard = _DIVERGENCE
-                    elif outcome == _STEP_LIMIT:  # the rates leave a step no length
-                        guard, now = _DIVERGENCE, self._begun + elapsed
-                    else:
-                        guard, now = -outcome - 1, self._begun + elapsed
-            if guard is None:
-                following = mode
-                if now >= corner:
-                    instant.time = self._switch_time
-                    following = system.switch_inputs(mode, instant)
-                if watched:
-                    self._pass(mode, None, following, now)
-                if following is not mode:
-                    mode = following
-                    self._enter(mode)
-                continue
-            if clocked:
-                instant.time = epoch + now
-            if watched:
-                self._reach_guard()
-            following = (
-                None if guard == _DIVERGENCE else self._transitions[guard](system, mode, instant)
-            )
-            if has_parts and following is not None:
-                following = system.apply_pending_guards(following, instant)
-            if watched:
-                self._pass(mode, guard, following, now)
+            phase = self._pass_phase(now, min(duration, self._corner - epoch), epoch, longest)
+            now, following = phase.end, self._follow(phase, epoch)
+            if self.observer is not None:
+                self._report(self.observer, phase)
             if following is None:
                 self.unbounded, self._short_step = True, None
-                break
-            mode = following
-            if recurrence is not None:
-                bound = elapsed if flow is None else min(flow.phase_bound(), elapsed + longest)
-                if recurrence.is_known(mode, instant.state, elapsed, bound, self._kept()):
-                    now = self._repeat(recurrence, now, duration)
-                    mode, recurrence = self._mode, None
-                    continue
-            self._enter(mode)
+                return
+            if phase.guard is None:
+                if following is not phase.mode:
+                    self.enter(following)
+            elif recurrence and recurrence.is_known(phase, following, self.instant.state):
+                now, recurrence = self._repeat(recurrence, now, duration), None
+            else:
+                self.enter(following)
+
+    def _pass_phase(self, now: float, end: float, epoch: float, longest: float) -> Phase:
+        """Advance in the mode from a time to a guard, or to `end`, in steps up to the longest."""
+        mode, flow = self.mode, self.flow
+        if self.observer is not None:
+            end = self.observer.begin(mode, flow, now, end)
+        if flow is None:
+            guard, elapsed = self.system.closed_form(mode, self.instant, end - now)
+            self.budget.take(_STEPS_OF_A_PHASE, elapsed)
+            end = end if guard is None else now + elapsed
+            return Phase(mode, end, guard, duration=elapsed, bound=elapsed)
+        taylor, origin = flow.taylor, now
+        if self.clocked:
+            origin = 0.0
+            if flow.epoch is not None:
+                flow.parameters[flow.epoch] = epoch
+        taylor.time = now - origin
+        if self.system.limits_steps:
+            longest = min(self.system.longest_step(self.instant), LONGEST_STEP)
+        outcome = self._propagate(flow, end - origin, longest)
+        if outcome == NO_EVENT:
+            return Phase(mode, end, origin=origin)
+        taylor.reset_cooldowns()  # the next integration is another phase
+        if outcome == _NOT_FINITE:
+            self._overflow(flow)
+            return Phase(mode, now, DIVERGENCE)
+        elapsed = taylor.time
+        if outcome == _STEP_LIMIT:  # the rates leave a step no length
+            return Phase(mode, origin + elapsed, DIVERGENCE, origin=origin)
+        bound = min(flow.phase_bound(), elapsed + longest)
+        return Phase(mode, origin + elapsed, -outcome - 1, None, origin, elapsed, bound)
+
+    def _follow(self, phase: Phase, epoch: float) -> Mode | None:
+        """Make the transition at the end of a phase; return the mode that follows."""
+        system, instant, mode, guard = self.system, self.instant, phase.mode, phase.guard
+        following: Mode | None = None
+        if guard is None:
+            following = mode
+            if phase.end >= self._corner - epoch:
+                instant.time = self._corner
+                following = system.switch_inputs(mode, instant)
+        else:
+            if self.clocked:
+                instant.time = epoch + phase.end
+            if self.observer is not None:
+                phase.state_at_guard = instant.state.tolist()
+            if guard != DIVERGENCE:
+                following = self._transitions[guard](system, mode, instant)
+            if following is not None and system.has_parts:
+                following = system.apply_pending_guards(following, instant)
+        phase.following = following
+        return following
+
+    def _report(self, observer: PhaseObserver[_System], phase: Phase) -> None:
+        """Let an observer take a phase that has just passed."""
+        x, y, *_ = self.instant.state
+        phase.end_state = x, y
+        if self.flow is not None:
+            phase.marks = self.flow.take_marks()
+        observer.take(phase, self.system, self.instant)
 
     def _propagate(self, flow: CompiledFlow, until: float, longest: float) -> int:
         """Integrate up to a time or a guard; return the outcome."""
         taylor, work = flow.taylor, _STEPS_OF_A_PHASE
         while True:
-            before, most = taylor.time, self._steps_left
+            before, most = taylor.time, self.budget.left
             reached = taylor.propagate_until(until, most, longest)
             outcome, steps = reached[0].value, reached[3]
             try:
-                self._take_steps(work + steps, taylor.time - before)
+                self.budget.take(work + steps, taylor.time - before)
             except TooManyStepsError:
                 taylor.reset_cooldowns()
                 flow.take_marks()  # of a phase that is not reported
@@ -239,56 +275,19 @@ class HybridMotion:
                 return outcome
             work = 0
 
-    def _take_steps(self, steps: int, elapsed: float) -> None:
-        """Count steps that took the motion on for a time; raise TooManyStepsError beyond a bound.
-
-        A motion that stays within it in the long run may save steps for a while that needs more.
-        """
-        self._steps += steps
-        per_unit = min(STEPS_PER_UNIT, self._steps_per_unit)
-        left = self._steps_left - steps + (per_unit * elapsed if elapsed > 0.0 else 0.0)  # not NaN
-        self._steps_left = _SPARE_STEPS if left > _SPARE_STEPS else int(left)
-        if left < 1.0:
-            raise TooManyStepsError
-
     def _repeat(self, recurrence: Recurrence, now: float, latest: float) -> float:
         """Continue with the known phases that `latest` does not shorten; return the time then."""
-        for phase in recurrence.phases():
-            begun, after = now, now + phase.duration
+        for known in recurrence.phases():
+            phase = known.phase
             if now + phase.bound >= latest:
-                self._instant.state[:] = memoryview(phase.state).cast("d")
-                self._enter(phase.mode)
+                self.instant.state[:] = memoryview(known.state).cast("d")
+                self.enter(known.mode)
                 return now
-            now = after
-            if self._watched:
-                self._recall(phase.kept, begun, now)
+            phase.origin, phase.end = now, now + phase.duration
+            now = phase.end
+            if self.observer is not None:
+                self.observer.take(phase, self.system, self.instant)
         raise AssertionError("the phases have no end")
-
-    def _kept(self) -> Any:
-        """Return what `_recall` needs of the phase that has passed; by default nothing."""
-        return None
-
-    def _recall(self, kept: Any, begun: float, now: float) -> None:
-        """Take note of a phase again, from `begun` to `now`; not called without any detail."""
-
-    def _begin(self, now: float, end: float) -> float:
-        """Take note of the start of a phase; return its latest end. Not called without detail."""
-        return end
-
-    def _reach_guard(self) -> None:
-        """Take note of the state at a guard: the mode that follows may set a part of it."""
-
-    def _pass(self, mode: Mode, guard: int | None, following: Mode | None, now: float) -> None:
-        """Take note of the end of a phase in `mode`, at a guard or not.
-
-        `now` is the time since the last advance. It is not called without any detail.
-        """
-
-    def _pass_shortly(self, duration: float) -> None:
-        """Take note of a short step."""
-        if self._watched:
-            self._begun = 0.0
-            self._pass(self._mode, None, self._mode, duration)
 
     def _overflow(self, flow: CompiledFlow) -> None:
         """End a motion whose rates are no longer finite: its cause exceeds any bound immediately.
@@ -296,4 +295,4 @@ class HybridMotion:
         The series of the last step still has the state at its start.
         """
         flow.variables[:] = array("d", flow.taylor.tc[: len(flow.variables), 0])
-        self._mode = self._system.overflow(self._mode, self._instant)
+        self.mode = self.system.overflow(self.mode, self.instant)

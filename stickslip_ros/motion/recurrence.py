@@ -3,54 +3,44 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import cycle
-from typing import Any
 
 from stickslip_ros.model.hybrid import Mode
+from stickslip_ros.motion.phase import Phase
 
 _MOST_PHASES = 10_000
 """Phases that are kept, at most."""
 
 
 @dataclass(slots=True)
-class Phase:
-    """Phase of a motion, from one guard to the next."""
+class KnownPhase:
+    """Start of a phase, and what passes then, up to a guard."""
 
     mode: Mode
     state: bytes
     """State at its start, before the mode is entered."""
-    duration: float = 0.0
-    bound: float = 0.0
-    """Time from its start to an end of the advance that would have shortened none of its steps."""
-    kept: Any = None
-    """What the motion has kept of it."""
+    phase: Phase
 
 
 class Recurrence:
     """Phases of one advance of an autonomous system, up to the first that is known."""
 
     def __init__(self) -> None:
-        self._phases: list[Phase] = []
+        self._phases: list[KnownPhase] = []
         self._numbers: dict[tuple[Mode, bytes], int] = {}
 
-    def is_known(
-        self, mode: Mode, state: "memoryview[float]", duration: float, bound: float, kept: Any
-    ) -> bool:
-        """Note the end of a phase, and the mode and the state of the next; return if it is known.
-
-        `duration`, `bound` and `kept` are those of the phase that ends.
-        """
+    def is_known(self, phase: Phase, mode: Mode, state: "memoryview[float]") -> bool:
+        """Note a phase, and the mode and the state of the next; return if that is known."""
         phases, values = self._phases, state.tobytes()
         if phases:
-            last = phases[-1]
-            last.duration, last.bound, last.kept = duration, bound, kept
+            phases[-1].phase = phase
         first = self._numbers.setdefault((mode, values), len(phases))
         if first < len(phases):
             self._phases = phases[first:]
             return True
         if first < _MOST_PHASES:
-            phases.append(Phase(mode, values))
+            phases.append(KnownPhase(mode, values, phase))
         return False
 
-    def phases(self) -> Iterator[Phase]:
+    def phases(self) -> Iterator[KnownPhase]:
         """Return the phases that follow, without end, once `is_known` has returned True."""
         return cycle(self._phases)

@@ -16,24 +16,12 @@ class SampleStamps:
         self._nanoseconds, self._samples = self.period.as_integer_ratio()
 
     def stamp(self, number: int) -> int:
-        """Return the stamp of a sample, ns.
-
-        Parameters
-        ----------
-        number : int
-            Number of the sample, from 0.
-        """
+        """Return the stamp (ns) of a sample, by its number from 0."""
         since = number * self._nanoseconds
         return self._start + (since if self._samples == 1 else _rounded(since, self._samples))
 
     def number(self, stamp: int) -> int:
-        """Return the number of the sample whose stamp is nearest; negative before sample 0.
-
-        Parameters
-        ----------
-        stamp : int
-            Stamp, ns.
-        """
+        """Return the number of the sample whose stamp (ns) is nearest; negative before sample 0."""
         return _rounded((stamp - self._start) * self._samples, self._nanoseconds)
 
 

@@ -175,7 +175,7 @@ class SampledLoop:
         return self._line.acting
 
     def offer(self, stamp: int, force: float) -> Verdict:
-        """Offer a force as the answer to a sample.
+        """Offer a force as the answer to a sample; return ACCEPTED, or why it will not act.
 
         Parameters
         ----------
@@ -183,16 +183,13 @@ class SampledLoop:
             Stamp of the sample that the force answers, ns.
         force : float
             Control force, N.
-
-        Returns
-        -------
-        Verdict
-            ACCEPTED, or the reason why the force will not act.
         """
         return self.answers.offer(stamp, force, self.sample_number, self.sample.stamp)
 
     def command(self, force: float, instant: float | None = None) -> Verdict:
         """Offer a force that names no sample.
+
+        Return ACCEPTED, SUPERSEDED for a command after the one that answers, or NOT_FINITE.
 
         Parameters
         ----------
@@ -202,11 +199,6 @@ class SampledLoop:
             When it arrives, periods after the present sample: from then on, plus `force_delay`, it
             acts until the next command. By default it answers the present sample, if it is the
             first command that does.
-
-        Returns
-        -------
-        Verdict
-            ACCEPTED, SUPERSEDED for a command after the first one, or NOT_FINITE.
         """
         if not isfinite(force):
             return self.answers.refuse(Verdict.NOT_FINITE)
@@ -263,17 +255,9 @@ class SampledLoop:
         self._changes = self._changes._replace(start=(position, velocity))
 
     def advance(self) -> Sample:
-        """Advance to the next sample with the forces that have arrived.
+        """Advance with the forces that have arrived; return the next sample, as it is measured.
 
-        Returns
-        -------
-        Sample
-            State of slide and belt at the next sample, as the sensor measures it.
-
-        Raises
-        ------
-        RunError
-            If the motion is so stiff that it would take too many steps.
+        Raises RunError if the motion is so stiff that it would take too many steps.
         """
         present, line, left = self.sample_number, self._line, self.period
         if not line.by_arrival:
@@ -296,7 +280,7 @@ class SampledLoop:
         return sample
 
     def skip(self, samples: int, force: float) -> None:
-        """Continue after samples that were answered elsewhere, in an ideal loop.
+        """Continue an ideal loop after samples that were answered elsewhere.
 
         Parameters
         ----------

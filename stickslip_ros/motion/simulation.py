@@ -86,7 +86,8 @@ def measure_block(
     The meter does not receive the breakpoints that only divide an advance: what it measures does
     not depend on whether the motion is drawn, or its samples are taken.
     """
-    divisions, breakpoints, drive = motion.take_divisions(), motion.take_breakpoints(), motion.drive
+    drive, divisions = motion.drive, motion.recorder.take_divisions()
+    breakpoints = motion.take_breakpoints()
     meter.rounding = _ROUNDING * drive.speed_scale
     meter.drift.rounding = _ROUNDING * drive.length_scale
     measured = breakpoints
@@ -98,7 +99,7 @@ def measure_block(
     if observer is not None:
         belt_velocity = np.full(len(breakpoints), drive.belt_speed)
         if drive.belt.pieces:
-            belt_velocity += [drive.belt.at(t) for t in motion.signal_times(breakpoints.time)]
+            belt_velocity += [drive.belt.at(t) for t in motion.clock.signal_times(breakpoints.time)]
         observer.take_motion(MeasuredMotion(breakpoints, belt_velocity, cycles, meter.ends))
 
 

@@ -59,7 +59,7 @@ class TickBlocks:
         """Return the blocks of a loop, or None if something acts or records that they lack."""
         if controller is None or type(motion) is not RecordedMotion or motion.recording:
             return None
-        law, (system, *_) = controller.law, motion.phase
+        law, system = controller.law, motion.core.system
         is_possible = (
             vars(type(law)).get("accepts_expressions", False)
             and not law.of_motor
@@ -77,7 +77,7 @@ class TickBlocks:
         first, period = loop.sample.stamp, loop.stamps.period.numerator
         if not controller.continues(first, period):
             return []
-        _, mode, instant = motion.phase
+        mode, instant = motion.core.mode, motion.core.instant
         if mode not in self._blocks:
             self._blocks[mode] = _Block(loop, motion, controller.law)
         forces, end = self._blocks[mode].run([*instant.state, *controller.state], most)
@@ -95,7 +95,8 @@ class _Block:
     """Compiled block of the ticks in one mode, with the values of its constants."""
 
     def __init__(self, loop: SampledLoop, motion: RecordedMotion, law: ControlLaw) -> None:
-        (system, mode, _), drive, order = motion.phase, motion.drive, _order(loop, motion)
+        system, mode, drive = motion.core.system, motion.core.mode, motion.drive
+        order = _order(loop, motion)
         ticks, step = _COEFFICIENTS // order, loop.period * drive.angular_frequency
         own = {
             "elapsed": loop.stamps.period.numerator * 1e-9,

@@ -11,17 +11,20 @@ from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import RunError
 from stickslip_ros.model.actuator import IDEAL_ACTUATOR
 from stickslip_ros.model.control import ContinuousControl
-from stickslip_ros.model.dimensionless_drive import MEMORY, SPEED
+from stickslip_ros.model.dimensionless_drive import SPEED
 from stickslip_ros.model.drive import Drive
-from stickslip_ros.model.drive_system import SLIP, STICK
-from stickslip_ros.model.hybrid import Mode
+from stickslip_ros.model.drive_system import SLIP, STICK, DriveSystem
+from stickslip_ros.model.hybrid import Instant, Mode
+from stickslip_ros.motion.breakpoint_recorder import BreakpointRecorder
 from stickslip_ros.motion.compiled_flow import (
     CompiledFlow,
     Detail,
     flow_rates,
     parameter_values,
 )
-from stickslip_ros.motion.motion import RecordedMotion
+from stickslip_ros.motion.hybrid_motion import StepBudget
+from stickslip_ros.motion.motion import Motion, RecordedMotion
+from stickslip_ros.motion.phase import Phase
 from stickslip_ros.samples import RESTING_MOTOR, MotorSample
 
 _GRAZING_RATE = 1e-12
@@ -41,18 +44,84 @@ class TooStiffError(Exception):
     """Raised when a motion takes too many steps; it does not depend on the speed of the machine."""
 
 
-class VariationalMotion(RecordedMotion):
+class Derivatives:
+    """Derivatives of the state of a motion by that at its start, and by the free constants.
+
+    heyoka integrates the variational equations along with the motion. At a guard the derivatives
+    jump by the saltation matrix (Leine and Nijmeijer, Dynamics and Bifurcations of Non-Smooth
+    Mechanical Systems, 2004, ch. 7), which has here a part for guards that depend on the constants.
+    """
+
+    def __init__(self) -> None:
+        self._matrix: FloatArray = np.empty((0, 0))
+        self._holder: CompiledFlow | None = None
+
+    def restart(self, system: DriveSystem, mode: Mode) -> None:
+        """Have derivatives by the state at present."""
+        order, count = len(system.states), len(system.free_constants)
+        self._matrix, self._holder = np.eye(order, order + count), None
+        # A body that sticks has the speed of the belt.
+        if mode.flow == STICK:
+            self._matrix[SPEED] = 0.0
+        if 0.0 in system.by_part(mode.switches).motor:
+            self._matrix[system.motor_states.stop - 1] = 0.0
+
+    @property
+    def matrix(self) -> FloatArray:
+        """Derivatives of the states (rows); may be a view that the next step overwrites."""
+        return self._matrix if self._holder is None else self._integrated(self._holder)
+
+    def _integrated(self, flow: CompiledFlow | None) -> FloatArray:
+        """Return the derivatives in an integrator."""
+        assert flow is not None
+        order = len(self._matrix)
+        return flow.state[order:].reshape(order, -1)
+
+    def begin(self, mode: Mode, flow: CompiledFlow | None, now: float, end: float) -> float:
+        """Hand the derivatives to the integrator; see `PhaseObserver`."""
+        if flow is not self._holder:
+            matrix = self.matrix
+            self._integrated(flow)[:] = matrix
+            self._holder = flow
+        return end
+
+    def take(self, phase: Phase, system: DriveSystem, instant: Instant) -> None:
+        """Let the derivatives jump at a guard; see `PhaseObserver`."""
+        if phase.guard is None or phase.following is None:
+            return
+        matrix, order = self.matrix.copy(), len(self._matrix)
+        state = np.array(phase.state_at_guard)
+        before, gradients = rates(system, phase.mode, instant, state)
+        gradient = gradients[order + phase.guard]
+        normal = gradient[:order] @ matrix
+        normal[order:] += gradient[order:-1]
+        rate = float(gradient[:order] @ before + gradient[-1])
+        if abs(rate) > _GRAZING_RATE:
+            after, _ = rates(system, phase.following, instant)
+            change: Any = np.outer((after - before) / rate, normal)
+            matrix += change
+        self._matrix, self._holder = matrix, None
+
+
+def rates(
+    system: DriveSystem, mode: Mode, instant: Instant, state: FloatArray | None = None
+) -> tuple[FloatArray, FloatArray]:
+    """Return the rates in a mode, and the gradients, see `FlowRates`.
+
+    They are those at a `state`, by default that of the instant.
+    """
+    state = np.array(instant.state) if state is None else state
+    parameters = parameter_values(system, mode, instant.inputs, instant.time)
+    return flow_rates(system, mode.flow).at(state, parameters)
+
+
+class VariationalMotion(Motion):
     """Motion with the derivatives of its state by the state at the start and by constants.
 
     The constants are those of a `ScaledDrive`; another drive has none. All derivatives are
-    dimensionless. heyoka integrates the variational equations along with the motion. At a guard
-    the derivatives jump by the saltation matrix (Leine and Nijmeijer, Dynamics and Bifurcations of
-    Non-Smooth Mechanical Systems, 2004, ch. 7), which has here a part for guards that depend on
-    the constants. What a law computes from its constants apart from its equations, as the elastic
+    dimensionless. What a law computes from its constants apart from its equations, as the elastic
     limit of `ElastoPlastic`, is held. Breakpoints are not recorded.
     """
-
-    _recorded_detail = Detail.DERIVATIVES
 
     def __init__(
         self,
@@ -61,11 +130,9 @@ class VariationalMotion(RecordedMotion):
         velocity: float,
         control: ContinuousControl | None = None,
     ) -> None:
-        self._found: FloatArray = np.empty((0, 0))
-        self._holder: CompiledFlow | None = None
-        self._at_guard: FloatArray = np.empty(0)
-        super().__init__(drive, position, velocity, control)
-        self._begin_again()
+        super().__init__(drive, position, velocity, control, Detail.DERIVATIVES)
+        self._derivatives = self.core.observer = Derivatives()
+        self._derivatives.restart(self.core.system, self.core.mode)
 
     def restart(
         self,
@@ -76,26 +143,7 @@ class VariationalMotion(RecordedMotion):
     ) -> None:
         """Set the state of the slide; derivatives are by this state from now on."""
         super().restart(position, velocity, memory, motor)
-        self._begin_again()
-
-    def _begin_again(self) -> None:
-        order, count = self.order, len(self._system.free_constants)
-        self._found, self._holder = np.eye(order, order + count), None
-        # A body that sticks has the speed of the belt.
-        if self._mode.flow == STICK:
-            self._found[SPEED] = 0.0
-        if 0.0 in self._system.by_part(self._mode.switches).motor:
-            self._found[self._system.motor_states.stop - 1] = 0.0
-
-    @property
-    def order(self) -> int:
-        """Number of components of the state."""
-        return len(self._system.states)
-
-    @property
-    def state(self) -> FloatArray:
-        """The state of the `DriveSystem`, dimensionless."""
-        return np.array(self._instant.state)
+        self._derivatives.restart(self.core.system, self.core.mode)
 
     @property
     def derivatives(self) -> FloatArray:
@@ -103,79 +151,88 @@ class VariationalMotion(RecordedMotion):
 
         They may be a view that the next step overwrites.
         """
-        return self._found if self._holder is None else self._integrated(self._holder)
-
-    def _integrated(self, flow: CompiledFlow | None) -> FloatArray:
-        """Return the derivatives in an integrator."""
-        assert flow is not None
-        order = len(self._system.states)
-        return flow.state[order:].reshape(order, -1)
-
-    def _begin(self, now: float, end: float) -> float:
-        if self._flow is not self._holder:
-            found = self.derivatives
-            self._integrated(self._flow)[:] = found
-            self._holder = self._flow
-        return end
-
-    def _reach_guard(self) -> None:
-        # What follows may set a part of the state.
-        self._at_guard = self.state
-
-    def _pass(self, mode: Mode, guard: int | None, following: Mode | None, now: float) -> None:
-        super()._pass(mode, guard, following, now)
-        if guard is not None and following is not None:
-            self._jump(mode, guard, following, self.derivatives.copy())
-
-    def _jump(self, mode: Mode, guard: int, following: Mode, found: FloatArray) -> None:
-        """Let derivatives jump at a guard."""
-        before, gradients = self._rates(mode, self._at_guard)
-        order = self.order
-        own = gradients[order + guard]
-        normal = own[:order] @ found
-        normal[order:] += own[order:-1]
-        rate = float(own[:order] @ before + own[-1])
-        if abs(rate) > _GRAZING_RATE:
-            after, _ = self._rates(following)
-            change: Any = np.outer((after - before) / rate, normal)
-            found += change
-        self._found, self._holder = found, None
-
-    def _rates(self, mode: Mode, state: FloatArray | None = None) -> tuple[FloatArray, FloatArray]:
-        """Return the rates in a mode, and the gradients, see `FlowRates`.
-
-        They are those at a `state`, by default the present one.
-        """
-        state, instant = self.state if state is None else state, self._instant
-        parameters = parameter_values(self._system, mode, instant.inputs, instant.time)
-        return flow_rates(self._system, mode.flow).at(state, parameters)
+        return self._derivatives.matrix
 
 
-class ShootingMotion(VariationalMotion):
+class _Shot(Derivatives):
+    """Derivatives and breakpoints since a start, with the effort of all starts."""
+
+    def __init__(self, recorder: BreakpointRecorder, budget: StepBudget) -> None:
+        """Pass the phases on to a recorder."""
+        super().__init__()
+        self.landed = False
+        """Whether the slide has stuck since the start."""
+        self._recorder, self._budget = recorder, budget
+        self._effort = self._begun = 0.0
+        self._steps_before = 0
+        self._flow: CompiledFlow | None = None
+
+    def restart(self, system: DriveSystem, mode: Mode) -> None:
+        """Start again."""
+        super().restart(system, mode)
+        self.landed = False
+
+    def begin(self, mode: Mode, flow: CompiledFlow | None, now: float, end: float) -> float:
+        """Start from the identity: heyoka's error is relative to the largest of the variables."""
+        self._flow, self._begun, self._steps_before = flow, now, self._budget.taken
+        self._integrated(flow)[:] = np.eye(len(self._matrix))
+        return min(end, now + _LONGEST_SLIP) if mode.flow == SLIP else end
+
+    def take(self, phase: Phase, system: DriveSystem, instant: Instant) -> None:
+        """Multiply the derivatives of the phases; raise TooStiffError beyond the effort."""
+        self._matrix = self._integrated(self._flow) @ self._matrix
+        self._recorder.take(phase, system, instant)
+        super().take(phase, system, instant)
+        guard, following = phase.guard, phase.following
+        if not system.sticks:
+            self._effort += _EFFORT_OF_A_STEP * (self._budget.taken - self._steps_before)
+        elif phase.mode.flow == SLIP:
+            # What follows may have set the speed, beyond that of the belt.
+            state = None if guard is None else np.array(phase.state_at_guard)
+            _, gradients = rates(system, phase.mode, instant, state)
+            stiffness = 1.0 + abs(float(gradients[SPEED, SPEED]))
+            self._effort += (phase.end - self._begun) * stiffness
+        if self._effort > _GREATEST_EFFORT:
+            raise TooStiffError
+        self.landed |= guard is not None and following is not None and following.flow != SLIP
+
+
+class ShootingMotion(RecordedMotion):
     """Motion with the derivatives of its state by that at its start, for searches of cycles.
 
     Breakpoints are recorded. `advance` raises TooStiffError when the integration becomes too
     costly, summed over all starts.
     """
 
-    _recorded_detail = Detail.MARKS | Detail.DERIVATIVES
-
     def __init__(self, drive: Drive, control: ContinuousControl | None = None) -> None:
         """Start at rest at X = 0, with continuous control if `control` (SI) is given.
 
         The actuator has no part in it.
         """
-        self.landed = False
+        detail, drive = Detail.MARKS | Detail.DERIVATIVES, replace(drive, actuator=IDEAL_ACTUATOR)
+        super().__init__(drive, 0.0, 0.0, control, detail=detail)
+        self._shot = self.core.observer = _Shot(self.recorder, self.core.budget)
+        self.start(np.zeros(len(self.core.system.states)))
+
+    @property
+    def derivatives(self) -> FloatArray:
+        """Derivatives of the states (rows) by those at the start, dimensionless."""
+        return self._shot.matrix
+
+    @property
+    def landed(self) -> bool:
         """Whether the slide has stuck since the start."""
-        self._effort = self._begun = 0.0
-        self._steps_before = 0
-        super().__init__(replace(drive, actuator=IDEAL_ACTUATOR), 0.0, 0.0, control)
-        self.start(np.zeros(self.order))
+        return self._shot.landed
+
+    @property
+    def mode(self) -> Mode:
+        """The mode of the system at present."""
+        return self.core.mode
 
     @property
     def rate(self) -> FloatArray:
         """Derivative of the state by dimensionless time."""
-        return self._rates(self._mode)[0]
+        return rates(self.core.system, self.core.mode, self.core.instant)[0]
 
     def state_at(
         self,
@@ -189,47 +246,30 @@ class ShootingMotion(VariationalMotion):
         They are given times N/k, so that W of eq. 17 is in m; one number applies to all. The memory
         of the friction law (SI) is that of steady slip by default.
         """
-        scale, drive = self._drive.length_scale, self._drive
-        found = self._system.initial_state(position / scale, 0.0)
+        drive = self._drive
         if memory is None:
             memory = drive.friction.memory_at(-drive.belt_speed, -copysign(1.0, drive.belt_speed))
-        self._put_memory(found, memory)
-        self._put_motor(found, motor)
-        state = np.array(found)
-        state[self._system.control_states] = np.asarray(filter_states) / scale
+        state = np.array(self.scaled_state(position / self._length, 0.0, memory, motor))
+        state[self.core.system.control_states] = np.asarray(filter_states) / self._length
         return state
-
-    def motor_of(self, state: FloatArray) -> MotorSample | None:
-        """Return the motor's part of a state, SI units; None if it is ideal."""
-        return self._motor_in(state)
-
-    def memory_of(self, state: FloatArray) -> tuple[float, ...]:
-        """Return the memory of the friction law in a state, SI units."""
-        own = state[MEMORY : MEMORY + len(self._memory_units)] * self._memory_units
-        return tuple(own.tolist())
 
     def filter_states_of(self, state: FloatArray) -> FloatArray:
         """Return the states of the control in a state; none without control."""
-        return state[self._system.control_states]
-
-    @property
-    def mode(self) -> Mode:
-        """The mode of the system at present."""
-        return self._mode
+        return state[self.core.system.control_states]
 
     def start(self, state: FloatArray, mode: Mode | None = None) -> None:
         """Start again at `state`, at time zero and without breakpoints.
 
         The state gives the mode, except where a law has parts that stick or slip by their past.
         """
-        self._recorded.clear()
-        self._time = self._breakpoint_time = 0.0
-        self._set_state(state.tolist())
-        if mode is not None and mode.flow == self._mode.flow:
-            self._enter(mode)
-        self._append_present()
-        self._begin_again()
-        self.landed = False
+        core = self.core
+        self.recorder.clear()
+        self.clock.time = 0.0
+        core.set_state(state.tolist())
+        if mode is not None and mode.flow == core.mode.flow:
+            core.enter(mode)
+        self.recorder.record_state(core.instant)
+        self._shot.restart(core.system, core.mode)
 
     def advance(self, duration: float) -> None:
         """Integrate over a duration, s; raises TooStiffError."""
@@ -237,23 +277,3 @@ class ShootingMotion(VariationalMotion):
             super().advance(duration)
         except RunError:
             raise TooStiffError from None
-
-    def _begin(self, now: float, end: float) -> float:
-        # Start from the identity: heyoka's error is relative to the largest of the variables.
-        self._integrated(self._flow)[:] = np.eye(self.order)
-        self._begun, self._steps_before = now, self._steps
-        return min(end, now + _LONGEST_SLIP) if self._mode.flow == SLIP else end
-
-    def _pass(self, mode: Mode, guard: int | None, following: Mode | None, now: float) -> None:
-        self._found = self._integrated(self._flow) @ self._found
-        super()._pass(mode, guard, following, now)
-        if not self._system.sticks:
-            self._effort += _EFFORT_OF_A_STEP * (self._steps - self._steps_before)
-        elif mode.flow == SLIP:
-            # What follows may have set the speed, beyond that of the belt.
-            state = self.state if guard is None else self._at_guard
-            _, gradients = self._rates(mode, state)
-            self._effort += (now - self._begun) * (1.0 + abs(float(gradients[SPEED, SPEED])))
-        if self._effort > _GREATEST_EFFORT:
-            raise TooStiffError
-        self.landed |= guard is not None and following is not None and following.flow != SLIP

@@ -36,12 +36,12 @@ def test_turning_points_have_a_velocity_of_exactly_zero() -> None:
 def test_a_motion_records_nothing_of_one_that_had_its_integrator_before() -> None:
     gc.collect()  # a motion of another test that is in a cycle would give its integrator back late
     motion = RecordedMotion(PAPER, 0.0, 0.0)
-    flow = motion._flow
+    flow = motion.core.flow
     assert flow is not None
     flow.taylor.propagate_until(10.0)
     assert any(flow.marks)
     del motion
-    assert RecordedMotion(PAPER, 0.0, 0.0)._flow is flow
+    assert RecordedMotion(PAPER, 0.0, 0.0).core.flow is flow
     assert not any(flow.marks)
 
 

@@ -29,7 +29,7 @@ def drive_of(law: str, seed: int) -> Drive:
 class Unknown(Recurrence):
     """Knows no phase: all are integrated."""
 
-    def is_known(self, mode: Any, state: Any, duration: Any, bound: Any, kept: Any) -> bool:
+    def is_known(self, phase: Any, mode: Any, state: Any) -> bool:
         return False
 
 
@@ -86,13 +86,13 @@ def test_a_settled_cycle_is_not_integrated_again() -> None:
     motion.recording = False
     motion.advance(100.0)
     entered = list[Mode]()
-    enter = motion._enter
+    enter = motion.core.enter
 
     def counting(mode: Mode) -> None:
         entered.append(mode)
         enter(mode)
 
-    motion._enter = counting
+    motion.core.enter = counting
     motion.advance(1000.0)
     known = len(entered)
     with integrating_all():
@@ -102,7 +102,7 @@ def test_a_settled_cycle_is_not_integrated_again() -> None:
 
 def test_no_step_is_longer_than_the_bound_of_its_phase() -> None:
     motion = RecordedMotion(PAPER, 0.0, 0.0)
-    flow = motion._flow
+    flow = motion.core.flow
     assert flow is not None
     for _ in range(50):
         _, length = flow.taylor.step()

@@ -64,7 +64,7 @@ def test_after_a_restart_nothing_of_a_refused_motion_is_recorded(
     motion = RecordedMotion(replace(PAPER, belt_speed=1.0), 0.1, 0.0)
     for budget, steps in (("STEPS_PER_UNIT", 0.01), ("STEPS_PER_ADVANCE", 10)):
         monkeypatch.setattr(f"stickslip_ros.motion.hybrid_motion.{budget}", steps)
-    motion._steps_left = 0
+    motion.core.budget.left = 0
     with pytest.raises(RunError):
         motion.advance(100.0)
     monkeypatch.undo()

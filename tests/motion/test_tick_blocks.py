@@ -99,7 +99,7 @@ class Run:
         return [
             *(sample.stamp, sample.belt_position, sample.belt_velocity, loop.sample_number),
             *(loop.answered, answers.controller_present, answers.late_forces, answers.dropped),
-            *(motion.sticking, motion.unbounded, motion.signal_time, motion.phase[1]),
+            *(motion.sticking, motion.unbounded, motion.clock.signal_time, motion.core.mode),
         ]
 
 

@@ -155,7 +155,7 @@ def test_derivatives_by_the_start_alone(drive: Drive, gains: Washout | None) -> 
     motion = ShootingMotion(drive, gains)
     # Fast enough to overtake the belt, and to stick in the end.
     own = [0.001] * len(drive.friction.states)
-    start = np.array([0.1, -1.3, *own, 0.2])[: motion.order]
+    start = np.array([0.1, -1.3, *own, 0.2])[: len(motion.state)]
     landings, step = 0, 1e-6
 
     def end(state: FloatArray, duration: float) -> FloatArray:
@@ -164,7 +164,7 @@ def test_derivatives_by_the_start_alone(drive: Drive, gains: Washout | None) -> 
         return motion.state
 
     for duration in np.arange(0.7, 21.0 if not own else 3.0, 1.4):
-        steps = step * np.eye(motion.order)
+        steps = step * np.eye(len(start))
         found = [end(start + each, duration) - end(start - each, duration) for each in steps]
         end(start, duration)
         landings += motion.sticking
