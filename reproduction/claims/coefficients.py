@@ -30,7 +30,7 @@ from reproduction.claims.paper_values import (
 )
 from reproduction.claims.verdict import Computations, Evidence, Formula, Number, Observation
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.model.dimensionless_drive import SPEED
+from stickslip_ros.model.drive_layout import SPEED
 from stickslip_ros.theory.linear import Expansion
 
 computes = Computations()

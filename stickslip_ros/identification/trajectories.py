@@ -14,8 +14,8 @@ from stickslip_ros.identification.identified_law import DELAY, LAG, IdentifiedLa
 from stickslip_ros.identification.predictor import Predictor, steady_memory
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.time_limit import TimeLimit
-from stickslip_ros.model.dimensionless_drive import MEMORY
 from stickslip_ros.model.drive import Drive, in_units_of
+from stickslip_ros.model.drive_layout import MEMORY
 from stickslip_ros.model.plain_drive import drive_system
 from stickslip_ros.motion.variational import VariationalMotion
 

@@ -5,14 +5,13 @@ the motor is sgn(X' - v_belt), 0 while it sticks.
 """
 
 from dataclasses import replace
-from functools import partial
 from math import copysign, ulp
 
 from stickslip_ros.model.control import ContinuousControl
-from stickslip_ros.model.dimensionless_drive import POSITION, SPEED
 from stickslip_ros.model.drive import Drive
+from stickslip_ros.model.drive_layout import POSITION, SIGN, SPEED
 from stickslip_ros.model.drive_system import SLIP, SMALLEST_STEP, STICK, DriveSystem
-from stickslip_ros.model.hybrid import Flow, Guard, Instant, Mode, with_switches
+from stickslip_ros.model.hybrid import Flow, Instant, Mode, with_switches
 
 
 class MotorFrictionSystem(DriveSystem):
@@ -23,27 +22,13 @@ class MotorFrictionSystem(DriveSystem):
         self.has_parts = True
         assert self.drive.motor is not None
         self._holding_force = float(self.drive.motor.friction)
-        self._x, self._y = self.motor_states.start, self.motor_states.start + 1
+        self._x = self.slots.motor.start
+        self._y = self._x + 1
 
     def flow(self, name: str) -> Flow:
-        """Return a flow; its last guards: the motor reaches the guide, slips backward, forward.
-
-        Each is a constant while the motor is in another mode.
-        """
-        flow, kind, parts = super().flow(name), type(self), self._expressions
-        assert parts.drive.motor is not None
-        (sign,) = parts.switches.motor
-        slips, friction = sign * sign, parts.drive.motor.friction
-        held, (_, motor_speed) = (
-            parts.motor_held(parts.speed),
-            self.symbols.state[self.motor_states],
-        )
-        sticks = 1.0 - slips
-        guards = (
-            Guard(sticks + sign * (motor_speed - parts.belt_speed), kind.motor_reaches_guide),
-            Guard(slips + sticks * (friction - held), partial(kind.release_motor, sign=-1.0)),
-            Guard(slips + sticks * (friction + held), partial(kind.release_motor, sign=1.0)),
-        )
+        """Return a flow; its last guards are those of the motor."""
+        flow, kind = super().flow(name), type(self)
+        guards = self.expressions.motor_guards(kind.motor_reaches_guide, kind.release_motor)
         return replace(flow, guards=(*flow.guards, *guards))
 
     def motor_reaches_guide(self, mode: Mode, instant: Instant) -> Mode:
@@ -70,7 +55,7 @@ class MotorFrictionSystem(DriveSystem):
         mode = super().apply_pending_guards(mode, instant)
         if mode.flow == SLIP:
             relative_speed = instant.state[SPEED] - self.belt_speed(mode, instant.time)
-            if mode.switches[0] * relative_speed < 0.0:
+            if mode.switches[SIGN] * relative_speed < 0.0:
                 mode = self.reach_belt(mode, instant)
         elif mode.flow == STICK:
             mode = self._resting(mode, instant)
@@ -111,8 +96,8 @@ class MotorFrictionSystem(DriveSystem):
         held = self.motor_held(mode, instant)
         if sign != 0.0 and -sign * held >= self._holding_force - self._rounding(instant):
             return mode  # just released: rounding must not lead back
-        found = self._resting_sign(mode, instant)
-        return mode if found == sign else self._with_motor(mode, found)
+        resting = self._resting_sign(mode, instant)
+        return mode if resting == sign else self._with_motor(mode, resting)
 
     def _resting_sign(self, mode: Mode, instant: Instant) -> float:
         """Return the switch of a motor that has the speed of the guide."""
@@ -130,7 +115,7 @@ class MotorFrictionSystem(DriveSystem):
         return 8.0 * ulp(stretch + rate + force)
 
     def _motor_sign(self, mode: Mode) -> float:
-        return mode.switches[self._parts.motor.start]
+        return mode.switches[self.switch_slots.motor.start]
 
     def _with_motor(self, mode: Mode, sign: float) -> Mode:
-        return with_switches(mode, self._parts.motor.start, (sign,))
+        return with_switches(mode, self.switch_slots.motor.start, (sign,))

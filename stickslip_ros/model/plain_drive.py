@@ -1,9 +1,10 @@
 """The drive of most motions: a static law, constant belt speed and load, no actuator states."""
 
+from stickslip_ros.model import equations
 from stickslip_ros.model.control import ContinuousControl
 from stickslip_ros.model.control.base import TwoBodyControl
-from stickslip_ros.model.dimensionless_drive import POSITION, SPEED
 from stickslip_ros.model.drive import Drive, ScaledDrive
+from stickslip_ros.model.drive_layout import POSITION, SIGN, SPEED
 from stickslip_ros.model.drive_system import SLIP, STICK, DriveSystem
 from stickslip_ros.model.hybrid import Instant, Mode
 from stickslip_ros.model.motor_friction import MotorFrictionSystem
@@ -20,7 +21,7 @@ class PlainDriveSystem(DriveSystem):
 
     def __init__(self, drive: Drive, control: ContinuousControl | None = None) -> None:
         super().__init__(drive, control)
-        self._speed = self.drive.belt_speed
+        self._speed, self._friction = self.drive.belt_speed, self.drive.friction.coefficient
         # Whether the belt bends the spring; without one a held force never releases the slide.
         self._loads = self._speed != 0.0 and self.drive.has_spring
         # A control that does not receive pairs: there is no motor.
@@ -34,14 +35,14 @@ class PlainDriveSystem(DriveSystem):
         if self._control_force is None:
             return super().control_force(instant)
         state = instant.state
-        return self._control_force(state[POSITION], state[SPEED], state[self.control_states])
+        return self._control_force(state[POSITION], state[SPEED], state[self.slots.control])
 
     def friction_force(self, mode: Mode, instant: Instant) -> float:
         """Return the friction force on the slide."""
-        sign = mode.switches[0]
+        sign = mode.switches[SIGN]
         if sign == 0.0:
             return self.reaction(instant)
-        return float(self._coefficient(instant.state[SPEED] - self._speed, sign))
+        return float(self._friction(instant.state[SPEED] - self._speed, sign))
 
     def settled(self, mode: Mode | None, instant: Instant) -> Mode:
         """Return stick, or slip in the direction of the relative speed."""
@@ -80,7 +81,7 @@ class PlainDriveSystem(DriveSystem):
         state, speed = instant.state, self._speed
         if self._loads:
             limit = self.backward_limit if speed > 0.0 else -self.forward_limit
-            limit -= self._reaction(0.0, speed, instant.inputs[0])
+            limit -= equations.reaction(self.drive, 0.0, speed, instant.inputs[0])
             time = (limit - state[POSITION]) / speed
             if time < 0.0:  # by rounding
                 time = 0.0

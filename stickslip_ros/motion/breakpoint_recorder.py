@@ -3,8 +3,8 @@
 import numpy as np
 
 from stickslip_ros.measures.breakpoints import STICK_SHARE, Breakpoints
-from stickslip_ros.model.dimensionless_drive import POSITION, SPEED
 from stickslip_ros.model.drive import Drive
+from stickslip_ros.model.drive_layout import POSITION, SPEED
 from stickslip_ros.model.drive_system import STICK, DriveSystem
 from stickslip_ros.model.hybrid import Instant, Mode
 from stickslip_ros.motion.compiled_flow import CompiledFlow

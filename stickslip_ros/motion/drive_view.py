@@ -6,8 +6,8 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.model.control import ContinuousControl
-from stickslip_ros.model.dimensionless_drive import MEMORY, POSITION, SPEED
 from stickslip_ros.model.drive import Drive
+from stickslip_ros.model.drive_layout import MEMORY, POSITION, SPEED
 from stickslip_ros.model.drive_system import STICK, DriveSystem
 from stickslip_ros.motion.hybrid_motion import HybridMotion
 from stickslip_ros.samples import MotorSample
@@ -108,7 +108,7 @@ class DriveView:
         """Return the motor's part of a dimensionless state, SI units; None if it is ideal."""
         if self._drive.motor is None:
             return None
-        position, speed = state[self.core.system.motor_states].tolist()
+        position, speed = state[self.core.system.slots.motor].tolist()
         return MotorSample(position * self._length, speed * self._speed)
 
     def memory_of(self, state: "FloatArray | memoryview[float]") -> tuple[float, ...]:
@@ -119,7 +119,7 @@ class DriveView:
 
     def control_state_of(self, state: "FloatArray | memoryview[float]") -> tuple[float, ...]:
         """Return the state of the continuous controller, SI units, as that of the sampled law."""
-        scaled = state[self.core.system.control_states].tolist()
+        scaled = state[self.core.system.slots.control].tolist()
         return tuple(x * unit for x, unit in zip(scaled, self._control_units, strict=True))
 
     def scaled_state(
@@ -139,7 +139,7 @@ class DriveView:
             for number, (value, unit) in enumerate(zip(memory, self._memory_units, strict=True)):
                 state[MEMORY + number] = value / unit
         if motor is not None and self._drive.motor is not None:
-            state[system.motor_states] = motor[0] / self._length, motor[1] / self._speed
+            state[system.slots.motor] = motor[0] / self._length, motor[1] / self._speed
         return state
 
     def put_control_state(
@@ -147,7 +147,7 @@ class DriveView:
     ) -> None:
         """Set the controller's part of a dimensionless state; see `control_state_of`."""
         values = zip(control_state, self._control_units, strict=True)
-        for index, (value, unit) in enumerate(values, self.core.system.control_states.start):
+        for index, (value, unit) in enumerate(values, self.core.system.slots.control.start):
             state[index] = value / unit
 
     @property

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from stickslip_ros.errors import RunError
 from stickslip_ros.measures.breakpoints import Breakpoints
 from stickslip_ros.model.control import ContinuousControl
-from stickslip_ros.model.dimensionless_drive import SPEED
 from stickslip_ros.model.drive import Drive
+from stickslip_ros.model.drive_layout import SPEED
 from stickslip_ros.model.plain_drive import drive_system
 from stickslip_ros.motion.breakpoint_recorder import BreakpointRecorder
 from stickslip_ros.motion.compiled_flow import Detail
@@ -274,7 +274,7 @@ class Motion(DriveView):
         force, disturbance, control_state = self.force, self.disturbance, self.control_state
         position, velocity, motor, memory = self.position, self.velocity, self.motor, self.memory
         x, y, *_ = core.instant.state
-        lagging = core.instant.state[core.system.actuator_states].tolist()
+        lagging = core.instant.state[core.system.slots.actuator].tolist()
         before, law, old_law = core.mode, drive.friction, old.friction
         remembers = bool(law.states) and (law.name, law.states) == (old_law.name, old_law.states)
         core.use(drive_system(drive, control))
@@ -286,7 +286,7 @@ class Motion(DriveView):
         self.put_control_state(state, control_state)
         if drive.actuator.states == old.actuator.states:
             ratio = old.force_scale / drive.force_scale
-            state[core.system.actuator_states] = [value * ratio for value in lagging]
+            state[core.system.slots.actuator] = [value * ratio for value in lagging]
         core.instant.time = self.clock.scaled
         core.instant.inputs = [0.0] * len(core.system.inputs)
         self.set_forces(force, disturbance)

@@ -173,7 +173,7 @@ def _slip(
     """Return what is above zero if the slide slips on, and position and speed after a tick."""
     position = Series(lambda k: speed[k - 1] * (step / k) if k else x)
     speed = Series(lambda k: acceleration[k - 1] * (step / k) if k else y)
-    acceleration = system.sliding_acceleration(position, speed, force)
+    acceleration = system.expressions.sliding_acceleration(position, speed, force)
     orders = range(order, -1, -1)
     sizes = [_size(speed[k]) for k in orders]
     change, rest = sum(sizes[:-1]), sizes[0] + sizes[1] / 256.0  # every second one may vanish
@@ -191,7 +191,7 @@ def _is_polynomial(system: PlainDriveSystem) -> bool:
     """Return whether the friction law of a system accepts series."""
     speed = Series(lambda k: system.variables[0])
     try:
-        return system.sliding_acceleration(speed, speed, 0.0)[1] is not None
+        return system.expressions.sliding_acceleration(speed, speed, 0.0)[1] is not None
     except TypeError:
         return False
 

@@ -11,8 +11,8 @@ from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import RunError
 from stickslip_ros.model.actuator import IDEAL_ACTUATOR
 from stickslip_ros.model.control import ContinuousControl
-from stickslip_ros.model.dimensionless_drive import SPEED
 from stickslip_ros.model.drive import Drive
+from stickslip_ros.model.drive_layout import SPEED
 from stickslip_ros.model.drive_system import SLIP, STICK, DriveSystem
 from stickslip_ros.model.hybrid import Instant, Mode
 from stickslip_ros.motion.breakpoint_recorder import BreakpointRecorder
@@ -63,8 +63,8 @@ class Derivatives:
         # A body that sticks has the speed of the belt.
         if mode.flow == STICK:
             self._matrix[SPEED] = 0.0
-        if 0.0 in system.by_part(mode.switches).motor:
-            self._matrix[system.motor_states.stop - 1] = 0.0
+        if 0.0 in mode.switches[system.switch_slots.motor]:
+            self._matrix[system.slots.motor.stop - 1] = 0.0
 
     @property
     def matrix(self) -> FloatArray:
@@ -250,12 +250,12 @@ class ShootingMotion(RecordedMotion):
         if memory is None:
             memory = drive.friction.memory_at(-drive.belt_speed, -copysign(1.0, drive.belt_speed))
         state = np.array(self.scaled_state(position / self._length, 0.0, memory, motor))
-        state[self.core.system.control_states] = np.asarray(filter_states) / self._length
+        state[self.core.system.slots.control] = np.asarray(filter_states) / self._length
         return state
 
     def filter_states_of(self, state: FloatArray) -> FloatArray:
         """Return the states of the control in a state; none without control."""
-        return state[self.core.system.control_states]
+        return state[self.core.system.slots.control]
 
     def start(self, state: FloatArray, mode: Mode | None = None) -> None:
         """Start again at `state`, at time zero and without breakpoints.

@@ -9,7 +9,7 @@ import numpy as np
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.model.control import ControlLaw, LinearFeedback
-from stickslip_ros.model.dimensionless_drive import SPEED
+from stickslip_ros.model.drive_layout import SPEED
 from stickslip_ros.theory.linear_sampled_loop import LinearSampledLoop
 
 _Law = TypeVar("_Law", bound=ControlLaw)

@@ -11,8 +11,8 @@ import numpy as np
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.model.actuator import IDEAL_ACTUATOR
 from stickslip_ros.model.control import ControlLaw
-from stickslip_ros.model.dimensionless_drive import POSITION, SPEED
 from stickslip_ros.model.drive import Drive
+from stickslip_ros.model.drive_layout import POSITION, SPEED
 from stickslip_ros.model.friction import Stribeck
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.scenarios.parameters import PlantParameters

@@ -8,8 +8,8 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.model.control import ContinuousControl, Washout
-from stickslip_ros.model.dimensionless_drive import MEMORY, POSITION, SPEED
 from stickslip_ros.model.drive import Drive
+from stickslip_ros.model.drive_layout import MEMORY, POSITION, SPEED
 from stickslip_ros.theory.gain_intervals import (
     GainInterval,
     gains_of,

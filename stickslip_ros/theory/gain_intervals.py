@@ -14,7 +14,7 @@ from stickslip_ros.model.control import (
     LinearFeedback,
     Washout,
 )
-from stickslip_ros.model.dimensionless_drive import POSITION, SPEED
+from stickslip_ros.model.drive_layout import POSITION, SPEED
 
 _ROUNDING = 1e-14
 """Relative error of a multiplier."""

@@ -12,8 +12,8 @@ import numpy as np
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.measures.cycle_measures import EQUILIBRIUM_SPEED
 from stickslip_ros.model.control import ContinuousControl
-from stickslip_ros.model.dimensionless_drive import POSITION, SPEED
 from stickslip_ros.model.drive import UNBOUNDED_SPEED, Drive
+from stickslip_ros.model.drive_layout import POSITION, SPEED
 from stickslip_ros.model.functions import zero_between
 from stickslip_ros.motion.variational import ShootingMotion, TooStiffError
 from stickslip_ros.theory.cycle_bounds import (

@@ -20,8 +20,8 @@ from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import RunError
 from stickslip_ros.model.actuator import IDEAL_ACTUATOR
 from stickslip_ros.model.control import ContinuousControl
-from stickslip_ros.model.dimensionless_drive import MEMORY, SPEED
 from stickslip_ros.model.drive import Drive
+from stickslip_ros.model.drive_layout import MEMORY, SPEED
 from stickslip_ros.model.drive_system import SLIP, DriveSystem
 from stickslip_ros.model.plain_drive import drive_system
 from stickslip_ros.motion.compiled_flow import evaluated, flow_rates
@@ -276,7 +276,7 @@ def equilibria(system: DriveSystem, parameters: FloatArray) -> FloatArray:
     order = len(system.states)
     free = np.arange(order)
     if system.control is None:
-        free = np.delete(free, system.motor_states)
+        free = np.delete(free, system.slots.motor)
     states = np.zeros((order, parameters.shape[1]))
     if law.states:
         speeds, signs = -parameters[index["belt_speed"]], parameters[index["sign"]]
@@ -293,7 +293,7 @@ def equilibria(system: DriveSystem, parameters: FloatArray) -> FloatArray:
             break
         states[free] += step
         # X' is zero there. Rounding, which differs between processors, would give it a sign.
-        states[[SPEED, *range(order)[system.motor_states][1:]]] = 0.0
+        states[[SPEED, *range(order)[system.slots.motor][1:]]] = 0.0
         if np.all(np.abs(step) <= _CONVERGED_STEP * np.maximum(1.0, np.abs(states).max(axis=0))):
             return states
     raise RunError(f"the friction law {law.name}: the equilibrium was not found")

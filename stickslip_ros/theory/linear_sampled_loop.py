@@ -17,8 +17,8 @@ from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.model.constants import scaled
 from stickslip_ros.model.control import ControlLaw, LinearFeedback
-from stickslip_ros.model.dimensionless_drive import POSITION, SPEED
 from stickslip_ros.model.drive import Drive
+from stickslip_ros.model.drive_layout import POSITION, SPEED
 from stickslip_ros.model.sensor import EXACT_SENSOR, Sensor
 from stickslip_ros.motion.force_line import whole_and_rest
 from stickslip_ros.theory.gain_intervals import (

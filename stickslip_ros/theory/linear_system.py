@@ -8,8 +8,8 @@ import numpy.typing as npt
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.model.actuator import IDEAL_ACTUATOR
 from stickslip_ros.model.control import ContinuousControl, ControlLaw, LinearFeedback
-from stickslip_ros.model.dimensionless_drive import POSITION, SPEED
 from stickslip_ros.model.drive import Drive
+from stickslip_ros.model.drive_layout import POSITION, SPEED
 from stickslip_ros.model.plain_drive import drive_system
 from stickslip_ros.theory.linear import expand
 from stickslip_ros.theory.linear_sampled_loop import LinearSampledLoop

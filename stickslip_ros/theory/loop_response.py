@@ -11,7 +11,7 @@ import numpy.typing as npt
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.model.control import LinearFeedback, VelocityFeedback
 from stickslip_ros.model.control.base import MOTOR, TABLE
-from stickslip_ros.model.dimensionless_drive import POSITION, SPEED
+from stickslip_ros.model.drive_layout import POSITION, SPEED
 from stickslip_ros.theory.linear_sampled_loop import LinearSampledLoop
 
 _PERIODS = 40.0

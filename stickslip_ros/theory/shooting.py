@@ -18,8 +18,8 @@ from stickslip_ros.measures.breakpoints import Breakpoints
 from stickslip_ros.measures.cycle_measures import Measures
 from stickslip_ros.measures.cycle_meter import CycleMeter
 from stickslip_ros.model.control import ContinuousControl
-from stickslip_ros.model.dimensionless_drive import SPEED
 from stickslip_ros.model.drive import Drive
+from stickslip_ros.model.drive_layout import SPEED
 from stickslip_ros.model.hybrid import Mode
 from stickslip_ros.motion.variational import ShootingMotion, TooStiffError
 from stickslip_ros.samples import RESTING_MOTOR, MotorSample

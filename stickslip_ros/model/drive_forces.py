@@ -1,0 +1,67 @@
+"""The forces in a drive, of a state: for numbers and for expressions."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from stickslip_ros.model import equations
+from stickslip_ros.model.control import ContinuousControl
+from stickslip_ros.model.control.base import seen_by
+from stickslip_ros.model.drive import Drive
+from stickslip_ros.model.drive_layout import POSITION, SPEED, DriveStates
+
+
+class DriveForces:
+    """Forces in a drive, which may have expressions for its constants, with its control."""
+
+    def __init__(self, drive: Drive, control: ContinuousControl | None, slots: DriveStates) -> None:
+        """Take states with these slots."""
+        self._drive, self._control, self._slots = drive, control, slots
+        self._lags = slots.actuator.stop > slots.actuator.start
+
+    def control_force(self, state: Sequence[Any], inputs: Sequence[Any]) -> Any:
+        """Return the force on the slide, or on a motor of finite mass.
+
+        It is held, that of the actuator, or of continuous control.
+        """
+        if self._control is not None:
+            return self._control.control_force(*self._seen(state), state[self._slots.control])
+        if not self._lags:
+            return inputs[0]
+        force = self._drive.actuator.force(inputs[0], state[self._slots.actuator])
+        return force if self._drive.motor is not None else force + inputs[1]
+
+    def reaction(self, state: Sequence[Any], inputs: Sequence[Any], force: Any = None) -> Any:
+        """Return h = X + 2 beta X' - U - bias of the slide; the control `force` may be known."""
+        if self._drive.motor is not None:
+            return equations.reaction(self._drive, *self.stretch(state), inputs[1])
+        force = self.control_force(state, inputs) if force is None else force
+        return equations.reaction(self._drive, state[POSITION], state[SPEED], force)
+
+    def motor_reaction(
+        self, state: Sequence[Any], inputs: Sequence[Any], relative_speed: Any
+    ) -> Any:
+        """Return the reaction of the motor at a speed of it relative to the guide."""
+        drive, force = self._drive, self.control_force(state, inputs)
+        assert drive.motor is not None
+        return equations.motor_reaction(
+            drive, drive.motor, *self.stretch(state), relative_speed, force
+        )
+
+    def stretch(self, state: Sequence[Any]) -> tuple[Any, Any]:
+        """Return the stretch of the spring and its rate: of the slide, or against a motor."""
+        x, y = state[POSITION], state[SPEED]
+        if self._drive.motor is None:
+            return x, y
+        motor_x, motor_y = state[self._slots.motor]
+        return x - motor_x, y - motor_y
+
+    def control_rates(self, state: Sequence[Any]) -> Sequence[Any]:
+        """Return the rates of the states of continuous control."""
+        if self._control is None:
+            return ()
+        return self._control.state_rates(*self._seen(state), state[self._slots.control])
+
+    def _seen(self, state: Sequence[Any]) -> tuple[Any, Any]:
+        assert self._control is not None
+        motor = state[self._slots.motor]
+        return seen_by(self._control, state[POSITION], state[SPEED], motor)
