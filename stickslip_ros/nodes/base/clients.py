@@ -6,6 +6,7 @@ An answer arrives even if the middleware is slow or loses messages.
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from functools import partial
 from math import inf
 from typing import Any, Self
 
@@ -22,6 +23,7 @@ from stickslip_ros.errors import RunError
 from stickslip_ros.nodes.base.process import ros_session
 from stickslip_ros.nodes.base.spinner import Spinner
 from stickslip_ros.scenarios import full_name
+from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
 
 ANSWER_TIME = 1.0
 """Time, s, for a client to match an existing service, and then to get its answer."""
@@ -157,6 +159,47 @@ def parameters_call(
 
     call = ServiceCall(node, GetParameters, f"{other}/get_parameters")
     return call.start(GetParameters.Request(names=names), take)
+
+
+class ParameterCalls:
+    """Asks nodes of this package, by name relative to the namespace, for their parameters."""
+
+    def __init__(self, node: Node, take: Callable[[str, dict[str, Any]], None]) -> None:
+        """Ask through `node`; `take` receives the name of each node that answers, and the values.
+
+        Those are by flat name.
+        """
+        self._node, self._take = node, take
+        self._calls: dict[str, ServiceCall] = {}
+
+    def __contains__(self, other: str) -> bool:
+        return other in self._calls
+
+    def ask(self, other: str) -> None:
+        """Ask a node, in place of an earlier request."""
+        if other in self._calls:
+            self._calls[other].close()
+        names, take = list(NODE_PARAMETERS[other].known), partial(self._take, other)
+        self._calls[other] = parameters_call(self._node, other, names, take)
+
+    def ask_again(self) -> None:
+        """Ask all nodes again that were asked before."""
+        for other in self._calls:
+            self.ask(other)
+
+    def pursue(self) -> bool:
+        """Do the next step; return whether all the nodes that exist have answered."""
+        answered = [call.pursue() or not call.exists for call in self._calls.values()]
+        return all(answered)
+
+    def has_answered(self, other: str) -> bool:
+        """Return whether a node has answered the last request."""
+        return other in self._calls and self._calls[other].answer is not None
+
+    def close(self) -> None:
+        """Stop; ignore answers that still arrive."""
+        for call in self._calls.values():
+            call.close()
 
 
 class LifecycleClient:

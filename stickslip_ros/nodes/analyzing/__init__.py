@@ -1,0 +1,1 @@
+"""Parts of the analyzer: what it takes in, its bag and its measures."""

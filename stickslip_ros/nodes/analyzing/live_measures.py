@@ -1,0 +1,129 @@
+"""Measures of a run that goes on, from its messages; no ROS graph."""
+
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from functools import partial
+from math import inf
+from threading import Thread
+from typing import Any
+
+import numpy as np
+
+from stickslip_ros.arrays import IntArray
+from stickslip_ros.errors import BagError, InvalidInputError
+from stickslip_ros.measures.cycle_measures import Cycle
+from stickslip_ros.measures.noise import import_for_noise
+from stickslip_ros.measures.onset_watch import OnsetWatch
+from stickslip_ros.measures.ring_down import RingDown
+from stickslip_ros.measures.run_meter import RunMeter
+from stickslip_ros.measures.sample_assumptions import SampleAssumptions
+from stickslip_ros.model.drive import Drive
+from stickslip_ros.nodes.analyzing.incoming import Message
+from stickslip_ros.nodes.base.managed import DroppedMessages
+from stickslip_ros.record.bag_layout import BagLayout
+from stickslip_ros.record.cdr import Messages, Refused, joined
+from stickslip_ros.record.codec import force_layouts, wrenches_in
+from stickslip_ros.record.force_reader import read_forces
+from stickslip_ros.record.motion_reader import MotionReader
+from stickslip_ros.record.topics import CONTROL_FORCE, DROPPED_FORCE, JOINT_STATES, Topic
+from stickslip_ros.samples import NO_FORCES, NO_SAMPLES, ForceColumns
+from stickslip_ros.scenarios.parameters import AnalyzerParameters
+from stickslip_ros.text import quantity
+
+
+class LiveMeasures:
+    """Keeps messages until they are measured, in blocks: cycles, ring-downs and forces."""
+
+    def __init__(self, parameters: AnalyzerParameters, dropped: DroppedMessages) -> None:
+        """Measure as the parameters say; messages that cannot be read count as `dropped`."""
+        self.meter = RunMeter(parameters.window, reading=parameters.reading_of({}))
+        self.watch = OnsetWatch()
+        self.cycles = 0
+        """Number of cycles so far."""
+        self._parameters, self._dropped = parameters, dropped
+        joint, belt_joint = parameters.joint or None, parameters.belt_joint or None
+        by_effort = parameters.force_type == "effort"
+        layout = BagLayout(joint, belt_joint, force="effort" if by_effort else "topic")
+        self._motion = MotionReader(JOINT_STATES.name, layout, parameters.belt_speed)
+        self._read_forces = _read_wrenches
+        if not by_effort and parameters.force_type != CONTROL_FORCE.type_name:
+            layouts = force_layouts(joint, parameters.force_number or None)
+            self._read_forces = partial(read_forces, layouts[parameters.force_type], by_log=True)
+        topics = JOINT_STATES, CONTROL_FORCE, DROPPED_FORCE
+        self._waiting: dict[str, list[Message]] = {topic.name: [] for topic in topics}
+
+    def add(self, messages: Mapping[Topic[Any], list[Message]]) -> None:
+        """Keep those messages, by topic, that are measured."""
+        for topic, batch in messages.items():
+            if topic.name in self._waiting:
+                self._waiting[topic.name] += batch
+
+    def give_up(self) -> None:
+        """Do not measure what was added."""
+        self.meter.unmeasured += len(self._waiting[JOINT_STATES.name])
+        for messages in self._waiting.values():
+            messages.clear()
+
+    def measure(self) -> tuple[list[Cycle], list[RingDown]]:
+        """Measure what was added; return the cycles and ring-downs that have ended."""
+        states, efforts = self._read(JOINT_STATES, self._read_states, NO_SAMPLES, NO_FORCES)
+        if self._motion.estimated and self.meter.motion.reading.noisy is None:
+            self._assume(SampleAssumptions(noisy=True))
+        cycles, ring_downs = self.meter.motion.feed(states), self.watch.feed(states)
+        self.cycles += len(cycles)
+        (dropped,) = self._read(DROPPED_FORCE, _read_wrenches, NO_FORCES)
+        if not len(efforts):
+            efforts = self._read(CONTROL_FORCE, self._read_forces, NO_FORCES)[0]
+        self.meter.feed_forces(efforts, dropped)
+        return cycles, ring_downs
+
+    def text(self) -> str:
+        """Return the measures of the last window of cycles in words."""
+        measures = self.meter.motion.measures(quick=True)
+        if measures.amplitude is None or measures.frequency is None:
+            return f"{measures.regime}"
+        return (
+            f"{measures.regime}: amplitude {quantity(measures.amplitude, 'm')}, "
+            f"frequency {quantity(measures.frequency, 'Hz')}, "
+            f"stick fraction {measures.stick_fraction:.3g}"
+        )
+
+    def assume_plant(self, plant: Mapping[str, Any]) -> None:
+        """Read the samples as those of a plant with these parameters, by flat name."""
+        self._assume(self._parameters.reading_of(plant))
+        with suppress(InvalidInputError, KeyError, TypeError):  # a plant of another version
+            period = Drive(mass=plant["mass"], stiffness=plant["stiffness"]).natural_period
+            self.watch.pause = max(1.0, period if period < inf else 0.0)
+
+    def _assume(self, reading: SampleAssumptions) -> None:
+        self.meter.motion.reading = reading
+        if reading.noisy:  # imported when first used, it would hold up the recording for long
+            Thread(target=import_for_noise, name="imports").start()
+
+    def _read_states(self, messages: Messages, _: IntArray) -> tuple[Any, ...]:
+        return self._motion.read(messages)
+
+    def _read(
+        self,
+        topic: Topic[Any],
+        read: Callable[[Messages, IntArray], tuple[Any, ...]],
+        *nothing: Any,
+    ) -> Sequence[Any]:
+        """Return what `read` makes of the messages of a topic to measure, or nothing.
+
+        It gets messages and their stamps, and returns values and what it refused, which is dropped.
+        """
+        messages, self._waiting[topic.name] = self._waiting[topic.name], []
+        stamps = np.array([message.stamp for message in messages], np.int64)
+        try:
+            *values, refused = read(joined([message.data for message in messages]), stamps)
+        except BagError as error:
+            self._dropped.add(str(error), len(messages))
+            return nothing
+        if refused.number > 0:
+            self._dropped.add(f"{topic.name}: {refused.reason}", refused.number)
+        return values
+
+
+def _read_wrenches(messages: Messages, _: IntArray) -> tuple[ForceColumns, Refused]:
+    return wrenches_in(*messages)
