@@ -12,8 +12,9 @@ from typing import Any
 from nicegui import ui
 from nicegui.events import GenericEventArguments
 
-from stickslip_ros.app.dashboard.elements import call, named, table
-from stickslip_ros.app.dashboard.listener import Answer, ListenerNode
+from stickslip_ros.app.dashboard.elements import call, card, named, table
+from stickslip_ros.app.dashboard.run_requests import Answer, Requests
+from stickslip_ros.app.dashboard.run_state import RunState
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.model.constants import SMALLEST, Changes, Parameter, constants_of
 from stickslip_ros.model.control import CONTROL_LAWS, ControlLaw
@@ -32,15 +33,15 @@ _LARGEST_RATIO = 10.0
 
 
 def main_parameters(law: str) -> list[str]:
-    """Return the parameters with a slider, as NODE.PARAMETER: belt speed and own gains of a law."""
+    """Return the parameters with a slider, as NODE.PARAMETER: belt speed and the gains of a law."""
     common = constants_of(ControlLaw)
     known = CONTROLLER_PARAMETERS[law].known
-    own = [
+    gains = [
         f"{controller_node(law)}.{name}"
         for name in CONTROL_LAWS[law].constants()
         if name not in common and name in known and _is_adjustable(known[name])
     ]
-    return ["plant.belt_speed", *own]
+    return ["plant.belt_speed", *gains]
 
 
 def other_parameters(law: str) -> list[str]:
@@ -74,10 +75,10 @@ def slider_range(value: float, parameter: Parameter) -> tuple[float, float, floa
     return low, high, step
 
 
-def current(listener: ListenerNode, full_name: str) -> Any:
+def current(run: RunState, full_name: str) -> Any:
     """Return the current value of NODE.PARAMETER; None if it is not known."""
     node, _, name = full_name.partition(".")
-    return listener.parameters[node].get(name)
+    return run.parameters[node].get(name)
 
 
 def scale_of(unit: str, drive: Drive | None) -> float:
@@ -90,7 +91,7 @@ def number_within(name: str, given: Any, unit: str, drive: Drive | None, now: An
     value = number_of(name, given, unit)
     limit = _LARGEST_RATIO * max(abs(now or 0.0), scale_of(unit, drive))
     if drive is not None and unit != "s" and isfinite(value) and abs(value) > limit:
-        shown, most = (Units.for_drive(drive).text(each, unit) for each in (value, limit))
+        shown, most = (Units.for_drive(drive).text(v, unit) for v in (value, limit))
         raise InvalidInputError(
             f"{name} = {shown} is invalid: must be at most {most} in size, which is "
             f"{_LARGEST_RATIO:g} times the scale of this drive, or the present value"
@@ -101,8 +102,8 @@ def number_within(name: str, given: Any, unit: str, drive: Drive | None, now: An
 class SliderField:
     """Slider and number for a parameter, with its unit, undo and the reason of a refusal."""
 
-    def __init__(self, listener: ListenerNode, full_name: str) -> None:
-        self._listener, self.full_name = listener, full_name
+    def __init__(self, run: RunState, requests: Requests, full_name: str) -> None:
+        self._run, self._requests, self.full_name = run, requests, full_name
         self._parameter = described(full_name)
         self._scale, self._unit = 1.0, ""
         self._earlier: list[float] = []
@@ -127,8 +128,8 @@ class SliderField:
 
     def refresh(self, units: Units) -> None:
         """Show the current value, in the unit of the plots, unless the user is changing it."""
-        value, unit = current(self._listener, self.full_name), self._parameter.unit or ""
-        usual = scale_of(unit, self._listener.drive) * (self._parameter.default or 1.0)
+        value, unit = current(self._run, self.full_name), self._parameter.unit or ""
+        usual = scale_of(unit, self._run.drive) * (self._parameter.default or 1.0)
         self._scale, unit = units.prefixed(unit, value or usual)
         self._unit = units.of_unit(unit)
         named = units.plain(name_of(self.full_name))
@@ -140,7 +141,7 @@ class SliderField:
         if known and not self._held and (self._outdated or shown != self._shown):
             self._shown, self._outdated = shown, False
             ends = slider_range(value or usual, self._parameter)
-            low, high, step, place = (f"{each / self._scale:.9g}" for each in (*ends, value))
+            low, high, step, place = (f"{number / self._scale:.9g}" for number in (*ends, value))
             # The value last: a range input keeps it within the limits that it has.
             self._slider.props.update(min=low, max=high, step=step, value=place)
             self._number.set_value(self._shown)
@@ -153,12 +154,12 @@ class SliderField:
         await self._set(float(f"{float(event.args) * self._scale:.9g}"))
 
     async def _enter(self) -> None:
-        given, now = str(self._number.value), current(self._listener, self.full_name)
+        given, now = str(self._number.value), current(self._run, self.full_name)
         if given != self._shown:
             with suppress(ValueError):  # a number alone is in the unit that is shown
                 given = f"{float(given)!r} {self._unit}".rstrip()
             with refusals_in(self._refusal):
-                unit, drive = self._parameter.unit or "", self._listener.drive
+                unit, drive = self._parameter.unit or "", self._run.drive
                 await self._set(number_within(self.full_name, given, unit, drive, now))
 
     async def _go_back(self) -> None:
@@ -166,9 +167,9 @@ class SliderField:
             await self._set(self._earlier.pop(), again=True)
 
     async def _set(self, value: float, *, again: bool = False) -> None:
-        before = current(self._listener, self.full_name)
+        before = current(self._run, self.full_name)
         node, _, name = self.full_name.partition(".")
-        answer = await asyncio.wrap_future(self._listener.set_parameter(node, name, value))
+        answer = await asyncio.wrap_future(self._requests.set_parameter(node, name, value))
         self._refusal.set_text(answer)
         self._outdated = True  # what was typed gives way to the value that the node has
         if not answer and not again and before is not None and before != value:
@@ -178,8 +179,8 @@ class SliderField:
 class OtherParameter:
     """Any other parameter: a list with value, unit and meaning, and a field for a new value."""
 
-    def __init__(self, listener: ListenerNode, names: list[str]) -> None:
-        self._listener, self._names = listener, names
+    def __init__(self, run: RunState, requests: Requests, names: list[str]) -> None:
+        self._run, self._requests, self._names = run, requests, names
         self._choice = ui.select(names, label="another parameter", with_input=True)
         self._choice.classes("w-full").props("dense outlined")
         self._meaning = ui.label().classes("text-sm")
@@ -203,7 +204,7 @@ class OtherParameter:
             self._meaning.set_text(f"{described(chosen).meaning} Now {self._value(chosen, units)}.")
 
     def _value(self, full_name: str, units: Units) -> str:
-        return units.text(current(self._listener, full_name), described(full_name).unit or "")
+        return units.text(current(self._run, full_name), described(full_name).unit or "")
 
     async def _apply(self) -> None:
         chosen = self._choice.value
@@ -212,9 +213,33 @@ class OtherParameter:
             return
         node, _, name = chosen.partition(".")
         with refusals_in(self._refusal):
-            unit, now = described(chosen).unit or "", current(self._listener, chosen)
-            value = number_within(chosen, self._field.value, unit, self._listener.drive, now)
-            await report(self._listener.set_parameter(node, name, value), self._refusal)
+            unit, now = described(chosen).unit or "", current(self._run, chosen)
+            value = number_within(chosen, self._field.value, unit, self._run.drive, now)
+            await report(self._requests.set_parameter(node, name, value), self._refusal)
+
+
+class ParametersCard:
+    """A slider for each main parameter of the plant and of the controller, and all others."""
+
+    def __init__(self, run: RunState, requests: Requests) -> None:
+        """Add the card; its fields come with the first `refresh`."""
+        self._run, self._requests = run, requests
+        self._law: str | None = None
+        self._fields: list[SliderField | OtherParameter] = []
+        with card("Parameters"):
+            self._column = ui.column().classes("w-full gap-2")
+
+    def refresh(self) -> None:
+        """Show the current values, of the controller that is there."""
+        run, requests, law = self._run, self._requests, self._run.law
+        if law != self._law:
+            self._law = law
+            self._column.clear()
+            with self._column:
+                self._fields = [SliderField(run, requests, name) for name in main_parameters(law)]
+                self._fields.append(OtherParameter(run, requests, other_parameters(law)))
+        for field in self._fields:
+            field.refresh(run.units)
 
 
 @dataclass(frozen=True)
@@ -231,13 +256,13 @@ class Settings:
 
     def __init__(
         self,
-        listener: ListenerNode,
-        is_active: Callable[[], bool],
+        run: RunState,
+        requests: Requests,
         set_active: Callable[[bool], Any],
         measures: Callable[[], dict[str, str]],
     ) -> None:
-        self._listener, self._measures = listener, measures
-        self._is_active, self._set_active = is_active, set_active
+        self._run, self._requests, self._measures = run, requests, measures
+        self._set_active = set_active
         self._stored: dict[str, Setting] = {}
         self._use: dict[str, ui.button] = {}
         with ui.row().classes("items-center gap-1"):
@@ -271,17 +296,15 @@ class Settings:
         return ", ".join(islice(texts, len(now.values) + 1))
 
     def _now(self) -> Setting:
-        units = self._listener.units
-        known = {
-            name: current(self._listener, name) for name in main_parameters(self._listener.law)
-        }
+        units = self._run.units
+        known = {name: current(self._run, name) for name in main_parameters(self._run.law)}
         values = {name: value for name, value in known.items() if value is not None}
         texts = {
             name_of(name): units.text(value, described(name).unit or "")
             for name, value in values.items()
         }
-        texts["control"] = "on" if self._is_active() else "off"
-        return Setting(values, self._is_active(), texts | self._measures())
+        texts["control"] = "on" if self._run.control_on else "off"
+        return Setting(values, self._run.control_on, texts | self._measures())
 
     def _store(self, name: str) -> None:
         self._stored[name] = self._now()
@@ -294,11 +317,11 @@ class Settings:
         stored = self._stored[name]
         refusals: list[str] = []
         for full_name, value in stored.values.items():
-            if current(self._listener, full_name) != value:
+            if current(self._run, full_name) != value:
                 node, _, parameter = full_name.partition(".")
-                answer = self._listener.set_parameter(node, parameter, value)
+                answer = self._requests.set_parameter(node, parameter, value)
                 refusals.append(await asyncio.wrap_future(answer))
-        if stored.active != self._is_active():
+        if stored.active != self._run.control_on:
             await self._set_active(stored.active)
         self._refusal.set_text("; ".join(filter(None, refusals)))
 

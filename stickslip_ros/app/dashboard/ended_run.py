@@ -1,14 +1,15 @@
-"""Card of a run that has ended: its measures, its bag, and what to do next."""
+"""A run that has ended: its measures, its bag, and what to do next."""
 
 import asyncio
 import shlex
 from pathlib import Path
 from typing import Any
 
-from nicegui import ui
+from nicegui import background_tasks, ui
 
-from stickslip_ros.app.dashboard.elements import heading, show_commands
+from stickslip_ros.app.dashboard.elements import call, heading, show_commands
 from stickslip_ros.app.dashboard.listener import ListenerNode
+from stickslip_ros.app.dashboard.run_state import RunState
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.files import open_regular
 from stickslip_ros.record.report import report_of_recording
@@ -33,11 +34,11 @@ _MEASURES = (
 class EndedRun:
     """The bag of a run that has ended, and its report.
 
-    Any node may name a bag: it is read only if the listener has it as readable.
+    Any node may name a bag: it is read only if the run has it as readable.
     """
 
-    def __init__(self, listener: ListenerNode) -> None:
-        self._listener = listener
+    def __init__(self, run: RunState) -> None:
+        self._run = run
         self.file: Path | None = None
         """The MCAP file of the bag; None if there is none here, or it is too large to offer."""
         self._bag = ""
@@ -48,13 +49,13 @@ class EndedRun:
     @property
     def bag(self) -> str:
         """The bag that the analyzer says it has written; empty if there is none."""
-        return self._listener.health["analyzer"].figures.get("bag", "")
+        return self._run.health["analyzer"].figures.get("bag", "")
 
     async def read(self) -> None:
         """Read the report of the bag, once; concurrent callers wait for it."""
         async with self._reading:
             named = self.bag
-            if named != self._bag and named in self._listener.readable:
+            if named != self._bag and named in self._run.readable:
                 await asyncio.to_thread(self._read, Path(named))
                 self._bag = named
 
@@ -75,13 +76,13 @@ class EndedRun:
 
     def show(self) -> None:
         """Add it to the page."""
-        plant = self._listener.health["plant"]
+        plant = self._run.health["plant"]
         failure = f": {plant.message}" if plant.level == 2 and plant.message else ""
         heading(2, f"Run ended{failure}").classes("text-lg")
         bag, commands = self.bag, list[str]()
         if bag and bag == self._bag:
             if self._report:
-                table = measure_table("", {"": self._report}, {"": self._listener.units})
+                table = measure_table("", {"": self._report}, {"": self._run.units})
                 measures = _MEASURES[1:] if failure else _MEASURES  # no regime of what came before
                 shown = [MEASURES[name].label for name in measures]
                 with ui.row().classes("gap-x-6 gap-y-1"):
@@ -98,7 +99,45 @@ class EndedRun:
         elif bag:
             ui.label(f"Recorded in {bag}, as the analyzer says")
         ui.label("In a terminal:")
-        namespace = self._listener.get_namespace()
+        namespace = self._run.namespace
         unknown = f"stickslip run SCENARIO --namespace {namespace} --dashboard"
-        commands.append(self._listener.command or unknown)
+        commands.append(self._run.command or unknown)
         show_commands(commands)
+
+
+class EndNotice:
+    """The part of a page that is there once the run has ended."""
+
+    def __init__(self, ended: EndedRun, listener: ListenerNode) -> None:
+        """Add it, hidden."""
+        self._ended, self._listener = ended, listener
+        self._shown = self._final = False
+        self._client = ui.context.client
+        self._notice = ui.element("section").classes("w-full notice")
+        self._notice.set_visibility(False)
+
+    def refresh(self) -> None:
+        """Show it if the run has ended; hide it if there is another."""
+        if not self._listener.ended:
+            if self._shown:
+                self._shown = False
+                self._notice.set_visibility(False)
+                call("fit")
+        elif not self._shown:
+            self._shown = True
+            background_tasks.create(self.show())
+
+    async def show(self, *, farewell: float = 0.0) -> None:
+        """Show it; with a `farewell` for good, and what is offered is kept within that time, s."""
+        await self._ended.read()
+        if self._final:
+            return
+        self._final = farewell > 0.0
+        with self._client:
+            self._shown = True
+            self._notice.clear()
+            with self._notice:
+                self._ended.show()
+            self._notice.set_visibility(True)
+            if farewell:
+                await ui.run_javascript("stickslip.end()", timeout=farewell)

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import orjson
 
-from stickslip_ros.app.dashboard.listener import ListenerNode
+from stickslip_ros.app.dashboard.run_state import RunState
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.model.drive import Drive
 from stickslip_ros.motion.trajectory import Trajectory
@@ -32,19 +32,19 @@ _COLUMNS = "time", "position", "velocity", "belt_velocity", "friction_force", "c
 
 
 class Frames:
-    """Build frames from the data of a listener."""
+    """Build frames from what is known of a run."""
 
-    def __init__(self, listener: ListenerNode) -> None:
-        self._listener = listener
+    def __init__(self, run: RunState) -> None:
+        self._run = run
         self._trace = LiveTrace(PERIODS[-1] * _UNKNOWN_PERIOD)
 
     @property
     def period(self) -> float:
         """Natural period, s, or the period of the last cycle if there is none, or it is unknown."""
-        drive = self._listener.drive
+        drive = self._run.drive
         if drive is not None and drive.has_spring:
             return drive.natural_period
-        frequencies = list(self._listener.cycles[FREQUENCY])[-1:]
+        frequencies = list(self._run.cycles[FREQUENCY])[-1:]
         return next((1.0 / f for f in frequencies if 1e-9 < f < 1e9), _UNKNOWN_PERIOD)
 
     def feed(self, states: SampleColumns, forces: ForceColumns, dropped: ForceColumns) -> None:
@@ -62,7 +62,7 @@ class Frames:
     def _marks(self, window: float) -> list[tuple[float, str]]:
         """Return the times (s before now) of events in the window, and their marks."""
         newest = self._trace.newest
-        events = [event for event in list(self._listener.events) if event.mark]
+        events = [event for event in list(self._run.events) if event.mark]
         # Of a slider that is moved in steps, the last.
         last = [
             one
@@ -81,14 +81,14 @@ class Frames:
         spaces to a multiple of 4 bytes, and x and y of each line in turn (32-bit floats). The JSON
         contains the number of points of each line.
         """
-        period, drive = self.period, self._listener.drive
+        period, drive = self.period, self._run.drive
         frame = self._trace.frame(periods * period, 5.0 * period, buckets=400)
         axes = _axes(drive)
         length, speed, force = (axis.scale for axis in axes)
         cycles = {
-            "count": self._listener.cycle_count,
-            "amplitude": [a / length for a in list(self._listener.cycles[AMPLITUDE])],
-            "stick_fraction": list(self._listener.cycles[STICK_FRACTION]),
+            "count": self._run.cycle_count,
+            "amplitude": [a / length for a in list(self._run.cycles[AMPLITUDE])],
+            "stick_fraction": list(self._run.cycles[STICK_FRACTION]),
             "label": axes[0].label.replace("displacement", "amplitude"),
         }
         body: dict[str, Any] = {"motion": None, "cycles": cycles}

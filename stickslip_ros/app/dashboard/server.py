@@ -20,6 +20,7 @@ from stickslip_ros.app.dashboard import DEFAULT_PORT, LARGEST_PORT
 from stickslip_ros.app.dashboard.frames import Frames
 from stickslip_ros.app.dashboard.listener import ListenerNode
 from stickslip_ros.app.dashboard.page import Pages
+from stickslip_ros.app.dashboard.run_state import RunState
 from stickslip_ros.app.dashboard.web_log import log_here_alone
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.nodes.base.process import ros_session
@@ -55,13 +56,9 @@ def serve(
     if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:
         signal.signal(signal.SIGHUP, _exit)
     with ros_session() as spinner:
-        listener = ListenerNode(
-            namespace,
-            lambda states, forces, dropped: frames.feed(states, forces, dropped),
-            readable,
-        )
-        listener.command = command
-        frames: Frames = Frames(listener)
+        run = RunState(namespace, readable, command)
+        frames = Frames(run)
+        listener = ListenerNode(run, frames.feed)
         with _running(spinner, listener):
             log_here_alone()
             app = FastAPI(openapi_url=None)

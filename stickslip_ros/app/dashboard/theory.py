@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from stickslip_ros.app.dashboard.listener import ListenerNode
+from stickslip_ros.app.dashboard.run_state import RunState
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import InvalidInputError, StickslipError
 from stickslip_ros.model.drive import Drive
@@ -142,10 +142,11 @@ class Theory:
     Nothing is computed while no page asks: `follow` is called by each open page.
     """
 
-    def __init__(self, listener: ListenerNode) -> None:
-        self._listener = listener
+    def __init__(self, run: RunState) -> None:
+        self._run = run
         self._results = {
-            each: Result(each) for each in (friction_curve, decay, stability_map, bifurcation)
+            compute: Result(compute)
+            for compute in (friction_curve, decay, stability_map, bifurcation)
         }
         self._pool: ProcessPoolExecutor | None = None
         self._running: tuple[Result, tuple[Any, ...], Future[Any]] | None = None
@@ -158,21 +159,22 @@ class Theory:
     @property
     def busy(self) -> bool:
         """Whether something is being computed, or is to be."""
-        return self._running is not None or any(each.is_stale for each in self._results.values())
+        return self._running is not None or any(r.is_stale for r in self._results.values())
 
     def follow(self) -> None:
         """Take a finished result, and start the next computation whose parameters changed."""
         if self._closed:
             return
         now = monotonic()
-        for each in self._results.values():
-            inputs = self._inputs(each.compute)
-            if repr(inputs) != repr(each.asked):
-                each.asked, each.changed_at = inputs, now
+        for result in self._results.values():
+            inputs = self._inputs(result.compute)
+            if repr(inputs) != repr(result.asked):
+                result.asked, result.changed_at = inputs, now
         self._take()
-        for each in self._results.values():
-            if self._running is None and each.is_stale and now - each.changed_at > _SETTLING_TIME:
-                self._running = each, each.asked, self._submit(each)
+        for result in self._results.values():
+            due = result.is_stale and now - result.changed_at > _SETTLING_TIME
+            if self._running is None and due:
+                self._running = result, result.asked, self._submit(result)
 
     def close(self) -> None:
         """End the process; nothing is computed from then on."""
@@ -188,20 +190,20 @@ class Theory:
         The ranges of map and diagram follow gains and belt speed by octaves, so that the present
         point moves in a figure that stays.
         """
-        plant = dict(self._listener.parameters["plant"])
+        plant = dict(self._run.parameters["plant"])
         if not plant:
             return ()
         if computation is friction_curve:
             return (plant,)
         if computation is bifurcation:
             return (plant | {"belt_speed": _octave(plant.get("belt_speed"))},)
-        controller = dict(self._listener.parameters[self._listener.controller])
+        controller = dict(self._run.parameters[self._run.controller])
         if computation is stability_map:
             if not controller:
                 return ()
             gains = "corner_frequency", "linear_gain"
             controller |= {name: _octave(controller[name]) for name in gains if name in controller}
-        return (plant, self._listener.law, controller)
+        return (plant, self._run.law, controller)
 
     def _submit(self, result: Result) -> Future[Any]:
         if self._pool is None:

@@ -6,7 +6,7 @@ from typing import Any
 from nicegui import ui
 
 from stickslip_ros.app.dashboard.elements import call, card, chart
-from stickslip_ros.app.dashboard.listener import ListenerNode
+from stickslip_ros.app.dashboard.run_state import RunState
 from stickslip_ros.app.dashboard.theory import (
     Decay,
     Theory,
@@ -23,7 +23,6 @@ from stickslip_ros.app.dashboard.theory_charts import (
 )
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.model.control import Washout
-from stickslip_ros.model.drive import Drive
 from stickslip_ros.scenarios.parameters import CONTROLLER_PARAMETERS, controller_node
 from stickslip_ros.show.quantities import Units
 from stickslip_ros.theory.gain_intervals import gains_of
@@ -43,9 +42,9 @@ _DRAWN = {"bifurcation": bifurcation_chart, "friction": friction_chart, "decay":
 class TheoryPanel:
     """Charts of the theory, each with the present state as a point, or why there is none."""
 
-    def __init__(self, listener: ListenerNode, theory: Theory) -> None:
+    def __init__(self, run: RunState, theory: Theory) -> None:
         """Add the charts."""
-        self._listener, self._theory = listener, theory
+        self._run, self._theory = run, theory
         self.charts: dict[str, ui.echart] = {}
         """The charts by name."""
         self._said: dict[str, ui.label] = {}
@@ -56,9 +55,10 @@ class TheoryPanel:
                     self._said[name] = ui.label("").classes("text-sm")
                     self.charts[name] = chart({"series": []}, text)
 
-    def refresh(self, drive: Drive | None) -> None:
-        """Draw what has changed; `drive` is None while it is not known."""
+    def refresh(self) -> None:
+        """Draw what has changed."""
         self._theory.follow()
+        drive = self._run.drive
         if drive is None:
             return
         gains = self._gains()
@@ -90,22 +90,22 @@ class TheoryPanel:
 
     def _gains(self) -> Washout | None:
         """Return the gains of the controller; None while they are not known, or it has others."""
-        law = self._listener.law
-        values = self._listener.parameters[controller_node(law)]
+        law = self._run.law
+        values = self._run.parameters[controller_node(law)]
         try:
             return gains_of(CONTROLLER_PARAMETERS[law].changed(values, law).control_law)
         except InvalidInputError:  # a controller of another version
             return None
 
 
-def _decay_text(found: Decay, units: Units) -> str:
+def _decay_text(result: Decay, units: Units) -> str:
     def named(rate: float) -> str:
         name = "growth rate" if rate < 0.0 else "decay rate"
         return f"{name} {abs(rate):.3g} {units.of_unit('1/s')}".rstrip()
 
-    without = named(found.uncontrolled_rate)
-    if found.rate is None:
+    without = named(result.uncontrolled_rate)
+    if result.rate is None:
         return without
-    text = f"{named(found.rate)} (without control: {without})"
-    settles = settling_time(found.rate)
+    text = f"{named(result.rate)} (without control: {without})"
+    settles = settling_time(result.rate)
     return text if settles is None else f"{text}, settles in {units.text(settles, 's')}"

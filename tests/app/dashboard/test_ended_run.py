@@ -5,13 +5,11 @@ import os
 import shutil
 from collections.abc import Callable
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any
 
 import pytest
 
 from stickslip_ros.app.dashboard.ended_run import EndedRun
-from stickslip_ros.app.dashboard.listener import Health
+from stickslip_ros.app.dashboard.run_state import Health, RunState
 from tests.record.runs import STAMPS, record
 
 FILE = "bag_0.mcap"
@@ -19,10 +17,9 @@ FILE = "bag_0.mcap"
 
 def ended(named: Path | str, *readable: Path) -> EndedRun:
     """Return what is known of a run whose analyzer, or another node, named a bag."""
-    listener: Any = SimpleNamespace(
-        health={"analyzer": Health(figures={"bag": str(named)})}, readable=[*map(str, readable)]
-    )
-    run = EndedRun(listener)
+    state = RunState("/test", readable=[*map(str, readable)])
+    state.health = {"analyzer": Health(figures={"bag": str(named)})}
+    run = EndedRun(state)
     asyncio.run(run.read())
     return run
 

@@ -2,19 +2,16 @@
 
 import json
 import struct
-from collections import deque
-from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
 
 from stickslip_ros.app.dashboard.frames import PERIODS, Frames
-from stickslip_ros.app.dashboard.listener import Event
+from stickslip_ros.app.dashboard.run_state import RunState
 from stickslip_ros.record.topics import AMPLITUDE, FREQUENCY, STICK_FRACTION
 from stickslip_ros.samples import ForceColumns, SampleColumns
 from stickslip_ros.scenarios.files import load_scenario
-from stickslip_ros.scenarios.parameters import PlantParameters
 
 
 class Decoded(NamedTuple):
@@ -36,10 +33,12 @@ def decoded(frame: bytes) -> Decoded:
     return Decoded(body, lines)
 
 
-def observed(parameters: dict[str, Any]) -> Any:
-    cycles = {AMPLITUDE: deque([4e-4]), STICK_FRACTION: deque([0.1]), FREQUENCY: deque([8.0])}
-    drive = PlantParameters().changed(parameters, "plant").as_drive() if parameters else None
-    return SimpleNamespace(drive=drive, cycles=cycles, cycle_count=7, events=deque[Event]())
+def observed(parameters: dict[str, Any]) -> RunState:
+    run = RunState("/test")
+    run.parameters = {**run.parameters, "plant": parameters}
+    for topic, value in ((AMPLITUDE, 4e-4), (STICK_FRACTION, 0.1), (FREQUENCY, 8.0)):
+        run.take_cycle(topic, value)
+    return run
 
 
 def fed(parameters: dict[str, Any], seconds: float, rate: float) -> Frames:
@@ -58,7 +57,7 @@ def test_before_the_first_sample_there_are_only_cycles() -> None:
     body, lines = decoded(Frames(observed({})).frame(50))
     assert body["motion"] is None
     assert not lines
-    assert body["cycles"]["count"] == 7
+    assert body["cycles"]["count"] == 1
 
 
 @pytest.mark.parametrize(
@@ -119,6 +118,6 @@ def test_on_a_belt_at_rest_no_place_is_the_equilibrium() -> None:
 def test_any_published_frequency_is_accepted() -> None:
     frames = fed({}, 5.0, 1000.0)
     for frequency in (0.0, 1e-300, 1e300, float("inf"), float("nan"), -1.0):
-        frames._listener.cycles[FREQUENCY].append(frequency)
+        frames._run.cycles[FREQUENCY].append(frequency)
         body, _ = decoded(frames.frame(PERIODS[0]))
         assert body["motion"]["window"] == PERIODS[0], frequency

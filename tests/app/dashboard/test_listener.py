@@ -9,8 +9,10 @@ from rcl_interfaces.msg import Parameter as ParameterMessage
 from rcl_interfaces.msg import ParameterEvent, ParameterValue
 from rclpy.parameter import Parameter
 
-from stickslip_ros.app.dashboard import listener as listener_module
-from stickslip_ros.app.dashboard.listener import ABSENT, SILENT, Answer, Health, ListenerNode
+from stickslip_ros.app.dashboard import run_requests, run_state
+from stickslip_ros.app.dashboard.listener import ListenerNode
+from stickslip_ros.app.dashboard.run_requests import Answer
+from stickslip_ros.app.dashboard.run_state import ABSENT, SILENT, Health, RunState
 from stickslip_ros.app.dashboard.theory import Theory
 from stickslip_ros.nodes.analyzer import AnalyzerNode
 from stickslip_ros.nodes.controller import ControllerNode
@@ -59,7 +61,7 @@ def shown() -> Shown:
 
 @pytest.fixture
 def observer(graph: Graph, shown: Shown) -> ListenerNode:
-    node = ListenerNode("/test", shown.take, context=graph.context)
+    node = ListenerNode(RunState("/test"), shown.take, context=graph.context)
     graph.adopt(node)
     return node
 
@@ -76,9 +78,9 @@ def run_loop(graph: Graph, observer: ListenerNode, **values: object) -> PlantNod
     plant = graph.add(PlantNode, **{"pace": "realtime", "belt_speed": 0.2, **values})
     graph.wait_until(
         lambda: (
-            len(observer.health) == 3
-            and all(health.state == "active" for health in observer.health.values())
-            and all(observer.parameters[node] for node in observer.health)
+            len(observer.run.health) == 3
+            and all(health.state == "active" for health in observer.run.health.values())
+            and all(observer.run.parameters[node] for node in observer.run.health)
         ),
         "the observer knows all nodes",
     )
@@ -88,40 +90,41 @@ def run_loop(graph: Graph, observer: ListenerNode, **values: object) -> PlantNod
 def test_it_hears_states_forces_and_cycles(
     graph: Graph, observer: ListenerNode, shown: Shown
 ) -> None:
-    assert {health.state for health in observer.health.values()} == {ABSENT}
+    assert {health.state for health in observer.run.health.values()} == {ABSENT}
     run_loop(graph, observer, pace="lockstep", rate=50.0, expects_control=False)
-    graph.wait_until(lambda: observer.cycle_count > 3, "cycles")
+    graph.wait_until(lambda: observer.run.cycle_count > 3, "cycles")
     assert (np.diff(shown.stamps) > 0).all()
     assert len(shown.stamps) > 300
     assert max(len(forces.stamp) for forces in shown.forces) > 0
-    assert {len(values) > 3 for values in observer.cycles.values()} == {True}
-    assert observer.cycles[AMPLITUDE][-1] > 0.0
-    assert 0.0 <= observer.cycles[STICK_FRACTION][-1] <= 1.0
-    assert 0.1 < observer.cycles[FREQUENCY][-1] < 0.2
-    assert int(observer.health["plant"].figures["samples"]) > 0
+    assert {len(values) > 3 for values in observer.run.cycles.values()} == {True}
+    assert observer.run.cycles[AMPLITUDE][-1] > 0.0
+    assert 0.0 <= observer.run.cycles[STICK_FRACTION][-1] <= 1.0
+    assert 0.1 < observer.run.cycles[FREQUENCY][-1] < 0.2
+    assert int(observer.run.health["plant"].figures["samples"]) > 0
 
 
 def test_a_value_is_taken_or_refused_with_the_reason_of_the_node(
     graph: Graph, observer: ListenerNode
 ) -> None:
     plant = run_loop(graph, observer)
-    assert observer.parameters["plant"]["belt_speed"] == 0.2
-    assert not outcome(graph, observer.set_parameter("plant", "belt_speed", 0.3))
-    graph.wait_until(lambda: observer.parameters["plant"]["belt_speed"] == 0.3, "the new value")
-    refusal = outcome(graph, observer.set_parameter("washout_controller", "corner_frequency", -1.0))
+    assert observer.run.parameters["plant"]["belt_speed"] == 0.2
+    assert not outcome(graph, observer.requests.set_parameter("plant", "belt_speed", 0.3))
+    graph.wait_until(lambda: observer.run.parameters["plant"]["belt_speed"] == 0.3, "the new value")
+    set_parameter = observer.requests.set_parameter
+    refusal = outcome(graph, set_parameter("washout_controller", "corner_frequency", -1.0))
     assert "corner_frequency = -1.0 is invalid: must be a finite number above 0" in refusal
-    assert observer.parameters["washout_controller"]["corner_frequency"] == 2.0
-    assert "rate cannot be changed" in outcome(graph, observer.set_parameter("plant", "rate", 1.0))
+    assert observer.run.parameters["washout_controller"]["corner_frequency"] == 2.0
+    assert "rate cannot be changed" in outcome(graph, set_parameter("plant", "rate", 1.0))
     plant.set_parameters([Parameter("damping", value=0.5)])  # by others
-    graph.wait_until(lambda: observer.parameters["plant"]["damping"] == 0.5, "the new value")
+    graph.wait_until(lambda: observer.run.parameters["plant"]["damping"] == 0.5, "the new value")
     for active, state in ((False, "inactive"), (True, "active")):
-        assert not outcome(graph, observer.set_active("washout_controller", active))
+        assert not outcome(graph, observer.requests.set_active("washout_controller", active))
         graph.wait_until(
-            lambda s=state: observer.health["washout_controller"].state == s, f"it is {state}"
+            lambda s=state: observer.run.health["washout_controller"].state == s, f"it is {state}"
         )
         # A request that is repeated, since its answer was lost, has been obeyed.
-        assert not outcome(graph, observer.set_active("washout_controller", active))
-    assert [each.text for each in observer.events if "inactive" in each.text] == [
+        assert not outcome(graph, observer.requests.set_active("washout_controller", active))
+    assert [each.text for each in observer.run.events if "inactive" in each.text] == [
         "washout_controller inactive"
     ]
 
@@ -142,28 +145,28 @@ def test_a_value_that_a_parameter_cannot_have_is_not_known(
     graph.wait_until(publisher.get_subscription_count, "the observer listens")
     sound = load_scenario("feed_drive").as_dict()
     active = Health("active", heard_at=1e9)
-    observer.health = dict.fromkeys(("analyzer", "plant", "washout_controller"), active)
-    observer._answering_since = 0.0
-    theory = Theory(observer)
+    observer.run.health = dict.fromkeys(("analyzer", "plant", "washout_controller"), active)
+    observer.run._answering_since = 0.0
+    theory = Theory(observer.run)
     for node, name, value in FOREIGN:
-        observer.parameters = observer.parameters | sound
+        observer.run.parameters = observer.run.parameters | sound
         parameters = [Parameter(name, value=value).to_parameter_msg()]
         publisher.publish(ParameterEvent(node=f"/test/{node}", changed_parameters=parameters))
         graph.wait_until(
-            lambda n=node, p=name: observer.parameters[n][p] is None, f"{name} {value}"
+            lambda n=node, p=name: observer.run.parameters[n][p] is None, f"{name} {value}"
         )
-        assert (observer.drive is None) == (node == "plant")
+        assert (observer.run.drive is None) == (node == "plant")
         theory.follow()
-        assert observer.acts_in >= 0.0
-        assert observer.waits_for_reply >= 0.0
-    assert not observer.events
+        assert observer.run.acts_in >= 0.0
+        assert observer.run.waits_for_reply >= 0.0
+    assert not observer.run.events
 
 
 def test_a_single_value_is_not_all_that_is_known(graph: Graph, observer: ListenerNode) -> None:
     """And one of an unknown type is ignored."""
     publisher = observer.create_publisher(ParameterEvent, "/parameter_events", 10)
     graph.wait_until(publisher.get_subscription_count, "the observer listens")
-    observer.parameters = observer.parameters | {"analyzer": {"window": 8}}
+    observer.run.parameters = observer.run.parameters | {"analyzer": {"window": 8}}
     strange = ParameterMessage(name="window", value=ParameterValue(type=99))
     duration, window = Parameter("duration", value=2.0), Parameter("window", value=9)
     for node, changed in (
@@ -172,12 +175,12 @@ def test_a_single_value_is_not_all_that_is_known(graph: Graph, observer: Listene
         ("analyzer", window.to_parameter_msg()),
     ):
         publisher.publish(ParameterEvent(node=f"/test/{node}", changed_parameters=[changed]))
-    graph.wait_until(lambda: observer.parameters["analyzer"].get("window") == 9, "the change")
-    assert observer.parameters["plant"] == {}
+    graph.wait_until(lambda: observer.run.parameters["analyzer"].get("window") == 9, "the change")
+    assert observer.run.parameters["plant"] == {}
 
 
 def test_any_number_in_diagnostics_is_accepted(observer: ListenerNode) -> None:
-    observer.parameters = observer.parameters | {"plant": {"rate": 1e-6}}
+    observer.run.parameters = observer.run.parameters | {"plant": {"rate": 1e-6}}
     keys = "answered", "samples", "late_forces"
     for number in ("٣", "²", "abc", "nan", "-1", "9" * 400, "9" * 5000, ""):
         figures = [KeyValue(key=key, value=number) for key in keys]
@@ -187,26 +190,26 @@ def test_any_number_in_diagnostics_is_accepted(observer: ListenerNode) -> None:
         ]
         for _ in range(2):
             observer._on_diagnostics(DiagnosticArray(status=status))
-        assert observer.acts_in == 0.0
-        assert observer.health["plant"].figures["samples"] == number
+        assert observer.run.acts_in == 0.0
+        assert observer.run.health["plant"].figures["samples"] == number
 
 
 def test_the_controller_is_the_one_that_is_heard(graph: Graph, observer: ListenerNode) -> None:
-    assert observer.controller == "washout_controller"
-    assert set(observer.health) == {"analyzer", "plant"}
+    assert observer.run.controller == "washout_controller"
+    assert set(observer.run.health) == {"analyzer", "plant"}
     node = graph.add(partial(ControllerNode, "velocity_feedback"), velocity_gain=-0.25)
-    graph.wait_until(lambda: observer.law == "velocity_feedback", "the controller")
-    assert observer.controller == node.get_name() == "velocity_feedback_controller"
-    graph.wait_until(lambda: observer.parameters[observer.controller], "its parameters")
-    assert observer.parameters[observer.controller]["velocity_gain"] == -0.25
-    assert set(observer.health) == {"analyzer", "plant", "velocity_feedback_controller"}
+    graph.wait_until(lambda: observer.run.law == "velocity_feedback", "the controller")
+    assert observer.run.controller == node.get_name() == "velocity_feedback_controller"
+    graph.wait_until(lambda: observer.run.parameters[observer.run.controller], "its parameters")
+    assert observer.run.parameters[observer.run.controller]["velocity_gain"] == -0.25
+    assert set(observer.run.health) == {"analyzer", "plant", "velocity_feedback_controller"}
 
 
 def test_reset_puts_the_motion_back(graph: Graph, observer: ListenerNode, shown: Shown) -> None:
     run_loop(graph, observer, expects_control=False, **{"initial.position": 0.5})
     graph.wait_until(lambda: abs(shown.position[-1] - 0.5) > 0.05, "the slide has moved")
     before = len(shown.position)
-    assert not outcome(graph, observer.reset())
+    assert not outcome(graph, observer.requests.reset())
     graph.wait_until(lambda: 0.5 in shown.position[before:], "the initial position again")
 
 
@@ -216,7 +219,7 @@ def test_a_tap_lasts_for_its_simulated_time_and_ends(
 ) -> None:
     applied = graph.listen(APPLIED_DISTURBANCE)
     run_loop(graph, observer, pace=pace, rate=1000.0)
-    assert not outcome(graph, observer.tap(0.05, 0.2))
+    assert not outcome(graph, observer.impulse.apply(0.05, 0.2))
     graph.wait_until(
         lambda: [m.wrench.force.x for m in applied][-2:] == [0.05, 0.0], "the force comes and goes"
     )
@@ -228,11 +231,12 @@ def test_an_impossible_tap_is_refused(
     graph: Graph, observer: ListenerNode, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for force, duration in ((float("nan"), 1.0), (float("inf"), 1.0), (1.0, 0.0), (1.0, 1e300)):
-        refusal = outcome(graph, observer.tap(force, duration))
+        refusal = outcome(graph, observer.impulse.apply(force, duration))
         assert refusal.startswith("an impulse needs a finite force and a duration above 0, at most")
-    assert outcome(graph, observer.tap(1.0, 0.1)) == "no node subscribes to /test/disturbance_force"
-    monkeypatch.setattr(listener_module, "_ANSWER_TIMEOUT", 0.3)
-    assert outcome(graph, observer.reset()) == "plant does not answer"
+    refusal = outcome(graph, observer.impulse.apply(1.0, 0.1))
+    assert refusal == "no node subscribes to /test/disturbance_force"
+    monkeypatch.setattr(run_requests, "_ANSWER_TIMEOUT", 0.3)
+    assert outcome(graph, observer.requests.reset()) == "plant does not answer"
 
 
 def test_a_node_that_was_started_again_at_once_is_asked_again(
@@ -240,15 +244,15 @@ def test_a_node_that_was_started_again_at_once_is_asked_again(
 ) -> None:
     first = graph.add(PlantNode, pace="realtime", expects_control=False, damping=0.1)
     graph.wait_until(
-        lambda: int(observer.health["plant"].figures.get("samples", 0)) > 150, "samples"
+        lambda: int(observer.run.health["plant"].figures.get("samples", 0)) > 150, "samples"
     )
     graph.executor.remove_node(first)
     first.destroy_node()
     graph.add(PlantNode, pace="realtime", expects_control=False, damping=0.3)
     graph.wait_until(
-        lambda: observer.parameters["plant"].get("damping") == 0.3, "the parameters of the other"
+        lambda: observer.run.parameters["plant"].get("damping") == 0.3, "the other's parameters"
     )
-    assert SILENT not in {each.text.split()[-1] for each in observer.events}
+    assert SILENT not in {each.text.split()[-1] for each in observer.run.events}
 
 
 def test_the_health_of_a_limited_number_of_nodes_is_kept(
@@ -261,16 +265,16 @@ def test_the_health_of_a_limited_number_of_nodes_is_kept(
 
     def heard() -> bool:
         publisher.publish(message)
-        return observer.health["plant"].message == "the last of them"
+        return observer.run.health["plant"].message == "the last of them"
 
     graph.wait_until(heard, "the diagnostics")
-    assert len(observer.health) == 50
+    assert len(observer.run.health) == 50
 
 
 def test_a_push_ends_with_the_observer(graph: Graph, observer: ListenerNode) -> None:
     applied = graph.listen(APPLIED_DISTURBANCE)
     run_loop(graph, observer)
-    assert not outcome(graph, observer.tap(0.05, 1e6))
+    assert not outcome(graph, observer.impulse.apply(0.05, 1e6))
     graph.wait_until(lambda: [m.wrench.force.x for m in applied][-1:] == [0.05], "the force")
     observer.close()
     graph.wait_until(lambda: applied[-1].wrench.force.x == 0.0, "no force")
@@ -279,12 +283,12 @@ def test_a_push_ends_with_the_observer(graph: Graph, observer: ListenerNode) -> 
 def test_a_node_that_falls_silent_and_comes_back_is_shown_as_that(
     graph: Graph, observer: ListenerNode, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(listener_module, "SILENCE", 1.0)
+    monkeypatch.setattr(run_state, "SILENCE", 1.0)
     plant = graph.add(PlantNode, pace="realtime", expects_control=False)
-    graph.wait_until(lambda: observer.health["plant"].state == "active", "the plant")
+    graph.wait_until(lambda: observer.run.health["plant"].state == "active", "the plant")
     graph.executor.remove_node(plant)
-    graph.wait_until(lambda: observer.health["plant"].state == SILENT, "silence")
+    graph.wait_until(lambda: observer.run.health["plant"].state == SILENT, "silence")
     graph.executor.add_node(plant)
-    graph.wait_until(lambda: observer.health["plant"].state == "active", "the plant again")
-    events = [each.text for each in observer.events]
+    graph.wait_until(lambda: observer.run.health["plant"].state == "active", "the plant again")
+    events = [each.text for each in observer.run.events]
     assert events.index("plant silent") < events.index("plant is back, active")

@@ -1,6 +1,7 @@
 """Answers of the server to requests and messages that no page sends: no traceback."""
 
 from itertools import product
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -20,8 +21,7 @@ def client() -> TestClient:
     """Return a client to which an exception of the server is raised."""
     app = FastAPI()
     frames: Frames = fed({}, 1.0, 100.0)
-    listener: Any = frames._listener
-    listener.health, listener.readable = {}, ()
+    listener: Any = SimpleNamespace(run=frames._run)
     Pages(app, listener, frames)
     return TestClient(app)
 

@@ -3,7 +3,6 @@
 import time
 from collections.abc import Iterator
 from multiprocessing import active_children
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -16,6 +15,7 @@ from stickslip_ros.app.dashboard.controls import (
     other_parameters,
     slider_range,
 )
+from stickslip_ros.app.dashboard.run_state import RunState
 from stickslip_ros.app.dashboard.theory import (
     Theory,
     bifurcation,
@@ -49,24 +49,25 @@ def reference() -> dict[str, Any]:
 
 
 @pytest.fixture
-def listener() -> Any:
+def run() -> RunState:
     """A drive that runs, as a listener knows it."""
-    parameters = {"plant": dict(PLANT), "washout_controller": dict(GAINS)}
-    return SimpleNamespace(parameters=parameters, law="washout", controller="washout_controller")
+    run = RunState("/test")
+    run.parameters = {"plant": dict(PLANT), "washout_controller": dict(GAINS)}
+    return run
 
 
 @pytest.fixture
-def theory(listener: Any) -> Iterator[Theory]:
-    found = Theory(listener)
+def theory(run: RunState) -> Iterator[Theory]:
+    found = Theory(run)
     yield found
     found.close()
 
 
 @pytest.mark.process
 def test_a_long_computation_does_not_delay_the_end(
-    listener: Any, monkeypatch: pytest.MonkeyPatch
+    run: RunState, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    theory = Theory(listener)
+    theory = Theory(run)
     monkeypatch.setattr(theory, "_inputs", lambda computation: (3600.0,))
     for result in theory._results.values():
         result.compute = time.sleep
@@ -156,28 +157,28 @@ def test_the_friction_curve_has_the_operating_point() -> None:
 
 @pytest.mark.process
 @pytest.mark.timeout(600)
-def test_only_what_a_parameter_changes_is_computed_again(listener: Any, theory: Theory) -> None:
+def test_only_what_a_parameter_changes_is_computed_again(run: RunState, theory: Theory) -> None:
     settle(theory)
     versions = {each: theory.result(each).version for each in (bifurcation, stability_map, decay)}
     assert set(versions.values()) == {1}
     # The same values as another message brings them: a NaN that is not the same object.
     unset = {name: float("nan") for name, value in PLANT.items() if value != value}
     assert unset
-    listener.parameters = listener.parameters | {"plant": PLANT | unset}
+    run.parameters = run.parameters | {"plant": PLANT | unset}
     theory.follow()
     assert not theory.busy
-    slower = listener.parameters["plant"] | {"belt_speed": 0.039}
-    listener.parameters = listener.parameters | {"plant": slower}
+    slower = run.parameters["plant"] | {"belt_speed": 0.039}
+    run.parameters = run.parameters | {"plant": slower}
     settle(theory)
     assert theory.result(bifurcation).version == 1
     assert theory.result(stability_map).version == 2
-    gains = listener.parameters["washout_controller"] | {"linear_gain": -2900.0}
-    listener.parameters = listener.parameters | {"washout_controller": gains}
+    gains = run.parameters["washout_controller"] | {"linear_gain": -2900.0}
+    run.parameters = run.parameters | {"washout_controller": gains}
     settle(theory)
     assert theory.result(stability_map).version == 2
     assert theory.result(decay).version == 3
-    loose = listener.parameters["plant"] | {"stiffness": 0.0}
-    listener.parameters = listener.parameters | {"plant": loose}
+    loose = run.parameters["plant"] | {"stiffness": 0.0}
+    run.parameters = run.parameters | {"plant": loose}
     settle(theory)
     for each in (bifurcation, stability_map, decay):  # what the theory does not cover is said
         assert theory.result(each).value is None
@@ -186,13 +187,13 @@ def test_only_what_a_parameter_changes_is_computed_again(listener: Any, theory: 
 
 
 def test_nothing_is_computed_while_a_slider_moves(
-    listener: Any, theory: Theory, monkeypatch: pytest.MonkeyPatch
+    run: RunState, theory: Theory, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(module, "monotonic", lambda: now)
     now = 100.0
     theory.follow()
     now += 0.2
-    listener.parameters = listener.parameters | {"plant": PLANT | {"belt_speed": 0.03}}
+    run.parameters = run.parameters | {"plant": PLANT | {"belt_speed": 0.03}}
     theory.follow()
     now += 0.2
     theory.follow()
@@ -200,8 +201,8 @@ def test_nothing_is_computed_while_a_slider_moves(
     monkeypatch.setattr(module, "monotonic", time.monotonic)
 
 
-def test_an_unknown_drive_has_no_theory(listener: Any, theory: Theory) -> None:
-    listener.parameters = {"plant": {}, "washout_controller": {}}
+def test_an_unknown_drive_has_no_theory(run: RunState, theory: Theory) -> None:
+    run.parameters = {"plant": {}, "washout_controller": {}}
     theory.follow()
     assert not theory.busy
 
