@@ -57,8 +57,22 @@ class Trace:
         self._kept: list[NDArray[Any]] = [np.empty(0, time), *[np.empty(0)] * columns]
         self._size = self._thinned = 0
         """Number of filled rows, and how many of them may be thinned."""
+        self._latest = -float("inf")
         self.interval = 0.0
         """Longest time between rows that results from thinning."""
+
+    @property
+    def last(self) -> list[float]:
+        """Time and columns of the last row; a time of minus infinity if there is none."""
+        if not self._size:
+            return [-float("inf")] + [0.0] * (len(self._kept) - 1)
+        return [float(kept[self._size - 1]) for kept in self._kept]
+
+    def later(self, time: FloatArray) -> BoolArray:
+        """Return which of the times that follow are later than all those before."""
+        later = time > np.maximum.accumulate(np.append(self._latest, time))[:-1]
+        self._latest = float(time.max(initial=self._latest))
+        return later
 
     def add(self, time: NDArray[Any], *columns: FloatArray) -> None:
         """Append rows, in ascending order of time."""
@@ -154,11 +168,8 @@ class RunHistory:
         """Analysis of the record."""
         self._motion, self._cycles = Trace(4), Trace(2)
         self._first: list[DrawnMotion] = []
-        self._switched: DrawnMotion | None = None
         self._first_rows = 0
-        self._stick_time = 0.0
-        self._motion_end = self._cycles_end = -float("inf")
-        self._friction_end = self._control_end = self._motor_end = -float("inf")
+        self._switched: DrawnMotion | None = None
 
     @property
     def motion(self) -> DrawnMotion:
@@ -174,7 +185,7 @@ class RunHistory:
 
     def end(self, duration: float) -> DrawnMotion:
         """Return the last `duration` (s) of the motion, of the 50,000 last rows or more."""
-        return DrawnMotion(*self._motion.since(self._motion_end - duration))
+        return DrawnMotion(*self._motion.since(self._motion.last[0] - duration))
 
     def around_switch_on(self, before: float, after: float) -> DrawnMotion:
         """Return the motion from `before` to `after` (s) the first force that is not zero."""
@@ -203,17 +214,15 @@ class RunHistory:
         if self.gap == float("inf"):
             self.gap = motion.longest_step
         # Breakpoints may share an instant; a step back in time is larger.
-        rows = (time > self._motion_end) | (time[0] >= self._motion_end)
+        end, *_, stick_time = self._motion.last
+        rows = (time > end) | (time[0] >= end)
         breakpoints, belt_velocity = motion.breakpoints[rows], motion.belt_velocity[rows]
         if len(breakpoints) == 0:
             return
         time = breakpoints.time
-        steps = np.diff(time, prepend=self._motion_end if self._first else time[0])
-        stick_time = self._stick_time + np.cumsum(np.where(breakpoints.sticking, steps, 0.0))
-        self._motion_end, self._stick_time = float(time[-1]), float(stick_time[-1])
-        drawn = DrawnMotion(
-            time, breakpoints.position, breakpoints.velocity, belt_velocity, stick_time
-        )
+        steps = np.diff(time, prepend=end if self._first else time[0])
+        stuck = stick_time + np.cumsum(np.where(breakpoints.sticking, steps, 0.0))
+        drawn = DrawnMotion(time, breakpoints.position, breakpoints.velocity, belt_velocity, stuck)
         self._motion.add(*drawn)
         self._keep_switch_on()
         if self._first_rows < _FIRST_ROWS:
@@ -229,34 +238,30 @@ class RunHistory:
         if self.switched_on is None or self._switched is not None:
             return
         if len(self._motion.since(self.switched_on)[0]) > _SWITCHED_ROWS:
-            kept = self._motion.since(2.0 * self.switched_on - self._motion_end)
+            kept = self._motion.since(2.0 * self.switched_on - self._motion.last[0])
             self._switched = DrawnMotion(*(column.copy() for column in kept))
 
     def _take_cycles(self, motion: MeasuredMotion) -> None:
         time = np.array(motion.cycle_ends)
         columns = np.array([(c.amplitude, c.stick_fraction) for c in motion.cycles])
-        later = _later(time, self._cycles_end)
-        self._cycles_end = float(time.max(initial=self._cycles_end))
+        later = self._cycles.later(time)
         self._cycles.add(time[later], *columns.reshape(-1, 2)[later].T)
 
     def take_friction(self, time: FloatArray, force: FloatArray) -> None:
         """Add the friction force at the next samples; unknown values are omitted."""
-        later = _later(time, self._friction_end)
+        later = self.friction.later(time)
         self.left_out += int((~later).sum())
-        self._friction_end = float(time.max(initial=self._friction_end))
         rows = later & (np.abs(force) <= LARGEST)
         self.friction.add(time[rows], force[rows])
 
     def take_motor(self, time: FloatArray, states: FloatArray) -> None:
         """Add the states of slide and motor at the next samples."""
-        rows = _later(time, self._motor_end) & np.all(np.abs(states) <= LARGEST, axis=0)
-        self._motor_end = float(time.max(initial=self._motor_end))
+        rows = self.motor.later(time) & np.all(np.abs(states) <= LARGEST, axis=0)
         self.motor.add(time[rows], *states[:, rows])
 
     def take_control(self, time: FloatArray, force: FloatArray, acted: BoolArray) -> None:
         """Add the next control forces, with the time from which each acts or is requested."""
-        rows = _later(time, self._control_end) & np.isfinite(force)
-        self._control_end = float(time.max(initial=self._control_end))
+        rows = self.control.later(time) & np.isfinite(force)
         if self.control_gap == float("inf") and rows.sum() > 1:
             self.control_gap = LONGEST_GAP * float(np.median(np.diff(time[rows])))
         acting = np.flatnonzero(rows & acted & (force != 0.0))
@@ -264,8 +269,3 @@ class RunHistory:
             self.switched_on = float(time[acting[0]])
         for trace, drawn in ((self.control, rows & acted), (self.dropped, rows & ~acted)):
             trace.add(time[drawn], force[drawn])
-
-
-def _later(time: FloatArray, end: float) -> BoolArray:
-    """Return which times are later than all earlier ones and than `end`."""
-    return time > np.maximum.accumulate(np.append(end, time))[:-1]
