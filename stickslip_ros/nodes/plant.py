@@ -8,13 +8,14 @@ from functools import partial
 from math import isfinite, nan
 from typing import Any
 
+from rclpy.publisher import Publisher
 from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 
 from stickslip_ros.errors import InvalidInputError, MessageError
 from stickslip_ros.motion.answers import Verdict
 from stickslip_ros.motion.motion import Motion
-from stickslip_ros.motion.sampled_loop import LOCKSTEP_START
+from stickslip_ros.motion.sampled_loop import LOCKSTEP_START, SampledLoop
 from stickslip_ros.nodes.base.managed import (
     ERROR,
     FAILURE,
@@ -60,10 +61,10 @@ class PlantNode(ManagedNode[PlantParameters]):
     def __init__(self, **options: Any) -> None:
         super().__init__("plant", PlantParameters(), **options)
         self._next_start = LOCKSTEP_START
-        self._has_started = False
         self.elapsed = 0.0
         """Simulated time, s, before the last pause that counts as part of the duration."""
         self._warned: str | None = None
+        self._timing: TimingMonitor | None = None
 
     def connect(self) -> None:
         """Compile the motion; publish the state, subscribe to forces and to the recorder."""
@@ -72,21 +73,12 @@ class PlantNode(ManagedNode[PlantParameters]):
         self._motion = Motion(self.parameters.as_drive(), initial.position, initial.velocity)
         self._moved = False
         self.elapsed = 0.0
-        self._disturbance = 0.0
         self._lock = threading.Lock()
-        self._state = self.read_last = self.advertise(JOINT_STATES)
-        self._truth = self._applied_force = None
-        if self.parameters.publish_truth:
-            self._truth = self.advertise(TRUE_JOINT_STATES)
-            self._applied_force = self.advertise(APPLIED_FORCE)
-        self._applied = self.advertise(APPLIED_DISTURBANCE)
+        self._topics = _SampleTopics(self)
+        self.read_last = self._topics.states
         self._dropped_force = self.advertise(DROPPED_FORCE)
         self._answerable = 0
         """Stamp of the sample that may still be answered while the plant pauses, ns."""
-        self._clock_time = self.advertise(CLOCK) if self.parameters.publish_clock else None
-        own = self.parameters.slide_name, self.parameters.belt_name
-        self._pack = joint_state_packer(*own)
-        self._pack_motor = joint_state_packer(*own, MOTOR)
         self.subscribe_serialized(CONTROL_FORCE, partial(self._on_force, unpack_wrench))
         unpack = partial(unpack_command, joint=self.parameters.slide_name)
         self.subscribe_serialized(JOINT_COMMANDS, partial(self._on_force, unpack))
@@ -96,10 +88,7 @@ class PlantNode(ManagedNode[PlantParameters]):
 
     def start(self) -> None:
         """Start a segment: sample 0 now, the following ones as the pacer advances."""
-        self._timing = TimingMonitor()
         self._superseded = 0
-        if self._disturbance:  # the recorder of the new segment has not received it
-            self._disturbance = nan
         parameters = self.parameters
         realtime = parameters.pace is Pace.REALTIME
         self._loop = parameters.as_loop(
@@ -108,6 +97,7 @@ class PlantNode(ManagedNode[PlantParameters]):
             hold_late=realtime,
             overtaken=lambda stamp, force: self._dropped_force.publish(pack_wrench(stamp, force)),
         )
+        self._topics.start(self._loop, effort_of_actuator=parameters.effort == "actuator")
         latest = END_OF_TIME - NANOSECONDS
         stampable = self._loop.stamps.number(latest) - 1
         if stampable < 0:
@@ -134,7 +124,7 @@ class PlantNode(ManagedNode[PlantParameters]):
         if parameters.last_sample is not None:
             due = parameters.last_sample - round(self.elapsed * parameters.rate)
             last = min(max(due, 0), stampable)
-        self._has_started = True
+        self._timing = TimingMonitor()
         self._pacer.start(last)
 
     def stop(self) -> None:
@@ -170,7 +160,7 @@ class PlantNode(ManagedNode[PlantParameters]):
 
     def diagnose(self) -> Diagnosis:
         """Return counts of samples, late and dropped forces and missed deadlines."""
-        if not self._has_started:
+        if self._timing is None:
             return OK, "", {}
         loop, pacer = self._loop, self._pacer
         values = {
@@ -211,32 +201,7 @@ class PlantNode(ManagedNode[PlantParameters]):
         return diagnosis(complaints, values)
 
     def _publish(self, sample: Sample) -> None:
-        self._state.publish(self._packed(sample))
-        if self._truth is not None and self._applied_force is not None:
-            self._truth.publish(self._packed(self._loop.true_sample))
-            self._applied_force.publish(pack_wrench(sample.stamp, self._loop.applied_force))
-        if self._loop.disturbance != self._disturbance:
-            self._disturbance = self._loop.disturbance
-            self._applied.publish(pack_wrench(sample.stamp, self._disturbance))
-        if self._clock_time is not None:
-            clock = Clock()
-            clock.clock.sec, clock.clock.nanosec = divmod(sample.stamp, NANOSECONDS)
-            self._clock_time.publish(clock)
-
-    def _packed(self, sample: Sample) -> bytes:
-        friction = sample.friction_force
-        by_actuator = self.parameters.effort == "actuator"
-        positions = sample.position, sample.belt_position
-        velocities = sample.velocity, sample.belt_velocity
-        efforts = (self._loop.applied_force if by_actuator else friction), -friction
-        if (motor := sample.motor) is None:
-            return self._pack(sample.stamp, positions, velocities, efforts)
-        return self._pack_motor(
-            sample.stamp,
-            (*positions, motor.position),
-            (*velocities, motor.velocity),
-            (*efforts, self._loop.applied_force),
-        )
+        self._topics.publish(sample)
 
     def _end(self) -> None:
         """Pause: the last sample was reached, or the motion cannot continue."""
@@ -295,6 +260,59 @@ class PlantNode(ManagedNode[PlantParameters]):
             self._motion.restart(initial.position, initial.velocity)
         response.success = True
         return response
+
+
+class _SampleTopics:
+    """Joint states and disturbances; if the parameters say so, what is true, and the clock."""
+
+    def __init__(self, node: ManagedNode[PlantParameters]) -> None:
+        """Advertise the topics through a node."""
+        parameters = node.parameters
+        self.states = node.advertise(JOINT_STATES)
+        self._truth: tuple[Publisher, Publisher] | None = None
+        if parameters.publish_truth:
+            self._truth = node.advertise(TRUE_JOINT_STATES), node.advertise(APPLIED_FORCE)
+        self._applied_disturbance = node.advertise(APPLIED_DISTURBANCE)
+        self._clock = node.advertise(CLOCK) if parameters.publish_clock else None
+        names = parameters.slide_name, parameters.belt_name
+        self._pack = joint_state_packer(*names)
+        self._pack_motor = joint_state_packer(*names, MOTOR)
+        self._disturbance = 0.0
+
+    def start(self, loop: SampledLoop, *, effort_of_actuator: bool) -> None:
+        """Publish the samples of a loop from now on, with friction or actuator as the effort."""
+        self._loop, self._effort_of_actuator = loop, effort_of_actuator
+        if self._disturbance:  # the recorder of the new segment has not received it
+            self._disturbance = nan
+
+    def publish(self, sample: Sample) -> None:
+        """Publish the newest sample of the loop."""
+        self.states.publish(self._packed(sample))
+        if self._truth is not None:
+            true_states, applied_force = self._truth
+            true_states.publish(self._packed(self._loop.true_sample))
+            applied_force.publish(pack_wrench(sample.stamp, self._loop.applied_force))
+        if self._loop.disturbance != self._disturbance:
+            self._disturbance = self._loop.disturbance
+            self._applied_disturbance.publish(pack_wrench(sample.stamp, self._disturbance))
+        if self._clock is not None:
+            clock = Clock()
+            clock.clock.sec, clock.clock.nanosec = divmod(sample.stamp, NANOSECONDS)
+            self._clock.publish(clock)
+
+    def _packed(self, sample: Sample) -> bytes:
+        friction = sample.friction_force
+        effort = self._loop.applied_force if self._effort_of_actuator else friction
+        positions = sample.position, sample.belt_position
+        velocities = sample.velocity, sample.belt_velocity
+        if (motor := sample.motor) is None:
+            return self._pack(sample.stamp, positions, velocities, (effort, -friction))
+        return self._pack_motor(
+            sample.stamp,
+            (*positions, motor.position),
+            (*velocities, motor.velocity),
+            (effort, -friction, self._loop.applied_force),
+        )
 
 
 def main() -> None:

@@ -37,7 +37,7 @@ def start(graph: Graph, threshold: float, **parameters: Any) -> tuple[Any, Hardw
     plant = graph.add(PlantNode, **{**own, **parameters})
     plant.trigger_configure()
     graph.wait_until(
-        lambda: interface.readers == 1 and plant._state.get_subscription_count() > 1, "matched"
+        lambda: interface.readers == 1 and plant.read_last.get_subscription_count() > 1, "matched"
     )
     return plant, interface
 
