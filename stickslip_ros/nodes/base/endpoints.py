@@ -1,9 +1,9 @@
 """Endpoints of topics in rclpy: message class, quality of service, what matches, what waits."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import cache
 from importlib import import_module
-from typing import Any
+from typing import Any, TypeVar
 
 from rclpy.duration import Duration, Infinite
 from rclpy.node import Node
@@ -20,6 +20,8 @@ from rclpy.subscription import Subscription
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from stickslip_ros.record.topics import DURABILITY, HISTORY, RELIABILITY, Topic
+
+ThingT = TypeVar("ThingT")
 
 
 def qos_profile(
@@ -103,6 +105,49 @@ class PollingNode(Node):
     def subscriptions(self) -> Iterator[Subscription]:
         """The subscriptions that the executor serves: those that are not polled."""
         return (s for s in super().subscriptions if s.callback is not _never_called)
+
+
+class KeepingNode(PollingNode):
+    """A node that keeps publishers, subscriptions, services and timers until it is cleaned up."""
+
+    def __init__(self, *arguments: Any, **options: Any) -> None:
+        """Make the node; the arguments are those of the next base class."""
+        super().__init__(*arguments, **options)
+        self.kept: list[Any] = []
+        """What it keeps, the oldest first."""
+
+    def keep(self, thing: ThingT) -> ThingT:
+        """Return a publisher, subscription, service or timer; cleaning up the node destroys it."""
+        self.kept.append(thing)
+        return thing
+
+    def release(self, thing: Any) -> None:
+        """Destroy an object of `keep` now."""
+        self.kept.remove(thing)
+        # The node must release it, too: an object that only destroys itself still gets messages.
+        destroyers = self.destroy_publisher, self.destroy_subscription, self.destroy_service
+        if not any(destroy(thing) for destroy in (*destroyers, self.destroy_timer)):
+            thing.destroy()
+
+    def advertise(self, topic: Topic[Any]) -> Publisher:
+        """Create a publisher of a topic, which lasts until the node is cleaned up.
+
+        It takes messages of the topic's type, or their serialized bytes.
+        """
+        kind = message_class(topic.type_name)
+        return self.keep(self.create_publisher(kind, topic.name, qos_profile(topic)))
+
+    def subscribe_serialized(
+        self, topic: Topic[Any], callback: Callable[[bytes], None], depth: int | None = None
+    ) -> Subscription:
+        """Pass the serialized messages of a topic to `callback` until the node is cleaned up."""
+        kind, qos = message_class(topic.type_name), qos_profile(topic, depth)
+        return self.keep(self.create_subscription(kind, topic.name, callback, qos, raw=True))
+
+    def release_all(self) -> None:
+        """Destroy all objects of `keep`."""
+        for thing in list(self.kept):
+            self.release(thing)
 
 
 def waiting_messages(subscription: Subscription) -> Iterator[bytes]:

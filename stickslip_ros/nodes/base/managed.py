@@ -20,7 +20,7 @@ from rclpy.timer import Timer
 
 from stickslip_ros.errors import BagError, InvalidInputError, StickslipError
 from stickslip_ros.nodes.base.endpoints import (
-    PollingNode,
+    KeepingNode,
     matching_readers,
     matching_writers,
     message_class,
@@ -36,7 +36,6 @@ Transition: TypeAlias = Any
 """A `TransitionCallbackReturn`, which is compiled and has no types."""
 
 MessageT = TypeVar("MessageT")
-ThingT = TypeVar("ThingT")
 
 Level = bytes
 OK: Level = DiagnosticStatus.OK
@@ -102,7 +101,7 @@ class DroppedMessages:
         return {"dropped_messages": self._number, "last_dropped": self._last or "none"}
 
 
-class ManagedNode(PollingNode, ParameterNode[ParametersT], ABC):
+class ManagedNode(KeepingNode, ParameterNode[ParametersT], ABC):
     """A managed (lifecycle) node whose parameters are one group.
 
     A subclass defines in `connect`, and optionally in `start` and `stop`, what it does when it is
@@ -119,7 +118,6 @@ class ManagedNode(PollingNode, ParameterNode[ParametersT], ABC):
         """Wall time, independent of simulated time."""
         self.dropped = DroppedMessages(self.get_logger())
         """Messages that the node has dropped since it was activated."""
-        self._kept: list[Any] = []
         self.read_last: Publisher | None = None
         """Publisher whose topic recorders subscribe to last; None if they read only one."""
         self._refusal = ""
@@ -143,7 +141,7 @@ class ManagedNode(PollingNode, ParameterNode[ParametersT], ABC):
 
     def stop(self) -> None:
         """Stop working (deactivate) once the messages sent have arrived."""
-        for publisher in self._kept:
+        for publisher in self.kept:
             if isinstance(publisher, Publisher):
                 publisher.wait_for_all_acked(Duration(seconds=1))
 
@@ -165,27 +163,6 @@ class ManagedNode(PollingNode, ParameterNode[ParametersT], ABC):
         """Call back from the executor, after its pending work. Any thread may call this."""
         if self.executor is not None:
             self.executor.create_task(callback)
-
-    def keep(self, thing: ThingT) -> ThingT:
-        """Return a publisher, subscription, service or timer; cleaning up the node destroys it."""
-        self._kept.append(thing)
-        return thing
-
-    def release(self, thing: Any) -> None:
-        """Destroy an object of `keep` now."""
-        self._kept.remove(thing)
-        # The node must release it, too: an object that only destroys itself still gets messages.
-        destroyers = self.destroy_publisher, self.destroy_subscription, self.destroy_service
-        if not any(destroy(thing) for destroy in (*destroyers, self.destroy_timer)):
-            thing.destroy()
-
-    def advertise(self, topic: Topic[Any]) -> Publisher:
-        """Create a publisher of a topic, which lasts until the node is cleaned up.
-
-        It takes messages of the topic's type, or their serialized bytes.
-        """
-        kind = message_class(topic.type_name)
-        return self.keep(self.create_publisher(kind, topic.name, qos_profile(topic)))
 
     def subscribe(
         self,
@@ -215,13 +192,6 @@ class ManagedNode(PollingNode, ParameterNode[ParametersT], ABC):
                 self.dropped.add(f"{topic.name.replace('_', ' ')}: {error}")
 
         return self.subscribe_serialized(topic, take, depth)
-
-    def subscribe_serialized(
-        self, topic: Topic[Any], callback: Callable[[bytes], None], depth: int | None = None
-    ) -> Subscription:
-        """Pass the serialized messages of a topic to `callback` until the node is cleaned up."""
-        kind, qos = message_class(topic.type_name), qos_profile(topic, depth)
-        return self.keep(self.create_subscription(kind, topic.name, callback, qos, raw=True))
 
     def publish_diagnostics(self) -> None:
         """Publish the node's health."""
@@ -290,17 +260,17 @@ class ManagedNode(PollingNode, ParameterNode[ParametersT], ABC):
 
     def on_cleanup(self, state: LifecycleState) -> Transition:
         """Disconnect."""
-        return self._transition(self._disconnect, "cleaned up")
+        return self._transition(self.release_all, "cleaned up")
 
     def on_shutdown(self, state: LifecycleState) -> Transition:
         """Stop if need be, and disconnect."""
         if self.active:
             self._transition(self._stop_and_tell)
-        return self._transition(self._disconnect)
+        return self._transition(self.release_all)
 
     def on_error(self, state: LifecycleState) -> Transition:
         """Disconnect, to start again."""
-        return self._transition(self._disconnect)
+        return self._transition(self.release_all)
 
     def _stop_and_tell(self) -> None:
         try:
@@ -308,10 +278,6 @@ class ManagedNode(PollingNode, ParameterNode[ParametersT], ABC):
             self.publish_diagnostics()
         finally:
             self.active = False
-
-    def _disconnect(self) -> None:
-        for thing in list(self._kept):
-            self.release(thing)
 
     def _transition(self, action: Callable[[], None], done: str = "") -> Transition:
         """Run the action of a transition, and log the new state."""
@@ -368,15 +334,15 @@ class ManagedNode(PollingNode, ParameterNode[ParametersT], ABC):
         waiting_for = {name.rsplit("/", 1)[-1] for name in self.parameters.wait_for}
         if not waiting_for:
             return ""
-        found = self.publishing_nodes()
+        peers = self.publishing_nodes()
         recorders = {
             writer.node_name for writer in self.get_publishers_info_by_topic(RECORDED.name)
         }
-        for end in self._kept:
+        for end in self.kept:
             if isinstance(end, Publisher):
                 readers = matching_readers(self, end)
                 known = {reader.node_name for reader in readers}
-                found |= known if self.read_last in (None, end) else known - recorders
+                peers |= known if self.read_last in (None, end) else known - recorders
                 matched = end.get_subscription_count() >= len(readers)
             elif isinstance(end, Subscription):
                 matched = end.get_publisher_count() >= len(matching_writers(self, end))
@@ -384,7 +350,7 @@ class ManagedNode(PollingNode, ParameterNode[ParametersT], ABC):
                 continue
             if not matched:
                 return f"{end.topic_name} is not yet matched"
-        absent = waiting_for - found
+        absent = waiting_for - peers
         return f"missing: {', '.join(sorted(absent))}" if absent else ""
 
 
