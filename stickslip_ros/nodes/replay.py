@@ -43,6 +43,8 @@ class ReplayNode(ManagedNode[ReplayParameters]):
     def __init__(self, **options: Any) -> None:
         super().__init__("replay", ReplayParameters(), **options)
         self._player: Player | None = None
+        self._recorded_time: int | None = None
+        """Recorded time of the newest message sent, ns."""
         self._waiting_for = ""
 
     def connect(self) -> None:
@@ -69,7 +71,7 @@ class ReplayNode(ManagedNode[ReplayParameters]):
 
     def start(self) -> None:
         """Publish the first message when the readers are complete, the others when due."""
-        self._clock_time: int | None = None
+        self._recorded_time = None
         self._player = Player(
             self._messages,
             self._publish,
@@ -109,9 +111,9 @@ class ReplayNode(ManagedNode[ReplayParameters]):
     @property
     def _position(self) -> float:
         """Recorded time from the first message of the bag to the last one sent, s."""
-        if self._player is None or self._player.sent == 0:
+        if self._recorded_time is None:
             return 0.0
-        return (self._player.recorded_time - self._selection.first) * 1e-9
+        return (self._recorded_time - self._selection.first) * 1e-9
 
     def _messages(self) -> Iterator[Message]:
         yield from self._selection.messages()
@@ -120,8 +122,9 @@ class ReplayNode(ManagedNode[ReplayParameters]):
             self.get_logger().warning(f"the bag is not complete: {lacking}", once=True)
 
     def _publish(self, message: Message, recorded_time: int) -> None:
-        if self._clock_writer is not None and recorded_time != self._clock_time:
-            self._clock_time = recorded_time
+        changed = recorded_time != self._recorded_time
+        self._recorded_time = recorded_time
+        if self._clock_writer is not None and changed:
             clock = Clock()
             clock.clock.sec, clock.clock.nanosec = divmod(recorded_time, NANOSECONDS)
             self._clock_writer.publish(clock)

@@ -104,8 +104,6 @@ class Player:
         """
         self.sent = 0
         """Messages sent."""
-        self.recorded_time = 0
-        """Log time, ns, of the newest message sent."""
         self.worst_lateness = 0.0
         """Largest delay of a message after its deadline, s."""
         self.complaint = ""
@@ -216,8 +214,7 @@ class Player:
                 if window is not None and window.full:
                     self._await_recorder(window)
                     continue
-                self.recorded_time = self._timeline.now
-                self._send(message, self.recorded_time)
+                self._send(message, self._timeline.now)
                 self.sent += 1
                 self.worst_lateness = max(self.worst_lateness, lateness)
                 if window is not None:
