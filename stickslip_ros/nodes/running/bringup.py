@@ -104,6 +104,26 @@ def run_nodes(
         return supervisor.run(bag, composed)
 
 
+class _ManagedNodes:
+    """Requests states and transitions of nodes; keeps which of them were activated."""
+
+    def __init__(self, spinner: Spinner, node: Node) -> None:
+        self.active: list[str] = []
+        self._spinner, self._node = spinner, node
+        self._clients: dict[str, LifecycleClient] = {}
+
+    def client(self, name: str) -> LifecycleClient:
+        if name not in self._clients:
+            self._clients[name] = LifecycleClient(self._spinner, self._node, name, 15.0)
+        return self._clients[name]
+
+    def change_state(self, name: str, transition: int) -> bool:
+        done = self.client(name).change_state(transition)
+        if done and transition == Transition.TRANSITION_ACTIVATE:
+            self.active.append(name)
+        return done
+
+
 class _Supervisor:
     """Starts the nodes of a run, changes their states, monitors them and ends them."""
 
@@ -131,8 +151,7 @@ class _Supervisor:
         self._spinner.is_cut_short = self._is_ended
         self._search = ControllerSearch(self._node, namespace, ("analyzer", "plant"))
         self._processes = ChildProcesses()
-        self._clients: dict[str, LifecycleClient] = {}
-        self._active: list[str] = []
+        self._managed = _ManagedNodes(self._spinner, self._node)
         self._monitor = RunMonitor(
             self._node, fail=self._fail, notify=notify, on_simulated_time=on_simulated_time
         )
@@ -168,13 +187,15 @@ class _Supervisor:
                 # A client that exists before the node appears is discovered along with the rest of
                 # this process; one that is created later may take a second or two.
                 for node in nodes:
-                    self._client(node)
+                    self._managed.client(node)
                 self._bring_up(nodes)
             self._spinner.spin_until(lambda: self._monitor.finished, period=0.03)
         finally:
             self._bring_down()
         if self._failure is not None:
-            raise (RunError if "analyzer" in self._active else NothingRecordedError)(self._failure)
+            raise (RunError if "analyzer" in self._managed.active else NothingRecordedError)(
+                self._failure
+            )
         failure = self._monitor.recording_failure
         return RunOutcome(self._stop.done(), self._monitor.plant, self._controller, failure)
 
@@ -220,7 +241,7 @@ class _Supervisor:
 
     def _configure(self, nodes: Iterable[str]) -> None:
         """Configure all nodes at the same time."""
-        clients = [self._client(node) for node in nodes]
+        clients = [self._managed.client(node) for node in nodes]
         for client in clients:
             client.start_change(Transition.TRANSITION_CONFIGURE)
         self._spinner.spin_until(
@@ -233,9 +254,10 @@ class _Supervisor:
         """Take a node through a transition; repeat the request while it waits for other nodes."""
         name, refusals = full_name(self._namespace, node), self._monitor.refusals
         ready = self._spinner.spin_until(
-            lambda: self._change_state(node, transition) or bool(refusals.get(name)),
+            lambda: self._managed.change_state(node, transition) or bool(refusals.get(name)),
             _READY_TIMEOUT,
-            period=0.02,
+            # Only an activation waits for others; a node logs each request that it must refuse.
+            period=0.02 if transition == Transition.TRANSITION_ACTIVATE else 0.5,
         )
         if refusals.get(name):
             self._fail(f"{node} could not start: {refusals[name]}")
@@ -295,22 +317,22 @@ class _Supervisor:
 
         A managed controller that this run started takes one step towards its active state.
         """
-        found, managed = self._search.controllers(), self._search.managed()
+        controllers, managed = self._search.controllers(), self._search.managed()
         # Before it is configured, it may have no topics: only its namespace identifies it.
         namespace = self._namespace.rstrip("/")
         candidates = [node for node in managed if node.rpartition("/")[0] == namespace]
         problems = list(self._search.near_misses())
-        for node in dict.fromkeys([*found, *candidates]):
-            if node in found and not (active and node in managed):
+        for node in dict.fromkeys([*controllers, *candidates]):
+            if node in controllers and not (active and node in managed):
                 return node, []
-            state = self._client(node).state()
+            state = self._managed.client(node).state()
             if state == ACTIVE:
-                if node in found:
+                if node in controllers:
                     return node, []
                 continue
             problems.append(f"the managed node {node} is {state or 'silent'}")
             if self._user_controller and state in NEXT_TRANSITION:
-                self._change_state(node, NEXT_TRANSITION[state])
+                self._managed.change_state(node, NEXT_TRANSITION[state])
         return None, problems
 
     def _bring_down(self) -> None:
@@ -320,7 +342,7 @@ class _Supervisor:
         """
         self._monitor.ending = True
         self._spinner.is_cut_short = self._hurry.done
-        for node in reversed(self._active):
+        for node in reversed(self._managed.active):
             if node == "analyzer":
                 self._let_the_analyzer_catch_up()
             finished = node == "plant" and self._monitor.finished
@@ -348,22 +370,11 @@ class _Supervisor:
 
     def _deactivate(self, node: str) -> None:
         """Deactivate a node if it is active; a user's may not answer an invalid request."""
-        state = self._client(node).state()
+        state = self._managed.client(node).state()
         if state == ACTIVE:
-            self._change_state(node, Transition.TRANSITION_DEACTIVATE)
+            self._managed.change_state(node, Transition.TRANSITION_DEACTIVATE)
         elif not state and not self._hurry.done():
             self._notify(f"the node {node} does not answer")
-
-    def _change_state(self, node: str, transition: int) -> bool:
-        done = self._client(node).change_state(transition)
-        if done and transition == Transition.TRANSITION_ACTIVATE:
-            self._active.append(node)
-        return done
-
-    def _client(self, node: str) -> LifecycleClient:
-        if node not in self._clients:
-            self._clients[node] = LifecycleClient(self._spinner, self._node, node, 15.0)
-        return self._clients[node]
 
     def _is_dead(self, node: str) -> bool:
         return node in self._processes.ended()

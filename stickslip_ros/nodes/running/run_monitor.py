@@ -57,9 +57,7 @@ class RunMonitor:
         """Whether the analyzer has published its last values after it was active."""
         self.refusals: dict[str, str] = {}
         """Why the last transition of each node has failed, by full name; empty if it has not."""
-        self._plant_name, self._analyzer_name = (
-            full_name(node.get_namespace(), name) for name in ("plant", "analyzer")
-        )
+        self._namespace = node.get_namespace()
         self._paused = self._forecast_told = False
         self._first_recorded: int | None = None
         node.create_subscription(
@@ -76,10 +74,10 @@ class RunMonitor:
         for status in message.status:
             values = {entry.key: entry.value for entry in status.values}
             self.refusals[status.name] = values.get(REFUSAL, "")
-            if status.name == self._plant_name:
+            if status.name == full_name(self._namespace, "plant"):
                 self.plant = values
                 self._follow_plant(values.get(STATE))
-            elif status.name == self._analyzer_name:
+            elif status.name == full_name(self._namespace, "analyzer"):
                 self.recording_failure = values.get(FAILURE, self.recording_failure)
                 self.recording_ended |= values.get(STATE) == "deactivating"
 
