@@ -34,7 +34,7 @@ class Forecast:
         if self.sentence or number < self._next:
             return
         now, last = time.monotonic(), min(number, self._last)
-        self._waits += [now - self._due(each) for each in range(self._next, last + 1)]
+        self._waits += [now - self._due(sample) for sample in range(self._next, last + 1)]
         self._next = last + 1
         if number >= self._last:
             self.sentence = forecast(self._waits, self._rate)
@@ -47,10 +47,10 @@ def forecast(waits: Sequence[float], rate: float) -> str:
     rate that would do has a period that 99 % of them do not exceed. It has one significant digit.
     """
     late = float(np.mean(np.array(waits) * rate > 1.0))
-    told = f"{quantity(rate, 'Hz')}: about {percentage(late)} of the forces will be late"
+    outlook = f"{quantity(rate, 'Hz')}: about {percentage(late)} of the forces will be late"
     if late <= NOTABLE_SHARE:
-        return told
+        return outlook
     longest = float(np.quantile(waits, 1.0 - NOTABLE_SHARE, method="higher"))
     enough = (1.0 + 1e-9) / longest  # rounding must not cost a digit
     digit = 10.0 ** floor(log10(enough))
-    return f"{told}; {quantity(floor(enough / digit) * digit, 'Hz')} would do"
+    return f"{outlook}; {quantity(floor(enough / digit) * digit, 'Hz')} would do"

@@ -166,14 +166,12 @@ class LockstepPacer(Pacer):
     ) -> None:
         super().__init__(loop, publish, end)
         self._node = node
-        own = node.parameters
-        self._reply_timeout = own.reply_timeout
-        self._holds = own.command_rule == "newest"
-        self._silence = own.command_timeout if self._holds else own.reply_timeout
+        parameters = node.parameters
+        self._reply_timeout = parameters.reply_timeout
+        self._holds = parameters.command_rule == "newest"
+        self._silence = parameters.command_timeout if self._holds else parameters.reply_timeout
         recorded = node.resolve_topic_name(RECORDED.name)
-        self._flow = FlowWindow(
-            node.parameters.flow_window, lambda: node.count_publishers(recorded) > 0
-        )
+        self._flow = FlowWindow(parameters.flow_window, lambda: node.count_publishers(recorded) > 0)
         self._scheduled = False
         self._seen = -1
         self._held_up = 0.0

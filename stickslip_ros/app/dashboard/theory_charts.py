@@ -35,12 +35,12 @@ _DIGITS = 5
 """Significant digits of what is sent to the page."""
 
 
-def bifurcation_chart(found: BifurcationBranches, drive: Drive) -> Options:
+def bifurcation_chart(branches: BifurcationBranches, drive: Drive) -> Options:
     """Return least and greatest displacement over the belt speed, and the present belt speed."""
     units = Units.for_drive(drive)
-    branches = (*found.equilibria, *found.cycles)
-    speeds = [branch.belt_speeds for branch in branches]
-    reaches = [side for branch in branches for side in (branch.least, branch.greatest)]
+    limit_sets = (*branches.equilibria, *branches.cycles)
+    speeds = [branch.belt_speeds for branch in limit_sets]
+    reaches = [side for branch in limit_sets for side in (branch.least, branch.greatest)]
     speed, speed_label = units.axis(units.plain("belt speed"), "m/s", *speeds)
     reach, reach_label = units.axis(units.plain("displacement"), "m", *reaches)
 
@@ -49,30 +49,30 @@ def bifurcation_chart(found: BifurcationBranches, drive: Drive) -> Options:
         style = "solid" if branch.stable else "dashed"
         return _line(name, branch.belt_speeds / speed, side / reach, colour, style, width=2.0)
 
-    series = [drawn(each, "equilibrium", GREEN, each.greatest) for each in found.equilibria]
-    for branch in found.cycles:
+    series = [drawn(b, "equilibrium", GREEN, b.greatest) for b in branches.equilibria]
+    for branch in branches.cycles:
         series += [drawn(branch, "cycle", ORANGE, s) for s in (branch.least, branch.greatest)]
     # Marks may be close to each other: their texts stand on different sides.
-    marks = [(each.belt_speed / speed, "Hopf", GREY, _RIGHT_OF_IT) for each in found.hopf_points]
-    if found.sticking_onset is not None:
-        marks.append((found.sticking_onset / speed, "stick-slip onset", GREY, _LEFT_OF_IT))
+    marks = [(hopf.belt_speed / speed, "Hopf", GREY, _RIGHT_OF_IT) for hopf in branches.hopf_points]
+    if branches.sticking_onset is not None:
+        marks.append((branches.sticking_onset / speed, "stick-slip onset", GREY, _LEFT_OF_IT))
     series.append(_verticals([*marks, (drive.belt_speed / speed, "now", BLUE, _ABOVE_IT)]))
-    names = dict.fromkeys(each["name"] for each in series if each.get("name"))
+    names = dict.fromkeys(s["name"] for s in series if s.get("name"))
     return _options(speed_label, reach_label, series, legend=list(names))
 
 
-def stability_chart(found: StabilityMap, drive: Drive, gains: Washout | None) -> Options:
+def stability_chart(stability: StabilityMap, drive: Drive, gains: Washout | None) -> Options:
     """Return the limit of stability over the gains, and the present gains, if any, as a point."""
     units = Units.for_drive(drive)
-    gain, label = units.axis(units.plain("linear gain"), "N s/m", found.linear_gains)
-    corners, linear = found.corner_frequencies, found.linear_gains / gain
-    contours: Any = contour_generator(corners, linear, found.decay_rates.T)
-    fastest = float(np.nanmax(found.decay_rates, initial=0.0))
+    gain, label = units.axis(units.plain("linear gain"), "N s/m", stability.linear_gains)
+    corners, linear = stability.corner_frequencies, stability.linear_gains / gain
+    contours: Any = contour_generator(corners, linear, stability.decay_rates.T)
+    fastest = float(np.nanmax(stability.decay_rates, initial=0.0))
     series = [
-        _line("limit of stability", each[:, 0], each[:, 1], ORANGE, width=2.5)
-        for each in contours.lines(0.0)
+        _line("limit of stability", contour[:, 0], contour[:, 1], ORANGE, width=2.5)
+        for contour in contours.lines(0.0)
     ]
-    continuous = found.continuous / gain
+    continuous = stability.continuous / gain
     inside = (continuous >= linear[0]) & (continuous <= linear[-1])
     shown = np.where(inside, continuous, np.nan)
     series.append(_line("limit, not sampled", corners, shown, GREY, "dashed"))
@@ -83,40 +83,40 @@ def stability_chart(found: StabilityMap, drive: Drive, gains: Washout | None) ->
             level = float(f"{share * fastest:.1g}")
             name = f"decay rate {level:g} {units.of_unit('1/s')}".rstrip()
             series += [
-                _line(name, each[:, 0], each[:, 1], SKY_BLUE, style, width=1.2)
-                for each in contours.lines(level)
+                _line(name, contour[:, 0], contour[:, 1], SKY_BLUE, style, width=1.2)
+                for contour in contours.lines(level)
             ]
-    series += [_region(text, *place) for text, place in _regions(found, linear)]
+    series += [_region(text, *place) for text, place in _regions(stability, linear)]
     options = _options(
         units.label(units.plain("cutoff frequency"), "rad/s"),
         label,
         series,
-        legend=list(dict.fromkeys(each["name"] for each in series if each["name"])),
+        legend=list(dict.fromkeys(s["name"] for s in series if s["name"])),
     )
     options["xAxis"] |= {"type": "log", "min": float(corners[0]), "max": float(corners[-1])}
     options["yAxis"] |= {"min": float(linear[0]), "max": float(linear[-1])}
     return options
 
 
-def friction_chart(found: FrictionCurve, drive: Drive) -> Options:
+def friction_chart(curve: FrictionCurve, drive: Drive) -> Options:
     """Return the friction curve and the operating point.
 
     The second series is for the loop of a law with a memory, which page.js draws.
     """
     units = Units.for_drive(drive)
     relative = units.plain("velocity relative to the belt")
-    speed, label = units.axis(relative, "m/s", found.relative_speed)
-    series = [_line("in steady slip", found.relative_speed / speed, found.coefficient, GREY)]
+    speed, label = units.axis(relative, "m/s", curve.relative_speed)
+    series = [_line("in steady slip", curve.relative_speed / speed, curve.coefficient, GREY)]
     if drive.friction.states:
         series.append(line("motion", BLUE))
     if drive.belt_speed:
         rest = float(drive.friction.at_rest(drive.belt_speed))
         series.append(_point("slide at rest", -drive.belt_speed / speed, rest))
-    names = [each["name"] for each in series]
+    names = [s["name"] for s in series]
     return _options(label, units.plain("friction coefficient"), series, names)
 
 
-def decay_chart(found: Decay, drive: Drive) -> Options:
+def decay_chart(decay: Decay, drive: Drive) -> Options:
     """Return the exponents of the sampled loop: deviations decay left of the dotted line.
 
     Exponents that are much faster than the drive itself are left out.
@@ -125,27 +125,27 @@ def decay_chart(found: Decay, drive: Drive) -> Options:
     reach = _LARGEST_EXPONENT * drive.angular_frequency
     series: list[Options] = []
     for name, values, colour, symbol in (
-        ("without control", found.uncontrolled, ORANGE, "triangle"),
-        ("with control", found.controlled, BLUE, "circle"),
+        ("without control", decay.uncontrolled, ORANGE, "triangle"),
+        ("with control", decay.controlled, BLUE, "circle"),
     ):
         places = [[_number(s.real), _number(s.imag)] for s in values if abs(s) < reach]
         if places:
             series.append(points(name, colour, 10, symbol) | {"data": places})
     series.append(_verticals([(0.0, "limit of stability", GREY, _LEFT_OF_IT)]))
-    names = [str(each["name"]) for each in series if each["name"]]
+    names = [str(s["name"]) for s in series if s["name"]]
     real, imaginary = (units.label(f"{part} part", unit) for part, unit in _PARTS)
     return _options(real, imaginary, series, names)
 
 
-def _regions(found: StabilityMap, linear: Any) -> Iterable[tuple[str, tuple[float, float]]]:
+def _regions(stability: StabilityMap, linear: Any) -> Iterable[tuple[str, tuple[float, float]]]:
     """Yield "stable" and "unstable", each with the median place of its region."""
     for text, inside in (
-        ("stable", found.decay_rates > 0.0),
-        ("unstable", found.decay_rates < 0.0),
+        ("stable", stability.decay_rates > 0.0),
+        ("unstable", stability.decay_rates < 0.0),
     ):
         rows, columns = np.nonzero(inside)
         if len(rows) > 20:
-            corner = found.corner_frequencies[int(np.median(rows))]
+            corner = stability.corner_frequencies[int(np.median(rows))]
             yield text, (float(corner), float(linear[int(np.median(columns))]))
 
 

@@ -320,9 +320,9 @@ def set_parameters(
 
 def _not_found(node: Node, name: str) -> str:
     elsewhere = sorted(
-        full_name(namespace, found)
-        for found, namespace in node.get_node_names_and_namespaces()
-        if found == name
+        full_name(namespace, running)
+        for running, namespace in node.get_node_names_and_namespaces()
+        if running == name
     )
     what = f"no node {full_name(node.get_namespace(), name)} is running"
     return f"{what}; running: {', '.join(elsewhere)}" if elsewhere else what

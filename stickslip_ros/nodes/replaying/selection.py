@@ -63,7 +63,7 @@ class Selection:
         self._parameters = parameters
         if not parameters.bag:
             raise self._refused("bag = ''", "must be the path of a bag")
-        given = {each.name: getattr(parameters, each.name) for each in fields(BagLayout)}
+        given = {field.name: getattr(parameters, field.name) for field in fields(BagLayout)}
         self._layout = BagLayout(**{name: value for name, value in given.items() if value})
         self._converted = self._layout != ANY_LAYOUT or parameters.belt_speed != 0.0
         with self._opened() as recording:
@@ -90,8 +90,8 @@ class Selection:
             self.lacking = [*recording.missing, *recording.notes]
 
     def _opened(self) -> Recording:
-        own = self._parameters
-        return Recording(Path(own.bag), belt_speed=own.belt_speed, layout=self._layout)
+        belt_speed = self._parameters.belt_speed
+        return Recording(Path(self._parameters.bag), belt_speed=belt_speed, layout=self._layout)
 
     def _recorded(self, recording: Recording, *topics: str) -> Iterator[Message]:
         """Yield the messages of the bag, or its motion and forces as those of our plant."""
@@ -100,14 +100,17 @@ class Selection:
             return
         states, forces = self._types
         for block in recording.blocks():
-            own, control = block.joint_states, block.control_forces
-            motion = own.stamp, own.position, own.velocity, own.belt_position, own.belt_velocity
+            samples, control = block.joint_states, block.control_forces
+            motion = (
+                *(samples.stamp, samples.position, samples.velocity),
+                *(samples.belt_position, samples.belt_velocity),
+            )
             messages: list[Message] = []
             if states in topics:
                 messages += [
                     (states, stamp, pack_joint_state(stamp, (x, belt), (v, belt_v), (nan, nan)))
                     for stamp, x, v, belt, belt_v in zip(
-                        *(each.tolist() for each in motion), strict=True
+                        *(column.tolist() for column in motion), strict=True
                     )
                 ]
             if forces in topics:
