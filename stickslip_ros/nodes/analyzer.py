@@ -17,8 +17,7 @@ from std_msgs.msg import Float64
 from stickslip_ros.measures.cycle_measures import trend_text
 from stickslip_ros.nodes.analyzing.incoming import Incoming, Message, recorded_topics
 from stickslip_ros.nodes.analyzing.live_bag import LiveBag
-from stickslip_ros.nodes.analyzing.live_measures import LiveMeasures
-from stickslip_ros.nodes.analyzing.plant_timing import PlantTiming
+from stickslip_ros.nodes.analyzing.live_measures import LiveMeasures, PlantTiming
 from stickslip_ros.nodes.base.clients import ANSWER_TIME, ParameterCalls
 from stickslip_ros.nodes.base.endpoints import waiting_messages
 from stickslip_ros.nodes.base.managed import ERROR, FAILURE, OK, Diagnosis, ManagedNode, diagnosis

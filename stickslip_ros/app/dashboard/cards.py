@@ -35,7 +35,6 @@ class CyclesCard:
     """Chart of the cycles, and the measures of the last one."""
 
     def __init__(self, run: RunState) -> None:
-        """Add the card."""
         self._run = run
         with card("Cycles"):
             self.chart = chart(CYCLES, "amplitude and stick fraction of each cycle")
@@ -68,7 +67,6 @@ class ControlCard:
     """Switch of the controller, impulse, reset and pause, each with the reason of a refusal."""
 
     def __init__(self, run: RunState, requests: Requests, impulse: Impulse) -> None:
-        """Add the card."""
         self._run, self._requests, self._impulse = run, requests, impulse
         self.busy = False
         """Whether the controller is being switched."""
@@ -151,7 +149,6 @@ class NodesCard:
     """State and health of each node, and all values of its diagnostics."""
 
     def __init__(self, run: RunState) -> None:
-        """Add the card."""
         self._run = run
         with card("Nodes"):
             self._table = table(node="node", state="state", health="health")
@@ -180,7 +177,6 @@ class EventsCard:
     """The last events, the newest first."""
 
     def __init__(self, run: RunState) -> None:
-        """Add the card."""
         self._run = run
         self._newest = 0.0
         with card("Events"):

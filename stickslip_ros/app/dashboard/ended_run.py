@@ -109,7 +109,6 @@ class EndNotice:
     """The part of a page that is there once the run has ended."""
 
     def __init__(self, ended: EndedRun, listener: ListenerNode) -> None:
-        """Add it, hidden."""
         self._ended, self._listener = ended, listener
         self._shown = self._final = False
         self._client = ui.context.client

@@ -1,5 +1,6 @@
-"""Measures of a run that goes on, from its messages; no ROS graph."""
+"""Measures and timing of a run while it goes on, from its messages; no ROS graph."""
 
+import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from functools import partial
@@ -8,6 +9,7 @@ from threading import Thread
 from typing import Any
 
 import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray
 
 from stickslip_ros.arrays import IntArray
 from stickslip_ros.errors import BagError, InvalidInputError
@@ -17,9 +19,11 @@ from stickslip_ros.measures.onset_watch import OnsetWatch
 from stickslip_ros.measures.ring_down import RingDown
 from stickslip_ros.measures.run_meter import RunMeter
 from stickslip_ros.measures.sample_assumptions import SampleAssumptions
+from stickslip_ros.measures.timing import Timing
 from stickslip_ros.model.drive import Drive
 from stickslip_ros.nodes.analyzing.incoming import Message
-from stickslip_ros.nodes.base.managed import DroppedMessages
+from stickslip_ros.nodes.base.clients import NEXT_TRANSITION
+from stickslip_ros.nodes.base.managed import FIRST_STAMP, STATE, DroppedMessages
 from stickslip_ros.record.bag_layout import BagLayout
 from stickslip_ros.record.cdr import Messages, Refused, joined
 from stickslip_ros.record.codec import force_layouts, wrenches_in
@@ -28,7 +32,7 @@ from stickslip_ros.record.motion_reader import MotionReader
 from stickslip_ros.record.topics import CONTROL_FORCE, DROPPED_FORCE, JOINT_STATES, Topic
 from stickslip_ros.samples import NO_FORCES, NO_SAMPLES, ForceColumns
 from stickslip_ros.scenarios.parameters import AnalyzerParameters
-from stickslip_ros.text import quantity
+from stickslip_ros.text import number_in, quantity
 
 
 class LiveMeasures:
@@ -123,6 +127,41 @@ class LiveMeasures:
         if refused.number > 0:
             self._dropped.add(f"{topic.name}: {refused.reason}", refused.number)
         return values
+
+
+class PlantTiming:
+    """Adds up the counts of a plant over its activations.
+
+    What a paused plant repeats is left out: it may be from before this recording.
+    """
+
+    def __init__(self, plant: str) -> None:
+        """Count from now on; `plant` is the full name of the node."""
+        self._plant, self._since = plant, time.time_ns()
+        self._activations: dict[str, Timing] = {}
+
+    @property
+    def total(self) -> Timing | None:
+        """The counts of all activations; None if there is none."""
+        counts = self._activations.values()
+        return Timing(*map(sum, zip(*counts, strict=True))) if counts else None
+
+    @property
+    def complete(self) -> bool:
+        """Whether all counts are of this recording: the plant started while it went on.
+
+        The stamps of lockstep are no time of day, and do not tell that.
+        """
+        return all(number_in(first) >= self._since for first in self._activations)
+
+    def take(self, health: DiagnosticArray) -> None:
+        """Take the counts of the plant's activation, if they are there."""
+        for status in health.status:
+            values = {entry.key: entry.value for entry in status.values}
+            paused = values.get(STATE) in NEXT_TRANSITION
+            if status.name == self._plant and FIRST_STAMP in values and not paused:
+                counts = (int(number_in(values.get(name, ""))) for name in Timing._fields)
+                self._activations[values[FIRST_STAMP]] = Timing(*counts)
 
 
 def _read_wrenches(messages: Messages, _: IntArray) -> tuple[ForceColumns, Refused]:
