@@ -161,8 +161,8 @@ class _Page:
         self._empty.set_visibility(not known)
         self._board.set_visibility(known)
         self._header.refresh(switching=self._control.busy, settings=self._settings.described())
-        for card_of_page in self._cards:
-            card_of_page.refresh()
+        for part in self._cards:
+            part.refresh()
 
 
 def _say_how_to_start(namespace: str) -> None:
