@@ -112,9 +112,10 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         self._keep_timing()
         self._bag.keep("stickslip_ros/report", report)
         self._bag.close()
-        # With a failure the report is in no bag.
-        log = self.get_logger().warning if self._bag.failure else self.get_logger().info
-        log(f"report: {json.dumps(report)}")
+        if self._bag.failure:  # then the report is in no bag
+            self.get_logger().warning(f"report: {json.dumps(report)}")
+        else:  # a logger allows one severity for each line of code
+            self.get_logger().info(f"report: {json.dumps(report)}")
 
     def publishing_nodes(self) -> set[str]:
         """Return the nodes that publish the recorded topics."""

@@ -428,6 +428,7 @@ def test_on_a_full_disk_it_says_so_and_goes_on_measuring(graph: Graph, tmp_path:
     analyzer.trigger_activate()
     run()
     graph.deactivate("analyzer")
+    assert analyzer.lifecycle_state == "inactive"
     report = report_of_recording(tmp_path / "bag_2")
     assert report["complete"]
     assert report["samples"] == 6001
