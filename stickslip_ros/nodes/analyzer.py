@@ -75,8 +75,8 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         self._bag.open(self.parameters, [t for t in topics if t not in RECORDED_IF_PUBLISHED])
         # The plant waits for the recorder while this publisher exists.
         self._recorded = self.advertise(RECORDED)
-        self._nodes = ParameterCalls(self, self._take_parameters)
-        self._nodes.ask("plant")
+        self._parameter_calls = ParameterCalls(self, self._take_parameters)
+        self._parameter_calls.ask("plant")
         self._incoming = Incoming(self, topics)
         self._timing = PlantTiming(full_name(self.get_namespace(), "plant"))
         self._look_for_controllers()
@@ -108,7 +108,7 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         self._incoming.close()
         for end in (self._recorded, *self._periodic):
             self.release(end)
-        self._nodes.close()
+        self._parameter_calls.close()
         self._keep_timing()
         self._bag.keep("stickslip_ros/report", report)
         self._bag.close()
@@ -173,7 +173,7 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
 
         Until then no sample counts as recorded: a short run would be over without them.
         """
-        return time.monotonic() - self._heard_at > ANSWER_TIME or self._nodes.pursue()
+        return time.monotonic() - self._heard_at > ANSWER_TIME or self._parameter_calls.pursue()
 
     def _take_parameters(self, node: str, values: Mapping[str, Any]) -> None:
         self._bag.keep_parameters(node, values)
@@ -188,8 +188,8 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         for publisher in self.get_publishers_info_by_topic(CONTROL_FORCE.name):
             node = publisher.node_name
             here = publisher.node_namespace == self.get_namespace() and node in NODE_PARAMETERS
-            if here and node not in self._nodes:
-                self._nodes.ask(node)
+            if here and node not in self._parameter_calls:
+                self._parameter_calls.ask(node)
 
     def _note_timing(self, health: DiagnosticArray) -> None:
         """Keep the plant's counts of late forces and missed deadlines once they change."""
@@ -227,7 +227,7 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
             self._log_measures()
         self._incoming.match_publishers()
         self._look_for_controllers()
-        self._nodes.pursue()
+        self._parameter_calls.pursue()
 
     def _tell(self, topic: Topic[Any], value: float) -> None:
         """Publish a number of the stability, and record it with the stamp of the newest sample."""

@@ -272,7 +272,7 @@ def test_no_sample_counts_as_recorded_before_the_parameters_are(
     answered: list[bool] = []
 
     def note(_: object) -> None:
-        answered.append(analyzer._nodes.has_answered("plant"))
+        answered.append(analyzer._parameter_calls.has_answered("plant"))
 
     graph.subscribe(RECORDED, note)
     graph.add(PlantNode, autostart=False)

@@ -52,7 +52,7 @@ class ListenerNode(PollingNode):
         self.requests = Requests(self, run)
         self.impulse = Impulse(self, run, self._take_samples)
         self._show = show
-        self._calls = ParameterCalls(self, run.take_parameters)
+        self._parameter_calls = ParameterCalls(self, run.take_parameters)
         self._states = self._listen_loosely(JOINT_STATES)
         self._forces = self._listen_loosely(CONTROL_FORCE)
         self._dropped_forces = self._listen_loosely(DROPPED_FORCE)
@@ -106,11 +106,11 @@ class ListenerNode(PollingNode):
     def _watch(self) -> None:
         """Continue pending requests; mark nodes that have become silent."""
         self.requests.pursue()
-        self._calls.pursue()
+        self._parameter_calls.pursue()
         matched = self._parameter_events.get_publisher_count()
         if matched != self._parameter_writers:
             self._parameter_writers = matched
-            self._calls.ask_again()  # earlier changes were not received
+            self._parameter_calls.ask_again()  # earlier changes were not received
         self.run.mark_silent()
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
@@ -119,7 +119,7 @@ class ListenerNode(PollingNode):
             node = status.name.removeprefix(here)
             changed = status.name.startswith(here) and self.run.take_status(node, status)
             if changed and node in NODE_PARAMETERS:
-                self._calls.ask(node)
+                self._parameter_calls.ask(node)
 
     def _on_parameter_event(self, event: ParameterEvent) -> None:
         here = full_name(self.get_namespace(), "")
@@ -130,8 +130,8 @@ class ListenerNode(PollingNode):
             with suppress(RuntimeError):  # a type that ROS does not know
                 values = {p.name: parameter_value_to_python(p.value) for p in changed}
             self.run.take_changes(node, values)
-            if node in self._calls and not self._calls.has_answered(node):
-                self._calls.ask(node)  # its answer may be outdated
+            if node in self._parameter_calls and not self._parameter_calls.has_answered(node):
+                self._parameter_calls.ask(node)  # its answer may be outdated
 
     def _on_cycle(self, topic: Topic[Any], message: Float64) -> None:
         self.run.take_cycle(topic, message.data)

@@ -151,7 +151,7 @@ class _Supervisor:
         self._spinner.is_cut_short = self._is_ended
         self._search = ControllerSearch(self._node, namespace, ("analyzer", "plant"))
         self._processes = ChildProcesses()
-        self._managed = _ManagedNodes(self._spinner, self._node)
+        self._nodes = _ManagedNodes(self._spinner, self._node)
         self._monitor = RunMonitor(
             self._node, fail=self._fail, notify=notify, on_simulated_time=on_simulated_time
         )
@@ -187,13 +187,13 @@ class _Supervisor:
                 # A client that exists before the node appears is discovered along with the rest of
                 # this process; one that is created later may take a second or two.
                 for node in nodes:
-                    self._managed.client(node)
+                    self._nodes.client(node)
                 self._bring_up(nodes)
             self._spinner.spin_until(lambda: self._monitor.finished, period=0.03)
         finally:
             self._bring_down()
         if self._failure is not None:
-            raise (RunError if "analyzer" in self._managed.active else NothingRecordedError)(
+            raise (RunError if "analyzer" in self._nodes.active else NothingRecordedError)(
                 self._failure
             )
         failure = self._monitor.recording_failure
@@ -241,7 +241,7 @@ class _Supervisor:
 
     def _configure(self, nodes: Iterable[str]) -> None:
         """Configure all nodes at the same time."""
-        clients = [self._managed.client(node) for node in nodes]
+        clients = [self._nodes.client(node) for node in nodes]
         for client in clients:
             client.start_change(Transition.TRANSITION_CONFIGURE)
         self._spinner.spin_until(
@@ -254,7 +254,7 @@ class _Supervisor:
         """Take a node through a transition; repeat the request while it waits for other nodes."""
         name, refusals = full_name(self._namespace, node), self._monitor.refusals
         ready = self._spinner.spin_until(
-            lambda: self._managed.change_state(node, transition) or bool(refusals.get(name)),
+            lambda: self._nodes.change_state(node, transition) or bool(refusals.get(name)),
             _READY_TIMEOUT,
             # Only an activation waits for others; a node logs each request that it must refuse.
             period=0.02 if transition == Transition.TRANSITION_ACTIVATE else 0.5,
@@ -325,14 +325,14 @@ class _Supervisor:
         for node in dict.fromkeys([*controllers, *candidates]):
             if node in controllers and not (active and node in managed):
                 return node, []
-            state = self._managed.client(node).state()
+            state = self._nodes.client(node).state()
             if state == ACTIVE:
                 if node in controllers:
                     return node, []
                 continue
             problems.append(f"the managed node {node} is {state or 'silent'}")
             if self._user_controller and state in NEXT_TRANSITION:
-                self._managed.change_state(node, NEXT_TRANSITION[state])
+                self._nodes.change_state(node, NEXT_TRANSITION[state])
         return None, problems
 
     def _bring_down(self) -> None:
@@ -342,7 +342,7 @@ class _Supervisor:
         """
         self._monitor.ending = True
         self._spinner.is_cut_short = self._hurry.done
-        for node in reversed(self._managed.active):
+        for node in reversed(self._nodes.active):
             if node == "analyzer":
                 self._let_the_analyzer_catch_up()
             finished = node == "plant" and self._monitor.finished
@@ -370,9 +370,9 @@ class _Supervisor:
 
     def _deactivate(self, node: str) -> None:
         """Deactivate a node if it is active; a user's may not answer an invalid request."""
-        state = self._managed.client(node).state()
+        state = self._nodes.client(node).state()
         if state == ACTIVE:
-            self._managed.change_state(node, Transition.TRANSITION_DEACTIVATE)
+            self._nodes.change_state(node, Transition.TRANSITION_DEACTIVATE)
         elif not state and not self._hurry.done():
             self._notify(f"the node {node} does not answer")
 
