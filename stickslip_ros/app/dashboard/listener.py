@@ -48,9 +48,10 @@ class ListenerNode(PollingNode):
         States, forces and dropped forces are passed to `show`, in blocks.
         """
         super().__init__(DASHBOARD, namespace=run.namespace, context=context)
+        clock = steady_clock(self)
         self.run = run
         self.requests = Requests(self, run)
-        self.impulse = Impulse(self, run, self._take_samples)
+        self.impulse = Impulse(self, clock, run, self._take_samples)
         self._show = show
         self._parameter_calls = ParameterCalls(self, run.take_parameters)
         self._states = self._listen_loosely(JOINT_STATES)
@@ -71,7 +72,6 @@ class ListenerNode(PollingNode):
             qos_profile_parameter_events,
         )
         self._parameter_writers = 0
-        clock = steady_clock(self)
         self.create_timer(0.02, self._take_samples, clock=clock)
         self.create_timer(0.1, self._watch, clock=clock)
 

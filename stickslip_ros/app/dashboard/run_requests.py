@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 from geometry_msgs.msg import WrenchStamped
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
+from rclpy.clock import Clock
 from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.timer import Timer
@@ -23,7 +24,6 @@ from stickslip_ros.nodes.base.clients import (
     transition_request,
 )
 from stickslip_ros.nodes.base.endpoints import qos_profile
-from stickslip_ros.nodes.base.spinner import steady_clock
 from stickslip_ros.record.codec import pack_wrench
 from stickslip_ros.record.topics import DISTURBANCE_FORCE
 from stickslip_ros.stamps import NANOSECONDS
@@ -132,9 +132,12 @@ class Requests:
 class Impulse:
     """A force on the slide for a simulated time."""
 
-    def __init__(self, node: Node, run: RunState, take_samples: Callable[[], None]) -> None:
-        """Publish through a node; `take_samples` brings the `run` up to date."""
-        self._node, self._run, self._take_samples = node, run, take_samples
+    def __init__(
+        self, node: Node, clock: Clock, run: RunState, take_samples: Callable[[], None]
+    ) -> None:
+        """Publish through a node with a steady clock; `take_samples` brings `run` up to date."""
+        self._node, self._clock, self._run = node, clock, run
+        self._take_samples = take_samples
         self._force = node.create_publisher(
             WrenchStamped, DISTURBANCE_FORCE.name, qos_profile(DISTURBANCE_FORCE)
         )
@@ -163,8 +166,7 @@ class Impulse:
             push, lasting = units.text(force, "N"), units.text(duration, "s")
             self._run.add_event(f"impulse of {push} for {lasting}", push)
             if self._timer is None:
-                clock = steady_clock(self._node)
-                self._timer = self._node.create_timer(0.002, self._take_samples, clock=clock)
+                self._timer = self._node.create_timer(0.002, self._take_samples, clock=self._clock)
             _settle(answer, "")
 
         _call_soon(self._node, begin)
