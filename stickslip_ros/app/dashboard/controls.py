@@ -238,8 +238,9 @@ class ParametersCard:
             with self._column:
                 self._fields = [SliderField(run, requests, name) for name in main_parameters(law)]
                 self._fields.append(OtherParameter(run, requests, other_parameters(law)))
+        units = run.units
         for field in self._fields:
-            field.refresh(run.units)
+            field.refresh(units)
 
 
 @dataclass(frozen=True)
