@@ -69,7 +69,7 @@ class AxisTask:
         found: list[Regression] = []
         self.limit.begin_stage(_CANDIDATES_TIME)
         for each in laws:
-            if each.memory or not each.of_slip:
+            if each.memory or not each.identifiable_in_slip:
                 continue
             if found and self.limit.is_over:
                 self.left.append(each.name)

@@ -154,7 +154,7 @@ class Fit(ABC):
     @property
     def size(self) -> int:
         """Number of fitted constants."""
-        return len(self.point) + (self.law.deflection > 0.0)
+        return len(self.point) + (self.law.one_way.deflection > 0.0)
 
     @property
     def by_direction(self) -> bool:

@@ -1,6 +1,7 @@
 """What identification must know of a friction law."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from math import inf, sqrt
 from typing import Any
 
@@ -28,21 +29,51 @@ DELAY = "force_delay"
 """Name of the constant that is not one of the drive: the time until a force acts, s."""
 LAG = "actuator.time_constant"
 """Name of the time constant of the lag of the force, s."""
-_SEARCHED = {
-    **dict.fromkeys(("mass", "stiffness"), (1.0 / 30.0, 30.0)),
-    DELAY: (-1.0, 1.0),
-    LAG: (0.0, 1.0),
-    "bias_force": (-inf, inf),
-    "viscous": (-30.0, 30.0),
-    "bristle_stiffness": (1.0, 3000.0),
-    "bristle_damping": (0.0, 3000.0),
-    **dict.fromkeys(("rise", "damping"), (0.0, inf)),
-}
-"""Smallest and largest value of a coordinate in a search, in sizes of where it begins."""
-_SPEEDS = 0.01, 10.0
-"""The same of speeds of a curve: what it does far below or above what was recorded is not told."""
 REVERSE = "reverse."
 """Start of the names of coordinates of backward slip where both directions have their own."""
+
+
+@dataclass(frozen=True)
+class Coordinate:
+    """What a search knows of a coordinate by its name."""
+
+    unit: str = ""
+    """Unit, from which its typical size follows; empty: that is its own value."""
+    low: float = _LEAST_SHARE
+    """Smallest value in a search, in sizes of where it begins."""
+    high: float = inf
+    """Largest value, likewise."""
+    of_memory: bool = False
+    """Whether it is a constant of the memory of a law."""
+
+
+_COORDINATES = {
+    **dict.fromkeys(("mass", "stiffness"), Coordinate("", 1.0 / 30.0, 30.0)),
+    DELAY: Coordinate("s", -1.0, 1.0),
+    LAG: Coordinate("s", 0.0, 1.0),
+    "bias_force": Coordinate("N", -inf),
+    "rise": Coordinate("N", 0.0),
+    "damping": Coordinate("N s/m", 0.0),
+    "viscous": Coordinate("N s/m", -30.0, 30.0),
+    "bristle_stiffness": Coordinate("N/m", 1.0, 3000.0, of_memory=True),
+    "bristle_damping": Coordinate("N s/m", 0.0, 3000.0, of_memory=True),
+}
+"""Coordinates by name; others are speeds, forces, or have no scale."""
+
+
+@dataclass(frozen=True)
+class Straightening:
+    """Coordinates in which fits are nearly linear, in a search in place of those of the same names.
+
+    They replace these where all are free. Both functions take the fastest speed, too.
+    """
+
+    bounds: Mapping[str, tuple[float, float] | None]
+    """Bounds of each; None: those that the law has for the name."""
+    to_search: Callable[[Values, float], dict[str, float]]
+    """Returns coordinates with these in place."""
+    from_search: Callable[[Values, float], dict[str, float]]
+    """Returns the others again; they may be ones that the law refuses."""
 
 
 class IdentifiedLaw:
@@ -56,6 +87,14 @@ class IdentifiedLaw:
 
     name: str
     """Name of the friction law."""
+    coordinates: Sequence[str]
+    """Names of the coordinates: those of the constants, and `rise` for `static`."""
+    unscaled: Sequence[str] = ()
+    """Coordinates that do not scale with the normal force, such as speeds."""
+    smallest: str
+    """Coordinate of the smallest friction."""
+
+    # Of the regression:
     least: Sequence[float]
     """Smallest value of each unknown force: 0 or minus infinity."""
     shaped: bool = False
@@ -66,23 +105,21 @@ class IdentifiedLaw:
     """Speeds of the points that stand for a curve, m/s; None: those recorded."""
     deflection: float = 0.0
     """Path over which friction follows a change of direction or speed, m; 0: immediately."""
-    coordinates: Sequence[str]
-    """Names of the coordinates: those of the constants, and `rise` for `static`."""
-    unscaled: Sequence[str] = ()
-    """Coordinates that do not scale with the normal force, such as speeds."""
-    smallest: str
-    """Coordinate of the smallest friction."""
-    memory: Sequence[str] = ()
-    """Coordinates of the memory of the law."""
-    of_slip: bool = True
+    identifiable_in_slip: bool = True
     """Whether friction in slip tells all constants."""
+
+    # Of the search:
     optional: Sequence[str] = ()
     """Coordinates that are fitted only if the records ask for them."""
     by_differences: Sequence[str] = ()
     """Coordinates on which the motion depends other than by its equations."""
-    straightened: Mapping[str, tuple[float, float] | None] = {}
-    """Coordinates that, where all of them are free, the search replaces by others of the same
-    names, in which fits are nearly linear; with their bounds, if these are not `bounds`."""
+    straightening: Straightening | None = None
+    """Other coordinates for the search, if it is slow in its own."""
+
+    @property
+    def memory(self) -> Sequence[str]:
+        """Coordinates of the memory of the law."""
+        return [name for name in self.coordinates if self._coordinate(name).of_memory]
 
     def terms(self, speed: FloatArray, shape: float) -> FloatArray:
         """Return the terms, rows of shape (rows, terms); `speed` is |v_r| and `shape` in m/s.
@@ -100,8 +137,8 @@ class IdentifiedLaw:
         not is the shape.
         """
         scaled = [name for name in self.coordinates if name not in self.unscaled]
-        own = dict(zip(scaled, forces, strict=False))  # a memory is none of friction in slip
-        return own | dict.fromkeys(self.unscaled, shape)
+        values = dict(zip(scaled, forces, strict=False))  # a memory is none of friction in slip
+        return values | dict.fromkeys(self.unscaled, shape)
 
     @property
     def one_way(self) -> "IdentifiedLaw":
@@ -110,26 +147,27 @@ class IdentifiedLaw:
 
     def joined(self, directions: Sequence[Values]) -> dict[str, float]:
         """Return the coordinates of one direction, or of forward and backward slip."""
-        first, *others = directions
-        return {**first, **{REVERSE + name: each[name] for each in others for name in each}}
+        forward, *reverse = directions
+        others = {REVERSE + name: value for way in reverse for name, value in way.items()}
+        return {**forward, **others}
 
     def start(self, values: Values, smallest: float) -> dict[str, float]:
         """Return coordinates from which a search can start: inside of their bounds.
 
         `smallest` is the smallest static friction, N.
         """
-        found = dict(values)
-        if "rise" in found:
-            least = LEAST_RISE * max(self.static_force(found), smallest)
-            static = max(self.static_force(found), least)
-            found["rise"] = min(max(found["rise"], least), static - least)
-            found[self.smallest] = static - found["rise"]
+        start = dict(values)
+        if "rise" in start:
+            least = LEAST_RISE * max(self.static_force(start), smallest)
+            static = max(self.static_force(start), least)
+            start["rise"] = min(max(start["rise"], least), static - least)
+            start[self.smallest] = static - start["rise"]
         else:
-            found[self.smallest] = max(found[self.smallest], smallest)
-        if "viscous" in found:
+            start[self.smallest] = max(start[self.smallest], smallest)
+        if "viscous" in start:
             # A law without viscous friction has other equations, not a derivative by it.
-            found["viscous"] = found["viscous"] or _LEAST_SHARE * found[self.smallest]
-        return found
+            start["viscous"] = start["viscous"] or _LEAST_SHARE * start[self.smallest]
+        return start
 
     def starts(self, values: Values, fastest: float) -> Sequence[Values]:
         """Return the coordinates from which searches of trajectories start.
@@ -148,11 +186,11 @@ class IdentifiedLaw:
         """Return the law of coordinates."""
         kind: Any = LAWS[self.name]
         has_static = "static" in constants_of(kind)
-        own = {"static": self.static_force(values) / normal_force} if has_static else {}
+        constants = {"static": self.static_force(values) / normal_force} if has_static else {}
         for name in self.coordinates:
             if name != "rise":
-                own[name] = values[name] / (1.0 if name in self.unscaled else normal_force)
-        return kind(**own)
+                constants[name] = values[name] / (1.0 if name in self.unscaled else normal_force)
+        return kind(**constants)
 
     def following(self, curve: FrictionLaw, values: Values, normal_force: float) -> FrictionLaw:
         """Return the law whose memory follows a curve."""
@@ -177,13 +215,13 @@ class IdentifiedLaw:
         A table has none. Of a law that is followed a few deflections are tried: its constants
         have no error, and are left out.
         """
-        own = {*self.coordinates, DELAY}
-        found = {name: value for name, value in values.items() if name not in own}
-        if self.deflection > 0.0:
-            return found
+        others = {*self.coordinates, DELAY}
+        constants = {name: value for name, value in values.items() if name not in others}
+        if self.one_way.deflection > 0.0:
+            return constants
         for group, law in by_group(self.friction(values, normal_force)).items():
-            found |= {group + name: value for name, value in numbers_of(law).items()}
-        return found
+            constants |= {group + name: value for name, value in numbers_of(law).items()}
+        return constants
 
     @property
     def fixable(self) -> Sequence[str]:
@@ -195,31 +233,30 @@ class IdentifiedLaw:
 
         The fastest speed is that relative to the belt in the records, m/s.
         """
-        other = _SPEEDS if name.endswith("_speed") else (_LEAST_SHARE, inf)
-        low, high = _SEARCHED.get(name, other)
-        size = self.size(name, values, fastest)
-        return low * size, high * size
+        coordinate, size = self._coordinate(name), self.size(name, values, fastest)
+        return coordinate.low * size, coordinate.high * size
 
     def size(self, name: str, values: Values, fastest: float) -> float:
         """Return a typical size of a coordinate, above 0, from which differences are made."""
+        match self._coordinate(name).unit:
+            case "N":
+                return self.static_force(values)
+            case "N s/m":
+                return self.static_force(values) / fastest
+            case "N/m":
+                return values["stiffness"]
+            case "m/s":
+                return fastest
+            case "s":
+                return sqrt(values["mass"] / values["stiffness"])
+            case _:
+                return max(abs(values[name]), np.finfo(float).tiny)
+
+    def _coordinate(self, name: str) -> Coordinate:
         if name.endswith("_speed"):
-            return fastest
-        if name in (DELAY, LAG):
-            return sqrt(values["mass"] / values["stiffness"])
-        if name in ("mass", "stiffness", *self.unscaled):
-            return max(abs(values[name]), np.finfo(float).tiny)
-        if name == "bristle_stiffness":
-            return values["stiffness"]
-        static = self.static_force(values)
-        return static / fastest if name in ("viscous", "damping", "bristle_damping") else static
-
-    def to_search(self, values: Values, fastest: float) -> dict[str, float]:
-        """Return the coordinates with those in place that `straightened` names."""
-        return dict(values)
-
-    def from_search(self, found: Values, fastest: float) -> dict[str, float]:
-        """Return the coordinates of `to_search`, which may be ones that the law refuses."""
-        return dict(found)
+            # What a curve does far below or above the recorded speeds is not identifiable.
+            return Coordinate("m/s", 0.01, 10.0)
+        return _COORDINATES.get(name) or Coordinate("" if name in self.unscaled else "N")
 
 
 def label_of(law: IdentifiedLaw) -> str:
@@ -238,7 +275,7 @@ def numbers_of(law: FrictionLaw) -> dict[str, float]:
     """Return the constants of a law that are one number, those of the curve that it follows too."""
     if isinstance(law, Table):
         return {}
-    own = {name: getattr(law, name) for name in constants_of(type(law))}
+    constants = {name: getattr(law, name) for name in constants_of(type(law))}
     if isinstance(law, CurveFollower):
-        own |= numbers_of(law.curve)
-    return {name: value for name, value in own.items() if isinstance(value, int | float)}
+        constants |= numbers_of(law.curve)
+    return {name: value for name, value in constants.items() if isinstance(value, int | float)}

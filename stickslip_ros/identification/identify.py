@@ -108,7 +108,7 @@ def identify(
     if (
         not spring
         and law not in (AUTO, *AXIS_LAWS)
-        and any(own.memory or not own.of_slip for own in laws)
+        and any(each.memory or not each.identifiable_in_slip for each in laws)
     ):
         raise InvalidInputError(
             f"law {law} is refused for a drive without a spring: must be one of {AUTO}, "

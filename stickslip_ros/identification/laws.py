@@ -7,7 +7,13 @@ import numpy as np
 from typing_extensions import override
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.identification.identified_law import LEAST_RISE, REVERSE, IdentifiedLaw, Values
+from stickslip_ros.identification.identified_law import (
+    LEAST_RISE,
+    REVERSE,
+    IdentifiedLaw,
+    Straightening,
+    Values,
+)
 from stickslip_ros.model.friction import Directional, FrictionLaw, Table
 
 _LEAST_FRICTION = 0.01
@@ -42,7 +48,7 @@ class StictionAdapter(CoulombAdapter):
     name = "stiction"
     coordinates: Sequence[str] = ("kinetic", "rise", "viscous")
     smallest = "kinetic"
-    of_slip = False
+    identifiable_in_slip = False
 
     @override
     def coordinates_of(self, forces: Sequence[float], shape: float) -> dict[str, float]:
@@ -66,7 +72,6 @@ class DahlAdapter(CoulombAdapter):
     name = "dahl"
     least = (0.0,)
     coordinates: Sequence[str] = ("static", "bristle_stiffness")
-    memory: Sequence[str] = ("bristle_stiffness",)
 
     @override
     def terms(self, speed: FloatArray, shape: float) -> FloatArray:
@@ -88,6 +93,32 @@ class StribeckAdapter(IdentifiedLaw):
     smallest = "minimum"
 
 
+def _by_forces(values: Values, fastest: float) -> dict[str, float]:
+    """Return coordinates of the exponential law with forces in place."""
+    sag = values["rise"] * _sag(values, fastest)
+    end = values["kinetic"] + values["rise"] * _decay(values, fastest)
+    end += values["viscous"] * fastest
+    return {**values, "viscous": values["kinetic"] + values["rise"], "kinetic": end, "rise": sag}
+
+
+def _from_forces(searched: Values, fastest: float) -> dict[str, float]:
+    """Return the coordinates of `_by_forces`."""
+    rise = searched["rise"] / _sag(searched, fastest)
+    kinetic = searched["viscous"] - rise
+    viscous = (searched["kinetic"] - kinetic - rise * _decay(searched, fastest)) / fastest
+    return {**searched, "viscous": viscous, "kinetic": kinetic, "rise": rise}
+
+
+def _decay(values: Values, speed: float) -> float:
+    """Return exp(-(w/v_s)^n) at a speed."""
+    return exp(-((speed / values["decay_speed"]) ** values["exponent"]))
+
+
+def _sag(values: Values, fastest: float) -> float:
+    """Return how far it is below its chord from rest to the fastest speed, at a third of that."""
+    return 1.0 + (_decay(values, fastest) - 1.0) / 3.0 - _decay(values, fastest / 3.0)
+
+
 class ExponentialAdapter(IdentifiedLaw):
     """F = F_k + D exp(-(w/v_s)^n) + F_v w; the viscous force may be negative.
 
@@ -107,12 +138,11 @@ class ExponentialAdapter(IdentifiedLaw):
     # An exponent that is a whole number makes other equations.
     by_differences: Sequence[str] = ("exponent",)
     smallest = "kinetic"
-    straightened: Mapping[str, tuple[float, float] | None] = {
-        "kinetic": (-inf, inf),
-        "rise": None,
-        "decay_speed": None,
-        "viscous": (0.0, inf),
-    }
+    straightening = Straightening(
+        {"kinetic": (-inf, inf), "rise": None, "decay_speed": None, "viscous": (0.0, inf)},
+        _by_forces,
+        _from_forces,
+    )
 
     @override
     def coordinates_of(self, forces: Sequence[float], shape: float) -> dict[str, float]:
@@ -125,20 +155,6 @@ class ExponentialAdapter(IdentifiedLaw):
     @override
     def bounds(self, name: str, values: Values, fastest: float) -> tuple[float, float]:
         return _EXPONENTS if name == "exponent" else super().bounds(name, values, fastest)
-
-    @override
-    def to_search(self, values: Values, fastest: float) -> dict[str, float]:
-        sag = values["rise"] * _sag(values, fastest)
-        end = values["kinetic"] + values["rise"] * _decay(values, fastest)
-        end += values["viscous"] * fastest
-        return {**values, "viscous": self.static_force(values), "kinetic": end, "rise": sag}
-
-    @override
-    def from_search(self, found: Values, fastest: float) -> dict[str, float]:
-        rise = found["rise"] / _sag(found, fastest)
-        kinetic = found["viscous"] - rise
-        viscous = (found["kinetic"] - kinetic - rise * _decay(found, fastest)) / fastest
-        return {**found, "viscous": viscous, "kinetic": kinetic, "rise": rise}
 
 
 class TableAdapter(IdentifiedLaw):
@@ -164,8 +180,8 @@ class TableAdapter(IdentifiedLaw):
         self.by_differences = self.coordinates
         self.deflection = deflection
         if deflection > 0.0:
-            self.name, self.memory = "lugre", _BRISTLES
-            self.coordinates = [*self.coordinates, *self.memory]
+            self.name = "lugre"
+            self.coordinates = [*self.coordinates, *_BRISTLES]
 
     @override
     def terms(self, speed: FloatArray, shape: float) -> FloatArray:
@@ -175,19 +191,20 @@ class TableAdapter(IdentifiedLaw):
 
     @override
     def coordinates_of(self, forces: Sequence[float], shape: float) -> dict[str, float]:
-        found = self.terms(self._points, shape) @ np.array(forces)
-        return dict(zip(self.coordinates, found.tolist(), strict=False))
+        curve = self.terms(self._points, shape) @ np.array(forces)
+        return dict(zip(self.coordinates, curve.tolist(), strict=False))
 
     @override
     def joined(self, directions: Sequence[Values]) -> dict[str, float]:
         if self.deflection > 0.0:
             # A law has one contact: the mean friction of both directions is that of its stiffness.
-            mean = float(np.mean([max(0.0, *each.values()) for each in directions]))
-            bristles = dict(zip(self.memory, (mean / self.deflection, 0.0), strict=True))
+            mean = float(np.mean([max(0.0, *way.values()) for way in directions]))
+            bristles = dict(zip(_BRISTLES, (mean / self.deflection, 0.0), strict=True))
             # Bristles need friction to deflect.
             least = _LEAST_FRICTION * mean
             directions = [
-                {name: max(each[name], least) for name in each} | bristles for each in directions
+                {name: max(force, least) for name, force in way.items()} | bristles
+                for way in directions
             ]
         return super().joined(directions)
 
@@ -200,7 +217,7 @@ class TableAdapter(IdentifiedLaw):
     def friction(self, values: Values, normal_force: float) -> FrictionLaw:
         forces = zip(self._points.tolist(), self.coordinates, strict=False)
         curve = Table(tuple((w, max(values[name], 0.0) / normal_force) for w, name in forces))
-        return self.following(curve, values, normal_force) if self.memory else curve
+        return self.following(curve, values, normal_force) if self.deflection else curve
 
 
 class SaturatingAdapter(TableAdapter):
@@ -219,15 +236,11 @@ class SaturatingAdapter(TableAdapter):
         return np.column_stack([np.ones_like(speed), 1.0 - np.exp(-speed / shape), speed])
 
 
-class BristleAdapter(ExponentialAdapter):
-    """A law with a memory that follows an exponential curve."""
+class LuGreAdapter(ExponentialAdapter):
+    """The LuGre law, which follows an exponential curve."""
 
-    def __init__(
-        self, name: str, memory: Sequence[str], by_differences: Sequence[str] = ()
-    ) -> None:
-        self.name, self.memory = name, memory
-        self.by_differences = (*ExponentialAdapter.by_differences, *by_differences)
-        self.coordinates = (*ExponentialAdapter.coordinates, *memory)
+    name = "lugre"
+    coordinates: Sequence[str] = (*ExponentialAdapter.coordinates, *_BRISTLES)
 
     @override
     def terms(self, speed: FloatArray, shape: float) -> FloatArray:
@@ -243,42 +256,56 @@ class BristleAdapter(ExponentialAdapter):
         return self.following(EXPONENTIAL.friction(values, normal_force), values, normal_force)
 
 
+class ElastoPlasticAdapter(LuGreAdapter):
+    """The elasto-plastic law, whose elastic limit is made from the smallest friction."""
+
+    name = "elasto_plastic"
+    by_differences: Sequence[str] = (*LuGreAdapter.by_differences, "kinetic")
+
+
+class MaxwellSlipAdapter(LuGreAdapter):
+    """The Maxwell-slip law, whose elements have no damping."""
+
+    name = "maxwell_slip"
+    coordinates: Sequence[str] = (*ExponentialAdapter.coordinates, "bristle_stiffness")
+
+
 class DirectionalAdapter(IdentifiedLaw):
     """A law that has constants of its own in each direction of slip."""
 
-    def __init__(self, own: IdentifiedLaw) -> None:
+    def __init__(self, law: IdentifiedLaw) -> None:
         """Take the adapter of each direction."""
-        self.own, self.name, self.deflection = own, own.name, own.deflection
+        self._law, self.name = law, law.name
         self.coordinates, self.optional, self.by_differences, self.unscaled = (
             [*names, *(REVERSE + name for name in names)]
-            for names in (own.coordinates, own.optional, own.by_differences, own.unscaled)
+            for names in (law.coordinates, law.optional, law.by_differences, law.unscaled)
         )
 
     @property
     @override
     def one_way(self) -> IdentifiedLaw:
-        return self.own
+        return self._law
 
     @override
     def static_force(self, values: Values) -> float:
         """Return the larger static friction, N."""
-        return max(self.own.static_force(each) for each in _by_direction(values))
+        return max(map(self._law.static_force, _by_direction(values)))
 
     @override
     def friction(self, values: Values, normal_force: float) -> FrictionLaw:
         both = _by_direction(values)
-        return Directional(*(self.own.friction(each, normal_force) for each in both))
+        return Directional(*(self._law.friction(way, normal_force) for way in both))
 
     @override
     def bounds(self, name: str, values: Values, fastest: float) -> tuple[float, float]:
-        own = _by_direction(values)[name.startswith(REVERSE)]
-        return self.own.bounds(name.removeprefix(REVERSE), own, fastest)
+        way = _by_direction(values)[name.startswith(REVERSE)]
+        return self._law.bounds(name.removeprefix(REVERSE), way, fastest)
 
     @override
     def size(self, name: str, values: Values, fastest: float) -> float:
         # Both directions are of a size.
-        larger = max(_by_direction(values), key=self.own.static_force)
-        return self.own.size(name.removeprefix(REVERSE), larger, fastest)
+        larger = max(_by_direction(values), key=self._law.static_force)
+        return self._law.size(name.removeprefix(REVERSE), larger, fastest)
 
 
 def _bristle_starts(values: Values) -> Sequence[Values]:
@@ -301,18 +328,8 @@ def _by_direction(values: Values) -> tuple[Values, Values]:
     return values, {**values, **reverse}
 
 
-def _decay(values: Values, speed: float) -> float:
-    """Return exp(-(w/v_s)^n) at a speed."""
-    return exp(-((speed / values["decay_speed"]) ** values["exponent"]))
-
-
-def _sag(values: Values, fastest: float) -> float:
-    """Return how far it is below its chord from rest to the fastest speed, at a third of that."""
-    return 1.0 + (_decay(values, fastest) - 1.0) / 3.0 - _decay(values, fastest / 3.0)
-
-
 EXPONENTIAL = ExponentialAdapter()
-LUGRE = BristleAdapter("lugre", _BRISTLES)
+LUGRE = LuGreAdapter()
 DAHL = DahlAdapter()
 COMPETING: Sequence[IdentifiedLaw] = (
     CoulombAdapter(),
@@ -321,10 +338,9 @@ COMPETING: Sequence[IdentifiedLaw] = (
     EXPONENTIAL,
     LUGRE,
     DAHL,
-    # Its elastic limit is made from the smallest friction.
-    BristleAdapter("elasto_plastic", _BRISTLES, ("kinetic",)),
-    BristleAdapter("maxwell_slip", ("bristle_stiffness",)),
+    ElastoPlasticAdapter(),
+    MaxwellSlipAdapter(),
 )
 """Laws that compete, the simpler ones first. Those after LuGre are searched from what it gives."""
-KNOWN_LAWS: Mapping[str, IdentifiedLaw] = {each.name: each for each in COMPETING}
+KNOWN_LAWS: Mapping[str, IdentifiedLaw] = {law.name: law for law in COMPETING}
 """All laws with constants by their name."""

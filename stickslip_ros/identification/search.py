@@ -72,10 +72,12 @@ class _Search:
         law, fastest = task.law, task.fastest
         self._task, self._free, self._values = task, free, values
         self._scale = 1.0 / (1e-3 * float(np.ptp(task.positions)))
-        self._straight = law.straightened if {*law.straightened} <= {*free} else {}
-        to_search = law.to_search(values, fastest) if self._straight else values
+        straight = law.straightening
+        self._straight = straight if straight and {*straight.bounds} <= {*free} else None
+        to_search = self._straight.to_search(values, fastest) if self._straight else values
         first = np.array([to_search[name] for name in free])
-        bounds = [self._straight.get(name) or law.bounds(name, values, fastest) for name in free]
+        known = self._straight.bounds if self._straight else {}
+        bounds = [known.get(name) or law.bounds(name, values, fastest) for name in free]
         self.bounds = np.array(bounds, float).reshape(-1, 2).T
         """Smallest and largest values of a point, shape (2, coordinates)."""
         # No more than a part of narrow bounds that the start is far away from.
@@ -115,7 +117,7 @@ class _Search:
     def _coordinates(self, point: FloatArray) -> dict[str, float]:
         """Return all coordinates at a point."""
         found = {**self._values, **dict(zip(self._free, point.tolist(), strict=True))}
-        return self._task.law.from_search(found, self._task.fastest) if self._straight else found
+        return self._straight.from_search(found, self._task.fastest) if self._straight else found
 
     def _by_point(self, point: FloatArray) -> FloatArray:
         """Return the derivatives of the coordinates by those of the search."""
