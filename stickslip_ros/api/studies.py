@@ -23,7 +23,7 @@ from stickslip_ros.quantities import Quantity, number_of
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.scenarios.keywords import described, keyword_of, parameter_of
 from stickslip_ros.show.parameter_tables import scenario_tables
-from stickslip_ros.show.quantities import STUDY
+from stickslip_ros.show.quantities import FURTHER
 from stickslip_ros.show.study_tables import attractor_name, basin_table, sweep_table, units_of
 from stickslip_ros.studies import transitions as theory
 from stickslip_ros.studies.basin import (
@@ -34,12 +34,12 @@ from stickslip_ros.studies.basin import (
     basin_study,
     default_axes,
 )
-from stickslip_ros.studies.columns import Columns, json_entries, write_csv
+from stickslip_ros.studies.columns import COLUMNS, Columns, json_entries, write_csv
 from stickslip_ros.studies.options import BASIN_COUNT, BASIN_OPTIONS
 from stickslip_ros.studies.plan import Axis, Continuation, Grid, ListedAxis, RandomSample
 from stickslip_ros.studies.runner import CountPoints, compute_columns
 from stickslip_ros.studies.settling import SettlingOptions
-from stickslip_ros.studies.study import COLUMNS, Study, sweep_study
+from stickslip_ros.studies.study import Study, sweep_study
 from stickslip_ros.text import shown
 
 if TYPE_CHECKING:
@@ -86,8 +86,10 @@ class Points(TabularResult):
 
     @override
     def _entries(self) -> dict[str, Any]:
-        columns = json_entries(self.study, self.columns, self.further)
-        return {**self.scenario.provenance(), **self._found(), **columns}
+        studied = self.study.as_dict()
+        studied.pop("scenario")
+        columns = json_entries(self.columns, self.further)
+        return {**self.scenario.provenance(), **self._found(), **studied, **columns}
 
     def _table(self) -> Table:
         columns, plan = self.columns, self.study.plan
@@ -102,7 +104,7 @@ class Points(TabularResult):
                 dimensions = {"direction": [*map(str, plan.directions)], **dimensions}
         found |= {**self.further, **{name: getattr(columns, name) for name in COLUMNS}}
         found["regime"] = np.array([each and str(each) for each in columns.regime], dtype=object)
-        quantities |= {name: STUDY[name] for name in (*self.further, *COLUMNS)}
+        quantities |= {name: FURTHER[name] for name in self.further} | COLUMNS
         units = units_of(self.study)
         return Table(found, quantities, units, dimensions, attributes(self.scenario))
 

@@ -37,14 +37,11 @@ MEASURES = {
 }
 """Measures and counts of a run, in the order of its table."""
 
-STUDY = _OF_CYCLES | {
-    "steady": Quantity("whether the motion has settled"),
-    "turning_points": Quantity("displacement where the velocity is zero", "m"),
-    "reason": Quantity("why there is no cycle"),
+FURTHER = {
     "direction": Quantity("direction in which it is carried on"),
     "attractor": Quantity("place in the attractors, from 0"),
 }
-"""Columns of a study, in addition to the values of the parameters."""
+"""Columns that a table of some studies has in addition to `COLUMNS` of `studies/columns.py`."""
 
 COLOURS = ("regime", *quantities_of(CycleMeasures))
 """What the map of a sweep can show in colour."""

@@ -12,10 +12,10 @@ from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.show.measure_table import measure_table
 from stickslip_ros.show.quantities import THEORY, Units
 from stickslip_ros.studies.basin import Attractor, Basins
-from stickslip_ros.studies.columns import Columns
+from stickslip_ros.studies.columns import Columns, Point
 from stickslip_ros.studies.plan import Grid
 from stickslip_ros.studies.stability import Notes, Section
-from stickslip_ros.studies.study import Point, Study
+from stickslip_ros.studies.study import Study
 from stickslip_ros.tables import TextTable
 
 _MOST_RANGES = 60

@@ -1,19 +1,21 @@
 """The points of a study as columns: arrays in memory, or a table in a CSV or JSON file."""
 
 import csv
-from collections.abc import Iterable, Iterator, Mapping
+from collections import namedtuple
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Self, TextIO
+from typing import Annotated, Any, Self, TextIO
 
 import numpy as np
 import numpy.typing as npt
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.measures.cycle_measures import CycleMeasures
-from stickslip_ros.quantities import quantities_of
+from stickslip_ros.measures.cycle_measures import CycleMeasures, Measures, Regime
+from stickslip_ros.quantities import Quantity, quantities_of
 from stickslip_ros.studies.plan import Grid, Plan
-from stickslip_ros.studies.study import COLUMNS, Point, Study
+
+_OF_CYCLES = quantities_of(Measures)
 
 
 @dataclass(frozen=True)
@@ -28,15 +30,17 @@ class Columns(CycleMeasures[FloatArray]):
     """The points of the study."""
     done: npt.NDArray[np.bool_]
     """Whether the point is computed."""
-    cycles: npt.NDArray[np.intp]
+    cycles: Annotated[npt.NDArray[np.intp], _OF_CYCLES["cycles"]]
     """Number of cycles that the measures are means of."""
-    regime: npt.NDArray[np.object_]
+    regime: Annotated[npt.NDArray[np.object_], _OF_CYCLES["regime"]]
     """The `Regime`, or None."""
-    steady: npt.NDArray[np.bool_]
+    steady: Annotated[npt.NDArray[np.bool_], Quantity("whether the motion has settled")]
     """Whether the motion has settled."""
-    turning_points: list[tuple[float, ...]]
+    turning_points: Annotated[
+        list[tuple[float, ...]], Quantity("displacement where the velocity is zero", "m")
+    ]
     """Poincare section x' = 0 of each point, m."""
-    reason: npt.NDArray[np.object_]
+    reason: Annotated[npt.NDArray[np.object_], Quantity("why there is no cycle")]
     """Why a point has no cycle to measure, or how it drifts, in words, or None."""
 
     @classmethod
@@ -49,16 +53,10 @@ class Columns(CycleMeasures[FloatArray]):
             The points of the study.
         """
         size = plan.size
-        return cls(
-            *(np.full(size, np.nan) for _ in quantities_of(CycleMeasures)),
-            plan=plan,
-            done=np.zeros(size, dtype=bool),
-            cycles=np.zeros(size, dtype=np.intp),
-            regime=np.full(size, None, dtype=object),
-            steady=np.zeros(size, dtype=bool),
-            turning_points=[()] * size,
-            reason=np.full(size, None, dtype=object),
-        )
+        columns: dict[str, Any] = {name: np.full(size, np.nan) for name in COLUMNS}
+        columns |= {name: np.full(size, cell) for name, cell in _EMPTY.items()}
+        columns["turning_points"] = [()] * size
+        return cls(plan=plan, done=np.zeros(size, dtype=bool), **columns)
 
     @cached_property
     def values(self) -> Mapping[str, FloatArray]:
@@ -66,7 +64,7 @@ class Columns(CycleMeasures[FloatArray]):
         rows = np.array([self.plan.values(row) for row in range(self.plan.size)], dtype=float)
         return dict(zip(self.plan.parameters, rows.T, strict=True))
 
-    def enter(self, points: Iterable[Point]) -> None:
+    def enter(self, points: Iterable["Point"]) -> None:
         """Enter points that are computed.
 
         Parameters
@@ -92,10 +90,37 @@ class Columns(CycleMeasures[FloatArray]):
         for value in column if isinstance(column, list) else column.tolist():
             yield None if value != value else value
 
-    def points(self) -> Iterator[Point]:
+    def points(self) -> Iterator["Point"]:
         """Yield the points that are computed, in their order."""
         rows = zip(self.done, *map(self.cells, COLUMNS), strict=True)
         return (Point(number, *cells) for number, (done, *cells) in enumerate(rows) if done)
+
+
+COLUMNS = quantities_of(Columns)
+"""Columns of a table by name, in addition to the values of the parameters."""
+
+_EMPTY: dict[str, Any] = {"cycles": 0, "regime": None, "steady": False, "reason": None}
+"""Cells of a point without a result; those of other columns are a number that does not exist."""
+
+_Row: Any = namedtuple(  # pyright: ignore[reportUntypedNamedTuple]
+    "_Row",
+    ["number", *COLUMNS],
+    defaults=[(_EMPTY | {"turning_points": ()}).get(name) for name in COLUMNS],
+)
+
+
+class Point(_Row):
+    """The result of one point: its number in the plan, from 0, and a cell for each of `COLUMNS`.
+
+    It is a row of the columns (see `Columns`), and of a journal in JSON.
+    """
+
+    @classmethod
+    def from_json(cls, values: Sequence[Any]) -> Self:
+        """Return the point of a list that went through JSON, the same to the last bit."""
+        point = cls._make(values)
+        regime = None if point.regime is None else Regime(point.regime)
+        return point._replace(regime=regime, turning_points=tuple(point.turning_points))
 
 
 def write_csv(stream: TextIO, columns: Columns, further: Mapping[str, Any]) -> None:
@@ -108,24 +133,23 @@ def write_csv(stream: TextIO, columns: Columns, further: Mapping[str, Any]) -> N
     writer.writerow([*plan.parameters, *further, *COLUMNS])
     more = (each.tolist() for each in further.values())
     rows = zip(*more, *map(columns.cells, COLUMNS), strict=True)
-    for number, (*cells, turning_points, reason) in enumerate(rows):
-        section = " ".join(map(repr, turning_points))
-        writer.writerow([*plan.values(number), *cells, section, reason])
+    for number, row in enumerate(rows):
+        cells = (" ".join(map(repr, cell)) if isinstance(cell, tuple) else cell for cell in row)
+        writer.writerow([*plan.values(number), *cells])
 
 
-def json_entries(study: Study, columns: Columns, further: Mapping[str, Any]) -> dict[str, Any]:
+def json_entries(columns: Columns, further: Mapping[str, Any]) -> dict[str, Any]:
     """Return parameters, their values, and the columns for JSON; arrays are iterators.
 
     For a grid, `values` has a list for each axis, and the arrays are row-major over the axes; if
     it has a continuation, the direction is the slowest index. Otherwise `values` has the
     parameters' values of each point.
     """
-    plan = study.plan
+    plan = columns.plan
     values: Iterator[Any] = map(plan.values, range(plan.size))
     if isinstance(plan, Grid):
         values = ([*map(axis.value, range(axis.count))] for axis in plan.axes)
     return {
-        **{name: found for name, found in study.as_dict().items() if name != "scenario"},
         "parameters": plan.parameters,
         "values": values,
         **{name: iter(cells.tolist()) for name, cells in further.items()},

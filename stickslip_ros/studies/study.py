@@ -1,12 +1,11 @@
 """A study: many points of one scenario, each simulated until its motion has settled."""
 
 from abc import ABC, abstractmethod
-from collections import namedtuple
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
 from hashlib import sha256
-from typing import Any, Generic, NamedTuple, Self, TypeVar
+from typing import Any, Generic, NamedTuple, TypeVar
 
 from typing_extensions import override
 
@@ -19,6 +18,7 @@ from stickslip_ros.measures.cycle_measures import (
 )
 from stickslip_ros.quantities import quantities_of
 from stickslip_ros.scenarios.files import Scenario
+from stickslip_ros.studies.columns import Point
 from stickslip_ros.studies.plan import Axis, Continuation, Grid, Plan
 from stickslip_ros.studies.settling import ControlledDrive, MotionState, SettlingOptions, settle
 
@@ -26,34 +26,8 @@ _NUDGE = EQUILIBRIUM_SPEED / 2.0
 """Share of the belt speed by which a slide at rest is pushed before the next point: rounding alone
 would leave an unstable equilibrium very late or never."""
 
-
 MEASURES = (*quantities_of(Measures),)
 """Columns of a table that are measures of the motion."""
-
-_OTHERS: dict[str, Any] = {"cycles": 0, "steady": False, "turning_points": (), "reason": None}
-"""What a point without a result has, where that is not None."""
-
-COLUMNS = (*MEASURES, "steady", "turning_points", "reason")
-"""Columns of a table, in addition to the values of the parameters."""
-
-_Row: Any = namedtuple(  # pyright: ignore[reportUntypedNamedTuple]
-    "_Row", ["number", *COLUMNS], defaults=[_OTHERS.get(name) for name in COLUMNS]
-)
-
-
-class Point(_Row):
-    """The result of one point: its number in the plan, from 0, and a cell for each of `COLUMNS`.
-
-    It is a row of the columns (see `Columns`), and of a journal in JSON.
-    """
-
-    @classmethod
-    def from_json(cls, values: Sequence[Any]) -> Self:
-        """Return the point of a list that went through JSON, the same to the last bit."""
-        number, *measures, regime, steady, turning_points, reason = values
-        regime = None if regime is None else Regime(regime)
-        cells = [number, *measures, regime, steady, tuple(turning_points), reason]
-        return cls._make(cells)
 
 
 class Piece(NamedTuple):
@@ -179,9 +153,10 @@ class Study(PointStudy[Plan]):
                 reason = "no whole cycle in the measured time"
             case _:
                 pass
-        values = [getattr(measures, name) for name in MEASURES]
-        turning_points = tuple(settled.turning_points.tolist())
-        return Point._make([index, *values, settled.steady, turning_points, reason]), end
+        columns = {name: getattr(measures, name) for name in MEASURES}
+        columns |= {"steady": settled.steady, "reason": reason}
+        columns["turning_points"] = tuple(settled.turning_points.tolist())
+        return Point(index, **columns), end
 
     @override
     def row(self, values: Sequence[Any]) -> Point:

@@ -10,7 +10,7 @@ from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.scenarios.keywords import keyword_of, parameter_of
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, NodeParameters
-from stickslip_ros.studies.study import COLUMNS
+from stickslip_ros.studies.columns import COLUMNS
 
 EVERY = [f"{node}.{name}" for node, model in NODE_PARAMETERS.items() for name in model.known]
 OF_PAPER = load_scenario("paper").nodes

@@ -11,7 +11,8 @@ import stickslip_ros as ss
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.measures.cycle_measures import Regime
 from stickslip_ros.studies.basin import Basins
-from stickslip_ros.studies.study import COLUMNS, MEASURES
+from stickslip_ros.studies.columns import COLUMNS
+from stickslip_ros.studies.study import MEASURES
 
 FREE = ss.scenario("paper", expects_control=False)
 SHORT: dict[str, Any] = {"transient": 20.0, "cycles": 2}

@@ -2,10 +2,11 @@
 
 from stickslip_ros.progress import Progress
 from stickslip_ros.scenarios.files import Scenario, load_scenario
+from stickslip_ros.studies.columns import Point
 from stickslip_ros.studies.plan import Axis, Continuation, Grid
 from stickslip_ros.studies.runner import compute_columns
 from stickslip_ros.studies.settling import SettlingOptions
-from stickslip_ros.studies.study import Point, Study
+from stickslip_ros.studies.study import Study
 
 SHORT = SettlingOptions(transient=5.0, cycles=2)
 """Long enough to tell one motion from another."""

@@ -19,11 +19,10 @@ from stickslip_ros.studies.basin import (
     basin_study,
     default_axes,
 )
-from stickslip_ros.studies.columns import Columns
+from stickslip_ros.studies.columns import Columns, Point
 from stickslip_ros.studies.plan import Axis, Continuation, Grid, Plan, RandomSample
 from stickslip_ros.studies.runner import compute_columns
 from stickslip_ros.studies.settling import SettlingOptions
-from stickslip_ros.studies.study import Point
 from stickslip_ros.theory.critical_gains import critical_gains
 from tests.studies.studies import EXPONENTIAL, free, paper
 

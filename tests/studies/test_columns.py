@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 from stickslip_ros.measures.cycle_measures import Regime
-from stickslip_ros.studies.columns import Columns, json_entries, write_csv
+from stickslip_ros.studies.columns import COLUMNS, Columns, Point, json_entries, write_csv
 from stickslip_ros.studies.plan import Axis, Continuation, Grid, RandomSample
 from stickslip_ros.studies.runner import compute_columns
 from stickslip_ros.studies.settling import SettlingOptions
-from stickslip_ros.studies.study import COLUMNS, MEASURES, Point, Study, compute
+from stickslip_ros.studies.study import MEASURES, Study, compute
 from tests.studies.studies import SHORT, free, speeds
 
 MINIMUM = Axis("plant.friction.minimum", 0.1, 0.6, 4)
@@ -96,7 +96,8 @@ def refuse(constant: str) -> None:
 def as_json(
     study: Study, columns: Columns, further: dict[str, Any] | None = None, **provenance: Any
 ) -> dict[str, Any]:
-    entries = {**provenance, **json_entries(study, columns, further or {})}
+    described = study.as_dict() | {"scenario": None} | provenance
+    entries = described | json_entries(columns, further or {})
     values = {name: [*v] if isinstance(v, Iterator) else v for name, v in entries.items()}
     return json.loads(json.dumps(values), parse_constant=refuse)
 

@@ -9,10 +9,11 @@ import pytest
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
 from stickslip_ros.studies import runner
+from stickslip_ros.studies.columns import Point
 from stickslip_ros.studies.journal import Journal
 from stickslip_ros.studies.plan import Axis, Continuation, Grid
 from stickslip_ros.studies.runner import compute_columns
-from stickslip_ros.studies.study import Point, Study, compute
+from stickslip_ros.studies.study import Study, compute
 from tests.studies.studies import SHORT, free, points_of, stop_at
 
 FRICTION = "0,0.4\n0.1,0.35\n0.5,0.3\n", "0,0.45\n0.1,0.4\n0.5,0.35\n"

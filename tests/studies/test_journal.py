@@ -12,10 +12,11 @@ import pytest
 
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.studies import runner
+from stickslip_ros.studies.columns import Point
 from stickslip_ros.studies.journal import Journal
 from stickslip_ros.studies.plan import Axis, Continuation, Grid
 from stickslip_ros.studies.settling import MotionState, SettlingOptions
-from stickslip_ros.studies.study import Piece, Point, Study
+from stickslip_ros.studies.study import Piece, Study
 from tests.studies.studies import SHORT, free, points_of, speeds, stop_at
 
 MINIMUM = Axis("plant.friction.minimum", 0.2, 0.5, 4)

@@ -19,11 +19,12 @@ import pytest
 
 from stickslip_ros.errors import InvalidInputError, RunError
 from stickslip_ros.studies import runner
+from stickslip_ros.studies.columns import Point
 from stickslip_ros.studies.journal import Journal
 from stickslip_ros.studies.plan import Axis, Continuation, Grid
 from stickslip_ros.studies.runner import compute_columns, local_processes, run, run_here
 from stickslip_ros.studies.settling import SettlingOptions
-from stickslip_ros.studies.study import Piece, Point, Study, compute
+from stickslip_ros.studies.study import Piece, Study, compute
 from tests.studies.studies import SHORT, free, paper, speeds, stop_at
 
 MINIMUM = Axis("plant.friction.minimum", 0.1, 0.6, 6)

@@ -12,10 +12,11 @@ from hypothesis import strategies as st
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.measures.cycle_measures import Regime
 from stickslip_ros.scenarios.files import Scenario
+from stickslip_ros.studies.columns import Point
 from stickslip_ros.studies.plan import Axis, Continuation, Grid
 from stickslip_ros.studies.runner import compute_columns
 from stickslip_ros.studies.settling import MotionState, SettlingOptions
-from stickslip_ros.studies.study import Point, Study, compute, sweep_study
+from stickslip_ros.studies.study import Study, compute, sweep_study
 from tests.studies.studies import CYCLE_LOST_SPEED, EXPONENTIAL, HOPF_SPEED, SHORT, free, paper
 
 MINIMUM = Axis("plant.friction.minimum", 0.1, 0.6, 6)
