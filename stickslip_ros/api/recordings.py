@@ -93,7 +93,7 @@ class RecordedRun(TabularResult):
     @property
     def verdict(self) -> str:
         """Regime, amplitude, frequency and stick fraction as a line of text."""
-        from stickslip_ros.show.panels import measures_text
+        from stickslip_ros.show.drawing import measures_text
 
         return measures_text(self.measures, self.units) + doubt(self.report)
 

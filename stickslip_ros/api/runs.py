@@ -86,7 +86,7 @@ class Run(TabularResult):
 
     @override
     def _summary(self) -> Summary:
-        from stickslip_ros.show.panels import measures_text
+        from stickslip_ros.show.drawing import measures_text
 
         verdict = measures_text(self.measures, self._units)
         parameters = scenario_tables(self.scenario, used=True)

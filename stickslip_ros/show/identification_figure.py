@@ -12,7 +12,7 @@ from stickslip_ros.arrays import FloatArray
 from stickslip_ros.identification.findings import Findings
 from stickslip_ros.identification.fit import QUANTILE
 from stickslip_ros.model.friction import FrictionLaw
-from stickslip_ros.show.panels import DOTS
+from stickslip_ros.show.drawing import DOTS
 from stickslip_ros.show.quantities import SI, Units
 from stickslip_ros.show.style import BLUE, GREEN, ORANGE, SCREEN, FigureStyle, finish, styled
 

@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.gridspec import SubplotSpec
+from matplotlib.gridspec import GridSpecFromSubplotSpec, SubplotSpec
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
@@ -18,8 +18,9 @@ from stickslip_ros.arrays import FloatArray
 from stickslip_ros.measures.cycle_measures import Measures, measures_of
 from stickslip_ros.model.drive import Drive
 from stickslip_ros.scenarios.files import Scenario
-from stickslip_ros.show.panels import (
+from stickslip_ros.show.drawing import (
     BELT,
+    HELD,
     LEAST_PART,
     MOTION,
     PIXELS,
@@ -28,10 +29,12 @@ from stickslip_ros.show.panels import (
     broken,
     draw_analysis,
     draw_cycles,
+    draw_held,
     draw_law,
     draw_line,
     label_axis,
     measures_text,
+    panels_over_time,
     say,
     shade,
     widened,
@@ -61,7 +64,6 @@ LAST_CYCLES = 5
 
 _REST: Any = {"color": GREEN, "lw": 1.2, "ls": ":", "zorder": 2.5}
 _CONTROL: Any = {"color": ORANGE, "lw": 1.6, "drawstyle": "steps-post"}
-_HELD: Any = {"color": ORANGE, "lw": 1.2, "ls": ":", "drawstyle": "steps-post"}
 _DROPPED: Any = {"color": ORANGE, "alpha": 0.5, "marker": ".", "ms": 2.0, "ls": ""}
 _FRICTION: Any = {"color": SKY_BLUE, "lw": 0.7}
 _EARLIER: Any = {"color": LIGHT_GREY, "lw": 0.7}
@@ -164,20 +166,15 @@ def _single(run: DrawnRun, style: FigureStyle) -> Figure:
         run = run._replace(drive=drive)
     if history.left_out:
         notes.append(f"not drawn: {history.left_out} samples without an increasing time")
-    analysis = history.analysis
-    extra = ["analysis"] if analysis.mean_cycle is not None or analysis.slips is not None else []
-    if drive is not None and drive.motor is not None and not style.printed:
-        extra += ["motor"] if len(history.motor.columns()[0]) else []
-    rows = 2 + len(extra)
-    size = (12.0, 10.0 + 2.5 * len(extra))
+    rows = [draw for draw, is_shown in _LOWER_ROWS.items() if is_shown(run, style)]
+    size = (12.0, 10.0 + 2.5 * len(rows))
     panels = _OneRun([run], narrow=style.narrow, short=style.crowded(*size))
-    figure = style.figure(*size, wide=1.1 + 0.3 * len(extra), narrow=2.5 + 0.26 * len(extra))
+    figure = style.figure(*size, wide=1.1 + 0.3 * len(rows), narrow=2.5 + 0.26 * len(rows))
     style.set_title(figure, run.title, measures_text(run.measures, panels.units), *notes)
-    ratios = (2.8, 2.4, *[1.5] * len(extra)) if panels.short else (3.0, 1.9, *[1.2] * len(extra))
+    ratios = (2.8, 2.4, *[1.5] * len(rows)) if panels.short else (3.0, 1.9, *[1.2] * len(rows))
     if style.narrow:
-        ratios = (4.4, 3.6, *[2.2] * len(extra))
-    grid = figure.add_gridspec(rows, 1, height_ratios=ratios)
-    above, below = grid[0], grid[1]
+        ratios = (4.4, 3.6, *[2.2] * len(rows))
+    above, below, *lower = figure.add_gridspec(2 + len(rows), 1, height_ratios=ratios)
     panels.over_time(figure, above)
     has_cycles, has_law = len(history.cycles[0]) > 0, drive is not None
     if style.narrow:
@@ -187,40 +184,14 @@ def _single(run: DrawnRun, style: FigureStyle) -> Figure:
     else:
         left, *others = below.subgridspec(1, 1 + has_cycles + has_law)
         middle, right = others[:has_cycles], others[has_cycles:]
-    for row, which in enumerate(extra, 2):
-        part = grid[row].subgridspec(1, 3)
-        if which == "analysis":
-            draw_analysis(figure, part, analysis, panels.units, short=panels.short)
-        else:
-            panels.behind_the_screw(*(figure.add_subplot(cell) for cell in part))
+    for draw, row in zip(rows, lower, strict=True):
+        draw(panels, figure, row.subgridspec(1, 3))
     panels.portrait(figure.add_subplot(left))
     for part in middle:
         cells = part.subgridspec(*((1, 2) if style.narrow else (2, 1)))
         panels.cycles(*(figure.add_subplot(cell) for cell in cells))
-    of_law = [entry for part in right for entry in panels.law(figure.add_subplot(part))]
-    force = "control force and disturbance" if run.disturbed else "control force"
-    sticks = "sticks" if panels.short else "sticks (paler: part of the time)"
-    handles: list[Any] = [
-        Line2D([], [], **MOTION, label="slide"),
-        Line2D([], [], **BELT, label="belt speed"),
-        Patch(color=GREY, alpha=0.6, lw=0.0, label=sticks),
-        *(
-            Line2D([], [], **look, label=label)
-            for trace, look, label in (
-                (history.control, _CONTROL, force),
-                (history.friction, _FRICTION, "friction force"),
-            )
-            if len(trace.columns()[0])
-        ),
-        Line2D([], [], **_EARLIER | {"lw": 4.0}, label="start of the run"),
-    ]
-    if drive is not None and drive.has_spring and drive.motor is None:
-        handles.insert(2, Line2D([], [], **POINT | _REST, label="equilibrium"))
-    if panels.holds:
-        handles.append(Line2D([], [], **_HELD, label="no new force: last one"))
-    if len(history.dropped.columns()[0]):
-        handles.append(Line2D([], [], **_DROPPED | {"ms": 6.0}, label="sent, did not act"))
-    style.legend_below(figure, [*handles, *of_law])
+    law_handles = [entry for part in right for entry in panels.law(figure.add_subplot(part))]
+    style.legend_below(figure, [*panels.handles(), *law_handles])
     return figure
 
 
@@ -292,7 +263,7 @@ class _OneRun(_Panels):
         if not any(len(columns[0]) for columns in whole):
             labels.pop()  # nothing tells a force
         shape = len(labels), len(panes)
-        panels = _panels_over_time(figure, part, *shape, narrow=self._narrow)
+        panels = panels_over_time(figure, part, *shape, narrow=self._narrow)
         for column, pane, (friction, control, dropped) in zip(panels.T, panes, drawn, strict=True):
             position, velocity, *forces = column
             title = pane.title.removesuffix(_ENLARGED) if self.short else pane.title
@@ -302,7 +273,7 @@ class _OneRun(_Panels):
                 draw_line(force, pane, friction, newton, history.gap, **_FRICTION)
                 gap = history.control_gap
                 draw_line(force, pane, control, newton, gap, **_CONTROL)
-                self.holds |= _draw_held(force, pane, control, newton, gap, dropped[0])
+                self.holds |= draw_held(force, pane, control, newton, gap, dropped[0])
                 draw_line(force, pane, dropped, newton, gap, **_DROPPED)
             self._label_time(column[-1], pane)
         for row, of_row in zip(panels, labels, strict=True):
@@ -371,8 +342,13 @@ class _OneRun(_Panels):
         axes.set_xlim(widened(*axes.get_xlim()))
         axes.set_ylim(widened(*axes.get_ylim()))
 
-    def behind_the_screw(self, force: Axes, slide: Axes, motor: Axes) -> None:
+    def analysis(self, figure: Figure, row: GridSpecFromSubplotSpec) -> None:
+        """Draw the mean cycle with its edges, or the distributions over the slips."""
+        draw_analysis(figure, row, self._history.analysis, self.units, short=self.short)
+
+    def behind_the_screw(self, figure: Figure, row: GridSpecFromSubplotSpec) -> None:
         """Draw the force of the spring, and the phase planes of slide and motor, at the end."""
+        force, slide, motor = (figure.add_subplot(cell) for cell in row)
         (length, label), (speed, speed_label) = self._length, self._speed
         start = float(self._last.time[0]) if len(self._last.time) else -np.inf
         time, *states = self._history.motor.since(start)
@@ -415,6 +391,47 @@ class _OneRun(_Panels):
         rest = Line2D([], [], **BELT, label="slide at rest")
         axes.legend(handles=[*handles, rest], loc="best")
         return []
+
+    def handles(self) -> list[Any]:
+        """Return the entries of the legend, but for the friction law."""
+        history, drive = self._history, self._drive
+        force = "control force and disturbance" if self._disturbed else "control force"
+        sticks = "sticks" if self.short else "sticks (paler: part of the time)"
+        handles: list[Any] = [
+            Line2D([], [], **MOTION, label="slide"),
+            Line2D([], [], **BELT, label="belt speed"),
+            Patch(color=GREY, alpha=0.6, lw=0.0, label=sticks),
+            *(
+                Line2D([], [], **look, label=label)
+                for trace, look, label in (
+                    (history.control, _CONTROL, force),
+                    (history.friction, _FRICTION, "friction force"),
+                )
+                if len(trace.columns()[0])
+            ),
+            Line2D([], [], **_EARLIER | {"lw": 4.0}, label="start of the run"),
+        ]
+        if drive is not None and drive.has_spring and drive.motor is None:
+            handles.insert(2, Line2D([], [], **POINT | _REST, label="equilibrium"))
+        if self.holds:
+            handles.append(Line2D([], [], **HELD, label="no new force: last one"))
+        if len(history.dropped.columns()[0]):
+            handles.append(Line2D([], [], **_DROPPED | {"ms": 6.0}, label="sent, did not act"))
+        return handles
+
+
+def _is_analysed(run: DrawnRun, style: FigureStyle) -> bool:
+    analysis = run.history.analysis
+    return analysis.mean_cycle is not None or analysis.slips is not None
+
+
+def _has_motor(run: DrawnRun, style: FigureStyle) -> bool:
+    has_motor = run.drive is not None and run.drive.motor is not None
+    return has_motor and not style.printed and len(run.history.motor.columns()[0]) > 0
+
+
+_LOWER_ROWS = {_OneRun.analysis: _is_analysed, _OneRun.behind_the_screw: _has_motor}
+"""What draws a row of three panels below the others, and which runs have it."""
 
 
 class _SeveralRuns(_Panels):
@@ -504,50 +521,3 @@ class _SeveralRuns(_Panels):
 def _runs_across(count: int, *, narrow: bool) -> int:
     """Return how many runs are side by side over time."""
     return (1 if count < 3 else 2) if narrow else count
-
-
-def _panels_over_time(
-    figure: Figure, part: SubplotSpec, quantities: int, panes: int, *, narrow: bool
-) -> Any:
-    """Return axes for so many quantities and panes; the first pane is the widest.
-
-    If the figure is narrow, the first pane is above the others.
-    """
-    if not narrow:
-        grid = part.subgridspec(quantities, panes, width_ratios=(2.0, *[1.0] * (panes - 1)))
-        return grid.subplots(sharex="col", sharey="row")
-    above, below = part.subgridspec(2, 1)
-    whole: Any = above.subgridspec(quantities, 1).subplots(sharex=True, squeeze=False)
-    others: Any = below.subgridspec(quantities, panes - 1).subplots(
-        sharex="col", sharey="row", squeeze=False
-    )
-    panels = np.concatenate([whole, others], axis=1)
-    for row in panels:
-        row[1].sharey(row[0])
-    return panels
-
-
-def _draw_held(
-    axes: Axes,
-    pane: Pane,
-    control: Sequence[FloatArray],
-    scale: float,
-    gap: float,
-    dropped: FloatArray,
-) -> bool:
-    """Extend forces up to the next one after a gap; return whether there are any.
-
-    If forces were `dropped` (times in s) in the gap, the acting force is unknown and not drawn.
-    """
-    time, force = control
-    behind = np.flatnonzero(np.diff(time) > max(gap, 2.0 * (pane.end - pane.start) / PIXELS))
-    came = np.diff(np.searchsorted(dropped, time)) > 0
-    behind = behind[~came[behind]]
-    behind = behind[(time[behind + 1] > pane.start) & (time[behind] < pane.end)]
-    if len(behind) == 0:
-        return False
-    rows = np.stack([behind, behind + 1, behind + 1], axis=1).ravel()
-    drawn = force[rows] / scale
-    drawn[2::3] = np.nan
-    axes.plot(time[rows], drawn, **_HELD)
-    return True

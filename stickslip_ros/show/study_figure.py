@@ -18,7 +18,7 @@ from matplotlib.path import Path
 
 from stickslip_ros.arrays import BoolArray, FloatArray
 from stickslip_ros.measures.cycle_measures import Regime
-from stickslip_ros.show.panels import label_axis
+from stickslip_ros.show.drawing import label_axis
 from stickslip_ros.show.quantities import MEASURES, Units, check_colour
 from stickslip_ros.show.study_tables import attractor_name
 from stickslip_ros.show.style import (

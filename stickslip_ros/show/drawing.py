@@ -1,4 +1,4 @@
-"""The panels of a figure of runs: parts over time, cycles, friction law, and analysis."""
+"""Drawing of runs on axes: traces over time, cycles, friction law, and analysis."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple, Self
@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.axis import XAxis, YAxis
 from matplotlib.colors import LinearSegmentedColormap, to_rgba
 from matplotlib.figure import Figure
-from matplotlib.gridspec import GridSpec, GridSpecFromSubplotSpec
+from matplotlib.gridspec import GridSpec, GridSpecFromSubplotSpec, SubplotSpec
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
@@ -37,6 +37,9 @@ LEAST_SPAN = 1e-6
 
 LEAST_PART = 1e-3
 """Smallest span of an axis for a part of a motion, as a share of the span of all of it."""
+
+HELD: Any = {"color": ORANGE, "lw": 1.2, "ls": ":", "drawstyle": "steps-post"}
+"""Look of a force that is held because no new one came."""
 
 _SHADE = LinearSegmentedColormap.from_list("stick", [to_rgba(GREY, 0.0), to_rgba(GREY, 0.6)])
 
@@ -96,6 +99,53 @@ def draw_line(
     # No rows are missing between neighbouring intervals.
     time, values = broken(max(gap, 2.0 * length), time[drawn], values[drawn])
     axes.plot(time, values / scale, **look)
+
+
+def draw_held(
+    axes: Axes,
+    pane: Pane,
+    control: Sequence[FloatArray],
+    scale: float,
+    gap: float,
+    dropped: FloatArray,
+) -> bool:
+    """Extend forces up to the next one after a gap; return whether there are any.
+
+    If forces were `dropped` (times in s) in the gap, the acting force is unknown and not drawn.
+    """
+    time, force = control
+    behind = np.flatnonzero(np.diff(time) > max(gap, 2.0 * (pane.end - pane.start) / PIXELS))
+    came = np.diff(np.searchsorted(dropped, time)) > 0
+    behind = behind[~came[behind]]
+    behind = behind[(time[behind + 1] > pane.start) & (time[behind] < pane.end)]
+    if len(behind) == 0:
+        return False
+    rows = np.stack([behind, behind + 1, behind + 1], axis=1).ravel()
+    drawn = force[rows] / scale
+    drawn[2::3] = np.nan
+    axes.plot(time[rows], drawn, **HELD)
+    return True
+
+
+def panels_over_time(
+    figure: Figure, part: SubplotSpec, quantities: int, panes: int, *, narrow: bool
+) -> Any:
+    """Return axes for so many quantities and panes; the first pane is the widest.
+
+    If the figure is narrow, the first pane is above the others.
+    """
+    if not narrow:
+        grid = part.subgridspec(quantities, panes, width_ratios=(2.0, *[1.0] * (panes - 1)))
+        return grid.subplots(sharex="col", sharey="row")
+    above, below = part.subgridspec(2, 1)
+    whole: Any = above.subgridspec(quantities, 1).subplots(sharex=True, squeeze=False)
+    others: Any = below.subgridspec(quantities, panes - 1).subplots(
+        sharex="col", sharey="row", squeeze=False
+    )
+    panels = np.concatenate([whole, others], axis=1)
+    for row in panels:
+        row[1].sharey(row[0])
+    return panels
 
 
 def widened(low: float, high: float, least: float = 0.0) -> tuple[float, float]:
