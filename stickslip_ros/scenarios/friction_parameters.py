@@ -1,7 +1,10 @@
-"""The parameters of the friction of the plant: its law and the constants of each law."""
+"""The parameters of the friction of the plant: its law and the constants of each law.
+
+They are those of the laws of this package and of the other packages that are installed.
+"""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, make_dataclass, replace
 from functools import cached_property
 from math import nan
@@ -17,7 +20,6 @@ from stickslip_ros.model.constants import (
     described_by,
 )
 from stickslip_ros.model.friction import (
-    LAWS,
     WITHDRAWN,
     CurveFollower,
     Directional,
@@ -26,31 +28,36 @@ from stickslip_ros.model.friction import (
     Table,
 )
 from stickslip_ros.scenarios.curve_file import Pairs, read_curve
-from stickslip_ros.scenarios.foreign_laws import FRICTION_LAWS, add_laws_of_other_packages
+from stickslip_ros.scenarios.foreign_laws import FRICTION_LAWS, laws_of_all_packages
 from stickslip_ros.scenarios.validation import ParameterGroup
 from stickslip_ros.text import shown
 
+LAWS = laws_of_all_packages(FRICTION_LAWS)
+_FOLLOWERS = [name for name, law in LAWS.items() if issubclass(law, CurveFollower)]
+_CURVES = [name for name, law in LAWS.items() if not law.states and law is not Stiction]
+"""The laws that a law with a memory can follow."""
 
-def _constants_of_laws(*, reverse: bool = False) -> Any:
-    """Return a group of the constants of the laws that are one number, in one direction of slip."""
+
+def _group(laws: Iterable[type[FrictionLaw]], *, reverse: bool = False) -> Any:
+    """Return a group of the constants of laws that are one number, in one direction of slip."""
     users: dict[str, list[str]] = {}
-    found: dict[str, Parameter] = {}
-    for law in LAWS.values():
-        for name, each in constants_of(law).items():
-            directed = not (each.whole or name in law.direction_independent)
-            if not isinstance(each.default, tuple) and (directed or not reverse):
-                found.setdefault(name, each)
+    constants: dict[str, Parameter] = {}
+    for law in laws:
+        for name, described in constants_of(law).items():
+            directed = not (described.whole or name in law.direction_independent)
+            if not isinstance(described.default, tuple) and (directed or not reverse):
+                constants.setdefault(name, described)
                 users.setdefault(name, []).append(law.name)
-    described: list[tuple[str, Any, Any]] = []
-    for name, each in found.items():
-        meaning = each.meaning.removesuffix(".") + (", for v_r < 0" if reverse else "")
+    fields: list[tuple[str, Any, Any]] = []
+    for name, described in constants.items():
+        meaning = described.meaning.removesuffix(".") + (", for v_r < 0" if reverse else "")
         if name not in constants_of(FrictionLaw):
             meaning += f" ({', '.join(users[name])})"
-        own = replace(each, meaning=f"{meaning}.")
+        parameter = replace(described, meaning=f"{meaning}.")
         if reverse:
-            own = replace(own, default=nan, unset="as forward")
-        described.append((name, Any, described_by(own)))
-    return make_dataclass("_Constants", described, bases=(ParameterGroup,), frozen=True)
+            parameter = replace(parameter, default=nan, unset="as forward")
+        fields.append((name, Any, described_by(parameter)))
+    return make_dataclass("_Constants", fields, bases=(ParameterGroup,), frozen=True)
 
 
 def _curve(direction: str = "") -> Any:
@@ -62,15 +69,8 @@ def _curve(direction: str = "") -> Any:
     )
 
 
-add_laws_of_other_packages()
-
-_FOLLOWERS = [name for name, law in LAWS.items() if issubclass(law, CurveFollower)]
-_CURVES = [name for name, law in LAWS.items() if not law.states and law is not Stiction]
-"""The laws that a law with a memory can follow."""
-
-
 @dataclass(frozen=True)
-class ReverseFriction(_constants_of_laws(reverse=True)):
+class ReverseFriction(_group(LAWS.values(), reverse=True)):
     """Coefficients of backward slip, v_r < 0, where they differ from those of forward slip."""
 
     file: str = _curve(" for v_r < 0; empty: as forward")
@@ -114,7 +114,7 @@ class _ChosenLaw(ParameterGroup):
 
 
 @dataclass(frozen=True)
-class Friction(_constants_of_laws(), _ChosenLaw):
+class Friction(_group(LAWS.values()), _ChosenLaw):
     """Friction law and its coefficients; each law uses those of its formula."""
 
     file: str = _curve()
@@ -132,13 +132,13 @@ class Friction(_constants_of_laws(), _ChosenLaw):
             )
 
         def read(group: Any, name: str) -> Any:
-            own = in_use and group.file
-            pairs = read_curve(f"{prefix}{name}", group.file, _refusal, curves) if own else ()
+            is_read = in_use and group.file
+            pairs = read_curve(f"{prefix}{name}", group.file, _refusal, curves) if is_read else ()
             return replace(group, points=pairs)
 
-        found = replace(read(self, "file"), reverse=read(self.reverse, "reverse.file"))
-        assert found.selected is not None  # raises ValueError for what does not fit together
-        return found
+        completed = replace(read(self, "file"), reverse=read(self.reverse, "reverse.file"))
+        assert completed.selected is not None  # raises ValueError for what does not fit together
+        return completed
 
     @cached_property
     def selected(self) -> FrictionLaw:
@@ -157,8 +157,8 @@ class Friction(_constants_of_laws(), _ChosenLaw):
         except ValueError as refusal:
 
             def parameter(match: re.Match[str]) -> str:
-                own = "reverse." if match[1] and match[2] in reverse else ""
-                return f"friction.{own}{match[2]} = "
+                direction = "reverse." if match[1] and match[2] in reverse else ""
+                return f"friction.{direction}{match[2]} = "
 
             names = "|".join(name for kind in self._kinds() for name in kind.constants())
             text = re.sub(rf"\b(reverse\.)?({names}) = ", parameter, str(refusal))
@@ -176,19 +176,19 @@ class Friction(_constants_of_laws(), _ChosenLaw):
             for name, described in constants_of(law).items()
             if described.simplifies and getattr(self, name) == described.default
         }
-        own = [name for name in self._parameters() if name not in simple]
-        given = [name for name in self._parameters() if name in self.reverse.given]
-        return [*own, *(f"reverse.{name}" for name in given)]
+        forward = [name for name in self._parameters() if name not in simple]
+        reverse = [name for name in self._parameters() if name in self.reverse.given]
+        return [*forward, *(f"reverse.{name}" for name in reverse)]
 
     @override
     def not_used(self) -> Iterator[tuple[str, str]]:
         law = " with the curve ".join(kind.name for kind in self._kinds())
         used = ("law", *self._parameters())
         for name in self.known:
-            own = name.removeprefix("reverse.")
-            if own not in used:
+            forward = name.removeprefix("reverse.")
+            if forward not in used:
                 users = ", ".join(
-                    kind.name for kind in LAWS.values() if own in law_parameters(kind)
+                    kind.name for kind in LAWS.values() if forward in law_parameters(kind)
                 )
                 yield name, f"by the law {law}; laws that use it: {users}"
 
@@ -206,17 +206,17 @@ class Friction(_constants_of_laws(), _ChosenLaw):
         values = {
             name: getattr(group, name, nan) for name in names if name not in ("curve", "file")
         }
-        return {name: each for name, each in values.items() if each == each and each != ()}
+        return {name: value for name, value in values.items() if value == value and value != ()}
 
     def _made(self, values: dict[str, Any], law: FrictionLaw | None = None) -> FrictionLaw:
         """Return the law with these constants, and others at their defaults or as in a `law`."""
         kind, *curves = self._kinds()
-        own = dict(values)
+        constants = dict(values)
         for curve in curves:
-            of_curve = {name: own.pop(name) for name in curve.constants() if name in own}
+            followed = {n: constants.pop(n) for n in curve.constants() if n in constants}
             known = law.curve if isinstance(law, CurveFollower) else curve()
-            own["curve"] = replace(known, **of_curve)
-        return kind(**own) if law is None else replace(law, **own)
+            constants["curve"] = replace(known, **followed)
+        return kind(**constants) if law is None else replace(law, **constants)
 
 
 def law_parameters(law: type[FrictionLaw]) -> list[str]:
