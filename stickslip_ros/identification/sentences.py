@@ -25,64 +25,64 @@ _STATIC_SHARE = 1.1
 _BY_DIRECTION = "it merges with friction by direction, and is taken as 0"
 
 
-def notes(found: Findings) -> Sequence[str]:
+def notes(findings: Findings) -> Sequence[str]:
     """Return sentences on what makes the model doubtful."""
     texts: list[str] = []
-    if found.chosen.error >= POOR_ERROR:
+    if findings.chosen.error >= POOR_ERROR:
         texts.append(
-            f"the model does not describe the recordings: its error is {found.chosen.error:.0%} "
+            f"the model does not describe the recordings: its error is {findings.chosen.error:.0%} "
             "of what it predicts; an input may be missing (a disturbance, the velocity of the "
             "belt), or have another sign or unit"
         )
-    for name in dict.fromkeys(record.name for record in found.records):
-        own = [record for record in found.records if record.name == name]
-        texts += [f"{name}: {note}" for note in own[0].notes]
-        missing = float(np.mean(np.concatenate([record.lost for record in own])))
+    for name in dict.fromkeys(record.name for record in findings.records):
+        records = [record for record in findings.records if record.name == name]
+        texts += [f"{name}: {note}" for note in records[0].notes]
+        missing = float(np.mean(np.concatenate([record.lost for record in records])))
         if missing > _MISSING_SHARE:
-            fitted = ", and not fitted" if found.chosen.has_spring else ""
+            fitted = ", and not fitted" if findings.chosen.has_spring else ""
             texts.append(
                 f"{100.0 * missing:.2g} % of the samples of {name} are missing: they are "
                 f"interpolated{fitted}"
             )
-        if own[0].left_out > 0.0:
+        if records[0].left_out > 0.0:
             texts.append(
-                f"{100.0 * own[0].left_out:.2g} % of the samples of {name} are left out: they "
+                f"{100.0 * records[0].left_out:.2g} % of the samples of {name} are left out: they "
                 f"are in parts of less than {FEWEST} samples between gaps"
             )
-    if found.left:
+    if findings.left:
         texts.append(
-            f"the time was over before these laws were fitted to the end: {', '.join(found.left)}; "
-            "more time is --time-limit, a single law is --law"
+            "the time was over before these laws were fitted to the end: "
+            f"{', '.join(findings.left)}; more time is --time-limit, a single law is --law"
         )
-    if not _SPEEDS_OF_MACHINES[0] <= found.fastest <= _SPEEDS_OF_MACHINES[1]:
+    if not _SPEEDS_OF_MACHINES[0] <= findings.fastest <= _SPEEDS_OF_MACHINES[1]:
         texts.append(
-            f"the slide is as fast as {found.fastest:.3g} m/s: check the units of time, position "
-            "and belt velocity"
+            f"the slide is as fast as {findings.fastest:.3g} m/s: check the units of time, "
+            "position and belt velocity"
         )
-    used = found.chosen.used(found.records)
+    used = findings.chosen.used(findings.records)
     if used < _USED_SHARE:
         texts.append(
             f"{used:.0%} of the samples were used, in parts over the whole length: "
             "the recordings are long; choose a part by --from and --to"
         )
-    if found.chosen.repetition is not None:
+    if findings.chosen.repetition is not None:
         texts.append(
-            f"the errors repeat every {found.chosen.repetition} samples: the motion takes a whole "
-            "number of samples, so that rounding does not average out; the intervals may be "
+            f"the errors repeat every {findings.chosen.repetition} samples: the motion takes a "
+            "whole number of samples, so that rounding does not average out; the intervals may be "
             "too narrow"
         )
     return texts
 
 
-def notes_on(found: Findings, record: Record) -> Sequence[str]:
+def notes_on(findings: Findings, record: Record) -> Sequence[str]:
     """Return sentences on what cannot be predicted of a record, and why."""
-    if found.servo is None or record.reference is None or record.force is None:
+    if findings.servo is None or record.reference is None or record.force is None:
         return record.notes
     led = record.led
     if led is None:
         why = f"has no {FEWEST} samples in a row: the closed loop is not predicted"
         return [*record.notes, f"the reference of {record.name} {why}"]
-    share = float(np.mean(found.servo.added(led) != 0.0))
+    share = float(np.mean(findings.servo.added(led) != 0.0))
     if share < _ADDED_SHARE:
         return record.notes
     return [
@@ -93,84 +93,42 @@ def notes_on(found: Findings, record: Record) -> Sequence[str]:
     ]
 
 
-def _static_friction(found: Findings) -> str:
+def _static_friction(findings: Findings) -> str:
     """Return what rests tell of the static friction, where it may be another one than the law's."""
     texts: list[str] = []
     for sign, way in zip((1.0, -1.0), ("forward", "backward"), strict=True):
-        if sign not in found.chosen.directions:
+        if sign not in findings.chosen.directions:
             continue
-        own, low, high = found.static_forces(sign)
-        if isfinite(low) and isfinite(high) and not low <= own <= high <= _STATIC_SHARE * own:
+        static, low, high = findings.static_forces(sign)
+        known = isfinite(low) and isfinite(high)
+        if known and not low <= static <= high <= _STATIC_SHARE * static:
             texts.append(
                 f"{way} the slide rests under {low:.3g} N and moves at {high:.3g} N at the latest, "
-                f"where the law has {own:.3g} N"
+                f"where the law has {static:.3g} N"
             )
     return ", ".join(texts)
 
 
-def unidentified(found: Findings) -> Mapping[str, str]:
+def unidentified(findings: Findings) -> Mapping[str, str]:
     """Return why parameters of the plant are not identifiable, and the run that would help.
 
     Parameters are named as in `Findings.fitted`.
     """
     why = {
         "normal_force": "only friction forces are identifiable: it is taken as 1 N, so that "
-        "coefficients are in N and viscous ones in N s/m; give it by --fix plant.normal_force=..."
+        "coefficients are in N and viscous ones in N s/m; give it by --fix plant.normal_force=...",
+        **(_with_spring if findings.chosen.has_spring else _without_spring)(findings),
     }
-    slower = f"run below {1e3 * found.slowest:.3g} mm/s"
-    one_direction = len(found.chosen.directions) == 1
-    if not found.chosen.has_spring:
-        why["damping"] = (
-            "viscous damping and the viscous part of friction are one where the belt is at rest: "
-            "it is in the friction, and taken as 0"
-        )
-        why["stiffness"] = (
-            "no spring is looked for on a belt at rest: it is taken as 0; give it by "
-            "--fix plant.stiffness=..."
-        )
-        why["bias_force"] = (
-            "it merges with the static friction of a single direction, and is taken as 0; run in "
-            "both directions"
-            if one_direction
-            else _BY_DIRECTION
-        )
-        if found.law != "coulomb":  # its static coefficient is that of slip
-            why["friction.static"] = (
-                "no row at rest is fitted: it is the curve at its slowest steady speed extended "
-                f"to rest; {slower}"
-            )
-        if at_rest := _static_friction(found):
-            why["friction.static"] = (
-                f"it is that of slip; {at_rest}: the law stiction has static friction of its own, "
-                "and a force that rises slowly from rest tells it"
-            )
-    else:
-        if found.one_belt_speed:
-            why["damping"] = (
-                "at one belt speed it merges with a linear part of friction, and is taken as 0; "
-                "run at several belt speeds"
-            )
-        if one_direction:
-            why["bias_force"] = (
-                "in one direction it merges with the static friction, and is taken as 0; run in "
-                "both directions"
-            )
-        elif found.chosen.by_direction:
-            why["bias_force"] = _BY_DIRECTION
-        if not found.stuck and found.law not in ("coulomb", "stiction", "dahl"):
-            why["friction.static"] = (
-                f"no record shows sticking: it is the curve extended to rest; {slower}"
-            )
-    known = {*found.fixed, *found.fitted} - {"friction.static"}
+    known = {*findings.fixed, *findings.fitted} - {"friction.static"}
     why = {name: reason for name, reason in why.items() if name not in known}
-    if found.rivals:
-        names = ", ".join([found.chosen.label, *found.rivals[:-1]])
+    if findings.rivals:
+        names = ", ".join([findings.chosen.label, *findings.rivals[:-1]])
         why["friction.law"] = (
-            f"{names} and {found.rivals[-1]} predict held-out parts alike, but differ in friction "
-            "at speeds that were hardly recorded: the simplest is taken; run with relative speeds "
-            f"from rest to {1e3 * found.fastest:.3g} mm/s"
+            f"{names} and {findings.rivals[-1]} predict held-out parts alike, but differ in "
+            "friction at speeds that were hardly recorded: the simplest is taken; run with "
+            f"relative speeds from rest to {1e3 * findings.fastest:.3g} mm/s"
         )
-    for name, estimate in found.fitted.items():
+    for name, estimate in findings.fitted.items():
         if estimate.standard_error < _VAGUE_ERROR * abs(estimate.value) or name in why:
             continue
         sure = f"{estimate.value:.4g} has a standard error of {estimate.standard_error:.2g}"
@@ -178,3 +136,55 @@ def unidentified(found: Findings) -> Mapping[str, str]:
             sure = f"{estimate.value:.4g} is one of many values that fit alike"
         why[name] = f"{sure}; a run with other speeds and forces may identify it"
     return why
+
+
+def _without_spring(findings: Findings) -> dict[str, str]:
+    """Return why parameters of an axis are not identifiable."""
+    one_direction = len(findings.chosen.directions) == 1
+    why = {
+        "damping": "viscous damping and the viscous part of friction are one where the belt is at "
+        "rest: it is in the friction, and taken as 0",
+        "stiffness": "no spring is looked for on a belt at rest: it is taken as 0; give it by "
+        "--fix plant.stiffness=...",
+        "bias_force": "it merges with the static friction of a single direction, and is taken as "
+        "0; run in both directions"
+        if one_direction
+        else _BY_DIRECTION,
+    }
+    if findings.law != "coulomb":  # its static coefficient is that of slip
+        why["friction.static"] = (
+            "no row at rest is fitted: it is the curve at its slowest steady speed extended "
+            f"to rest; {_slower(findings)}"
+        )
+    if at_rest := _static_friction(findings):
+        why["friction.static"] = (
+            f"it is that of slip; {at_rest}: the law stiction has static friction of its own, "
+            "and a force that rises slowly from rest tells it"
+        )
+    return why
+
+
+def _with_spring(findings: Findings) -> dict[str, str]:
+    """Return why parameters of a drive on a spring are not identifiable."""
+    why: dict[str, str] = {}
+    if findings.one_belt_speed:
+        why["damping"] = (
+            "at one belt speed it merges with a linear part of friction, and is taken as 0; "
+            "run at several belt speeds"
+        )
+    if len(findings.chosen.directions) == 1:
+        why["bias_force"] = (
+            "in one direction it merges with the static friction, and is taken as 0; run in "
+            "both directions"
+        )
+    elif findings.chosen.by_direction:
+        why["bias_force"] = _BY_DIRECTION
+    if not findings.stuck and findings.law not in ("coulomb", "stiction", "dahl"):
+        why["friction.static"] = (
+            f"no record shows sticking: it is the curve extended to rest; {_slower(findings)}"
+        )
+    return why
+
+
+def _slower(findings: Findings) -> str:
+    return f"run below {1e3 * findings.slowest:.3g} mm/s"

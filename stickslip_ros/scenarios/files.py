@@ -82,20 +82,14 @@ def load_scenario(
     ('paper', 0.2)
     """
     path = _find(name_or_path)
-    files = [read_file(path, namespace)]
-    below = _path_of_base(files[0]) if base is None else _find(base)
-    given = [path] if base is None else [path, below]
-    while below is not None:
-        if any(below.samefile(file.path) for file in files):
-            raise InvalidInputError(f"{path}: base {below} leads back to itself")
-        with _contents_kept(below, given):
-            files.append(read_file(below, namespace))
-            below = _path_of_base(files[-1])
+    top = read_file(path, namespace)
+    given = [path] if base is None else [path, _find(base)]
+    files = _with_bases(top, given, namespace)
     law = _law_in_use(files, namespace) if controller is None else known_law(controller)
     values: dict[str, dict[str, Any]] = {node: {} for node in NODE_PARAMETERS}
     sources: dict[str, str] = {}
     other_sections: list[str] = []
-    for file in files[::-1]:
+    for file in reversed(files):
         with _contents_kept(file.path, given):
             found, other_sections = file.values(namespace, other_nodes=other_nodes)
             for node, name, value in found:
@@ -131,8 +125,23 @@ def load_scenario(
     return scenario.overridden(overrides) if overrides else scenario
 
 
+def _with_bases(
+    file: ScenarioFile, given: Sequence[Path], namespace: str
+) -> Sequence[ScenarioFile]:
+    """Return a file and its bases; `given` has its path, and that of a base given beside it."""
+    files = [file]
+    below = given[1] if len(given) > 1 else _path_of_base(file)
+    while below is not None:
+        if any(below.samefile(other.path) for other in files):
+            raise InvalidInputError(f"{file.path}: base {below} leads back to itself")
+        with _contents_kept(below, given):
+            files.append(read_file(below, namespace))
+            below = _path_of_base(files[-1])
+    return files
+
+
 @contextmanager
-def _contents_kept(path: Path, given: Sequence[Path | None]) -> Generator[None]:
+def _contents_kept(path: Path, given: Sequence[Path]) -> Generator[None]:
     """Keep what is in a file out of messages unless it is `given`: another one may name any."""
     try:
         yield
