@@ -52,13 +52,13 @@ class AxisTask:
         self.records, self.limit = records, limit
         self.left: list[str] = []
         """Laws that were not fitted, because the time was over."""
-        own = {name: fixed[name] for name in LINEAR if name in fixed}
-        self.fixed = {**dict.fromkeys(LINEAR[1:], 0.0), **own}
+        given_constants = {name: fixed[name] for name in LINEAR if name in fixed}
+        self.fixed = {**dict.fromkeys(LINEAR[1:], 0.0), **given_constants}
         self.free = [name for name in LINEAR if name not in self.fixed]
         self.delay: float | None = fixed.get(DELAY)
         # Where the slide never rests it is as in the published method: the force is that at the
         # instant of a sample. Otherwise it is held until the next one.
-        self.rows = Rows.of([filtered(each, decimated=True) for each in records])
+        self.rows = Rows.of([filtered(record, decimated=True) for record in records])
         if self.delay is not None or self.rows.resting:
             self.rows = self._rows(self.delay or 0.0)
 
@@ -66,50 +66,50 @@ class AxisTask:
         self, law: str, laws: Sequence[IdentifiedLaw], progress: Callable[[str], None]
     ) -> list[Regression]:
         """Return the fits of the laws that compete, or of the one that is asked for."""
-        found: list[Regression] = []
+        fits: list[Regression] = []
         self.limit.begin_stage(_CANDIDATES_TIME)
-        for each in laws:
-            if each.memory or not each.identifiable_in_slip:
+        for curve in laws:
+            if curve.memory or not curve.identifiable_in_slip:
                 continue
-            if found and self.limit.is_over:
-                self.left.append(each.name)
+            if fits and self.limit.is_over:
+                self.left.append(curve.name)
             else:
-                progress(each.name)
-                found.append(self._with_delay(each))
-        if found and self.limit.is_over:
+                progress(curve.name)
+                fits.append(self._with_delay(curve))
+        if fits and self.limit.is_over:
             self.left += ["table", "lugre"]
         elif law in (AUTO, "table", "lugre"):
             progress("table")
             knots = np.quantile(self.rows.speeds, np.linspace(0.0, 1.0, _KNOTS))
             knots[0] = 0.0
             tables = SaturatingAdapter(self.rows.curve_speeds), TableAdapter(knots)
-            best = min(map(self._with_delay, tables), key=lambda each: each.error)
-            found += [best] if law != "lugre" else []
+            best = min(map(self._with_delay, tables), key=lambda fit: fit.error)
+            fits += [best] if law != "lugre" else []
             if law != "table":
                 progress("lugre")
-                found.append(self._with_memory(best, asked=law == "lugre"))
-        return found
+                fits.append(self._with_memory(best, asked=law == "lugre"))
+        return fits
 
     def _with_delay(self, law: IdentifiedLaw) -> Regression:
         """Return a fit with a delay if the records ask for one."""
-        fit = found = self._fitted(law, self.rows).validated()
+        fit = without = self._fitted(law, self.rows).validated()
         if self.delay is not None:
-            return found
+            return without
         if self.rows.resting:
             fits = fit, self._fitted(law, self._rows(None)).validated()
-            found = min(fits, key=lambda each: each.error)
+            without = min(fits, key=lambda fitted: fitted.error)
         best = 0.0
         for tried in (_DELAYS, _DELAY_STEPS):
             best = self._best_delay(fit, best + tried)
             fit = self._fitted(law, self._rows(best * self.records[0].period))
         fit = fit.validated()
-        return fit if fit.error < _RESOLVED_ERROR_RATIO * found.error else found
+        return fit if fit.error < _RESOLVED_ERROR_RATIO * without.error else without
 
     def _best_delay(self, fit: Regression, tried: FloatArray) -> float:
         """Return the delay, in samples, with which the errors of a fit are least."""
         period = self.records[0].period
         design, wanted = fit.system
-        changes = [self._forces(each * period) - fit.rows.force for each in tried.tolist()]
+        changes = [self._forces(delay * period) - fit.rows.force for delay in tried.tolist()]
         wanted = wanted[:, None] + np.column_stack(changes)
         left = wanted - design @ np.linalg.lstsq(design, wanted, rcond=None)[0]
         return float(tried[np.argmin(np.sum(left * left, axis=0))])
@@ -129,12 +129,12 @@ class AxisTask:
 
         best = min((fitted(share * span) for share in _DEFLECTIONS), key=_loss)
         others = [fitted(factor * best.curve.deflection) for factor in (0.2, 0.4, 2.0, 4.0)]
-        found = min([best, *others], key=_loss).validated()
-        if asked or found.error < _RESOLVED_ERROR_RATIO * static.error:
-            return found
+        memory = min([best, *others], key=_loss).validated()
+        if asked or memory.error < _RESOLVED_ERROR_RATIO * static.error:
+            return memory
         share = f"{1.0 - _RESOLVED_ERROR_RATIO:.0%}"
         remark = f"predicts better by less than {share}: not resolved by filtered rows"
-        return replace(found, remark=remark)
+        return replace(memory, remark=remark)
 
     def _fitted(self, law: IdentifiedLaw, rows: Rows) -> Regression:
         return regress(rows, law, self.free, self.fixed)

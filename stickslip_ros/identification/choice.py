@@ -42,14 +42,14 @@ def choose(candidates: Sequence[Fit]) -> tuple[Fit, Mapping[str, bool]]:
     1984, section 3.4), with three. A model with constants that the records do not tell is chosen
     only if all have some.
     """
-    best = min(candidates, key=lambda each: each.error)
-    near = [each for each in candidates if each is best or better_by(best, each) < _SIGNIFICANT]
+    best = min(candidates, key=lambda fit: fit.error)
+    near = [fit for fit in candidates if fit is best or better_by(best, fit) < _SIGNIFICANT]
     # An error that scatters much is within it, too: what is simpler and better is as good as that.
     as_good = [
-        each
-        for each in candidates
-        if any(each.size <= other.size and each.error <= other.error for other in near)
+        fit
+        for fit in candidates
+        if any(fit.size <= other.size and fit.error <= other.error for other in near)
     ]
-    told = [each for each in as_good if np.isfinite(np.diag(each.covariance)).all()]
-    chosen = min(told or as_good, key=lambda each: (each.size, each.error))
-    return chosen, {each.label: each in as_good for each in candidates}
+    certain = [fit for fit in as_good if np.isfinite(np.diag(fit.covariance)).all()]
+    chosen = min(certain or as_good, key=lambda fit: (fit.size, fit.error))
+    return chosen, {fit.label: fit in as_good for fit in candidates}

@@ -29,21 +29,21 @@ def block_covariance(jacobian: FloatArray, residual: FloatArray, lost: int = 0) 
     untold = _untold(product)
     changes: list[FloatArray] = []
     for rows in np.array_split(np.arange(len(residual)), BLOCKS):
-        own = scaled[rows]
-        rest = np.linalg.pinv(product - own.T @ own, rcond=_RANK, hermitian=True)
-        changes.append(rest @ (own.T @ residual[rows]))
+        part = scaled[rows]
+        rest = np.linalg.pinv(product - part.T @ part, rcond=_RANK, hermitian=True)
+        changes.append(rest @ (part.T @ residual[rows]))
     away = np.array(changes) - np.mean(changes, axis=0)
-    found = (away.T @ away) * (BLOCKS - 1) / BLOCKS
+    covariance = (away.T @ away) * (BLOCKS - 1) / BLOCKS
     freedom = max(len(residual) - jacobian.shape[1] - lost, 1)
     white = np.linalg.pinv(product, rcond=_RANK, hermitian=True)
     white *= float(residual @ residual) / freedom
     tiny = np.finfo(float).tiny
-    ratios = np.maximum(np.diag(white), tiny) / np.maximum(np.diag(found), tiny)
+    ratios = np.maximum(np.diag(white), tiny) / np.maximum(np.diag(covariance), tiny)
     larger = np.sqrt(np.maximum(ratios, 1.0))
-    found = found * np.outer(larger / scale, larger / scale)
-    found[untold, :] = found[:, untold] = 0.0
-    found[untold, untold] = np.inf
-    return found
+    covariance = covariance * np.outer(larger / scale, larger / scale)
+    covariance[untold, :] = covariance[:, untold] = 0.0
+    covariance[untold, untold] = np.inf
+    return covariance
 
 
 def _untold(product: FloatArray) -> BoolArray:
@@ -61,10 +61,10 @@ def propagated(linear: FloatArray, covariance: FloatArray) -> FloatArray:
     `linear` has the derivatives of the results, shape (results, values). The variance of what
     depends on a value with an infinite variance is infinite.
     """
-    told = np.isfinite(np.diag(covariance))
-    own = linear[:, told]
-    found = own @ covariance[np.ix_(told, told)] @ own.T
-    untold = (linear[:, ~told] != 0.0).any(axis=1)
-    found[untold, :] = found[:, untold] = 0.0
-    found[untold, untold] = np.inf
-    return found
+    finite = np.isfinite(np.diag(covariance))
+    known = linear[:, finite]
+    variances = known @ covariance[np.ix_(finite, finite)] @ known.T
+    untold = (linear[:, ~finite] != 0.0).any(axis=1)
+    variances[untold, :] = variances[:, untold] = 0.0
+    variances[untold, untold] = np.inf
+    return variances

@@ -52,54 +52,56 @@ class DriveTask:
         much worse in the search is not fitted further.
         """
         search = self._search
-        found: list[Refinement] = []
+        candidates: list[Refinement] = []
 
-        def compete(own: Sequence[IdentifiedLaw], like: Refinement | None = None) -> None:
+        def compete(competitors: Sequence[IdentifiedLaw], like: Refinement | None = None) -> None:
             """Search laws one by one, then extend what was found of them."""
             near: list[Sequence[Refinement]] = []
-            for each in own:
-                self._limit.begin_part(_LAW_TIME if len(own) > 1 else 1.0)
-                name = label_of(each)
-                if (found or near) and self._limit.is_over:
+            for competitor in competitors:
+                self._limit.begin_part(_LAW_TIME if len(competitors) > 1 else 1.0)
+                name = label_of(competitor)
+                if (candidates or near) and self._limit.is_over:
                     self.left.append(name)
                     continue
                 progress(name)
                 thorough = not any(map(is_white, chain(*near)))
-                near.append(search.searched(each, thorough=thorough, like=like))
+                near.append(search.searched(competitor, thorough=thorough, like=like))
             self._limit.begin_part(1.0)
             for fits in sorted(near, key=lambda fits: min(map(loss_of, fits))):
-                least = min(map(loss_of, chain(found, *near)))
-                found.append(search.extended(fits, least))
+                least = min(map(loss_of, chain(candidates, *near)))
+                candidates.append(search.extended(fits, least))
 
         def explained() -> bool:
-            return any(map(is_white, found))
+            return any(map(is_white, candidates))
 
         self._limit.begin_stage(_SEARCH_TIME)
         tables = [search.table] if law == search.table.name else []
-        compete([*(each for each in laws if not each.memory), *tables])
-        if len(search.rows.directions) > 1 and found and not explained():
-            compete([DirectionalAdapter(min(found, key=loss_of).law)])
+        compete([*(competitor for competitor in laws if not competitor.memory), *tables])
+        if len(search.rows.directions) > 1 and candidates and not explained():
+            compete([DirectionalAdapter(min(candidates, key=loss_of).law)])
         # A memory changes the motion near sticking: it does not explain an input that is missing.
-        described = not found or (law == AUTO and min(map(_share, found)) < _MISSING_INPUT_ERROR)
+        described = not candidates or (
+            law == AUTO and min(map(_share, candidates)) < _MISSING_INPUT_ERROR
+        )
         bristles: Refinement | None = None
-        for each in laws if described and not explained() else ():
-            if each.memory and (each is DAHL or not explained()):
-                compete([each], bristles)
-                bristles = found[-1] if found[-1].law is LUGRE else bristles
+        for rival in laws if described and not explained() else ():
+            if rival.memory and (rival is DAHL or not explained()):
+                compete([rival], bristles)
+                bristles = candidates[-1] if candidates[-1].law is LUGRE else bristles
         if law == AUTO and not explained():
             compete([search.table])
-        return self._finished(found)
+        return self._finished(candidates)
 
-    def _finished(self, found: Sequence[Refinement]) -> list[Refinement]:
+    def _finished(self, fits: Sequence[Refinement]) -> list[Refinement]:
         """Return searched models fitted further, the better ones first, as far as time allows."""
-        least = min(map(loss_of, found))
-        near = [each for each in found if each.loss <= _HOPELESS_LOSS_RATIO * least]
-        finished = {each: remarked(each, _HOPELESS) for each in found}
-        for number, each in enumerate(sorted(near, key=loss_of)):
+        least = min(map(loss_of, fits))
+        near = [fit for fit in fits if fit.loss <= _HOPELESS_LOSS_RATIO * least]
+        finished = {fit: remarked(fit, _HOPELESS) for fit in fits}
+        for number, fit in enumerate(sorted(near, key=loss_of)):
             self._limit.begin_stage(1.0 / (len(near) - number))
-            finished[each] = self._search.finished(each)
-            if finished[each].remark == OUT_OF_TIME:
-                self.left.append(label_of(each.law))
+            finished[fit] = self._search.finished(fit)
+            if finished[fit].remark == OUT_OF_TIME:
+                self.left.append(label_of(fit.law))
         return [*finished.values()]
 
 

@@ -43,7 +43,7 @@ def evenly_spaced(name: str, stamp: IntArray, columns: Mapping[str, FloatArray])
         known &= np.isfinite(columns[each])
     known &= np.diff(stamp, prepend=np.iinfo(np.int64).min // 2) > 0
     time = (stamp[known] - stamp[0]) / NANOSECONDS
-    columns = {each: values[known] for each, values in columns.items()}
+    columns = {column: values[known] for column, values in columns.items()}
     if len(time) < FEWEST:
         raise InvalidInputError(
             f"{name} has {len(time)} samples: identification needs at least {FEWEST}"
@@ -59,25 +59,27 @@ def evenly_spaced(name: str, stamp: IntArray, columns: Mapping[str, FloatArray])
     long_enough = [rows for rows in parts if len(rows) >= FEWEST]
     left_out = 1.0 - sum(map(len, long_enough)) / len(time)
     for rows in long_enough:
-        own = time[rows]
-        even = own[0] + period * np.arange(round((own[-1] - own[0]) / period) + 1)
-        far = _distances(even, own) > _MISSING_DISTANCE * period
-        found: dict[str, Any] = {"missing": far if far.any() else None, "left_out": left_out}
-        jitters = float(_distances(own, even).max()) <= _JITTER * period
-        as_measured = len(own) == len(even) and np.abs(own - even).max() < 1e-3 * period
-        for each, values in columns.items():
+        times = time[rows]
+        even = times[0] + period * np.arange(round((times[-1] - times[0]) / period) + 1)
+        far = _distances(even, times) > _MISSING_DISTANCE * period
+        samples: dict[str, Any] = {"missing": far if far.any() else None, "left_out": left_out}
+        jitters = float(_distances(times, even).max()) <= _JITTER * period
+        as_measured = len(times) == len(even) and np.abs(times - even).max() < 1e-3 * period
+        for column, values in columns.items():
             if as_measured:
-                found[each] = values[rows]
-            elif each in ("force", "disturbance") and not jitters:
-                found[each] = mean_held(own, values[rows], np.append(even, even[-1] + period))
-            elif each in ("force", "disturbance"):
-                last = np.searchsorted(own, even + _JITTER * period, "right") - 1
-                found[each] = values[rows][np.maximum(last, 0)]
+                samples[column] = values[rows]
+            elif column in ("force", "disturbance") and not jitters:
+                samples[column] = mean_held(times, values[rows], np.append(even, even[-1] + period))
+            elif column in ("force", "disturbance"):
+                last = np.searchsorted(times, even + _JITTER * period, "right") - 1
+                samples[column] = values[rows][np.maximum(last, 0)]
             else:
-                found[each] = np.interp(even, own, values[rows])
-        if "velocity" in found and _is_difference(found["velocity"], found["position"], period):
-            del found["velocity"]
-        records.append(Record(name, period, **found))
+                samples[column] = np.interp(even, times, values[rows])
+        if "velocity" in samples and _is_difference(
+            samples["velocity"], samples["position"], period
+        ):
+            del samples["velocity"]
+        records.append(Record(name, period, **samples))
     if not records:
         raise InvalidInputError(
             f"{name} has no {FEWEST} samples without a gap of more than {_LONGEST_GAP:g} periods"
@@ -112,7 +114,7 @@ def _is_difference(velocity: FloatArray, position: FloatArray, period: float) ->
     for span in range(1, _LONGEST_DIFFERENCE + 1):
         differences = (position[span:] - position[:-span]) / (span * period)
         for late in {span, span // 2}:
-            own = velocity[late : late + len(differences)]
-            if float(np.median(np.abs(own - differences))) <= allowed:
+            recorded = velocity[late : late + len(differences)]
+            if float(np.median(np.abs(recorded - differences))) <= allowed:
                 return True
     return False

@@ -64,9 +64,9 @@ class Filtered:
         if self.weight is None:
             return self._decimated(values)
         # Samples are the last axis of the transpose.
-        found = self._decimated((values.T * self.weight).T)
+        decimated = self._decimated((values.T * self.weight).T)
         used = self._row_weight > _LEAST_WEIGHT
-        return (found[used].T / self._row_weight[used]).T
+        return (decimated[used].T / self._row_weight[used]).T
 
     @property
     def decimation(self) -> int:
@@ -82,8 +82,8 @@ class Filtered:
         from scipy.signal import sosfiltfilt  # takes long to import
 
         low_pass = _chebyshev(self.decimation)
-        found: FloatArray = np.asarray(sosfiltfilt(low_pass, values, axis=0))
-        return found[:: self.decimation]
+        smooth: FloatArray = np.asarray(sosfiltfilt(low_pass, values, axis=0))
+        return smooth[:: self.decimation]
 
 
 @cache

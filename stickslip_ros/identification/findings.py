@@ -54,8 +54,8 @@ class Findings:
 
     def behind(self, candidate: Fit) -> float:
         """Return by how many standard errors a law predicts held-out parts worse than the best."""
-        allowed = [each for each in self.candidates if not each.remark] or self.candidates
-        return better_by(min(allowed, key=lambda each: each.error), candidate)
+        allowed = [fit for fit in self.candidates if not fit.remark] or self.candidates
+        return better_by(min(allowed, key=lambda fit: fit.error), candidate)
 
     @property
     def law(self) -> str:
@@ -91,15 +91,15 @@ class Findings:
     def rivals(self) -> Sequence[str]:
         """Laws that predict as well as the one that was chosen, and have another friction."""
 
-        def differs(each: Fit, own: Friction) -> bool:
-            other = each.friction(own.direction, self.fastest)
-            away = np.abs(np.interp(own.speed, other.speed, other.force) - own.force)
-            return float(away.max()) > _FRICTION_DIFFERENCE * float(own.force.max())
+        def differs(fit: Fit, curve: Friction) -> bool:
+            other = fit.friction(curve.direction, self.fastest)
+            away = np.abs(np.interp(curve.speed, other.speed, other.force) - curve.force)
+            return float(away.max()) > _FRICTION_DIFFERENCE * float(curve.force.max())
 
         # The one that was chosen may have been fitted further since.
-        others = [each for each in self.candidates if each.label != self.chosen.label]
-        alike = [each for each in others if self.as_good.get(each.label) and not each.remark]
-        return [each.label for each in alike if any(differs(each, own) for own in self.curves)]
+        others = [fit for fit in self.candidates if fit.label != self.chosen.label]
+        alike = [fit for fit in others if self.as_good.get(fit.label) and not fit.remark]
+        return [fit.label for fit in alike if any(differs(fit, curve) for curve in self.curves)]
 
     @property
     def one_belt_speed(self) -> bool:
@@ -110,8 +110,8 @@ class Findings:
     @cached_property
     def _speeds(self) -> Sequence[FloatArray]:
         """Sliding speeds of each record, m/s."""
-        columns = (filtered(each, decimated=False) for each in self.records)
-        return [np.abs(each.relative_speed) for each in columns]
+        columns = (filtered(part, decimated=False) for part in self.records)
+        return [np.abs(part.relative_speed) for part in columns]
 
     @property
     def slowest(self) -> float:
@@ -123,11 +123,11 @@ class Findings:
     def stuck(self) -> bool:
         """Whether the slide stuck in a record; the filter blurs short sticking, noise the rest."""
         raw = (
-            np.abs(np.diff(each.position) / each.period - each.belt_velocity[1:])
-            for each in self.records
+            np.abs(np.diff(record.position) / record.period - record.belt_velocity[1:])
+            for record in self.records
         )
         return any(
-            np.mean(each > _STILL_SPEED * each.max()) < 0.98 for each in (*self._speeds, *raw)
+            np.mean(speeds > _STILL_SPEED * speeds.max()) < 0.98 for speeds in (*self._speeds, *raw)
         )
 
     def static_forces(self, sign: float) -> tuple[float, float, float]:
@@ -141,8 +141,8 @@ class Findings:
             late = record.delayed(chosen.delay)
             held = late.held_force + values["bias_force"] - values["stiffness"] * late.position
             bounds.append(static_force(late, held, sign))
-        own = float(chosen.force_at(chosen.point, sign, np.zeros(1))[0])
-        return own, max(low for low, _ in bounds), min(high for _, high in bounds)
+        static = float(chosen.force_at(chosen.point, sign, np.zeros(1))[0])
+        return static, max(low for low, _ in bounds), min(high for _, high in bounds)
 
     @cached_property
     def curves(self) -> Sequence[Friction]:
@@ -153,7 +153,7 @@ class Findings:
     @property
     def fastest(self) -> float:
         """Fastest speed |v_r| that was recorded, m/s."""
-        return max(float(each.max()) for each in self._speeds)
+        return max(float(speeds.max()) for speeds in self._speeds)
 
     @cached_property
     def drive(self) -> Drive:
@@ -164,8 +164,8 @@ class Findings:
         """Return the rms of F - F_model over that of F, on filtered rows; None without a force."""
         if not record.held_force.any():
             return None
-        found = self.chosen.errors(record)
-        return rms(found.error) / rms(found.force) if len(found.force) else None
+        errors = self.chosen.errors(record)
+        return rms(errors.error) / rms(errors.force) if len(errors.force) else None
 
     @cached_property
     def free_run(self) -> Callable[[Record], FloatArray]:
@@ -194,7 +194,7 @@ class Findings:
         record.require_motion()
         away, has_spring = self.free_run(record) - record.position, self.chosen.has_spring
         error = rms(away[~(record.lost | (has_spring & np.isnan(away)))])
-        found = {
+        check = {
             "force_error": self.force_error(record),
             "free_run_error": error if isfinite(error) else inf,
             "segment_error": rms(self.residuals(record).error) if has_spring else None,
@@ -204,9 +204,9 @@ class Findings:
         led = record.led
         if self.servo is not None and led is not None and led.force is not None:
             position, force = closed_loop(led, self.drive, self.servo, self.chosen.delay)
-            found["position_error"] = _relative(position[START:], led.position[START:])
-            found["closed_loop_force_error"] = _relative(force[START:], led.force[START:])
-        return found
+            check["position_error"] = _relative(position[START:], led.position[START:])
+            check["closed_loop_force_error"] = _relative(force[START:], led.force[START:])
+        return check
 
 
 def _usual(belt: FloatArray) -> float:
@@ -219,6 +219,6 @@ def _usual(belt: FloatArray) -> float:
     return float(np.median(moving[moving * sign > 0.0]))
 
 
-def _relative(found: FloatArray, measured: FloatArray) -> float:
+def _relative(predicted: FloatArray, measured: FloatArray) -> float:
     """Return the rms error as a share of what was measured; infinite of an unbounded motion."""
-    return rms(found - measured) / rms(measured) if np.isfinite(found).all() else inf
+    return rms(predicted - measured) / rms(measured) if np.isfinite(predicted).all() else inf

@@ -43,8 +43,8 @@ class Estimate:
 
     def as_dict(self) -> dict[str, Any]:
         """Return value, `standard_error` and `interval` by name, for JSON."""
-        own = {"value": self.value, "standard_error": self.standard_error}
-        return {**own, "interval": [*self.interval]}
+        entries = {"value": self.value, "standard_error": self.standard_error}
+        return {**entries, "interval": [*self.interval]}
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,13 +193,13 @@ class Fit(ABC):
     def parameters(self, normal_force: float) -> tuple[list[str], FloatArray, FloatArray]:
         """Return names, values and covariance of the fitted parameters of the plant."""
 
-        def found(point: FloatArray) -> dict[str, float]:
+        def constants(point: FloatArray) -> dict[str, float]:
             values = self.values_at(point)
             return self.law.constants(values, normal_force) | {DELAY: values[DELAY]}
 
-        values, linear = self._linear(lambda point: np.array([*found(point).values()]))
+        values, linear = self._linear(lambda point: np.array([*constants(point).values()]))
         fitted = np.abs(linear).sum(axis=1) > 0.0
-        names = [name for name, used in zip(found(self.point), fitted, strict=True) if used]
+        names = [name for name, used in zip(constants(self.point), fitted, strict=True) if used]
         return names, values[fitted], propagated(linear[fitted], self.covariance)
 
     def friction(self, sign: float, fastest: float) -> Friction:

@@ -31,8 +31,8 @@ def free_run(predictor: Predictor, drive: Drive) -> tuple[float, FloatArray]:
     spread = 3.0 * abs(slope) + float(np.std(np.diff(first))) / record.period
 
     def loss(velocity: float) -> float:
-        found = predictor.positions(drive, float(velocity)) - record.position
-        return float(np.mean(found * found)) if np.isfinite(found).all() else _UNBOUNDED_LOSS
+        error = predictor.positions(drive, float(velocity)) - record.position
+        return float(np.mean(error * error)) if np.isfinite(error).all() else _UNBOUNDED_LOSS
 
     solve: Any = minimize_scalar  # its types know no bounds
     bounds, options = (slope - spread, slope + spread), {"xatol": _SPEED_TOLERANCE * spread}

@@ -65,12 +65,12 @@ def fitted_curves(
 
 
 def _best(speed: FloatArray, force: FloatArray, law: str) -> FittedCurve:
-    return min(_candidates(speed, force, law), key=lambda each: _criterion([each]))
+    return min(_candidates(speed, force, law), key=lambda curve: _criterion([curve]))
 
 
 def _criterion(curves: Sequence[FittedCurve]) -> float:
-    pairs, squares = (sum(getattr(each, name) for each in curves) for name in ("pairs", "squares"))
-    constants = sum(len(each.estimates) for each in curves)
+    pairs, squares = (sum(getattr(fit, name) for fit in curves) for name in ("pairs", "squares"))
+    constants = sum(len(fit.estimates) for fit in curves)
     return pairs * log(squares / pairs) + constants * log(pairs)
 
 
@@ -78,8 +78,8 @@ def _candidates(speed: FloatArray, force: FloatArray, law: str) -> Iterator[Fitt
     one = np.ones_like(speed)
     if law != "exponential":
         (static, viscous), squares = _solved([one, speed], force)
-        found = Coulomb(max(static, 0.0), viscous)
-        yield _curve(found, ("static", "viscous"), [one, speed], squares)
+        fitted = Coulomb(max(static, 0.0), viscous)
+        yield _curve(fitted, ("static", "viscous"), [one, speed], squares)
     for exponent in _EXPONENTS if law != "coulomb" else ():
         decay_speed = _decay_speed(speed, force, exponent)
         columns = _columns(speed, decay_speed, exponent)
@@ -88,8 +88,8 @@ def _candidates(speed: FloatArray, force: FloatArray, law: str) -> Iterator[Fitt
             power = (speed / decay_speed) ** exponent
             change = (static - kinetic) * columns[1] * power * exponent / decay_speed
             names = ("kinetic", "static", "viscous", "decay_speed")
-            found = Exponential(static, kinetic, decay_speed, viscous, exponent)
-            yield _curve(found, names, [*columns, change], squares)
+            fitted = Exponential(static, kinetic, decay_speed, viscous, exponent)
+            yield _curve(fitted, names, [*columns, change], squares)
 
 
 def _decay_speed(speed: FloatArray, force: FloatArray, exponent: float) -> float:
@@ -100,10 +100,10 @@ def _decay_speed(speed: FloatArray, force: FloatArray, exponent: float) -> float
         return _solved(_columns(speed, exp(logarithm), exponent), force)[1]
 
     grid = np.linspace(log(speed.min() / 3.0), log(speed.max()), _GRID).tolist()
-    best = int(np.argmin([squares(each) for each in grid]))
+    best = int(np.argmin([squares(decay_speed) for decay_speed in grid]))
     bounds = grid[max(best - 1, 0)], grid[min(best + 1, _GRID - 1)]
-    found: Any = minimize_scalar(squares, bounds=bounds, method="bounded")
-    return exp(found.x)
+    minimum: Any = minimize_scalar(squares, bounds=bounds, method="bounded")
+    return exp(minimum.x)
 
 
 def _columns(speed: FloatArray, decay_speed: float, exponent: float) -> list[FloatArray]:

@@ -54,17 +54,17 @@ def fixed_of(texts: Sequence[str]) -> dict[str, float]:
 
     Raises InvalidInputError for a text that is none.
     """
-    found: dict[str, float] = {}
+    fixed: dict[str, float] = {}
     for text in texts:
         name, equals, value = text.partition("=")
         target = name.strip()
-        if not equals or target in found:
+        if not equals or target in fixed:
             raise InvalidInputError(
                 f"--fix {text}: must be plant.PARAMETER=VALUE, each parameter once, as in "
                 "plant.mass=95"
             )
-        found[target] = _constant(target, value)
-    return found
+        fixed[target] = _constant(target, value)
+    return fixed
 
 
 def _constant(target: str, value: float | str) -> float:
@@ -94,10 +94,10 @@ def identify(
     """
     if not records:
         raise InvalidInputError("no recording is given: must be at least one")
-    delays = [each.delay for each in records if each.delay is not None]
+    delays = [record.delay for record in records if record.delay is not None]
     fixed = ({DELAY: delays[-1]} if delays else {}) | dict(fixed or {})
     laws = _laws(law)
-    fixable = {*FIXABLE, *(f"friction.{name}" for own in laws for name in own.fixable)}
+    fixable = {*FIXABLE, *(f"friction.{name}" for kind in laws for name in kind.fixable)}
     for name, value in fixed.items():
         if name not in fixable:
             raise InvalidInputError(f"plant.{name} is invalid: {_allowed(f'plant.{name}')}")
@@ -108,7 +108,7 @@ def identify(
     if (
         not spring
         and law not in (AUTO, *AXIS_LAWS)
-        and any(each.memory or not each.identifiable_in_slip for each in laws)
+        and any(kind.memory or not kind.identifiable_in_slip for kind in laws)
     ):
         raise InvalidInputError(
             f"law {law} is refused for a drive without a spring: must be one of {AUTO}, "
@@ -120,7 +120,7 @@ def identify(
     limit = TimeLimit(_FITTING_SHARE * time_limit if law == AUTO else inf)
     task = (DriveTask if spring else AxisTask)(records, fixed, limit)
     candidates = task.candidates(law, laws, progress)
-    in_choice = [each for each in candidates if law != AUTO or not each.remark]
+    in_choice = [candidate for candidate in candidates if law != AUTO or not candidate.remark]
     chosen, as_good = choose(in_choice or candidates)
     if isinstance(chosen, Regression):
         chosen.require("mass")
@@ -132,16 +132,16 @@ def _laws(law: str) -> Sequence[IdentifiedLaw]:
     """Return the laws with constants that are fitted: those that compete, or the one named."""
     if law in (AUTO, TableAdapter.name):
         return COMPETING if law == AUTO else ()
-    found = KNOWN_LAWS.get(law) or foreign_adapter(law)
-    if found is None:
+    named = KNOWN_LAWS.get(law) or foreign_adapter(law)
+    if named is None:
         known = (AUTO, TableAdapter.name, *KNOWN_LAWS, *foreign_names())
         raise InvalidInputError(f"law {law} is invalid: {must_be_one_of(law, known)}")
-    return (found,)
+    return (named,)
 
 
 def _allowed(name: str) -> str:
     """Return the end of a message that refuses a constant."""
-    return must_be_one_of(name, [f"plant.{each}" for each in FIXABLE])
+    return must_be_one_of(name, [f"plant.{constant}" for constant in FIXABLE])
 
 
 def _check_value(name: str, value: float, period: float) -> None:
@@ -177,10 +177,10 @@ def _check_friction(
 ) -> None:
     """Refuse constants of friction that the law in question does not search by themselves."""
     searched = laws if spring and law != AUTO else ()
-    known = [f"friction.{name}" for own in searched for name in own.fixable]
+    known = [f"friction.{name}" for searched_law in searched for name in searched_law.fixable]
     for name in fixed:
         if name.startswith("friction.") and name not in known:
-            allowed = ", ".join(f"plant.{each}" for each in known)
+            allowed = ", ".join(f"plant.{constant}" for constant in known)
             raise InvalidInputError(
                 f"plant.{name} cannot be fixed with the law {law} "
                 f"{'on' if spring else 'without'} a spring: of friction "

@@ -76,7 +76,7 @@ class LawSearch:
                 "identifiable; fix one, as in --fix plant.mass=100"
             )
         delay = self.fixed.get(DELAY, 0.0)
-        self.rows = Rows.of([filtered(each, decimated=False, delay=delay) for each in records])
+        self.rows = Rows.of([filtered(record, decimated=False, delay=delay) for record in records])
         self.predictors = [Predictor(record) for record in records]
 
     @cached_property
@@ -120,8 +120,10 @@ class LawSearch:
         if min(map(loss_of, near)) > _GIVEN_UP_LOSS_RATIO * least:
             return min(near, key=loss_of)
         extended: list[Refinement] = []
-        for each in near:
-            fit = each if is_white(each) else self._with_optional(each, least_share=_OPTIONAL_GAIN)
+        for start in near:
+            fit = (
+                start if is_white(start) else self._with_optional(start, least_share=_OPTIONAL_GAIN)
+            )
             extended.append(fit)
             if is_white(fit) or _is_rounding(fit):
                 break
@@ -132,12 +134,12 @@ class LawSearch:
         constants, columns = fit.constants, fit.rows.columns
         others = sum(abs(value) * rms(columns[name]) for name, value in constants.items())
         smallest = _LEAST_SHARE * (others or 1.0)
-        own = [fit.curve.start(each, smallest) for each in fit.coordinates]
+        directions = [fit.curve.start(coordinates, smallest) for coordinates in fit.coordinates]
         # A curve that does not suit the friction may leave no mass or stiffness to them.
         unfit = [name for name in self.free if not constants[name] > 0.0]
         return {
             **constants,
-            **law.joined(own if law.one_way is not law else own[-1:]),
+            **law.joined(directions if law.one_way is not law else directions[-1:]),
             **{name: self.constants[name] for name in unfit},
         }
 
@@ -230,17 +232,17 @@ class LawSearch:
 
     def _trajectories(self, law: IdentifiedLaw, length: float, most: int) -> Trajectories:
         # Of the segments of long records one of so many is used.
-        stride = -(-sum(len(each.position) for each in self.records) // most)
+        stride = -(-sum(len(record.position) for record in self.records) // most)
         segments = segments_of(self.predictors, length)[::stride]
         directions = self.rows.directions
         return Trajectories(law, directions, segments, self.normal_force, self.limit)
 
     def _known(self, law: IdentifiedLaw, values: Mapping[str, float]) -> dict[str, float]:
-        own = {
+        friction = {
             name: value * (1.0 if name in law.unscaled else self.normal_force)
             for name, value in self.friction.items()
         }
-        return {DELAY: 0.0, LAG: 0.0, **values, **own, **self.fixed}
+        return {DELAY: 0.0, LAG: 0.0, **values, **friction, **self.fixed}
 
 
 def is_white(fit: Refinement) -> bool:
@@ -254,9 +256,9 @@ def _is_rounding(fit: Refinement) -> bool:
     They repeat where a slide sticks and the belt moves by whole steps of it between samples.
     """
     task = fit.task
-    step = min(each.resolution for each in task.records)
-    own = task.of_positions
-    return rms(fit.residual[own]) < _ROUNDING * step / sqrt(12.0) * rms(task.weight[own])
+    step = min(record.resolution for record in task.records)
+    rows = task.of_positions
+    return rms(fit.residual[rows]) < _ROUNDING * step / sqrt(12.0) * rms(task.weight[rows])
 
 
 def _errors_from_zero(fit: Refinement, name: str) -> float:
@@ -282,8 +284,8 @@ def _held_out(fit: Refinement) -> FloatArray:
     if len(segments) < 4:
         return losses
     even, odd = slice(0, None, 2), slice(1, None, 2)
-    for own, other in ((even, odd), (odd, even)):
-        task, rest = (replace(fit.task, segments=segments[half]) for half in (own, other))
-        trained = refine(task, fit.names, fit.values, fit.starts[own], most=6)
+    for training, other in ((even, odd), (odd, even)):
+        task, rest = (replace(fit.task, segments=segments[half]) for half in (training, other))
+        trained = refine(task, fit.names, fit.values, fit.starts[training], most=6)
         losses[other] = best_starts(rest, trained.values, fit.starts[other]).losses
     return losses

@@ -34,7 +34,7 @@ class Predictor:
 
     def __init__(self, record: Record) -> None:
         self.record = record
-        self._force, self._disturbance = (each.tolist() for each in record.held_forces)
+        self._force, self._disturbance = (force.tolist() for force in record.held_forces)
         self._steps = 1
         self._corners = _corners(record.belt_velocity)
 
@@ -57,11 +57,11 @@ class Predictor:
         if self.record.force is None or not time_constant > 0.0:
             return self
         other, periods = copy(self), self.record.period / _LAG_STEPS / time_constant
-        command, disturbance = (np.repeat(each, _LAG_STEPS) for each in self.record.held_forces)
+        command, disturbance = (np.repeat(column, _LAG_STEPS) for column in self.record.held_forces)
         force = lagged(command, periods)
         # A mean force gives the right velocity at the end of a step, and not the right position.
         missing = (force - command) * (-1.0 / expm1(-periods) - 1.0 / periods - 0.5)
-        force, missing = (each.reshape(-1, _LAG_STEPS) for each in (force, missing))
+        force, missing = (column.reshape(-1, _LAG_STEPS) for column in (force, missing))
         moved = missing.sum(axis=1) / (_LAG_STEPS - 1)
         force[:, 0] += moved
         force[:, -1] -= moved
@@ -73,8 +73,8 @@ class Predictor:
         """Return positions, m, from the measured one at a velocity, m/s; NaN once unbounded."""
         count = len(self.record.position)
         start = np.array([[self.record.position[0], velocity]])
-        ((found, _),) = self.followed(drive, [slice(0, count)], start, 0.0)
-        return found[:count]
+        ((outputs, _),) = self.followed(drive, [slice(0, count)], start, 0.0)
+        return outputs[:count]
 
     def followed(
         self,
@@ -109,15 +109,15 @@ class Predictor:
             motion.restart(position, velocity, memory)
             end, length = part.stop, part.stop - part.start
             varied = motion if isinstance(motion, VariationalMotion) else None
-            own = np.full((count, length), np.nan)
-            by = np.zeros((*own.shape, varied.derivatives.shape[1] if varied else 0))
+            outputs = np.full((count, length), np.nan)
+            by = np.zeros((*outputs.shape, varied.derivatives.shape[1] if varied else 0))
             for number in chain((0,), self._samples(motion, part.start, length, delay)):
-                own[0, number] = motion.position
+                outputs[0, number] = motion.position
                 if count > 1:
-                    own[1, number] = motion.velocity
+                    outputs[1, number] = motion.velocity
                 if varied:
                     by[:, number] = varied.derivatives[:count]
-            yield own.ravel(), (by * units).reshape(own.size, -1)
+            yield outputs.ravel(), (by * units).reshape(outputs.size, -1)
             # The clock of the belt goes on to the start of the next part.
             motion.advance(self.record.period)
 

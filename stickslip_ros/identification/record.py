@@ -140,8 +140,8 @@ class Record:
         """
         from scipy.signal import savgol_filter  # takes long to import
 
-        found = savgol_filter(self.position, _SMOOTHED_SAMPLES, 3, deriv=order, delta=self.period)
-        return np.asarray(found)
+        smooth = savgol_filter(self.position, _SMOOTHED_SAMPLES, 3, deriv=order, delta=self.period)
+        return np.asarray(smooth)
 
     @cached_property
     def velocity_weight(self) -> float:
@@ -168,7 +168,7 @@ class Record:
             return None
         edges = np.flatnonzero(np.diff(np.isfinite(self.reference), prepend=False, append=False))
         parts = [(int(low), int(high)) for low, high in edges.reshape(-1, 2)]
-        low, high = max(parts, key=lambda each: each[1] - each[0], default=(0, 0))
+        low, high = max(parts, key=lambda ends: ends[1] - ends[0], default=(0, 0))
         return self.part(low, high) if high - low >= FEWEST else None
 
     def lagging(self, time_constant: float) -> Self:
@@ -187,9 +187,9 @@ class Record:
 
     def part(self, start: int, end: int) -> Self:
         """Return the samples from `start` to before `end`."""
-        values = {each.name: getattr(self, each.name) for each in fields(self)}
-        columns = {name: own for name, own in values.items() if isinstance(own, np.ndarray)}
-        return replace(self, **{name: own[start:end] for name, own in columns.items()})
+        values = {column.name: getattr(self, column.name) for column in fields(self)}
+        columns = {name: array for name, array in values.items() if isinstance(array, np.ndarray)}
+        return replace(self, **{name: array[start:end] for name, array in columns.items()})
 
 
 def lagged(command: FloatArray, periods: float) -> FloatArray:

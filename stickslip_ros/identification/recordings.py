@@ -43,19 +43,19 @@ def read_all(
     it is left out where a table lacks it. Options and errors are those of `read_records`.
     """
     tables = {path: table_of(path, form) for path in paths if is_table(path)}
-    found: dict[Path, list[Record]] = {}
+    by_path: dict[Path, list[Record]] = {}
     for path in dict.fromkeys(paths):
-        own, table = columns, tables.get(path)
+        given, table = columns, tables.get(path)
         if columns is not None and table is not None:
-            own = {
+            given = {
                 quantity: text
                 for quantity, text in columns.items()
                 if table.has(text)
                 or quantity not in _OPTIONAL
                 or not any(other.has(text) for other in tables.values())
             }
-        found[path] = read_records(path, own, table=table, **options)
-    return found
+        by_path[path] = read_records(path, given, table=table, **options)
+    return by_path
 
 
 def read_records(
@@ -84,18 +84,18 @@ def read_records(
         table = table_of(path, form)
     notes: Sequence[str] = ()
     if table is not None:
-        stamp, found, notes = _of_table(table, columns, belt_speed)
+        stamp, quantities, notes = _of_table(table, columns, belt_speed)
         delay = None
     else:
-        stamp, found, delay, notes = _of_bag(path, namespace, belt_speed, layout)
+        stamp, quantities, delay, notes = _of_bag(path, namespace, belt_speed, layout)
     since = (stamp - stamp[0]) / NANOSECONDS
     part = (since >= start) & (since < end)
     if not part.any():
         part_of = f"from {start:g} s" + (f" to {end:g} s" if isfinite(end) else " on")
         raise InvalidInputError(f"{path} holds no samples {part_of}: it lasts {since.max():.4g} s")
-    own = {name: values[part] for name, values in found.items()}
-    records = evenly_spaced(str(path), stamp[part], own)
-    return [replace(each, notes=tuple(notes), delay=delay) for each in records]
+    part_values = {name: values[part] for name, values in quantities.items()}
+    records = evenly_spaced(str(path), stamp[part], part_values)
+    return [replace(record, notes=tuple(notes), delay=delay) for record in records]
 
 
 def _of_table(
@@ -105,12 +105,12 @@ def _of_table(
     if columns is None and "motor_position" in table.columns:
         raise _has_motor(path)
     columns = table.own_columns if columns is None else columns
-    found, notes = quantities_of(table, columns, belt_speed)
-    time = found.pop("time")
-    belt = found.get("belt_velocity", np.full(len(time), 0.0))
+    quantities, notes = quantities_of(table, columns, belt_speed)
+    time = quantities.pop("time")
+    belt = quantities.get("belt_velocity", np.full(len(time), 0.0))
     optional = ("force", "disturbance", "reference", "velocity")
-    used = {name: found[name] for name in optional if name in found}
-    used |= {"position": found["position"], "belt_velocity": belt}
+    used = {name: quantities[name] for name in optional if name in quantities}
+    used |= {"position": quantities["position"], "belt_velocity": belt}
     for name, values in used.items():
         count = np.count_nonzero(np.isfinite(values))
         if name not in _MAY_LACK_VALUES and count < FEWEST <= len(values):
@@ -147,17 +147,17 @@ def _of_bag(
         with suppress(ValueError, RecursionError):
             plant[name] = json.loads(text)
     stamp = states.stamp
-    found = {"position": states.position, "belt_velocity": states.belt_velocity}
-    found["velocity"] = states.velocity
+    columns = {"position": states.position, "belt_velocity": states.belt_velocity}
+    columns["velocity"] = states.velocity
     if len(forces):
-        found["force"] = _held(forces, stamp, plant)
+        columns["force"] = _held(forces, stamp, plant)
     if len(disturbances):
-        found["disturbance"] = _since(stamp, disturbances.stamp, disturbances.force, before=0.0)
+        columns["disturbance"] = _since(stamp, disturbances.stamp, disturbances.force, before=0.0)
     if len(references):
-        found["reference"] = _since(stamp, references.stamp, references.position, before=nan)
+        columns["reference"] = _since(stamp, references.stamp, references.position, before=nan)
     delay = plant.get("force_delay", 0.0)
     late = isinstance(delay, int | float) and delay > 0.0
-    return stamp, found, float(delay) if late else None, notes
+    return stamp, columns, float(delay) if late else None, notes
 
 
 def _held(forces: ForceColumns, stamp: IntArray, plant: Mapping[str, Any]) -> FloatArray:
@@ -171,7 +171,7 @@ def _held(forces: ForceColumns, stamp: IntArray, plant: Mapping[str, Any]) -> Fl
         **{name: float(value) for name, value in given.items() if isinstance(value, int | float)}
     ).limiter
     if limiter is not None:
-        held = np.array([limiter(each) for each in held.tolist()])
+        held = np.array([limiter(force) for force in held.tolist()])
     time_constant = plant.get("actuator.time_constant", 0.0)
     if not isinstance(time_constant, int | float) or not time_constant > 0.0 or len(stamp) < 2:
         return held

@@ -69,9 +69,7 @@ class Refinement(Errors, Fit):
         )
         values = self.values
         law = self.law.friction(values, 1.0)
-        friction = np.array(
-            [float(law.coefficient(each, 1.0 if each > 0.0 else -1.0)) for each in speed]
-        )
+        friction = np.array([float(law.coefficient(w, 1.0 if w > 0.0 else -1.0)) for w in speed])
         model = values["mass"] * acceleration - friction - values["bias_force"]
         model += values["damping"] * velocity + values["stiffness"] * position
         return ForceErrors(time, position, speed, force - model, force - model - friction, force)
@@ -107,7 +105,7 @@ class Refinement(Errors, Fit):
 
     @override
     def used(self, records: Sequence[Record]) -> float:
-        return sum(self.task.lengths) / sum(len(each.position) for each in records)
+        return sum(self.task.lengths) / sum(len(record.position) for record in records)
 
     @property
     @override
@@ -150,10 +148,10 @@ def repetition_of(errors: FloatArray) -> int | None:
     """
     from scipy.signal import correlate, find_peaks
 
-    found = correlate(errors, errors, method="fft")[len(errors) - 1 :][: len(errors) // 4]
-    if not len(found) or not found[0] > 0.0:
+    products = correlate(errors, errors, method="fft")[len(errors) - 1 :][: len(errors) // 4]
+    if not len(products) or not products[0] > 0.0:
         return None
-    shares = found / found[0]
+    shares = products / products[0]
     unlike = np.flatnonzero(shares < _UNLIKE_CORRELATION)
     if not len(unlike):
         return None

@@ -78,18 +78,18 @@ class Regression(Fit):
     @property
     def coordinates(self) -> Sequence[dict[str, float]]:
         """Coordinates of the curve in each direction of the rows."""
-        return [self.curve.coordinates_of(each.tolist(), shape) for each, shape in self.curves]
+        return [self.curve.coordinates_of(forces.tolist(), shape) for forces, shape in self.curves]
 
     @override
     def values_at(self, point: FloatArray) -> Mapping[str, float]:
-        own = self.at(point)
+        moved = self.at(point)
         delay = {DELAY: self.rows.delay or 0.0}
-        return {**own.constants, **self.curve.joined(own.coordinates), **delay}
+        return {**moved.constants, **self.curve.joined(moved.coordinates), **delay}
 
     @override
     def curve_speeds(self, fastest: float) -> FloatArray:
-        own = self.curve.speeds
-        return self.rows.curve_speeds if own is None else own
+        speeds = self.curve.speeds
+        return self.rows.curve_speeds if speeds is None else speeds
 
     @override
     def errors(self, record: Record) -> ForceErrors:
@@ -98,8 +98,8 @@ class Regression(Fit):
         error = replace(self, rows=rows).residual
         friction = -rows.friction_terms(self.curve, self.shapes) @ self.unknowns[len(self.free) :]
         time, position, speed, force = (
-            columns.rows(each)
-            for each in (columns.time, columns.position, columns.relative_speed, columns.force)
+            columns.rows(column)
+            for column in (columns.time, columns.position, columns.relative_speed, columns.force)
         )
         return ForceErrors(time, position, speed, error, error - friction, force)
 
@@ -124,8 +124,8 @@ class Regression(Fit):
 
     def refitted(self, shapes: FloatArray | None = None) -> "Regression":
         """Return the fit to its rows with the same shapes, or with other ones."""
-        own = self if shapes is None else replace(self, shapes=shapes)
-        return replace(own, unknowns=solve(*own.system, own.least))
+        fit = self if shapes is None else replace(self, shapes=shapes)
+        return replace(fit, unknowns=solve(*fit.system, fit.least))
 
     @property
     def system(self) -> tuple[FloatArray, FloatArray]:
@@ -158,8 +158,8 @@ class Regression(Fit):
         for block in range(BLOCKS):
             held = blocks == block
             values = solve(design[~held], wanted[~held], self.least)
-            own = wanted[held] - design[held] @ values
-            losses[block] = np.mean(own * own)
+            left = wanted[held] - design[held] @ values
+            losses[block] = np.mean(left * left)
         return replace(self, held_out=losses)
 
     @property
@@ -196,15 +196,15 @@ def regress(
     low = float(np.log(rows.least_shape(curve)))
 
     def residual(logarithms: FloatArray) -> FloatArray:
-        own = replace(fit, shapes=np.broadcast_to(np.exp(logarithms), directions))
-        design, wanted = own.system
-        return wanted - design @ solve(design, wanted, own.least)
+        shaped = replace(fit, shapes=np.broadcast_to(np.exp(logarithms), directions))
+        design, wanted = shaped.system
+        return wanted - design @ solve(design, wanted, shaped.least)
 
     grid = np.linspace(low, high, 9)[1:-1]
-    best = grid[np.argmin([np.sum(residual(np.array([each])) ** 2) for each in grid])]
+    best = grid[np.argmin([np.sum(residual(np.array([logarithm])) ** 2) for logarithm in grid])]
     start = np.full(directions, best)
-    found = least_squares(residual, start, bounds=(low, high), diff_step=1e-4, xtol=1e-6)
-    return fit.refitted(np.exp(found.x))
+    optimum = least_squares(residual, start, bounds=(low, high), diff_step=1e-4, xtol=1e-6)
+    return fit.refitted(np.exp(optimum.x))
 
 
 def solve(design: FloatArray, wanted: FloatArray, least: FloatArray) -> FloatArray:

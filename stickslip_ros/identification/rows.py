@@ -111,9 +111,9 @@ def _followed(terms: FloatArray, path: FloatArray) -> FloatArray:
 
     `path` is that from the sample before, in deflections; the terms have the sign of the slip.
     """
-    found = np.empty_like(terms)
+    followed = np.empty_like(terms)
     state = terms[0]
     for number, (target, kept) in enumerate(zip(terms, np.exp(-path).tolist(), strict=True)):
         state = target + (state - target) * kept
-        found[number] = state
-    return found
+        followed[number] = state
+    return followed

@@ -19,18 +19,18 @@ _DIRECTIONS = ("forward", "backward")
 
 def curve_files(path: Path) -> tuple[Path, Path]:
     """Return where the curves of a scenario file are written: for forward and backward slip."""
-    forward, backward = (path.with_name(f"{path.stem}-{each}.csv") for each in _DIRECTIONS)
+    forward, backward = (path.with_name(f"{path.stem}-{way}.csv") for way in _DIRECTIONS)
     return forward, backward
 
 
-def written_scenario(found: Findings, path: Path) -> list[Path]:
+def written_scenario(findings: Findings, path: Path) -> list[Path]:
     """Write a scenario with the identified drive, and its friction curves beside it.
 
     An axis is held by the position controller of the recording, if it was found; a drive on a
     spring has a washout controller without gains, for `stickslip design`. Returns the files that
     were written; raises OSError if one exists or cannot be written.
     """
-    laws = by_group(found.drive.friction)
+    laws = by_group(findings.drive.friction)
     curves: list[Path] = []
     files: dict[str, str] = {}
     with ExitStack() as undo:
@@ -43,7 +43,7 @@ def written_scenario(found: Findings, path: Path) -> list[Path]:
                 curves.append(file)
                 files[f"plant.{group}file"] = str(file.absolute())
         # A scenario reads its curves: it can only be made when they are written.
-        text = commented_file(_scenario(found, laws, files), _heading(found, path))
+        text = commented_file(_scenario(findings, laws, files), _heading(findings, path))
         for file in curves:
             text = text.replace(str(file.absolute()), file.name)
         with written(path, then=undo.pop_all) as stream:
@@ -51,8 +51,10 @@ def written_scenario(found: Findings, path: Path) -> list[Path]:
     return [path, *curves]
 
 
-def _scenario(found: Findings, laws: Mapping[str, FrictionLaw], files: dict[str, str]) -> Scenario:
-    drive, record, servo = found.drive, found.records[0], found.servo
+def _scenario(
+    findings: Findings, laws: Mapping[str, FrictionLaw], files: dict[str, str]
+) -> Scenario:
+    drive, record, servo = findings.drive, findings.records[0], findings.servo
     values: dict[str, Any] = {
         f"plant.{name}": getattr(drive, name)
         for name in ("mass", "damping", "stiffness", "normal_force", "belt_speed", "bias_force")
@@ -60,17 +62,17 @@ def _scenario(found: Findings, laws: Mapping[str, FrictionLaw], files: dict[str,
     values["plant.friction.law"] = laws["friction."].name
     for group, law in laws.items():
         # What the contact remembers is one in both directions.
-        own = {} if isinstance(law, CurveFollower) and group != "friction." else numbers_of(law)
-        values |= {f"plant.{group}{name}": value for name, value in own.items()}
+        numbers = {} if isinstance(law, CurveFollower) and group != "friction." else numbers_of(law)
+        values |= {f"plant.{group}{name}": value for name, value in numbers.items()}
         if isinstance(law, CurveFollower) and group == "friction.":
             values["plant.friction.curve"] = law.curve.name
     values |= files
     values["plant.rate"] = float(f"{1.0 / record.period:.9g}")
-    values["plant.force_delay"] = max(found.chosen.delay, 0.0)
+    values["plant.force_delay"] = max(findings.chosen.delay, 0.0)
     values["plant.initial.position"] = float(record.position[0])
-    if found.chosen.has_spring:
-        if LAG in found.fitted:
-            values[f"plant.{LAG}"] = found.fitted[LAG].value
+    if findings.chosen.has_spring:
+        if LAG in findings.fitted:
+            values[f"plant.{LAG}"] = findings.fitted[LAG].value
         values |= {"washout_controller.linear_gain": 0.0, "washout_controller.start_after": 0.0}
         return load_scenario(_BASE).changed(values)
     values["plant.duration"] = 10.0
@@ -84,7 +86,7 @@ def _scenario(found: Findings, laws: Mapping[str, FrictionLaw], files: dict[str,
     return load_scenario(_BASE, controller="velocity_feedback").changed(values)
 
 
-def _heading(found: Findings, path: Path) -> str:
-    names = ", ".join(dict.fromkeys(record.name for record in found.records))
-    law = f"law {found.law}, validation error {found.chosen.error:.2%}"
+def _heading(findings: Findings, path: Path) -> str:
+    names = ", ".join(dict.fromkeys(record.name for record in findings.records))
+    law = f"law {findings.law}, validation error {findings.chosen.error:.2%}"
     return f"{path.stem}: a drive identified from {names}; {law}.\nstickslip simulate {path.name}"

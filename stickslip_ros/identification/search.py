@@ -89,35 +89,35 @@ class _Search:
 
     def residual(self, point: FloatArray) -> FloatArray:
         """Return the errors at a point, at starts that are best to first order."""
-        found = self.at(point)
+        errors = self.at(point)
         if self._task.limit.is_over:
             raise OutOfTimeError
-        return found.without_starts(found.residual[:, None])[:, 0] * self._scale
+        return errors.without_starts(errors.residual[:, None])[:, 0] * self._scale
 
     def derivatives(self, point: FloatArray) -> FloatArray:
         """Return the derivatives of the errors at a point, at starts that follow it."""
-        found = self.at(point)
-        return found.without_starts(found.by_names) @ self._by_point(point) * self._scale
+        errors = self.at(point)
+        return errors.without_starts(errors.by_names) @ self._by_point(point) * self._scale
 
     def at(self, point: FloatArray) -> Refinement:
         """Return the errors at a point, at starts that are nearly the best ones."""
-        for known, found in (self._last, self.best):
+        for known, errors in (self._last, self.best):
             if np.array_equal(known, point):
-                return found
+                return errors
         before, best = self.best
         change = best.by_names @ self._by_point(before) @ (point - before)
         values = self._coordinates(point)
-        found = Refinement.at(self._task, self._free, values, best.starts - best.steps(change))
-        if found.loss > _WORSE_LOSS_RATIO * best.loss:
-            found = min(found, found.moved(best.starts), key=lambda each: each.loss)
-        self._last = point.copy(), found.settled(ROUGH_TOLERANCE)
-        self.best = min(self.best, self._last, key=lambda each: each[1].loss)
+        errors = Refinement.at(self._task, self._free, values, best.starts - best.steps(change))
+        if errors.loss > _WORSE_LOSS_RATIO * best.loss:
+            errors = min(errors, errors.moved(best.starts), key=lambda attempt: attempt.loss)
+        self._last = point.copy(), errors.settled(ROUGH_TOLERANCE)
+        self.best = min(self.best, self._last, key=lambda attempt: attempt[1].loss)
         return self._last[1]
 
     def _coordinates(self, point: FloatArray) -> dict[str, float]:
         """Return all coordinates at a point."""
-        found = {**self._values, **dict(zip(self._free, point.tolist(), strict=True))}
-        return self._straight.from_search(found, self._task.fastest) if self._straight else found
+        values = {**self._values, **dict(zip(self._free, point.tolist(), strict=True))}
+        return self._straight.from_search(values, self._task.fastest) if self._straight else values
 
     def _by_point(self, point: FloatArray) -> FloatArray:
         """Return the derivatives of the coordinates by those of the search."""
@@ -126,9 +126,9 @@ class _Search:
         from scipy.optimize import approx_fprime
 
         def coordinates(point: FloatArray) -> FloatArray:
-            found = self._coordinates(point)
-            return np.array([found[name] for name in self._free])
+            moved = self._coordinates(point)
+            return np.array([moved[name] for name in self._free])
 
         steps = _STEP * np.maximum(np.abs(point), 1e-12)
-        found: Any = approx_fprime(point, coordinates, steps)
-        return found
+        derivatives: Any = approx_fprime(point, coordinates, steps)
+        return derivatives

@@ -83,10 +83,10 @@ class Errors:
 
     def without_starts(self, columns: FloatArray) -> FloatArray:
         """Return the part of columns, shape (rows, columns), that no change of starts explains."""
-        found = np.array(columns)
+        projected = np.array(columns)
         for part, (basis, _) in zip(self.task.parts, self._bases, strict=True):
-            found[part] -= basis @ (basis.T @ found[part])
-        return found
+            projected[part] -= basis @ (basis.T @ projected[part])
+        return projected
 
     def steps(self, column: FloatArray) -> FloatArray:
         """Return the changes of the starts that explain a column best; shape (segments, 2)."""
@@ -102,16 +102,16 @@ class Errors:
 
         The start of a segment has no part in the others: each takes steps of its own length.
         """
-        found, share = self, np.ones(len(self.starts))
+        settled, share = self, np.ones(len(self.starts))
         for _ in range(_START_STEPS):
-            left = found.without_starts(found.residual[:, None])[:, 0]
-            gains = found._sums(found.residual) - found._sums(left)
-            if float(np.sum(gains * (share >= _SHORTEST_STEP))) <= tolerance * found.loss:
+            left = settled.without_starts(settled.residual[:, None])[:, 0]
+            gains = settled._sums(settled.residual) - settled._sums(left)
+            if float(np.sum(gains * (share >= _SHORTEST_STEP))) <= tolerance * settled.loss:
                 break
-            other = found.moved(found.starts - share[:, None] * found.steps(found.residual))
-            found, better = found._better(other)
+            other = settled.moved(settled.starts - share[:, None] * settled.steps(settled.residual))
+            settled, better = settled._better(other)
             share = np.where(better, np.minimum(2.0 * share, 1.0), 0.25 * share)
-        return found
+        return settled
 
     def moved(self, starts: FloatArray) -> Self:
         """Return the errors of the same coordinates from other states."""
@@ -124,12 +124,12 @@ class Errors:
         """
         if not self.has_outliers:
             return self
-        found = self
-        rough = np.sqrt(np.median(found.losses)) / self.task.records[0].period
+        restarted = self
+        rough = np.sqrt(np.median(restarted.losses)) / self.task.records[0].period
         for kick in _KICKS:
             other = self.moved(self.task.starts + np.array([0.0, kick * rough])).settled()
-            found, _ = found._better(other)
-        return found
+            restarted, _ = restarted._better(other)
+        return restarted
 
     def _better(self, other: Self) -> tuple[Self, BoolArray]:
         """Return the better one of two fits of each segment, and for which it is the other one."""

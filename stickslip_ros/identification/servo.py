@@ -55,8 +55,8 @@ class Servo:
         assert record.reference is not None
         speed = _differences(record, self.difference_samples)
         wanted = self.position_gain * (record.reference - record.position)
-        own = np.clip(wanted - self.velocity_gain * speed, -self.limit, self.limit)
-        rest = record.force - own
+        command = np.clip(wanted - self.velocity_gain * speed, -self.limit, self.limit)
+        rest = record.force - command
         rest[: self.difference_samples] = 0.0
         return np.where(np.abs(rest) > _ADDED_FORCE_RATIO * self.error, rest, 0.0)
 
@@ -142,6 +142,6 @@ def closed_loop(
         loop.offer(sample.stamp, force)
         loop.disturb(float(disturbance[number + 1]))
         sample = loop.advance()
-    found = np.full((2, len(position)), np.nan)
-    found[0, : len(forces)], found[1, : len(forces)] = positions[span:], forces
-    return found[0], found[1]
+    predicted = np.full((2, len(position)), np.nan)
+    predicted[0, : len(forces)], predicted[1, : len(forces)] = positions[span:], forces
+    return predicted[0], predicted[1]

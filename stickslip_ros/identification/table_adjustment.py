@@ -80,13 +80,13 @@ class _FreeRuns:
 
     def residual(self, point: FloatArray) -> FloatArray:
         """Return the errors of the forces and of the simulated free runs, weighted."""
-        own = self._fit.at(point)
-        drive, speeds = own.drive(1.0), point[len(own.point) :].tolist()
+        moved = self._fit.at(point)
+        drive, speeds = moved.drive(1.0), point[len(moved.point) :].tolist()
         pairs = zip(self._predictors, speeds, strict=True)
         runs = [predictor.positions(drive, speed) for predictor, speed in pairs]
         errors = np.concatenate(runs) - self._measured
         errors = np.nan_to_num(errors, nan=_UNBOUNDED_ERROR / self._weights[1])
-        return np.concatenate([own.residual * self._weights[0], errors * self._weights[1]])
+        return np.concatenate([moved.residual * self._weights[0], errors * self._weights[1]])
 
     def begun(self, fit: Regression) -> FloatArray:
         """Return the point of a regression with the velocities of its best free runs."""
@@ -141,19 +141,19 @@ class _FreeRuns:
         shapes = fit.shapes
         if len(shapes):
             lowest = np.log(fit.rows.least_shape(fit.curve))
-            found = least_squares(
+            optimum = least_squares(
                 by_logarithms,
                 np.maximum(np.log(shapes), lowest),
                 bounds=(lowest, np.inf),
                 diff_step=1e-3,
                 max_nfev=10,
             )
-            shapes = np.exp(found.x)
+            shapes = np.exp(optimum.x)
         return replace(fit, unknowns=solved(shapes)[0][: len(fit.unknowns)], shapes=shapes)
 
     def _runs(self, fit: Regression) -> list[tuple[float, FloatArray]]:
         drive = fit.drive(1.0)
-        return [free_run(each, drive) for each in self._predictors]
+        return [free_run(predictor, drive) for predictor in self._predictors]
 
 
 def _slope(fit: Regression, low: float, high: float) -> float:

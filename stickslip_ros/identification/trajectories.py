@@ -68,17 +68,17 @@ class Trajectories:
     @property
     def records(self) -> Sequence[Record]:
         """Records of the segments."""
-        return [*dict.fromkeys(each.predictor.record for each in self.segments)]
+        return [*dict.fromkeys(segment.predictor.record for segment in self.segments)]
 
     @property
     def lengths(self) -> Sequence[int]:
         """Number of samples of each segment."""
-        return [each.samples.stop - each.samples.start for each in self.segments]
+        return [segment.samples.stop - segment.samples.start for segment in self.segments]
 
     @cached_property
     def starts(self) -> FloatArray:
         """Measured state at the start of each segment, m and m/s; shape (segments, 2)."""
-        return np.array([each.state for each in self.segments])
+        return np.array([segment.state for segment in self.segments])
 
     @cached_property
     def measured(self) -> FloatArray:
@@ -113,15 +113,15 @@ class Trajectories:
 
     @property
     def _counts(self) -> Sequence[int]:
-        return [each.predictor.measured[:, each.samples].size for each in self.segments]
+        return [segment.predictor.measured[:, segment.samples].size for segment in self.segments]
 
     def _joined(self, values: Callable[[Predictor], Any]) -> Any:
         """Return rows of all segments from values of shape (outputs, samples) of each record."""
 
-        def own(predictor: Predictor, samples: slice) -> Any:
+        def rows_of(predictor: Predictor, samples: slice) -> Any:
             return np.broadcast_to(values(predictor), predictor.measured.shape)[:, samples]
 
-        return np.concatenate([own(s.predictor, s.samples).ravel() for s in self.segments])
+        return np.concatenate([rows_of(s.predictor, s.samples).ravel() for s in self.segments])
 
     def sensitivities(
         self, values: Mapping[str, float], starts: FloatArray, names: Sequence[str]
@@ -141,12 +141,12 @@ class Trajectories:
             return share * max(abs(values[name]), size)
 
         others = [name for name in names if name in (DELAY, LAG, *self.law.by_differences)]
-        own = [name for name in names if name not in others]
+        by_equations = [name for name in names if name not in others]
         try:
             drive = self._drive(values)
             moved = [
                 (step(name, _STEP), self._drive({**values, name: values[name] + step(name, _STEP)}))
-                for name in own
+                for name in by_equations
             ]
 
             def by_coordinates(function: Callable[[Drive], FloatArray]) -> FloatArray:
@@ -167,7 +167,7 @@ class Trajectories:
                 for run in predictor.followed(scaled, parts, begun, delay, VariationalMotion)
             )
             each_segment = zip(self.parts, self.segments, starts.tolist(), runs, strict=True)
-            for part, segment, (_, velocity), (found, rows) in each_segment:
+            for part, segment, (_, velocity), (predicted, rows) in each_segment:
                 order = rows.shape[1] - len(of_constants)
                 derivatives = rows[:, order:] @ of_constants
                 if order > MEMORY:
@@ -177,8 +177,8 @@ class Trajectories:
                         )
                     )
                     derivatives += rows[:, MEMORY:order] @ memory / scaled.length_scale
-                outputs[part] = found
-                by_names[part, [names.index(name) for name in own]] = derivatives
+                outputs[part] = predicted
+                by_names[part, [names.index(name) for name in by_equations]] = derivatives
                 by_start[part] = rows[:, :2] * units
         except (InvalidInputError, RunError):
             outputs[:] = np.nan
@@ -194,14 +194,14 @@ class Trajectories:
         delay = values[DELAY]
         try:
             drive = self._drive(values)
-            found = [
-                each
-                for predictor, parts, own in self._by_record(values, starts)
-                for each, _ in predictor.followed(drive, parts, own, delay)
+            parts_outputs = [
+                output
+                for predictor, parts, begun in self._by_record(values, starts)
+                for output, _ in predictor.followed(drive, parts, begun, delay)
             ]
         except (InvalidInputError, RunError):
             return self._bounded(np.full(len(self.measured), np.nan))
-        return self._bounded(np.concatenate(found))
+        return self._bounded(np.concatenate(parts_outputs))
 
     def _drive(self, values: Mapping[str, float]) -> Drive:
         """Return the drive of coordinates; raises InvalidInputError if there is none."""
@@ -216,9 +216,9 @@ class Trajectories:
     ) -> Iterator[tuple[Predictor, Sequence[slice], FloatArray]]:
         """Yield each predictor with its segments and their starts, which follow one another."""
         pairs = zip(self.segments, starts, strict=True)
-        for predictor, own in groupby(pairs, key=lambda each: each[0].predictor):
-            segments, begun = zip(*own, strict=True)
-            parts = [each.samples for each in segments]
+        for predictor, segments_of_record in groupby(pairs, key=lambda pair: pair[0].predictor):
+            segments, begun = zip(*segments_of_record, strict=True)
+            parts = [segment.samples for segment in segments]
             yield predictor.lagging(values[LAG]), parts, np.array(begun)
 
     def _bounded(self, outputs: FloatArray) -> FloatArray:
@@ -229,7 +229,7 @@ class Trajectories:
     @property
     def fastest(self) -> float:
         """Fastest speed relative to the belt, m/s, by the starts of the segments."""
-        belts = [each.belt_speed for each in self.segments]
+        belts = [segment.belt_speed for segment in self.segments]
         return max(float(np.abs(self.starts[:, 1] - belts).max()), 1e-12)
 
 
@@ -251,7 +251,7 @@ def segments_of(predictors: Sequence[Predictor], length: float) -> Sequence[Segm
         edges = np.linspace(0, total, count + 1).astype(int)
         reach = max((edges[1] - edges[0]) // 5, 1)
         near = [slice(max(edge - reach, 0), edge + reach) for edge in edges[:-1].tolist()]
-        places = [each.start + int(np.argmax(relative[each])) for each in near]
+        places = [window.start + int(np.argmax(relative[window])) for window in near]
         if record.velocity_weight > 0.0 and record.velocity is not None:
             speed = record.velocity
         states = np.column_stack([smooth, speed])

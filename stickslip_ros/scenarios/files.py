@@ -91,8 +91,8 @@ def load_scenario(
     other_sections: list[str] = []
     for file in reversed(files):
         with _contents_kept(file.path, given):
-            found, other_sections = file.values(namespace, other_nodes=other_nodes)
-            for node, name, value in found:
+            entries, other_sections = file.values(namespace, other_nodes=other_nodes)
+            for node, name, value in entries:
                 values[node][name] = NODE_PARAMETERS[node].absolute(name, value, file.path.parent)
                 sources[f"{node}.{name}"] = FILE if file is files[0] else BASE
                 if file.path not in given:
@@ -176,8 +176,8 @@ def config_directories() -> list[Path]:
 
 def shipped_scenarios() -> dict[str, Path]:
     """Return the files of the scenarios that are found by name, by that name."""
-    found = {path.stem: path for d in config_directories()[::-1] for path in d.glob("*.yaml")}
-    return dict(sorted(found.items()))
+    shipped = {path.stem: path for d in config_directories()[::-1] for path in d.glob("*.yaml")}
+    return dict(sorted(shipped.items()))
 
 
 def _find(name_or_path: str) -> Path:

@@ -121,30 +121,30 @@ def check_friction_law(law: FrictionLaw) -> None:
     """Ask a friction law for its equations, as numbers at one speed and as symbols."""
     import heyoka as hy  # only where a package has a law
 
-    for each in (law.forward, law.reverse) if isinstance(law, Directional) else (law,):
+    for way in (law.forward, law.reverse) if isinstance(law, Directional) else (law,):
 
-        def equations(*given: Any, law: FrictionLaw = each) -> list[Any]:
+        def equations(*given: Any, law: FrictionLaw = way) -> list[Any]:
             rates = law.memory_rates(*given)
             return [law.friction(*given), *rates, *law.margins(*given)]
 
-        speed = each.characteristic_speed
+        speed = way.characteristic_speed
         unit = 1.0 if isinf(speed) else float(speed)
         for sign in (1.0, -1.0):
-            memory = each.memory_at(sign * unit, sign)
-            switches = each.switches_at(sign * unit, sign, memory)
+            memory = way.memory_at(sign * unit, sign)
+            switches = way.switches_at(sign * unit, sign, memory)
             _check_finite("friction", equations(sign * unit, sign, memory, switches))
-        symbols = [hy.expression(name) for name in ("speed", "sign", *each.states, *each.switches)]
-        count = 2 + len(each.states)
-        found = equations(*symbols[:2], symbols[2:count], symbols[count:])
-        hy.cfunc([hy.expression(0.0) + equation for equation in found], symbols)
-        _check_finite("limits", each.limits)
+        symbols = [hy.expression(name) for name in ("speed", "sign", *way.states, *way.switches)]
+        count = 2 + len(way.states)
+        symbolic = equations(*symbols[:2], symbols[2:count], symbols[count:])
+        hy.cfunc([hy.expression(0.0) + equation for equation in symbolic], symbols)
+        _check_finite("limits", way.limits)
 
 
 def check_control_law(law: ControlLaw) -> None:
     """Ask a control law for its equations, if it has some; its answers are checked as they come."""
     linear = law.linear_feedback(1e-3)
     if linear is not None:
-        _check_finite("linear_feedback", np.concatenate([np.ravel(each) for each in linear]))
+        _check_finite("linear_feedback", np.concatenate([np.ravel(matrix) for matrix in linear]))
     control = law.continuous
     if control is not None:
         seen = seen_by(control, 0.1, 0.2, ())
@@ -154,9 +154,9 @@ def check_control_law(law: ControlLaw) -> None:
 
 
 def _check_finite(name: str, values: Iterable[Any]) -> None:
-    found = [float(each) for each in values]
-    if not all(map(isfinite, found)):
-        raise InvalidInputError(f"its {name} is {found}, which must be finite numbers")
+    numbers = [float(value) for value in values]
+    if not all(map(isfinite, numbers)):
+        raise InvalidInputError(f"its {name} is {numbers}, which must be finite numbers")
 
 
 FRICTION_LAWS = LawFamily(
@@ -211,7 +211,7 @@ def laws_of_all_packages(family: LawFamily[_Law]) -> Mapping[str, type[_Law]]:
 
 def entries_of_other_packages(*groups: str) -> list[tuple[EntryPoint, Distribution]]:
     """Return the entry points of groups with their packages, by name."""
-    found = [
+    entries = [
         (entry, package)
         for package in distributions()
         # Parsing the entry points takes longer.
@@ -220,7 +220,7 @@ def entries_of_other_packages(*groups: str) -> list[tuple[EntryPoint, Distributi
         if group in text
         for entry in package.entry_points.select(group=group)
     ]
-    return sorted(found, key=lambda each: (each[0].name, each[0].value))
+    return sorted(entries, key=lambda pair: (pair[0].name, pair[0].value))
 
 
 def failure_in_words(error: BaseException) -> str | None:
@@ -235,12 +235,12 @@ def failure_in_words(error: BaseException) -> str | None:
 def loaded(entry: EntryPoint, base: type[_Base]) -> type[_Base]:
     """Return the class of an entry point; InvalidInputError if none derives from `base`."""
     try:
-        found = entry.load()
+        kind = entry.load()
     except (Exception, SystemExit) as error:  # the code of others: anything
         raise InvalidInputError(f"cannot be imported: {in_words(error)}") from None
-    if not (isinstance(found, type) and issubclass(found, base)):
+    if not (isinstance(kind, type) and issubclass(kind, base)):
         raise InvalidInputError(f"is no class derived from {base.__name__}")
-    return found
+    return kind
 
 
 def made(kind: type[_Base]) -> _Base:
@@ -253,8 +253,8 @@ def made(kind: type[_Base]) -> _Base:
 
 def check_name(name: str, kind: type) -> None:
     """Refuse a class that has another name than its entry point."""
-    own = getattr(kind, "name", None)
-    if own != name:
+    named = getattr(kind, "name", None)
+    if named != name:
         raise InvalidInputError(
-            f"has the name {own!r} in its class and {name!r} in its entry point: must be the same"
+            f"has the name {named!r} in its class and {name!r} in its entry point: must be the same"
         )

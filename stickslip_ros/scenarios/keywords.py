@@ -36,8 +36,8 @@ def parameter_of(keyword: str, nodes: Sequence[str]) -> str:
     Raises InvalidInputError for one that no node has, or that several nodes have.
     """
     known = _parameters(tuple(nodes))
-    found: list[str] = [*known.get(keyword, ())]
-    if not found:
+    names: list[str] = [*known.get(keyword, ())]
+    if not names:
         unused = [node for node in NODE_PARAMETERS if node not in nodes]
         owners = [node for node in unused if keyword in _parameters((node,))]
         if owners:
@@ -50,12 +50,12 @@ def parameter_of(keyword: str, nodes: Sequence[str]) -> str:
             f"{keyword:.80}: no node has such a parameter; "
             + did_you_mean(keyword, known, "docs/parameters.md has them all")
         )
-    if len(found) > 1:
+    if len(names) > 1:
         raise InvalidInputError(
-            f"{keyword}: several nodes have this parameter; write {' or '.join(found)} in a text "
+            f"{keyword}: several nodes have this parameter; write {' or '.join(names)} in a text "
             "NODE.PARAMETER=VALUE"
         )
-    return found[0]
+    return names[0]
 
 
 def plain(value: Any) -> Any:
@@ -92,7 +92,7 @@ def parse_override(text: str) -> tuple[str, str, Any]:
         value = ros_yaml.parse(written, f"{given}: the value")
         return node, parameter, in_own_unit(target, value)
     if not equals or not parameter:
-        usual = [each for each in known if each != _NAMED_WITH_NODE]
+        usual = [keyword for keyword in known if keyword != _NAMED_WITH_NODE]
         meant = did_you_mean(target, usual, "as in plant.belt_speed=0.2")
         raise InvalidInputError(f"{given}: must be NODE.PARAMETER=VALUE; {meant}")
     if node not in NODE_PARAMETERS:
@@ -114,10 +114,10 @@ def in_own_unit(parameter: str, value: Any) -> Any:
 @cache
 def _parameters(nodes: tuple[str, ...]) -> Mapping[str, tuple[str, ...]]:
     """Return NODE.PARAMETER of each keyword."""
-    found: dict[str, tuple[str, ...]] = {}
+    parameters: dict[str, tuple[str, ...]] = {}
     for node in nodes:
         for name in NODE_PARAMETERS[node].known:
             parameter = f"{node}.{name}"
             keyword = keyword_of(parameter)
-            found[keyword] = (*found.get(keyword, ()), parameter)
-    return found
+            parameters[keyword] = (*parameters.get(keyword, ()), parameter)
+    return parameters

@@ -277,14 +277,14 @@ class PlantParameters(DriveConstants, NodeParameters):
 
         Those at a default that simplifies the equations are none of them.
         """
-        own = [
+        names = [
             name
             for name, described in constants_of(DriveConstants).items()
             if not (described.simplifies and getattr(self, name) == described.default)
         ]
         if self.motor.kind == "mass":
-            own += ["motor.kind", "motor.mass", "motor.damping", "motor.friction"]
-        return [*own, "friction.law", *(f"friction.{name}" for name in self.friction.names())]
+            names += ["motor.kind", "motor.mass", "motor.damping", "motor.friction"]
+        return [*names, "friction.law", *(f"friction.{name}" for name in self.friction.names())]
 
     @property
     def linear_sampling(self) -> tuple[float, float, Sensor, Sensor]:
@@ -355,12 +355,14 @@ class ControllerParameters(NodeParameters):
 
     @override
     def replaced(self, values: Mapping[str, Any]) -> Self:
-        own = {name: each for name, each in values.items() if name in self.__dataclass_fields__}
-        constants = {name: each for name, each in values.items() if name not in own}
+        groups = {
+            name: value for name, value in values.items() if name in self.__dataclass_fields__
+        }
+        constants = {name: value for name, value in values.items() if name not in groups}
         constants.pop("law", None)
         law = self.control_law
         made = CONTROLLERS.made(lambda: replace(law, **constants), type(law))
-        return replace(self, **own, control_law=made)
+        return replace(self, **groups, control_law=made)
 
     @override
     def not_used(self) -> Iterator[tuple[str, str]]:
@@ -398,13 +400,13 @@ def _parameters_of_law(law: type[ControlLaw]) -> Mapping[str, Parameter]:
         choices=(law.name,),
     )
     reference = parameters_of(ReferenceParameters(), "reference.")
-    found = (
+    parameters = (
         *parameters_of(NodeParameters()),
         own_law,
         *(described[n] for n in law.constants() if not isinstance(described[n].default, tuple)),
         *(reference if law.follows_reference else ()),
     )
-    return {parameter.name: parameter for parameter in found}
+    return {parameter.name: parameter for parameter in parameters}
 
 
 @dataclass(frozen=True)
@@ -526,7 +528,7 @@ CONTROLLER_PARAMETERS: dict[str, ControllerParameters] = {
 
 NODE_PARAMETERS: dict[str, NodeParameters] = {
     "plant": PlantParameters(),
-    **{controller_node(name): each for name, each in CONTROLLER_PARAMETERS.items()},
+    **{controller_node(name): parameters for name, parameters in CONTROLLER_PARAMETERS.items()},
     "analyzer": AnalyzerParameters(),
 }
 """The parameters of each node at their defaults, by node name; a run has one of the controllers."""

@@ -42,7 +42,9 @@ def entries(text: str, source: str) -> Iterator[Entry]:
     """
     parsed = yaml.parse(text.encode(errors="surrogatepass"), _LOADER)
     # Documents and their ends do not matter, as in ROS.
-    events = (each for each in parsed if isinstance(each, yaml.NodeEvent | yaml.CollectionEndEvent))
+    events = (
+        event for event in parsed if isinstance(event, yaml.NodeEvent | yaml.CollectionEndEvent)
+    )
     try:
         for event in events:
             yield from _entries(events, event, ())
@@ -57,8 +59,8 @@ def entries(text: str, source: str) -> Iterator[Entry]:
 
 def parse(text: str, source: str) -> Any:
     """Return the value in a YAML text, None for an empty one; raise as `entries` does."""
-    found = {".".join(keys): value for keys, _, value in entries(text, source)}
-    return found.get("", found or None)
+    values = {".".join(keys): value for keys, _, value in entries(text, source)}
+    return values.get("", values or None)
 
 
 def number_in(text: str) -> float | None:
@@ -75,7 +77,7 @@ def dump(values: Any) -> str:
 def _entries(events: Iterator[Any], event: Any, keys: tuple[str, ...]) -> Iterator[Entry]:
     """Yield what is in the value that `event` begins."""
     line = event.start_mark.line + 1
-    inner = takewhile(lambda each: not isinstance(each, yaml.CollectionEndEvent), events)
+    inner = takewhile(lambda event: not isinstance(event, yaml.CollectionEndEvent), events)
     if isinstance(event, yaml.MappingStartEvent):
         names: list[str] = []
         for key in inner:

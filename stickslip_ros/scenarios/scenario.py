@@ -81,8 +81,8 @@ class Scenario:
     def reading(self) -> SampleAssumptions:
         """How the samples of the plant are to be read."""
         plant = self.plant
-        found = self.analyzer.reading_of(plant.flat(), plant.as_drive().fastest_belt)
-        return found._replace(varies=self._varies)
+        reading = self.analyzer.reading_of(plant.flat(), plant.as_drive().fastest_belt)
+        return reading._replace(varies=self._varies)
 
     @property
     def _varies(self) -> bool:
@@ -91,7 +91,7 @@ class Scenario:
         signals: list[Any] = [plant.belt, plant.load, plant.disturbance]
         if plant.expects_control and controller.control_law.follows_reference:
             signals.append(controller.reference)
-        return any(each.kind in CHANGING_KINDS for each in signals)
+        return any(signal.kind in CHANGING_KINDS for signal in signals)
 
     def cycle_meter(self, cycles: int) -> CycleMeter:
         """Return what measures the motion itself.
@@ -151,7 +151,7 @@ class Scenario:
 
     def unused(self) -> dict[str, str]:
         """Return why parameters have no effect, by NODE.PARAMETER; defaults are not listed."""
-        found = {
+        unused = {
             f"{node}.{name}": f"{node}.{why}"
             for node in self.nodes
             for name, why in getattr(self, node).unused().items()
@@ -161,8 +161,8 @@ class Scenario:
             for name, value in self.controller.flat().items():
                 if [value] != [known[name].default]:
                     name = f"{self.controller.node}.{name}"
-                    found[name] = f"{name} is not used with plant.expects_control = False"
-        return found
+                    unused[name] = f"{name} is not used with plant.expects_control = False"
+        return unused
 
     def changed(self, values: Mapping[str, Any]) -> Self:
         """Return the scenario with other values of some parameters.
@@ -206,7 +206,9 @@ class Scenario:
         for text in texts:
             node = text.partition(".")[0]
             sources[node] = f"{sources.get(node, f'{self.path} with')} {text:.80}"
-        changed = self._changed(given, {node: f"{each}, {node}" for node, each in sources.items()})
+        changed = self._changed(
+            given, {node: f"{source}, {node}" for node, source in sources.items()}
+        )
         for reason in (why for name, why in changed.unused().items() if name in given):
             raise InvalidInputError(reason)
         last = {text.partition("=")[0]: text for text in (*self.overrides, *texts)}
@@ -235,7 +237,9 @@ class Scenario:
         others = {**self.other_controllers, self.controller.law: self.controller}
         controller = others.pop(law, None) or CONTROLLER_PARAMETERS[law]
         overrides = [
-            each for each in self.overrides if not each.startswith(f"{self.controller.node}.")
+            override
+            for override in self.overrides
+            if not override.startswith(f"{self.controller.node}.")
         ]
         return replace(
             self,
@@ -246,12 +250,14 @@ class Scenario:
 
     def with_force_limit(self) -> Self:
         """Return the scenario with the force limit of another controller, unless it has its own."""
-        own = f"{self.controller.node}.force_limit"
+        limit = f"{self.controller.node}.force_limit"
         for other in self.other_controllers.values():
             name = f"{other.node}.force_limit"
-            if name in self.sources and own not in self.sources:
-                sources = {**self.sources, own: self.sources[name]}
-                return replace(self.changed({own: other.control_law.force_limit}), sources=sources)
+            if name in self.sources and limit not in self.sources:
+                sources = {**self.sources, limit: self.sources[name]}
+                return replace(
+                    self.changed({limit: other.control_law.force_limit}), sources=sources
+                )
         return self
 
     def _changed(self, values: Mapping[str, Any], sources: Mapping[str, str]) -> Self:
@@ -260,7 +266,7 @@ class Scenario:
         for target, value in values.items():
             node, _, name = target.partition(".")
             by_node.setdefault(node, {})[name] = NODE_PARAMETERS[node].absolute(name, value)
-        own = self.controller.node
+        controller = self.controller.node
         changes: dict[str, Any] = {}
         for node, new in by_node.items():
             if node not in self.nodes:
@@ -268,7 +274,7 @@ class Scenario:
                     f"{node}: is not the controller in use, which is {self.controller.node}"
                 )
             changed = getattr(self, node).changed(new, sources.get(node, node))
-            changes["controller" if node == own else node] = changed
+            changes["controller" if node == controller else node] = changed
         return replace(self, **changes)
 
     def __repr__(self) -> str:

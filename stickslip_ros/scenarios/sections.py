@@ -47,7 +47,7 @@ class ScenarioFile(NamedTuple):
         Also return the sections of unknown nodes. Raises InvalidInputError for an unknown parameter
         and, unless `other_nodes` is set, for an unknown node.
         """
-        found: list[tuple[str, str, Any]] = []
+        values: list[tuple[str, str, Any]] = []
         other_sections: list[str] = []
         for pattern, parameters in self.sections:
             known = {
@@ -74,8 +74,8 @@ class ScenarioFile(NamedTuple):
                             name, {*chain(*known.values())}, "docs/parameters.md lists all"
                         )
                     )
-                found += [(node, name, value) for node in takers]
-        return found, other_sections
+                values += [(node, name, value) for node in takers]
+        return values, other_sections
 
 
 def read_file(path: Path, namespace: str) -> ScenarioFile:
@@ -87,8 +87,8 @@ def read_file(path: Path, namespace: str) -> ScenarioFile:
     base: str | None = None
     for name, parameters in _sections(path).items():
         pattern = f"/{name.removeprefix('/')}"
-        own = section_matches(pattern, full_name(namespace, BASE_SECTION))
-        if own and pattern.endswith(f"/{BASE_SECTION}"):
+        is_base = section_matches(pattern, full_name(namespace, BASE_SECTION))
+        if is_base and pattern.endswith(f"/{BASE_SECTION}"):
             base = parameters.get("base")
             if len(parameters) != 1 or not isinstance(base, str) or not base:
                 raise InvalidInputError(
@@ -129,8 +129,8 @@ def _sections(path: Path) -> Mapping[str, Mapping[str, Any]]:
         pattern, name = "/".join(nodes), ".".join(names)
         reason = None
         if nodes == keys:
-            found = f"found {value!r:.60} at {'/'.join(keys) or 'the top'}"
-            reason = f"expected node names with {PARAMETERS_KEY} below, {found}"
+            place = f"found {value!r:.60} at {'/'.join(keys) or 'the top'}"
+            reason = f"expected node names with {PARAMETERS_KEY} below, {place}"
         elif (value == {}) == bool(names) or value == [] or "" in keys:
             reason = f"{pattern}: {PARAMETERS_KEY} must be names and values"
         elif not _PATTERN.fullmatch(f"/{pattern.removeprefix('/')}") or "/" in "".join(nodes[1:]):

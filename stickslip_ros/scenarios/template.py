@@ -27,11 +27,11 @@ def short_file(scenario: Scenario, heading: str, base: str) -> str:
     lines += ["", f"/**/{BASE_SECTION}:", f"  {PARAMETERS_KEY}:"]
     lines += [f"    base: {json.dumps(base)}  # gives what this file omits"]
     shown, values = scenario.names_of_drive(), scenario.as_dict()
-    for node, own in values.items():
-        names = [name for name in own if f"{node}.{name}" in shown]
+    for node, parameters in values.items():
+        names = [name for name in parameters if f"{node}.{name}" in shown]
         lines += ["", f"/**/{node}:", f"  {PARAMETERS_KEY}:"] if names else []
         for name in names:
-            text = ros_yaml.dump({name: own[name]}).replace('"', "", 2).rstrip()
+            text = ros_yaml.dump({name: parameters[name]}).replace('"', "", 2).rstrip()
             lines.append(f"    {text}  # {_explained(NODE_PARAMETERS[node].known[name])}")
     return "\n".join(lines) + "\n"
 
@@ -45,12 +45,12 @@ def commented_file(scenario: Scenario, heading: str) -> str:
     """
     lines = [part for line in heading.splitlines() for part in _comment(line, "")]
     unused = scenario.unused()
-    for node, own in scenario.as_dict().items():
+    for node, used in scenario.as_dict().items():
         parameters = own_first(NODE_PARAMETERS[node])
         if node == "plant":  # whose values would be refused
-            own |= {p.name: p.default for p in parameters if f"plant.{p.name}" in unused}
+            used |= {p.name: p.default for p in parameters if f"plant.{p.name}" in unused}
         lines += ["", f"/**/{node}:", f"  {PARAMETERS_KEY}:"]
-        lines += _section(parameters, own)
+        lines += _section(parameters, used)
     return "\n".join(lines) + "\n"
 
 

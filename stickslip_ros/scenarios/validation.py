@@ -61,7 +61,7 @@ class ParameterGroup:
         if not complaints:
             reads = "file" in known or any("." in name for name in taken)
             curves_now = self.curves() if reads else {}
-            kept = {path: each for path, each in curves_now.items() if path not in taken.values()}
+            kept = {path: pairs for path, pairs in curves_now.items() if path not in taken.values()}
             changed = _changed(self, taken, "", {**kept, **(curves or {})}, complaints)
             if not complaints:
                 return changed
@@ -83,8 +83,8 @@ class ParameterGroup:
 
     def replaced(self, values: Mapping[str, Any]) -> Self:
         """Return the group with other values of its own fields, by name."""
-        made, own = object.__new__(type(self)), vars(self)  # `replace` takes five times as long
-        vars(made).update({name: own[name] for name in self.__dataclass_fields__}, **values)
+        made, present = object.__new__(type(self)), vars(self)  # `replace` takes five times as long
+        vars(made).update({name: present[name] for name in self.__dataclass_fields__}, **values)
         return made
 
     def completed(self, prefix: str, curves: dict[str, Pairs]) -> Self:
@@ -97,12 +97,12 @@ class ParameterGroup:
 
     def curves(self) -> dict[str, Pairs]:
         """Return the pairs in the files that these parameters were made from, by path."""
-        own: Any = self
-        found = {own.file: own.points} if getattr(self, "points", ()) else {}
+        given: Any = self
+        curves = {given.file: given.points} if getattr(self, "points", ()) else {}
         for group in vars(self).values():
             if isinstance(group, ParameterGroup):
-                found |= group.curves()
-        return found
+                curves |= group.curves()
+        return curves
 
     def flat(self) -> dict[str, Any]:
         """Return the values by flat name, as plain Python types."""
@@ -120,10 +120,10 @@ class ParameterGroup:
 
     def not_used(self) -> Iterator[tuple[str, str]]:
         """Yield the parameters that have no effect beside the others, each with the reason."""
-        for each in fields(self):
-            group = getattr(self, each.name)
+        for part in fields(self):
+            group = getattr(self, part.name)
             if isinstance(group, ParameterGroup):
-                yield from ((f"{each.name}.{name}", why) for name, why in group.not_used())
+                yield from ((f"{part.name}.{name}", why) for name, why in group.not_used())
 
 
 @cache
@@ -139,22 +139,24 @@ def _changed(
     complaints: list[str],
 ) -> Any:
     """Return a group, or a part of a drive, with other values; reasons against it are added."""
-    own: dict[str, Any] = {}
+    changes: dict[str, Any] = {}
     inner: dict[str, dict[str, Any]] = {}
     for name, value in values.items():
         group, dot, rest = name.partition(".")
         if dot:
             inner.setdefault(group, {})[rest] = value
         else:
-            own[group] = value
-    for group, each in inner.items():
-        own[group] = _changed(getattr(part, group), each, f"{prefix}{group}.", curves, complaints)
+            changes[group] = value
+    for group, given in inner.items():
+        changes[group] = _changed(
+            getattr(part, group), given, f"{prefix}{group}.", curves, complaints
+        )
     if complaints and not prefix:
         return part
     try:
         if isinstance(part, ParameterGroup):
-            return part.replaced(own).completed(prefix, curves)
-        changed = replace(part, **own)
+            return part.replaced(changes).completed(prefix, curves)
+        changed = replace(part, **changes)
         refusal = changed.refusal() if hasattr(changed, "refusal") else None
         if refusal is not None:
             complaints.append(f"{prefix}{refusal}")
@@ -185,7 +187,7 @@ def checked(parameter: Parameter, value: Any) -> Any:
         if isinstance(value, int) and not isinstance(value, bool) and _within(parameter, value):
             return value
     elif kind is list:
-        if isinstance(value, list) and all(isinstance(each, str) for each in value):
+        if isinstance(value, list) and all(isinstance(item, str) for item in value):
             return [*value]
     elif isinstance(value, kind):
         return value
