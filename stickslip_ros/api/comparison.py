@@ -128,16 +128,16 @@ class ComparedLaws(TabularResult):
         """Columns of all cases by name, those of the plan first."""
         plan = self.study.plan
         cases = [plan.case(number) for number in range(plan.size)]
-        laws, texts = [*plan.laws], [str(each) for each in plan.disturbances]
-        found: dict[str, Any] = {"law": [laws[case.law] for case in cases]}
+        laws, texts = [*plan.laws], [str(disturbance) for disturbance in plan.disturbances]
+        columns: dict[str, Any] = {"law": [laws[case.law] for case in cases]}
         if plan.grid is not None:
             values = [plan.grid.values(case.point) for case in cases]
-            found |= dict(zip(plan.parameters, zip(*values, strict=True), strict=True))
-        found["disturbance"] = [texts[case.disturbance] for case in cases]
-        found["seed"] = [case.seed for case in cases]
+            columns |= dict(zip(plan.parameters, zip(*values, strict=True), strict=True))
+        columns["disturbance"] = [texts[case.disturbance] for case in cases]
+        columns["seed"] = [case.seed for case in cases]
         for name in OUTCOMES:
-            found[name] = [getattr(row, name) for row in self.outcomes.rows]
-        return found
+            columns[name] = [getattr(row, name) for row in self.outcomes.rows]
+        return columns
 
     def write_csv(self, stream: TextIO) -> None:
         """Write a row for each case.

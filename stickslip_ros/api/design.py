@@ -198,17 +198,17 @@ class Proposal(Proposed[WashoutDesign]):
 
     @override
     def _found(self) -> dict[str, Any]:
-        found, checks = self.design, self._checks()
+        design, checks = self.design, self._checks()
         return {
-            **{name: getattr(found.controller, name, None) for name in _WASHOUT},
-            "force_limit": found.task.force_limit,
-            "worst_belt_speed": found.slowest.drive.belt_speed if found.slowest else None,
+            **{name: getattr(design.controller, name, None) for name in _WASHOUT},
+            "force_limit": design.task.force_limit,
+            "worst_belt_speed": design.slowest.drive.belt_speed if design.slowest else None,
             "decay_rate": min((check["decay_rate"] for check in checks), default=None),
             **{
-                name: max((each[name] for each in checks if each[name] is not None), default=None)
+                name: max((row[name] for row in checks if row[name] is not None), default=None)
                 for name in [*_CHECKS][2:]
             },
-            "margins": asdict(found.margins) if found.margins else dict.fromkeys(_MARGINS),
+            "margins": asdict(design.margins) if design.margins else dict.fromkeys(_MARGINS),
         }
 
     @override
@@ -218,7 +218,7 @@ class Proposal(Proposed[WashoutDesign]):
             title = "margins at the worst of these belt speeds"
             yield one_below_another(title, _MARGINS, asdict(self.margins), units)
         yield side_by_side("verification", _CHECKS, checks, units)
-        at_rest = [each | each["rest"] for each in checks if each["rest"] is not None]
+        at_rest = [check | check["rest"] for check in checks if check["rest"] is not None]
         if at_rest:
             columns = {"belt_speed": _CHECKS["belt_speed"], **quantities_of(Rest)}
             yield side_by_side("at rest, by noise and rounding", columns, at_rest, units)

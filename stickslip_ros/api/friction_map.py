@@ -55,9 +55,9 @@ class FrictionMap(Result):
         """
         groups = ("plant.friction.", "plant.friction.reverse.")
         return {
-            group + name: each
+            group + name: estimate
             for group, curve in zip(groups, self.curves, strict=False)
-            for name, each in curve.estimates.items()
+            for name, estimate in curve.estimates.items()
         }
 
     @property
@@ -89,7 +89,7 @@ class FrictionMap(Result):
     def _entries(self) -> dict[str, Any]:
         return {
             "law": self.law,
-            "parameters": {name: each.as_dict() for name, each in self.parameters.items()},
+            "parameters": {name: estimate.as_dict() for name, estimate in self.parameters.items()},
             "pairs": sum(curve.pairs for curve in self.curves),
             "error": self.error,
             "notes": [*self.notes],
@@ -151,10 +151,10 @@ def friction_map(
     ('coulomb', 80.0)
     """
     form, paths = TableFormat(decimal, skip, encoding, rotary), [*map(Path, tables)]
-    found = [speed_and_force(table_of(path, form), columns) for path in paths]
+    read = [speed_and_force(table_of(path, form), columns) for path in paths]
     velocity, force = (
-        np.concatenate([each.values[name] for each in found]) for name in ("velocity", "force")
+        np.concatenate([table.values[name] for table in read]) for name in ("velocity", "force")
     )
-    notes = dict.fromkeys(note for each in found for note in each.notes)
+    notes = dict.fromkeys(note for table in read for note in table.notes)
     curves = fitted_curves(velocity, force, law)
     return FrictionMap(paths, velocity, force, curves, [*notes], Units(rotary=rotary))

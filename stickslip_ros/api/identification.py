@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from stickslip_ros.show.style import FigureStyle
 
 
-_FORM, _LAYOUT = ({each.name for each in fields(kind)} for kind in (TableFormat, BagLayout))
+_FORM, _LAYOUT = ({part.name for part in fields(kind)} for kind in (TableFormat, BagLayout))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -54,13 +54,13 @@ class Model(Result):
     @property
     def parameters(self) -> dict[str, Estimate]:
         """Value, standard error and 95 % interval by parameter, such as `plant.mass`; SI units."""
-        return {f"plant.{name}": each for name, each in self.findings.fitted.items()}
+        return {f"plant.{name}": estimate for name, estimate in self.findings.fitted.items()}
 
     @cached_property
     def unidentified(self) -> dict[str, str]:
         """Why a parameter is not identifiable, and the run that would identify it, by parameter."""
-        found = sentences.unidentified(self.findings)
-        return {f"plant.{name}": why for name, why in found.items()}
+        reasons = sentences.unidentified(self.findings)
+        return {f"plant.{name}": why for name, why in reasons.items()}
 
     @property
     def drive(self) -> Drive:
@@ -154,53 +154,53 @@ class Model(Result):
 
     @override
     def _entries(self) -> dict[str, Any]:
-        found = self.findings
+        findings = self.findings
         return {
-            "law": found.law,
-            "parameters": {name: each.as_dict() for name, each in self.parameters.items()},
+            "law": findings.law,
+            "parameters": {name: estimate.as_dict() for name, estimate in self.parameters.items()},
             "correlations": [
                 {"parameters": [f"plant.{first}", f"plant.{second}"], "correlation": value}
-                for first, second, value in found.correlations
+                for first, second, value in findings.correlations
             ],
             "unidentified": self.unidentified,
             **self.predictions[""],
             "candidates": [
                 {
-                    "law": each.law.name,
-                    "constants": each.size,
-                    "held_out_error": each.error,
-                    "by_direction": each.by_direction,
-                    "as_good": found.as_good.get(each.label, False),
-                    "remark": each.remark,
+                    "law": candidate.law.name,
+                    "constants": candidate.size,
+                    "held_out_error": candidate.error,
+                    "by_direction": candidate.by_direction,
+                    "as_good": findings.as_good.get(candidate.label, False),
+                    "remark": candidate.remark,
                 }
-                for each in found.candidates
+                for candidate in findings.candidates
             ],
             "curves": [
                 {
-                    "direction": each.direction,
-                    "speed": each.speed.tolist(),
-                    "force": each.force.tolist(),
-                    "standard_error": each.standard_error.tolist(),
+                    "direction": curve.direction,
+                    "speed": curve.speed.tolist(),
+                    "force": curve.force.tolist(),
+                    "standard_error": curve.standard_error.tolist(),
                 }
-                for each in found.curves
+                for curve in findings.curves
             ],
             "notes": self._notes,
-            "servo": None if found.servo is None else vars(found.servo),
-            "force_delay": found.chosen.delay,
+            "servo": None if findings.servo is None else vars(findings.servo),
+            "force_delay": findings.chosen.delay,
             "checks": self._checks,
         }
 
     @override
     def _summary(self) -> Summary:
-        found = self.findings
-        names = ", ".join(dict.fromkeys(record.name for record in found.records))
-        verdict = f"friction law {found.law}, validation error {found.chosen.error:.3%}"
+        findings = self.findings
+        names = ", ".join(dict.fromkeys(record.name for record in findings.records))
+        verdict = f"friction law {findings.law}, validation error {findings.chosen.error:.3%}"
         return Summary("Identified drive", names, verdict)
 
     @override
     def parts(self) -> Parts:
-        own = self.predictions[""], self._checks, self._notes
-        return identification_tables(self.findings, *own, self._units)
+        predictions = self.predictions[""], self._checks, self._notes
+        return identification_tables(self.findings, *predictions, self._units)
 
 
 def identify(
@@ -296,11 +296,11 @@ def identify(
         form=TableFormat(decimal, skip, encoding, rotary, period, where, session),
         layout=BagLayout(joint, belt_joint, states_topic, force_topic, time, force),
     )
-    own = [record for path in fitted for record in read[path]]
-    found = identify_records(own, law, constants(fixed or {}), progress, time_limit)
+    records = [record for path in fitted for record in read[path]]
+    findings = identify_records(records, law, constants(fixed or {}), progress, time_limit)
     predicted = {
         str(path) if len(read[path]) == 1 else f"{path}, part {number}": record
         for path in others
         for number, record in enumerate(read[path], start=1)
     }
-    return Model(found, predicted, Units(rotary=rotary))
+    return Model(findings, predicted, Units(rotary=rotary))

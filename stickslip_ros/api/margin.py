@@ -51,26 +51,30 @@ class Margin(Result):
         texts, shown = self.units.texts, quantities_of(FeedDecay)
         yield self._verdict
         if self.onset.feeds:
-            cells = zip(*(vars(each).values() for each in self.onset.feeds), strict=True)
-            columns = [texts(own, q.unit) for own, q in zip(cells, shown.values(), strict=True)]
+            cells = zip(*(vars(feed).values() for feed in self.onset.feeds), strict=True)
+            columns = [
+                texts(values, q.unit) for values, q in zip(cells, shown.values(), strict=True)
+            ]
             rows = [[*row] for row in zip(*columns, strict=True)]
             yield TextTable("decay", [quantity.label for quantity in shown.values()], rows)
         if self.onset.families:
             rows = [
-                [name, *texts([each.onset_speed], "m/s"), *texts(each[2:4], "")]
-                for name, each in self.onset.families.items()
+                [name, *texts([feed.onset_speed], "m/s"), *texts(feed[2:4], "")]
+                for name, feed in self.onset.families.items()
             ]
             yield TextTable("friction", ["law", "onset", "probability", "rejected"], rows)
         yield from self.notes
 
     @property
     def _verdict(self) -> str:
-        found = self.onset
-        if found.upper is None:
+        estimate = self.onset
+        if estimate.upper is None:
             return "the onset of vibration cannot be told"
-        speeds = [found.speed, found.lower, found.upper, self.least_feed]
-        onset, lower, upper, least = (self.units.text(each, "m/s") for each in speeds)
-        text = f"at {onset} (95 % interval {lower} to {upper})" if found.lower else f"below {upper}"
+        speeds = [estimate.speed, estimate.lower, estimate.upper, self.least_feed]
+        onset, lower, upper, least = (self.units.text(speed, "m/s") for speed in speeds)
+        text = (
+            f"at {onset} (95 % interval {lower} to {upper})" if estimate.lower else f"below {upper}"
+        )
         return (
             f"vibration starts {text}; the least feed with a margin of {self.margin:g} is {least}"
         )
@@ -85,22 +89,22 @@ class Margin(Result):
 
     @property
     def _names(self) -> str:
-        return ", ".join(each.name for each in self.recordings)
+        return ", ".join(recording.name for recording in self.recordings)
 
     @override
     def _entries(self) -> dict[str, Any]:
         families = [{"law": law} | f._asdict() for law, f in self.onset.families.items()]
-        for each in families:
-            del each["decay_rate"]
+        for family in families:
+            del family["decay_rate"]
         return {
             "onset_speed": self.onset.speed,
             "interval": [self.onset.lower, self.onset.upper],
             "margin": self.margin,
             "least_feed": self.least_feed,
-            "feeds": [vars(each) for each in self.onset.feeds],
+            "feeds": [vars(feed) for feed in self.onset.feeds],
             "families": families,
             "notes": [*self.notes],
-            "recordings": [str(each) for each in self.recordings],
+            "recordings": [str(recording) for recording in self.recordings],
         }
 
     @override
@@ -146,18 +150,20 @@ def margin(
     records = [record for path in paths for record in read[path]]
     if {-1.0, 1.0} <= {float(np.sign(record.belt_velocity.mean())) for record in records}:
         raise InvalidInputError("the belt moves in both directions: friction may differ in them")
-    found: list[RingDown] = []
+    every_decay: list[RingDown] = []
     notes: list[str] = []
     for record in records:
         motion = record.position, record.belt_velocity, record.period
-        own = [*ring_downs(*motion)]
+        decays = [*ring_downs(*motion)]
         notes += record.notes
-        if not own:
+        if not decays:
             notes.append(f"{record.name}: {why_no_ring_down(*motion, units.of_unit('m'))}")
-        growing = [units.text(each.belt_speed, "m/s") for each in own if each.decay_rate <= 0.0]
+        growing = [
+            units.text(decay.belt_speed, "m/s") for decay in decays if decay.decay_rate <= 0.0
+        ]
         notes += [f"{record.name}: a vibration does not decay at {feed}" for feed in growing]
-        found += own
-    if not found:
+        every_decay += decays
+    if not every_decay:
         raise InvalidInputError("; ".join(notes))
-    onset = onset_of(found, units.of_unit("m"))
+    onset = onset_of(every_decay, units.of_unit("m"))
     return Margin(paths, margin, onset, [*filter(None, [*notes, onset.advice])], units)

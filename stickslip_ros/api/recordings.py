@@ -87,8 +87,8 @@ class RecordedRun(TabularResult):
         """Return what figures draw of the run."""
         from stickslip_ros.show.run_figure import DrawnRun
 
-        own = self._history, self.report, self.drive
-        return DrawnRun.recorded(self.path, *own, rotary=self._rotary)
+        parts = self._history, self.report, self.drive
+        return DrawnRun.recorded(self.path, *parts, rotary=self._rotary)
 
     @property
     def verdict(self) -> str:
@@ -102,8 +102,8 @@ class RecordedRun(TabularResult):
         if not self._is_table:
             with Recording(self.path, self._namespace) as recording:
                 names = [*NODE_PARAMETERS, "versions"]
-                found = {name: recording.metadata(f"stickslip_ros/{name}") for name in names}
-            known = {name: texts for name, texts in found.items() if texts}
+                settings = {name: recording.metadata(f"stickslip_ros/{name}") for name in names}
+            known = {name: texts for name, texts in settings.items() if texts}
             yield from recorded_tables(known, self.units)
 
     @override
@@ -124,7 +124,7 @@ class RecordedRun(TabularResult):
             "control_force": _answers(samples, self.forces),
         }
         if not samples.has_motor:
-            columns = {name: each for name, each in columns.items() if "motor" not in name}
+            columns = {name: column for name, column in columns.items() if "motor" not in name}
         units, source = self.units, {"bag": str(self.path)}
         return Table(columns, _COLUMNS, units, {"time": time}, source, "time")
 
@@ -159,12 +159,12 @@ class Comparison(Result):
 
     @override
     def _summary(self) -> Summary:
-        found = {str(run.path): run.verdict for run in self.runs}
-        verdict = "; ".join(f"{path}: {text}" for path, text in found.items())
+        verdicts = {str(run.path): run.verdict for run in self.runs}
+        verdict = "; ".join(f"{path}: {text}" for path, text in verdicts.items())
         parameters = [
             table._replace(title=str(run.path)) for run in self.runs for table in run.settings()
         ]
-        return Summary("Recorded runs compared", ", ".join(found), verdict, parameters)
+        return Summary("Recorded runs compared", ", ".join(verdicts), verdict, parameters)
 
     @override
     def parts(self) -> Parts:
@@ -395,11 +395,13 @@ def with_forms(options: Mapping[str, Any]) -> dict[str, Any]:
 
     Raises InvalidInputError if one of them is not allowed.
     """
-    found = dict(options)
+    others = dict(options)
     for name, kind in (("form", TableFormat), ("layout", BagLayout)):
-        own = {each.name: found.pop(each.name) for each in fields(kind) if each.name in found}
-        found |= {name: kind(**own)} if own else {}
-    return found
+        given = {
+            option.name: others.pop(option.name) for option in fields(kind) if option.name in others
+        }
+        others |= {name: kind(**given)} if given else {}
+    return others
 
 
 def recorded_drive(bag: Path, namespace: str | None = None) -> Drive | None:
@@ -419,7 +421,7 @@ def recorded_drive(bag: Path, namespace: str | None = None) -> Drive | None:
             if name in PlantParameters().known
         }
         known = {path: as_pairs(json.loads(text)) for path, text in curves.items()}
-        named = {each for name, each in values.items() if name.endswith(".file") and each}
+        named = {value for name, value in values.items() if name.endswith(".file") and value}
         if not named <= known.keys():
             return None  # a bag must not have other files of its reader read
         plant = PlantParameters().changed(values, str(bag), known)
@@ -430,11 +432,11 @@ def recorded_drive(bag: Path, namespace: str | None = None) -> Drive | None:
 
 def _answers(samples: SampleColumns, forces: ForceColumns) -> FloatArray:
     """Return the last force that answers each sample, NaN where none does."""
-    found = np.full(len(samples), np.nan)
+    answers = np.full(len(samples), np.nan)
     if len(forces):
         order = np.argsort(forces.stamp, kind="stable")
         stamps = forces.stamp[order]
         last = np.searchsorted(stamps, samples.stamp, "right") - 1
         answered = (last >= 0) & (stamps[last] == samples.stamp)
-        found[answered] = forces.force[order][last[answered]]
-    return found
+        answers[answered] = forces.force[order][last[answered]]
+    return answers

@@ -260,12 +260,12 @@ class TabularResult(Result):
             elif values.dtype == object:
                 values = np.array([value or "" for value in values], dtype=str)
             variables[name] = dimensions, values.reshape(*shape, *values.shape[1:])
-        found = optional("xarray").Dataset(variables, coordinates, dict(table.attributes))
-        for name in found.variables:
-            found[name].attrs["long_name"] = table.quantities[name].label
-        for name, unit in table.units_of(found).items():
-            found[name].attrs["units"] = unit
-        return found
+        dataset = optional("xarray").Dataset(variables, coordinates, dict(table.attributes))
+        for name in dataset.variables:
+            dataset[name].attrs["long_name"] = table.quantities[name].label
+        for name, unit in table.units_of(dataset).items():
+            dataset[name].attrs["units"] = unit
+        return dataset
 
 
 def column(values: Sequence[Any], *, text: bool = False) -> Any:
@@ -286,10 +286,10 @@ def attributes(scenario: Scenario) -> dict[str, str]:
 
 def _padded(rows: Sequence[tuple[float, ...]]) -> Any:
     """Return rows of unequal length as an array, filled up with NaN."""
-    found = np.full((len(rows), max(map(len, rows), default=0)), np.nan)
+    padded = np.full((len(rows), max(map(len, rows), default=0)), np.nan)
     for number, row in enumerate(rows):
-        found[number, : len(row)] = row
-    return found
+        padded[number, : len(row)] = row
+    return padded
 
 
 def optional(package: str) -> Any:

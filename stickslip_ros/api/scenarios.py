@@ -69,7 +69,7 @@ def scenario(
     else:
         chosen = name_or_path if law is None else name_or_path.with_controller(law)
     control = ["plant.expects_control=false"] if controller is None else []
-    values = {parameter_of(keyword, chosen.nodes): each for keyword, each in parameters.items()}
+    values = {parameter_of(keyword, chosen.nodes): value for keyword, value in parameters.items()}
     texts = [*control, *overrides]
     return chosen.overridden(texts, values) if texts or values else chosen
 

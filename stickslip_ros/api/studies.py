@@ -94,7 +94,7 @@ class Points(TabularResult):
     def _table(self) -> Table:
         columns, plan = self.columns, self.study.plan
         names = [keyword_of(parameter) for parameter in plan.parameters]
-        found: dict[str, Any] = dict(zip(names, columns.values.values(), strict=True))
+        cells: dict[str, Any] = dict(zip(names, columns.values.values(), strict=True))
         quantities = dict(zip(names, map(_of_parameter, plan.parameters), strict=True))
         dimensions: dict[str, Any] = {"point": range(plan.size)}
         if isinstance(plan, Grid):
@@ -102,11 +102,13 @@ class Points(TabularResult):
             dimensions = dict(zip(names, values, strict=True))
             if plan.continuation:
                 dimensions = {"direction": [*map(str, plan.directions)], **dimensions}
-        found |= {**self.further, **{name: getattr(columns, name) for name in COLUMNS}}
-        found["regime"] = np.array([each and str(each) for each in columns.regime], dtype=object)
+        cells |= {**self.further, **{name: getattr(columns, name) for name in COLUMNS}}
+        cells["regime"] = np.array(
+            [regime and str(regime) for regime in columns.regime], dtype=object
+        )
         quantities |= {name: FURTHER[name] for name in self.further} | COLUMNS
         units = units_of(self.study)
-        return Table(found, quantities, units, dimensions, attributes(self.scenario))
+        return Table(cells, quantities, units, dimensions, attributes(self.scenario))
 
 
 class Sweep(Points):
@@ -162,8 +164,8 @@ class Sweep(Points):
         return {"direction": np.repeat(ways, plan.size // len(ways))}
 
     def _found(self) -> dict[str, Any]:
-        found = self.transitions.items()
-        return {"transitions": {name.lower().replace(" ", "_"): values for name, values in found}}
+        speeds = self.transitions.items()
+        return {"transitions": {name.lower().replace(" ", "_"): values for name, values in speeds}}
 
     @override
     def draw(self, style: "FigureStyle", colour: str = "regime") -> "Figure":
@@ -230,7 +232,9 @@ class Basin(Points):
 
     @override
     def _summary(self) -> Summary:
-        shares = [f"{attractor_name(each)} {each.share:.1%}" for each in self.attractors]
+        shares = [
+            f"{attractor_name(attractor)} {attractor.share:.1%}" for attractor in self.attractors
+        ]
         parameters = scenario_tables(self.scenario, used=True)
         title = "Basins of attraction"
         return Summary(title, self.scenario.name, ", ".join(shares), parameters)

@@ -107,8 +107,8 @@ class Stability(Result):
 
     @override
     def _entries(self) -> dict[str, Any]:
-        found = {name: value for name, value in vars(self).items() if name != "scenario"}
-        return {**found, **self.scenario.provenance()}
+        entries = {name: value for name, value in vars(self).items() if name != "scenario"}
+        return {**entries, **self.scenario.provenance()}
 
     @override
     def _summary(self) -> Summary:
@@ -151,5 +151,5 @@ def stability(scenario: ScenarioLike) -> Stability:
     (False, True)
     """
     chosen = as_scenario(scenario)
-    found, notes = stabilities.stability(chosen)
-    return Stability(chosen, **found, notes=notes)
+    sections, notes = stabilities.stability(chosen)
+    return Stability(chosen, **sections, notes=notes)

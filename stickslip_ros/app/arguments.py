@@ -169,7 +169,7 @@ def reading_of(arguments: argparse.Namespace) -> dict[str, Any]:
     from stickslip_ros.record.bag_layout import BagLayout
     from stickslip_ros.record.table_columns import TableFormat
 
-    names = [each.name for kind in (TableFormat, BagLayout) for each in fields(kind)]
+    names = [option.name for kind in (TableFormat, BagLayout) for option in fields(kind)]
     names += ["start", "end", "namespace", "belt_speed"]
     columns = _columns_of(arguments.columns)
     return {"columns": columns} | {name: getattr(arguments, name) for name in names}
@@ -224,16 +224,16 @@ def _columns_of(text: str | None) -> dict[str, str] | None:
 
     if text is None:
         return None
-    found: dict[str, str] = {}
+    columns: dict[str, str] = {}
     for part in parts_of(text):
-        quantity, equals, column = (each.strip() for each in part.partition("="))
-        if not (quantity and equals and column) or quantity in found:
+        quantity, equals, column = (side.strip() for side in part.partition("="))
+        if not (quantity and equals and column) or quantity in columns:
             raise InvalidInputError(
                 f"--columns {text}: must be QUANTITY=COLUMN,..., each quantity once, as in "
                 "time=t,position=x"
             )
-        found[quantity] = column
-    return found
+        columns[quantity] = column
+    return columns
 
 
 def add_namespace(parser: argparse.ArgumentParser) -> None:
@@ -341,9 +341,9 @@ def check_speeds(arguments: argparse.Namespace, scenario: "Scenario", *speeds: f
 
     plant, known = scenario.plant, scenario.plant.known
     used = [name for name in plant.drive_names() if name.startswith("friction.")]
-    own = [plant.flat()[name] for name in used if known[name].unit == "m/s"]
+    values = [plant.flat()[name] for name in used if known[name].unit == "m/s"]
     drive = plant.as_drive()
-    fastest, scale = max([drive.fastest_belt, *map(abs, speeds)]), max([drive.speed_scale, *own])
+    fastest, scale = max([drive.fastest_belt, *map(abs, speeds)]), max([drive.speed_scale, *values])
     if fastest > _DOUBTFUL_RATIO * scale and not arguments.yes:
         shown, limit = Units.for_drive(drive).texts([fastest, scale], "m/s")
         raise InvalidInputError(

@@ -97,14 +97,14 @@ def run(arguments: argparse.Namespace) -> None:
         for parameter in model.known.values()
         for value in (("true", "false") if parameter.kind is bool else parameter.choices or ("",))
     ]
-    own = {"bash": _BASH, "zsh": _ZSH}[arguments.shell]
+    text = {"bash": _BASH, "zsh": _ZSH}[arguments.shell]
     for place, words in (
         ("@PARAMETERS@", parameters),
         ("@SCENARIOS@", shipped_scenarios()),
         ("@LAWS@", CONTROLLER_PARAMETERS),
     ):
-        own = own.replace(place, " ".join(words))
-    script = shtab.complete(parser, arguments.shell, preamble=own)
+        text = text.replace(place, " ".join(words))
+    script = shtab.complete(parser, arguments.shell, preamble=text)
     if arguments.shell == "bash":
         script += "\ncomplete -F _stickslip stickslip"
     else:  # an argument that can be repeated, and --OPTION=VALUE

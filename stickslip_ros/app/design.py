@@ -62,12 +62,12 @@ def run(arguments: argparse.Namespace) -> None:
         check_new("--out", arguments.out)
     check_results(arguments)
     with progress_bar(f"designing for {scenario.name}", 1.0, lines=True) as progress:
-        found = proposal(task, progress)
-    text = found.design.parameter_file
+        design = proposal(task, progress)
+    text = design.design.parameter_file
     if arguments.plot is not None and text is None:
         _report_omitted(f"--plot {arguments.plot}: not drawn")
         arguments.plot = None
-    give_result(arguments, found)
+    give_result(arguments, design)
     if not arguments.json and text is not None and arguments.out is None:
         print("--out FILE writes the scenario with these gains, --json prints it: parameter_file")
     if arguments.out is not None:

@@ -121,17 +121,17 @@ def _fit_map(arguments: argparse.Namespace, reading: dict[str, Any]) -> None:
             raise InvalidInputError(f"--{option}: a map has friction only, and no drive")
     options = {name: reading[name] for name in ("rotary", "decimal", "skip", "encoding")}
     columns = reading["columns"] or {}
-    found = friction_map(*arguments.recordings, columns=columns, law=arguments.law, **options)
-    give_result(arguments, found)
+    fitted = friction_map(*arguments.recordings, columns=columns, law=arguments.law, **options)
+    give_result(arguments, fitted)
 
 
-def _write(path: Path, found: "Findings") -> None:
+def _write(path: Path, findings: "Findings") -> None:
     from stickslip_ros.identification.scenario import written_scenario
 
     with writing("--out", path):
-        files = written_scenario(found, path)
+        files = written_scenario(findings, path)
     names = ", ".join(map(str, files))
     command = shlex.join(["stickslip", "simulate", str(path)])
     still = ", which stays at rest until a force or a reference moves it"
-    moves = "" if found.chosen.has_spring else still
+    moves = "" if findings.chosen.has_spring else still
     tell(f"{names}: written; `{command}` simulates the drive{moves}")

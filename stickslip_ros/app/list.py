@@ -55,7 +55,7 @@ def run(arguments: argparse.Namespace) -> None:
             }
         )
         return
-    _print("scenarios", {each["name"]: [each["description"]] for each in scenarios})
+    _print("scenarios", {scenario["name"]: [scenario["description"]] for scenario in scenarios})
     for heading, laws in (
         ("friction laws, plant.friction.law", friction_laws),
         ("control laws, --controller", control_laws),

@@ -27,5 +27,5 @@ def run(arguments: argparse.Namespace) -> None:
     from stickslip_ros.api.margin import margin
 
     check_results(arguments)
-    found = margin(*arguments.recordings, margin=arguments.margin, **reading_of(arguments))
-    give_result(arguments, found)
+    result = margin(*arguments.recordings, margin=arguments.margin, **reading_of(arguments))
+    give_result(arguments, result)

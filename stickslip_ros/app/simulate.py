@@ -88,7 +88,7 @@ def run(arguments: argparse.Namespace) -> None:
         _recorder(arguments, scenario) as recorder,
         progress_bar(f"simulating {shown}", 1.0) as progress,
     ):
-        found = measured_run(
+        simulated = measured_run(
             scenario,
             duration,
             continuous=arguments.continuous_control,
@@ -96,8 +96,8 @@ def run(arguments: argparse.Namespace) -> None:
             drawn=is_drawn(arguments),
             progress=progress,
         )
-        write_results(arguments, found)
-    print_result(arguments, found)
+        write_results(arguments, simulated)
+    print_result(arguments, simulated)
 
 
 @contextmanager

@@ -32,7 +32,7 @@ def run(arguments: argparse.Namespace) -> None:
         if reason is not None:
             raise InvalidInputError(f"--plot {arguments.plot}: there is nothing to draw: {reason}")
     with progress_bar(f"theory of {scenario.name}", None):
-        found = stability(scenario)
+        result = stability(scenario)
     with progress_bar("drawing", None):
-        write_results(arguments, found)
-    print_result(arguments, found)
+        write_results(arguments, result)
+    print_result(arguments, result)

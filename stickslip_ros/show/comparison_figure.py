@@ -73,13 +73,13 @@ def comparison_figure(
 
 
 @styled
-def bode_figure(found: TunedDesign, *, style: FigureStyle = SCREEN) -> Figure:
+def bode_figure(design: TunedDesign, *, style: FigureStyle = SCREEN) -> Figure:
     """Return magnitude and phase of the loop transfer function, and the sensitivity, by feed."""
     figure = style.figure(7.0, 6.0, narrow=1.3)
-    style.set_title(figure, f"loop with {found.tuned.law.name}, {found.task.scenario.name}")
+    style.set_title(figure, f"loop with {design.tuned.law.name}, {design.task.scenario.name}")
     size, phase, sensitivity = figure.subplots(3, 1, sharex=True)
-    units = Units.for_drive(found.task.drive)
-    for response in found.tuned.responses:
+    units = Units.for_drive(design.task.drive)
+    for response in design.tuned.responses:
         hertz = response.plant.frequency / (2.0 * np.pi)
         label = units.text(response.plant.loop.drive.belt_speed, "m/s")
         size.loglog(hertz, np.abs(response.open_loop), label=label)

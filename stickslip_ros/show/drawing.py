@@ -78,12 +78,12 @@ class Pane(NamedTuple):
 def measures_text(measures: Measures, units: Units) -> str:
     """Return regime, amplitude, frequency and stick fraction as a line of text."""
     trend = trend_text(vars(measures), units.text)
-    found = [f"{REGIMES[measures.regime].label}{trend and f', not steady: {trend}'}"]
+    texts = [f"{REGIMES[measures.regime].label}{trend and f', not steady: {trend}'}"]
     for name in ("amplitude", "frequency", "stick_fraction"):
         value, (label, unit, _) = getattr(measures, name), MEASURES[name]
         if value is not None and measures.period is not None:
-            found.append(f"{label} {units.text(value, unit)}")
-    return ", ".join(found)
+            texts.append(f"{label} {units.text(value, unit)}")
+    return ", ".join(texts)
 
 
 def draw_line(
@@ -174,20 +174,20 @@ def draw_cycles(
     """
     cycles = [history.cycles for history in histories]
     (amplitude, metre, _), fraction = MEASURES["amplitude"], MEASURES["stick_fraction"].label
-    scale, label = units.axis(amplitude, metre, *(each[1] for each in cycles))
+    scale, label = units.axis(amplitude, metre, *(run[1] for run in cycles))
     if not any(len(time) for time, *_ in cycles):
         say(panels[0], "no cycle was completed")
     positions = [history.motion.position for history in histories]
-    farthest = max(float(np.abs(each).max(initial=0.0)) for each in positions) / scale
+    farthest = max(float(np.abs(position).max(initial=0.0)) for position in positions) / scale
     for axes, column, of_panel, size, least in (
         (panels[0], 1, label, scale, LEAST_SPAN * farthest),
         (panels[1], 2, fraction, 1.0, 0.0),
     ):
-        for each, look in zip(cycles, looks, strict=False):
-            rows = _cycle_rows(*each)
+        for run, look in zip(cycles, looks, strict=False):
+            rows = _cycle_rows(*run)
             every = max(1, len(rows) // most)
-            axes.plot(each[0][rows], each[column][rows] / size, markevery=every, **look)
-        largest = max(float(each[column].max(initial=0.0)) / size for each in cycles)
+            axes.plot(run[0][rows], run[column][rows] / size, markevery=every, **look)
+        largest = max(float(run[column].max(initial=0.0)) / size for run in cycles)
         axes.set_ylim(0.0, max(1.1 * largest, least) or 1.0)
         axes.set_ylabel(of_panel)
 
@@ -290,7 +290,7 @@ def _law_between(
 def draw_analysis(
     figure: Figure,
     part: GridSpec | GridSpecFromSubplotSpec,
-    found: RunAnalysis,
+    analysis: RunAnalysis,
     units: Units,
     *,
     short: bool,
@@ -299,14 +299,14 @@ def draw_analysis(
 
     `part` has three cells, beside each other or one above another. Labels may have to be `short`.
     """
-    if found.slips is not None:  # they were asked for
-        each, shown = found.slips["each"], quantities_of(Slip)
+    if analysis.slips is not None:  # they were asked for
+        slips, shown = analysis.slips["each"], quantities_of(Slip)
         for column, name in enumerate(("stick_time", "drop", "slip_time")):
-            values = np.array([value for value in each[name] if value is not None])
+            values = np.array([value for value in slips[name] if value is not None])
             _distribution(figure.add_subplot(part[column]), values, shown[name], units)
-    elif found.mean_cycle is not None:
-        _cycle(figure.add_subplot(part[0:2]), found.mean_cycle, units, short=short)
-        _residual(figure.add_subplot(part[2]), found.mean_cycle, units, short=short)
+    elif analysis.mean_cycle is not None:
+        _cycle(figure.add_subplot(part[0:2]), analysis.mean_cycle, units, short=short)
+        _residual(figure.add_subplot(part[2]), analysis.mean_cycle, units, short=short)
 
 
 def _cycle(axes: Axes, mean: MeanCycle, units: Units, *, short: bool) -> None:

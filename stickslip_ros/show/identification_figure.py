@@ -30,7 +30,7 @@ _NAMES = {1.0: "forward slip", -1.0: "backward slip"}
 
 @styled
 def identification_figure(
-    found: Findings, *, style: FigureStyle = SCREEN, units: Units = SI
+    findings: Findings, *, style: FigureStyle = SCREEN, units: Units = SI
 ) -> Figure:
     """Return the figure of what was found.
 
@@ -44,9 +44,9 @@ def identification_figure(
     else:
         grid = figure.add_gridspec(3, 2)
         first, *residuals, last = grid[0, :], grid[1, 0], grid[1, 1], grid[2, 0], grid[2, 1]
-    _friction(figure.add_subplot(first), found, units)
-    left = found.residuals(found.records[0])
-    quantity, error_unit = ("position", "m") if found.chosen.has_spring else ("force", "N")
+    _friction(figure.add_subplot(first), findings, units)
+    left = findings.residuals(findings.records[0])
+    quantity, error_unit = ("position", "m") if findings.chosen.has_spring else ("force", "N")
     what = "residual" if style.printed else "measured less fitted"
     errors = left.error, f"{quantity}, {what}", error_unit
     for place, values, name, unit in zip(
@@ -57,10 +57,10 @@ def identification_figure(
         strict=True,
     ):
         _residuals(figure.add_subplot(place), (values, name, unit), errors, units)
-    _free_run(figure, last, found, units, short=style.printed)
-    names = ", ".join(dict.fromkeys(Path(record.name).name for record in found.records))
-    error = f"{100.0 * found.chosen.error:.4g} %"
-    title = f"Identified drive, {names}: law {found.chosen.label}, validation error {error}"
+    _free_run(figure, last, findings, units, short=style.printed)
+    names = ", ".join(dict.fromkeys(Path(record.name).name for record in findings.records))
+    error = f"{100.0 * findings.chosen.error:.4g} %"
+    title = f"Identified drive, {names}: law {findings.chosen.label}, validation error {error}"
     style.set_title(figure, title)
     finish(figure)
     return figure
@@ -85,7 +85,9 @@ def map_figure(
     for sign, law in ((1.0, laws[0]), (-1.0, laws[-1])):
         size = float(np.max(sign * velocity, initial=0.0))
         speed = np.linspace(0.0, size, _CURVE_POINTS) if size else np.empty(0)
-        driving = -np.array([law.coefficient(sign * each, sign) for each in speed.tolist()])
+        driving = -np.array(
+            [law.coefficient(sign * slip_speed, sign) for slip_speed in speed.tolist()]
+        )
         named = f"law {law.name}" if sign > 0.0 else None
         axes.plot(sign * speed / scale, driving / force_scale, color=ORANGE, label=named)
     axes.set_xlabel(label)
@@ -96,19 +98,19 @@ def map_figure(
     return figure
 
 
-def _friction(axes: Axes, found: Findings, units: Units) -> None:
-    errors, curves = found.chosen.errors(found.records[0]), found.curves
+def _friction(axes: Axes, findings: Findings, units: Units) -> None:
+    errors, curves = findings.chosen.errors(findings.records[0]), findings.curves
     sizes = [np.abs(errors.friction), *(curve.force for curve in curves)]
-    top = max(float(np.quantile(each, _SHOWN_SHARE)) for each in sizes if len(each))
+    top = max(float(np.quantile(part, _SHOWN_SHARE)) for part in sizes if len(part))
     scale, label = units.axis("friction force", "N", np.array([top]))
     fastest = max(float(curve.speed[-1]) for curve in curves)
     speed_scale, speed_label = units.axis("sliding speed $|v_r|$", "m/s", np.array([fastest]))
     for curve, colour in zip(curves, (BLUE, ORANGE), strict=False):
         direction = curve.direction
-        own, name = errors.relative_speed * direction > 0.0, _NAMES[direction]
+        rows, name = errors.relative_speed * direction > 0.0, _NAMES[direction]
         axes.plot(
-            np.abs(errors.relative_speed[own]) / speed_scale,
-            direction * errors.friction[own] / scale,
+            np.abs(errors.relative_speed[rows]) / speed_scale,
+            direction * errors.friction[rows] / scale,
             color=colour,
             label=f"{name}, measured",
             **_MEASURED,
@@ -134,10 +136,10 @@ def _friction(axes: Axes, found: Findings, units: Units) -> None:
 def _residuals(
     axes: Axes,
     over: tuple[FloatArray, str, str],
-    of: tuple[FloatArray, str, str],
+    measured: tuple[FloatArray, str, str],
     units: Units,
 ) -> None:
-    (values, name, unit), (errors, quantity, error_unit) = over, of
+    (values, name, unit), (errors, quantity, error_unit) = over, measured
     scale, label = units.axis(units.named(name), unit, values)
     error_scale, error_label = units.axis(quantity, error_unit, errors)
     axes.plot(values / scale, errors / error_scale, color=BLUE, **DOTS)
@@ -147,10 +149,10 @@ def _residuals(
     axes.set_title(f"residuals over {name}")
 
 
-def _free_run(figure: Figure, place: Any, found: Findings, units: Units, *, short: bool) -> None:
-    record = found.records[0]
+def _free_run(figure: Figure, place: Any, findings: Findings, units: Units, *, short: bool) -> None:
+    record = findings.records[0]
     time = record.period * np.arange(len(record.position))
-    run = found.free_run(record)
+    run = findings.free_run(record)
     below = place.subgridspec(2, 1, height_ratios=(2.0, 1.0))
     upper = figure.add_subplot(below[0])
     lower = figure.add_subplot(below[1], sharex=upper)

@@ -18,8 +18,8 @@ _DIGITS = 2, 10
 
 
 def identification_tables(
-    found: Findings,
-    own: Mapping[str, Any],
+    findings: Findings,
+    fitted: Mapping[str, Any],
     checks: Sequence[Mapping[str, Any]],
     notes: Sequence[str],
     units: Units = SI,
@@ -29,43 +29,46 @@ def identification_tables(
     `own` is what the model predicts of the first recording that it was fitted to, `checks` of
     others; `notes` are sentences on both.
     """
-    names = ", ".join(dict.fromkeys(record.name for record in found.records))
-    constants = {f"plant.{name}": each for name, each in found.fitted.items()}
-    yield constants_table(f"{names}: law {found.law}", constants, units)
-    if found.law == "table" or (found.law == "lugre" and not found.chosen.has_spring):
-        yield _curve(found, units)
+    names = ", ".join(dict.fromkeys(record.name for record in findings.records))
+    constants = {f"plant.{name}": estimate for name, estimate in findings.fitted.items()}
+    yield constants_table(f"{names}: law {findings.law}", constants, units)
+    if findings.law == "table" or (findings.law == "lugre" and not findings.chosen.has_spring):
+        yield _curve(findings, units)
     yield TextTable(
         "laws",
         ["law", "constants", "validation error", ""],
         [
-            [each.label, str(each.size), f"{each.error:.3%}", _verdict(found, each)]
-            for each in sorted(found.candidates, key=lambda each: each.error)
+            [fit.label, str(fit.size), f"{fit.error:.3%}", _verdict(findings, fit)]
+            for fit in sorted(findings.candidates, key=lambda fit: fit.error)
         ],
     )
-    shown = [("fitted to, in-sample", own), *((each["recording"], each) for each in checks)]
+    shown = [("fitted to, in-sample", fitted), *((check["recording"], check) for check in checks)]
     yield TextTable(
         "predictions",
         ["recording", *(quantity.label for quantity in PREDICTIONS.values())],
         [[name, *_predicted(values, units)] for name, values in shown],
     )
     yield from notes
-    for first, second, share in found.correlations:
+    for first, second, share in findings.correlations:
         yield f"plant.{first} and plant.{second} are correlated, {share:.3f}"
-    for name, why in unidentified(found).items():
+    for name, why in unidentified(findings).items():
         yield f"plant.{name} is not identifiable: {why}"
 
 
 def constants_table(title: str, constants: Mapping[str, Estimate], units: Units = SI) -> TextTable:
     """Return the table of constants by parameter, such as `plant.mass`, with intervals."""
-    known = {f"plant.{each.name}": each.unit or "" for each in PlantParameters().known.values()}
+    known = {
+        f"plant.{parameter.name}": parameter.unit or ""
+        for parameter in PlantParameters().known.values()
+    }
     rows = [
         [
             name,
-            units.texts([each.value], known[name], _digits(each))[0],
-            units.text(each.standard_error, known[name], largest=abs(each.value)),
-            _interval(each, known[name], units),
+            units.texts([estimate.value], known[name], _digits(estimate))[0],
+            units.text(estimate.standard_error, known[name], largest=abs(estimate.value)),
+            _interval(estimate, known[name], units),
         ]
-        for name, each in constants.items()
+        for name, estimate in constants.items()
     ]
     return TextTable(title, ["parameter", "value", "standard error", "95 % interval"], rows)
 
@@ -84,9 +87,9 @@ def _interval(estimate: Estimate, unit: str, units: Units) -> str:
     return " to ".join(units.texts([*estimate.interval], unit, max(6, _digits(estimate))))
 
 
-def _curve(found: Findings, units: Units) -> TextTable:
+def _curve(findings: Findings, units: Units) -> TextTable:
     rows: list[list[str]] = []
-    for curve in found.curves:
+    for curve in findings.curves:
         places = range(0, len(curve.speed), max(len(curve.speed) // 6, 1))
         rows += [
             [
@@ -100,14 +103,14 @@ def _curve(found: Findings, units: Units) -> TextTable:
     return TextTable("friction", ["slip", "speed", "force", "+- (95 %)"], rows)
 
 
-def _verdict(found: Findings, candidate: Fit) -> str:
-    if candidate.label == found.chosen.label:
+def _verdict(findings: Findings, candidate: Fit) -> str:
+    if candidate.label == findings.chosen.label:
         return "chosen"
     if candidate.remark:
         return candidate.remark
-    if found.as_good.get(candidate.label):
+    if findings.as_good.get(candidate.label):
         return "predicts as well, within the noise"
-    worse = found.behind(candidate)
+    worse = findings.behind(candidate)
     return f"predicts worse, by {worse:.1f} standard errors" if isfinite(worse) else ""
 
 

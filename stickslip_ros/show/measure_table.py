@@ -50,7 +50,7 @@ def simulation_tables(
     drive = scenario.plant.as_drive()
     units = Units.for_drive(drive)
     columns = {"": measures} if truth is None else {"measured": measures, "true": truth}
-    values = {name: each.as_dict() for name, each in columns.items()}
+    values = {name: run.as_dict() for name, run in columns.items()}
     title = f"{scenario.name}, {duration:g} {units.of_unit('s')}".rstrip()
     yield measure_table(title, values, dict.fromkeys(values, units))
     reason = why_no_cycle((truth or measures).regime, duration, drive)
@@ -130,11 +130,11 @@ def _row(
     """Return the cells of one row; columns in the same units have the same prefix."""
     cells: dict[str, str] = {}
     for shown_in in {units.get(column, SI) for column in columns}:
-        own = [column for column in columns if units.get(column, SI) == shown_in]
-        values = [_shown(name, columns[column], shown_in) for column in own]
-        others = [columns[column].get(_SAME_SCALE.get(name, "")) for column in own]
+        columns_shown = [column for column in columns if units.get(column, SI) == shown_in]
+        values = [_shown(name, columns[column], shown_in) for column in columns_shown]
+        others = [columns[column].get(_SAME_SCALE.get(name, "")) for column in columns_shown]
         largest = max((abs(value) for value in others if value is not None), default=0.0)
-        cells |= zip(own, shown_in.texts(values, unit, largest=largest), strict=True)
+        cells |= zip(columns_shown, shown_in.texts(values, unit, largest=largest), strict=True)
     return [cells[column] for column in columns]
 
 

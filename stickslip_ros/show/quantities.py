@@ -236,10 +236,10 @@ class Units:
         """
         unit = self.of_unit(unit)
         sizes = (abs(value) for value in values if isinstance(value, float) and isfinite(value))
-        found = max(sizes, default=0.0)
-        least = NOISE * max(found, largest)
+        greatest = max(sizes, default=0.0)
+        least = NOISE * max(greatest, largest)
         values = [0.0 if isinstance(v, float) and abs(v) < least else v for v in values]
-        scale, prefix = _prefix_of(unit, found if found >= least else 0.0)
+        scale, prefix = _prefix_of(unit, greatest if greatest >= least else 0.0)
         return [_text(value, scale, f" {prefix}{unit}".rstrip(), digits) for value in values]
 
 

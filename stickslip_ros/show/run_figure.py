@@ -222,12 +222,12 @@ class _Panels:
     """Common part of the panels of a figure: runs and axes."""
 
     def __init__(self, runs: Sequence[DrawnRun], *, narrow: bool, short: bool) -> None:
-        own = {run.units.shortened() for run in runs}
-        self.units = units = own.pop() if len(own) == 1 else SI
+        all_units = {run.units.shortened() for run in runs}
+        self.units = units = all_units.pop() if len(all_units) == 1 else SI
         self.short, self._narrow, self._runs = short, narrow, runs
         self._motions = motions = [run.history.motion for run in runs]
         positions = [motion.position for motion in motions]
-        speeds = [each for motion in motions for each in (motion.velocity, motion.belt_velocity)]
+        speeds = [speed for motion in motions for speed in (motion.velocity, motion.belt_velocity)]
         self._length = units.axis(units.named("displacement", short=short), "m", *positions)
         self._speed = units.axis(units.named("velocity", short=short), "m/s", *speeds)
 
@@ -475,7 +475,7 @@ class _SeveralRuns(_Panels):
             label_axis((position, *below)[-1].xaxis, *time)
             for axes, what, recorded in (
                 (position, "motion", pane.rows.time),
-                *((each, "force", trace[0]) for each in below),
+                *((force, "force", trace[0]) for force in below),
             ):
                 if not len(recorded):
                     say(axes, f"no {what} recorded")

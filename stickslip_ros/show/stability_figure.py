@@ -87,7 +87,7 @@ def scenario_stability_figure(scenario: Scenario, *, style: FigureStyle = SCREEN
 
 @styled
 def stability_figure(
-    found: StabilityMap,
+    stability: StabilityMap,
     critical: CriticalGainCurves | None,
     *,
     title: str = "",
@@ -95,35 +95,35 @@ def stability_figure(
 ) -> Figure:
     """Return the figure of the map and, if given, of the critical gains over the delay."""
     figure = style.figure(*((6.4, 5.8) if critical is None else (12.0, 5.6)), narrow=2.0)
-    _set_title(figure, title, found, style)
+    _set_title(figure, title, stability, style)
     count = 1 if critical is None else 2
     shape = (count, 1) if style.narrow else (1, count)
     panels = figure.subplots(*shape, squeeze=False).ravel()
-    handles = _draw_map(figure, panels[0], found)
+    handles = _draw_map(figure, panels[0], stability)
     if critical is not None:
-        _draw_critical_gains(panels[1], critical, found)
+        _draw_critical_gains(panels[1], critical, stability)
     style.legend_below(figure, handles, most=4)
     finish(figure)
     return figure
 
 
 @styled
-def design_figure(found: WashoutDesign, *, style: FigureStyle = SCREEN) -> Figure:
+def design_figure(design: WashoutDesign, *, style: FigureStyle = SCREEN) -> Figure:
     """Return the map around a proposal, with the force limit; there must be a proposal."""
-    around, scenario = found.map_around(), found.scenario
+    around, scenario = design.map_around(), design.scenario
     assert around is not None
     assert scenario is not None
     figure = style.figure(6.8, 6.2, narrow=1.2)
-    what, (low, high) = "Designed gains", found.task.belt_speeds
+    what, (low, high) = "Designed gains", design.task.belt_speeds
     if low != high:
-        ends = Units.for_drive(found.task.drive).texts([low, high], "m/s")
+        ends = Units.for_drive(design.task.drive).texts([low, high], "m/s")
         what += f" for {' to '.join(ends)}"
     title = title_of(what, scenario, _PROPOSED)
     _set_title(figure, title, around, style, " (slowest to settle)" * (low != high))
     axes = figure.subplots()
     handles = _draw_map(figure, axes, around)
-    forces = found.peak_forces(around)
-    handles += _draw_forces(axes, around, forces, found.task.force_limit)
+    forces = design.peak_forces(around)
+    handles += _draw_forces(axes, around, forces, design.task.force_limit)
     style.legend_below(figure, handles, most=3)
     finish(figure)
     return figure
@@ -142,12 +142,12 @@ _PROPOSED = (
 def _set_title(
     figure: Figure,
     title: str,
-    found: StabilityMap,
+    stability: StabilityMap,
     style: FigureStyle,
     which: str = "",
 ) -> None:
     """Set the title with the loop of a map; `which` of several it is."""
-    loop = found.loop
+    loop = stability.loop
     units = Units.for_drive(loop.drive)
     belt, rate = units.text(loop.drive.belt_speed, "m/s"), units.text(loop.rate, "Hz")
     late = units.text(loop.force_delay, "s")
@@ -156,10 +156,14 @@ def _set_title(
     style.set_title(figure, *([title] if title else []), values)
 
 
-def _draw_map(figure: Figure, axes: Axes, found: StabilityMap) -> list[Artist]:
+def _draw_map(figure: Figure, axes: Axes, stability: StabilityMap) -> list[Artist]:
     """Draw the decay rates; return the entries of the legend."""
-    corners, gains, rates = found.corner_frequencies, found.linear_gains, found.decay_rates.T
-    units = Units.for_drive(found.loop.drive)
+    corners, gains, rates = (
+        stability.corner_frequencies,
+        stability.linear_gains,
+        stability.decay_rates.T,
+    )
+    units = Units.for_drive(stability.loop.drive)
     axes.grid(visible=False)
     axes.set_facecolor(_UNSTABLE)
     fastest = float(rates.max())
@@ -168,8 +172,8 @@ def _draw_map(figure: Figure, axes: Axes, found: StabilityMap) -> list[Artist]:
         filled = axes.contourf(corners, gains, rates, levels=levels, cmap="viridis")
         figure.colorbar(filled, ax=axes, label=units.label("decay rate", "1/s"), ticks=levels)
         axes.contour(corners, gains, rates, levels=[0.0], colors=[ORANGE], linewidths=2.0)
-    axes.plot(corners, found.continuous, **_CONTINUOUS)
-    axes.plot(found.gains.corner_frequency, found.gains.linear_gain, **_GAINS, ms=14)
+    axes.plot(corners, stability.continuous, **_CONTINUOUS)
+    axes.plot(stability.gains.corner_frequency, stability.gains.linear_gain, **_GAINS, ms=14)
     axes.axhline(0.0, color=GREY, lw=0.8)
     axes.set_xscale("log")
     axes.set_xlim(corners[0], corners[-1])
@@ -177,7 +181,7 @@ def _draw_map(figure: Figure, axes: Axes, found: StabilityMap) -> list[Artist]:
     axes.set_xlabel(units.label(units.named("cutoff frequency"), "rad/s"))
     axes.set_ylabel(units.label(units.named("linear gain"), "N s/m"))
     for stable, name in ((rates > 0.0, "stable"), (rates < 0.0, "unstable")):
-        place = _roomiest(stable, found)
+        place = _roomiest(stable, stability)
         if place is not None:
             colour, stroke = ("white", "black") if name == "stable" else (INK, "white")
             axes.text(
@@ -192,17 +196,19 @@ def _draw_map(figure: Figure, axes: Axes, found: StabilityMap) -> list[Artist]:
     ]
 
 
-def _roomiest(shown: BoolArray, found: StabilityMap) -> tuple[float, float] | None:
+def _roomiest(shown: BoolArray, stability: StabilityMap) -> tuple[float, float] | None:
     """Return the middle of the most room among the cells that are shown; None if there is little.
 
     The gains, and the edges of the map, are in the way of a text there.
     """
     from scipy.ndimage import distance_transform_edt  # importing it takes long
 
-    columns, rows = len(found.corner_frequencies), len(found.linear_gains)
+    columns, rows = len(stability.corner_frequencies), len(stability.linear_gains)
     free = shown.copy()
-    column = int(np.abs(np.log(found.corner_frequencies / found.gains.corner_frequency)).argmin())
-    row = int(np.abs(found.linear_gains - found.gains.linear_gain).argmin())
+    column = int(
+        np.abs(np.log(stability.corner_frequencies / stability.gains.corner_frequency)).argmin()
+    )
+    row = int(np.abs(stability.linear_gains - stability.gains.linear_gain).argmin())
     width, height = columns // 12, rows // 16
     free[max(row - height, 0) : row + height + 1, max(column - width, 0) : column + width + 1] = 0
     # A text is three times as wide as high.
@@ -211,8 +217,8 @@ def _roomiest(shown: BoolArray, found: StabilityMap) -> tuple[float, float] | No
     if distances[best] < columns / 9.0:
         return None
     return (
-        float(found.corner_frequencies[int(best[1]) - 1]),
-        float(found.linear_gains[int(best[0]) - 1]),
+        float(stability.corner_frequencies[int(best[1]) - 1]),
+        float(stability.linear_gains[int(best[0]) - 1]),
     )
 
 
@@ -257,8 +263,8 @@ def _draw_forces(
     return [Line2D([], [], **_FORCE, label=f"force limit {shown}"), hatched]
 
 
-def _draw_critical_gains(axes: Axes, critical: CriticalGainCurves, found: StabilityMap) -> None:
-    units = Units.for_drive(found.loop.drive)
+def _draw_critical_gains(axes: Axes, critical: CriticalGainCurves, stability: StabilityMap) -> None:
+    units = Units.for_drive(stability.loop.drive)
     late, label = units.axis("force delay", "s", critical.force_delays)
     axes.set_xlabel(label)
     for index, (rate, gains) in enumerate(zip(critical.rates, critical.linear_gains, strict=True)):
@@ -267,20 +273,24 @@ def _draw_critical_gains(axes: Axes, critical: CriticalGainCurves, found: Stabil
         jumps = np.flatnonzero(gains[:-1] * gains[1:] < 0.0) + 1
         delays = np.insert(critical.force_delays, jumps, np.nan)
         label = units.text(float(rate), "Hz")
-        width, label = (2.8, f"{label}, this loop") if rate == found.loop.rate else (1.2, label)
+        width, label = (2.8, f"{label}, this loop") if rate == stability.loop.rate else (1.2, label)
         axes.plot(delays / late, np.insert(gains, jumps, np.nan), **look, lw=width, label=label)
     axes.axhline(0.0, color=GREY, lw=0.8)
     axes.plot(
-        found.loop.force_delay / late, found.gains.linear_gain, **_GAINS, ms=14, clip_on=False
+        stability.loop.force_delay / late,
+        stability.gains.linear_gain,
+        **_GAINS,
+        ms=14,
+        clip_on=False,
     )
     axes.set_ylabel(units.label(units.named("critical linear gain"), "N s/m"))
-    corner = found.gains.corner_frequency
+    corner = stability.gains.corner_frequency
     axes.set_title(f"cutoff frequency {corner:.3g}{'' if units.dimensionless else ' rad/s'}")
     axes.margins(x=0.04)
     limits = axes.get_ylim()
-    for row in np.flatnonzero(critical.rates == found.loop.rate).tolist():
-        ends, own = (critical.linear_gains[row], critical.other_ends[row]), axes.lines[row]
-        axes.fill_between(critical.force_delays / late, *ends, color=own.get_color(), alpha=0.2)
+    for row in np.flatnonzero(critical.rates == stability.loop.rate).tolist():
+        ends, line = (critical.linear_gains[row], critical.other_ends[row]), axes.lines[row]
+        axes.fill_between(critical.force_delays / late, *ends, color=line.get_color(), alpha=0.2)
         axes.collections[-1].set_label("stable, this loop")
     axes.set_ylim(limits)
     axes.legend(title="sample rate")
@@ -288,7 +298,7 @@ def _draw_critical_gains(axes: Axes, critical: CriticalGainCurves, found: Stabil
 
 @styled
 def branches_figure(
-    found: BifurcationBranches, *, title: str, style: FigureStyle = SCREEN
+    diagram: BifurcationBranches, *, title: str, style: FigureStyle = SCREEN
 ) -> Figure:
     """Return the bifurcation diagram of a drive without control.
 
@@ -299,18 +309,22 @@ def branches_figure(
     figure = style.figure(8.0, 5.6, narrow=1.15)
     style.set_title(figure, title)
     axes = figure.subplots()
-    units = Units.for_drive(found.drive)
-    branches = [*found.equilibria, *found.cycles]
-    every = [each for branch in branches for each in (branch.least, branch.greatest)]
+    units = Units.for_drive(diagram.drive)
+    branches = [*diagram.equilibria, *diagram.cycles]
+    every = [
+        displacement for branch in branches for displacement in (branch.least, branch.greatest)
+    ]
     length, y_label = units.axis(units.named("displacement"), "m", *every)
-    speed, x_label = units.axis(units.named("belt speed"), "m/s", found.belt_speeds)
+    speed, x_label = units.axis(units.named("belt speed"), "m/s", diagram.belt_speeds)
     looks: dict[str, dict[str, Any]] = {}
-    for branch in found.equilibria:
+    for branch in diagram.equilibria:
         name, look = _look(branch, Regime.EQUILIBRIUM)
         looks[name] = look
         axes.plot(branch.belt_speeds / speed, branch.least / length, **look)
-    for branch in found.cycles:
-        looks |= (_look(branch, each) for each in _CYCLES if (branch.sticks == _CYCLES[each]).any())
+    for branch in diagram.cycles:
+        looks |= (
+            _look(branch, regime) for regime in _CYCLES if (branch.sticks == _CYCLES[regime]).any()
+        )
         for edge in (branch.least, branch.greatest):
             for regime in reversed(_CYCLES):
                 rows = branch.sticks == _CYCLES[regime]
@@ -319,18 +333,18 @@ def branches_figure(
                 _, look = _look(branch, regime)
                 axes.plot(branch.belt_speeds / speed, shown / length, **look)
     handles: list[Artist] = [Line2D([], [], **look, label=name) for name, look in looks.items()]
-    speeds = np.concatenate([branch.belt_speeds for branch in found.equilibria])
-    rests = np.concatenate([branch.least for branch in found.equilibria])
-    for point in found.hopf_points:
+    speeds = np.concatenate([branch.belt_speeds for branch in diagram.equilibria])
+    rests = np.concatenate([branch.least for branch in diagram.equilibria])
+    for point in diagram.hopf_points:
         rest = np.interp(point.belt_speed, speeds, rests)
         label = f"critical feed speed (Hopf) {units.text(point.belt_speed, 'm/s')}"
         handles += axes.plot(point.belt_speed / speed, rest / length, **_POINT, label=label)
-    onset, own = found.sticking_onset, found.drive.belt_speed
-    for fold in found.folds:
+    onset, belt_speed = diagram.sticking_onset, diagram.drive.belt_speed
+    for fold in diagram.folds:
         name = "fold"
         if onset is not None and isclose(fold, onset, rel_tol=_SAME_MARK_DISTANCE):
             name, onset = "fold, stick-slip onset speed", None
-        for branch in found.cycles:
+        for branch in diagram.cycles:
             for end in (0, -1):
                 if branch.belt_speeds[end] == fold:
                     ends = branch.least[end] / length, branch.greatest[end] / length
@@ -339,16 +353,16 @@ def branches_figure(
     if onset is not None:
         label = f"stick-slip onset speed {units.text(onset, 'm/s')}"
         handles.append(axes.axvline(onset / speed, **_ONSET, label=label))
-    if own != 0.0:
-        label = f"belt speed of the drive {units.text(own, 'm/s')}"
-        handles.append(axes.axvline(own / speed, **_NOW, label=label))
-    low, high = found.belt_speeds[[0, -1]].tolist()
-    axes.set_xlim(min(low, own, 0.0) / speed, max(high, own, 0.0) / speed)
+    if belt_speed != 0.0:
+        label = f"belt speed of the drive {units.text(belt_speed, 'm/s')}"
+        handles.append(axes.axvline(belt_speed / speed, **_NOW, label=label))
+    low, high = diagram.belt_speeds[[0, -1]].tolist()
+    axes.set_xlim(min(low, belt_speed, 0.0) / speed, max(high, belt_speed, 0.0) / speed)
     axes.set_xlabel(x_label)
     axes.set_ylabel(y_label)
     finish(figure)
     style.legend_below(figure, handles, most=3)
-    _name_regions(figure, axes, found, speed)
+    _name_regions(figure, axes, diagram, speed)
     return figure
 
 
@@ -359,14 +373,14 @@ def _look(branch: Branch, regime: Regime) -> tuple[str, dict[str, Any]]:
     return (f"{name}, stable", look) if branch.stable else (f"{name}, unstable", look | _DASHED)
 
 
-def _regions(found: BifurcationBranches) -> Iterator[tuple[float, float, str]]:
+def _regions(diagram: BifurcationBranches) -> Iterator[tuple[float, float, str]]:
     """Yield ranges of belt speeds with the motions that the drive settles to."""
-    low, high = found.belt_speeds[[0, -1]].tolist()
-    onset = [] if found.sticking_onset is None else [found.sticking_onset]
-    edges = [point.belt_speed for point in found.hopf_points] + found.folds + onset
+    low, high = diagram.belt_speeds[[0, -1]].tolist()
+    onset = [] if diagram.sticking_onset is None else [diagram.sticking_onset]
+    edges = [point.belt_speed for point in diagram.hopf_points] + diagram.folds + onset
     start, before = low, ""
     for left, right in pairwise([low, *sorted(edges), high]):
-        name = _settles(found, (left + right) / 2.0)
+        name = _settles(diagram, (left + right) / 2.0)
         if left > start and name != before:
             yield start, left, before
             start = left
@@ -374,10 +388,10 @@ def _regions(found: BifurcationBranches) -> Iterator[tuple[float, float, str]]:
     yield start, high, before
 
 
-def _settles(found: BifurcationBranches, belt_speed: float) -> str:
+def _settles(diagram: BifurcationBranches, belt_speed: float) -> str:
     """Return the stable motions at a belt speed."""
     motions: dict[str, None] = {}
-    for branches, rests in ((found.cycles, False), (found.equilibria, True)):
+    for branches, rests in ((diagram.cycles, False), (diagram.equilibria, True)):
         for branch in branches:
             speeds = branch.belt_speeds
             if branch.stable and speeds[0] <= belt_speed <= speeds[-1]:
@@ -387,7 +401,7 @@ def _settles(found: BifurcationBranches, belt_speed: float) -> str:
     return " or ".join(motions)
 
 
-def _name_regions(figure: Figure, axes: Axes, found: BifurcationBranches, speed: float) -> None:
+def _name_regions(figure: Figure, axes: Axes, diagram: BifurcationBranches, speed: float) -> None:
     """Write above each range of belt speeds what the drive settles to, upright if it is narrow."""
     points = 8.0
     figure.draw_without_rendering()
@@ -395,11 +409,11 @@ def _name_regions(figure: Figure, axes: Axes, found: BifurcationBranches, speed:
     width, height = box.width / figure.dpi, box.height / figure.dpi
     left, right = axes.get_xlim()
     line, deepest = 1.5 * points / 72.0, 0.0
-    for start, end, name in _regions(found):
+    for start, end, name in _regions(diagram):
         room = width * (end - start) / speed / (right - left)
         written = text_width(name, points)
         upright = written > 0.95 * room
-        if end != found.belt_speeds[-1]:
+        if end != diagram.belt_speeds[-1]:
             axes.axvline(end / speed, **_BORDER)
         if not name or (upright and room < line):
             continue

@@ -94,8 +94,8 @@ def diagram_figure(columns: Columns, study: Study, *, style: FigureStyle = SCREE
     grid = _grid(study)
     (axis,) = grid.axes
     both = grid.continuation is Continuation.BOTH
-    own = Units.for_drive(study.scenario.plant.as_drive(), grid.parameters)
-    units, terse = own.shortened(terse=style.crowded(8.5, 8.0)), own.shortened()
+    drive_units = Units.for_drive(study.scenario.plant.as_drive(), grid.parameters)
+    units, terse = drive_units.shortened(terse=style.crowded(8.5, 8.0)), drive_units.shortened()
     figure = style.figure(8.5, 8.0, narrow=1.7)
     what = "Bifurcation diagram"
     style.set_title(figure, title_of(what, study.scenario, grid.parameters))
@@ -164,7 +164,7 @@ def map_figure(
     style.set_title(figure, title_of(what, study.scenario, grid.parameters))
     shape = (count, 1) if style.narrow else (1, count)
     panels: list[Axes] = list(figure.subplots(*shape, sharex=True, sharey=True, squeeze=False).flat)
-    found = transition_map(study, (first, second))
+    theory = transition_map(study, (first, second))
     mesh: Any = None
     scale, bar = 1.0, ""
     if colour != "regime":
@@ -178,11 +178,11 @@ def map_figure(
             _draw_regimes(axes, columns, grid, rows)
         else:
             mesh = _draw_values(axes, columns, grid, rows, getattr(columns, colour) / scale)
-        for _, margins, dashes in _curves(found):
+        for _, margins, dashes in _curves(theory):
             # White below black is visible on any colour.
             for black, width, pattern in ((False, 3.5, "-"), (True, 1.5, dashes)):
                 axes.contour(
-                    found.first, found.second, margins, levels=[0.0],
+                    theory.first, theory.second, margins, levels=[0.0],
                     colors="black" if black else "white", linewidths=width, linestyles=pattern,
                 )  # fmt: skip
         if axes in (panels[-1], *panels[: 0 if style.narrow else count]):
@@ -202,7 +202,7 @@ def map_figure(
     if _are(columns.regime, None).any():
         handles.append(Patch(**_HATCH, label="no result"))
     handles += [
-        Line2D([], [], color="black", ls=dashes, label=name) for name, _, dashes in _curves(found)
+        Line2D([], [], color="black", ls=dashes, label=name) for name, _, dashes in _curves(theory)
     ]
     style.legend_below(figure, handles, most=4)
     finish(figure)
@@ -296,7 +296,7 @@ def draw_section(
 
     `length` is the divisor of their positions.
     """
-    counts = np.array([len(found) for found in points])
+    counts = np.array([len(turns) for turns in points])
     positions = np.fromiter(chain.from_iterable(points), dtype=float, count=int(counts.sum()))
     size = float(np.clip(800.0 / len(values), 1.8, 3.0)) + 5.0 * wide
     steady = np.ones(len(values), dtype=bool) if settled is None else settled
@@ -350,8 +350,8 @@ def _mark_transitions(
         more = [] if len(values) <= _MOST_SHOWN else ["..."]
         return ", ".join(units.texts(values[:_MOST_SHOWN], axis.unit, 5) + more)
 
-    found = transitions(study, axis).items()
-    marks = {transition_label(name, axis.parameter): values for name, values in found}
+    speeds = transitions(study, axis).items()
+    marks = {transition_label(name, axis.parameter): values for name, values in speeds}
     return draw_transitions(panels, marks, text)
 
 
@@ -390,15 +390,15 @@ def _draw_values(axes: Axes, columns: Columns, grid: Grid, rows: slice, values: 
     return axes.pcolormesh(x, y, cells, rasterized=cells.size > MANY, **look)
 
 
-def _curves(found: TransitionMap) -> Iterator[tuple[str, npt.NDArray[Any], str]]:
+def _curves(transitions_map: TransitionMap) -> Iterator[tuple[str, npt.NDArray[Any], str]]:
     """Yield the transitions within the map: name, margins by row, and dashes."""
-    for (name, margins), dashes in zip(found.margins.items(), cycle(DASHES)):
+    for (name, margins), dashes in zip(transitions_map.margins.items(), cycle(DASHES)):
         if np.nanmin(margins) < 0.0 < np.nanmax(margins):
             yield transition_label(name), np.ma.masked_invalid(margins.T), dashes
 
 
 def _are(regimes: npt.NDArray[np.object_], regime: Regime | None) -> npt.NDArray[np.bool_]:
-    return np.array([found is regime for found in regimes])
+    return np.array([value is regime for value in regimes])
 
 
 def _edges(axis: Axis) -> FloatArray:

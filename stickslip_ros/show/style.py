@@ -270,10 +270,10 @@ def wrapped(lines: Iterable[str], width: float, size: float | str) -> str:
 
 def text_width(text: str, points: float) -> float:
     """Return the width of a line of text in a font of that size, inches."""
-    found = TextToPath().get_text_width_height_descent(
+    extent = TextToPath().get_text_width_height_descent(
         text, FontProperties(size=points), ismath=bool(is_math_text(text))
     )
-    return float(found[0]) / 72.0
+    return float(extent[0]) / 72.0
 
 
 def _legend_columns(handles: Sequence[Artist], room: float, most: int) -> int:

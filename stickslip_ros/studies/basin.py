@@ -70,18 +70,18 @@ class Basins:
         regime, steady = columns.regime, columns.steady
         cycle = steady & np.isin(regime, CYCLES)
         amplitude, midpoint = (
-            np.where(cycle, each, 0.0) for each in (columns.amplitude, columns.midpoint)
+            np.where(cycle, measure, 0.0) for measure in (columns.amplitude, columns.midpoint)
         )
-        found = np.full(len(regime), -1)
+        places = np.full(len(regime), -1)
         attractors: list[Attractor] = []
-        while len(left := np.flatnonzero(found < 0)):
+        while len(left := np.flatnonzero(places < 0)):
             first = int(left[0])
             allowed = 0.02 * amplitude[first]
             alike = (regime[left] == regime[first]) & (steady[left] == steady[first])
-            for each in (amplitude, midpoint):
-                alike &= np.abs(each[left] - each[first]) <= allowed
+            for column in (amplitude, midpoint):
+                alike &= np.abs(column[left] - column[first]) <= allowed
             alike[0] = True  # also where an amplitude is not finite
-            found[left[alike]] = len(attractors)
+            places[left[alike]] = len(attractors)
             share = (count := int(alike.sum())) / len(regime)
             attractor = Attractor(
                 regime=regime.item(first),
@@ -95,7 +95,7 @@ class Basins:
             attractors.append(attractor)
         order = sorted(range(len(attractors)), key=lambda place: -attractors[place].count)
         ranked = tuple(attractors[place] for place in order)
-        return cls(ranked, np.argsort(order)[found] if order else found)
+        return cls(ranked, np.argsort(order)[places] if order else places)
 
 
 def basin_study(

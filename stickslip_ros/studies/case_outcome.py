@@ -152,7 +152,7 @@ def simulate_case(
     late = slice(round(_JUDGED * len(rows)), None)
     limit = min(limit, drive.actuator.limit)
     middle, swing = float(position[late].mean()), rms(velocity[late])
-    found = Outcome(
+    outcome = Outcome(
         0,
         sticking=float(sticks[late].mean()),
         rms_velocity=swing,
@@ -163,21 +163,21 @@ def simulate_case(
         at_limit=float((np.abs(force) >= limit).mean()),
     )
     if is_positioning(scenario):
-        return _positioned(found, position - target, target, late, tolerance, plant.rate)
+        return _positioned(outcome, position - target, target, late, tolerance, plant.rate)
     allowed = tolerance * abs(drive.belt_speed)
     if disturbance.kind == "sine":
-        return found._replace(held=found.sticking == 0.0)
+        return outcome._replace(held=outcome.sticking == 0.0)
     ends = {"step": _END, "none": 0.0}.get(disturbance.kind, _START) * duration
     omega = drive.angular_frequency if drive.has_spring else 0.0
     distance = np.hypot(omega * (position - middle), velocity)
-    return found._replace(
-        held=found.sticking == 0.0 and swing <= allowed,
+    return outcome._replace(
+        held=outcome.sticking == 0.0 and swing <= allowed,
         settling_time=settling_time(distance, 2.0 * allowed, ends, plant.rate),
     )
 
 
 def _positioned(
-    found: Outcome,
+    outcome: Outcome,
     error: FloatArray,
     target: FloatArray,
     late: slice,
@@ -190,7 +190,7 @@ def _positioned(
     ends = (int(moving[-1]) + 1) / rate if len(moving) else 0.0
     amplitude, period = hunting(error[late], allowed, rate)
     final = float(np.abs(error[late]).max())
-    return found._replace(
+    return outcome._replace(
         held=final <= allowed,
         settling_time=settling_time(np.abs(error), allowed, ends, rate),
         final_error=final,

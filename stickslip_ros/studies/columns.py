@@ -131,7 +131,7 @@ def write_csv(stream: TextIO, columns: Columns, further: Mapping[str, Any]) -> N
     plan = columns.plan
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow([*plan.parameters, *further, *COLUMNS])
-    more = (each.tolist() for each in further.values())
+    more = (column.tolist() for column in further.values())
     rows = zip(*more, *map(columns.cells, COLUMNS), strict=True)
     for number, row in enumerate(rows):
         cells = (" ".join(map(repr, cell)) if isinstance(cell, tuple) else cell for cell in row)

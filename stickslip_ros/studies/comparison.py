@@ -116,14 +116,16 @@ class Comparison(PointStudy[Cases]):
         """
         plan, case = self.plan, self.plan.case(number)
         law = [*plan.laws][case.law]
-        found = with_law(self.scenario, law, plan.laws[law])
+        scenario = with_law(self.scenario, law, plan.laws[law])
         values: dict[str, Any] = {"plant.sensor.seed": case.seed}
         values["plant.force_jitter_seed"] = case.seed
         values |= plan.disturbances[case.disturbance].parameters(plan.duration)
         if plan.grid is not None:
             values |= zip(plan.parameters, plan.grid.values(case.point), strict=True)
-        found = found.changed(values)
-        return found.changed(drawn(found, case.seed, plan.spread)) if plan.spread else found
+        scenario = scenario.changed(values)
+        return (
+            scenario.changed(drawn(scenario, case.seed, plan.spread)) if plan.spread else scenario
+        )
 
     @override
     def compute_point(
@@ -131,13 +133,13 @@ class Comparison(PointStudy[Cases]):
     ) -> tuple[Outcome, MotionState | None]:
         try:
             plan, case = self.plan, self.plan.case(index)
-            found = simulate_case(
+            outcome = simulate_case(
                 self.scenario_of(index),
                 plan.duration,
                 plan.disturbances[case.disturbance],
                 plan.tolerance,
             )
-            return found._replace(number=index), None
+            return outcome._replace(number=index), None
         except (StickslipError, ArithmeticError) as error:
             return Outcome(index, held=False, reason=" ".join(str(error).split())), None
 
@@ -168,12 +170,12 @@ def drawn(scenario: Scenario, seed: int, spread: float) -> dict[str, float]:
     """
     plant, rng = scenario.plant, np.random.default_rng((seed, 1))
     values, known = plant.flat(), plant.known
-    found: dict[str, float] = {}
+    changes: dict[str, float] = {}
     for name in plant.drive_names():
         if known[name].unit and name not in ("belt_speed", "bias_force") and values[name]:
             factor = 1.0 + spread * float(rng.uniform(-1.0, 1.0))
-            found[f"plant.{name}"] = values[name] * factor
-    return found
+            changes[f"plant.{name}"] = values[name] * factor
+    return changes
 
 
 def compared(
@@ -210,22 +212,22 @@ def compared(
     fixed = [known_law(law) for law in _names("given", given)] if given else []
     if not {*fixed} <= {*laws}:
         raise InvalidInputError(f"given {shown(fixed)}: must be among {', '.join(laws)}")
-    found = tuple(
+    applied = tuple(
         Disturbance.parse(text, scenario) for text in _names("disturbances", disturbances)
     )
-    step = max((each.amplitude for each in found if each.kind in ("step", "sine")), default=0.0)
+    step = max((d.amplitude for d in applied if d.kind in ("step", "sine")), default=0.0)
     tuned: dict[str, Tuned] = {}
     constants: dict[str, dict[str, Any]] = {}
     for number, law in enumerate(laws):
-        own = with_law(scenario, law, {}).controller.control_law
-        if own.tuned and law not in fixed:
-            goal = Goal.from_scenario(scenario, feeds(scenario, axes), step, own.force_limit)
+        as_given = with_law(scenario, law, {}).controller.control_law
+        if as_given.tuned and law not in fixed:
+            goal = Goal.from_scenario(scenario, feeds(scenario, axes), step, as_given.force_limit)
             tuned[law] = tune(scenario, law, goal)
-            own = tuned[law].law
-        constants[law] = {name: getattr(own, name) for name in own.constants()}
+            as_given = tuned[law].law
+        constants[law] = {name: getattr(as_given, name) for name in as_given.constants()}
         progress((number + 1) / len(laws))
     grid = Grid(tuple(axes)) if axes else None
-    plan = Cases(constants, grid, found, seeds, spread, duration, tolerance)
+    plan = Cases(constants, grid, applied, seeds, spread, duration, tolerance)
     study = Comparison(scenario, plan)
     study.check()
     return study, tuned

@@ -147,17 +147,21 @@ class Bench:
         motion = RecordedMotion(drive, release_position(drive), drive.belt_speed)
         # On a slow belt a cycle is mostly the time in which the belt loads the spring.
         loading = loading_time(drive)
-        found, before = _measured(motion, loading), inf
+        vibration, before = _measured(motion, loading), inf
         for _ in range(6):
-            amplitude = found.velocity_amplitude
-            if found.period is None or amplitude is None or abs(amplitude / before - 1.0) < 1e-4:
+            amplitude = vibration.velocity_amplitude
+            if (
+                vibration.period is None
+                or amplitude is None
+                or abs(amplitude / before - 1.0) < 1e-4
+            ):
                 break
             motion.advance(300 * drive.natural_period)
-            found, before = _measured(motion, loading), amplitude
-        if found.period is None:
-            return Vibration(drive, self.rate, found.regime, None, np.empty(0), np.empty(0))
+            vibration, before = _measured(motion, loading), amplitude
+        if vibration.period is None:
+            return Vibration(drive, self.rate, vibration.regime, None, np.empty(0), np.empty(0))
         # The fewest cycles that last nearly a whole number of samples, or else the nearest of all.
-        lengths = np.arange(1, 13) * (found.period * self.rate)
+        lengths = np.arange(1, 13) * (vibration.period * self.rate)
         counts = np.maximum(np.rint(lengths), 1.0)
         misses = np.abs(counts / lengths - 1.0)
         states: list[tuple[float, float]] = []
@@ -165,7 +169,7 @@ class Bench:
             states.append((motion.position, motion.velocity))
             motion.advance(1.0 / self.rate)
         position, velocity = np.array(states).T
-        return Vibration(drive, self.rate, found.regime, found.period, position, velocity)
+        return Vibration(drive, self.rate, vibration.regime, vibration.period, position, velocity)
 
     def catch(self, vibration: Vibration, law: Washout, patience: float) -> Outcome:
         """Return the worst outcome of control, its filter settled, that catches a vibration.
@@ -189,11 +193,11 @@ class Bench:
             if number in due:
                 before = [states[(row - back) % count] for back in range(self.sensor.spans, 0, -1)]
                 trial = copy(controller), self._measure(before)
-                found = self._run(Motion(drive, *start), *trial, stamp, patience, vibration.size)
-                peak = max(peak, found.peak_force)
-                if found.settling_time is None:
-                    return replace(found, peak_force=peak)
-                slowest = max(slowest, found.settling_time)
+                caught = self._run(Motion(drive, *start), *trial, stamp, patience, vibration.size)
+                peak = max(peak, caught.peak_force)
+                if caught.settling_time is None:
+                    return replace(caught, peak_force=peak)
+                slowest = max(slowest, caught.settling_time)
             measured = start if measure is None else measure(number, *start)
             controller.answer(_sample(drive, stamp, *measured))
         return Outcome(peak, slowest, grows=False)

@@ -57,12 +57,12 @@ class Task:
                 "ideal motor"
             )
         if belt_speeds is None:
-            own = abs(plant.belt_speed)
-            if own == 0.0:
+            speed = abs(plant.belt_speed)
+            if speed == 0.0:
                 raise InvalidInputError(
                     "plant.belt_speed = 0: gains are for a moving belt, so speeds must be given"
                 )
-            belt_speeds = (own * (1.0 - OWN_SPEED_RANGE), own * (1.0 + OWN_SPEED_RANGE))
+            belt_speeds = (speed * (1.0 - OWN_SPEED_RANGE), speed * (1.0 + OWN_SPEED_RANGE))
         low, high = belt_speeds
         if not SMALLEST <= low <= high <= LARGEST:
             ordered = SMALLEST <= high < low <= LARGEST
@@ -100,14 +100,14 @@ class Task:
             The changed copy. Its belt speed is that of the scenario, or the nearest one within the
             range.
         """
-        (low, high), own = self.belt_speeds, self.scenario.plant.belt_speed
+        (low, high), belt_speed = self.belt_speeds, self.scenario.plant.belt_speed
         values = {name: getattr(law, name) for name in law.constants()}
         proposed: dict[str, Any] = {
             f"{self.scenario.controller.node}.{name}": value
             for name, value in values.items()
             if isinstance(value, float)
         }
-        proposed["plant.belt_speed"] = copysign(min(max(abs(own), low), high), own)
+        proposed["plant.belt_speed"] = copysign(min(max(abs(belt_speed), low), high), belt_speed)
         return self.scenario.overridden([], proposed)
 
 

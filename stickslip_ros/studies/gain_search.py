@@ -40,14 +40,14 @@ class Loops:
 
     def decay_rates(self, laws: Sequence[ControlLaw]) -> FloatArray:
         """Return the smallest decay rate with each law, 1/s; approximate for a long delay."""
-        found = np.full(len(laws), inf)
+        rates = np.full(len(laws), inf)
         for loop in self.deciding:
             forms = (linear_part(law, loop) for law in laws)
             stacked = LinearFeedback(*map(np.array, zip(*forms, strict=True)))
             radii = np.abs(np.linalg.eigvals(loop.transition_matrix(stacked))).max(axis=-1)
             with np.errstate(divide="ignore"):
-                found = np.minimum(found, -np.log(radii) * loop.rate)
-        return found
+                rates = np.minimum(rates, -np.log(radii) * loop.rate)
+        return rates
 
 
 def linear_part(law: ControlLaw, loop: LinearSampledLoop) -> LinearFeedback:
@@ -55,10 +55,10 @@ def linear_part(law: ControlLaw, loop: LinearSampledLoop) -> LinearFeedback:
 
     Raises InvalidInputError if the law has none.
     """
-    found = law.linear_part(1.0 / loop.rate)
-    if found is None:
+    part = law.linear_part(1.0 / loop.rate)
+    if part is None:
         raise InvalidInputError(f"control law {law.name}: it has no linear part to tune")
-    return found
+    return part
 
 
 def fastest(
@@ -105,18 +105,18 @@ def fastest(
     axes = np.eye(starts.shape[1])
     steps = np.vstack([axes, -axes]) if ways is None else np.array(ways)
 
-    def refined(found: Any) -> Any:
+    def refined(top: Any) -> Any:
         """Return the best value and point, with ever smaller steps."""
         step = _FIRST_STEP
         for _ in range(_REFINED):
-            best = max(valued(np.array(found[1]) + step * steps))
-            if best[0] > found[0]:
-                found = best
+            best = max(valued(np.array(top[1]) + step * steps))
+            if best[0] > top[0]:
+                top = best
             elif step < _LAST_STEP:
                 break
             else:
                 step /= 2.0
-        return found
+        return top
 
     order = np.argsort(loops.decay_rates([law_at(start) for start in starts]))[::-1]
     best = sorted(valued(starts[order[:_VALUED]]), reverse=True)[:kept]

@@ -136,7 +136,7 @@ class Journal:
     def _piece(self, line: bytes, offset: int) -> Piece:
         values = _parsed(line, offset)
         end = None if values["end"] is None else MotionState.from_json(values["end"])
-        return Piece([self.study.row(each) for each in values["points"]], end)
+        return Piece([self.study.row(point) for point in values["points"]], end)
 
     def _compare(self, header: Mapping[str, Any], line: bytes) -> None:
         if not line.startswith(_OPENING):
@@ -216,10 +216,10 @@ def _parsed(line: bytes, offset: int) -> dict[str, Any]:
         raise ValueError from None
 
 
-def _differences(found: Mapping[str, Any], expected: Mapping[str, Any]) -> Iterator[str]:
+def _differences(present: Mapping[str, Any], expected: Mapping[str, Any]) -> Iterator[str]:
     """Yield the entries in which the two differ, with both values."""
     for key, other in expected.items():
-        one = found.get(key)
+        one = present.get(key)
         if isinstance(one, dict) and isinstance(other, dict):
             yield from (f"{key}.{text}" for text in _differences(one, other))
         elif one != other and (one == one or other == other):  # nan is as good as nan

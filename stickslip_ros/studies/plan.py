@@ -163,7 +163,7 @@ class Axis:
             )
         known = NODE_PARAMETERS[node].known
         if name not in known:
-            numbers = by_group(each.partition(".")[2] for each in _numbers(node))
+            numbers = by_group(name.partition(".")[2] for name in _numbers(node))
             every = f"numbers of {node} are {numbers}"
             raise InvalidInputError(
                 f"{self.parameter:.80}: unknown parameter; "

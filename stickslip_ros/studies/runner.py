@@ -272,9 +272,9 @@ def _missing(journal: Journal) -> Iterator[tuple[range, MotionState | None]]:
     plan, done = journal.study.plan, journal.columns.done
     for points in plan.chains():
         places = np.flatnonzero(~done[points])
-        for each in np.split(places, np.flatnonzero(np.diff(places) > 1) + 1):
-            if len(each):
-                first, last = int(each[0]), int(each[-1])
+        for run in np.split(places, np.flatnonzero(np.diff(places) > 1) + 1):
+            if len(run):
+                first, last = int(run[0]), int(run[-1])
                 carried = plan.continuation and first
                 start = journal.state_after(points[first - 1]) if carried else None
                 yield points[first : last + 1], start

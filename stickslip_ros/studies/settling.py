@@ -50,7 +50,9 @@ class MotionState:
     def from_json(cls, values: Sequence[Any]) -> Self:
         """Return the state of the values of a tuple that went through JSON."""
         position, velocity, *parts = values
-        return cls(position, velocity, *(None if each is None else tuple(each) for each in parts))
+        return cls(
+            position, velocity, *(None if state is None else tuple(state) for state in parts)
+        )
 
 
 @dataclass(frozen=True)

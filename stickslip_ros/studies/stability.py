@@ -85,7 +85,7 @@ def stability(scenario: Scenario) -> tuple[Section, Notes]:
     require("the theory of stability", drive, AUTONOMOUS)
     law, (expansion, lack) = scenario.control_law, _covered(lambda: expand(drive))
     position = drive.equilibrium_position if expansion else None
-    found, notes = _separated(
+    section, notes = _separated(
         {
             "equilibrium_position": _Noted(position, lack or _held(drive)),
             "open_loop": _open_loop(drive, expansion, lack),
@@ -94,14 +94,14 @@ def stability(scenario: Scenario) -> tuple[Section, Notes]:
             "sampled_loop": _sampled_loop(drive, law, plant),
         }
     )
-    forms, more = _separated({"closed_forms": _closed_forms(drive, found)})
-    return found | forms, notes | more
+    forms, more = _separated({"closed_forms": _closed_forms(drive, section)})
+    return section | forms, notes | more
 
 
-def _separated(found: Section) -> tuple[Section, Notes]:
+def _separated(section: Section) -> tuple[Section, Notes]:
     """Return the quantities without their notes, and the notes by place."""
     values, notes = Section(), Notes()
-    for name, value in found.items():
+    for name, value in section.items():
         if isinstance(value, _Noted):
             value, note = value
             if note is not None:
@@ -334,7 +334,7 @@ def _sampled_gains(loop: LinearSampledLoop, law: ControlLaw) -> tuple[_Noted, _N
     return _Noted(critical, reason), _Noted(stable, reason)
 
 
-def _closed_forms(drive: Drive, found: Section) -> Section | _Noted:
+def _closed_forms(drive: Drive, section: Section) -> Section | _Noted:
     """Return the quantities with a closed form under the cubic Stribeck law, of those found."""
     _, lack = _covered(lambda: require("the closed form", drive, *ONE_DEGREE))
     lack = lack or _held(drive)
@@ -342,14 +342,14 @@ def _closed_forms(drive: Drive, found: Section) -> Section | _Noted:
         lack = "closed forms exist for the cubic Stribeck law only"
     if lack is not None:
         return _Noted(None, lack)
-    opened, closed = found["open_loop"], found["closed_loop"]
+    opened, closed = section["open_loop"], section["closed_loop"]
     forms: Section = {
-        "equilibrium_position": found["equilibrium_position"],
+        "equilibrium_position": section["equilibrium_position"],
         **{
             name: next(iter(opened[f"{name}s"]), None)
             for name in ("first_lyapunov_coefficient", "hopf_speed", "crossing_speed")
         },
-        "onset_speed_approximate": found["sticking"]["onset_speed_approximate"],
+        "onset_speed_approximate": section["sticking"]["onset_speed_approximate"],
         "critical_linear_gain": closed["critical_linear_gain"],
         "critical_lyapunov_coefficient": closed["first_lyapunov_coefficient"],
         "critical_cubic_gain": closed["critical_cubic_gain"],
@@ -420,7 +420,9 @@ def hopf_ratio(drive: Drive) -> float | None:
     speed = abs(drive.belt_speed)
     if not speeds or speed == 0.0:
         return None
-    return min((speed / each for each in speeds), key=lambda ratio: max(ratio, 1.0 / ratio))
+    return min(
+        (speed / hopf_speed for hopf_speed in speeds), key=lambda ratio: max(ratio, 1.0 / ratio)
+    )
 
 
 def hopf_distance(drive: Drive) -> str:
@@ -432,8 +434,8 @@ def hopf_distance(drive: Drive) -> str:
     if ratio is None:
         return ""
     speed = abs(drive.belt_speed)
-    own, nearest = (number_text(drive, each, "m/s") for each in (speed, speed / ratio))
-    clause = f"{own} is {ratio:.4g} times the critical speed of {nearest}"
+    here, nearest = (number_text(drive, value, "m/s") for value in (speed, speed / ratio))
+    clause = f"{here} is {ratio:.4g} times the critical speed of {nearest}"
     return clause if drive.is_dimensionless else f"{clause} (belt speeds are in m/s)"
 
 

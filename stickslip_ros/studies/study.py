@@ -241,11 +241,11 @@ def compute(study: PointStudy[Any], points: Sequence[int], start: MotionState | 
     initial state, as does the point after one that failed or diverged.
     """
     continuation, end = study.plan.continuation, start
-    found: list[Any] = []
+    computed: list[Any] = []
     for index in points:
         point, end = study.compute_point(index, end if continuation else None)
-        found.append(point)
-    return Piece(found, end if continuation else None)
+        computed.append(point)
+    return Piece(computed, end if continuation else None)
 
 
 def pieces_of(points: range, size: int) -> Iterator[range]:

@@ -105,12 +105,12 @@ def transitions(study: Study, axis: Axis) -> dict[str, list[float]]:
     if axis.whole:
         return {}
     values = [axis.at(number / 200) for number in range(201)]
-    found: dict[str, list[float]] = {}
+    speeds: dict[str, list[float]] = {}
     for name, margin in _margins(study).items():
         at = partial(_at, study, [axis.parameter], margin)
         if places := list(sign_changes(at, values)):
-            found[name] = places
-    return found
+            speeds[name] = places
+    return speeds
 
 
 def transition_map(study: Study, axes: tuple[Axis, Axis]) -> TransitionMap:
@@ -127,9 +127,9 @@ def transition_map(study: Study, axes: tuple[Axis, Axis]) -> TransitionMap:
     names = [axis.parameter for axis in axes]
     margins: dict[str, FloatArray] = {}
     for name, margin in _margins(study, coarse=True).items():
-        found = np.array([[_at(study, names, margin, x, y) for y in second] for x in first])
-        if not np.isnan(found).all():
-            margins[name] = found
+        values = np.array([[_at(study, names, margin, x, y) for y in second] for x in first])
+        if not np.isnan(values).all():
+            margins[name] = values
     return TransitionMap(first, second, margins)
 
 

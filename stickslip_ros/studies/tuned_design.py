@@ -68,10 +68,10 @@ def design_by_rule(task: Task, progress: Progress = lambda _: None) -> TunedDesi
         duration = max(_PERIODS * task.drive.natural_period, _SHORTEST)
     checks: list[TunedCheck] = []
     for speed in speeds:
-        for each in disturbances:
-            values = {"plant.belt_speed": speed, **each.parameters(duration)}
-            outcome = simulate_case(proposed.changed(values), duration, each, FEED_TOLERANCE)
-            checks.append(TunedCheck(speed, each, outcome))
+        for disturbance in disturbances:
+            values = {"plant.belt_speed": speed, **disturbance.parameters(duration)}
+            outcome = simulate_case(proposed.changed(values), duration, disturbance, FEED_TOLERANCE)
+            checks.append(TunedCheck(speed, disturbance, outcome))
             progress(len(checks) / len(speeds) / len(disturbances))
     failed = [f"at {speed:g} m/s, {kind}" for speed, kind, outcome in checks if not outcome.held]
     said = f"the simulated drive is not held {'; '.join(failed)}" if failed else None

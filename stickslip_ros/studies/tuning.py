@@ -88,12 +88,12 @@ class Tuned:
     @property
     def poles(self) -> dict[float, npt.NDArray[np.complex128]]:
         """Poles of the linear loop per sample, by belt speed, m/s."""
-        found: dict[float, npt.NDArray[np.complex128]] = {}
-        for each in self.responses:
-            loop = each.plant.loop
-            matrix = loop.transition_matrix(each.feedback)
-            found[loop.drive.belt_speed] = np.linalg.eigvals(matrix).astype(np.complex128)
-        return found
+        poles: dict[float, npt.NDArray[np.complex128]] = {}
+        for response in self.responses:
+            loop = response.plant.loop
+            matrix = loop.transition_matrix(response.feedback)
+            poles[loop.drive.belt_speed] = np.linalg.eigvals(matrix).astype(np.complex128)
+        return poles
 
 
 LINEAR = quantities_of(Tuned)
@@ -105,14 +105,14 @@ def with_law(scenario: Scenario, law: str, constants: Mapping[str, float]) -> Sc
 
     The reference is that of the scenario's own controller.
     """
-    found, reference = scenario.with_controller(law), scenario.controller.reference
-    node = found.controller.node
+    chosen, reference = scenario.with_controller(law), scenario.controller.reference
+    node = chosen.controller.node
     values: dict[str, Any] = {f"{node}.{name}": value for name, value in constants.items()}
     values[f"{node}.start_after"] = 0.0
-    found = replace(found.changed(values), plant=replace(found.plant, expects_control=True))
-    if not found.controller.control_law.follows_reference:
-        return found
-    return replace(found, controller=replace(found.controller, reference=reference))
+    chosen = replace(chosen.changed(values), plant=replace(chosen.plant, expects_control=True))
+    if not chosen.controller.control_law.follows_reference:
+        return chosen
+    return replace(chosen, controller=replace(chosen.controller, reference=reference))
 
 
 class _Rule:
@@ -130,10 +130,10 @@ class _Rule:
             reason = why_no_linear_loop(at_feed, plant.rate, delay)
             if reason is not None:
                 raise InvalidInputError(f"gains of {law.name} by theory: {reason}")
-            spans = (each.spans for each in sensors[: 1 if drive.motor is None else 2])
+            spans = (sensor.spans for sensor in sensors[: 1 if drive.motor is None else 2])
             loop = LinearSampledLoop(at_feed, plant.rate, delay, _jacobian(at_feed), *spans)
             self.plants.append(PlantResponse.of(loop))
-        self.loops = Loops([each.loop for each in self.plants])
+        self.loops = Loops([member.loop for member in self.plants])
         self.deciding = [self.plants[place] for place in self.loops.ends]
         self.noises = [sqrt(s.position_resolution**2 / 12.0 + s.position_noise**2) for s in sensors]
         self.friction = max(drive.friction.limits) * drive.normal_force
@@ -153,22 +153,24 @@ class _Rule:
         """Return what the loops of these plants say of a stable law."""
         feedback = linear_part(law, plants[0].loop)
         responses = tuple(LoopResponse(plant, feedback) for plant in plants)
-        steps = [each.step_response() for each in responses]
-        noise = max(each.noise_force(*self.noises) for each in responses)
+        steps = [response.step_response() for response in responses]
+        noise = max(response.noise_force(*self.noises) for response in responses)
         peak = max(
             self.goal.disturbance * float(np.abs(step).max()) + self.friction * share
-            for step, share in zip(steps, (self.carried(each) for each in responses), strict=True)
+            for step, share in zip(
+                steps, (self.carried(response) for response in responses), strict=True
+            )
         )
-        below, above = zip(*(each.gain_margins for each in responses), strict=True)
+        below, above = zip(*(response.gain_margins for response in responses), strict=True)
         return Tuned(
             law,
             self.goal,
             min(plant.loop.decay_rate(feedback) for plant in plants),
-            _least(each.delay_margin for each in responses),
-            _least(each.phase_margin for each in responses),
+            _least(response.delay_margin for response in responses),
+            _least(response.phase_margin for response in responses),
             max((factor for factor in below if factor is not None), default=None),
             _least(above),
-            max(each.sensitivity_peak for each in responses),
+            max(response.sensitivity_peak for response in responses),
             peak + 4.0 * noise,
             noise,
             None,
@@ -187,14 +189,14 @@ class _Rule:
         rest = system.C @ np.linalg.solve(np.eye(len(system.A)) - system.A, system.B)
         return abs(1.0 - drive.stiffness * float(rest[0, 0]))
 
-    def excess(self, found: Tuned) -> dict[str, float]:
+    def excess(self, tuned: Tuned) -> dict[str, float]:
         """Return by how much, as logarithms, a law exceeds each limit of the goal."""
         goal = self.goal
         noise = _NOISE_SHARE * min(goal.force_limit, self.friction)
         ratios = {
-            "the delay margin": goal.delay_margin / (found.delay_margin or inf),
-            "the peak force": found.peak_force / goal.force_limit,
-            "the rms force by noise": found.noise_force / noise,
+            "the delay margin": goal.delay_margin / (tuned.delay_margin or inf),
+            "the peak force": tuned.peak_force / goal.force_limit,
+            "the rms force by noise": tuned.noise_force / noise,
         }
         return {name: log(ratio) for name, ratio in ratios.items() if ratio > 1.0}
 
@@ -207,10 +209,10 @@ def tune(scenario: Scenario, law: str, goal: Goal) -> Tuned:
     it does not meet. Raises InvalidInputError if the law has no gains to tune, or no gains make all
     loops stable.
     """
-    found = with_law(scenario, law, {}).controller.control_law
-    if not found.tuned:
+    known = with_law(scenario, law, {}).controller.control_law
+    if not known.tuned:
         raise InvalidInputError(f"control law {law}: it names no gains to tune, so give them")
-    start = replace(found.for_drive(scenario.plant.as_drive()), force_limit=goal.force_limit)
+    start = replace(known.for_drive(scenario.plant.as_drive()), force_limit=goal.force_limit)
     rule = _Rule(scenario, start, goal)
     starts = log(10.0) * np.random.default_rng(1).uniform(
         -_RANGE, _RANGE, (_STARTS, len(start.tuned))

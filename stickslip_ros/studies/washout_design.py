@@ -130,11 +130,11 @@ def design_washout(task: Task, progress: Progress = lambda _: None) -> WashoutDe
     WashoutDesign
         The proposal with its margins and checks, or the reason why there is none.
     """
-    found = _design(task, progress)
+    design = _design(task, progress)
     if task.scenario.plant.force_jitter == 0.0:
-        return found
+        return design
     no_jitter = "force_jitter is omitted: the delay of the force is constant here"
-    return replace(found, remark=joined(found.remark, no_jitter))
+    return replace(design, remark=joined(design.remark, no_jitter))
 
 
 def _design(task: Task, progress: Progress) -> WashoutDesign:
@@ -152,13 +152,13 @@ def _design(task: Task, progress: Progress) -> WashoutDesign:
             reason = f"without control the motion diverges at a belt speed of {speed}"
             return WashoutDesign(task, remark=f"{reason}, so there is no limit cycle to suppress")
     candidates = Candidates(task, vibrations)
-    found = _propose(bench, candidates, progress)
-    if found.controller is None and not isinf(task.force_limit):
+    proposed = _propose(bench, candidates, progress)
+    if proposed.controller is None and not isinf(task.force_limit):
         enough = _sufficient_limit(bench, candidates)
         if enough is not None:
             limit = f"a force limit of about {number_text(task.drive, enough, 'N')}"
-            return replace(found, remark=f"{found.remark}; {limit} is sufficient")
-    return found
+            return replace(proposed, remark=f"{proposed.remark}; {limit} is sufficient")
+    return proposed
 
 
 def _propose(bench: Bench, candidates: Candidates, progress: Progress) -> WashoutDesign:
@@ -185,17 +185,17 @@ def _propose(bench: Bench, candidates: Candidates, progress: Progress) -> Washou
             if failure is not None:
                 break
         slowest = candidates.loops.slowest(gains)
-        remark, found, little = candidates.why_zero(), None, None
+        remark, robustness, little = candidates.why_zero(), None, None
         if failure is None and gains.linear_gain != 0.0:
-            found = margins(loops, gains)
-            little = little_margin(task, found)
+            robustness = margins(loops, gains)
+            little = little_margin(task, robustness)
             ends = [loop.drive for loop in loops if loop in (loops[0], loops[-1], slowest)]
             remark, failure = _throw_from_high_speeds(bench, ends, controller)
         if failure is None:
             progress(1.0)
             seen = tuple(candidates.vibrations)
             remark = joined(remark, little)
-            return WashoutDesign(task, controller, remark, checks, slowest, found, seen)
+            return WashoutDesign(task, controller, remark, checks, slowest, robustness, seen)
         peak = max((check.peak_force or 0.0 for check in checks), default=0.0)
         if peak > task.force_limit:
             strength *= 0.97 * task.force_limit / peak

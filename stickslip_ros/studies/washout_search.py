@@ -45,8 +45,8 @@ class Candidates:
         self.task, self.vibrations = task, vibrations
         plant = task.scenario.plant
         loops = (
-            LinearSampledLoop.from_drive(each.drive, plant.rate, plant.force_delay, plant.sensor)
-            for each in vibrations
+            LinearSampledLoop.from_drive(member.drive, plant.rate, plant.force_delay, plant.sensor)
+            for member in vibrations
         )
         self.loops = Loops([loop for loop in loops if loop is not None])
         # Twice the gain that settles without overshoot: a larger one does not damp faster.
@@ -111,9 +111,9 @@ class Candidates:
         sets = [[loop.stable_linear_gains(d) for loop in self.loops.deciding] for d in frequencies]
         if not any(
             max(one.low, other.low) < min(one.high, other.high)
-            for each in sets
-            for one in each[0]
-            for other in each[-1]
+            for gains in sets
+            for one in gains[0]
+            for other in gains[-1]
         ):
             return (
                 "no linear gain makes the equilibrium stable at all these belt speeds, at this "
@@ -218,14 +218,14 @@ def _delay_margin(loop: LinearSampledLoop, gains: Washout) -> float | None:
     return None
 
 
-def little_margin(task: Task, found: Margins) -> str | None:
+def little_margin(task: Task, margins: Margins) -> str | None:
     """Return a remark on loops with a small margin; None if all margins are large enough."""
     little = [
         f"{factor:.3g} times the linear gain is unstable"
-        for factor in (found.gain_down, found.gain_up)
+        for factor in (margins.gain_down, margins.gain_up)
         if factor is not None and 1.0 / 1.1 < factor < 1.1
     ]
-    if found.delay is not None and found.delay < 0.02 * task.drive.natural_period:
-        delay = number_text(task.drive, found.delay, "s")
+    if margins.delay is not None and margins.delay < 0.02 * task.drive.natural_period:
+        delay = number_text(task.drive, margins.delay, "s")
         little.append(f"an additional delay of {delay} makes it unstable")
     return f"the margin is very small: {', '.join(little)}" if little else None
