@@ -52,9 +52,7 @@ class Margin(Result):
         yield self._verdict
         if self.onset.feeds:
             cells = zip(*(vars(feed).values() for feed in self.onset.feeds), strict=True)
-            columns = [
-                texts(values, q.unit) for values, q in zip(cells, shown.values(), strict=True)
-            ]
+            columns = [texts(row, q.unit) for row, q in zip(cells, shown.values(), strict=True)]
             rows = [[*row] for row in zip(*columns, strict=True)]
             yield TextTable("decay", [quantity.label for quantity in shown.values()], rows)
         if self.onset.families:
@@ -67,14 +65,12 @@ class Margin(Result):
 
     @property
     def _verdict(self) -> str:
-        estimate = self.onset
-        if estimate.upper is None:
+        fit = self.onset
+        if fit.upper is None:
             return "the onset of vibration cannot be told"
-        speeds = [estimate.speed, estimate.lower, estimate.upper, self.least_feed]
+        speeds = [fit.speed, fit.lower, fit.upper, self.least_feed]
         onset, lower, upper, least = (self.units.text(speed, "m/s") for speed in speeds)
-        text = (
-            f"at {onset} (95 % interval {lower} to {upper})" if estimate.lower else f"below {upper}"
-        )
+        text = f"at {onset} (95 % interval {lower} to {upper})" if fit.lower else f"below {upper}"
         return (
             f"vibration starts {text}; the least feed with a margin of {self.margin:g} is {least}"
         )
@@ -150,20 +146,18 @@ def margin(
     records = [record for path in paths for record in read[path]]
     if {-1.0, 1.0} <= {float(np.sign(record.belt_velocity.mean())) for record in records}:
         raise InvalidInputError("the belt moves in both directions: friction may differ in them")
-    every_decay: list[RingDown] = []
+    decays: list[RingDown] = []
     notes: list[str] = []
     for record in records:
         motion = record.position, record.belt_velocity, record.period
-        decays = [*ring_downs(*motion)]
+        taps = [*ring_downs(*motion)]
         notes += record.notes
-        if not decays:
+        if not taps:
             notes.append(f"{record.name}: {why_no_ring_down(*motion, units.of_unit('m'))}")
-        growing = [
-            units.text(decay.belt_speed, "m/s") for decay in decays if decay.decay_rate <= 0.0
-        ]
+        growing = [units.text(tap.belt_speed, "m/s") for tap in taps if tap.decay_rate <= 0.0]
         notes += [f"{record.name}: a vibration does not decay at {feed}" for feed in growing]
-        every_decay += decays
-    if not every_decay:
+        decays += taps
+    if not decays:
         raise InvalidInputError("; ".join(notes))
-    onset = onset_of(every_decay, units.of_unit("m"))
+    onset = onset_of(decays, units.of_unit("m"))
     return Margin(paths, margin, onset, [*filter(None, [*notes, onset.advice])], units)

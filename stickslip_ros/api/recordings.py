@@ -397,9 +397,7 @@ def with_forms(options: Mapping[str, Any]) -> dict[str, Any]:
     """
     others = dict(options)
     for name, kind in (("form", TableFormat), ("layout", BagLayout)):
-        given = {
-            option.name: others.pop(option.name) for option in fields(kind) if option.name in others
-        }
+        given = {part.name: others.pop(part.name) for part in fields(kind) if part.name in others}
         others |= {name: kind(**given)} if given else {}
     return others
 

@@ -103,9 +103,7 @@ class Points(TabularResult):
             if plan.continuation:
                 dimensions = {"direction": [*map(str, plan.directions)], **dimensions}
         cells |= {**self.further, **{name: getattr(columns, name) for name in COLUMNS}}
-        cells["regime"] = np.array(
-            [regime and str(regime) for regime in columns.regime], dtype=object
-        )
+        cells["regime"] = np.array([kind and str(kind) for kind in columns.regime], dtype=object)
         quantities |= {name: FURTHER[name] for name in self.further} | COLUMNS
         units = units_of(self.study)
         return Table(cells, quantities, units, dimensions, attributes(self.scenario))
@@ -232,9 +230,7 @@ class Basin(Points):
 
     @override
     def _summary(self) -> Summary:
-        shares = [
-            f"{attractor_name(attractor)} {attractor.share:.1%}" for attractor in self.attractors
-        ]
+        shares = [f"{attractor_name(motion)} {motion.share:.1%}" for motion in self.attractors]
         parameters = scenario_tables(self.scenario, used=True)
         title = "Basins of attraction"
         return Summary(title, self.scenario.name, ", ".join(shares), parameters)

@@ -52,7 +52,7 @@ class DriveTask:
         much worse in the search is not fitted further.
         """
         search = self._search
-        candidates: list[Refinement] = []
+        models: list[Refinement] = []
 
         def compete(competitors: Sequence[IdentifiedLaw], like: Refinement | None = None) -> None:
             """Search laws one by one, then extend what was found of them."""
@@ -60,7 +60,7 @@ class DriveTask:
             for competitor in competitors:
                 self._limit.begin_part(_LAW_TIME if len(competitors) > 1 else 1.0)
                 name = label_of(competitor)
-                if (candidates or near) and self._limit.is_over:
+                if (models or near) and self._limit.is_over:
                     self.left.append(name)
                     continue
                 progress(name)
@@ -68,29 +68,27 @@ class DriveTask:
                 near.append(search.searched(competitor, thorough=thorough, like=like))
             self._limit.begin_part(1.0)
             for fits in sorted(near, key=lambda fits: min(map(loss_of, fits))):
-                least = min(map(loss_of, chain(candidates, *near)))
-                candidates.append(search.extended(fits, least))
+                least = min(map(loss_of, chain(models, *near)))
+                models.append(search.extended(fits, least))
 
         def explained() -> bool:
-            return any(map(is_white, candidates))
+            return any(map(is_white, models))
 
         self._limit.begin_stage(_SEARCH_TIME)
         tables = [search.table] if law == search.table.name else []
         compete([*(competitor for competitor in laws if not competitor.memory), *tables])
-        if len(search.rows.directions) > 1 and candidates and not explained():
-            compete([DirectionalAdapter(min(candidates, key=loss_of).law)])
+        if len(search.rows.directions) > 1 and models and not explained():
+            compete([DirectionalAdapter(min(models, key=loss_of).law)])
         # A memory changes the motion near sticking: it does not explain an input that is missing.
-        described = not candidates or (
-            law == AUTO and min(map(_share, candidates)) < _MISSING_INPUT_ERROR
-        )
+        described = not models or (law == AUTO and min(map(_share, models)) < _MISSING_INPUT_ERROR)
         bristles: Refinement | None = None
         for rival in laws if described and not explained() else ():
             if rival.memory and (rival is DAHL or not explained()):
                 compete([rival], bristles)
-                bristles = candidates[-1] if candidates[-1].law is LUGRE else bristles
+                bristles = models[-1] if models[-1].law is LUGRE else bristles
         if law == AUTO and not explained():
             compete([search.table])
-        return self._finished(candidates)
+        return self._finished(models)
 
     def _finished(self, fits: Sequence[Refinement]) -> list[Refinement]:
         """Return searched models fitted further, the better ones first, as far as time allows."""

@@ -62,24 +62,22 @@ def evenly_spaced(name: str, stamp: IntArray, columns: Mapping[str, FloatArray])
         times = time[rows]
         even = times[0] + period * np.arange(round((times[-1] - times[0]) / period) + 1)
         far = _distances(even, times) > _MISSING_DISTANCE * period
-        samples: dict[str, Any] = {"missing": far if far.any() else None, "left_out": left_out}
+        fields: dict[str, Any] = {"missing": far if far.any() else None, "left_out": left_out}
         jitters = float(_distances(times, even).max()) <= _JITTER * period
         as_measured = len(times) == len(even) and np.abs(times - even).max() < 1e-3 * period
         for column, values in columns.items():
             if as_measured:
-                samples[column] = values[rows]
+                fields[column] = values[rows]
             elif column in ("force", "disturbance") and not jitters:
-                samples[column] = mean_held(times, values[rows], np.append(even, even[-1] + period))
+                fields[column] = mean_held(times, values[rows], np.append(even, even[-1] + period))
             elif column in ("force", "disturbance"):
                 last = np.searchsorted(times, even + _JITTER * period, "right") - 1
-                samples[column] = values[rows][np.maximum(last, 0)]
+                fields[column] = values[rows][np.maximum(last, 0)]
             else:
-                samples[column] = np.interp(even, times, values[rows])
-        if "velocity" in samples and _is_difference(
-            samples["velocity"], samples["position"], period
-        ):
-            del samples["velocity"]
-        records.append(Record(name, period, **samples))
+                fields[column] = np.interp(even, times, values[rows])
+        if "velocity" in fields and _is_difference(fields["velocity"], fields["position"], period):
+            del fields["velocity"]
+        records.append(Record(name, period, **fields))
     if not records:
         raise InvalidInputError(
             f"{name} has no {FEWEST} samples without a gap of more than {_LONGEST_GAP:g} periods"

@@ -120,12 +120,10 @@ class LawSearch:
         if min(map(loss_of, near)) > _GIVEN_UP_LOSS_RATIO * least:
             return min(near, key=loss_of)
         extended: list[Refinement] = []
-        for start in near:
-            fit = (
-                start if is_white(start) else self._with_optional(start, least_share=_OPTIONAL_GAIN)
-            )
-            extended.append(fit)
-            if is_white(fit) or _is_rounding(fit):
+        for fit in near:
+            more = fit if is_white(fit) else self._with_optional(fit, least_share=_OPTIONAL_GAIN)
+            extended.append(more)
+            if is_white(more) or _is_rounding(more):
                 break
         return min(extended, key=loss_of)
 

@@ -51,10 +51,8 @@ def written_scenario(findings: Findings, path: Path) -> list[Path]:
     return [path, *curves]
 
 
-def _scenario(
-    findings: Findings, laws: Mapping[str, FrictionLaw], files: dict[str, str]
-) -> Scenario:
-    drive, record, servo = findings.drive, findings.records[0], findings.servo
+def _scenario(model: Findings, laws: Mapping[str, FrictionLaw], files: dict[str, str]) -> Scenario:
+    drive, record, servo = model.drive, model.records[0], model.servo
     values: dict[str, Any] = {
         f"plant.{name}": getattr(drive, name)
         for name in ("mass", "damping", "stiffness", "normal_force", "belt_speed", "bias_force")
@@ -68,11 +66,11 @@ def _scenario(
             values["plant.friction.curve"] = law.curve.name
     values |= files
     values["plant.rate"] = float(f"{1.0 / record.period:.9g}")
-    values["plant.force_delay"] = max(findings.chosen.delay, 0.0)
+    values["plant.force_delay"] = max(model.chosen.delay, 0.0)
     values["plant.initial.position"] = float(record.position[0])
-    if findings.chosen.has_spring:
-        if LAG in findings.fitted:
-            values[f"plant.{LAG}"] = findings.fitted[LAG].value
+    if model.chosen.has_spring:
+        if LAG in model.fitted:
+            values[f"plant.{LAG}"] = model.fitted[LAG].value
         values |= {"washout_controller.linear_gain": 0.0, "washout_controller.start_after": 0.0}
         return load_scenario(_BASE).changed(values)
     values["plant.duration"] = 10.0

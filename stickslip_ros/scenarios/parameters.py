@@ -355,14 +355,12 @@ class ControllerParameters(NodeParameters):
 
     @override
     def replaced(self, values: Mapping[str, Any]) -> Self:
-        groups = {
-            name: value for name, value in values.items() if name in self.__dataclass_fields__
-        }
-        constants = {name: value for name, value in values.items() if name not in groups}
+        parts = {name: value for name, value in values.items() if name in self.__dataclass_fields__}
+        constants = {name: value for name, value in values.items() if name not in parts}
         constants.pop("law", None)
         law = self.control_law
         made = CONTROLLERS.made(lambda: replace(law, **constants), type(law))
-        return replace(self, **groups, control_law=made)
+        return replace(self, **parts, control_law=made)
 
     @override
     def not_used(self) -> Iterator[tuple[str, str]]:

@@ -42,12 +42,10 @@ def entries(text: str, source: str) -> Iterator[Entry]:
     """
     parsed = yaml.parse(text.encode(errors="surrogatepass"), _LOADER)
     # Documents and their ends do not matter, as in ROS.
-    events = (
-        event for event in parsed if isinstance(event, yaml.NodeEvent | yaml.CollectionEndEvent)
-    )
+    events = (e for e in parsed if isinstance(e, yaml.NodeEvent | yaml.CollectionEndEvent))
     try:
-        for event in events:
-            yield from _entries(events, event, ())
+        for e in events:
+            yield from _entries(events, e, ())
     except RecursionError:
         raise InvalidInputError(f"{source} cannot be read: it is nested too deeply") from None
     except yaml.MarkedYAMLError as error:

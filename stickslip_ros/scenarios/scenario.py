@@ -250,14 +250,12 @@ class Scenario:
 
     def with_force_limit(self) -> Self:
         """Return the scenario with the force limit of another controller, unless it has its own."""
-        limit = f"{self.controller.node}.force_limit"
+        ours = f"{self.controller.node}.force_limit"
         for other in self.other_controllers.values():
             name = f"{other.node}.force_limit"
-            if name in self.sources and limit not in self.sources:
-                sources = {**self.sources, limit: self.sources[name]}
-                return replace(
-                    self.changed({limit: other.control_law.force_limit}), sources=sources
-                )
+            if name in self.sources and ours not in self.sources:
+                sources = {**self.sources, ours: self.sources[name]}
+                return replace(self.changed({ours: other.control_law.force_limit}), sources=sources)
         return self
 
     def _changed(self, values: Mapping[str, Any], sources: Mapping[str, str]) -> Self:

@@ -85,9 +85,7 @@ def map_figure(
     for sign, law in ((1.0, laws[0]), (-1.0, laws[-1])):
         size = float(np.max(sign * velocity, initial=0.0))
         speed = np.linspace(0.0, size, _CURVE_POINTS) if size else np.empty(0)
-        driving = -np.array(
-            [law.coefficient(sign * slip_speed, sign) for slip_speed in speed.tolist()]
-        )
+        driving = -np.array([law.coefficient(sign * w, sign) for w in speed.tolist()])
         named = f"law {law.name}" if sign > 0.0 else None
         axes.plot(sign * speed / scale, driving / force_scale, color=ORANGE, label=named)
     axes.set_xlabel(label)

@@ -57,10 +57,7 @@ def identification_tables(
 
 def constants_table(title: str, constants: Mapping[str, Estimate], units: Units = SI) -> TextTable:
     """Return the table of constants by parameter, such as `plant.mass`, with intervals."""
-    known = {
-        f"plant.{parameter.name}": parameter.unit or ""
-        for parameter in PlantParameters().known.values()
-    }
+    known = {f"plant.{p.name}": p.unit or "" for p in PlantParameters().known.values()}
     rows = [
         [
             name,

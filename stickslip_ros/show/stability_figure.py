@@ -87,7 +87,7 @@ def scenario_stability_figure(scenario: Scenario, *, style: FigureStyle = SCREEN
 
 @styled
 def stability_figure(
-    stability: StabilityMap,
+    chart: StabilityMap,
     critical: CriticalGainCurves | None,
     *,
     title: str = "",
@@ -95,13 +95,13 @@ def stability_figure(
 ) -> Figure:
     """Return the figure of the map and, if given, of the critical gains over the delay."""
     figure = style.figure(*((6.4, 5.8) if critical is None else (12.0, 5.6)), narrow=2.0)
-    _set_title(figure, title, stability, style)
+    _set_title(figure, title, chart, style)
     count = 1 if critical is None else 2
     shape = (count, 1) if style.narrow else (1, count)
     panels = figure.subplots(*shape, squeeze=False).ravel()
-    handles = _draw_map(figure, panels[0], stability)
+    handles = _draw_map(figure, panels[0], chart)
     if critical is not None:
-        _draw_critical_gains(panels[1], critical, stability)
+        _draw_critical_gains(panels[1], critical, chart)
     style.legend_below(figure, handles, most=4)
     finish(figure)
     return figure
@@ -142,12 +142,12 @@ _PROPOSED = (
 def _set_title(
     figure: Figure,
     title: str,
-    stability: StabilityMap,
+    chart: StabilityMap,
     style: FigureStyle,
     which: str = "",
 ) -> None:
     """Set the title with the loop of a map; `which` of several it is."""
-    loop = stability.loop
+    loop = chart.loop
     units = Units.for_drive(loop.drive)
     belt, rate = units.text(loop.drive.belt_speed, "m/s"), units.text(loop.rate, "Hz")
     late = units.text(loop.force_delay, "s")
@@ -156,14 +156,10 @@ def _set_title(
     style.set_title(figure, *([title] if title else []), values)
 
 
-def _draw_map(figure: Figure, axes: Axes, stability: StabilityMap) -> list[Artist]:
+def _draw_map(figure: Figure, axes: Axes, chart: StabilityMap) -> list[Artist]:
     """Draw the decay rates; return the entries of the legend."""
-    corners, gains, rates = (
-        stability.corner_frequencies,
-        stability.linear_gains,
-        stability.decay_rates.T,
-    )
-    units = Units.for_drive(stability.loop.drive)
+    corners, gains, rates = chart.corner_frequencies, chart.linear_gains, chart.decay_rates.T
+    units = Units.for_drive(chart.loop.drive)
     axes.grid(visible=False)
     axes.set_facecolor(_UNSTABLE)
     fastest = float(rates.max())
@@ -172,8 +168,8 @@ def _draw_map(figure: Figure, axes: Axes, stability: StabilityMap) -> list[Artis
         filled = axes.contourf(corners, gains, rates, levels=levels, cmap="viridis")
         figure.colorbar(filled, ax=axes, label=units.label("decay rate", "1/s"), ticks=levels)
         axes.contour(corners, gains, rates, levels=[0.0], colors=[ORANGE], linewidths=2.0)
-    axes.plot(corners, stability.continuous, **_CONTINUOUS)
-    axes.plot(stability.gains.corner_frequency, stability.gains.linear_gain, **_GAINS, ms=14)
+    axes.plot(corners, chart.continuous, **_CONTINUOUS)
+    axes.plot(chart.gains.corner_frequency, chart.gains.linear_gain, **_GAINS, ms=14)
     axes.axhline(0.0, color=GREY, lw=0.8)
     axes.set_xscale("log")
     axes.set_xlim(corners[0], corners[-1])
@@ -181,7 +177,7 @@ def _draw_map(figure: Figure, axes: Axes, stability: StabilityMap) -> list[Artis
     axes.set_xlabel(units.label(units.named("cutoff frequency"), "rad/s"))
     axes.set_ylabel(units.label(units.named("linear gain"), "N s/m"))
     for stable, name in ((rates > 0.0, "stable"), (rates < 0.0, "unstable")):
-        place = _roomiest(stable, stability)
+        place = _roomiest(stable, chart)
         if place is not None:
             colour, stroke = ("white", "black") if name == "stable" else (INK, "white")
             axes.text(
@@ -196,19 +192,17 @@ def _draw_map(figure: Figure, axes: Axes, stability: StabilityMap) -> list[Artis
     ]
 
 
-def _roomiest(shown: BoolArray, stability: StabilityMap) -> tuple[float, float] | None:
+def _roomiest(shown: BoolArray, chart: StabilityMap) -> tuple[float, float] | None:
     """Return the middle of the most room among the cells that are shown; None if there is little.
 
     The gains, and the edges of the map, are in the way of a text there.
     """
     from scipy.ndimage import distance_transform_edt  # importing it takes long
 
-    columns, rows = len(stability.corner_frequencies), len(stability.linear_gains)
+    columns, rows = len(chart.corner_frequencies), len(chart.linear_gains)
     free = shown.copy()
-    column = int(
-        np.abs(np.log(stability.corner_frequencies / stability.gains.corner_frequency)).argmin()
-    )
-    row = int(np.abs(stability.linear_gains - stability.gains.linear_gain).argmin())
+    column = int(np.abs(np.log(chart.corner_frequencies / chart.gains.corner_frequency)).argmin())
+    row = int(np.abs(chart.linear_gains - chart.gains.linear_gain).argmin())
     width, height = columns // 12, rows // 16
     free[max(row - height, 0) : row + height + 1, max(column - width, 0) : column + width + 1] = 0
     # A text is three times as wide as high.
@@ -217,8 +211,8 @@ def _roomiest(shown: BoolArray, stability: StabilityMap) -> tuple[float, float] 
     if distances[best] < columns / 9.0:
         return None
     return (
-        float(stability.corner_frequencies[int(best[1]) - 1]),
-        float(stability.linear_gains[int(best[0]) - 1]),
+        float(chart.corner_frequencies[int(best[1]) - 1]),
+        float(chart.linear_gains[int(best[0]) - 1]),
     )
 
 
@@ -263,8 +257,8 @@ def _draw_forces(
     return [Line2D([], [], **_FORCE, label=f"force limit {shown}"), hatched]
 
 
-def _draw_critical_gains(axes: Axes, critical: CriticalGainCurves, stability: StabilityMap) -> None:
-    units = Units.for_drive(stability.loop.drive)
+def _draw_critical_gains(axes: Axes, critical: CriticalGainCurves, chart: StabilityMap) -> None:
+    units = Units.for_drive(chart.loop.drive)
     late, label = units.axis("force delay", "s", critical.force_delays)
     axes.set_xlabel(label)
     for index, (rate, gains) in enumerate(zip(critical.rates, critical.linear_gains, strict=True)):
@@ -273,22 +267,22 @@ def _draw_critical_gains(axes: Axes, critical: CriticalGainCurves, stability: St
         jumps = np.flatnonzero(gains[:-1] * gains[1:] < 0.0) + 1
         delays = np.insert(critical.force_delays, jumps, np.nan)
         label = units.text(float(rate), "Hz")
-        width, label = (2.8, f"{label}, this loop") if rate == stability.loop.rate else (1.2, label)
+        width, label = (2.8, f"{label}, this loop") if rate == chart.loop.rate else (1.2, label)
         axes.plot(delays / late, np.insert(gains, jumps, np.nan), **look, lw=width, label=label)
     axes.axhline(0.0, color=GREY, lw=0.8)
     axes.plot(
-        stability.loop.force_delay / late,
-        stability.gains.linear_gain,
+        chart.loop.force_delay / late,
+        chart.gains.linear_gain,
         **_GAINS,
         ms=14,
         clip_on=False,
     )
     axes.set_ylabel(units.label(units.named("critical linear gain"), "N s/m"))
-    corner = stability.gains.corner_frequency
+    corner = chart.gains.corner_frequency
     axes.set_title(f"cutoff frequency {corner:.3g}{'' if units.dimensionless else ' rad/s'}")
     axes.margins(x=0.04)
     limits = axes.get_ylim()
-    for row in np.flatnonzero(critical.rates == stability.loop.rate).tolist():
+    for row in np.flatnonzero(critical.rates == chart.loop.rate).tolist():
         ends, line = (critical.linear_gains[row], critical.other_ends[row]), axes.lines[row]
         axes.fill_between(critical.force_delays / late, *ends, color=line.get_color(), alpha=0.2)
         axes.collections[-1].set_label("stable, this loop")
@@ -311,9 +305,7 @@ def branches_figure(
     axes = figure.subplots()
     units = Units.for_drive(diagram.drive)
     branches = [*diagram.equilibria, *diagram.cycles]
-    every = [
-        displacement for branch in branches for displacement in (branch.least, branch.greatest)
-    ]
+    every = [edge for branch in branches for edge in (branch.least, branch.greatest)]
     length, y_label = units.axis(units.named("displacement"), "m", *every)
     speed, x_label = units.axis(units.named("belt speed"), "m/s", diagram.belt_speeds)
     looks: dict[str, dict[str, Any]] = {}

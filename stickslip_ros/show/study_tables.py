@@ -48,9 +48,7 @@ def sweep_table(study: Study, columns: Columns) -> TextTable:
             headings = ["regime", plan.parameters[0], "points", "amplitude", "stick fraction"]
             return TextTable(title, headings, rows)
     counts = Counter(_direction_and_regime(point, plan) for point in columns.points())
-    return TextTable(
-        title, ["regime", "points"], [[regime, str(n)] for regime, n in counts.items()]
-    )
+    return TextTable(title, ["regime", "points"], [[name, str(n)] for name, n in counts.items()])
 
 
 def units_of(study: Study) -> Units:
@@ -126,14 +124,12 @@ def one_below_another(
     return TextTable(title, ["", ""], rows)
 
 
-def stability_tables(
-    scenario: Scenario, sections: Section, notes: Notes
-) -> Iterator[TextTable | str]:
+def stability_tables(scenario: Scenario, parts: Section, notes: Notes) -> Iterator[TextTable | str]:
     """Yield the tables of what `stability` has found, and its notes."""
     units = Units.for_drive(scenario.plant.as_drive())
     rows: list[list[str]] = []
     for section, quantities in THEORY.items():
-        values = sections[section]
+        values = parts[section]
         rows.append([section.replace("_", " "), ""])
         for name, (label, unit, _) in quantities.items():
             value = values[name]
@@ -146,7 +142,7 @@ def stability_tables(
             rows.append([f"  {label}", shown])
     yield TextTable(f"{scenario.name}, by theory", ["", ""], rows)
     for loop in ("open_loop", "closed_loop"):
-        cycles: list[Section] = sections[loop]["limit_cycles"]
+        cycles: list[Section] = parts[loop]["limit_cycles"]
         if cycles:
             columns = {
                 f"{number}, {'stable' if cycle['stable'] else 'unstable'}": {

@@ -116,16 +116,14 @@ class Comparison(PointStudy[Cases]):
         """
         plan, case = self.plan, self.plan.case(number)
         law = [*plan.laws][case.law]
-        scenario = with_law(self.scenario, law, plan.laws[law])
+        varied = with_law(self.scenario, law, plan.laws[law])
         values: dict[str, Any] = {"plant.sensor.seed": case.seed}
         values["plant.force_jitter_seed"] = case.seed
         values |= plan.disturbances[case.disturbance].parameters(plan.duration)
         if plan.grid is not None:
             values |= zip(plan.parameters, plan.grid.values(case.point), strict=True)
-        scenario = scenario.changed(values)
-        return (
-            scenario.changed(drawn(scenario, case.seed, plan.spread)) if plan.spread else scenario
-        )
+        varied = varied.changed(values)
+        return varied.changed(drawn(varied, case.seed, plan.spread)) if plan.spread else varied
 
     @override
     def compute_point(

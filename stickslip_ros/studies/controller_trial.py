@@ -147,21 +147,17 @@ class Bench:
         motion = RecordedMotion(drive, release_position(drive), drive.belt_speed)
         # On a slow belt a cycle is mostly the time in which the belt loads the spring.
         loading = loading_time(drive)
-        vibration, before = _measured(motion, loading), inf
+        cycle, before = _measured(motion, loading), inf
         for _ in range(6):
-            amplitude = vibration.velocity_amplitude
-            if (
-                vibration.period is None
-                or amplitude is None
-                or abs(amplitude / before - 1.0) < 1e-4
-            ):
+            amplitude = cycle.velocity_amplitude
+            if cycle.period is None or amplitude is None or abs(amplitude / before - 1.0) < 1e-4:
                 break
             motion.advance(300 * drive.natural_period)
-            vibration, before = _measured(motion, loading), amplitude
-        if vibration.period is None:
-            return Vibration(drive, self.rate, vibration.regime, None, np.empty(0), np.empty(0))
+            cycle, before = _measured(motion, loading), amplitude
+        if cycle.period is None:
+            return Vibration(drive, self.rate, cycle.regime, None, np.empty(0), np.empty(0))
         # The fewest cycles that last nearly a whole number of samples, or else the nearest of all.
-        lengths = np.arange(1, 13) * (vibration.period * self.rate)
+        lengths = np.arange(1, 13) * (cycle.period * self.rate)
         counts = np.maximum(np.rint(lengths), 1.0)
         misses = np.abs(counts / lengths - 1.0)
         states: list[tuple[float, float]] = []
@@ -169,7 +165,7 @@ class Bench:
             states.append((motion.position, motion.velocity))
             motion.advance(1.0 / self.rate)
         position, velocity = np.array(states).T
-        return Vibration(drive, self.rate, vibration.regime, vibration.period, position, velocity)
+        return Vibration(drive, self.rate, cycle.regime, cycle.period, position, velocity)
 
     def catch(self, vibration: Vibration, law: Washout, patience: float) -> Outcome:
         """Return the worst outcome of control, its filter settled, that catches a vibration.

@@ -50,9 +50,7 @@ class MotionState:
     def from_json(cls, values: Sequence[Any]) -> Self:
         """Return the state of the values of a tuple that went through JSON."""
         position, velocity, *parts = values
-        return cls(
-            position, velocity, *(None if state is None else tuple(state) for state in parts)
-        )
+        return cls(position, velocity, *(None if item is None else tuple(item) for item in parts))
 
 
 @dataclass(frozen=True)

@@ -420,9 +420,7 @@ def hopf_ratio(drive: Drive) -> float | None:
     speed = abs(drive.belt_speed)
     if not speeds or speed == 0.0:
         return None
-    return min(
-        (speed / hopf_speed for hopf_speed in speeds), key=lambda ratio: max(ratio, 1.0 / ratio)
-    )
+    return min((speed / hopf for hopf in speeds), key=lambda ratio: max(ratio, 1.0 / ratio))
 
 
 def hopf_distance(drive: Drive) -> str:

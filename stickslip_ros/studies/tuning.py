@@ -153,24 +153,22 @@ class _Rule:
         """Return what the loops of these plants say of a stable law."""
         feedback = linear_part(law, plants[0].loop)
         responses = tuple(LoopResponse(plant, feedback) for plant in plants)
-        steps = [response.step_response() for response in responses]
-        noise = max(response.noise_force(*self.noises) for response in responses)
+        steps = [loop.step_response() for loop in responses]
+        noise = max(loop.noise_force(*self.noises) for loop in responses)
         peak = max(
             self.goal.disturbance * float(np.abs(step).max()) + self.friction * share
-            for step, share in zip(
-                steps, (self.carried(response) for response in responses), strict=True
-            )
+            for step, share in zip(steps, (self.carried(loop) for loop in responses), strict=True)
         )
-        below, above = zip(*(response.gain_margins for response in responses), strict=True)
+        below, above = zip(*(loop.gain_margins for loop in responses), strict=True)
         return Tuned(
             law,
             self.goal,
             min(plant.loop.decay_rate(feedback) for plant in plants),
-            _least(response.delay_margin for response in responses),
-            _least(response.phase_margin for response in responses),
+            _least(loop.delay_margin for loop in responses),
+            _least(loop.phase_margin for loop in responses),
             max((factor for factor in below if factor is not None), default=None),
             _least(above),
-            max(response.sensitivity_peak for response in responses),
+            max(loop.sensitivity_peak for loop in responses),
             peak + 4.0 * noise,
             noise,
             None,
