@@ -4,6 +4,7 @@ A test that takes a fixture which starts a process is marked `process` by that; 
 process in another way has to say so, and fails where it does not.
 """
 
+import gc
 import os
 import signal
 import sys
@@ -66,6 +67,11 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker("process")
         if function_of(item.nodeid) in listed():
             item.add_marker("slow")
+
+
+def pytest_collection_finish() -> None:
+    """Leave what is imported out of all collections of garbage: it takes a part of their time."""
+    gc.freeze()
 
 
 def dealt(items: list[pytest.Item], workers: int) -> list[pytest.Item]:

@@ -46,9 +46,8 @@ def numbers(found: Any, name: str = "") -> dict[str, Any]:
 
 @pytest.mark.parametrize("answer", ANSWERS.values(), ids=ANSWERS)
 def test_answers_agree(answer: Callable[[ss.Scenario, ss.Scenario], Any]) -> None:
-    usual, *others = (numbers(answer(*with_share(n)).to_dict()) for n in (1000.0, 1e-3, 1e6))
-    for found in others:
-        assert found.keys() == usual.keys()
-        for name, value in usual.items():
-            near = pytest.approx(value, rel=1e-6, abs=1e-9) if isinstance(value, float) else value
-            assert found[name] == near, name
+    usual, other = (numbers(answer(*with_share(n)).to_dict()) for n in (1000.0, 1e-3))
+    assert other.keys() == usual.keys()
+    for name, value in usual.items():
+        near = pytest.approx(value, rel=1e-6, abs=1e-9) if isinstance(value, float) else value
+        assert other[name] == near, name

@@ -23,7 +23,7 @@ DIFFERENCE = {"sensor_velocity": "difference", "sensor_difference_samples": 3}
          ("x", "y", "actuator.force", "control.1", "force.1", "force.2", "force.3")),
         ("feed_drive", DIFFERENCE,
          ("x", "y", "control.1", "earlier_x.1", "earlier_x.2", "earlier_x.3")),
-        ("feed_drive", {"friction_law": "lugre"}, ("x", "y", "friction.z", "control.1")),
+        ("feed_drive", {"friction_law": "dahl"}, ("x", "y", "friction.z", "control.1")),
     ],
 )  # fmt: skip
 def test_the_linear_loops_are_systems_with_the_poles_that_are_reported(

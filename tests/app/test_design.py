@@ -77,10 +77,14 @@ def test_without_vibration_nothing_is_simulated(stickslip: Run) -> None:
 
 def test_no_proposal_is_a_result_with_a_reason(stickslip: Run, tmp_path: Path) -> None:
     limit = ("-p", "washout_controller.force_limit=5", "--belt-speed", "0.04")
-    done = stickslip("design", "feed_drive", *limit, "--out", "gains.yaml", "--plot", "map.png")
+    files = ("--out", "gains.yaml", "--plot", "map.png", "--html", "page.html")
+    done = stickslip("design", "feed_drive", *limit, *files)
     assert done.returncode == 0, done.stderr
     assert "force limit of 5 N is too small" in done.stdout
-    assert list(tmp_path.iterdir()) == []
+    (page,) = tmp_path.iterdir()
+    shown = page.read_text(encoding="utf-8")
+    assert "There is none: there is nothing to propose" in shown
+    assert "<svg" not in shown
     lines = [line for line in done.stderr.splitlines() if "nothing to propose" in line]
     options = "--plot map.png: not drawn", "--out gains.yaml: not written"
     for line, option in zip(lines, options, strict=True):

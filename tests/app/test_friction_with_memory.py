@@ -25,7 +25,7 @@ def options(law: str, **others: float) -> list[str]:
 
 @pytest.mark.parametrize(
     "law",
-    [pytest.param(law, marks=[pytest.mark.long] * (law != "elasto_plastic")) for law in LAWS],
+    [pytest.param(law, marks=[pytest.mark.long] * (law != "dahl")) for law in LAWS],
 )
 def test_a_law_is_simulated_and_its_stability_computed(stickslip: Run, law: str) -> None:
     given = ["feed_drive", *options(law), "--no-control"]

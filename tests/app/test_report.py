@@ -47,7 +47,7 @@ def test_late_forces_are_shown_where_they_are_counted(stickslip: Run, tmp_path: 
     counts = {"samples": "1000", "late_forces": "617", "missed_deadlines": "0"}
     record(tmp_path / "late", tables={"stickslip_ros/timing": counts})
     record(tmp_path / "old")
-    late, old = (stickslip("report", bag, "--plot", "run.svg").stdout for bag in ("late", "old"))
+    late, old = (stickslip("report", bag).stdout for bag in ("late", "old"))
     rows = dict(line.split("  ", 1) for line in late.splitlines() if "  " in line)
     assert rows["regime"].endswith(", doubtful: late forces")
     assert (rows["late forces"].strip(), rows["missed deadlines"].strip()) == ("617", "0")
@@ -103,14 +103,14 @@ def test_a_bag_whose_law_is_gone_is_reported_as_one_of_a_law_with_a_memory(
     stickslip: Run, tmp_path: Path
 ) -> None:
     printed: list[str] = []
-    for law in ("rate_state", "lugre"):
+    for law, page in (("rate_state", ("--plot", "run.svg", "--html", "run.html")), ("lugre", ())):
         plant = {"friction.law": f'"{law}"', "mass": "1.0", "stiffness": "10.0", "rate": "100.0"}
         record(tmp_path / law, tables={"stickslip_ros/plant": plant})
-        done = stickslip("report", law, "--plot", f"{law}.svg", "--html", f"{law}.html")
+        done = stickslip("report", law, *page)
         assert done.returncode == 0, done.stderr
         printed.append(done.stdout.partition("\n")[2])
     assert printed[0] == printed[1]
-    assert "rate_state" in (tmp_path / "rate_state.html").read_text(encoding="utf-8")
+    assert "rate_state" in (tmp_path / "run.html").read_text(encoding="utf-8")
 
 
 class Refused(WithoutArguments):

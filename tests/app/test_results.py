@@ -1,6 +1,5 @@
 """What a command prints, writes and draws is one result, the same as in Python."""
 
-import json
 import re
 from collections.abc import Callable
 from html.parser import HTMLParser
@@ -15,15 +14,15 @@ from stickslip_ros.api.results import Result
 from stickslip_ros.errors import RunError
 from stickslip_ros.scenarios.files import load_scenario
 from tests.app.conftest import REFERENCE, Run
+from tests.docs.test_json import differences
 
 LOG = "log.csv"
 
 
-def log(folder: Path) -> str:
-    """Write a table of a drive without control, and return its path."""
+def log(folder: Path) -> None:
+    """Write a table of a drive without control."""
     drive = ss.scenario("feed_drive", expects_control=False, belt_speed=0.02)
-    ss.simulate(drive, duration=1.0).to_pandas().to_csv(folder / LOG)
-    return str(folder / LOG)
+    ss.simulate(drive, duration=0.6).to_pandas().to_csv(folder / LOG)
 
 
 FREE = ("paper", "--no-control")
@@ -38,28 +37,41 @@ LAWS = ["washout", "velocity_feedback"]
 DISTURBED: dict[str, Any] = {"disturbances": "step", "seeds": 2, "spread": 0.1}
 NOISY = "plant.sensor.position_noise=1e-6"
 
-CASES: dict[str, tuple[tuple[str, ...], Callable[[str], Result]]] = {
+CASES: dict[str, tuple[tuple[str, ...], Callable[[], Result], str]] = {
     "simulate": (
         ("feed_drive", "--duration", "1"),
-        lambda _: ss.simulate("feed_drive", duration=1.0),
+        lambda: ss.simulate("feed_drive", duration=1.0),
+        "434.1 µm",
     ),
     "simulate, with a sensor": (
         ("feed_drive", "-p", NOISY, "--duration", "1"),
-        lambda _: ss.simulate(ss.scenario("feed_drive", NOISY), duration=1.0),
+        lambda: ss.simulate(ss.scenario("feed_drive", NOISY), duration=1.0),
+        "stick-slip",
     ),
     "sweep": (
         (*FREE, "--over", "plant.belt_speed=0.3:0.5:3", "--carry", "both"),
-        lambda _: ss.sweep(free(), belt_speed=(0.3, 0.5, 3), carry="both"),
+        lambda: ss.sweep(free(), belt_speed=(0.3, 0.5, 3), carry="both"),
+        "stick-slip at",
     ),
-    "basin": ((*FREE, "--sample", "3"), lambda _: ss.basin(free(), sample=3)),
-    "stability": (("feed_drive",), lambda _: ss.stability("feed_drive")),
+    "basin": (
+        (*FREE, "--sample", "3"),
+        lambda: ss.basin(free(), sample=3),
+        "stick-slip 100.0%",
+    ),
+    "stability": (
+        ("feed_drive",),
+        lambda: ss.stability("feed_drive"),
+        "without control: unstable; sampled loop: stable",
+    ),
     "design": (
         ("feed_drive", "--belt-speed", "0.04"),
-        lambda _: ss.design("feed_drive", belt_speed=0.04),
+        lambda: ss.design("feed_drive", belt_speed=0.04),
+        "linear gain",
     ),
     "identify": (
-        (LOG, "--law", "stribeck", *(f"--fix={n}={v}" for n, v in KNOWN.items()), "--check", LOG),
-        lambda log: ss.identify(log, law="stribeck", fixed=KNOWN, check=[log]),
+        (LOG, "--law", "coulomb", *(f"--fix={n}={v}" for n, v in KNOWN.items()), "--check", LOG),
+        lambda: ss.identify(LOG, law="coulomb", fixed=KNOWN, check=[LOG]),
+        "95 % interval",
     ),
     "compare": (
         (
@@ -67,31 +79,46 @@ CASES: dict[str, tuple[tuple[str, ...], Callable[[str], Result]]] = {
             *("--controllers", ",".join(LAWS), "--given", "washout", "--duration", "0.6"),
             *("--disturbances", "step", "--seeds", "2", "--spread", "0.1"),
         ),
-        lambda _: ss.compare("feed_drive", LAWS, given="washout", duration=0.6, **DISTURBED),
+        lambda: ss.compare("feed_drive", LAWS, given="washout", duration=0.6, **DISTURBED),
+        "Comparison of control laws",
     ),
-    "report": ((REFERENCE,), lambda _: ss.read_bag(REFERENCE)),
+    "report": ((REFERENCE,), lambda: ss.read_bag(REFERENCE), "decaying"),
     "report, of two": (
         (REFERENCE, LOG),
-        lambda log: Comparison((ss.read_bag(REFERENCE), ss.read_table(log))),
+        lambda: Comparison((ss.read_bag(REFERENCE), ss.read_table(LOG))),
+        f"{REFERENCE}: stick-slip, not steady: decaying",
     ),
 }
-"""The arguments of commands, and the same results from Python, with a table if they need one."""
+"""The arguments of commands, the same results from Python, and what they say, of a table too."""
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_a_command_prints_what_python_returns(
+def test_a_command_prints_and_a_page_shows_what_python_returns(
     name: str, stickslip: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    arguments, made = CASES[name]
+    """And the schema of docs describes it."""
+    arguments, made, verdict = CASES[name]
     if LOG in arguments:
         log(tmp_path)
     command = name.partition(",")[0]
     monkeypatch.chdir(tmp_path)
-    result = made(LOG)
-    printed = stickslip(command, *arguments, "--json").stdout
-    assert json.loads(printed) == result.to_dict()
+    result = made()
+    printed = stickslip.json(command, *arguments)
+    assert printed == result.to_dict()
+    schema = "report_of_several_bags" if name == "report, of two" else command
+    assert differences(schema, printed) == []
     text = stickslip(command, *arguments).stdout
     assert all(line in text for line in repr(result).splitlines())
+
+    def draw(*_: Any, **__: Any) -> Any:
+        raise RunError("it takes too long")
+
+    monkeypatch.setattr(type(result), "draw", draw)
+    result.to_html(tmp_path / "page.html")
+    found = Page(tmp_path / "page.html")
+    assert verdict in found.text
+    assert "There is none: it takes too long" in found.text
+    assert "table" in found.tags
 
 
 class Page(HTMLParser):
@@ -124,63 +151,19 @@ class Page(HTMLParser):
         ]
 
 
-def page(stickslip: Run, folder: Path, *arguments: str) -> Page:
-    done = stickslip(*arguments, "--html", str(folder / "page.html"))
-    assert done.returncode == 0, done.stderr
-    return Page(folder / "page.html")
-
-
 def test_a_page_is_one_file_whose_identifiers_are_its_own(stickslip: Run, tmp_path: Path) -> None:
-    found = page(stickslip, tmp_path, "simulate", "feed_drive", "--duration", "1")
+    """The name of a scenario is text in it."""
+    name = "<script>alert(1)<"
+    stickslip("new", "drive.yaml", "--from", "feed_drive")
+    (tmp_path / "drive.yaml").rename(tmp_path / f"{name}.yaml")
+    done = stickslip("simulate", f"{name}.yaml", "--duration", "1", "--html", "page.html")
+    assert done.returncode == 0, done.stderr
+    found = Page(tmp_path / "page.html")
     assert found.tags.count("svg") == 2
     assert not {"script", "link", "iframe", "object"} & {*found.tags}
     assert len({*found.identifiers}) == len(found.identifiers) > 10
     inside = {f"#{each}" for each in found.identifiers}
     assert {each for each in found.references if not each.startswith("data:")} <= inside
-    for text in ("stick-slip", "434.1 µm", "friction.static", "N s/m", "heyoka"):
+    for text in (name, "stick-slip", "434.1 µm", "friction.static", "N s/m", "heyoka"):
         assert text in found.text
     assert "friction.kinetic" not in found.text  # of another law
-
-
-def test_a_name_is_text(stickslip: Run, tmp_path: Path) -> None:
-    name = "<script>alert(1)<"
-    stickslip("new", "drive.yaml", "--from", "feed_drive")
-    (tmp_path / "drive.yaml").rename(tmp_path / f"{name}.yaml")
-    found = page(stickslip, tmp_path, "simulate", f"{name}.yaml", "--duration", "1")
-    assert "script" not in found.tags
-    assert name in found.text
-
-
-@pytest.mark.parametrize(
-    ("name", "verdict"),
-    [
-        ("design", "linear gain"),
-        ("identify", "95 % interval"),
-        ("compare", "Comparison of control laws"),
-        ("basin", "stick-slip 100.0%"),
-        ("stability", "without control: unstable; sampled loop: stable"),
-        ("sweep", "stick-slip at"),
-        ("report", "decaying"),
-        ("report, of two", f"{REFERENCE}: stick-slip, not steady: decaying"),
-    ],
-)
-def test_python_writes_a_page_of_any_result(
-    name: str, verdict: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def draw(*_: Any, **__: Any) -> Any:
-        raise RunError("it takes too long")
-
-    result = CASES[name][1](log(tmp_path))
-    monkeypatch.setattr(type(result), "draw", draw)
-    result.to_html(tmp_path / "page.html")
-    found = Page(tmp_path / "page.html")
-    assert verdict in found.text
-    assert "There is none: it takes too long" in found.text
-    assert "table" in found.tags
-
-
-def test_without_a_figure_a_page_says_why(stickslip: Run, tmp_path: Path) -> None:
-    limit = ("-p", "washout_controller.force_limit=1")
-    found = page(stickslip, tmp_path, "design", "feed_drive", *limit)
-    assert "There is none: there is nothing to propose" in found.text
-    assert "svg" not in found.tags

@@ -54,28 +54,20 @@ SHORT = ("--transient", "20", "--cycles", "3")
 BELT = ("--over", "plant.belt_speed=0.3:0.6:3")
 GRID = ("--position=-1:1:2", "--velocity=-1:1:2")
 RIG = ("feed_drive", "--belt-speed")
-KNOWN = ("--fix", "plant.mass=100", "--fix", "plant.damping=200")
 ENCODER = ("-p", "plant.sensor.position_resolution=1e-6")
-CALLS = [
+CALLS = [  # tests/app/test_results.py has others
     ("simulate", ("simulate", "paper", "--duration", "30")),
     ("simulate", ("simulate", "paper", "--duration", "0.1", "--no-control")),
     ("simulate", ("simulate", "feed_drive", "--duration", "1", *ENCODER)),
-    ("report", ("report", REFERENCE)),
-    ("report_of_several_bags", ("report", REFERENCE, f"{REFERENCE}/reference_0.mcap")),
     ("sweep", ("sweep", "paper", "--no-control", *BELT, *SHORT)),
-    ("sweep", ("sweep", "paper", "--no-control", *BELT, *SHORT, "--carry", "both")),
     ("sweep", ("sweep", "paper", "--no-control", *BELT, "--over", "plant.mass=1:2:2", *SHORT)),
     ("basin", ("basin", "paper", "--no-control", *GRID, *SHORT)),
-    ("basin", ("basin", "paper", "--no-control", "--sample", "3", *SHORT)),
-    ("stability", ("stability", "paper")),
     ("stability", ("stability", "feed_drive", "-p", "plant.friction.law=coulomb")),
     ("stability", ("stability", "paper", "-p", "plant.belt_speed=0")),
     ("design", ("design", *RIG, "0.06")),
     ("design", ("design", *RIG, "0.02:0.04", "-p", "plant.force_delay=0.02")),
     pytest.param("design", ("design", *RIG, "0.03", *ENCODER), marks=pytest.mark.long),
     ("design_of_another_law", ("design", *RIG, "0.04", "--controller", "velocity_feedback")),
-    ("compare", ("compare", "feed_drive", "--controllers", "washout", "--duration", "0.3")),
-    ("identify", ("identify", REFERENCE, "--to", "0.6", "--law", "stribeck", *KNOWN)),
     ("repair", ("repair", REFERENCE, "sound")),
     ("list", ("list",)),
     ("show", ("show", "feed_drive", "-p", "plant.mass=2")),

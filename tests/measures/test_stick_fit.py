@@ -29,7 +29,7 @@ def around_a_stick(stick_time: float, drop: float = 0.0) -> tuple[np.ndarray, np
     return time, landing - leaving + BELT * time
 
 
-@examples(quick=10, thorough=25)
+@examples(quick=4, thorough=25)
 @given(
     st.floats(0.003, 0.04),
     st.floats(-0.002, 0.002),
@@ -73,7 +73,7 @@ def test_edges_on_a_steep_curve_are_found(scale: float) -> None:
 
 @pytest.mark.parametrize(
     ("stick_time", "seeds"),
-    [(0.010, 12), *(pytest.param(each, 40, marks=pytest.mark.long) for each in (0.003, 0.030))],
+    [(0.010, 8), *(pytest.param(each, 40, marks=pytest.mark.long) for each in (0.003, 0.030))],
 )
 def test_under_noise_the_stick_time_is_within_its_error(stick_time: float, seeds: int) -> None:
     """The errors, over their standard error, have a deviation near one.

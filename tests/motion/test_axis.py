@@ -135,7 +135,7 @@ STEP = 0.05  # s
 
 
 @pytest.mark.parametrize("belt_moves", [False, True])
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.long)])
 def test_random_axes_move_as_another_integrator_says(seed: int, belt_moves: bool) -> None:
     """Random masses, laws and held forces; with a belt and a load that swing too."""
     rng = np.random.default_rng([seed, belt_moves])

@@ -185,7 +185,7 @@ def test_a_plain_drive_moves_as_any_other(case: Case) -> None:
 
 @pytest.mark.parametrize("scales", [(100.0, 1e6, 1000.0), (0.5, 7e3, 2.0)])
 def test_units_do_not_matter(scales: tuple[float, float, float]) -> None:
-    for law, signals, control in product(LAWS, SIGNALS, (None, GAINS)):
+    for law, (signals, control) in zip(LAWS, product(SIGNALS, (None, GAINS)), strict=True):
         ends: list[tuple[float, ...]] = []
         for units in ((1.0, 1.0, 1.0), scales):
             drive = drive_of(law, 0.3, signals, scales=units)

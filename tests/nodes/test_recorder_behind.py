@@ -29,7 +29,9 @@ def counts_of_analyzer(bag: Path) -> tuple[str, str]:
     return stored["samples"], stored["lost_samples"]
 
 
-@pytest.mark.parametrize("samples", [DEEP, RECORDER_DEPTH + 2 * DEEP])
+@pytest.mark.parametrize(
+    "samples", [DEEP, pytest.param(RECORDER_DEPTH + 2 * DEEP, marks=pytest.mark.long)]
+)
 def test_what_waits_up_to_the_bound_is_recorded_and_beyond_it_is_counted(
     graph: Graph, tmp_path: Path, samples: int
 ) -> None:
