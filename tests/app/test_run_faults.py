@@ -123,8 +123,9 @@ IGNORED = signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
 @pytest.mark.parametrize(
     ("number", "flags"),
     [
-        (signal.SIGINT, IN_PROCESSES),
-        (signal.SIGHUP, COMPOSED),
+        (signal.SIGINT, COMPOSED),
+        pytest.param(signal.SIGHUP, COMPOSED, marks=pytest.mark.long),
+        pytest.param(signal.SIGINT, IN_PROCESSES, marks=pytest.mark.long),
         pytest.param(signal.SIGHUP, IN_PROCESSES, marks=pytest.mark.long),
     ],
 )

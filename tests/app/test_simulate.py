@@ -118,3 +118,14 @@ def test_defaults_are_reported_once(stickslip: Run, tmp_path: Path) -> None:
     assert json.loads(based.stdout)["scenario"]["plant"]["normal_force"] == 1000.0
     (line,) = stickslip(*call, "--no-control").stderr.splitlines()
     assert "washout_controller" not in line
+
+
+def test_a_law_that_is_not_passive_is_told(stickslip: Run) -> None:
+    lugre = {"law": "lugre", "bristle_stiffness": 1e5, "bristle_damping": 100.0}
+    lugre |= {"curve": "exponential", "decay_speed": 0.02, "kinetic": 0.25}
+    call = ("simulate", "feed_drive", "--duration", "0.1")
+    call += tuple(f"-p=plant.friction.{name}={value}" for name, value in lugre.items())
+    told = stickslip(*call)
+    assert "friction law lugre is not passive, and may supply energy" in told.stderr
+    assert "viscous = 0 s/m is 60 s/m below" in told.stderr
+    assert stickslip(*call, "-p=plant.friction.viscous=61").stderr == ""

@@ -131,11 +131,6 @@ def exists(test: str) -> bool:
     return (CHECKOUT / path).is_file() and name in functions(path)
 
 
-def test_a_test_that_does_not_exist_is_noticed() -> None:
-    assert not exists("tests/docs/test_nothing.py::test_make_has_the_targets_that_are_named")
-    assert not exists("tests/docs/test_named.py::test_nothing")
-
-
 def test_public_names_exist_once_and_have_docstrings() -> None:
     names = public_names()
     assert len(names) == len(set(names))

@@ -352,10 +352,10 @@ def test_a_measured_velocity_tells_more() -> None:
 
 @pytest.mark.long
 def test_laws_that_the_record_cannot_tell_apart_are_named() -> None:
-    found = identify([study.record("stribeck", "narrow", 1, 2.5)], fixed={"normal_force": 1000.0})
+    found = identify([study.record("stribeck", "narrow", 1, 1.2)], fixed={"normal_force": 1000.0})
     assert "predict held-out parts alike" in unidentified(found)["friction.law"]
     assert "run with relative speeds from rest" in unidentified(found)["friction.law"]
-    told = identify([study.record("stribeck", "taps", 1, 2.5)], fixed={"normal_force": 1000.0})
+    told = identify([study.record("stribeck", "taps", 1, 1.2)], fixed={"normal_force": 1000.0})
     assert told.law == "stribeck"
     assert "friction.law" not in unidentified(told)
 
@@ -419,14 +419,6 @@ def test_the_study_of_100_seeds() -> None:
         for name, each in case["constants"].items():
             assert 0.88 <= each["covered"] <= 1.0, (case["law"], case["kind"], name)
             assert abs(each["bias"]) < each["standard_error"], (case["law"], case["kind"], name)
-
-
-@pytest.mark.long
-def test_the_first_seed_of_the_study() -> None:
-    (case,) = study.study(1, workers=1, cases=[("exponential", "stick")])["cases"]
-    assert case["right"] == 1.0
-    for name, each in case["constants"].items():
-        assert abs(each["bias"]) < 3.0 * each["standard_error"], name
 
 
 @pytest.mark.long

@@ -310,7 +310,7 @@ def test_the_memory_is_bounded() -> None:
     """What is kept is a window of 131,072 rows of four numbers, in a table twice as long."""
     meter = SampleMeter(20, reading=NOISY)
     record, sizes = samples(noise=1e-6, count=8000), list[int]()
-    for repeat in range(40):
+    for repeat in range(35):
         meter.feed(replace(record, stamp=record.stamp + repeat * 8_000_000_000))
         sizes.append(len(pickle.dumps(meter)))
     assert max(sizes) < 2.1 * 131_072 * 4 * 8

@@ -23,9 +23,8 @@ from benchmarks.random_drives import (
 )
 from stickslip_ros.errors import RunError
 from stickslip_ros.model.drive import Drive
-from stickslip_ros.model.friction import LAWS as FRICTION_LAWS
 from stickslip_ros.model.friction import Coulomb, Exponential
-from stickslip_ros.model.signals import SIGNALS, Signal, ramp, sine, step, trapezoid
+from stickslip_ros.model.signals import Signal, ramp, sine, step, trapezoid
 from stickslip_ros.motion import Motion
 from stickslip_ros.motion.sampled_loop import SampledLoop
 from tests.drives import PAPER
@@ -138,12 +137,6 @@ def test_a_fast_belt_with_a_narrow_exponential() -> None:
     belt = RandomSignal("ramp", {"amplitude": 0.5, "start": 1.0, "duration": 6.0})
     drive = RandomDrive(plain, curve, curve, belt, NONE, NONE, 0.0, 0.0)
     check(drive, 4.0)
-
-
-def test_every_kind_and_every_law_is_tested() -> None:
-    assert {*KINDS} == {*SIGNALS}
-    others = {name for name, law in FRICTION_LAWS.items() if not law.states} - {"stiction"}
-    assert {*LAWS} - {"exponent"} == others
 
 
 def test_a_far_corner_costs_no_accuracy() -> None:

@@ -57,7 +57,9 @@ def test_nodes_started_singly_close_the_loop_and_the_bag(
     assert states.belt_velocity.tolist() == [1.0] * count
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize(
+    "number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.long)]
+)
 def test_a_node_that_closes_ignores_further_signals(
     processes: Processes, number: signal.Signals
 ) -> None:
@@ -84,8 +86,12 @@ def test_a_parameter_file_without_a_section_for_the_node_is_named(
     ("node", "arguments", "named"),
     [
         ("plant", ("-p", "mass:=-1.0"), ("mass = -1.0", "above 0", "/plant")),
-        ("plant", ("--params-file", "/nowhere/to/be/found.yaml"), ("/nowhere/to/be/found.yaml",)),
-        ("analyzer", ("-p", "bag:=/proc/none/bag"), ("/proc/none/bag",)),
+        pytest.param(
+            "plant", ("--params-file", "/no/file.yaml"), ("/no/file.yaml",), marks=pytest.mark.long
+        ),
+        pytest.param(
+            "analyzer", ("-p", "bag:=/proc/no/bag"), ("/proc/no/bag",), marks=pytest.mark.long
+        ),
         ("controller", ("-p", "law:=washuot"), ("unknown control law washuot; did you mean wash",)),
     ],
 )

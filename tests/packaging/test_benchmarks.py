@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.parties import PartyError, Slice, party, results_by_turns
+from benchmarks.parties import Slice, party, results_by_turns
 from benchmarks.slices import Row, table
 from tests.nodes.graph import PATIENCE
 
@@ -47,39 +47,14 @@ def first_slice(run: Slice[int]) -> int:
     return run(7)
 
 
-@contextmanager
-def in_this_process(fails: str) -> Generator[Slice[int]]:
-    """Stand for a party in a process of its own."""
-    try:
-        with counting(fails) as run:
-
-            def ask(length: int) -> int:
-                try:
-                    return run(length)
-                except ValueError as error:
-                    raise PartyError(str(error)) from None
-
-            yield ask
-    except SystemExit as error:
-        raise PartyError(str(error)) from None
-
-
-def test_a_party_that_fails_is_named_with_the_reason_and_the_others_have_results() -> None:
-    kinds = ("never", "at the start", "in a slice", "at the end")
-    parties = {kind: in_this_process(kind) for kind in kinds}
-    results, failures = results_by_turns(ROUNDS, parties, first_slice)
-    assert results == {kind: [7] * ROUNDS for kind in ("never", "at the end")}
-    assert {row.what: row.failure for row in failures} == REASONS
-
-
 @pytest.mark.long
 @pytest.mark.process
-def test_a_process_tells_why_it_fails() -> None:
-    kinds = (*REASONS, "is killed")
+def test_a_party_that_fails_is_named_with_the_reason_and_the_others_have_results() -> None:
+    kinds = ("never", *REASONS, "is killed")
     results, failures = results_by_turns(
         ROUNDS, {kind: party(counting, kind) for kind in kinds}, first_slice
     )
-    assert results == {"at the end": [7] * ROUNDS}
+    assert results == {kind: [7] * ROUNDS for kind in ("never", "at the end")}
     reasons = REASONS | {"is killed": "it ended early, with status -6"}
     assert {row.what: row.failure for row in failures} == reasons
 

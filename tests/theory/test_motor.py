@@ -55,7 +55,10 @@ def test_what_needs_an_ideal_motor_says_so() -> None:
     "law",
     [
         replace(CASCADE, linear_gain=-800.0),
-        replace(CASCADE, integral_gain=0.0, feedback="table", washout_feedback="motor"),
+        pytest.param(
+            replace(CASCADE, integral_gain=0.0, feedback="table", washout_feedback="motor"),
+            marks=pytest.mark.long,
+        ),
         HOLDING,
     ],
     ids=["motor", "table", "feedback"],
