@@ -5,13 +5,7 @@ import argparse
 from stickslip_ros.app.arguments import add_scenario, whole
 from stickslip_ros.app.output import progress_bar
 from stickslip_ros.app.result import add_results, check_results
-from stickslip_ros.app.study_command import (
-    add_workers,
-    check_out,
-    computed,
-    finish,
-    scenario_over,
-)
+from stickslip_ros.app.study_command import add_workers, check_out, computed, finish, scenario_over
 
 _DESCRIPTION = """Compare control laws on one drive. The gains of each law are tuned by one rule for
 the sampled loop, or given by the scenario. With a moving belt the task is regulation: the slide is

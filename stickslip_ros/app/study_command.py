@@ -8,14 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from stickslip_ros.app.arguments import (
-    check_new,
-    check_speeds,
-    naming,
-    scenario_of,
-    whole,
-    writing,
-)
+from stickslip_ros.app.arguments import check_new, check_speeds, naming, scenario_of, whole, writing
 from stickslip_ros.app.output import progress_bar, tell
 from stickslip_ros.app.result import print_result, write_results
 from stickslip_ros.errors import InvalidInputError, RunError

@@ -10,13 +10,7 @@ import numpy as np
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.model.constants import constants_of
 from stickslip_ros.model.drive import Drive
-from stickslip_ros.model.friction import (
-    LAWS,
-    CurveFollower,
-    Directional,
-    FrictionLaw,
-    Table,
-)
+from stickslip_ros.model.friction import LAWS, CurveFollower, Directional, FrictionLaw, Table
 
 Values = Mapping[str, float]
 """Values of coordinates by name, SI units."""

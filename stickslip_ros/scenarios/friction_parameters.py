@@ -12,13 +12,7 @@ from typing import Any, Self
 
 from typing_extensions import override
 
-from stickslip_ros.model.constants import (
-    Changes,
-    Parameter,
-    constant,
-    constants_of,
-    described_by,
-)
+from stickslip_ros.model.constants import Changes, Parameter, constant, constants_of, described_by
 from stickslip_ros.model.friction import (
     WITHDRAWN,
     CurveFollower,

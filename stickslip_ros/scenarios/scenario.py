@@ -8,19 +8,9 @@ from typing import Any, Self
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.measures.cycle_meter import CycleMeter
 from stickslip_ros.measures.noise import resolved
-from stickslip_ros.measures.sample_assumptions import (
-    CHANGING_KINDS,
-    SampleAssumptions,
-    held_range,
-)
+from stickslip_ros.measures.sample_assumptions import CHANGING_KINDS, SampleAssumptions, held_range
 from stickslip_ros.model.control import ControlLaw
-from stickslip_ros.scenarios.keywords import (
-    described,
-    in_own_unit,
-    override,
-    parse_override,
-    plain,
-)
+from stickslip_ros.scenarios.keywords import described, in_own_unit, override, parse_override, plain
 from stickslip_ros.scenarios.parameters import (
     CONTROLLER_PARAMETERS,
     NODE_PARAMETERS,

@@ -238,8 +238,7 @@ def draw_law(
     ends = ends[0] - room, ends[1] + room
     relative_speed = units.named("velocity relative to the belt", short=short)
     scale, label = units.axis(relative_speed, "m/s", ends)
-    axes.set_xlabel(label)
-    axes.set_ylabel(units.named("friction coefficient", short=short))
+    axes.set(xlabel=label, ylabel=units.named("friction coefficient", short=short))
     _law_between(axes, drive, *ends, scale, **_LAW)
     if reached is not None:
         axes.axvspan(least / scale, largest / scale, **_REACHED)
@@ -330,8 +329,7 @@ def _cycle(axes: Axes, mean: MeanCycle, units: Units, *, short: bool) -> None:
                 textcoords="offset points", fontsize="small",
             )  # fmt: skip
     axes.set_xlabel(time_label)
-    axes.set_ylabel(label)
-    axes.set_title("mean cycle" if short else "mean cycle; edges with 95 % intervals")
+    axes.set(ylabel=label, title="mean cycle" if short else "mean cycle; edges with 95 % intervals")
     axes.legend(loc="upper right", fontsize="small")
 
 
@@ -340,9 +338,7 @@ def _residual(axes: Axes, mean: MeanCycle, units: Units, *, short: bool) -> None
     scale, label = units.axis("residual", "m", residual)
     second, time_label = units.axis(_TIME[short], "s", mean.phase)
     axes.plot(mean.phase / second, residual / scale, **_RAW)
-    axes.set_xlabel(time_label)
-    axes.set_ylabel(label)
-    axes.set_title(f"noise {units.text(mean.noise, 'm')}")
+    axes.set(xlabel=time_label, ylabel=label, title=f"noise {units.text(mean.noise, 'm')}")
 
 
 def _distribution(axes: Axes, values: FloatArray, quantity: Quantity, units: Units) -> None:
@@ -355,6 +351,4 @@ def _distribution(axes: Axes, values: FloatArray, quantity: Quantity, units: Uni
         axes.hist(shown, bins=_BINS, range=(low, high), color=BLUE)
         axes.axvline(float(np.median(values)) / scale, color=ORANGE, lw=1.2, label="median")
         axes.legend(fontsize="small")
-    axes.set_xlabel(label)
-    axes.set_ylabel("slips")
-    axes.set_title(f"{len(values)} slips")
+    axes.set(xlabel=label, ylabel="slips", title=f"{len(values)} slips")

@@ -88,8 +88,7 @@ def map_figure(
         driving = -np.array([law.coefficient(sign * w, sign) for w in speed.tolist()])
         named = f"law {law.name}" if sign > 0.0 else None
         axes.plot(sign * speed / scale, driving / force_scale, color=ORANGE, label=named)
-    axes.set_xlabel(label)
-    axes.set_ylabel(force_label)
+    axes.set(xlabel=label, ylabel=force_label)
     axes.legend(loc="best")
     style.set_title(figure, f"Friction map, {names}")
     finish(figure)
@@ -122,8 +121,7 @@ def _friction(axes: Axes, findings: Findings, units: Units) -> None:
         seen = 2.0 * float(band.max()) * scale > _LEAST_BAND * top
         name = "95 % band" if seen else "95 % band: narrower than the line"
         axes.fill_between(speed, *limits, color=colour, alpha=0.3, lw=0.0, label=name)
-    axes.set_xlabel(speed_label)
-    axes.set_ylabel(label)
+    axes.set(xlabel=speed_label, ylabel=label)
     axes.set_xlim(0.0, 1.05 * fastest / speed_scale)
     # A band may be many times as large as the friction.
     axes.set_ylim(0.0, 1.15 * top / scale)
@@ -142,9 +140,7 @@ def _residuals(
     error_scale, error_label = units.axis(quantity, error_unit, errors)
     axes.plot(values / scale, errors / error_scale, color=BLUE, **DOTS)
     axes.axhline(0.0, color="black", lw=0.6)
-    axes.set_xlabel(label)
-    axes.set_ylabel(error_label)
-    axes.set_title(f"residuals over {name}")
+    axes.set(xlabel=label, ylabel=error_label, title=f"residuals over {name}")
 
 
 def _free_run(figure: Figure, place: Any, findings: Findings, units: Units, *, short: bool) -> None:
@@ -158,11 +154,9 @@ def _free_run(figure: Figure, place: Any, findings: Findings, units: Units, *, s
     scale, label = units.axis(name, "m", record.position)
     upper.plot(time, record.position / scale, color=BLUE)
     upper.plot(time, run / scale, color=ORANGE, ls="--")
-    upper.set_ylabel(label)
-    upper.set_title("in-sample: measured, and without feedback (dashed)")
+    upper.set(ylabel=label, title="in-sample: measured, and without feedback (dashed)")
     upper.tick_params(labelbottom=False)
     away = record.position - run
     scale, label = units.axis("difference", "m", away)
     lower.plot(time, away / scale, color=GREEN)
-    lower.set_xlabel("time (s)")
-    lower.set_ylabel(label)
+    lower.set(xlabel="time (s)", ylabel=label)

@@ -166,7 +166,13 @@ def _single(run: DrawnRun, style: FigureStyle) -> Figure:
         run = run._replace(drive=drive)
     if history.left_out:
         notes.append(f"not drawn: {history.left_out} samples without an increasing time")
-    rows = [draw for draw, is_shown in _LOWER_ROWS.items() if is_shown(run, style)]
+    analysis = history.analysis
+    has_motor = drive is not None and drive.motor is not None and not style.printed
+    lower_rows = (  # each with three panels
+        (_OneRun.analysis, analysis.mean_cycle is not None or analysis.slips is not None),
+        (_OneRun.behind_the_screw, has_motor and len(history.motor.columns()[0]) > 0),
+    )
+    rows = [draw for draw, is_shown in lower_rows if is_shown]
     size = (12.0, 10.0 + 2.5 * len(rows))
     panels = _OneRun([run], narrow=style.narrow, short=style.crowded(*size))
     figure = style.figure(*size, wide=1.1 + 0.3 * len(rows), narrow=2.5 + 0.26 * len(rows))
@@ -418,20 +424,6 @@ class _OneRun(_Panels):
         if len(history.dropped.columns()[0]):
             handles.append(Line2D([], [], **_DROPPED | {"ms": 6.0}, label="sent, did not act"))
         return handles
-
-
-def _is_analysed(run: DrawnRun, style: FigureStyle) -> bool:
-    analysis = run.history.analysis
-    return analysis.mean_cycle is not None or analysis.slips is not None
-
-
-def _has_motor(run: DrawnRun, style: FigureStyle) -> bool:
-    has_motor = run.drive is not None and run.drive.motor is not None
-    return has_motor and not style.printed and len(run.history.motor.columns()[0]) > 0
-
-
-_LOWER_ROWS = {_OneRun.analysis: _is_analysed, _OneRun.behind_the_screw: _has_motor}
-"""What draws a row of three panels below the others, and which runs have it."""
 
 
 class _SeveralRuns(_Panels):

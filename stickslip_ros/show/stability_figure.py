@@ -140,11 +140,7 @@ _PROPOSED = (
 
 
 def _set_title(
-    figure: Figure,
-    title: str,
-    chart: StabilityMap,
-    style: FigureStyle,
-    which: str = "",
+    figure: Figure, title: str, chart: StabilityMap, style: FigureStyle, which: str = ""
 ) -> None:
     """Set the title with the loop of a map; `which` of several it is."""
     loop = chart.loop
@@ -350,8 +346,7 @@ def branches_figure(
         handles.append(axes.axvline(belt_speed / speed, **_NOW, label=label))
     low, high = diagram.belt_speeds[[0, -1]].tolist()
     axes.set_xlim(min(low, belt_speed, 0.0) / speed, max(high, belt_speed, 0.0) / speed)
-    axes.set_xlabel(x_label)
-    axes.set_ylabel(y_label)
+    axes.set(xlabel=x_label, ylabel=y_label)
     finish(figure)
     style.legend_below(figure, handles, most=3)
     _name_regions(figure, axes, diagram, speed)

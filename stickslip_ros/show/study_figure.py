@@ -143,11 +143,7 @@ def diagram_figure(columns: Columns, study: Study, *, style: FigureStyle = SCREE
 
 @styled
 def map_figure(
-    columns: Columns,
-    study: Study,
-    colour: str = "regime",
-    *,
-    style: FigureStyle = SCREEN,
+    columns: Columns, study: Study, colour: str = "regime", *, style: FigureStyle = SCREEN
 ) -> Figure:
     """Return the map of a sweep over two parameters, the first one on the horizontal axis.
 

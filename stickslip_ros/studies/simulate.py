@@ -11,11 +11,7 @@ from stickslip_ros.measures.cycle_measures import Measures
 from stickslip_ros.measures.run_meter import RunObserver
 from stickslip_ros.measures.sample_meter import NOT_JUDGED, SampleMeter
 from stickslip_ros.motion import RecordedMotion
-from stickslip_ros.motion.simulation import (
-    MotionTracer,
-    simulate_continuous,
-    simulate_sampled,
-)
+from stickslip_ros.motion.simulation import MotionTracer, simulate_continuous, simulate_sampled
 from stickslip_ros.motion.trajectory import SampleRecorder
 from stickslip_ros.progress import Progress
 from stickslip_ros.scenarios.files import Scenario

@@ -33,11 +33,7 @@ from stickslip_ros.theory.linear_sampled_loop import (
     not_linear,
     why_no_linear_loop,
 )
-from stickslip_ros.theory.linear_system import (
-    LinearSystem,
-    continuous_system,
-    sampled_system,
-)
+from stickslip_ros.theory.linear_system import LinearSystem, continuous_system, sampled_system
 from stickslip_ros.theory.requirements import (
     AUTONOMOUS,
     ONE_DEGREE,

@@ -10,12 +10,7 @@ from typing import Any, Generic, NamedTuple, TypeVar
 from typing_extensions import override
 
 from stickslip_ros.errors import InvalidInputError, StickslipError
-from stickslip_ros.measures.cycle_measures import (
-    EQUILIBRIUM_SPEED,
-    Measures,
-    Regime,
-    trend_text,
-)
+from stickslip_ros.measures.cycle_measures import EQUILIBRIUM_SPEED, Measures, Regime, trend_text
 from stickslip_ros.quantities import quantities_of
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.studies.columns import Point
