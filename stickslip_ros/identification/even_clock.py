@@ -39,8 +39,8 @@ def evenly_spaced(name: str, stamp: IntArray, columns: Mapping[str, FloatArray])
         del columns["velocity"]
     _check_clock(name, stamp)
     known = np.ones(len(stamp), bool)
-    for each in columns.keys() - {"reference"}:
-        known &= np.isfinite(columns[each])
+    for column in columns.keys() - {"reference"}:
+        known &= np.isfinite(columns[column])
     known &= np.diff(stamp, prepend=np.iinfo(np.int64).min // 2) > 0
     time = (stamp[known] - stamp[0]) / NANOSECONDS
     columns = {column: values[known] for column, values in columns.items()}

@@ -228,8 +228,8 @@ def basin_figure(
     rasterized = plan.size > MANY
     area = float(np.clip(2e5 / max(plan.size, 1), 4.0, 30.0))
     looks = _looks([attractor.regime for attractor in basins.attractors])
-    for number, (look, found) in enumerate(zip(looks, basins.attractors, strict=True)):
-        of_it, label = basins.places == number, _label(found, units)
+    for number, (look, attractor) in enumerate(zip(looks, basins.attractors, strict=True)):
+        of_it, label = basins.places == number, _label(attractor, units)
         if isinstance(plan, Grid):
             middles = x.reshape(plan.shape), y.reshape(plan.shape)
             _draw_cells(axes, *middles, of_it.reshape(plan.shape), look, shading="nearest")

@@ -90,7 +90,7 @@ def stick_margin(case: ControlledDrive) -> float:
 
 def sign_changes(margin: Callable[[float], float], values: Sequence[float]) -> Iterator[float]:
     """Yield the points where `margin` changes sign between neighbouring `values`, to rounding."""
-    known = [(value, found) for value in values if (found := margin(value)) != 0.0]
+    known = [(value, size) for value in values if (size := margin(value)) != 0.0]
     for (before, one), (after, other) in pairwise(known):
         if one * other < 0.0:
             yield zero_between(margin, before, after)
