@@ -129,7 +129,7 @@ class Layout:
         self._table = np.dtype(
             {
                 "names": [*(name for name, _, _ in stamps), *places],
-                "formats": [f"{order}{each}" for _, each, _ in stamps]
+                "formats": [f"{order}{form}" for _, form, _ in stamps]
                 + [f"{order}f8"] * len(places),
                 "offsets": [*(place for _, _, place in stamps), *places.values()],
                 "itemsize": len(message.data),

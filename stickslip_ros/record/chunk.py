@@ -97,7 +97,7 @@ class MessageBlock:
         """Publish times, ns; negative above 63 bits."""
         return self._field("publish_time")
 
-    def on(self, channels: Collection[int]) -> "MessageBlock":
+    def on_channels(self, channels: Collection[int]) -> "MessageBlock":
         """Return the messages on these channels."""
         chosen = np.zeros(1 << 16, np.bool_)
         chosen[list(channels)] = True
@@ -169,7 +169,9 @@ def open_chunk(data: bytes, starts: IntArray) -> OpenChunk:
             messages, first = MessageBlock(data, starts), int(starts[0])
             end = messages.end
             adjacent = np.array_equal(end[:-1], starts[1:]) and end[-1] == len(data)
-            if adjacent and all(each[0] != Opcode.MESSAGE for each in records_in(data[:first])):
+            if adjacent and all(
+                opcode != Opcode.MESSAGE for opcode, *_ in records_in(data[:first])
+            ):
                 return OpenChunk(messages, first)
     begins = (begin for opcode, begin, _ in records_in(data) if opcode == Opcode.MESSAGE)
     starts = np.array(array("q", begins), np.int64) - HEAD.size

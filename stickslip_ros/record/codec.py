@@ -176,8 +176,8 @@ def unpack_joint_state(data: bytes) -> Sample:
             return Sample(stamp, x, v, effort, belt, belt_v, MotorSample(motor, motor_v))
     stamp, values = joint_state_layout(data).read(data)
     x, v, effort, belt, belt_v, *motor = values
-    told = None if isnan(motor[0]) else MotorSample(*motor)
-    return Sample(stamp, x, v, effort, belt, belt_v, told)
+    moved = None if isnan(motor[0]) else MotorSample(*motor)
+    return Sample(stamp, x, v, effort, belt, belt_v, moved)
 
 
 def unpack_reference(data: bytes) -> tuple[int, Reference]:
@@ -356,7 +356,7 @@ class _Joints:
     def layout(self, joint: str, *others: str | None) -> Layout:
         """Return position, velocity and effort of a joint, and of others the first two."""
         places = [self.place(field, joint) for field in range(3)]
-        return self.layout_of(*places, *(self.place(n, each) for each in others for n in (0, 1)))
+        return self.layout_of(*places, *(self.place(n, name) for name in others for n in (0, 1)))
 
     def layout_of(self, *places: int | None) -> Layout:
         """Return the layout of places."""

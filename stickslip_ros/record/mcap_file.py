@@ -136,23 +136,23 @@ class McapFile:
                 gaps[-1] = gaps[-1][0], max(end, gaps[-1][1])
             else:
                 gaps.append((start, end))
-        found = [
+        sentences = [
             f"{name}: bytes {start} to {end - 1} of {self._size} cannot be read"
             for start, end in gaps[:_MOST_GAPS_LISTED]
         ]
         if len(gaps) > _MOST_GAPS_LISTED:
             more = len(gaps) - _MOST_GAPS_LISTED
-            found.append(f"{name}: {more} further ranges of bytes cannot be read")
+            sentences.append(f"{name}: {more} further ranges of bytes cannot be read")
         if not self._whole:
-            found.append(
+            sentences.append(
                 f"{name} is incomplete: its recorder is still running or was killed, "
                 "or the file was truncated or damaged"
             )
         for channel, lost in self._lost.items():
             topic = self.channels[channel].topic
-            found.append(f"{name}: {lost} messages recorded on {topic} are missing")
-        found += [f"{name}: the type of {topic} is missing" for topic in self._undefined]
-        return found
+            sentences.append(f"{name}: {lost} messages recorded on {topic} are missing")
+        sentences += [f"{name}: the type of {topic} is missing" for topic in self._undefined]
+        return sentences
 
     def tables(self, name: str | None = None) -> Iterator[Metadata]:
         """Yield the readable metadata records, of this name or all, in file order."""
@@ -170,7 +170,7 @@ class McapFile:
         """
         counts: Counter[int] = Counter()
         for block in self._blocks():
-            wanted = block.on(channels)
+            wanted = block.on_channels(channels)
             if len(wanted) > 0:
                 numbers = np.bincount(wanted.channel)
                 counts.update({int(c): int(numbers[c]) for c in np.flatnonzero(numbers)})
@@ -186,9 +186,10 @@ class McapFile:
         data = takewhile(lambda record: record.opcode != Opcode.DATA_END, self._records())
         for opcode, records in groupby(data, lambda record: record.opcode):
             if opcode == Opcode.MESSAGE:
-                yield from as_blocks(self._read(each.start, each.end) for each in records)
+                yield from as_blocks(self._read(record.start, record.end) for record in records)
             else:
-                yield from (each.chunk.messages for each in records if each.chunk is not None)
+                chunks = (record.chunk for record in records)
+                yield from (chunk.messages for chunk in chunks if chunk is not None)
 
     def _read_inventory(self) -> bool:
         """Find the content of the file; return whether its beginning and end are sound."""
@@ -277,14 +278,14 @@ class McapFile:
         self._gaps[start] = max(end, self._gaps.get(start, end))
 
     def _define(
-        self, known: dict[int, DefinitionT], found: DefinitionT, content: bytes, checked: bool
+        self, known: dict[int, DefinitionT], definition: DefinitionT, content: bytes, checked: bool
     ) -> None:
         """Keep a definition; for each id the one with a checksum, or else the first."""
-        if found.id not in known or (checked and known[found.id] != found):
+        if definition.id not in known or (checked and known[definition.id] != definition):
             self._definitions_size += len(content)
             if self._definitions_size > _LARGEST_DEFINITIONS:
                 raise DamageError
-            known[found.id] = found
+            known[definition.id] = definition
 
     def _records(self) -> Iterator[_Record]:
         """Yield the records up to the footer; after damage continue at the next chunk."""
@@ -376,9 +377,9 @@ class McapFile:
             try:
                 if record.end - record.begin > largest:
                     raise DamageError
-                found = _parse(read, self._read(record.begin, record.end))
-                if name in (None, found.name):
-                    yield found
+                content = _parse(read, self._read(record.begin, record.end))
+                if name in (None, content.name):
+                    yield content
             except DamageError:
                 self._add_gap(record.start, record.end)
 
@@ -394,9 +395,9 @@ def _parse(read: Callable[[ReadDataStream], ParsedT], content: bytes) -> ParsedT
     """Parse a content with the mcap library; raise DamageError if it fails or leaves a rest."""
     stream = ReadDataStream(BytesIO(content))
     try:
-        found = read(stream)
+        parsed = read(stream)
     except (EndOfFile, struct.error, OverflowError, ValueError) as error:
         raise DamageError from error
     if stream.count < len(content):
         raise DamageError
-    return found
+    return parsed

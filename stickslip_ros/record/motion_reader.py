@@ -8,13 +8,7 @@ from stickslip_ros.arrays import IntArray
 from stickslip_ros.errors import BagError, MessageError
 from stickslip_ros.record.bag_layout import ANY_LAYOUT, BagLayout
 from stickslip_ros.record.cdr import Layout, Messages, Refused, decode
-from stickslip_ros.record.codec import (
-    BELT,
-    SLIDE,
-    joint_layout,
-    joint_names,
-    joint_state_layout,
-)
+from stickslip_ros.record.codec import BELT, SLIDE, joint_layout, joint_names, joint_state_layout
 from stickslip_ros.record.machine_motion import MachineMotion, StampCheck
 from stickslip_ros.samples import ForceColumns, SampleColumns
 from stickslip_ros.text import printable, shown

@@ -141,7 +141,7 @@ class Recording:
 
     @property
     def notes(self) -> list[str]:
-        """Sentences on how what was read of another machine was read, and what it lacks."""
+        """Sentences on how the motion of another machine was read, and what it lacks."""
         return [note for reading in self._readings.values() for note in reading.notes]
 
     @property
@@ -195,10 +195,7 @@ class Recording:
 
     @property
     def dropped_known(self) -> bool:
-        """Whether the bag records which control forces did not act.
-
-        Bags of older versions and of other plants do not.
-        """
+        """Whether the bag tells which control forces did not act; some older ones do not."""
         return self._drive.name(DROPPED_FORCE) != ""
 
     def name_of(self, topic: Topic[Any]) -> str:

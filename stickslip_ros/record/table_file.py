@@ -72,7 +72,7 @@ def is_table(path: Path) -> bool:
     """Return whether a path names a table rather than a bag: by its end or its first bytes."""
     if path.suffix.lower() in TABLE_SUFFIXES:
         return True
-    if not path.is_file() or any(each in _BAG_SUFFIXES for each in path.suffixes):
+    if not path.is_file() or any(suffix in _BAG_SUFFIXES for suffix in path.suffixes):
         return False
     with reading_file(path), open_regular(path) as stream:
         return not stream.read(_START).startswith((_MCAP, *OTHER_BAGS))
@@ -147,8 +147,8 @@ def read_table(
     return _recording(path, quantities_of(table_of(path, form), columns, belt_speed))
 
 
-def _recording(path: Path, found: Quantities) -> TableRecording:
-    values, notes = found.values, [*found.notes]
+def _recording(path: Path, quantities: Quantities) -> TableRecording:
+    values, notes = quantities.values, [*quantities.notes]
     time, position = values["time"], values["position"]
     stamp = stamps_of(path, time)
     present = np.isfinite(position)

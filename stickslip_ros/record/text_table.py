@@ -142,13 +142,15 @@ class TextTable(Table):
                     kept.append(frame.index.to_numpy())
                 for place in places:
                     parts[place].append(self._values(frame[place]))
-        skipped = [number for each in caught for number in _SKIPPED.findall(str(each.message))]
+        skipped = [
+            number for warning in caught for number in _SKIPPED.findall(str(warning.message))
+        ]
         refused = [first - 1 + int(number) for number in skipped]
         if wanted is not None and not any(map(len, kept)):
             raise self._nothing_where(wanted.place)
         places_kept = np.concatenate(kept) if kept else None
         self._lines = _Lines(first, sorted([*blank, *refused]), refused, places_kept)
-        self.clocks = {place for place, each in parts.items() if each[0].dtype.kind in "mM"}
+        self.clocks = {place for place in places if parts[place][0].dtype.kind in "mM"}
         return [_joined(parts.pop(place)) for place in places]
 
     def _frames(self) -> Iterator[Any]:
