@@ -50,7 +50,7 @@ class DimensionlessDrive(HybridSystem):
         separate = bool(actuator.states) or motor is not None
         self.inputs = ("force", "disturbance") if separate else ("force",)
         self.forces = DriveForces(self.drive, self.control, self.slots)
-        """The forces of a state."""
+        """The forces at an instant, but for friction."""
         self.has_guide_damping = self.drive.guide_damping != 0.0
         self.steady = not belt.pieces
         """Whether the speed of the belt is constant."""
@@ -137,17 +137,9 @@ class DimensionlessDrive(HybridSystem):
         switches = mode.switches[self.switch_slots.load]
         return float(equations.normal_force(self.drive, time, switches))
 
-    def control_force(self, instant: Instant) -> float:
-        """Return the force on the slide, see `DriveForces.control_force`."""
-        return self.forces.control_force(instant.state, instant.inputs)
-
-    def reaction(self, instant: Instant, force: float | None = None) -> float:
-        """Return the reaction of the slide at the belt speed, see `DriveForces.reaction`."""
-        return self.forces.reaction(instant.state, instant.inputs, force)
-
-    def held_force(self, mode: Mode, instant: Instant) -> float:
-        """Return the friction force that a slide needs to move with the belt."""
-        held = self.reaction(instant)
+    def held_force(self, mode: Mode, instant: Instant, force: float | None = None) -> float:
+        """Return the friction that a slide needs to move with the belt; `force` may be known."""
+        held: float = self.forces.reaction(instant, force)
         if self.steady and not self.has_guide_damping:
             return held
         if self.has_guide_damping:
@@ -157,7 +149,7 @@ class DimensionlessDrive(HybridSystem):
     def motor_held(self, mode: Mode, instant: Instant) -> float:
         """Return the dry friction that a motor needs to move with the guide."""
         assert self.drive.motor is not None
-        held = self.forces.motor_reaction(instant.state, instant.inputs, 0.0)
+        held = self.forces.motor_reaction(instant, 0.0)
         return held + self.drive.motor.mass * self.belt_acceleration(mode, instant)
 
     def friction_force(self, mode: Mode, instant: Instant) -> float:

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Any
+from typing import Any, cast
 
 import heyoka as hy
 
@@ -13,7 +13,7 @@ from stickslip_ros.model.dimensionless_drive import LIFT_ROUNDING, Dimensionless
 from stickslip_ros.model.drive import UNBOUNDED_SPEED, Drive, DriveConstants
 from stickslip_ros.model.drive_forces import DriveForces
 from stickslip_ros.model.drive_layout import SIGN, SPEED
-from stickslip_ros.model.hybrid import Flow, Guard, Mode, Transition
+from stickslip_ros.model.hybrid import Flow, Guard, Instant, Mode, Transition
 from stickslip_ros.model.motor import Motor
 from stickslip_ros.model.symbols import with_symbols
 
@@ -33,7 +33,8 @@ class DriveExpressions:
 
     def __init__(self, system: DimensionlessDrive) -> None:
         self._system = system
-        self._state, constants, self._inputs, switches, time = system.symbols
+        self._state, constants, inputs, switches, time = system.symbols
+        self._instant = Instant(cast("Any", self._state), cast("Any", inputs))
         symbolic = constants_of(DriveConstants).keys() & constants
         parts = {
             name: with_symbols(getattr(system.drive, name), name, constants)
@@ -132,7 +133,7 @@ class DriveExpressions:
 
     def _reaction(self) -> Any:
         """Return the reaction of the slide."""
-        reaction = self._forces.reaction(self._state, self._inputs)
+        reaction = self._forces.reaction(self._instant)
         if self._system.has_guide_damping:
             relative_speed = self._state[SPEED] - self.belt_speed
             reaction += equations.guide_reaction(self.drive, relative_speed)
@@ -140,13 +141,13 @@ class DriveExpressions:
 
     def _motor_reaction(self) -> Any:
         _, speed = self._state[self._system.slots.motor]
-        return self._forces.motor_reaction(self._state, self._inputs, speed - self.belt_speed)
+        return self._forces.motor_reaction(self._instant, speed - self.belt_speed)
 
     def _part_rates(self) -> tuple[Any, ...]:
         """Return the rates of control, actuator and motor."""
         rates = [*self._forces.control_rates(self._state)]
         if forces := self._state[self._system.slots.actuator]:
-            rates += self.drive.actuator.state_rates(self._inputs[0], forces)
+            rates += self.drive.actuator.state_rates(self._instant.inputs[0], forces)
         if self.drive.motor is not None:
             _, speed = self._state[self._system.slots.motor]
             rates += [speed, self._motor_acceleration(self.drive.motor)]

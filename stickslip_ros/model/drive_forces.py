@@ -1,4 +1,4 @@
-"""The forces in a drive, of a state: for numbers and for expressions."""
+"""The forces in a drive at an instant: for numbers and for expressions."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -8,21 +8,23 @@ from stickslip_ros.model.control import ContinuousControl
 from stickslip_ros.model.control.base import seen_by
 from stickslip_ros.model.drive import Drive
 from stickslip_ros.model.drive_layout import POSITION, SPEED, DriveStates
+from stickslip_ros.model.hybrid import Instant
 
 
 class DriveForces:
-    """Forces in a drive, which may have expressions for its constants, with its control."""
+    """Forces in a drive with its control; its constants, and the instants, may be expressions."""
 
     def __init__(self, drive: Drive, control: ContinuousControl | None, slots: DriveStates) -> None:
         """Take states with these slots."""
         self._drive, self._control, self._slots = drive, control, slots
         self._lags = slots.actuator.stop > slots.actuator.start
 
-    def control_force(self, state: Sequence[Any], inputs: Sequence[Any]) -> Any:
+    def control_force(self, instant: Instant) -> Any:
         """Return the force on the slide, or on a motor of finite mass.
 
         It is held, that of the actuator, or of continuous control.
         """
+        state, inputs = instant.state, instant.inputs
         if self._control is not None:
             return self._control.control_force(*self._seen(state), state[self._slots.control])
         if not self._lags:
@@ -30,22 +32,20 @@ class DriveForces:
         force = self._drive.actuator.force(inputs[0], state[self._slots.actuator])
         return force if self._drive.motor is not None else force + inputs[1]
 
-    def reaction(self, state: Sequence[Any], inputs: Sequence[Any], force: Any = None) -> Any:
+    def reaction(self, instant: Instant, force: Any = None) -> Any:
         """Return h = X + 2 beta X' - U - bias of the slide; the control `force` may be known."""
+        state = instant.state
         if self._drive.motor is not None:
-            return equations.reaction(self._drive, *self.stretch(state), inputs[1])
-        force = self.control_force(state, inputs) if force is None else force
+            return equations.reaction(self._drive, *self.stretch(state), instant.inputs[1])
+        force = self.control_force(instant) if force is None else force
         return equations.reaction(self._drive, state[POSITION], state[SPEED], force)
 
-    def motor_reaction(
-        self, state: Sequence[Any], inputs: Sequence[Any], relative_speed: Any
-    ) -> Any:
+    def motor_reaction(self, instant: Instant, relative_speed: Any) -> Any:
         """Return the reaction of the motor at a speed of it relative to the guide."""
-        drive, force = self._drive, self.control_force(state, inputs)
+        drive, force = self._drive, self.control_force(instant)
         assert drive.motor is not None
-        return equations.motor_reaction(
-            drive, drive.motor, *self.stretch(state), relative_speed, force
-        )
+        stretch = self.stretch(instant.state)
+        return equations.motor_reaction(drive, drive.motor, *stretch, relative_speed, force)
 
     def stretch(self, state: Sequence[Any]) -> tuple[Any, Any]:
         """Return the stretch of the spring and its rate: of the slide, or against a motor."""

@@ -196,8 +196,8 @@ class DriveSystem(DimensionlessDrive):
         if sign != 0.0 and y != belt_speed:
             return
         if self.sticks:
-            force = self.control_force(instant)
-            held = self.reaction(instant, force) if self.steady else self.held_force(mode, instant)
+            force = self.forces.control_force(instant)
+            held = self.held_force(mode, instant, force)
             backward = sign < 0.0 or (sign == 0.0 and held > 0.0)
             limit = self.backward_limit if backward else self.forward_limit
             if self._loaded:
@@ -234,15 +234,13 @@ class DriveSystem(DimensionlessDrive):
         step from the series at its start. It would miss an exponential that is negligible there and
         rises before the step ends.
         """
-        state = instant.state
+        state, drive, reaction = instant.state, self.drive, self.forces.reaction(instant)
         stretch, _ = self.forces.stretch(state)
         acceleration = (
-            abs(self.reaction(instant)) + self.drive.stiffness * abs(stretch) + abs(state[SPEED])
+            abs(reaction) + drive.stiffness * abs(stretch) + abs(state[SPEED])
             + self._largest_friction + self._largest_belt_acceleration
         )  # fmt: skip
-        return (
-            self.drive.friction.characteristic_speed / acceleration if acceleration > 0.0 else inf
-        )
+        return drive.friction.characteristic_speed / acceleration if acceleration > 0.0 else inf
 
     def overflow(self, mode: Mode, instant: Instant) -> Mode:
         """Set the speed at which a motion counts as unbounded: what overflows exceeds any speed.
@@ -258,7 +256,7 @@ class DriveSystem(DimensionlessDrive):
                     f"the friction law {law.name} of package {law.package} fails: its coefficient "
                     f"is {friction}, which must be a finite number"
                 )
-        sign = copysign(1.0, -self.reaction(instant))
+        sign = copysign(1.0, -self.forces.reaction(instant))
         instant.state[SPEED] = sign * UNBOUNDED_SPEED
         return self._slip(mode, sign, instant)
 

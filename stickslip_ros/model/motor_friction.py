@@ -111,7 +111,7 @@ class MotorFrictionSystem(DriveSystem):
         state, drive = instant.state, self.drive
         stretch = drive.stiffness * (abs(state[POSITION]) + abs(state[self._x]))
         rate = drive.damping * (abs(state[SPEED]) + abs(state[self._y]))
-        force = abs(self.control_force(instant)) + self._holding_force
+        force = abs(self.forces.control_force(instant)) + self._holding_force
         return 8.0 * ulp(stretch + rate + force)
 
     def _motor_sign(self, mode: Mode) -> float:

@@ -2,7 +2,6 @@
 
 from stickslip_ros.model import equations
 from stickslip_ros.model.control import ContinuousControl
-from stickslip_ros.model.control.base import TwoBodyControl
 from stickslip_ros.model.drive import Drive, ScaledDrive
 from stickslip_ros.model.drive_layout import POSITION, SIGN, SPEED
 from stickslip_ros.model.drive_system import SLIP, STICK, DriveSystem
@@ -24,24 +23,12 @@ class PlainDriveSystem(DriveSystem):
         self._speed, self._friction = self.drive.belt_speed, self.drive.friction.coefficient
         # Whether the belt bends the spring; without one a held force never releases the slide.
         self._loads = self._speed != 0.0 and self.drive.has_spring
-        # A control that does not receive pairs: there is no motor.
-        control = None if isinstance(self.control, TwoBodyControl) else self.control
-        self._control_force = None if control is None else control.control_force
-
-    def control_force(self, instant: Instant) -> float:
-        """Return the force on the slide: held, or continuous control."""
-        if self.control is None:
-            return instant.inputs[0]
-        if self._control_force is None:
-            return super().control_force(instant)
-        state = instant.state
-        return self._control_force(state[POSITION], state[SPEED], state[self.slots.control])
 
     def friction_force(self, mode: Mode, instant: Instant) -> float:
         """Return the friction force on the slide."""
         sign = mode.switches[SIGN]
         if sign == 0.0:
-            return self.reaction(instant)
+            return self.forces.reaction(instant)
         return float(self._friction(instant.state[SPEED] - self._speed, sign))
 
     def settled(self, mode: Mode | None, instant: Instant) -> Mode:
@@ -62,7 +49,7 @@ class PlainDriveSystem(DriveSystem):
         return self._resting(mode, instant)
 
     def _resting(self, mode: Mode | None, instant: Instant) -> Mode:
-        held = self.reaction(instant)
+        held = self.forces.reaction(instant)
         if held > self.backward_limit:
             return _BACKWARD
         return _FORWARD if held < -self.forward_limit else _STUCK

@@ -41,10 +41,9 @@ class BreakpointRecorder:
         """Record the breakpoints of a phase; see `PhaseObserver`."""
         self._divides = phase.guard is None and phase.following is phase.mode
         start, frequency, latest = self._clock.time, self._clock.frequency, self._time
-        sticking, settles = phase.mode.flow == STICK, system.sticks
-        points = [(phase.origin + since, x, y) for since, x, y in phase.marks]
-        points.append((phase.end, *phase.end_state))
-        for now, x, y in points:
+        sticking, settles, origin = phase.mode.flow == STICK, system.sticks, phase.origin
+        for since, x, y in phase.points:
+            now = phase.end if since is None else origin + since
             if not settles:
                 sticking = self._stays_slow(system, phase.mode, now, y)
             time = start + now / frequency

@@ -80,7 +80,7 @@ class DriveView:
     @property
     def applied_force(self) -> float:
         """Present force on slide or motor, N: the held one, or that of continuous control."""
-        return self.core.system.control_force(self.core.instant) * self._weight
+        return self.core.system.forces.control_force(self.core.instant) * self._weight
 
     @property
     def motor(self) -> MotorSample | None:

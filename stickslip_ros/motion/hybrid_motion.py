@@ -193,7 +193,7 @@ class HybridMotion(Generic[_System]):
             if phase.guard is None:
                 if following is not phase.mode:
                     self.enter(following)
-            elif recurrence and recurrence.is_known(phase, following, self.instant.state):
+            elif recurrence and self._recurs(recurrence, phase, following):
                 now, recurrence = self._repeat(recurrence, now, duration), None
             else:
                 self.enter(following)
@@ -226,8 +226,8 @@ class HybridMotion(Generic[_System]):
         elapsed = taylor.time
         if outcome == _STEP_LIMIT:  # the rates leave a step no length
             return Phase(mode, origin + elapsed, DIVERGENCE, origin=origin)
-        bound = min(flow.phase_bound(), elapsed + longest)
-        return Phase(mode, origin + elapsed, -outcome - 1, None, origin, elapsed, bound)
+        end, bound = origin + elapsed, elapsed + longest
+        return Phase(mode, end, -outcome - 1, None, origin, elapsed, bound)
 
     def _follow(self, phase: Phase, epoch: float) -> Mode | None:
         """Make the transition at the end of a phase; return the mode that follows."""
@@ -252,10 +252,8 @@ class HybridMotion(Generic[_System]):
 
     def _report(self, observer: PhaseObserver[_System], phase: Phase) -> None:
         """Let an observer take a phase that has just passed."""
-        x, y, *_ = self.instant.state
-        phase.end_state = x, y
-        if self.flow is not None:
-            phase.marks = self.flow.take_marks()
+        marks = () if self.flow is None else self.flow.take_marks()
+        phase.points = (*marks, (None, self.instant.state[0], self.instant.state[1]))
         observer.take(phase, self.system, self.instant)
 
     def _propagate(self, flow: CompiledFlow, until: float, longest: float) -> int:
@@ -274,6 +272,12 @@ class HybridMotion(Generic[_System]):
             if outcome != _STEP_LIMIT or steps < most:
                 return outcome
             work = 0
+
+    def _recurs(self, recurrence: Recurrence, phase: Phase, following: Mode) -> bool:
+        """Note a phase; return whether the one that follows is known."""
+        if self.flow is not None:
+            phase.bound = min(self.flow.phase_bound(), phase.bound)
+        return recurrence.is_known(phase, following, self.instant.state)
 
     def _repeat(self, recurrence: Recurrence, now: float, latest: float) -> float:
         """Continue with the known phases that `latest` does not shorten; return the time then."""

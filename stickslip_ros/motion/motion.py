@@ -261,8 +261,7 @@ class Motion(DriveView):
             faded = (value if abs(value) > _FADED else 0.0 for value in core.instant.state)
             core.instant.state[:] = array("d", faded)
         if core.clocked:
-            clock.pass_exactly(duration)
-            core.set_time(clock.scaled)
+            core.set_time(clock.pass_exactly(duration))
         else:
             clock.time += duration
 

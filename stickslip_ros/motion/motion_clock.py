@@ -33,8 +33,9 @@ class MotionClock:
         """Start the signals now."""
         self._origin, self._lost = self.time, 0.0
 
-    def pass_exactly(self, duration: float) -> None:
-        """Add a duration, s, and what the sum of the durations has lost by rounding."""
+    def pass_exactly(self, duration: float) -> float:
+        """Add a duration, s, and what the sum has lost by rounding; return the scaled time."""
         before, duration = self.time, duration - self._lost
         self.time = before + duration
         self._lost = (self.time - before) - duration
+        return (self.time - self._origin) * self.frequency

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
 from stickslip_ros.model.hybrid import HybridSystem, Instant, Mode
-from stickslip_ros.motion.compiled_flow import CompiledFlow, Marks
+from stickslip_ros.motion.compiled_flow import CompiledFlow
 
 _System = TypeVar("_System", bound=HybridSystem, contravariant=True)
 
@@ -32,10 +32,8 @@ class Phase:
     duration: float = 0.0
     bound: float = 0.0
     """Time until an end of the advance that would have shortened none of its steps."""
-    marks: Marks | tuple[()] = ()
-    """Marks of the flow."""
-    end_state: tuple[float, float] = (0.0, 0.0)
-    """First two states at the end."""
+    points: Sequence[tuple[float | None, float, float]] = ()
+    """Time, None at the end, and first two states, at the marks of the flow and at the end."""
     state_at_guard: Sequence[float] = ()
     """State at the guard: the mode that follows may set a part of it."""
 

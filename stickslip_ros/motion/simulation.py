@@ -1,5 +1,6 @@
 """Simulation of the closed loop without ROS, sampled or continuous as in the paper."""
 
+from collections.abc import Iterator
 from itertools import islice
 from math import ceil, inf
 
@@ -16,7 +17,7 @@ from stickslip_ros.motion.sampled_loop import SampledLoop
 from stickslip_ros.motion.tick_blocks import LEAST_TICKS, TickBlocks
 from stickslip_ros.motion.trajectory import SampleRecorder
 from stickslip_ros.progress import Progress
-from stickslip_ros.samples import SampleColumns
+from stickslip_ros.samples import Sample, SampleColumns
 
 _BLOCK = 1000
 """Number of samples after which meters and observers receive the motion."""
@@ -103,6 +104,37 @@ def measure_block(
         observer.take_motion(MeasuredMotion(breakpoints, belt_velocity, cycles, meter.ends))
 
 
+def _observed(
+    ticks: Iterator[float], loop: SampledLoop, recorder: SampleRecorder | None, seen: list[Sample]
+) -> Iterator[float]:
+    """Yield the forces of ticks; a recorder takes each sample, and the next is added to `seen`."""
+    true, measured = loop.true_sample, loop.sample
+    for force in ticks:
+        if recorder is not None:
+            recorder.take(true, force, measured)
+            true = loop.true_sample
+        measured = loop.sample
+        seen.append(measured)
+        yield force
+
+
+def _forces(
+    ticks: Iterator[float], blocks: TickBlocks | None, motion: RecordedMotion, count: int
+) -> list[float]:
+    """Return the forces of so many ticks, or until the motion is unbounded."""
+    forces = list[float]()
+    while len(forces) < count and not motion.unbounded:
+        left = count - len(forces)
+        if blocks is not None:
+            forces += blocks.advance(left)
+            left = min(count - len(forces), blocks.left)
+        for force in islice(ticks, left):
+            forces.append(force)
+            if motion.unbounded:
+                break
+    return forces
+
+
 def simulate_sampled(
     loop: SampledLoop,
     motion: RecordedMotion,
@@ -118,10 +150,8 @@ def simulate_sampled(
 
     Parameters
     ----------
-    loop : SampledLoop
-        Loop to advance.
-    motion : RecordedMotion
-        Motion of `loop`.
+    loop, motion : SampledLoop, RecordedMotion
+        Loop to advance, and its motion.
     controller : Controller or None
         Controller that answers the samples; None for no control.
     duration : float
@@ -143,37 +173,24 @@ def simulate_sampled(
         If the motion is so stiff that it would take too many steps.
     """
     samples, done = round(duration / loop.period), 0
-    seen, present = [loop.sample], (loop.true_sample, loop.sample)
-    answers = loop.run((lambda _: None) if controller is None else controller.answer)
-    blocks = None
-    if recorder is None and measured is None and samples >= LEAST_TICKS:
+    seen, blocks = [loop.sample], None
+    ticks = loop.run((lambda _: None) if controller is None else controller.answer)
+    if recorder is not None or measured is not None:
+        ticks = _observed(ticks, loop, recorder, seen)
+    elif samples >= LEAST_TICKS:
         blocks = TickBlocks.of(loop, motion, controller)
     while done < samples and not motion.unbounded:
-        forces, count = list[float](), min(_BLOCK, samples - done)
-        while len(forces) < count and not motion.unbounded:
-            left = count - len(forces)
-            if blocks is not None:
-                forces += blocks.advance(left)
-                left = min(count - len(forces), blocks.left)
-            for force in islice(answers, left):
-                forces.append(force)
-                if recorder is not None:
-                    recorder.take(present[0], force, present[1])
-                    present = loop.true_sample, loop.sample
-                if measured is not None:
-                    seen.append(loop.sample)
-                if motion.unbounded:
-                    break
+        forces = _forces(ticks, blocks, motion, min(_BLOCK, samples - done))
         measure_block(motion, meter, observer)
         times = loop.period * np.arange(done, done + len(forces))
         meter.drift.force.feed(times, forces)
         if measured is not None:
             measured.feed(SampleColumns.from_samples(seen))
             measured.drift.force.feed(times, forces)
-            seen.clear()
+        seen.clear()
         done += len(forces)
         progress(done / samples)
-    meter.unbounded = meter.unbounded or motion.unbounded
+    meter.unbounded |= motion.unbounded
     if recorder is not None:
         recorder.take(loop.true_sample, answer(loop, controller), loop.sample)
     return meter.measures()
@@ -224,8 +241,7 @@ def simulate_continuous(
         advance = recorder.sampling(motion, advance)
     control = None if law is None else law.continuous
     free = duration if law is None else min(law.start_after, duration)
-    block = 10.0 * period
-    done = 0.0
+    block, done = 10.0 * period, 0.0
     for length, acts in ((free, False), (duration - free, True)):
         if control is not None:
             motion.control = control if acts else control.silenced()
@@ -238,6 +254,5 @@ def simulate_continuous(
             progress(done / duration)
     if recorder is not None:
         recorder.take_due(motion)
-    if motion.unbounded:
-        meter.unbounded = True
+    meter.unbounded |= motion.unbounded
     return meter.measures()
