@@ -23,6 +23,8 @@ _STEP = 1e-4
 """Step, as a share of the value, of constants that are linear in the coordinates."""
 _MOTION_STEP = 1e-5
 """Step, as a share of the value, of what a motion has no derivatives by."""
+_LEAST = 1e-9
+"""Share of its usual size that a constant has instead of 0."""
 _ROUGH_SAMPLES = 5
 """Samples at the start of a record whose velocity is rough."""
 _LONG_DELAY = 100.0
@@ -142,6 +144,9 @@ class Trajectories:
 
         others = [name for name in names if name in (DELAY, LAG, *self.law.by_differences)]
         by_equations = [name for name in names if name not in others]
+        # At 0 a constant may drop out of the equations, and its derivatives with it.
+        least = {name: step(name, _LEAST) for name in by_equations if values[name] == 0.0}
+        values = {**values, **least}
         try:
             drive = self._drive(values)
             moved = [

@@ -46,3 +46,14 @@ def test_a_search_whose_time_is_over_is_not_worse_than_its_start() -> None:
     task, begun = segments(0.0), TRUE | {"mass": 1.05 * TRUE["mass"]}
     found = refine(task, FREE, begun)
     assert found.loss <= 1.001 * best_starts(task, begun).loss
+
+
+def test_a_constant_at_zero_has_derivatives() -> None:
+    """Without viscous friction the equations have no such constant."""
+    task, begun = segments(), TRUE | {"viscous": 0.0}
+    starts = best_starts(task, begun).starts
+    outputs, by_names, _ = task.sensitivities(begun, starts, ["viscous"])
+    step = 1e-3 * TRUE["viscous"]
+    moved, _, _ = task.sensitivities(begun | {"viscous": step}, starts, ["viscous"])
+    change = moved - outputs
+    assert by_names[:, 0] * step == pytest.approx(change, abs=1e-2 * float(abs(change).max()))
