@@ -11,6 +11,7 @@ from stickslip_ros.api.page import Summary
 from stickslip_ros.api.results import Parts, Table, TabularResult, attributes
 from stickslip_ros.api.scenarios import ScenarioLike, as_scenario
 from stickslip_ros.measures.cycle_measures import Measures
+from stickslip_ros.measures.sample_meter import NOT_JUDGED
 from stickslip_ros.motion.trajectory import (
     MeasuredMotorTrajectory,
     SampleRecorder,
@@ -172,6 +173,8 @@ def measured_run(
         recorder=recorder,
         measured=measured,
     )
-    measures, truth = (true, None) if measured is None else (measured.measures(), true)
-    notes = simulation.notes_on(scenario, measured, measures)
-    return Run(scenario, duration, continuous, measures, truth, notes, recorder, history)
+    if measured is not None:
+        measures, notes, _ = measured.measured()
+        return Run(scenario, duration, continuous, measures, true, notes, recorder, history)
+    notes = [NOT_JUDGED] if scenario.reading.varies else []
+    return Run(scenario, duration, continuous, true, None, notes, recorder, history)

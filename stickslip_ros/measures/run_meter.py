@@ -9,9 +9,9 @@ import numpy as np
 
 from stickslip_ros.arrays import BoolArray, FloatArray
 from stickslip_ros.measures.control_forces import ForceMeter, ForceSettler
-from stickslip_ros.measures.cycle_fit import MeanCycle
+from stickslip_ros.measures.mean_cycle import MeanCycle
 from stickslip_ros.measures.sample_assumptions import EXACT, SampleAssumptions
-from stickslip_ros.measures.sample_meter import MotionObserver, SampleMeter
+from stickslip_ros.measures.sample_meter import MeasuredSamples, MotionObserver, SampleMeter
 from stickslip_ros.measures.sampling_grid import LONGEST_GAP
 from stickslip_ros.measures.timing import Timing
 from stickslip_ros.samples import NO_FORCES, ForceColumns
@@ -102,10 +102,11 @@ class RunMeter:
             time = (sent.stamp - self.motion.origin) / NANOSECONDS
             self._observer.take_control(time, sent.force, acted)
 
-    def report(self, *, quick: bool = False) -> dict[str, Any]:
+    def report(self, measured: MeasuredSamples | None = None) -> dict[str, Any]:
         """Return the measures and counts by name, ready for JSON; SI units.
 
-        `notes` are sentences that say why the measures may be wrong. `quick` as in `SampleMeter`.
+        They are those that the samples tell, which may have been `measured`. `notes` are sentences
+        that say why the measures may be wrong.
         """
         motion, timing = self.motion, self.timing
         notes: list[str] = []
@@ -118,9 +119,9 @@ class RunMeter:
         if timing is not None and (complaint := timing.warning()):
             doubt = "" if timing.in_time else "the regime is doubtful: "
             notes.append(doubt + complaint)
-        measures = motion.measures(quick=quick)
+        measured = measured or motion.measured()
         return {
-            **measures.as_dict(),
+            **measured.measures.as_dict(),
             "position_noise": motion.position_noise,
             "peak_force": self.force.peak_force,
             "resting_force": self.force.resting_force,
@@ -133,7 +134,7 @@ class RunMeter:
             "samples": samples,
             "lost_samples": lost,
             "duration": None if motion.mixed else motion.duration,
-            "notes": [*notes, *self._force_notes(), *motion.notes(measures)],
+            "notes": [*notes, *self._force_notes(), *measured.notes],
         }
 
     def _force_notes(self) -> list[str]:

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import copysign, inf
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -15,7 +15,6 @@ from stickslip_ros.measures.breakpoints import (
     Breakpoints,
     breakpoints_from_samples,
 )
-from stickslip_ros.measures.cycle_fit import MeanCycle
 from stickslip_ros.measures.cycle_measures import (
     UNBOUNDED_BELT_SPEEDS,
     Cycle,
@@ -25,10 +24,18 @@ from stickslip_ros.measures.cycle_measures import (
 )
 from stickslip_ros.measures.cycle_meter import CycleMeter
 from stickslip_ros.measures.drift import Drift
+from stickslip_ros.measures.mean_cycle import MeanCycle
 from stickslip_ros.measures.noise import FEW_SAMPLES
-from stickslip_ros.measures.noisy_meter import NoisyCycleMeter
 from stickslip_ros.measures.sample_assumptions import EXACT, SampleAssumptions
+from stickslip_ros.measures.sample_window import Window, WindowMeter
 from stickslip_ros.measures.sampling_grid import LONGEST_GAP, SamplingGrid, whole
+from stickslip_ros.measures.window_measures import (
+    line,
+    measure,
+    other_guide,
+    rests_and_slips,
+    segmented_measures,
+)
 from stickslip_ros.samples import SampleColumns
 from stickslip_ros.stamps import NANOSECONDS
 from stickslip_ros.text import quantity
@@ -72,6 +79,38 @@ class MotionObserver(Protocol):
         ...
 
 
+class MeasuredSamples(NamedTuple):
+    """What samples tell of a motion."""
+
+    measures: Measures
+    """Means over the last whole cycles."""
+    notes: Sequence[str]
+    """Sentences that say why the measures may be wrong."""
+    mean_cycle: MeanCycle | None
+    """Fit to the cycles; None for exact samples and cycles that are not alike."""
+
+
+class _Speeds:
+    """Extremes of the speeds so far, m/s."""
+
+    def __init__(self) -> None:
+        self.belt = self.slip = self.slide = 0.0
+        self.lasting = 0.0  # of the slide since the belt moves: what it was before tells nothing
+        self.belt_varies = False
+
+    def follow(self, samples: SampleColumns, count: int) -> None:
+        """Add samples; a speed lasts for so many of them."""
+        belt_speed, speed = np.abs(samples.belt_velocity), np.abs(samples.velocity)
+        self.belt_varies |= bool(np.ptp(belt_speed) > 1e-6 * belt_speed[0])
+        velocity = samples.velocity[np.logical_or.accumulate(belt_speed + self.belt > 0.0)]
+        self.belt = max(self.belt, float(belt_speed.max()))
+        self.slide = max(self.slide, float(speed.max()))
+        if len(velocity) >= count:
+            rows = sliding_window_view(velocity, count)
+            lasting = max(float(rows.min(axis=1).max()), -float(rows.max(axis=1).min()))
+            self.lasting = max(self.lasting, lasting)
+
+
 class SampleMeter:
     """Measures a motion from its samples, fed in blocks of columns of any length.
 
@@ -105,23 +144,16 @@ class SampleMeter:
         """Number of samples so far."""
         self.first = inf
         """Stamp of the first one, ns; infinite before it."""
-        self.steps_back = 0
-        """Number of samples whose stamp is not later than the previous one."""
-        self._strays = 0  # those, and others that are not whole periods after the previous one
-        self.mean_cycle: MeanCycle | None = None
-        """Fit of the last `measures`; None for exact samples and cycles that are not alike."""
-        self._observer = observer
-        self._grid = SamplingGrid()
-        self._meter = CycleMeter(window)
-        self._noisy_meter = NoisyCycleMeter(window)
         self.drift = Drift()
         """Trends of the run; those of the control force are for its user to feed."""
+        self._steps_back = 0  # number of samples whose stamp is not later than the previous one
+        self._strays = 0  # those, and others that are not whole periods after the previous one
+        self._observer = observer
+        self._grid, self._elapsed = SamplingGrid(), 0
+        self._meter, self._window = CycleMeter(window), WindowMeter(window)
         self._last: SampleColumns | None = None
-        self._elapsed = 0
-        self._fastest_belt = self._fastest_slip = self._fastest = 0.0
-        self._belt_varies = False
+        self._speeds = _Speeds()
         self._per_cycle = inf  # samples of the last cycle of exact samples
-        self._lasting_speed = 0.0  # since the belt moves: what it was before tells nothing
 
     def feed(self, samples: SampleColumns) -> list[Cycle]:
         """Add the samples that follow; return the cycles completed by them.
@@ -138,19 +170,20 @@ class SampleMeter:
             return []
         self.first = min(self.first, float(samples.stamp[0]))
         steps, period = np.diff(samples.stamp), self.reading.period
-        self.steps_back += np.count_nonzero(steps <= 0)
+        self._steps_back += np.count_nonzero(steps <= 0)
         astray = steps <= 0 if period is None else ~whole(steps, period)
         self._strays += int(np.count_nonzero(astray))
         cycles: list[Cycle] = []
         starts = [0, *self._grid.cuts(samples.stamp)]
         for start, end in zip(starts, [*starts[1:], len(samples)], strict=True):
             segment = samples[start:end]
-            self._look_for_unbounded(segment)
+            # Impulses go back.
+            self._speeds.follow(segment, _LASTING_SAMPLES if self.noisy else 1)
             if len(segment) == 1 and end < len(samples):
                 continue  # a single sample is no motion, and there may be very many of them
             if start > 0:
                 self._meter.interrupt()
-                self._noisy_meter.window.interrupt()
+                self._window.interrupt()
                 self._last = None
             cycles += self._feed_segment(segment)
         self._last = samples[-1:]
@@ -174,46 +207,17 @@ class SampleMeter:
     @property
     def noisy(self) -> bool:
         """Whether the samples have noise, as far as it is known."""
-        given = self.reading.noisy
-        return self._noisy_meter.noisy if given is None else given
+        return self._window.noisy if self.reading.noisy is None else self.reading.noisy
 
     @property
     def position_noise(self) -> float | None:
         """Standard deviation of the noise of the positions, m; None for exact samples."""
-        return self._noisy_meter.window.noise if self.noisy else None
+        return self._window.noise if self.noisy else None
 
-    def measures(self, *, quick: bool = False) -> Measures:
-        """Return the means over the last whole cycles.
-
-        With `quick`, cycles under noise are measured one by one instead of together, which takes a
-        thousandth of the time and is less accurate.
-        """
-        if self.mixed:
-            self.mean_cycle = None
-            return without_cycles(None, None)
-        limit = UNBOUNDED_BELT_SPEEDS * self._fastest_belt
-        # The last sample of a plant whose motion diverges has just that speed.
-        ended = self._fastest >= (1.0 - 1e-9) * self.reading.unbounded_speed
-        unbounded = ended or self._lasting_speed > limit > 0.0
-        self._meter.unbounded = unbounded
-        window = self._noisy_meter.window
-        self._meter.within = window.within = self.reading.within
-        window.stick_speed, window.fastest_belt = self._stick_speed, self._fastest_belt
-        few = not self.noisy and self._per_cycle < FEW_SAMPLES and window.line
-        self.mean_cycle = None
-        if unbounded or not (self.noisy or few):
-            found = self._meter.measures()
-            segmented = None if unbounded or not self._may_rest else window.stick_slip()
-            if segmented is not None and segmented.rests and not segmented.agrees(found):
-                return window.segmented(segmented)
-            if found.errors is not None and found.stick_fraction:
-                error = max(found.errors["stick_fraction"], _EDGE_ERROR / self._per_cycle)
-                found = replace(found, errors={**found.errors, "stick_fraction": error})
-        else:
-            found, self.mean_cycle = window.measures(quick=quick)
-        self.drift.resolution = window.step
-        self.drift.judged = not (self.reading.varies or self._belt_varies)
-        return with_drift(found, self.drift)
+    @property
+    def step(self) -> float:
+        """Step of the encoder, m; 0 without one."""
+        return self._window.step
 
     @property
     def other_guide(self) -> tuple[float, float] | None:
@@ -221,36 +225,78 @@ class SampleMeter:
 
         Behind it is the share of the time in which it does; None where there is none.
         """
-        return self._noisy_meter.window.other_guide()
+        return other_guide(self._window.window(), self._known)
 
-    def notes(self, measures: Measures) -> list[str]:
-        """Return sentences that say why these measures, its last ones, may be wrong."""
+    def measures(self, *, quick: bool = False) -> Measures:
+        """Return the measures as `measured` does."""
+        return self.measured(quick=quick).measures
+
+    def measured(self, *, quick: bool = False) -> MeasuredSamples:
+        """Return the means over the last whole cycles, and why they may be wrong.
+
+        With `quick`, cycles under noise are measured one by one instead of together, which takes a
+        thousandth of the time and is less accurate.
+        """
         if self.mixed:
-            return [
+            note = (
                 f"{self._strays} of {self.samples} samples are not whole periods after the one "
                 "before, as where several plants publish on one topic: motion, duration and lost "
                 "samples are not known"
-            ]
+            )
+            return MeasuredSamples(without_cycles(None, None), [note], None)
+        window, mean = self._window.window(), None
+        few = not self.noisy and self._per_cycle < FEW_SAMPLES and line(window, self._known)
+        if self._unbounded or not (self.noisy or few):
+            found = self._exact_measures(window)
+        else:
+            found, mean = measure(window, self._known, quick=quick)
+        varies = self.reading.varies or self._speeds.belt_varies
+        self.drift.resolution, self.drift.judged = self.step, not varies
+        found = with_drift(found, self.drift)
+        return MeasuredSamples(found, self._notes(found, mean), mean)
+
+    @property
+    def _unbounded(self) -> bool:
+        """Whether the motion diverges."""
+        limit = UNBOUNDED_BELT_SPEEDS * self._speeds.belt
+        # The last sample of a plant whose motion diverges has just that speed.
+        ended = self._speeds.slide >= (1.0 - 1e-9) * self.reading.unbounded_speed
+        return ended or self._speeds.lasting > limit > 0.0
+
+    def _exact_measures(self, window: Window) -> Measures:
+        self._meter.unbounded, self._meter.within = self._unbounded, self.reading.within
+        found = self._meter.measures()
+        # The velocities of other machines are filtered, and those on a guide at rest are not those
+        # of a belt.
+        may_rest = self.reading.noisy is None or self._speeds.belt == 0.0
+        rests = rests_and_slips(window, self._known) if may_rest and not self._unbounded else None
+        if rests is not None and rests.rests and not rests.agrees(found):
+            return segmented_measures(window, rests)
+        if found.errors is not None and found.stick_fraction:
+            error = max(found.errors["stick_fraction"], _EDGE_ERROR / self._per_cycle)
+            found = replace(found, errors={**found.errors, "stick_fraction": error})
+        return found
+
+    def _notes(self, measures: Measures, mean: MeanCycle | None) -> list[str]:
         notes: list[str] = []
-        if self.steps_back:
+        if self._steps_back:
             notes.append(
-                f"the stamp of {self.steps_back} of {self.samples} samples is not later than "
+                f"the stamp of {self._steps_back} of {self.samples} samples is not later than "
                 "the one before, and the motion is cut there: the plant was restarted, or the "
                 "samples of several plants are mixed"
             )
-        step = self.drift.resolution
-        if step and measures.amplitude and measures.cycles > 2 and measures.errors is None:
+        if self.step and measures.amplitude and measures.cycles > 2 and measures.errors is None:
             notes.append(
-                f"the amplitude is only {measures.amplitude / step:.2g} steps of the encoder: the "
-                "standard errors are not known"
+                f"the amplitude is only {measures.amplitude / self.step:.2g} steps of the encoder: "
+                "the standard errors are not known"
             )
         if measures.regime is None and measures.period is not None:
             notes.append(
                 "the regime is not known: the positions do not tell whether the slide rests in its "
                 "cycles or moves slowly"
             )
-        mean, belt = self.mean_cycle, self._last.belt_velocity[-1] if self._last else 0.0
-        if mean is not None and mean.stick is not None and not self._stick_speed:
+        belt = self._last.belt_velocity[-1] if self._last else 0.0
+        if mean is not None and mean.stick is not None:
             velocity, error = copysign(mean.stick.fit.belt_speed, belt), mean.stick.speed_error
             if abs(velocity - belt) > _LEAST_ERRORS * error + _LEAST_SHARE * abs(belt):
                 notes.append(
@@ -261,14 +307,21 @@ class SampleMeter:
                 )
         return notes if self.drift.judged else [*notes, NOT_JUDGED]
 
+    @property
+    def _known(self) -> SampleAssumptions:
+        """What is known of the samples, with a stick speed."""
+        speed = self.reading.stick_speed
+        if speed is None:
+            speed = STICK_SHARE * (self._speeds.belt or self._speeds.slip)
+        return self.reading._replace(stick_speed=speed)
+
     def _feed_segment(self, samples: SampleColumns) -> list[Cycle]:
         stamp = samples.stamp
         time = (stamp - stamp[0] + float(self._elapsed)) * 1e-9
         self._elapsed += int(stamp[-1] - stamp[0])
         new, belt = slice(0 if self._last is None else 1, None), samples.belt_velocity
         self.drift.position.feed(time[new], samples.position[new])
-        slip = np.abs(samples.velocity - belt)
-        self._fastest_slip = max(self._fastest_slip, float(slip.max()))
+        self._speeds.slip = max(self._speeds.slip, float(np.abs(samples.velocity - belt).max()))
         given, breakpoints, cycles = self.reading.noisy, None, list[Cycle]()
         if not given or self._observer is not None:
             with np.errstate(over="ignore", invalid="ignore"):
@@ -277,20 +330,20 @@ class SampleMeter:
                     samples.position,
                     samples.velocity,
                     belt,
-                    stick_speed=self._stick_speed,
+                    stick_speed=self._known.stick_speed or 0.0,
                     exact_times=self._grid.on_grid(np.diff(stamp)),
                 )
             if self._last is not None:
                 breakpoints = breakpoints[1:]  # the first sample was fed with the previous block
-            cycles = self._meter.feed(breakpoints, float(belt[-1]), self._fastest_belt)
+            cycles = self._meter.feed(breakpoints, float(belt[-1]), self._speeds.belt)
             if cycles and len(time) > 1:
                 self._per_cycle = cycles[-1].period / float(np.median(np.diff(time)))
-        if given is not False or self._fastest_belt == 0.0 or self._per_cycle < FEW_SAMPLES:
-            under_noise = self._noisy_meter.feed(
+        if given is not False or self._speeds.belt == 0.0 or self._per_cycle < FEW_SAMPLES:
+            under_noise = self._window.feed(
                 time[new], samples.position[new], samples.velocity[new], belt[new]
             )
             cycles = under_noise if self.noisy else cycles
-        ends = (self._noisy_meter if self.noisy else self._meter).ends
+        ends = (self._window if self.noisy else self._meter).ends
         self.drift.feed_cycles(ends, cycles)
         if self._observer is not None and breakpoints is not None:
             observed = (stamp - self.origin) / NANOSECONDS
@@ -307,29 +360,3 @@ class SampleMeter:
                 )
             )
         return cycles
-
-    @property
-    def _may_rest(self) -> bool:
-        """Whether rests and slips are looked for in samples that seem to be exact.
-
-        The velocities of other machines are filtered, and those on a guide at rest are not those of
-        a belt.
-        """
-        return self.reading.noisy is None or self._fastest_belt == 0.0
-
-    @property
-    def _stick_speed(self) -> float:
-        given = self.reading.stick_speed
-        return STICK_SHARE * (self._fastest_belt or self._fastest_slip) if given is None else given
-
-    def _look_for_unbounded(self, samples: SampleColumns) -> None:
-        belt_speed = np.abs(samples.belt_velocity)
-        self._belt_varies |= bool(np.ptp(belt_speed) > 1e-6 * belt_speed[0])
-        velocity = samples.velocity[np.logical_or.accumulate(belt_speed + self._fastest_belt > 0.0)]
-        self._fastest_belt = max(self._fastest_belt, float(belt_speed.max()))
-        self._fastest = max(self._fastest, float(np.abs(samples.velocity).max()))
-        count = _LASTING_SAMPLES if self.noisy else 1  # impulses go back
-        if len(velocity) >= count:
-            rows = sliding_window_view(velocity, count)
-            lasting = max(float(rows.min(axis=1).max()), -float(rows.max(axis=1).min()))
-            self._lasting_speed = max(self._lasting_speed, lasting)

@@ -18,7 +18,7 @@ import numpy as np
 
 from stickslip_ros.arrays import BoolArray, FloatArray
 from stickslip_ros.measures.cycle_measures import Cycle, CycleMeans, Measures
-from stickslip_ros.measures.noise import FEWEST_SAMPLES, encoder_step, white_noise
+from stickslip_ros.measures.noise import FEWEST_SAMPLES, ROUNDING, encoder_step, white_noise
 
 _TAIL, _GROWTH = 2048, 4
 """Number of last samples in which cycles are looked for first, and its growth while they are few.
@@ -27,8 +27,6 @@ _BLOCKS = 4096
 """Number of means of positions from which the mean speed is taken."""
 _LOOK = 4096
 """Number of last samples from which noise and step are estimated."""
-ROUNDING = 1e-9
-"""Rounding of numbers in tables, as a share of the largest."""
 _REST_SHARE = 0.5
 """Share of the mean speed up to which a slide may rest."""
 _STEPS, _DEVIATIONS = 1.3, 3.5
@@ -80,10 +78,8 @@ class StickSlip(CycleMeans):
 
     errors: Cycle
     """Their standard errors, SI units, with those of the edges."""
-    start: float
-    """Release from which the first of these cycles begins, s."""
     end: float
-    """Release with which the last of them ends, s."""
+    """Release with which the last of these cycles ends, s."""
     feed: float
     """Mean velocity of the slide relative to the guide in these cycles, m/s."""
     creep: float
@@ -222,29 +218,29 @@ def _measured(
         feed = 0.0
     if not belt_velocity:
         position = position - feed * (time - time[0])
-    rows = np.searchsorted(time, release)
-    width = float(np.median([slip.duration for slip in used])) * _SMOOTH_SHARE
-    reach = int(min(width * (len(time) - 1) / float(time[-1] - time[0]), _WIDEST))
-    extremes = _extremes(time, position, rows.tolist(), reach)
-    cycle, errors = _means(extremes, release, shares)
+    means = _means(time, position, used, release, shares)
+    errors = means.errors
+    assert errors is not None  # of three cycles
     edges = np.mean([slip.errors for slip in used], axis=0) * len(used) / len(shares) / period
-    sure = hypot(errors.stick_fraction, float(np.hypot(*edges)))
     errors = replace(
         errors,
         amplitude=hypot(errors.amplitude, max(step, noise) / sqrt(8.0 * len(shares))),
         midpoint=hypot(errors.midpoint, max(step, noise) / sqrt(8.0 * len(shares))),
-        stick_fraction=sure,
+        stick_fraction=hypot(errors.stick_fraction, float(np.hypot(*edges))),
     )
     creep, creep_error = _creep(time, relative, used, noise, step)
     if creep_error == inf:
         return None
     unit = abs(belt_velocity) or speed
     return StickSlip(
-        cycle=cycle,
+        cycle=replace(
+            means.cycle,
+            frequency=1.0 / period,
+            stick_fraction=1.0 - float(np.sum(durations)) / float(release[-1] - release[0]),
+        ),
         errors=errors,
         sticks=True,
-        amplitudes=extremes[0],
-        start=float(release[0]),
+        amplitudes=means.amplitudes,
         end=float(release[-1]),
         feed=feed,
         creep=creep / unit,
@@ -442,20 +438,18 @@ def _extremes(
 
 
 def _means(
-    extremes: tuple[FloatArray, FloatArray, FloatArray], release: FloatArray, shares: FloatArray
-) -> tuple[Cycle, Cycle]:
-    """Return the means over cycles, and their standard errors."""
-    periods = np.diff(release)
-    count = len(periods)
-    columns = [*extremes, periods, 1.0 / periods, shares]
-    amplitude, velocity, middle, period, frequency, share = (
-        float(np.std(each, ddof=1)) / sqrt(count) for each in columns
-    )
-    errors = Cycle(amplitude, velocity, middle, period, frequency, share)
-    mean = [float(np.mean(each)) for each in columns]
-    weighted = float(shares @ periods) / float(periods.sum())
-    cycle = Cycle(mean[0], mean[1], mean[2], mean[3], 1.0 / mean[3], weighted)
-    return cycle, errors
+    time: FloatArray,
+    position: FloatArray,
+    slips: list[_Slip],
+    release: FloatArray,
+    shares: FloatArray,
+) -> CycleMeans:
+    """Return the means over the cycles from release to release that rest for these shares."""
+    width = float(np.median([slip.duration for slip in slips])) * _SMOOTH_SHARE
+    reach = int(min(width * (len(time) - 1) / float(time[-1] - time[0]), _WIDEST))
+    extremes = _extremes(time, position, np.searchsorted(time, release).tolist(), reach)
+    columns = *extremes, np.diff(release), 1.0 / np.diff(release), shares
+    return CycleMeans.over([Cycle(*each) for each in np.transpose(columns).tolist()])
 
 
 def _creep(

@@ -1,18 +1,44 @@
-"""Single cycles of positions with noise: reversals, and what is measured between them."""
+"""Single cycles of positions with noise: reversals, and what is measured between them.
 
+Extremes and velocities are those of parabolas through the samples beside them, by least squares
+(A. Savitzky and M. J. E. Golay, Analytical Chemistry 36, 1964) at times that need not be even.
+"""
+
+from dataclasses import dataclass
 from math import isfinite, nan, pi, sqrt
+from typing import NamedTuple
 
 import numpy as np
 
-from stickslip_ros.arrays import FloatArray
+from stickslip_ros.arrays import FloatArray, Table
 from stickslip_ros.measures.cycle_measures import Cycle
 from stickslip_ros.measures.noise import medians
-from stickslip_ros.measures.noisy_samples import NoisySamples, Point
 
 _PASSING_SHARE = 1.15
 """Share of the belt speed beyond which a slide has passed the belt; calibrations err by less."""
 LEAST_STICK = 0.03
 """Stick fraction up to which a single cycle counts as one without a stick: it errs by as much."""
+
+
+@dataclass
+class NoisySamples(Table):
+    """Columns of samples without impulses; SI units."""
+
+    time: FloatArray
+    position: FloatArray
+    velocity: FloatArray
+    belt: FloatArray
+
+    def row(self, time: float) -> int:
+        """Return the first row that is not earlier than a time, s."""
+        return int(np.searchsorted(self.time, time))
+
+
+class Point(NamedTuple):
+    """A position at an instant."""
+
+    time: float
+    position: float
 
 
 def reversals(position: FloatArray, least: float) -> list[tuple[int, int]]:
@@ -47,9 +73,8 @@ def fit_reach(samples: NoisySamples, low: int, high: int, noise: float) -> int:
 def vertex(samples: NoisySamples, at: int, reach: int) -> Point:
     """Return the highest or lowest point near a row.
 
-    It is the vertex of the parabola that fits the samples up to `reach` rows beside it best, by
-    least squares: a local polynomial (Savitzky and Golay, Analytical Chemistry 36, 1964) at times
-    that need not be even. Where there are too few samples, or no bend, it is the sample.
+    It is the vertex of the parabola through the samples up to `reach` rows beside it. Where there
+    are too few samples, or no bend, it is the sample.
     """
     rows = slice(max(at - reach, 0), at + reach + 1)
     time, position = samples.time[rows], samples.position[rows]
@@ -73,7 +98,7 @@ def cycle_between(
     """Return the cycle between two lowest points, with its highest sample at the row `high`.
 
     Displacements are those of the fitted extremes; velocities, and the stick by them, are slopes of
-    parabolas through as many samples (Savitzky and Golay, 1964). None without a period.
+    parabolas through as many samples. None without a period.
     """
     period = end.time - start.time
     if period <= 0.0:

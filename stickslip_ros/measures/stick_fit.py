@@ -1,4 +1,10 @@
-"""Stick edges from positions with noise: the motion near the speed of the belt, fitted."""
+"""Stick edges from positions with noise: the motion near the speed of the belt, fitted.
+
+A slide on a spring with some forms of friction is integrated from its edges (single shooting) and
+fitted by nonlinear least squares. Where the data do not tell one form from another, the edges are
+means over the forms with the weights of their information criteria (K. P. Burnham and D. R.
+Anderson, Model selection and multimodel inference, 2002).
+"""
 
 from dataclasses import dataclass
 from math import inf
@@ -26,7 +32,7 @@ parameters but one: a small one makes the edge at the departure uncertain, and l
 
 @dataclass(frozen=True)
 class StickFit:
-    """Fitted motion on both sides of a stick, or of the highest speed of a motion without one.
+    """Fitted motion on both sides of a stick.
 
     Near the belt's speed the displacement r relative to the belt obeys
 
@@ -35,24 +41,22 @@ class StickFit:
     on both sides of the stick, from r = r' = 0 at its edges: the spring has reached the limit of
     the friction at departure, and is short of it by k v_b t_stick at landing. The powers of r' and
     the fall j of the friction, at once or with n = 1 or 2, are the kinetic curve less the damping,
-    over the mass. A motion without a stick obeys it, too, with r' < 0 where r'' = 0.
+    over the mass.
     """
 
     centre: float
-    """Middle of the stick, or instant of the highest speed, s."""
+    """Middle of the stick, s."""
     stick_time: float
-    """Duration of the stick, s; 0 without."""
+    """Duration of the stick, s."""
     belt_speed: float
-    """Speed during the stick, m/s; the given one without."""
+    """Speed during the stick, m/s."""
     offset: float
     """Position of a slide that sticks, at time 0, m."""
     residual: FloatArray
     """Differences between positions and fit, m; shape (n,)."""
     jacobian: FloatArray
-    """Derivatives of the fit by its free parameters: the centre, the stick time, the belt speed of
-    a fit with a stick, and others; shape (n, p)."""
-    squares: float
-    """Sum of the squared residuals, m^2."""
+    """Derivatives of the fit by its free parameters: the centre, the stick time, the belt speed,
+    and others; shape (n, p)."""
     spread: FloatArray
     """Covariance of centre, stick time and belt speed by the form of the friction, shape (3, 3)."""
 
@@ -66,6 +70,11 @@ class StickFit:
         """Instant at which the slide stops to stick, s."""
         return self.centre + self.stick_time / 2.0
 
+    @property
+    def squares(self) -> float:
+        """Sum of the squared residuals, m^2."""
+        return float(self.residual @ self.residual)
+
 
 def fit_stick(
     time: FloatArray,
@@ -74,34 +83,31 @@ def fit_stick(
     frequency: float,
     stick_time: float,
     *,
-    sticks: bool = True,
     may_fall: bool = True,
 ) -> StickFit:
     """Fit the motion around a stick at time 0, and the belt speed, to positions, m, at times, s.
 
-    Nonlinear least squares, with the motion integrated from its edges (single shooting). Where the
-    data do not tell one form of the friction from another, the edges are means over the forms, with
-    the weights of their information criteria by Akaike (Burnham and Anderson, Model selection,
-    2002), and their `spread` is an error; residuals are those of the best form.
+    The edges are means over the forms of the friction, and their `spread` is an error; residuals
+    are those of the best form.
 
     The scale of the fit is the angular `frequency` of the cycle, rad/s; `belt_speed`, above 0 m/s,
-    and `stick_time`, s, are the first guesses. Without `sticks` the belt has this speed, and the
-    highest speed of the slide is another. Unless it `may_fall`, the friction is a cubic.
+    and `stick_time`, s, are the first guesses. Without a stick time the slide touches a speed
+    near this one, and does not stick. Unless it `may_fall`, the friction is a cubic.
     """
     reach = (float(np.abs(time).max()) - stick_time / 2.0) * frequency
     length = belt_speed / frequency
     times, relative = time * frequency, (position - belt_speed * time) / length
-    motion = _Motion(times, relative, (1.0 + _MARGIN) * reach, sticks)
+    motion = _Motion(times, relative, (1.0 + _MARGIN) * reach)
     start = np.zeros(len(_LOWER_BOUNDS))
-    start[_SIZE] = max(stick_time * frequency, 0.05) if sticks else 0.02
+    start[_SIZE] = max(stick_time * frequency, 0.05) if stick_time > 0.0 else _LEAST_SIZE
     start[_STIFFNESS], start[_OFFSET] = 1.2, float(np.median(relative))
-    fits = [motion.fit(start, _SMOOTH if sticks else _NO_STICK)]
-    if sticks and may_fall:
-        start, noise = fits[0].values.copy(), (fits[0].squares / len(time)) ** 0.5
+    fits = [motion.fit(start, _SMOOTH if stick_time > 0.0 else _TOUCHING)]
+    if stick_time > 0.0 and may_fall:
+        start, noise = fits[0].values.copy(), rms(fits[0].residual)
         for free, values in _FALLS:
             start[[*values]] = [*values.values()]
             fits.append(motion.fit(start, free, noise))
-    squares = np.array([fit.squares for fit in fits])
+    squares = np.array([fit.residual @ fit.residual for fit in fits])
     freedom = max(len(time) - len(_STEEP), 1)
     criterion = squares / max(squares.min(), 1e-300) * freedom
     criterion += [0.0, _JUMP_LEVEL, 0.0, 0.0][: len(fits)]
@@ -110,20 +116,16 @@ def fit_stick(
     found = np.array([fit.values for fit in fits])
     mean = weight @ found
     apart = (found - mean)[:, [_CENTRE, _SIZE, _BELT]]
-    spread = (apart.T * weight) @ apart
     units = np.array([1.0 / frequency, 1.0 / frequency, belt_speed])
     scale = np.append(units, np.ones(best.jacobian.shape[1] - 3))
-    if not sticks:
-        scale[2] = 1.0
     return StickFit(
         centre=float(mean[_CENTRE]) / frequency,
-        stick_time=float(mean[_SIZE]) / frequency if sticks else 0.0,
+        stick_time=float(mean[_SIZE]) / frequency,
         belt_speed=belt_speed * (1.0 + float(mean[_BELT])),
         offset=float(mean[_OFFSET]) * length,
         residual=-best.residual * length,
         jacobian=best.jacobian * length / scale,
-        squares=best.squares * length**2,
-        spread=spread * np.outer(units, units),
+        spread=(apart.T * weight) @ apart * np.outer(units, units),
     )
 
 
@@ -132,16 +134,12 @@ class _Fit(NamedTuple):
     residual: FloatArray
     jacobian: FloatArray
 
-    @property
-    def squares(self) -> float:
-        return float(self.residual @ self.residual)
-
 
 _CENTRE, _SIZE, _BELT, _STIFFNESS, _SLOPE, _SECOND, _THIRD, _OFFSET, _FALL, _SCALE = range(10)
 _EXPONENT = 10
 _SMOOTH = [_CENTRE, _SIZE, _BELT, _STIFFNESS, _SLOPE, _SECOND, _THIRD, _OFFSET]
 _STEEP = [_CENTRE, _SIZE, _BELT, _STIFFNESS, _SLOPE, _OFFSET, _FALL, _SCALE]
-_NO_STICK = [each for each in _SMOOTH if each != _BELT]
+_TOUCHING = [each for each in _SMOOTH if each != _SIZE]
 _STRAIGHT = {_SLOPE: 0.0, _SECOND: 0.0, _THIRD: 0.0, _FALL: 0.5, _SCALE: 0.5}
 _FALLS = (
     ([*_SMOOTH, _FALL], {_FALL: 0.1}),
@@ -161,8 +159,8 @@ _PRIOR[range(3), [_SECOND, _THIRD, _BELT]] = 1.0 / np.array([_CURVATURE, _CURVAT
 class _Motion:
     """Positions near a stick, in units of 1 / frequency and of belt speed / frequency."""
 
-    def __init__(self, time: FloatArray, relative: FloatArray, reach: float, sticks: bool) -> None:
-        self._time, self._relative, self._reach, self._sticks = time, relative, reach, sticks
+    def __init__(self, time: FloatArray, relative: FloatArray, reach: float) -> None:
+        self._time, self._relative, self._reach = time, relative, reach
 
     def fit(self, start: FloatArray, free: list[int], noise: float = 0.0) -> _Fit:
         """Return the fit with the least squares by the parameters that are free.
@@ -172,10 +170,7 @@ class _Motion:
         from scipy.optimize import least_squares  # takes long to import
 
         values, jacobian = start.copy(), np.empty(0)
-        lowest = _LOWER_BOUNDS.copy()
-        if not self._sticks:
-            lowest[[_SIZE, _STIFFNESS]] = -0.3
-        inside = np.clip(start, lowest + 1e-9, _UPPER_BOUNDS - 1e-9)[free]
+        inside = np.clip(start, _LOWER_BOUNDS + 1e-9, _UPPER_BOUNDS - 1e-9)[free]
 
         def residual(part: FloatArray) -> FloatArray:
             nonlocal jacobian
@@ -195,7 +190,7 @@ class _Motion:
                 residual,
                 inside,
                 jac=rates,  # pyright: ignore[reportArgumentType]
-                bounds=(lowest[free], _UPPER_BOUNDS[free]),
+                bounds=(_LOWER_BOUNDS[free], _UPPER_BOUNDS[free]),
                 x_scale="jac",
                 ftol=1e-6,
                 xtol=1e-6,
@@ -209,7 +204,7 @@ class _Motion:
     def _fitted(self, trials: FloatArray) -> FloatArray:
         """Return the fit for k sets of parameters, shape (k, n)."""
         count, belt = len(trials), trials[:, _BELT, None]
-        half = trials[:, _SIZE] / 2.0 if self._sticks else np.zeros(count)
+        half = trials[:, _SIZE] / 2.0
         motion = self._integrate(trials)
         since_centre = self._time - trials[:, _CENTRE, None]
         fitted = trials[:, _OFFSET, None] + belt * self._time
@@ -229,12 +224,8 @@ class _Motion:
         )
         exponent = float(trials[0, _EXPONENT])
         side = np.repeat([-1.0, 1.0], len(trials))
-        if self._sticks:
-            # At the landing the spring is short of the limit by the time of the stick.
-            early, gap, limit = np.where(side < 0.0, size, 0.0), np.zeros_like(size), -fall
-        else:
-            early, gap = np.zeros_like(size), size
-            limit = gap * (slope + gap * (-second + gap * third))
+        # At the landing the spring is short of the limit by the time of the stick.
+        early = np.where(side < 0.0, size, 0.0)
 
         def rate(state: FloatArray, time: FloatArray) -> FloatArray:
             # Far from the solution the motion diverges within reach.
@@ -242,10 +233,10 @@ class _Motion:
             friction = velocity * (slope + velocity * (second + velocity * third))
             if exponent > 0.0:
                 friction += fall * np.exp(-(np.abs(velocity / scale) ** exponent))
-            return np.array([state[1], friction + limit - stiffness * (state[0] + time - early)])
+            return np.array([state[1], friction - fall - stiffness * (state[0] + time - early)])
 
         step = side * (self._reach / _STEPS)
-        states = [np.array([np.zeros_like(gap), -gap])]
+        states = [np.zeros((2, len(size)))]
         for row in range(_STEPS):
             state, middle = states[-1], (row + 0.5) * step
             k1 = rate(state, row * step)

@@ -130,7 +130,8 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         bag = {"bag": str(self._bag.directory)} if self._bag.directory is not None else {}
         if not self.active:
             return OK, "", bag
-        report = self._measures.meter.report(quick=True)
+        meter = self._measures.meter
+        report = meter.report(meter.motion.measured(quick=True))
         counts = {name: report[name] for name in ("regime", "steady", "samples", "lost_samples")}
         counts["trend"] = trend_text(report)
         notes = {"notes": "; ".join(report["notes"])}

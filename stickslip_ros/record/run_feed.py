@@ -113,7 +113,8 @@ class RunFeed:
         """Return the measures and counts, and the slips if they were looked for."""
         if self._measured == 0:
             raise InvalidInputError(f"{path} holds no samples {self._part}")
-        report, slips = self._meter.report(), None
+        measured, slips = self._meter.motion.measured(), None
+        report = self._meter.report(measured)
         notes = [*self._notes, *report["notes"]]
         if self._feed_speed:
             feed = quantity(self._feed_speed, f"{length}/s")
@@ -129,7 +130,7 @@ class RunFeed:
             slips, slip_notes = self._slips.report(report["position_noise"], length)
             notes += slip_notes
         if self._observer is not None:
-            self._observer.take_analysis(RunAnalysis(self._meter.motion.mean_cycle, slips))
+            self._observer.take_analysis(RunAnalysis(measured.mean_cycle, slips))
         return {**report, "notes": notes, "slips": slips}
 
     def _doubt(self, report: dict[str, Any], length: str) -> str | None:
@@ -145,7 +146,7 @@ class RunFeed:
             )
         if report["regime"] != Regime.PURE_SLIP:
             return None
-        steps = report["amplitude"] / (motion.drift.resolution or float_info.min)
+        steps = report["amplitude"] / (motion.step or float_info.min)
         samples = report["period"] / report["duration"] * report["samples"]
         few = f"{steps:.2g} steps of the encoder in the amplitude" * (steps < _LEAST_STEPS)
         few = few or f"{samples:.2g} samples per cycle" * (samples < _LEAST_SAMPLES)

@@ -14,8 +14,8 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from stickslip_ros.arrays import FloatArray, IntArray
-from stickslip_ros.measures.cycle_fit import MeanCycle
 from stickslip_ros.measures.cycle_measures import Measures, trend_text
+from stickslip_ros.measures.mean_cycle import MeanCycle
 from stickslip_ros.measures.run_meter import RunAnalysis
 from stickslip_ros.measures.slips import Slip
 from stickslip_ros.model.drive import Drive

@@ -8,11 +8,11 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray, rms
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.measures.holding import hunting, settling_time
 from stickslip_ros.motion import Motion
 from stickslip_ros.motion.controller import answer
 from stickslip_ros.quantities import Quantity, number_of, quantities_of
 from stickslip_ros.scenarios.files import Scenario
+from stickslip_ros.studies.holding import hunting, settling_time
 
 KINDS = ("none", "step", "impulse", "sine")
 """Kinds of disturbances."""

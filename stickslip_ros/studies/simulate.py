@@ -9,7 +9,7 @@ from typing_extensions import override
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.measures.cycle_measures import Measures
 from stickslip_ros.measures.run_meter import RunObserver
-from stickslip_ros.measures.sample_meter import NOT_JUDGED, SampleMeter
+from stickslip_ros.measures.sample_meter import SampleMeter
 from stickslip_ros.motion import RecordedMotion
 from stickslip_ros.motion.simulation import MotionTracer, simulate_continuous, simulate_sampled
 from stickslip_ros.motion.trajectory import SampleRecorder
@@ -40,16 +40,6 @@ def sensor_meter(scenario: Scenario) -> SampleMeter | None:
     if scenario.plant.sensor.exact:
         return None
     return SampleMeter(scenario.analyzer.window, reading=scenario.reading)
-
-
-def notes_on(scenario: Scenario, measured: SampleMeter | None, measures: Measures) -> list[str]:
-    """Return sentences that say why the measures of a run may be wrong.
-
-    They are those of its sensor's samples, which `measured` has received, or of the motion itself.
-    """
-    if measured is not None:
-        return measured.notes(measures)
-    return [NOT_JUDGED] if scenario.reading.varies else []
 
 
 def simulate(

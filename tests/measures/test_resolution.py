@@ -144,6 +144,21 @@ def test_a_whole_number_of_samples_per_cycle_is_fitted_by_no_more_than_they_tell
         assert found.amplitude == pytest.approx(truth.amplitude, rel=0.01, abs=step)
 
 
+@pytest.mark.parametrize(("play", "regime"), [(40e-6, None), (0.0, Regime.PURE_SLIP)])
+def test_an_axis_that_stays_where_it_turns_has_no_pure_slip(
+    play: float, regime: Regime | None
+) -> None:
+    """It follows a circle on a guide at rest, through a play: it rests in 2 % of the time."""
+    time = np.arange(8000) / 500.0
+    position = 0.05 * np.sin(np.pi / 2.0 * time)
+    for row in range(1, len(time)):
+        position[row] += min(max(position[row - 1] - position[row], -play), play)
+    found = measured(time, np.round(position, 8), belt=0.0)
+    assert found.regime is regime
+    assert (found.stick_fraction is None) == (regime is None)
+    assert found.period == pytest.approx(4.0, rel=1e-4)
+
+
 def test_motion_that_the_spectrum_shows_is_motion_under_large_noise() -> None:
     position, _, truth = study.motion(0.04)
     position = position[:6000] + 3e-4 * np.random.default_rng(0).standard_normal(6000)

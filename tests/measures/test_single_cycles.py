@@ -10,13 +10,16 @@ from scipy.signal import find_peaks
 
 from stickslip_ros.measures import Regime
 from stickslip_ros.measures.noise import medians
-from stickslip_ros.measures.noisy_samples import NoisySamples, Point
-from stickslip_ros.measures.noisy_window import rest
+from stickslip_ros.measures.sample_assumptions import EXACT
+from stickslip_ros.measures.sample_window import Window
 from stickslip_ros.measures.single_cycles import (
+    NoisySamples,
+    Point,
     cycle_between,
     reversals,
     vertex,
 )
+from stickslip_ros.measures.window_measures import rest
 
 
 def samples(position: np.ndarray, step: float = 1e-3, belt: float = 0.04) -> NoisySamples:
@@ -52,7 +55,8 @@ def test_a_motion_of_few_samples_per_cycle_is_no_rest(
     amplitude: float, regime: Regime | None
 ) -> None:
     moving = samples(amplitude * np.sin(2.0 * np.pi * np.arange(200) / 6.7), step=0.01)
-    assert rest(moving, 1e-6, 0.0, 0.0, Regime.EQUILIBRIUM).regime is regime
+    window = Window(moving, (), (), None, 20, 200, 1e-6, 0.0)
+    assert rest(moving, window, EXACT).regime is regime
 
 
 @given(st.floats(0.2, 0.8), st.floats(-100.0, 100.0), st.integers(3, 9))

@@ -180,16 +180,16 @@ def test_a_belt_speed_that_is_told_wrong_and_a_drift_leave_the_stick(
         belt_velocity=(1.0 + told) * record.belt_velocity,
     )
     meter = fed(record, NOISY)
-    found = meter.measures()
+    found, notes, mean = meter.measured()
     assert found.regime is Regime.STICK_SLIP
     assert found.stick_fraction == pytest.approx(
         0.10006, abs=3.0 * found.errors["stick_fraction"] + 1e-5
     )
     assert found.errors["stick_fraction"] < 0.005
     assert found.amplitude == pytest.approx(434.09e-6, rel=1e-3)
-    stick = meter.mean_cycle.stick
+    stick = mean.stick
     assert stick.fit.belt_speed == pytest.approx(0.04, abs=4.0 * stick.speed_error)
-    assert any("the slide sticks at" in note for note in meter.notes(found)) == (told != 0.0)
+    assert any("the slide sticks at" in note for note in notes) == (told != 0.0)
     assert (found.drift is not None) == (drift != 0.0)
 
 
@@ -226,7 +226,7 @@ def test_no_stick_is_certain_only_where_the_slide_stays_far_below_the_belt(
     assert error == 0.0 if speed < 0.85 else 1e-3 < error < 0.1
 
 
-def test_a_stick_that_an_encoder_hides_is_within_the_error_of_none() -> None:
+def test_a_short_stick_that_an_encoder_nearly_hides_is_within_the_error() -> None:
     """It sticks in 3 % of the time, and the encoder has 80 or 160 steps from peak to peak."""
     law = {"friction_law": "exponential", "friction_decay_speed": 0.5}
     drive = ss.scenario("feed_drive", belt_speed=0.08, start_after=1e6, **law)
@@ -235,10 +235,9 @@ def test_a_stick_that_an_encoder_hides_is_within_the_error_of_none() -> None:
         part = np.array(run.trajectory.position[7000 + 300 * seed :][:2000])
         case = study.Case(0.08, resolution, 0.0)
         found = study.measured(case, seed, part, np.zeros(len(part)))
-        assert found.stick_fraction == 0.0
         error = found.errors["stick_fraction"]
         assert error < 0.05
-        assert run.measures.stick_fraction < 1.96 * error
+        assert abs(found.stick_fraction - run.measures.stick_fraction) < 1.96 * error
 
 
 def test_lost_samples_and_impulses_change_little() -> None:

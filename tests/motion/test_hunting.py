@@ -12,7 +12,6 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.measures.holding import hunting
 from stickslip_ros.model.control import ControlLaw, LugreObserver, Pid, ResetIntegral
 from stickslip_ros.model.drive import Drive
 from stickslip_ros.model.friction import Exponential, LuGre
@@ -20,6 +19,7 @@ from stickslip_ros.model.signals import step
 from stickslip_ros.motion import Motion
 from stickslip_ros.motion.controller import Controller, answer
 from stickslip_ros.motion.sampled_loop import SampledLoop
+from stickslip_ros.studies.holding import hunting
 
 STIFFNESS, DAMPING, VISCOUS = 1e5, np.sqrt(1e5), 0.4
 CURVE = Exponential(1.5, kinetic=1.0, decay_speed=1e-3, viscous=VISCOUS, exponent=2.0)

@@ -404,8 +404,8 @@ def test_the_mean_cycle_of_a_noisy_record_is_shown(
 ) -> None:
     """Raw samples, the fit, and the edges of the stick with their intervals."""
     history, meter = noisy_record
-    measures = meter.measures()
-    history.take_analysis(RunAnalysis(meter.mean_cycle, None))
+    measures, _, mean = meter.measured()
+    history.take_analysis(RunAnalysis(mean, None))
     figure = figure_of(history, measures, None, style=STYLES["paper"])
     assert faults(figure) == []
     (axes,) = (each for each in figure.axes if "mean cycle" in each.get_title())
@@ -423,9 +423,10 @@ def test_the_slips_of_a_noisy_record_are_shown_instead(
     history, meter = noisy_record
     each = {name: [1e-3, 2e-3, 4e-3] for name in ("stick_time", "drop")}
     slips = {"each": {**each, "slip_time": [4e-3, 4e-3 + 1e-18, 4e-3]}}
-    history.take_analysis(RunAnalysis(meter.mean_cycle, slips))
+    measures, _, mean = meter.measured()
+    history.take_analysis(RunAnalysis(mean, slips))
     style = FigureStyle(size=(8.0, 7.0))
-    figure = figure_of(history, meter.measures(), None, style=style)
+    figure = figure_of(history, measures, None, style=style)
     assert faults(figure) == []
     assert "3 slips" in titles(figure)
     assert not any("mean cycle" in title for title in titles(figure))

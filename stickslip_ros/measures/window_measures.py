@@ -1,0 +1,302 @@
+"""The measures of a window of positions with noise: `measure`, a function of the window.
+
+Rests and slips tell the cycles first (`segmentation`), reversals where the slide does not rest, and
+a line of the spectrum where noise or few samples hide the reversals. The mean cycle (`mean_cycle`)
+of cycles that are alike tells more than rests and slips if sticks are short.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
+from math import hypot, inf, sqrt
+
+import numpy as np
+
+from stickslip_ros.arrays import FloatArray
+from stickslip_ros.measures.cycle_measures import (
+    EQUILIBRIUM_SPEED,
+    LEAST_CYCLES,
+    STALE_PERIODS,
+    STEADY_CHANGE_UNDER_NOISE,
+    Cycle,
+    CycleMeans,
+    Measures,
+    Regime,
+    Trend,
+    without_cycles,
+)
+from stickslip_ros.measures.mean_cycle import STICKING_SHARE, MeanCycle, fit_mean_cycle
+from stickslip_ros.measures.noise import (
+    FEW_SAMPLES,
+    FEWEST_SAMPLES,
+    LEAST_SAMPLES,
+    PRECISION,
+    resolved,
+    strongest_line,
+)
+from stickslip_ros.measures.sample_assumptions import SampleAssumptions
+from stickslip_ros.measures.sample_window import REVERSAL, Window
+from stickslip_ros.measures.segmentation import StickSlip, resting_velocity, stick_slip
+from stickslip_ros.measures.single_cycles import LEAST_STICK, NoisySamples
+
+_FEW_STEPS = 25.0
+"""Amplitude, in steps of an encoder without noise, below which the errors are not known."""
+_SHORTEST, _LONGEST = 128, 2048
+"""Least and largest number of samples of the last part of a run, unless its cycles are longer."""
+_QUANTUM = 1.73
+"""Resolution of an encoder with a noise of half of it, in standard deviations of the two."""
+_REFINED_SHARE = 0.5
+"""Stick fraction up to which a fit of the mean cycle refines it."""
+_SAME_VELOCITY, _REST_SHARE = 0.05, 0.2
+"""Relative difference of two velocities of a guide that are the same; share of rests on another."""
+_SLIP_SHARE = 0.1
+"""Share of the belt speed by which a slide at rest may seem to move."""
+_NEAR_STEPS, _LEAST_DWELL, _DWELL_GROWTH = 4.0, 4.0, 1.25
+"""Distance from an extreme, in steps, that is near; number of samples near it that tell a rest;
+growth of their number with four times the distance below which they do: it is two in a parabola."""
+
+
+def measure(
+    window: Window, reading: SampleAssumptions, *, quick: bool = False
+) -> tuple[Measures, MeanCycle | None]:
+    """Return the measures, with errors, and the mean cycle if it was fitted and the cycles alike.
+
+    `reading` is what is known of the samples, with a stick speed. With `quick`, rests and slips, or
+    means over single cycles, will do.
+    """
+    segmented = rests_and_slips(window, reading)
+    if segmented is None or segmented.passes:
+        found, fit = _by_reversals(window, reading, quick=quick)
+        if found.regime is Regime.PURE_SLIP and _rests_where_it_turns(window):
+            found = replace(found, regime=None, stick_fraction=None)
+        return found, fit
+    short = segmented.cycle.stick_fraction < _REFINED_SHARE
+    if not segmented.rests or (short and not quick):
+        refined, fit = _by_reversals(window, reading, quick=quick)
+        if segmented.agrees(refined):
+            return refined, fit
+    found = segmented_measures(window, segmented)
+    if not segmented.rests:
+        found = replace(found, regime=None, stick_fraction=None)
+    return found, None
+
+
+def rests_and_slips(window: Window, reading: SampleAssumptions) -> StickSlip | None:
+    """Return the rests and slips that go on at the end of the run; None without them."""
+    samples = window.samples
+    if len(samples) < FEWEST_SAMPLES or reading.stick_speed or not _even(samples.belt):
+        return None
+    belt = float(samples.belt[-1])
+    found = stick_slip(samples.time, samples.position, belt, window.most_cycles, window.step)
+    if found is None:
+        return None
+    since = float(samples.time[-1]) - found.end
+    return found if since <= STALE_PERIODS * found.cycle.period else None
+
+
+def _rests_where_it_turns(window: Window) -> bool:
+    """Return whether a slide on a guide at rest stays where it turns for longer than it need.
+
+    The number of samples near an extreme grows with the root of the distance, unless it rests.
+    """
+    samples, near, far = window.samples, 0, 0
+    if samples.belt.any():
+        return False
+    distance = max(_NEAR_STEPS * window.step, REVERSAL * window.noise)
+    ends = [samples.row(low.time) for low in window.lows]
+    for first, last in pairwise(ends):
+        for course in (samples.position[first:last], -samples.position[first:last]):
+            below = course.max(initial=-inf) - course
+            near += int(np.count_nonzero(below <= distance))
+            far += int(np.count_nonzero(below <= 4.0 * distance))
+    dwells = near > _LEAST_DWELL * 2 * (len(ends) - 1) > 0
+    return dwells and far < _DWELL_GROWTH * near
+
+
+def segmented_measures(window: Window, found: StickSlip) -> Measures:
+    """Return the measures of rests and slips."""
+    return found.measures(False, *_trend(window, found.amplitudes))
+
+
+def other_guide(window: Window, reading: SampleAssumptions) -> tuple[float, float] | None:
+    """Return the velocity relative to which a slide rests that does not rest on its belt.
+
+    Also the share of the time in which it does. None where there is no other one.
+    """
+    own, samples, lows = rests_and_slips(window, reading), window.samples, window.lows
+    if own is not None and own.rests:
+        return None
+    samples = samples[samples.row(lows[0].time) if lows else 0 :]
+    if len(samples) < FEWEST_SAMPLES:
+        return None
+    belt = float(samples.belt[-1])
+    velocity = resting_velocity(samples.time, samples.position)
+    if abs(velocity - belt) <= _SAME_VELOCITY * max(abs(velocity), abs(belt)):
+        return None
+    found = stick_slip(samples.time, samples.position, velocity, window.most_cycles, window.step)
+    share = 0.0 if found is None or not found.rests else found.cycle.stick_fraction
+    return (velocity, share) if share > _REST_SHARE else None
+
+
+def line(window: Window, reading: SampleAssumptions) -> float | None:
+    """Return the frequency of the line in the spectrum of the last positions, in 1/samples."""
+    position = _recent(window, reading).position
+    # An encoder that rounds a steady motion has lines, too.
+    if len(position) < FEWEST_SAMPLES:
+        return None
+    flat = position - np.linspace(position[0], position[-1], len(position))
+    least = max(_resolved(window, reading), PRECISION * float(np.abs(position).max()))
+    return strongest_line(flat) if np.ptp(flat) > least else None
+
+
+def _even(belt: FloatArray) -> bool:
+    """Return whether a belt keeps its speed."""
+    return float(np.ptp(belt)) <= 1e-6 * abs(float(belt[-1]))
+
+
+def _recent(window: Window, reading: SampleAssumptions) -> NoisySamples:
+    """Return the samples of the last part of the run, of several cycles if there are any."""
+    samples, cycles = window.samples, window.cycles
+    row = len(samples) - min(max(window.run // 4, _SHORTEST), _LONGEST)
+    if cycles and 2.0 * cycles[-1].amplitude > _resolved(window, reading):
+        # What seems to be a last cycle may have ended by noise, long after.
+        period = min(cycle.period for cycle in cycles)
+        row = min(row, samples.row(float(samples.time[-1]) - LEAST_CYCLES * period))
+    return samples[max(row, 0) :]
+
+
+def _resolved(window: Window, reading: SampleAssumptions) -> float:
+    """Return the range of positions, m, within which sensor or actuator resolve no motion."""
+    return max(resolved(window.step, window.noise), reading.within)
+
+
+def _by_reversals(
+    window: Window, reading: SampleAssumptions, *, quick: bool
+) -> tuple[Measures, MeanCycle | None]:
+    part, resting, recent = window, window.resting, _recent(window, reading)
+    # Few samples after a gap tell less than the cycles before it.
+    enough = len(recent) >= (1 if window.before is None else FEWEST_SAMPLES)
+    if enough and 0.0 < _resolved(window, reading) >= float(np.ptp(recent.position)):
+        return rest(recent, window, reading, Regime.HELD), None
+    if len(part.cycles) < LEAST_CYCLES and window.before is not None and not resting:
+        part = window.before
+    frequency = line(window, reading)
+    resting |= not part.cycles
+    if frequency is not None and (resting or frequency * FEW_SAMPLES > 1.0):
+        return _by_line(window, reading, recent, frequency)
+    if resting:
+        # The second half of what has come since the last cycle.
+        samples = part.samples
+        first = samples.row(part.lows[-1].time) if part.cycles else 0
+        return rest(samples[(first + len(samples)) // 2 :], window, reading), None
+    starts = [low.time for low in part.lows]
+    fit = None if quick else _fit(window, reading, part.samples, starts)
+    if fit is not None:
+        return _found(window, part.samples, fit, fit.noise), fit
+    # Half of the cycles: a single one may seem to stick for a moment.
+    found = _found(window, part.samples, CycleMeans.over(part.cycles, 0.5), window.noise)
+    fastest = max(cycle.velocity_amplitude for cycle in part.cycles)
+    if found.errors and fastest > STICKING_SHARE * float(np.abs(part.samples.belt).max()):
+        error = hypot(found.errors["stick_fraction"], LEAST_STICK)
+        found = replace(found, errors={**found.errors, "stick_fraction": error})
+    return found, None
+
+
+def _by_line(
+    window: Window, reading: SampleAssumptions, samples: NoisySamples, frequency: float
+) -> tuple[Measures, MeanCycle | None]:
+    """Return the measures of the cycles that a line of the spectrum shows."""
+    fit = None
+    if frequency * LEAST_SAMPLES <= 1.0:
+        time = samples.time
+        period = float(time[-1] - time[0]) / (len(time) - 1) / frequency
+        cycles = min(int(float(time[-1] - time[0]) / period), window.most_cycles)
+        starts = (time[-1] - period * np.arange(cycles, -1.0, -1.0)).tolist()
+        fit = _fit(window, reading, samples, starts)
+    if fit is None:
+        few = frequency * FEW_SAMPLES > 1.0
+        return without_cycles(None, Regime.UNDERSAMPLED if few else None), None
+    return _found(window, samples, fit, fit.noise), fit
+
+
+def _fit(
+    window: Window, reading: SampleAssumptions, samples: NoisySamples, starts: Sequence[float]
+) -> MeanCycle | None:
+    if len(starts) <= LEAST_CYCLES:
+        return None
+    part = samples[samples.row(starts[0]) : samples.row(starts[-1])]
+    if not _even(part.belt):
+        return None
+    belt, known = float(part.belt[-1]), (window.noise, window.step, reading.stick_speed or 0.0)
+    with np.errstate(over="ignore", invalid="ignore"):  # squares of very large positions
+        return fit_mean_cycle(part.time, part.position, belt, np.array(starts), *known)
+
+
+def _found(window: Window, samples: NoisySamples, means: CycleMeans, noise: float) -> Measures:
+    """Return the measures of cycles in samples with this noise, m."""
+    if noise < window.step / 2.0 and means.cycle.amplitude < _FEW_STEPS * window.step:
+        means = replace(means, errors=None)
+    fastest = float(np.abs(samples.belt).max())
+    moving = float(samples.belt[-1]) != 0.0
+    resting = moving and means.cycle.velocity_amplitude < EQUILIBRIUM_SPEED * fastest
+    return means.measures(resting, *_trend(window, means.amplitudes))
+
+
+def _trend(window: Window, amplitudes: FloatArray) -> tuple[bool | None, Trend | None]:
+    """Return whether a window of cycles is steady, and the change of their amplitude.
+
+    The line of least squares through the amplitudes shows growth and decay, their range a change to
+    and fro; half of what is never to be called steady counts, as the estimate has noise, too.
+    """
+    if len(amplitudes) < LEAST_CYCLES:
+        return None, None
+    mean = float(np.mean(amplitudes))
+    least = max(STEADY_CHANGE_UNDER_NOISE * mean, _QUANTUM * window.noise, window.step)
+    order = np.linspace(-0.5, 0.5, len(amplitudes))
+    change = float(order @ (amplitudes - mean) / (order @ order))
+    if abs(change) > least / 2.0:
+        return False, Trend.GROWING if change > 0.0 else Trend.DECAYING
+    varies = float(np.ptp(amplitudes)) > 0.8 * least
+    return not varies, Trend.VARYING if varies else None
+
+
+def rest(
+    samples: NoisySamples,
+    window: Window,
+    reading: SampleAssumptions,
+    regime: Regime = Regime.EQUILIBRIUM,
+) -> Measures:
+    """Return the measures of a motion without cycles, steady once it lasts for as many as it had.
+
+    The amplitude is that of a sine whose variance is what that of the positions exceeds the noise
+    by. A slide that moves on, by a line through the positions, by more than is resolved, or to and
+    fro from sample to sample, has no regime.
+    """
+    none = without_cycles(None, None)
+    if len(samples) < 8:
+        return none
+    time = samples.time - samples.time[0]
+    belt_speed = abs(float(samples.belt[-1]))
+    slope = float(np.polyfit(time, samples.position - samples.position[0], 1)[0])
+    spread = float(np.std(samples.position))
+    far = max(_resolved(window, reading), REVERSAL * window.noise)
+    far = max(far, PRECISION * abs(samples.position[0]))
+    if abs(slope) > _SLIP_SHARE * belt_speed and abs(slope) * float(time[-1]) > far:
+        return none
+    amplitude = sqrt(2.0 * max(spread**2 - window.noise**2, 0.0))
+    speed = float(np.std(np.diff(samples.position))) * (len(time) - 1) / max(float(time[-1]), 1e-9)
+    if amplitude > far and speed > _SLIP_SHARE * belt_speed > 0.0:
+        return none
+    at_rest = Cycle(
+        amplitude=amplitude,
+        velocity_amplitude=0.0,
+        midpoint=float(np.mean(samples.position)),
+        period=0.0,
+        frequency=0.0,
+        stick_fraction=0.0 if belt_speed > 0.0 else 1.0,
+    )
+    regime = regime if belt_speed > 0.0 else Regime.STUCK
+    needed = window.most_cycles * window.cycles[-1].period if window.cycles else 0.0
+    steady = float(time[-1]) * 2.0 >= needed or regime is Regime.HELD or None
+    found = without_cycles(at_rest, regime, steady=steady)
+    return replace(found, velocity_amplitude=None)  # the positions do not tell it
