@@ -68,8 +68,12 @@ _LEAST_RIDE, _MOST_RIDE, _PASSES = 1e-3, 0.06, 3
 it is corrected."""
 _NO_FEED = 0.02
 """Travel on, as a share of that to and fro, that is none."""
-_SMOOTH_SHARE, _WIDEST = 0.1, 40
-"""Half of the width of the smoothing parabola, in slip times, and in samples at most."""
+_SMOOTH_SHARES, _WIDEST = (0.05, 0.1), 40
+"""Half of the width of the parabola for displacement and velocity, in slip times, and in samples at
+most."""
+_BETWEEN, _EXTREME_ERROR = 0.7, 0.15
+"""What an extreme between two of the samples of a slip, and noise or a step, leave of an amplitude:
+shares of the amplitude over the square of their number, and of the noise."""
 
 
 @dataclass(frozen=True)
@@ -218,14 +222,17 @@ def _measured(
         feed = 0.0
     if not belt_velocity:
         position = position - feed * (time - time[0])
-    means = _means(time, position, used, release, shares)
+    width = float(np.median([slip.duration for slip in used]))
+    width *= (len(time) - 1) / float(time[-1] - time[0])
+    means = _means(time, position, width, release, shares)
     errors = means.errors
     assert errors is not None  # of three cycles
     edges = np.mean([slip.errors for slip in used], axis=0) * len(used) / len(shares) / period
+    extreme = hypot(_EXTREME_ERROR * max(step, noise), _BETWEEN * means.cycle.amplitude / width**2)
     errors = replace(
         errors,
-        amplitude=hypot(errors.amplitude, max(step, noise) / sqrt(8.0 * len(shares))),
-        midpoint=hypot(errors.midpoint, max(step, noise) / sqrt(8.0 * len(shares))),
+        amplitude=hypot(errors.amplitude, extreme),
+        midpoint=hypot(errors.midpoint, extreme),
         stick_fraction=hypot(errors.stick_fraction, float(np.hypot(*edges))),
     )
     creep, creep_error = _creep(time, relative, used, noise, step)
@@ -410,25 +417,21 @@ def _cycle_starts(time: FloatArray, course: list[_Move]) -> list[int]:
 
 
 def _extremes(
-    time: FloatArray, position: FloatArray, rows: list[int], reach: int
+    time: FloatArray, position: FloatArray, rows: list[int], width: float
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return amplitude, velocity amplitude and midpoint of each cycle between two of the rows.
 
-    Displacement and velocity are those of the parabola through the samples within `reach` (Savitzky
-    and Golay, Analytical Chemistry 36, 1964).
+    Of parabolas through the samples around each (Savitzky and Golay, Analytical Chemistry 36,
+    1964): displacements are extreme at a vertex, within shares of the `width` of a slip, in rows.
     """
-    reach = max(reach, 1)
-    lags = np.arange(-reach, reach + 1)
-    powers = np.linalg.pinv(np.vander(lags, min(3, 2 * reach + 1), increasing=True).astype(float))
-    first, last = max(rows[0] - reach, 0), rows[-1] + reach + 1
+    narrow, wide = (max(int(min(share * width, _WIDEST)), 1) for share in _SMOOTH_SHARES)
+    first, last = max(rows[0] - wide, 0), rows[-1] + wide + 1
     period = float(time[-1] - time[0]) / (len(time) - 1)
-    part = np.pad(position[first:last] - position[first], reach, mode="edge")
-    smooth = (
-        position[first:last]
-        if reach < 2
-        else np.convolve(part, powers[0][::-1], "valid") + position[first]
-    )
-    speed = np.convolve(part, powers[1][::-1], "valid") / period
+    part = position[first:last]
+    smooth, slope, bend = _parabolas(part, narrow)
+    speed = _parabolas(part, wide)[1] / period
+    with np.errstate(divide="ignore", invalid="ignore"):
+        smooth -= np.where(np.abs(slope) < 2.0 * np.abs(bend), slope**2 / (4.0 * bend), 0.0)
     amplitudes = np.empty((3, len(rows) - 1))
     for each, (start, end) in enumerate(pairwise(rows)):
         inside = slice(start - first, end - first + 1)
@@ -437,17 +440,27 @@ def _extremes(
     return amplitudes[0], amplitudes[1], amplitudes[2]
 
 
+def _parabolas(course: FloatArray, reach: int) -> list[FloatArray]:
+    """Return value, slope and half of the second derivative, in rows, of a parabola at each row."""
+    lags = np.arange(-reach, reach + 1)
+    powers = np.linalg.pinv(np.vander(lags, 3, increasing=True).astype(float))
+    part = np.pad(course - course[0], reach, mode="edge")
+    value, slope, bend = (np.convolve(part, each[::-1], "valid") for each in powers)
+    return [value + course[0], slope, bend]
+
+
 def _means(
     time: FloatArray,
     position: FloatArray,
-    slips: list[_Slip],
+    width: float,
     release: FloatArray,
     shares: FloatArray,
 ) -> CycleMeans:
-    """Return the means over the cycles from release to release that rest for these shares."""
-    width = float(np.median([slip.duration for slip in slips])) * _SMOOTH_SHARE
-    reach = int(min(width * (len(time) - 1) / float(time[-1] - time[0]), _WIDEST))
-    extremes = _extremes(time, position, np.searchsorted(time, release).tolist(), reach)
+    """Return the means over the cycles from release to release that rest for these shares.
+
+    `width` is the number of rows in a slip.
+    """
+    extremes = _extremes(time, position, np.searchsorted(time, release).tolist(), width)
     columns = *extremes, np.diff(release), 1.0 / np.diff(release), shares
     return CycleMeans.over([Cycle(*each) for each in np.transpose(columns).tolist()])
 

@@ -139,8 +139,7 @@ def _of_yaml(content: bytes) -> str:
     import pandas as pd
     import yaml
 
-    loader: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
-    messages: Any = yaml.load_all(content, loader)
+    messages: Any = yaml.load_all(content, yaml.CSafeLoader)
     rows = [
         dict(islice(_fields("", each), _MOST_COLUMNS + 1))
         for each in messages

@@ -15,7 +15,7 @@ EXECUTING_METHODS = {
     ("subprocess", "getoutput"),
     ("subprocess", "getstatusoutput"),
 }
-SAFE_LOADERS = {"_RosLoader", "yaml.BaseLoader", "yaml.SafeLoader"}
+SAFE_LOADERS = {"_RosLoader", "yaml.BaseLoader", "yaml.CSafeLoader", "yaml.SafeLoader"}
 
 
 def offences(tree: ast.AST) -> list[str]:
