@@ -223,7 +223,7 @@ def _measured(
     if not belt_velocity:
         position = position - feed * (time - time[0])
     width = float(np.median([slip.duration for slip in used]))
-    width *= (len(time) - 1) / float(time[-1] - time[0])
+    width = max(width * (len(time) - 1) / float(time[-1] - time[0]), 1.0)
     means = _means(time, position, width, release, shares)
     errors = means.errors
     assert errors is not None  # of three cycles

@@ -199,15 +199,47 @@ class Recording:
         return self._drive.name(DROPPED_FORCE) != ""
 
     def name_of(self, topic: Topic[Any]) -> str:
-        """Return the full name that a topic of the drive has, whether the bag has it or not."""
+        """Return the full name that a topic of the drive has, whether the bag has it or not.
+
+        Parameters
+        ----------
+        topic : Topic
+            A topic of `messages.topics`.
+
+        Returns
+        -------
+        str
+            Its name in the namespace of the drive.
+
+        Raises
+        ------
+        BagError
+            If the bag holds several drives and no namespace was given.
+        """
         return self._drive.prefix + topic.name
 
     def blocks(self, least: int = 1) -> Iterator[RunBlock]:
         """Yield joint states, control forces and dropped forces in file order, chunk by chunk.
 
-        Chunks of fewer than `least` messages are joined; the last block may have fewer. What
-        another machine recorded is one block. Messages that cannot be decoded are skipped and
+        What another machine recorded is one block. Messages that cannot be decoded are skipped and
         listed in `missing`.
+
+        Parameters
+        ----------
+        least : int
+            Smallest number of messages in a block; smaller chunks are joined. The last block may
+            have fewer.
+
+        Yields
+        ------
+        RunBlock
+            The messages of one chunk, or of several joined ones.
+
+        Raises
+        ------
+        BagError
+            If the bag holds several drives and no namespace was given, or if the operating system
+            fails to read it.
         """
         for reading in _RunReader(self._drive).blocks(least):
             self._readings[JOINT_STATES.name] = replace(reading, columns=None)

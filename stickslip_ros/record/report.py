@@ -41,22 +41,59 @@ def report_of_recording(
     observer: RunObserver | None = None,
     take: Take = lambda _: None,
 ) -> dict[str, Any]:
-    """Return measures (SI units), counts and completeness of a recording by name, for JSON.
+    """Return measures, counts and completeness of a recording, ready for JSON.
 
-    `columns`, `form` and `belt_speed` are those of `read_table`; `namespace`, `layout` and
-    `belt_speed` those of `Recording`. `table` says whether the file is a table; None: its name or
-    content does. Measured is the part from `start` to `end`, a `RunPart`, whose times count from
-    the first joint state or, if there is none, from the first force; late forces and missed
-    deadlines are those of the whole run. `window` is the number of whole cycles at its end that are
-    averaged, `stick_speed` the largest relative speed of a slide that sticks, m/s; None: as the
-    analyzer used. Without `slips` these are not looked for. `length` is the unit of the positions
-    in the notes, m or rad. The `observer` receives samples and cycles of the whole part, `take` its
-    joint states and its control forces as they are read, each in their order.
+    Times count from the first joint state or, if there is none, from the first force.
 
-    `complete` is True if `missing`, sentences on what the bag lacks, is empty; `notes` are
-    sentences on what a table lacks, and on what makes the measures doubtful. Raises BagError if
-    `path` is not a bag or table, or holds neither joint states nor control forces, and
-    InvalidInputError if the part is empty, or a table does not have a column.
+    Parameters
+    ----------
+    path : Path
+        A bag directory, one file of a bag, or a table.
+    columns : mapping or None
+        Where a table has its quantities, as for `read_table`.
+    table : bool or None
+        Whether the file is a table; None: whether its name or content is that of one.
+    start : float
+        Start of the part that is measured, s; 0 includes everything from the beginning.
+    end : float
+        End of the part that is measured, s; samples at `end` are excluded.
+    window : int or None
+        Number of whole cycles at the end of the part over which the measures are averaged; None:
+        as many as the analyzer used.
+    namespace : str or None
+        ROS namespace of the drive; None if the bag holds only one drive, or for a table.
+    stick_speed : float or None
+        Largest relative speed of a slide that sticks, m/s; None: as the analyzer used.
+    belt_speed : float or None
+        Belt speed, m/s, of a bag whose joint states have no belt, or in place of a column of a
+        table.
+    form : TableFormat, optional
+        What is known of the form of a table; the rest is found.
+    layout : BagLayout, optional
+        Where a bag of another machine has motion and force; the rest is found.
+    slips : SlipThreshold or None
+        What counts as a slip; None: slips are not looked for.
+    length : str, optional
+        Unit of the positions in the notes, m or rad.
+    observer : RunObserver or None
+        Receives the samples and cycles of the whole part, with times as in `start` and `end`.
+    take : callable, optional
+        Receives the joint states and the control forces of the part as they are read, each in
+        their order.
+
+    Returns
+    -------
+    dict
+        Measures (SI units) and counts by name. `complete` is True if `missing`, sentences on what
+        the bag lacks, is empty. `notes` are sentences on what a table lacks, and on what makes the
+        measures doubtful. Late forces and missed deadlines are those of the whole run.
+
+    Raises
+    ------
+    BagError
+        If `path` is not a bag or table, or holds neither joint states nor control forces.
+    InvalidInputError
+        If the part is empty, or a table does not have a column.
     """
     part = RunPart(start, end)
     with (
