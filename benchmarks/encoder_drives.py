@@ -195,7 +195,7 @@ def main() -> int:
     numbers = range(arguments.first, arguments.first + arguments.drives)
     with ProcessPoolExecutor(arguments.workers) as pool:
         rows = [asdict(each) for each in pool.map(comparison, numbers)]
-    found = {"counts": counts(rows), "drives": rows, "versions": versions()}
+    found: dict[str, Any] = {"counts": counts(rows), "drives": rows, "versions": versions()}
     for row in rows:
         worst = max(map(abs, row["deviations"].values()), default=0.0)
         if worst > 3.0 or not right(row["regime"], row["true_regime"]):

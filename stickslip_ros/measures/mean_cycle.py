@@ -246,8 +246,11 @@ class FoldedCycles:
         """Return the stick of the cycles, if they show one, and the stick time that would not."""
         grid = np.linspace(0.0, self.period, _GRID, endpoint=False)
         velocity = shape.velocity(grid)
-        if not STICKING_SHARE * belt_speed < velocity.max() < _PASSING_SHARE * belt_speed:
+        gap = self.period / self.phases
+        if velocity.max() <= STICKING_SHARE * belt_speed:
             return None, 0.0
+        if velocity.max() >= _PASSING_SHARE * belt_speed:
+            return None, gap  # twice it has the speed of the belt, and may stick for a moment
         near = velocity > np.minimum(0.93 * belt_speed, 0.98 * velocity.max())
         frequency = 2.0 * pi / self.period
         centre = float(np.angle(np.sum(np.exp(1j * frequency * grid[near])))) / frequency
@@ -256,7 +259,6 @@ class FoldedCycles:
         around = self.phase - centre
         around -= np.rint(around / self.period) * self.period
         used = np.flatnonzero(np.abs(around) < min(reach, 0.49 * self.period))
-        gap = self.period / self.phases
         if len(used) < 12:
             return None, max(guess, gap)
         time, position = around[used], self.position[used]

@@ -90,6 +90,8 @@ class StickSlip(CycleMeans):
     """Velocity relative to the guide in the rests, in mean speeds."""
     creep_error: float
     """Its standard error."""
+    slip_samples: float
+    """Number of samples in a slip."""
 
     @property
     def rests(self) -> bool:
@@ -252,6 +254,7 @@ def _measured(
         feed=feed,
         creep=creep / unit,
         creep_error=creep_error / unit,
+        slip_samples=width,
     )
 
 

@@ -47,6 +47,8 @@ _QUANTUM = 1.73
 """Resolution of an encoder with a noise of half of it, in standard deviations of the two."""
 _REFINED_SHARE = 0.5
 """Stick fraction up to which a fit of the mean cycle refines it."""
+_LEAST_SLIP, _APART = 12.0, 4.0
+"""Samples in a slip from which it does; errors of a stick fraction within which both agree."""
 _SAME_VELOCITY, _REST_SHARE = 0.05, 0.2
 """Relative difference of two velocities of a guide that are the same; share of rests on another."""
 _SLIP_SHARE = 0.1
@@ -71,14 +73,29 @@ def measure(
             found = replace(found, regime=None, stick_fraction=None)
         return found, fit
     short = segmented.cycle.stick_fraction < _REFINED_SHARE
+    short &= segmented.slip_samples >= _LEAST_SLIP
     if not segmented.rests or (short and not quick):
         refined, fit = _by_reversals(window, reading, quick=quick)
         if segmented.agrees(refined):
-            return refined, fit
+            return _not_surer(refined, segmented), fit
     found = segmented_measures(window, segmented)
     if not segmented.rests:
         found = replace(found, regime=None, stick_fraction=None)
     return found, None
+
+
+def _not_surer(refined: Measures, segmented: StickSlip) -> Measures:
+    """Return measures whose stick fraction is not surer than its distance from that of the rests.
+
+    A distance of many errors shows that the friction has none of the forms of the fit.
+    """
+    errors = dict(refined.errors or {})
+    if refined.stick_fraction is None or "stick_fraction" not in errors:
+        return refined
+    apart = abs(refined.stick_fraction - segmented.cycle.stick_fraction)
+    if apart <= _APART * errors["stick_fraction"]:
+        return refined
+    return replace(refined, errors={**errors, "stick_fraction": apart / 2.0})
 
 
 def rests_and_slips(window: Window, reading: SampleAssumptions) -> StickSlip | None:
