@@ -214,6 +214,8 @@ def _measured(
     near = max(_EDGE_STEPS * step, _EDGE_NOISES * noise)
     used = [_slip(time, relative, move, near) for move in course[starts[0] : starts[-1] + 1]]
     release = np.array([used[each - starts[0]].release for each in starts])
+    if not np.all(np.diff(release) > 0.0):
+        return None  # times that repeat
     del used[-1]
     period = float(release[-1] - release[0]) / (len(release) - 1)
     durations = np.add.reduceat([slip.duration for slip in used], np.array(starts[:-1]) - starts[0])

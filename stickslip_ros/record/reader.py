@@ -108,7 +108,7 @@ class Recording:
     Raises
     ------
     BagError
-        If `path` is not a bag, or a bag that is not stored as MCAP.
+        If `path` is not a bag.
 
     Examples
     --------
@@ -204,7 +204,7 @@ class Recording:
         Parameters
         ----------
         topic : Topic
-            A topic of `messages.topics`.
+            A topic of `record.topics`.
 
         Returns
         -------

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from scipy.io import savemat
 
@@ -254,6 +254,7 @@ def faulty(chance: random.Random) -> tuple[bytes, dict[str, str]]:
 
 @examples(quick=20, thorough=1000, deadline=None)
 @given(seed=st.integers(0, 2**32))
+@example(seed=4900)  # times that repeat, between rests
 def test_a_table_with_faults_is_measured_or_refused(
     tmp_path_factory: pytest.TempPathFactory, seed: int
 ) -> None:
