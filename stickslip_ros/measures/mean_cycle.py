@@ -9,7 +9,7 @@ data analysis using generalized linear models, Biometrika 73, 1986.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from math import hypot, inf, pi
+from math import hypot, inf, pi, sqrt
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -56,6 +56,17 @@ class Shape:
     covariance: FloatArray
     period: float
 
+    @property
+    def grid(self) -> FloatArray:
+        """Phases, s, at which extremes are looked for."""
+        return np.linspace(0.0, self.period, _GRID, endpoint=False)
+
+    def overtakes(self, speed: float) -> bool:
+        """Return whether the velocity is above a speed, m/s, by three standard errors."""
+        velocity = self.velocity(self.grid)
+        row = self.rates(self.grid[[np.argmax(velocity)]])[0]
+        return float(velocity.max()) - 3.0 * sqrt(row @ self.covariance @ row) > speed
+
     def rates(self, phase: FloatArray) -> FloatArray:
         """Return the derivatives of the rows by time, by a central difference."""
         step = _DIFFERENCE * self.period
@@ -93,6 +104,9 @@ class MeanCycle(CycleMeans):
     """The fit at each sample, m; shape (n,)."""
     stick: Stick | None
     """The stick within the cycle, on a belt that moves forward; None without one."""
+    overtakes: bool
+    """Whether the slide overtakes the belt, and may stick for a moment where it passes its speed.
+    """
 
 
 def fit_mean_cycle(
@@ -120,9 +134,10 @@ def fit_mean_cycle(
     fold, shape = FoldedCycles(time - starts[0], sign * position, count, period, step).smoothed()
     if len(time) < FEW_SAMPLES * count and fold.phases < _LEAST_PHASES:
         return None
-    stick, hidden = None, 0.0
+    stick, hidden, overtakes = None, 0.0, False
     if belt_speed > 0.0 and stick_speed == 0.0:
         stick, hidden = fold.stick(shape, belt_speed, noise)
+        overtakes = shape.overtakes(_PASSING_SHARE * belt_speed)
     if stick is not None:
         fold = fold.adjusted(fold.slip(stick.fit))
         shape = fold.slip(stick.fit)
@@ -144,6 +159,7 @@ def fit_mean_cycle(
         position=sign * fold.position,
         fitted=sign * fitted,
         stick=stick,
+        overtakes=overtakes,
     )
 
 
@@ -244,21 +260,18 @@ class FoldedCycles:
 
     def stick(self, shape: Shape, belt_speed: float, noise: float) -> tuple[Stick | None, float]:
         """Return the stick of the cycles, if they show one, and the stick time that would not."""
-        grid = np.linspace(0.0, self.period, _GRID, endpoint=False)
-        velocity = shape.velocity(grid)
-        gap = self.period / self.phases
-        if velocity.max() <= STICKING_SHARE * belt_speed:
+        velocity = shape.velocity(shape.grid)
+        if not STICKING_SHARE * belt_speed < velocity.max() < _PASSING_SHARE * belt_speed:
             return None, 0.0
-        if velocity.max() >= _PASSING_SHARE * belt_speed:
-            return None, gap  # twice it has the speed of the belt, and may stick for a moment
         near = velocity > np.minimum(0.93 * belt_speed, 0.98 * velocity.max())
         frequency = 2.0 * pi / self.period
-        centre = float(np.angle(np.sum(np.exp(1j * frequency * grid[near])))) / frequency
+        centre = float(np.angle(np.sum(np.exp(1j * frequency * shape.grid[near])))) / frequency
         guess = max(np.count_nonzero(near) * self.period / _GRID - 0.05 * self.period, 0.0)
         reach = guess / 2.0 + _reach(noise * frequency / belt_speed) / frequency
         around = self.phase - centre
         around -= np.rint(around / self.period) * self.period
         used = np.flatnonzero(np.abs(around) < min(reach, 0.49 * self.period))
+        gap = self.period / self.phases
         if len(used) < 12:
             return None, max(guess, gap)
         time, position = around[used], self.position[used]
@@ -373,8 +386,7 @@ def _measures(
     shape: Shape, stick: Stick | None, period_error: float, hidden_stick: float
 ) -> tuple[Cycle, Cycle]:
     """Return the measures of a shape, and their standard errors."""
-    period = shape.period
-    grid = np.linspace(0.0, period, _GRID, endpoint=False)
+    period, grid = shape.period, shape.grid
     courses = shape.value(grid), shape.velocity(grid)
     at = np.array([_refined(grid, sign * course) for course in courses for sign in (1.0, -1.0)])
     (high, low), (peak, slowest) = shape.value(at)[:2], shape.velocity(at)[2:]

@@ -293,7 +293,7 @@ class SampleMeter:
         if measures.regime is None and measures.period is not None:
             notes.append(
                 "the regime is not known: the positions do not tell whether the slide rests in its "
-                "cycles or moves slowly"
+                "cycles, or for a moment at the speed of the belt, or moves slowly"
             )
         belt = self._last.belt_velocity[-1] if self._last else 0.0
         if mean is not None and mean.stick is not None:

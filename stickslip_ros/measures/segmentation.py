@@ -229,16 +229,7 @@ def _measured(
     width = float(np.median([slip.duration for slip in used]))
     width = max(width * (len(time) - 1) / float(time[-1] - time[0]), 1.0)
     means = _means(time, position, width, release, shares)
-    errors = means.errors
-    assert errors is not None  # of three cycles
-    edges = np.mean([slip.errors for slip in used], axis=0) * len(used) / len(shares) / period
-    extreme = hypot(_EXTREME_ERROR * max(step, noise), _BETWEEN * means.cycle.amplitude / width**2)
-    errors = replace(
-        errors,
-        amplitude=hypot(errors.amplitude, extreme),
-        midpoint=hypot(errors.midpoint, extreme),
-        stick_fraction=hypot(errors.stick_fraction, float(np.hypot(*edges))),
-    )
+    errors = _errors(means, used, width, max(step, noise))
     creep, creep_error = _creep(time, relative, used, noise, step)
     if creep_error == inf:
         return None
@@ -257,6 +248,23 @@ def _measured(
         creep=creep / unit,
         creep_error=creep_error / unit,
         slip_samples=width,
+    )
+
+
+def _errors(means: CycleMeans, slips: list[_Slip], width: float, resolution: float) -> Cycle:
+    """Return the standard errors of means, with those of the edges and the extremes.
+
+    A slip has `width` rows, and the sensor a step or noise of `resolution`, m.
+    """
+    errors, cycle, count = means.errors, means.cycle, len(means.amplitudes)
+    assert errors is not None  # of three cycles
+    edges = np.mean([slip.errors for slip in slips], axis=0) * len(slips) / count / cycle.period
+    extreme = hypot(_EXTREME_ERROR * resolution, _BETWEEN * cycle.amplitude / width**2)
+    return replace(
+        errors,
+        amplitude=hypot(errors.amplitude, extreme),
+        midpoint=hypot(errors.midpoint, extreme),
+        stick_fraction=hypot(errors.stick_fraction, float(np.hypot(*edges))),
     )
 
 

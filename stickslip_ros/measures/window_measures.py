@@ -70,18 +70,27 @@ def measure(
     if segmented is None or segmented.passes:
         found, fit = _by_reversals(window, reading, quick=quick)
         if found.regime is Regime.PURE_SLIP and _rests_where_it_turns(window):
-            found = replace(found, regime=None, stick_fraction=None)
-        return found, fit
+            found = _undecided(found)
+        return _as_it_passes(found, fit), fit
     short = segmented.cycle.stick_fraction < _REFINED_SHARE
     short &= segmented.slip_samples >= _LEAST_SLIP
     if not segmented.rests or (short and not quick):
         refined, fit = _by_reversals(window, reading, quick=quick)
         if segmented.agrees(refined):
-            return _not_surer(refined, segmented), fit
+            return _as_it_passes(_not_surer(refined, segmented), fit), fit
     found = segmented_measures(window, segmented)
-    if not segmented.rests:
-        found = replace(found, regime=None, stick_fraction=None)
-    return found, None
+    return found if segmented.rests else _undecided(found), None
+
+
+def _undecided(found: Measures) -> Measures:
+    """Return measures that do not say whether the slide sticks."""
+    return replace(found, regime=None, stick_fraction=None)
+
+
+def _as_it_passes(found: Measures, fit: MeanCycle | None) -> Measures:
+    """Return measures that do not deny a stick of a slide that passes the speed of the belt."""
+    passes = fit is not None and fit.overtakes and found.regime is Regime.PURE_SLIP
+    return _undecided(found) if passes else found
 
 
 def _not_surer(refined: Measures, segmented: StickSlip) -> Measures:
