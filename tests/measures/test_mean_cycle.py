@@ -49,7 +49,7 @@ def test_values_and_velocities_are_those_of_the_motion() -> None:
 def test_a_drift_is_taken_out(drift: float) -> None:
     fold = folded(drift=drift)
     taken = fold.position - fold.smoothed()[0].position
-    assert np.polyfit(fold.time, taken, 1)[0] == pytest.approx(drift, rel=0.02, abs=1e-8)
+    assert np.polyfit(fold.time, taken, 1)[0] == pytest.approx(drift, rel=0.02, abs=1e-12)
     assert taken.mean() == pytest.approx(0.0, abs=1e-3 * abs(drift) + 1e-12)
 
 
