@@ -47,20 +47,25 @@ class Regime(StrEnum):
     UNDERSAMPLED = "undersampled"
 
     @classmethod
-    def label(cls, regime: str | None) -> str:
+    def label(cls, regime: str | None, cycles: int = 0) -> str:
         """Return the display text of a regime.
 
         Parameters
         ----------
         regime : str or None
             Value of a regime, or None.
+        cycles : int
+            Number of cycles that were measured.
 
         Returns
         -------
         str
-            Text such as "stick-slip"; "no whole cycle" for None.
+            Text such as "stick-slip"; for None "no whole cycle" or, of measured cycles, "regime not
+            known".
         """
-        return "no whole cycle" if regime is None else _LABELS[cls(regime)]
+        if regime is None:
+            return "regime not known" if cycles else "no whole cycle"
+        return _LABELS[cls(regime)]
 
 
 RESTS = (Regime.EQUILIBRIUM, Regime.HELD, Regime.STUCK)

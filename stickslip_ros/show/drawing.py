@@ -14,7 +14,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from stickslip_ros.arrays import FloatArray, IntArray
-from stickslip_ros.measures.cycle_measures import Measures, trend_text
+from stickslip_ros.measures.cycle_measures import Measures, Regime, trend_text
 from stickslip_ros.measures.mean_cycle import MeanCycle
 from stickslip_ros.measures.run_meter import RunAnalysis
 from stickslip_ros.measures.slips import Slip
@@ -22,7 +22,7 @@ from stickslip_ros.model.drive import Drive
 from stickslip_ros.quantities import Quantity, quantities_of
 from stickslip_ros.show.quantities import MEASURES, Units
 from stickslip_ros.show.run_history import DrawnMotion, RunHistory, intervals, peaks
-from stickslip_ros.show.style import BLUE, GREEN, GREY, LIGHT_GREY, ORANGE, REGIMES
+from stickslip_ros.show.style import BLUE, GREEN, GREY, LIGHT_GREY, ORANGE
 
 MOTION: Any = {"color": BLUE, "lw": 1.0}
 BELT: Any = {"color": "black", "lw": 1.0, "ls": "--", "zorder": 2.5}
@@ -78,7 +78,8 @@ class Pane(NamedTuple):
 def measures_text(measures: Measures, units: Units) -> str:
     """Return regime, amplitude, frequency and stick fraction as a line of text."""
     trend = trend_text(vars(measures), units.text)
-    texts = [f"{REGIMES[measures.regime].label}{trend and f', not steady: {trend}'}"]
+    regime = Regime.label(measures.regime, measures.cycles)
+    texts = [f"{regime}{trend and f', not steady: {trend}'}"]
     for name in ("amplitude", "frequency", "stick_fraction"):
         value, (label, unit, _) = getattr(measures, name), MEASURES[name]
         if value is not None and measures.period is not None:

@@ -145,7 +145,7 @@ def _shown(name: str, values: Mapping[str, Any], units: Units) -> Any:
         return "not known"
     if name == "regime":
         trend = trend_text(values, units.text)
-        motion = f"{Regime.label(value)}{_MEANING.get(value, '')}"
+        motion = Regime.label(value, values.get("cycles") or 0) + _MEANING.get(value, "")
         return f"{motion}{trend and f', not steady: {trend}'}{doubt(values)}"
     if name == "velocity_amplitude" and value is not None:
         amplitude, midpoint = values.get("amplitude") or 0.0, values.get("midpoint") or 0.0

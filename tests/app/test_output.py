@@ -173,3 +173,9 @@ def test_a_long_work_says_once_how_long_it_takes(
                 clock += 1.2
                 progress(step * number)
     assert "about" not in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("cycles", "label"), [(0, "no whole cycle"), (4, "regime not known")])
+def test_cycles_without_a_regime_are_not_denied(cycles: int, label: str) -> None:
+    (row, _) = measure_table("", {"": {"regime": None, "cycles": cycles}}).rows
+    assert row == ["regime", label]

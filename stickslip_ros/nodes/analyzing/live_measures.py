@@ -86,10 +86,11 @@ class LiveMeasures:
         measures = self.meter.motion.measures(quick=True)
         if measures.amplitude is None or measures.frequency is None:
             return f"{measures.regime}"
+        share = measures.stick_fraction
         return (
             f"{measures.regime}: amplitude {quantity(measures.amplitude, 'm')}, "
             f"frequency {quantity(measures.frequency, 'Hz')}, "
-            f"stick fraction {measures.stick_fraction:.3g}"
+            f"stick fraction {'not known' if share is None else f'{share:.3g}'}"
         )
 
     def assume_plant(self, plant: Mapping[str, Any]) -> None:
