@@ -13,10 +13,8 @@ from stickslip_ros.model.drive import Drive, DriveConstants, ScaledDrive
 from stickslip_ros.model.drive_forces import DriveForces
 from stickslip_ros.model.drive_layout import SIGN, SPEED, states_of, switches_of
 from stickslip_ros.model.hybrid import HybridSystem, Instant, Mode, structure_number
+from stickslip_ros.model.rounding import LIFT_ROUNDING
 from stickslip_ros.model.symbols import numbers, structure
-
-LIFT_ROUNDING = 2.0**-40
-"""Normal force, in that of the drive, that is rounding where a load takes all of it away."""
 
 _CHANGE_IN_A_STEP = 8.0
 """Change of the speed in a step, in the characteristic one, for a law with a memory.

@@ -9,20 +9,14 @@ import heyoka as hy
 
 from stickslip_ros.model import equations
 from stickslip_ros.model.constants import constants_of
-from stickslip_ros.model.dimensionless_drive import LIFT_ROUNDING, DimensionlessDrive
+from stickslip_ros.model.dimensionless_drive import DimensionlessDrive
 from stickslip_ros.model.drive import UNBOUNDED_SPEED, Drive, DriveConstants
 from stickslip_ros.model.drive_forces import DriveForces
 from stickslip_ros.model.drive_layout import SIGN, SPEED
 from stickslip_ros.model.hybrid import Flow, Guard, Instant, Mode, Transition
 from stickslip_ros.model.motor import Motor
+from stickslip_ros.model.rounding import HYSTERESIS, LIFT_ROUNDING
 from stickslip_ros.model.symbols import with_symbols
-
-HYSTERESIS = 2.0**-45
-"""Distance behind a guard of a part at which the mode ends.
-
-The mode that follows then starts before its own guards: heyoka misses an event in a step that
-starts on one. It also keeps rounding from leading back.
-"""
 
 _UNSEEN = 2.0**-60
 """Factor of a series that has no part in the choice of steps."""

@@ -2,24 +2,29 @@
 
 from collections.abc import Sequence
 from functools import cached_property
-from math import copysign, inf, isfinite, ulp
+from math import copysign, inf, isfinite
 
 import numpy as np
 
 from stickslip_ros.errors import RunError
 from stickslip_ros.model.control import ContinuousControl
-from stickslip_ros.model.dimensionless_drive import LIFT_ROUNDING, DimensionlessDrive
+from stickslip_ros.model.dimensionless_drive import DimensionlessDrive
 from stickslip_ros.model.drive import UNBOUNDED_SPEED, Drive
-from stickslip_ros.model.drive_expressions import HYSTERESIS, DriveExpressions
+from stickslip_ros.model.drive_expressions import DriveExpressions
 from stickslip_ros.model.drive_layout import MEMORY, POSITION, SIGN, SPEED
-from stickslip_ros.model.hybrid import TIME_ROUNDING, Flow, Instant, Mode, with_switches
+from stickslip_ros.model.hybrid import Flow, Instant, Mode, with_switches
+from stickslip_ros.model.rounding import (
+    HYSTERESIS,
+    LIFT_ROUNDING,
+    SPEED_ROUNDING,
+    TIME_ROUNDING,
+    off_speed,
+    rounding_of,
+)
 from stickslip_ros.model.signals import Signal
 
 SLIP, STICK = "slip", "stick"
 """The flows of a drive. In slip the first switch is sgn(v_r), in stick it is 0."""
-
-SMALLEST_STEP = 2.0**-35
-"""Speed below which a change of the belt speed at a corner, or a relative speed, is rounding."""
 
 _MOST_AT_ONCE = 100
 """Number of changes of mode at one instant above which there is no end of them."""
@@ -35,7 +40,7 @@ class DriveSystem(DimensionlessDrive):
 
     def __init__(self, drive: Drive, control: ContinuousControl | None = None) -> None:
         super().__init__(drive, control)
-        law, load = self.drive.friction, self.drive.load
+        law, belt, load = self.drive.friction, self.drive.belt, self.drive.load
         self.sticks = law.sticks
         """Whether the slide can move with the belt: not under a law that has a memory."""
         self.many_steps = not law.sticks or bool(self.drive.actuator.states)
@@ -43,11 +48,11 @@ class DriveSystem(DimensionlessDrive):
         self.has_parts = len(law.switches) > 0
         self._frequency = drive.angular_frequency
         self.forward_limit, self.backward_limit = map(float, law.limits)
-        self._largest_friction = max(self.forward_limit, self.backward_limit)
-        self._largest_friction *= 1.0 + load.bounds[1]
-        self._largest_belt_acceleration = self.drive.belt.steepest
-        # Time at which the speed of the belt was last asked for, and that speed.
-        self._seen_at = self._seen_belt_speed = inf
+        largest = max(self.forward_limit, self.backward_limit)
+        self._largest_friction = largest * (1.0 + load.bounds[1])
+        self._largest_belt_acceleration = belt.steepest
+        slowest, fastest = (self.drive.belt_speed + speed for speed in belt.bounds)
+        self._below_belt, self._above_belt = slowest - SPEED_ROUNDING, fastest + SPEED_ROUNDING
 
     @cached_property
     def expressions(self) -> DriveExpressions:
@@ -112,43 +117,48 @@ class DriveSystem(DimensionlessDrive):
         mode = with_switches(mode, slots.belt.start, (*belt, *load))
         self._check_contact(mode, instant)
         belt_speed = self.belt_speed(mode, time)
-        self._seen_at, self._seen_belt_speed = time, belt_speed
         relative_speed = instant.state[SPEED] - belt_speed
-        if abs(relative_speed) <= SMALLEST_STEP:
+        if abs(relative_speed) <= SPEED_ROUNDING:
             instant.state[SPEED] = belt_speed
             return self._resting(mode, instant)  # acceleration of the belt, or load, jumps
         sign = copysign(1.0, relative_speed)
-        if sign == mode.switches[SIGN] and abs(belt_speed - before) <= SMALLEST_STEP:
+        if sign == mode.switches[SIGN] and abs(belt_speed - before) <= SPEED_ROUNDING:
             return mode
         return self._slip(mode, sign, instant)
 
-    def settled(self, mode: Mode | None, instant: Instant) -> Mode:
+    def starting_mode(self, instant: Instant) -> Mode:
         """Return stick, or slip in the direction of the relative speed; see the class."""
-        state, time = instant.state, instant.time
-        sticks = mode is not None and mode.flow == STICK
-        if mode is None:
-            mode = self._starting(instant)
-            self._check_contact(mode, instant)
-        elif self.has_parts:
+        belt = self.drive.belt.switches_at(instant.time)
+        load = self.drive.load.switches_at(instant.time)
+        law = (0.0,) * len(self.drive.friction.switches)
+        motor = (0.0,) * len(self.switches[self.switch_slots.motor])
+        stick = Mode(STICK, (0.0, *law, *belt, *load, *motor))
+        self._check_contact(stick, instant)
+        return self._settled_at(self.belt_speed(stick, instant.time), stick, instant)
+
+    def settled(self, mode: Mode, instant: Instant) -> Mode:
+        """Return the mode that continues, mostly the same; see `HybridSystem.settled`."""
+        state, sign = instant.state, mode.switches[SIGN]
+        if self.has_parts:
             if (following := self.apply_pending_guards(mode, instant)) is not mode:
                 return following
-        elif not sticks:
-            # The belt has changed its speed by so much at most.
-            change = self._largest_belt_acceleration * (time - self._seen_at)
-            speed = mode.switches[SIGN] * (state[SPEED] - self._seen_belt_speed)
-            if speed > change + SMALLEST_STEP:
-                return mode
-        belt_speed = self.belt_speed(mode, time)
-        self._seen_at, self._seen_belt_speed = time, belt_speed
-        if sticks and not self.steady:  # without the rounding of the integration
+        elif (sign < 0.0 and state[SPEED] < self._below_belt) or (
+            sign > 0.0 and state[SPEED] > self._above_belt
+        ):
+            return mode  # in less time
+        belt_speed = self.belt_speed(mode, instant.time)
+        if mode.flow == STICK and not self.steady:  # without the rounding of the integration
             state[SPEED] = belt_speed
-        relative_speed = state[SPEED] - belt_speed
+        return self._settled_at(belt_speed, mode, instant)
+
+    def _settled_at(self, belt_speed: float, mode: Mode, instant: Instant) -> Mode:
+        relative_speed = instant.state[SPEED] - belt_speed
         if relative_speed == 0.0:
-            settled = self._resting(mode, instant)
-            if settled is mode:
+            resting = self._resting(mode, instant)
+            if resting is mode:
                 self.nudge_off_guard(mode, instant)
-            return settled
-        sign = 1.0 if relative_speed > 0.0 else -1.0
+            return resting
+        sign = copysign(1.0, relative_speed)
         return mode if mode.switches[SIGN] == sign else self._slip(mode, sign, instant)
 
     def continued(self, before: Mode, mode: Mode, instant: Instant) -> Mode:
@@ -189,33 +199,37 @@ class DriveSystem(DimensionlessDrive):
         return abs(instant.state[SPEED]) > UNBOUNDED_SPEED
 
     def nudge_off_guard(self, mode: Mode, instant: Instant) -> None:
-        """Move a slide that starts to slip, or sticks near its limit, by rounding errors."""
+        """Move the slide, by rounding errors, off a guard on which it starts.
+
+        One that sticks is moved to where the friction that it needs is within the limits, one that
+        starts to slip to where it is beyond them, and off the speed of the belt.
+        """
         state, sign = instant.state, mode.switches[SIGN]
-        x, y = state[POSITION], state[SPEED]
         belt_speed = self.belt_speed(mode, instant.time)
-        if sign != 0.0 and y != belt_speed:
+        if sign != 0.0 and state[SPEED] != belt_speed:
             return
         if self.sticks:
-            force = self.forces.control_force(instant)
-            held = self.held_force(mode, instant, force)
-            backward = sign < 0.0 or (sign == 0.0 and held > 0.0)
-            limit = self.backward_limit if backward else self.forward_limit
-            if self._loaded:
-                limit *= self.normal_force(mode, instant.time)
-            # Without a spring no displacement changes the reaction.
-            size = abs(x) + abs(held) + abs(force) + limit
-            if self.drive.motor is not None:
-                size += sum(map(abs, state[self.slots.motor]))
-            margin = self.drive.stiffness * 8.0 * ulp(size)
-            if sign == 0.0:
-                if abs(held) > limit - margin:
-                    state[POSITION] = x - copysign(margin, held)
-                return
-            if abs(held) < limit + margin:
-                state[POSITION] = x - sign * margin
+            state[POSITION] -= self._displacement_off_limit(mode, instant)
         elif self._is_at_rest(mode, instant):
             return
-        state[SPEED] = y + sign * max(ulp(belt_speed), ulp(1.0))
+        if sign != 0.0:
+            state[SPEED] = off_speed(belt_speed, sign)
+
+    def _displacement_off_limit(self, mode: Mode, instant: Instant) -> float:
+        state, sign = instant.state, mode.switches[SIGN]
+        force = self.forces.control_force(instant)
+        held = self.held_force(mode, instant, force)
+        limit = self.backward_limit if (sign or -held) < 0.0 else self.forward_limit
+        if self._loaded:
+            limit *= self.normal_force(mode, instant.time)
+        size = abs(state[POSITION]) + abs(held) + abs(force) + limit
+        if self.drive.motor is not None:
+            size += sum(map(abs, state[self.slots.motor]))
+        # Without a spring no displacement changes the reaction.
+        margin = self.drive.stiffness * rounding_of(size)
+        if sign == 0.0:
+            return copysign(margin, held) if abs(held) > limit - margin else 0.0
+        return sign * margin if abs(held) < limit + margin else 0.0
 
     def _is_at_rest(self, mode: Mode, instant: Instant) -> bool:
         """Return whether a slide with a memory stays where it is, on a belt that does not move."""
@@ -259,14 +273,6 @@ class DriveSystem(DimensionlessDrive):
         sign = copysign(1.0, -self.forces.reaction(instant))
         instant.state[SPEED] = sign * UNBOUNDED_SPEED
         return self._slip(mode, sign, instant)
-
-    def _starting(self, instant: Instant) -> Mode:
-        """Return stick, with the switches that the signals have at an instant."""
-        belt = self.drive.belt.switches_at(instant.time)
-        load = self.drive.load.switches_at(instant.time)
-        law = (0.0,) * len(self.drive.friction.switches)
-        motor = (0.0,) * len(self.switches[self.switch_slots.motor])
-        return Mode(STICK, (0.0, *law, *belt, *load, *motor))
 
     def _slip(self, mode: Mode, sign: float, instant: Instant) -> Mode:
         """Return slip in a direction; the signals stay in their pieces."""

@@ -15,9 +15,6 @@ import heyoka as hy
 
 _Shared = TypeVar("_Shared")
 
-TIME_ROUNDING = 2.0**-49
-"""Share of the time by which rounding may put a corner after an instant that is meant to be it."""
-
 
 @dataclass(frozen=True, slots=True)
 class Mode:
@@ -126,11 +123,15 @@ class HybridSystem(ABC):
         return self.shared(("flow", name), lambda: self.flow(name))
 
     @abstractmethod
-    def settled(self, mode: Mode | None, instant: Instant) -> Mode:
-        """Return the mode that continues, or starts, at an instant.
+    def starting_mode(self, instant: Instant) -> Mode:
+        """Return the mode in which a motion starts at an instant."""
 
-        It is asked at the start of each integration, since inputs may have changed. Without `mode`
-        the motion starts. In a mode that continues the state must be off its guards.
+    @abstractmethod
+    def settled(self, mode: Mode, instant: Instant) -> Mode:
+        """Return the mode that continues at an instant, mostly the same one.
+
+        It is asked at the start of each advance, since inputs may have changed. It moves the state
+        off the guards of a mode that continues; that of another one follows where it is entered.
         """
 
     def is_unbounded(self, instant: Instant) -> bool:

@@ -5,13 +5,14 @@ the motor is sgn(X' - v_belt), 0 while it sticks.
 """
 
 from dataclasses import replace
-from math import copysign, ulp
+from math import copysign
 
 from stickslip_ros.model.control import ContinuousControl
 from stickslip_ros.model.drive import Drive
 from stickslip_ros.model.drive_layout import POSITION, SIGN, SPEED
-from stickslip_ros.model.drive_system import SLIP, SMALLEST_STEP, STICK, DriveSystem
+from stickslip_ros.model.drive_system import SLIP, STICK, DriveSystem
 from stickslip_ros.model.hybrid import Flow, Instant, Mode, with_switches
+from stickslip_ros.model.rounding import SPEED_ROUNDING, off_speed, rounding_of
 
 
 class MotorFrictionSystem(DriveSystem):
@@ -40,11 +41,13 @@ class MotorFrictionSystem(DriveSystem):
         """Let the motor slip in a direction, where the force on it exceeds its dry friction."""
         return self._with_motor(mode, sign)
 
-    def settled(self, mode: Mode | None, instant: Instant) -> Mode:
-        """Return the mode that continues, or starts, of both bodies."""
-        settled = super().settled(mode, instant)
-        follow = self._motor_after_jump if mode is None else self._motor_settled
-        return follow(settled, instant)
+    def starting_mode(self, instant: Instant) -> Mode:
+        """Return the mode in which both bodies start."""
+        return self._motor_after_jump(super().starting_mode(instant), instant)
+
+    def settled(self, mode: Mode, instant: Instant) -> Mode:
+        """Return the mode that continues, of both bodies."""
+        return self._motor_settled(super().settled(mode, instant), instant)
 
     def switch_inputs(self, mode: Mode, instant: Instant) -> Mode:
         """Return the mode after the corners and steps of the signals up to an instant."""
@@ -77,13 +80,13 @@ class MotorFrictionSystem(DriveSystem):
             return
         if -sign * held < limit + margin:
             state[self._x] -= sign * margin
-        state[self._y] = belt_speed + sign * max(ulp(belt_speed), ulp(1.0))
+        state[self._y] = off_speed(belt_speed, sign)
 
     def _motor_after_jump(self, mode: Mode, instant: Instant) -> Mode:
         """Return the mode where the speed of the guide, or the state, may have jumped."""
         belt_speed = self.belt_speed(mode, instant.time)
         relative_speed = instant.state[self._y] - belt_speed
-        if abs(relative_speed) > SMALLEST_STEP:
+        if abs(relative_speed) > SPEED_ROUNDING:
             return self._with_motor(mode, copysign(1.0, relative_speed))
         instant.state[self._y] = belt_speed
         return self._with_motor(mode, self._resting_sign(mode, instant))
@@ -112,7 +115,7 @@ class MotorFrictionSystem(DriveSystem):
         stretch = drive.stiffness * (abs(state[POSITION]) + abs(state[self._x]))
         rate = drive.damping * (abs(state[SPEED]) + abs(state[self._y]))
         force = abs(self.forces.control_force(instant)) + self._holding_force
-        return 8.0 * ulp(stretch + rate + force)
+        return rounding_of(stretch + rate + force)
 
     def _motor_sign(self, mode: Mode) -> float:
         return mode.switches[self.switch_slots.motor.start]

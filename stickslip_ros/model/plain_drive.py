@@ -31,7 +31,11 @@ class PlainDriveSystem(DriveSystem):
             return self.forces.reaction(instant)
         return float(self._friction(instant.state[SPEED] - self._speed, sign))
 
-    def settled(self, mode: Mode | None, instant: Instant) -> Mode:
+    def starting_mode(self, instant: Instant) -> Mode:
+        """Return stick, or slip in the direction of the relative speed."""
+        return self.settled(_FORWARD, instant)  # the state gives the mode: none continues
+
+    def settled(self, mode: Mode, instant: Instant) -> Mode:
         """Return stick, or slip in the direction of the relative speed."""
         relative_speed = instant.state[SPEED] - self._speed
         if relative_speed > 0.0:
@@ -48,7 +52,7 @@ class PlainDriveSystem(DriveSystem):
         instant.state[SPEED] = self._speed
         return self._resting(mode, instant)
 
-    def _resting(self, mode: Mode | None, instant: Instant) -> Mode:
+    def _resting(self, mode: Mode, instant: Instant) -> Mode:
         held = self.forces.reaction(instant)
         if held > self.backward_limit:
             return _BACKWARD

@@ -6,7 +6,8 @@ from typing import Generic, TypeVar
 
 import heyoka as hy
 
-from stickslip_ros.model.hybrid import TIME_ROUNDING, HybridSystem, Instant, Mode
+from stickslip_ros.model.hybrid import HybridSystem, Instant, Mode
+from stickslip_ros.model.rounding import TIME_ROUNDING
 from stickslip_ros.motion.compiled_flow import CompiledFlow, Detail, IntegratorPool
 from stickslip_ros.motion.phase import DIVERGENCE, Phase, PhaseObserver
 from stickslip_ros.motion.recurrence import Recurrence
@@ -115,7 +116,7 @@ class HybridMotion(Generic[_System]):
     def set_state(self, state: list[float]) -> None:
         """Start again in the mode that a state gives."""
         self.instant.state = memoryview(array("d", state))
-        self.enter(self.system.settled(None, self.instant))
+        self.enter(self.system.starting_mode(self.instant))
         self.unbounded = self.system.is_unbounded(self.instant)
 
     def set_time(self, time: float) -> None:
