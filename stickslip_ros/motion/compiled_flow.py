@@ -18,7 +18,7 @@ import heyoka as hy
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.model.hybrid import HybridSystem, Mode, Transition
+from stickslip_ros.model.hybrid import HybridSystem, Instant, Mode, Transition
 
 # heyoka warns on standard output, which is for results, where a marker's polynomial is only
 # rounding, as in equilibrium.
@@ -85,6 +85,22 @@ class CompiledFlow:
         used = array("d", list(system.constants.values())[: len(self.parameters)])
         self.parameters[: len(used)] = used
         self.mode = None
+
+    def take_over(self, instant: Instant, mode: Mode) -> None:
+        """Continue an instant in a mode: its state lies in this integrator from now on."""
+        for number, index in self.inputs:
+            self.parameters[index] = instant.inputs[number]
+        if mode is not self.mode:
+            self.mode = mode
+            for number, index in self.switches:
+                self.parameters[index] = mode.switches[number]
+        if instant.state is not self.variables:
+            self.variables[:] = instant.state
+            instant.state = self.variables
+
+    def undo_step(self) -> None:
+        """Take the states back to the start of the last step, of which the series is kept."""
+        self.variables[:] = array("d", self.taylor.tc[: len(self.variables), 0])
 
     def phase_bound(self) -> float:
         """Return an end of the integration that would have shortened no step of the last one.

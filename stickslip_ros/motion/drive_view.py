@@ -22,11 +22,11 @@ class DriveView:
         """View the motion of a drive, with continuous control or without."""
         self.core = core
         """The motion, dimensionless."""
-        self._view(drive, control)
+        self._view(core.system, drive, control)
 
-    def _view(self, drive: Drive, control: ContinuousControl | None) -> None:
-        """View the motion in the units of another drive and controller."""
-        self._drive, self._control = drive, control
+    def _view(self, system: DriveSystem, drive: Drive, control: ContinuousControl | None) -> None:
+        """View a system in the units of its drive and controller."""
+        self._system, self._drive, self._control = system, drive, control
         # Those of the drive take longer to look up.
         self._length, self._speed = drive.length_scale, drive.speed_scale
         self._weight = drive.force_scale
@@ -108,7 +108,7 @@ class DriveView:
         """Return the motor's part of a dimensionless state, SI units; None if it is ideal."""
         if self._drive.motor is None:
             return None
-        position, speed = state[self.core.system.slots.motor].tolist()
+        position, speed = state[self._system.slots.motor].tolist()
         return MotorSample(position * self._length, speed * self._speed)
 
     def memory_of(self, state: "FloatArray | memoryview[float]") -> tuple[float, ...]:
@@ -119,7 +119,7 @@ class DriveView:
 
     def control_state_of(self, state: "FloatArray | memoryview[float]") -> tuple[float, ...]:
         """Return the state of the continuous controller, SI units, as that of the sampled law."""
-        scaled = state[self.core.system.slots.control].tolist()
+        scaled = state[self._system.slots.control].tolist()
         return tuple(x * unit for x, unit in zip(scaled, self._control_units, strict=True))
 
     def scaled_state(
@@ -133,13 +133,12 @@ class DriveView:
 
         What is not given is that of `DimensionlessDrive.initial_state`.
         """
-        system = self.core.system
-        state = system.initial_state(x, y)
+        state = self._system.initial_state(x, y)
         if memory is not None:
             for number, (value, unit) in enumerate(zip(memory, self._memory_units, strict=True)):
                 state[MEMORY + number] = value / unit
         if motor is not None and self._drive.motor is not None:
-            state[system.slots.motor] = motor[0] / self._length, motor[1] / self._speed
+            state[self._system.slots.motor] = motor[0] / self._length, motor[1] / self._speed
         return state
 
     def put_control_state(
@@ -147,7 +146,7 @@ class DriveView:
     ) -> None:
         """Set the controller's part of a dimensionless state; see `control_state_of`."""
         values = zip(control_state, self._control_units, strict=True)
-        for index, (value, unit) in enumerate(values, self.core.system.slots.control.start):
+        for index, (value, unit) in enumerate(values, self._system.slots.control.start):
             state[index] = value / unit
 
     @property

@@ -69,30 +69,41 @@ class HybridMotion(Generic[_System]):
     margin of a guard falls to zero; the guard then leads to the next mode. A mode with a closed
     form is not integrated. A phase of an autonomous system that starts as an earlier one did, to
     the last bit, is not integrated again. All values are dimensionless.
+
+    The state is one of a mode: `enter` hands it to the integrator of the mode, in which it lies
+    until the next one is entered. Keep no view of it.
     """
 
     def __init__(self, system: _System, state: list[float], detail: Detail = Detail.STATES) -> None:
         """Start at time zero with all inputs at zero."""
-        self.unbounded = False
-        """Whether the motion is unbounded; then it does not advance any further."""
         self.budget = StepBudget()
         """Work that the motion may still take."""
         self.observer: PhaseObserver[_System] | None = None
         """Takes note of the phases, if there is one."""
-        self.instant = Instant(memoryview(array("d")), [0.0] * len(system.inputs))
-        """State, inputs and time of the system."""
         self._integrators = IntegratorPool(detail)
-        self.use(system)
-        self.set_state(state)
+        self.change(system, state, [0.0] * len(system.inputs), 0.0)
 
-    def use(self, system: _System) -> None:
-        """Continue with a system that has the same states; its mode is found by `set_state`."""
+    def change(self, system: _System, state: list[float], inputs: list[float], time: float) -> None:
+        """Continue with another system, from its state and its inputs on."""
         self.system = system
         """System in motion."""
         self.clocked = not system.autonomous
         """Whether the flows depend on the time."""
         self._corner = inf
         self._integrators.use(system)
+        self.instant = Instant(memoryview(array("d", state)), inputs, time)
+        """State, inputs and time of the system."""
+        self._start()
+
+    def start(self, state: list[float], time: float) -> None:
+        """Start again in the mode that a state gives; the inputs stay as they are."""
+        self.instant.state, self.instant.time = memoryview(array("d", state)), time
+        self._start()
+
+    def _start(self) -> None:
+        self.enter(self.system.starting_mode(self.instant))
+        self.unbounded = self.system.is_unbounded(self.instant)
+        """Whether the motion is unbounded; then it does not advance any further."""
 
     def set_constant(self, name: str, value: float) -> None:
         """Set a constant of the system."""
@@ -113,12 +124,6 @@ class HybridMotion(Generic[_System]):
                 if used == number:
                     self.flow.parameters[index] = value
 
-    def set_state(self, state: list[float]) -> None:
-        """Start again in the mode that a state gives."""
-        self.instant.state = memoryview(array("d", state))
-        self.enter(self.system.starting_mode(self.instant))
-        self.unbounded = self.system.is_unbounded(self.instant)
-
     def set_time(self, time: float) -> None:
         """Set the time, and enter the mode that follows a corner there, or within its rounding."""
         self.instant.time = time
@@ -126,7 +131,7 @@ class HybridMotion(Generic[_System]):
             self.enter(self.system.switch_inputs(self.mode, self.instant))
 
     def enter(self, mode: Mode) -> None:
-        """Continue in a mode."""
+        """Continue in a mode, off its guards."""
         self.mode = mode
         """Mode of the system."""
         self._short_step: ShortStep | None = None
@@ -134,21 +139,9 @@ class HybridMotion(Generic[_System]):
             self._corner = self.system.next_switch_time(mode)
         self.flow, self._transitions = self._integrators.flow_of(mode)
         """Integrator of the mode; None with a closed form."""
-        flow = self.flow
-        if flow is None:
-            return
-        instant, parameters = self.instant, flow.parameters
-        self.system.nudge_off_guard(mode, instant)
-        for number, index in flow.inputs:
-            parameters[index] = instant.inputs[number]
-        if mode is not flow.mode:
-            flow.mode = mode
-            for number, index in flow.switches:
-                parameters[index] = mode.switches[number]
-        variables = flow.variables
-        if instant.state is not variables:
-            variables[:] = instant.state
-            instant.state = variables
+        if self.flow is not None:
+            self.system.nudge_off_guard(mode, self.instant)
+            self.flow.take_over(self.instant, mode)
 
     def step_shortly(self, duration: float, force: float | None = None) -> bool:
         """Advance within the present phase by a step that is prepared; return if that was possible.
@@ -222,7 +215,9 @@ class HybridMotion(Generic[_System]):
             return Phase(mode, end, origin=origin)
         taylor.reset_cooldowns()  # the next integration is another phase
         if outcome == _NOT_FINITE:
-            self._overflow(flow)
+            # Its cause exceeds any bound immediately.
+            flow.undo_step()
+            self.mode = self.system.overflow(mode, self.instant)
             return Phase(mode, now, DIVERGENCE)
         elapsed = taylor.time
         if outcome == _STEP_LIMIT:  # the rates leave a step no length
@@ -293,11 +288,3 @@ class HybridMotion(Generic[_System]):
             if self.observer is not None:
                 self.observer.take(phase, self.system, self.instant)
         raise AssertionError("the phases have no end")
-
-    def _overflow(self, flow: CompiledFlow) -> None:
-        """End a motion whose rates are no longer finite: its cause exceeds any bound immediately.
-
-        The series of the last step still has the state at its start.
-        """
-        flow.variables[:] = array("d", flow.taylor.tc[: len(flow.variables), 0])
-        self.mode = self.system.overflow(self.mode, self.instant)

@@ -84,11 +84,10 @@ class Motion(DriveView):
         self._set_scales()
 
     def _set_scales(self) -> None:
-        core = self.core
         self._frequency = self.clock.frequency = self._drive.angular_frequency
-        core.budget.per_unit = _STEPS_PER_SECOND / self._frequency
-        self._has_one_force = len(core.system.inputs) == 1
-        self._fades = not core.system.sticks
+        self.core.budget.per_unit = _STEPS_PER_SECOND / self._frequency
+        self._has_one_force = len(self._system.inputs) == 1
+        self._fades = not self._system.sticks
 
     def restart(
         self,
@@ -113,8 +112,7 @@ class Motion(DriveView):
             Displacement, m, and velocity, m/s, of the motor; by default it rests at the reference.
         """
         x, y = position / self._length, velocity / self._speed
-        self.core.instant.time = self.clock.scaled
-        self.core.set_state(self.scaled_state(x, y, memory, motor))
+        self.core.start(self.scaled_state(x, y, memory, motor), self.clock.scaled)
 
     def restart_signals(self) -> None:
         """Start the signals of belt and load again, at their time zero; the slide moves on."""
@@ -122,8 +120,7 @@ class Motion(DriveView):
             return
         self.clock.restart_signals()
         if self.core.clocked:
-            self.core.instant.time = self.clock.scaled
-            self.core.set_state(list(self.core.instant.state))
+            self.core.start(list(self.core.instant.state), self.clock.scaled)
 
     @property
     def drive(self) -> Drive:
@@ -276,8 +273,8 @@ class Motion(DriveView):
         lagging = core.instant.state[core.system.slots.actuator].tolist()
         before, law, old_law = core.mode, drive.friction, old.friction
         remembers = bool(law.states) and (law.name, law.states) == (old_law.name, old_law.states)
-        core.use(drive_system(drive, control))
-        self._view(drive, control)
+        system = drive_system(drive, control)
+        self._view(system, drive, control)
         self._set_scales()
         if drive.speed_scale != old.speed_scale or drive.length_scale != old.length_scale:
             x, y = position / drive.length_scale, velocity / drive.speed_scale
@@ -285,13 +282,13 @@ class Motion(DriveView):
         self.put_control_state(state, control_state)
         if drive.actuator.states == old.actuator.states:
             ratio = old.force_scale / drive.force_scale
-            state[core.system.slots.actuator] = [value * ratio for value in lagging]
-        core.instant.time = self.clock.scaled
-        core.instant.inputs = [0.0] * len(core.system.inputs)
-        self.set_forces(force, disturbance)
-        core.set_state(state)
+            state[system.slots.actuator] = [value * ratio for value in lagging]
+        forces = [force + disturbance] if self._has_one_force else [force, disturbance]
+        scaled = (each / self._weight for each in forces)
+        inputs = [max(-_LARGEST_FORCE, min(_LARGEST_FORCE, each)) for each in scaled]
+        core.change(system, state, inputs, self.clock.scaled)
         if remembers and law.switches:
-            core.enter(core.system.continued(before, core.mode, core.instant))
+            core.enter(system.continued(before, core.mode, core.instant))
 
 
 class RecordedMotion(Motion):

@@ -265,7 +265,7 @@ class ShootingMotion(RecordedMotion):
         core = self.core
         self.recorder.clear()
         self.clock.time = 0.0
-        core.set_state(state.tolist())
+        core.start(state.tolist(), self.clock.scaled)
         if mode is not None and mode.flow == core.mode.flow:
             core.enter(mode)
         self.recorder.record_state(core.instant)
