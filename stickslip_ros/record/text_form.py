@@ -1,4 +1,8 @@
-"""The form of a table as text: separator, decimal mark, lines on top, names, units, first row."""
+"""The form of a table as text: separator, decimal mark, lines on top, names, units, first row.
+
+The last rows tell the separator and the columns of numbers, and with these which line is the first
+row; the lines of texts above that one are names and units.
+"""
 
 import codecs
 import csv
@@ -11,16 +15,19 @@ from io import BytesIO, StringIO
 from itertools import islice
 from pathlib import Path
 from statistics import mode
-from typing import BinaryIO
+from typing import BinaryIO, NamedTuple
 
 from stickslip_ros.files import open_regular
 from stickslip_ros.record.expressions import listed
 from stickslip_ros.record.table_columns import TableFormat
 from stickslip_ros.record.units import are_units, joined_units, period_in, without_unit
 
-_HEAD, TAIL, _TOP = 1 << 20, 10, 100
-"""Bytes from which the form is found; lines at their end that are rows, with or without more; lines
-above the rows that may tell their period, and first rows that are looked at."""
+_HEAD = 1 << 20
+"""Bytes from which the form is found."""
+TAIL = 10
+"""Lines at their end that are rows of the table: by them the others are known."""
+_TOP = 100
+"""Lines on top that may be names or tell the period; first rows that are kept."""
 _LARGEST, _MOST_COLUMNS = 1 << 33, 10_000
 """Bytes of a file, and columns."""
 
@@ -34,8 +41,25 @@ TIME = re.compile(
     rf"(?: ?[AP]M)?(?: ?Z|[+-]\d\d(?::?\d\d)?)?|{_CLOCK}(?: ?[AP]M)?",
     re.IGNORECASE,
 )
+_Line = tuple[int, list[str]]
+"""Place of a line, and its cells."""
 _COMMENT = re.compile(r"^\s*(?:#|%|//)\s*")
 _NO_NUMBERS = ("", "na", "n/a", "null", "none", "#n/a", "#na", "<na>")
+
+
+class Head(NamedTuple):
+    """What the lines above the rows of a table say."""
+
+    names: Sequence[str]
+    """Name of each column; empty if it has none."""
+    units: Sequence[str]
+    """Cells of the columns in a line of units; empty without one."""
+    units_line: int | None
+    """Number of this line, from 1."""
+    skipped: int
+    """Number of lines before the names or, without names, the rows."""
+    first: int
+    """Number of lines before the first row."""
 
 
 @dataclass(frozen=True)
@@ -48,16 +72,7 @@ class TextForm:
     """Whether blanks follow separators."""
     decimal: str
     """Decimal mark."""
-    first: int
-    """Number of lines before the first row."""
-    skipped: int
-    """Number of lines before the names or, without names, the rows."""
-    names: tuple[str, ...]
-    """Name of each column; empty if it has none."""
-    units: tuple[str, ...]
-    """Cells of the columns in a line of units; empty without one."""
-    units_line: int | None
-    """Number of this line, from 1."""
+    head: Head
     columns: Mapping[str, int]
     """Places of the columns by name and by number, without those of labels."""
     labelled: bool
@@ -70,7 +85,7 @@ class TextForm:
     @property
     def width(self) -> int:
         """Number of columns."""
-        return len(self.names)
+        return len(self.head.names)
 
     @cached_property
     def first_rows(self) -> list[list[str]]:
@@ -80,16 +95,18 @@ class TextForm:
 
     def features(self, *, decimal_commas: bool) -> list[str]:
         """Return what is not the usual, as phrases; decimal commas if they were seen."""
-        skipped = f"the first {self.skipped} lines" if self.skipped > 1 else "the first line"
-        return [
-            *([] if self.separator == "," else [f"{_SEPARATORS[self.separator]} as separators"]),
-            *(["decimal commas"] if decimal_commas else []),
-            *([] if self.encoding.startswith("utf-8") else [f"text in {self.encoding}"]),
-            *([f"{skipped} skipped"] if self.skipped else []),
-            *([f"the names in each row: {listed(self.columns)}"] if self.labelled else []),
-            *([] if any(self.names) else [f"no names: the columns are #1 to #{self.width}"]),
-            *([f"units in line {self.units_line}"] if self.units_line else []),
-        ]
+        names, _, units_line, skip, _ = self.head
+        skipped = f"the first {skip} lines" if skip > 1 else "the first line"
+        unusual = {
+            f"{_SEPARATORS[self.separator]} as separators": self.separator != ",",
+            "decimal commas": decimal_commas,
+            f"text in {self.encoding}": not self.encoding.startswith("utf-8"),
+            f"{skipped} skipped": skip > 0,
+            f"the names in each row: {listed(self.columns)}": self.labelled,
+            f"no names: the columns are #1 to #{self.width}": not any(names),
+            f"units in line {units_line}": units_line is not None,
+        }
+        return [phrase for phrase, applies in unusual.items() if applies]
 
 
 def opened(path: Path, content: bytes | None) -> BinaryIO:
@@ -105,61 +122,56 @@ def opened(path: Path, content: bytes | None) -> BinaryIO:
 
 def form_of(stream: BinaryIO, given: TableFormat) -> TextForm:
     """Return the form of a table in an open text; raises OSError and ValueError if it has none."""
-    head = stream.read(_HEAD)
-    encoding = given.encoding or _encoding_of(head)
+    lines, encoding = _lines_of(stream.read(_HEAD), given.encoding)
+    skip = given.skip or 0
+    rows = _last_rows(lines[skip:])
+    period = next(filter(None, map(period_in, lines[:_TOP])), None)
+    _check_rows(rows, fewest=2 if given.period is None and period is None else 1)
+    places = range(skip, len(lines))
+    first = next((place for place in places if rows.is_row(lines[place])), max(skip, len(lines)))
+    texts = _texts_above(lines, first, skip, rows)
+    head = _head_in(texts, first, skip, rows.width)
+    labels = {} if texts else rows.labels
+    names = [labels.get(place - 1, name) for place, name in enumerate(head.names)]
+    blank = re.compile(f"(^|{re.escape(rows.separator)}) ", re.MULTILINE)
+    return TextForm(
+        encoding=encoding,
+        separator=rows.separator,
+        has_blanks=blank.search("".join(lines)) is not None,
+        decimal=given.decimal or rows.decimal,
+        head=head._replace(names=names),
+        columns=_columns(names, labels),
+        labelled=len(labels) > 0,
+        period=period,
+        first_lines=lines[head.first : head.first + _TOP],
+    )
+
+
+def _lines_of(head: bytes, encoding: str | None) -> tuple[list[str], str]:
+    """Return the whole lines at the start of a text, and its encoding."""
+    encoding = encoding or _encoding_of(head)
     text = head.decode(encoding, errors="replace")
     if len(re.findall(r"[\x00-\x08\x0e-\x1f]", text)) > len(text) // 100:
         raise ValueError("it is no text; say its encoding if it is, such as utf-16")
     lines = [*StringIO(text, newline=None)]
-    if len(head) == _HEAD and len(lines) > 1:
-        del lines[-1]  # a part of a line
-    return _form_of_lines(lines, given, encoding)
+    cut_off = len(head) == _HEAD and len(lines) > 1
+    return lines[:-1] if cut_off else lines, encoding
 
 
-def _form_of_lines(lines: list[str], given: TableFormat, encoding: str) -> TextForm:
-    skip = given.skip or 0
-    body = _last_rows(lines[skip:])
-    width, numeric = body.width, body.numeric
-    period = next(filter(None, map(period_in, lines[:_TOP])), None)
-    fewest = 2 if given.period is None and period is None else 1
-    if width < fewest or sum(numeric) < fewest:
-        raise ValueError(
-            "it has no rows of two numbers or more, whatever the separator; options say its "
-            "--decimal mark, the lines to --skip and its --encoding"
-        )
-    if width > _MOST_COLUMNS:
-        raise ValueError(f"it has more than {_MOST_COLUMNS} columns")
-    rows_from = (place for place in range(skip, len(lines)) if body.is_row(lines[place]))
-    first = skipped = next(rows_from, max(skip, len(lines)))
-    above = _texts_above(lines, first, skip, body)
-    names, units, units_line = [""] * width, [""] * width, None
-    if above:
-        skipped, names = above[0]
-        first = max(skip, skipped + 1)
-    if len(above) > 1:
-        lower, upper = (are_units(row) for _, row in above[:2])
-        if lower or upper:
-            skipped = above[1][0]
-            place, units = above.pop(0 if lower else 1)
-            names, units_line = above[0][1], place + 1
-    labels = {} if above else body.labels
-    names = [labels.get(place - 1, name) for place, name in enumerate(names)]
-    blank = re.compile(f"(^|{re.escape(body.separator)}) ", re.MULTILINE)
-    return TextForm(
-        encoding=encoding,
-        separator=body.separator,
-        has_blanks=blank.search("".join(lines)) is not None,
-        decimal=given.decimal or body.decimal,
-        first=first,
-        skipped=skipped,
-        names=tuple(names),
-        units=tuple(units),
-        units_line=units_line,
-        columns=_columns(names, labels),
-        labelled=len(labels) > 0,
-        period=period,
-        first_lines=lines[first : first + _TOP],
-    )
+def _encoding_of(head: bytes) -> str:
+    """Return the encoding of a text by its mark, its zeros, or whether it is UTF-8."""
+    if head.startswith(codecs.BOM_UTF8):
+        return "utf-8-sig"
+    if head.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return "utf-16"
+    for encoding, high in (("utf-16-le", head[1::2]), ("utf-16-be", head[::2])):
+        if 2 * high.count(0) > len(high):
+            return encoding
+    try:
+        codecs.getincrementaldecoder("utf-8")().decode(head)
+    except UnicodeDecodeError:
+        return "cp1252"
+    return "utf-8"
 
 
 @dataclass(frozen=True)
@@ -223,26 +235,52 @@ def _last_rows(lines: list[str]) -> _LastRows:
     return _LastRows(separator, [row for row in rows if len(row) == width])
 
 
-def _texts_above(
-    lines: list[str], first: int, skip: int, body: _LastRows
-) -> list[tuple[int, list[str]]]:
-    """Return lines of texts above the first row, from the lowest: places and cells."""
-    width, texts = body.width, list[tuple[int, list[str]]]()
+def _check_rows(rows: _LastRows, fewest: int) -> None:
+    """Refuse rows with fewer columns of numbers, or with too many columns."""
+    if rows.width < fewest or sum(rows.numeric) < fewest:
+        raise ValueError(
+            "it has no rows of two numbers or more, whatever the separator; options say its "
+            "--decimal mark, the lines to --skip and its --encoding"
+        )
+    if rows.width > _MOST_COLUMNS:
+        raise ValueError(f"it has more than {_MOST_COLUMNS} columns")
+
+
+def _head_in(texts: Sequence[_Line], first: int, skip: int, width: int) -> Head:
+    """Return names and units: one of two lines of texts may have the units."""
+    empty = [""] * width
+    if not texts:
+        return Head(empty, empty, None, first, first)
+    (place, lower), *above = texts
+    first = max(skip, place + 1)
+    for upper_place, upper in above[:1]:
+        if are_units(lower):
+            return Head(upper, lower, place + 1, upper_place, first)
+        if are_units(upper):
+            return Head(lower, upper, upper_place + 1, upper_place, first)
+    return Head(lower, empty, None, place, first)
+
+
+def _texts_above(lines: list[str], first: int, skip: int, rows: _LastRows) -> list[_Line]:
+    """Return the lines of texts above the first row, the lowest first."""
+    width, texts = rows.width, list[_Line]()
     for place in range(first - 1, -1, -1):
-        row = _cells(_COMMENT.sub("", lines[place]), body.separator)
-        if not lines[place].strip() and not texts and place >= skip:
+        if not texts and place >= skip and not lines[place].strip():
             continue
-        _, values = body.texts_and_values(row)
+        row = _cells(_COMMENT.sub("", lines[place]), rows.separator)
+        _, values = rows.texts_and_values(row)
         row = joined_units(row, width)
-        if len(row) == width - 1 and not any(cells[-1] for cells in body.cells):
+        if len(row) == width - 1 and not any(cells[-1] for cells in rows.cells):
             row.append("")  # a separator at the end of each row
-        wrong = 1 < len(row) != width and body.separator != " " and place >= skip
-        if not texts and not values and wrong:
-            raise ValueError(
-                f"line {place + 1} has {len(row)} names for {width} columns; with --skip "
-                f"{place + 1} they are #1 to #{width}"
-            )
-        if len(row) != width or (values and texts) or (not values and not any(row)):
+        if len(row) != width:
+            may_be_names = len(row) > 1 and rows.separator != " " and place >= skip
+            if may_be_names and not (texts or values):
+                raise ValueError(
+                    f"line {place + 1} has {len(row)} names for {width} columns; with --skip "
+                    f"{place + 1} they are #1 to #{width}"
+                )
+            break
+        if (values and texts) or not (values or any(row)):
             break
         if not values:
             texts.append((place, row))
@@ -260,22 +298,6 @@ def _columns(names: Sequence[str], labels: Collection[int]) -> dict[str, int]:
     return columns
 
 
-def _encoding_of(head: bytes) -> str:
-    """Return the encoding of a text by its mark, its zeros, or whether it is UTF-8."""
-    if head.startswith(codecs.BOM_UTF8):
-        return "utf-8-sig"
-    if head.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
-        return "utf-16"
-    for encoding, high in (("utf-16-le", head[1::2]), ("utf-16-be", head[::2])):
-        if 2 * high.count(0) > len(high):
-            return encoding
-    try:
-        codecs.getincrementaldecoder("utf-8")().decode(head)
-    except UnicodeDecodeError:
-        return "cp1252"
-    return "utf-8"
-
-
 def _likelihood(separator: str, tail: Sequence[str], lines: Sequence[str]) -> float:
     """Return the share of numbers among the cells, and a little more for a line of names."""
     rows = [_cells(line, separator) for line in tail]
@@ -286,7 +308,7 @@ def _likelihood(separator: str, tail: Sequence[str], lines: Sequence[str]) -> fl
     values = sum(_is_value(cell) for row in rows if len(row) == width for cell in row)
     named = any(
         len(row) == width and all(map(_is_text, row))
-        for row in (_cells(_COMMENT.sub("", line), separator) for line in lines[:100])
+        for row in (_cells(_COMMENT.sub("", line), separator) for line in lines[:_TOP])
     )
     empty = sum(not cell for cell in cells)
     return values / max(1, len(cells) - empty) + 0.1 * named
