@@ -35,6 +35,12 @@ def shown(value: Any) -> str:
     return text if len(text) <= _LONGEST_NAME else f"{text[:_LONGEST_NAME]}..."
 
 
+def renamed(sentence: str, names: Mapping[str, str]) -> str:
+    """Return a sentence that has other names wherever it says NAME = VALUE."""
+    known = "|".join(map(re.escape, sorted(names, key=len, reverse=True)))
+    return re.sub(rf"(?<![\w.])({known})(?= = )", lambda match: names[match[1]], sentence)
+
+
 def quantity(value: float, unit: str) -> str:
     """Return a rounded value with a suitable prefix and its unit."""
     scale, prefix = prefix_for(value)

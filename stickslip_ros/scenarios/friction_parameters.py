@@ -3,12 +3,11 @@
 They are those of the laws of this package and of the other packages that are installed.
 """
 
-import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, make_dataclass, replace
 from functools import cached_property
 from math import nan
-from typing import Any, Self
+from typing import Any, Self, TypeVar
 
 from typing_extensions import override
 
@@ -24,7 +23,9 @@ from stickslip_ros.model.friction import (
 from stickslip_ros.scenarios.curve_file import Pairs, read_curve
 from stickslip_ros.scenarios.foreign_laws import FRICTION_LAWS, laws_of_all_packages
 from stickslip_ros.scenarios.validation import ParameterGroup
-from stickslip_ros.text import shown
+from stickslip_ros.text import renamed, shown
+
+_Group = TypeVar("_Group", bound=ParameterGroup)
 
 LAWS = laws_of_all_packages(FRICTION_LAWS)
 _FOLLOWERS = [name for name, law in LAWS.items() if issubclass(law, CurveFollower)]
@@ -32,26 +33,29 @@ _CURVES = [name for name, law in LAWS.items() if not law.states and law is not S
 """The laws that a law with a memory can follow."""
 
 
-def _group(laws: Iterable[type[FrictionLaw]], *, reverse: bool = False) -> Any:
-    """Return a group of the constants of laws that are one number, in one direction of slip."""
+def _descriptions(*, reverse: bool) -> Iterator[Parameter]:
+    """Yield the constants of all laws that are one number, as parameters of one direction."""
     users: dict[str, list[str]] = {}
     constants: dict[str, Parameter] = {}
-    for law in laws:
+    for law in LAWS.values():
         for name, described in constants_of(law).items():
             directed = not (described.whole or name in law.direction_independent)
             if not isinstance(described.default, tuple) and (directed or not reverse):
                 constants.setdefault(name, described)
                 users.setdefault(name, []).append(law.name)
-    fields: list[tuple[str, Any, Any]] = []
     for name, described in constants.items():
         meaning = described.meaning.removesuffix(".") + (", for v_r < 0" if reverse else "")
         if name not in constants_of(FrictionLaw):
             meaning += f" ({', '.join(users[name])})"
-        parameter = replace(described, meaning=f"{meaning}.")
-        if reverse:
-            parameter = replace(parameter, default=nan, unset="as forward")
-        fields.append((name, Any, described_by(parameter)))
-    return make_dataclass("_Constants", fields, bases=(ParameterGroup,), frozen=True)
+        unset: dict[str, Any] = {"default": nan, "unset": "as forward"} if reverse else {}
+        yield replace(described, meaning=f"{meaning}.", **unset)
+
+
+def _with_constants(base: type[_Group], *, reverse: bool = False) -> type[_Group]:
+    """Return a group with a field for each constant: what laws there are is known now only."""
+    constants = _descriptions(reverse=reverse)
+    fields = [(parameter.name, Any, described_by(parameter)) for parameter in constants]
+    return make_dataclass(f"{base.__name__}WithConstants", fields, bases=(base,), frozen=True)
 
 
 def _curve(direction: str = "") -> Any:
@@ -64,7 +68,7 @@ def _curve(direction: str = "") -> Any:
 
 
 @dataclass(frozen=True)
-class ReverseFriction(_group(LAWS.values(), reverse=True)):
+class ReverseFriction(_with_constants(ParameterGroup, reverse=True)):
     """Coefficients of backward slip, v_r < 0, where they differ from those of forward slip."""
 
     file: str = _curve(" for v_r < 0; empty: as forward")
@@ -108,7 +112,7 @@ class _ChosenLaw(ParameterGroup):
 
 
 @dataclass(frozen=True)
-class Friction(_group(LAWS.values()), _ChosenLaw):
+class Friction(_with_constants(_ChosenLaw)):
     """Friction law and its coefficients; each law uses those of its formula."""
 
     file: str = _curve()
@@ -131,7 +135,7 @@ class Friction(_group(LAWS.values()), _ChosenLaw):
             return replace(group, points=pairs)
 
         completed = replace(read(self, "file"), reverse=read(self.reverse, "reverse.file"))
-        assert completed.selected is not None  # raises ValueError for what does not fit together
+        _ = completed.selected  # raises ValueError for what does not fit together
         return completed
 
     @cached_property
@@ -140,23 +144,22 @@ class Friction(_group(LAWS.values()), _ChosenLaw):
 
         Raises ValueError, with the names of the parameters, for constants that the law refuses.
         """
+        law, *curves = self._kinds()
         forward, reverse = self._given(self), self._given(self.reverse)
 
         def make() -> FrictionLaw:
-            law = self._made(forward)
-            return Directional(law, self._made(reverse, law)) if reverse else law
+            made = _changed(law(*(curve() for curve in curves)), forward)
+            return Directional(made, _changed(made, reverse)) if reverse else made
 
         try:
-            return FRICTION_LAWS.made(make, *self._kinds())
+            return FRICTION_LAWS.made(make, law, *curves)
         except ValueError as refusal:
-
-            def parameter(match: re.Match[str]) -> str:
-                direction = "reverse." if match[1] and match[2] in reverse else ""
-                return f"friction.{direction}{match[2]} = "
-
-            names = "|".join(name for kind in self._kinds() for name in kind.constants())
-            text = re.sub(rf"\b(reverse\.)?({names}) = ", parameter, str(refusal))
-            raise ValueError(text) from None
+            constants = [name for kind in (law, *curves) for name in kind.constants()]
+            parameters = {name: f"friction.{name}" for name in constants}
+            for name in constants:
+                group = "friction.reverse" if name in reverse else "friction"
+                parameters[f"reverse.{name}"] = f"{group}.{name}"
+            raise ValueError(renamed(str(refusal), parameters)) from None
 
     def names(self) -> list[str]:
         """Return the names of the parameters that make the law.
@@ -202,15 +205,14 @@ class Friction(_group(LAWS.values()), _ChosenLaw):
         }
         return {name: value for name, value in values.items() if value == value and value != ()}
 
-    def _made(self, values: dict[str, Any], law: FrictionLaw | None = None) -> FrictionLaw:
-        """Return the law with these constants, and others at their defaults or as in a `law`."""
-        kind, *curves = self._kinds()
-        constants = dict(values)
-        for curve in curves:
-            followed = {n: constants.pop(n) for n in curve.constants() if n in constants}
-            known = law.curve if isinstance(law, CurveFollower) else curve()
-            constants["curve"] = replace(known, **followed)
-        return kind(**constants) if law is None else replace(law, **constants)
+
+def _changed(law: FrictionLaw, values: Mapping[str, Any]) -> FrictionLaw:
+    """Return a law with other constants, those of the curve that it follows among them."""
+    if not isinstance(law, CurveFollower):
+        return replace(law, **values)
+    curve = {name: values[name] for name in law.curve.constants() if name in values}
+    others = {name: value for name, value in values.items() if name not in curve}
+    return replace(law, curve=replace(law.curve, **curve), **others)
 
 
 def law_parameters(law: type[FrictionLaw]) -> list[str]:

@@ -1,6 +1,5 @@
 """A friction law whose constants differ between the directions."""
 
-import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import wraps
@@ -10,6 +9,7 @@ from typing import Any, ClassVar, Self
 from typing_extensions import override
 
 from stickslip_ros.model.friction.base import FrictionLaw
+from stickslip_ros.text import renamed
 
 
 def _of_direction(method: Callable[..., Any]) -> Any:
@@ -100,8 +100,8 @@ class Directional(FrictionLaw):
             ahead, back = (getattr(law, name) for law in (self.forward, self.reverse))
             if ahead != back:
                 return f"reverse.{name} = {back} must equal {name} = {ahead}"
-        names = "|".join(self.reverse.constants())
-        return refusal and re.sub(rf"\b({names})(?= = )", r"reverse.\1", refusal)
+        names = {name: f"reverse.{name}" for name in self.reverse.constants()}
+        return refusal and renamed(refusal, names)
 
     @override
     def multiplied(self, factor: float) -> Self | None:
