@@ -9,13 +9,13 @@ import csv
 import os
 import re
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from io import BytesIO, StringIO
 from itertools import islice
 from pathlib import Path
 from statistics import mode
-from typing import BinaryIO, NamedTuple
+from typing import BinaryIO
 
 from stickslip_ros.files import open_regular
 from stickslip_ros.record.expressions import listed
@@ -47,7 +47,8 @@ _COMMENT = re.compile(r"^\s*(?:#|%|//)\s*")
 _NO_NUMBERS = ("", "na", "n/a", "null", "none", "#n/a", "#na", "<na>")
 
 
-class Head(NamedTuple):
+@dataclass(frozen=True)
+class Head:
     """What the lines above the rows of a table say."""
 
     names: Sequence[str]
@@ -63,7 +64,7 @@ class Head(NamedTuple):
 
 
 @dataclass(frozen=True)
-class TextForm:
+class TextForm(Head):
     """The form of a table as text."""
 
     encoding: str
@@ -72,7 +73,6 @@ class TextForm:
     """Whether blanks follow separators."""
     decimal: str
     """Decimal mark."""
-    head: Head
     columns: Mapping[str, int]
     """Places of the columns by name and by number, without those of labels."""
     labelled: bool
@@ -85,7 +85,7 @@ class TextForm:
     @property
     def width(self) -> int:
         """Number of columns."""
-        return len(self.head.names)
+        return len(self.names)
 
     @cached_property
     def first_rows(self) -> list[list[str]]:
@@ -95,16 +95,15 @@ class TextForm:
 
     def features(self, *, decimal_commas: bool) -> list[str]:
         """Return what is not the usual, as phrases; decimal commas if they were seen."""
-        names, _, units_line, skip, _ = self.head
-        skipped = f"the first {skip} lines" if skip > 1 else "the first line"
+        skipped = f"the first {self.skipped} lines" if self.skipped > 1 else "the first line"
         unusual = {
             f"{_SEPARATORS[self.separator]} as separators": self.separator != ",",
             "decimal commas": decimal_commas,
             f"text in {self.encoding}": not self.encoding.startswith("utf-8"),
-            f"{skipped} skipped": skip > 0,
+            f"{skipped} skipped": self.skipped > 0,
             f"the names in each row: {listed(self.columns)}": self.labelled,
-            f"no names: the columns are #1 to #{self.width}": not any(names),
-            f"units in line {units_line}": units_line is not None,
+            f"no names: the columns are #1 to #{self.width}": not any(self.names),
+            f"units in line {self.units_line}": self.units_line is not None,
         }
         return [phrase for phrase, applies in unusual.items() if applies]
 
@@ -133,13 +132,14 @@ def form_of(stream: BinaryIO, given: TableFormat) -> TextForm:
     head = _head_in(texts, first, skip, rows.width)
     labels = {} if texts else rows.labels
     names = [labels.get(place - 1, name) for place, name in enumerate(head.names)]
+    head = replace(head, names=names)
     blank = re.compile(f"(^|{re.escape(rows.separator)}) ", re.MULTILINE)
     return TextForm(
+        **vars(head),
         encoding=encoding,
         separator=rows.separator,
         has_blanks=blank.search("".join(lines)) is not None,
         decimal=given.decimal or rows.decimal,
-        head=head._replace(names=names),
         columns=_columns(names, labels),
         labelled=len(labels) > 0,
         period=period,

@@ -82,9 +82,9 @@ class TextTable(Table):
         self.path, self.form, self._content, self._converted = path, given, content, notes
         with opened(path, content) as stream:
             self._text = text = form_of(stream, given)
-        self.names, self.units, self.columns = text.head.names, text.head.units, text.columns
+        self.names, self.units, self.columns = text.names, text.units, text.columns
         self.decimal, self.period = text.decimal, text.period
-        self._lines = _Lines(text.head.first + 1)
+        self._lines = _Lines(text.first + 1)
         self._decimal_commas = False
 
     @property
@@ -165,7 +165,7 @@ class TextTable(Table):
             opened(self.path, self._content) as stream,
             TextIOWrapper(stream, encoding=text.encoding, errors="replace", newline="") as file,
         ):
-            for _ in range(text.head.first):
+            for _ in range(text.first):
                 file.readline()
             frames: Any = pd.read_csv(
                 file,
