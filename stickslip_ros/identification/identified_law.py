@@ -57,17 +57,25 @@ _COORDINATES = {
 
 @dataclass(frozen=True)
 class Straightening:
-    """Coordinates in which fits are nearly linear, in a search in place of those of the same names.
+    """Numbers in which fits are nearly linear, which a search has in place of coordinates.
 
     They replace these where all are free. Both functions take the fastest speed, too.
     """
 
-    bounds: Mapping[str, tuple[float, float] | None]
-    """Bounds of each; None: those that the law has for the name."""
+    names: Mapping[str, str]
+    """Name of the number in place of each coordinate."""
+    beside: Sequence[str]
+    """Coordinates that must be free besides."""
+    bounds: Mapping[str, tuple[float, float]]
+    """Bounds of the numbers; the others have those of the coordinate that they replace."""
     to_search: Callable[[Values, float], dict[str, float]]
-    """Returns coordinates with these in place."""
+    """Returns the numbers of coordinates."""
     from_search: Callable[[Values, float], dict[str, float]]
-    """Returns the others again; they may be ones that the law refuses."""
+    """Returns the coordinates of numbers; they may be ones that the law refuses."""
+
+
+AS_THEY_ARE = Straightening({}, (), {}, lambda _, __: {}, lambda _, __: {})
+"""Has no coordinate replaced."""
 
 
 class IdentifiedLaw:
@@ -107,8 +115,8 @@ class IdentifiedLaw:
     """Coordinates that are fitted only if the records ask for them."""
     by_differences: Sequence[str] = ()
     """Coordinates on which the motion depends other than by its equations."""
-    straightening: Straightening | None = None
-    """Other coordinates for the search, if it is slow in its own."""
+    straightening: Straightening = AS_THEY_ARE
+    """Numbers for the search, if it is slow in its coordinates."""
 
     @property
     def memory(self) -> Sequence[str]:

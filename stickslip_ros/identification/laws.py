@@ -42,10 +42,11 @@ class CoulombAdapter(IdentifiedLaw):
     smallest = "static"
 
 
-class StictionAdapter(CoulombAdapter):
+class StictionAdapter(IdentifiedLaw):
     """Coulomb friction with stiction, of which slip tells the kinetic friction only."""
 
     name = "stiction"
+    least = 0.0, 0.0
     coordinates: Sequence[str] = ("kinetic", "rise", "viscous")
     smallest = "kinetic"
     identifiable_in_slip = False
@@ -66,12 +67,13 @@ class StictionAdapter(CoulombAdapter):
         return super().bounds(name, values, fastest)
 
 
-class DahlAdapter(CoulombAdapter):
+class DahlAdapter(IdentifiedLaw):
     """Dahl's law: Coulomb friction that bristles follow, without viscous friction."""
 
     name = "dahl"
     least = (0.0,)
     coordinates: Sequence[str] = ("static", "bristle_stiffness")
+    smallest = "static"
 
     @override
     def terms(self, speed: FloatArray, shape: float) -> FloatArray:
@@ -93,20 +95,22 @@ class StribeckAdapter(IdentifiedLaw):
     smallest = "minimum"
 
 
-def _by_forces(values: Values, fastest: float) -> dict[str, float]:
-    """Return coordinates of the exponential law with forces in place."""
-    sag = values["rise"] * _sag(values, fastest)
-    end = values["kinetic"] + values["rise"] * _decay(values, fastest)
-    end += values["viscous"] * fastest
-    return {**values, "viscous": values["kinetic"] + values["rise"], "kinetic": end, "rise": sag}
+def _forces(values: Values, fastest: float) -> dict[str, float]:
+    """Return the forces that stand for an exponential law; see `ExponentialAdapter`."""
+    rise, fast = values["rise"], values["kinetic"] + values["rise"] * _decay(values, fastest)
+    return {
+        "force_at_rest": values["kinetic"] + rise,
+        "force_at_fastest": fast + values["viscous"] * fastest,
+        "sag": rise * _sag(values, fastest),
+    }
 
 
-def _from_forces(searched: Values, fastest: float) -> dict[str, float]:
-    """Return the coordinates of `_by_forces`."""
-    rise = searched["rise"] / _sag(searched, fastest)
-    kinetic = searched["viscous"] - rise
-    viscous = (searched["kinetic"] - kinetic - rise * _decay(searched, fastest)) / fastest
-    return {**searched, "viscous": viscous, "kinetic": kinetic, "rise": rise}
+def _of_forces(values: Values, fastest: float) -> dict[str, float]:
+    """Return the coordinates of `_forces`."""
+    rise = values["sag"] / _sag(values, fastest)
+    kinetic = values["force_at_rest"] - rise
+    viscous = (values["force_at_fastest"] - kinetic - rise * _decay(values, fastest)) / fastest
+    return {"kinetic": kinetic, "rise": rise, "viscous": viscous}
 
 
 def _decay(values: Values, speed: float) -> float:
@@ -124,9 +128,9 @@ class ExponentialAdapter(IdentifiedLaw):
 
     A regression has the exponent n = 1. Records that hardly tell the decay speed from viscous
     friction have a long curved valley of good fits. It is straight where friction is given by
-    forces: in the search `kinetic` is replaced by that at the fastest speed, m/s, `viscous` by that
-    at rest, and `rise` by how far the force at a third of the fastest speed is below the straight
-    line between them.
+    forces: in the search `kinetic` is replaced by that at the fastest speed, `viscous` by that at
+    rest, and `rise` by the sag, how far the force at a third of the fastest speed is below the
+    straight line between them.
     """
 
     name = "exponential"
@@ -139,9 +143,11 @@ class ExponentialAdapter(IdentifiedLaw):
     by_differences: Sequence[str] = ("exponent",)
     smallest = "kinetic"
     straightening = Straightening(
-        {"kinetic": (-inf, inf), "rise": None, "decay_speed": None, "viscous": (0.0, inf)},
-        _by_forces,
-        _from_forces,
+        {"kinetic": "force_at_fastest", "rise": "sag", "viscous": "force_at_rest"},
+        ("decay_speed",),
+        {"force_at_fastest": (-inf, inf), "force_at_rest": (0.0, inf)},
+        _forces,
+        _of_forces,
     )
 
     @override
@@ -237,10 +243,18 @@ class SaturatingAdapter(TableAdapter):
 
 
 class LuGreAdapter(ExponentialAdapter):
-    """The LuGre law, which follows an exponential curve."""
+    """A law with bristles, or elements, whose friction follows an exponential curve."""
 
-    name = "lugre"
-    coordinates: Sequence[str] = (*ExponentialAdapter.coordinates, *_BRISTLES)
+    def __init__(
+        self,
+        name: str,
+        bristles: Sequence[str] = _BRISTLES,
+        by_differences: Sequence[str] = (),
+    ) -> None:
+        """Take its name, the coordinates of its memory, and what else takes differences."""
+        self.name = name
+        self.coordinates = [*ExponentialAdapter.coordinates, *bristles]
+        self.by_differences = [*ExponentialAdapter.by_differences, *by_differences]
 
     @override
     def terms(self, speed: FloatArray, shape: float) -> FloatArray:
@@ -254,20 +268,6 @@ class LuGreAdapter(ExponentialAdapter):
     @override
     def friction(self, values: Values, normal_force: float) -> FrictionLaw:
         return self.following(EXPONENTIAL.friction(values, normal_force), values, normal_force)
-
-
-class ElastoPlasticAdapter(LuGreAdapter):
-    """The elasto-plastic law, whose elastic limit is made from the smallest friction."""
-
-    name = "elasto_plastic"
-    by_differences: Sequence[str] = (*LuGreAdapter.by_differences, "kinetic")
-
-
-class MaxwellSlipAdapter(LuGreAdapter):
-    """The Maxwell-slip law, whose elements have no damping."""
-
-    name = "maxwell_slip"
-    coordinates: Sequence[str] = (*ExponentialAdapter.coordinates, "bristle_stiffness")
 
 
 class DirectionalAdapter(IdentifiedLaw):
@@ -329,7 +329,7 @@ def _by_direction(values: Values) -> tuple[Values, Values]:
 
 
 EXPONENTIAL = ExponentialAdapter()
-LUGRE = LuGreAdapter()
+LUGRE = LuGreAdapter("lugre")
 DAHL = DahlAdapter()
 COMPETING: Sequence[IdentifiedLaw] = (
     CoulombAdapter(),
@@ -338,8 +338,9 @@ COMPETING: Sequence[IdentifiedLaw] = (
     EXPONENTIAL,
     LUGRE,
     DAHL,
-    ElastoPlasticAdapter(),
-    MaxwellSlipAdapter(),
+    # The elastic limit is made from the smallest friction.
+    LuGreAdapter("elasto_plastic", by_differences=["kinetic"]),
+    LuGreAdapter("maxwell_slip", ["bristle_stiffness"]),
 )
 """Laws that compete, the simpler ones first. Those after LuGre are searched from what it gives."""
 KNOWN_LAWS: Mapping[str, IdentifiedLaw] = {law.name: law for law in COMPETING}

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray
+from stickslip_ros.identification.identified_law import AS_THEY_ARE
 from stickslip_ros.identification.refinement import Refinement
 from stickslip_ros.identification.segment_starts import ROUGH_TOLERANCE
 from stickslip_ros.identification.time_limit import OutOfTimeError
@@ -73,11 +74,15 @@ class _Search:
         self._task, self._free, self._values = task, free, values
         self._scale = 1.0 / (1e-3 * float(np.ptp(task.positions)))
         straight = law.straightening
-        self._straight = straight if straight and {*straight.bounds} <= {*free} else None
-        to_search = self._straight.to_search(values, fastest) if self._straight else values
-        first = np.array([to_search[name] for name in free])
-        known = self._straight.bounds if self._straight else {}
-        bounds = [known.get(name) or law.bounds(name, values, fastest) for name in free]
+        if not {*straight.names, *straight.beside} <= {*free}:
+            straight = AS_THEY_ARE
+        self._straight, self._names = straight, [straight.names.get(name, name) for name in free]
+        to_search = {**values, **straight.to_search(values, fastest)}
+        first = np.array([to_search[name] for name in self._names])
+        bounds = [
+            straight.bounds.get(searched) or law.bounds(name, values, fastest)
+            for name, searched in zip(free, self._names, strict=True)
+        ]
         self.bounds = np.array(bounds, float).reshape(-1, 2).T
         """Smallest and largest values of a point, shape (2, coordinates)."""
         # No more than a part of narrow bounds that the start is far away from.
@@ -116,12 +121,13 @@ class _Search:
 
     def _coordinates(self, point: FloatArray) -> dict[str, float]:
         """Return all coordinates at a point."""
-        values = {**self._values, **dict(zip(self._free, point.tolist(), strict=True))}
-        return self._straight.from_search(values, self._task.fastest) if self._straight else values
+        values = {**self._values, **dict(zip(self._names, point.tolist(), strict=True))}
+        values |= self._straight.from_search(values, self._task.fastest)
+        return {name: values[name] for name in self._values}
 
     def _by_point(self, point: FloatArray) -> FloatArray:
         """Return the derivatives of the coordinates by those of the search."""
-        if not self._straight:
+        if self._straight is AS_THEY_ARE:
             return np.eye(len(point))
         from scipy.optimize import approx_fprime
 
