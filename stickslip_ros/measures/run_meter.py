@@ -1,4 +1,4 @@
-"""The measures of a run: those of its samples and those of its control forces."""
+"""The meter of a run: of its samples and its control forces."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -11,12 +11,10 @@ from stickslip_ros.arrays import BoolArray, FloatArray
 from stickslip_ros.measures.control_forces import ForceMeter, ForceSettler
 from stickslip_ros.measures.mean_cycle import MeanCycle
 from stickslip_ros.measures.sample_assumptions import EXACT, SampleAssumptions
-from stickslip_ros.measures.sample_meter import MeasuredSamples, MotionObserver, SampleMeter
-from stickslip_ros.measures.sampling_grid import LONGEST_GAP
+from stickslip_ros.measures.sample_meter import MotionObserver, SampleMeter
 from stickslip_ros.measures.timing import Timing
 from stickslip_ros.samples import NO_FORCES, ForceColumns
 from stickslip_ros.stamps import NANOSECONDS
-from stickslip_ros.text import quantity
 
 
 @dataclass(frozen=True)
@@ -50,7 +48,7 @@ class RunObserver(MotionObserver, Protocol):
 
 
 class RunMeter:
-    """Measures a run from its record: the samples and the control forces."""
+    """Measures a run from its record, the samples and the control forces; see `report_of`."""
 
     def __init__(
         self,
@@ -79,14 +77,15 @@ class RunMeter:
         """Number of samples published while the run was recorded; None while it is not known."""
         self.unmeasured = 0
         """Number of samples that were recorded and are not measured."""
-        self._first_force: float = inf  # stamp, ns
+        self.first_force = inf
+        """Smallest stamp of a control force, ns; infinite without one."""
         self._settler = ForceSettler()
         self._observer = observer
 
     def feed_forces(self, forces: ForceColumns, dropped: ForceColumns) -> None:
         """Add the forces that follow, published and dropped."""
         if len(forces):
-            self._first_force = min(self._first_force, int(forces.stamp.min()))
+            self.first_force = min(self.first_force, int(forces.stamp.min()))
         self.force.feed(forces)
         self.motion.drift.force.feed(forces.stamp / NANOSECONDS, forces.force)
         self.dropped += len(dropped)
@@ -101,51 +100,3 @@ class RunMeter:
         if self._observer is not None:
             time = (sent.stamp - self.motion.origin) / NANOSECONDS
             self._observer.take_control(time, sent.force, acted)
-
-    def report(self, measured: MeasuredSamples | None = None) -> dict[str, Any]:
-        """Return the measures and counts by name, ready for JSON; SI units.
-
-        They are those that the samples tell, which may have been `measured`. `notes` are sentences
-        that say why the measures may be wrong.
-        """
-        motion, timing = self.motion, self.timing
-        notes: list[str] = []
-        samples = motion.samples + self.unmeasured
-        lost: int | None = None
-        if not motion.mixed:
-            lost = max(motion.lost_samples - self.unmeasured, (self.published or 0) - samples, 0)
-        if self.unmeasured:
-            notes.append(f"{self.unmeasured} of the samples are recorded, and not measured here")
-        if timing is not None and (complaint := timing.warning()):
-            doubt = "" if timing.in_time else "the regime is doubtful: "
-            notes.append(doubt + complaint)
-        measured = measured or motion.measured()
-        return {
-            **measured.measures.as_dict(),
-            "position_noise": motion.position_noise,
-            "peak_force": self.force.peak_force,
-            "resting_force": self.force.resting_force,
-            "peak_applied_force": self.applied.peak_force if self.dropped_known else None,
-            "resting_applied_force": self.applied.resting_force if self.dropped_known else None,
-            "dropped_forces": self.dropped if self.dropped_known else None,
-            "late_forces": None if timing is None else timing.late_forces,
-            "missed_deadlines": None if timing is None else timing.missed_deadlines,
-            "in_time": None if timing is None else timing.in_time,
-            "samples": samples,
-            "lost_samples": lost,
-            "duration": None if motion.mixed else motion.duration,
-            "notes": [*notes, *self._force_notes(), *measured.notes],
-        }
-
-    def _force_notes(self) -> list[str]:
-        motion, late = self.motion, (self._first_force - self.motion.first) / NANOSECONDS
-        if motion.mixed or not motion.samples or late == inf:
-            return []
-        if late <= LONGEST_GAP * motion.duration / motion.samples:
-            return []
-        if late > motion.duration:
-            return ["the stamps of the control forces are later than those of all samples"]
-        return [
-            f"the first control force is {quantity(late, 's')} after the first sample: what acted "
-            "before is not recorded, and the peak control force may be larger"
-        ]

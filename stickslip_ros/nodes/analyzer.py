@@ -15,6 +15,7 @@ from rclpy.serialization import deserialize_message, serialize_message
 from std_msgs.msg import Float64
 
 from stickslip_ros.measures.cycle_measures import trend_text
+from stickslip_ros.measures.run_report import report_of
 from stickslip_ros.nodes.analyzing.incoming import Incoming, Message, recorded_topics
 from stickslip_ros.nodes.analyzing.live_bag import LiveBag
 from stickslip_ros.nodes.analyzing.live_measures import LiveMeasures, PlantTiming
@@ -104,7 +105,7 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
             self._note_timing(deserialize_message(message, DiagnosticArray))
         if meter.timing is not None and self._timing.complete:
             meter.published = meter.timing.samples
-        report = meter.report()
+        report = report_of(meter)
         self._incoming.close()
         for end in (self._recorded, *self._periodic):
             self.release(end)
@@ -131,7 +132,7 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         if not self.active:
             return OK, "", bag
         meter = self._measures.meter
-        report = meter.report(meter.motion.measured(quick=True))
+        report = report_of(meter, meter.motion.measured(quick=True))
         counts = {name: report[name] for name in ("regime", "steady", "samples", "lost_samples")}
         counts["trend"] = trend_text(report)
         notes = {"notes": "; ".join(report["notes"])}

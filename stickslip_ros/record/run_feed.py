@@ -14,6 +14,7 @@ from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.measures.cycle_measures import Regime
 from stickslip_ros.measures.feed import moving_part, relative_to_feed
 from stickslip_ros.measures.run_meter import RunAnalysis, RunMeter, RunObserver
+from stickslip_ros.measures.run_report import report_of
 from stickslip_ros.measures.sample_assumptions import SampleAssumptions
 from stickslip_ros.measures.slips import SlipMeter, SlipThreshold
 from stickslip_ros.record.reader import RunBlock
@@ -114,7 +115,7 @@ class RunFeed:
         if self._measured == 0:
             raise InvalidInputError(f"{path} holds no samples {self._part}")
         measured, slips = self._meter.motion.measured(), None
-        report = self._meter.report(measured)
+        report = report_of(self._meter, measured)
         notes = [*self._notes, *report["notes"]]
         if self._feed_speed:
             feed = quantity(self._feed_speed, f"{length}/s")

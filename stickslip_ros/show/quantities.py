@@ -11,27 +11,25 @@ import numpy.typing as npt
 
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.measures.cycle_measures import CycleMeasures, Measures
+from stickslip_ros.measures.run_report import RunReport
 from stickslip_ros.model.drive import Drive
 from stickslip_ros.quantities import ROTARY, Quantity, quantities_of
 from stickslip_ros.text import must_be_one_of, prefix_for, shown
 
-_OF_CYCLES = quantities_of(Measures)
+_OF_CYCLES, _OF_RUN = quantities_of(Measures), quantities_of(RunReport)
+_FIRST = (
+    *("peak_force", "peak_applied_force", "resting_force", "resting_applied_force"),
+    *("samples", "lost_samples", "late_forces", "dropped_forces", "missed_deadlines"),
+)
+"""Rows of the table of a run that have another order than in `RunReport`."""
 
 MEASURES = {
     "regime": _OF_CYCLES["regime"],
     **_OF_CYCLES,
     "multipliers": Quantity("Floquet multipliers"),
-    "peak_force": Quantity("peak control force", "N"),
-    "peak_applied_force": Quantity("peak control force acting", "N"),
-    "resting_force": Quantity("final control force", "N"),
-    "resting_applied_force": Quantity("final control force acting", "N"),
-    "samples": Quantity("samples"),
-    "lost_samples": Quantity("lost samples"),
-    "late_forces": Quantity("late forces"),
-    "dropped_forces": Quantity("dropped forces"),
-    "missed_deadlines": Quantity("missed deadlines"),
+    **{name: _OF_RUN[name] for name in _FIRST},
     "steps_per_second": Quantity("steps per second"),
-    "duration": Quantity("duration", "s"),
+    **_OF_RUN,
     "complete": Quantity("bag complete"),
     "bag": Quantity("bag"),
 }

@@ -12,6 +12,7 @@ from stickslip_ros.measures import Measures, Regime
 from stickslip_ros.measures.cycle_measures import Cycle, Trend, trend_text
 from stickslip_ros.measures.drift import Drift, TrendMeter
 from stickslip_ros.measures.run_meter import RunMeter
+from stickslip_ros.measures.run_report import report_of
 from stickslip_ros.model.control import ControlLaw
 from stickslip_ros.motion import RecordedMotion
 from stickslip_ros.motion.controller import Controller
@@ -83,7 +84,7 @@ def test_a_force_that_grows_is_a_drift_even_if_the_slide_does_not_move(
     noise = np.random.default_rng(0).standard_normal(COUNT)
     forces = ForceColumns(milliseconds(COUNT), 400.0 + rate * TIME + 0.1 * noise)
     meter.feed_forces(forces, forces[:0])
-    report = meter.report()
+    report = report_of(meter)
     assert report["regime"] == "stuck"
     assert report["steady"] is not drifts
     assert (report["drift"] is not None) is drifts
@@ -94,7 +95,7 @@ def test_a_force_that_grows_is_a_drift_even_if_the_slide_does_not_move(
 def test_creep_is_a_drift() -> None:
     meter = RunMeter(20)
     meter.motion.feed(samples(4e-5 * (1.0 - np.exp(-TIME / 30.0))))
-    report = meter.report()
+    report = report_of(meter)
     assert report["steady"] is False
     assert report["trend"] == "drifting"
 
@@ -128,7 +129,7 @@ def test_a_belt_that_varies_makes_no_drift_but_a_note() -> None:
     meter = RunMeter(20)
     position = 4e-4 * (1.0 + 0.1 * TIME)
     meter.motion.feed(columns(milliseconds(COUNT), position, belt_velocity=0.04 + 0.01 * TIME))
-    report = meter.report()
+    report = report_of(meter)
     assert report["drift"] is None
     assert any("a drift is not judged" in note for note in report["notes"])
 

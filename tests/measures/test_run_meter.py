@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from stickslip_ros.measures.run_meter import RunMeter
+from stickslip_ros.measures.run_report import report_of
 from stickslip_ros.samples import NO_FORCES, ForceColumns
 from tests.measures.records import columns
 
@@ -23,7 +24,7 @@ def test_the_report_of_a_run() -> None:
     position, velocity = -np.cos(angle), 1.5 * np.pi * np.sin(angle)
     meter.motion.feed(columns(forces.stamp, position, velocity, 6.0))
     meter.force.feed(forces)
-    report = meter.report()
+    report = report_of(meter)
     assert report["samples"] == 300
     assert report["lost_samples"] == 0
     assert report["duration"] == pytest.approx(2.99)
@@ -40,7 +41,7 @@ def test_what_was_sent_and_what_acted_are_measured_apart() -> None:
     forces = decaying(300)
     meter.feed_forces(forces, forces[np.array([0, 299])])
     meter.finish()
-    report = meter.report()
+    report = report_of(meter)
     assert (report["peak_force"], report["peak_applied_force"]) == (1.0, 0.5)
     assert report["resting_force"] == report["resting_applied_force"] == pytest.approx(1.0 / 271.0)
     assert report["dropped_forces"] == 2
@@ -61,5 +62,5 @@ def test_forces_that_begin_after_the_samples_are_noted(later: int, note: str | N
     zero = np.zeros(301)
     meter.motion.feed(columns(forces.stamp, zero, zero))
     meter.feed_forces(ForceColumns(forces.stamp + later * PERIOD, forces.force), NO_FORCES)
-    notes = meter.report()["notes"]
+    notes = report_of(meter)["notes"]
     assert [each[: len(note or "")] for each in notes] == ([] if note is None else [note])

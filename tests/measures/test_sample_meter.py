@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.measures.cycle_measures import Regime
 from stickslip_ros.measures.run_meter import RunMeter
+from stickslip_ros.measures.run_report import report_of
 from stickslip_ros.measures.sample_assumptions import EXACT, UNKNOWN, SampleAssumptions, reading_of
 from stickslip_ros.measures.sample_meter import SampleMeter
 from stickslip_ros.motion.motion import Motion
@@ -367,7 +368,7 @@ def test_the_motion_of_two_plants_on_one_topic_is_not_known(
     meter = RunMeter(window=20, reading=EXACT._replace(period=1e7))
     for first in range(0, len(both), size):
         meter.motion.feed(both[first : first + size])
-    report = meter.report()
+    report = report_of(meter)
     unknown = ("regime", "amplitude", "period", "lost_samples", "duration", "steady")
     assert {name: report[name] for name in unknown} == dict.fromkeys(unknown)
     (note,) = report["notes"]
