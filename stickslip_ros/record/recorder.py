@@ -24,13 +24,13 @@ from stickslip_ros.record.definitions import message_definition, type_hash
 from stickslip_ros.record.file_writer import LAST_STAMP, Definitions, FileWriter
 from stickslip_ros.record.mcap_file import McapFile
 from stickslip_ros.record.metadata import BagDescription
-from stickslip_ros.record.topics import DURABILITY, HISTORY, RELIABILITY
+from stickslip_ros.record.topics import HISTORY, RELIABLE, VOLATILE
 from stickslip_ros.stamps import NANOSECONDS
 
 Compression = Literal["lz4", "zstd", "none"]
 
 
-def offered_qos(depth: int) -> str:
+def offered_qos(depth: int, reliability: str = RELIABLE, durability: str = VOLATILE) -> str:
     """Return the QoS that a publisher of ours offers, as rosbag2 stores it with a channel.
 
     It is YAML: a list of one profile, which a player offers again.
@@ -39,8 +39,8 @@ def offered_qos(depth: int) -> str:
     profile = {
         "history": HISTORY,
         "depth": depth,
-        "reliability": RELIABILITY,
-        "durability": DURABILITY,
+        "reliability": reliability,
+        "durability": durability,
         "deadline": dict(unlimited),
         "lifespan": dict(unlimited),
         "liveliness": "automatic",
@@ -112,18 +112,18 @@ class Recorder:
         self._sync: Future[None] | None = None
         self._in_background(_sync_directories, [*(new.parent for new in made), self.directory])
 
-    def add_topic(self, name: str, type_name: str, depth: int) -> int:
+    def add_topic(self, name: str, type_name: str, depth: int, **policies: str) -> int:
         """Add a topic, such as `/feed_drive/joint_states`, and return its channel for `write`.
 
         An example of a type is `sensor_msgs/msg/JointState`; `depth` is that of the history that
-        its publisher offers. Raises BagError if the topic is already in the bag, its type is not
-        installed, or the bag is closed or fails.
+        its publisher offers, `policies` are as in `offered_qos`. Raises BagError if the topic is
+        already in the bag, its type is not installed, or the bag is closed or fails.
         """
         if name in self._definitions.topics:
             raise BagError(f"the topic {name} is already in the bag {self.directory}")
         definition = message_definition(type_name).encode()
         metadata = {
-            "offered_qos_profiles": offered_qos(depth),
+            "offered_qos_profiles": offered_qos(depth, **policies),
             "topic_type_hash": type_hash(type_name),
         }
         return self.add_channel(

@@ -1,4 +1,4 @@
-"""The topics: name, type, history depth, meaning and decoder of each; no ROS.
+"""The topics: name, type, quality of service, meaning and decoder of each; no ROS.
 
 Names are relative to the namespace.
 """
@@ -21,8 +21,8 @@ DEEP = 4_900
 RECORDER_DEPTH = 20_000
 """Messages of a topic that wait in the analyzer; each takes about a kilobyte."""
 
-HISTORY, RELIABILITY, DURABILITY = "keep_last", "reliable", "volatile"
-"""Quality of service of all topics, besides the depth of the history; rosbag2's names."""
+HISTORY, RELIABLE, VOLATILE = "keep_last", "reliable", "volatile"
+"""Quality of service, in rosbag2's names; the history of all topics is that."""
 
 _WRENCH = "geometry_msgs/msg/WrenchStamped"
 _NUMBER = "std_msgs/msg/Float64"
@@ -35,9 +35,12 @@ class Topic(Generic[MessageT]):
     name: str
     type_name: str
     depth: int = 10
+    """Messages that wait for a slow reader."""
     meaning: str = ""
     decode: Callable[[bytes], MessageT] | None = None
     """Decodes a serialized message or raises BagError; None: ROS deserializes it to an object."""
+    reliability: str = RELIABLE
+    durability: str = VOLATILE
 
 
 JOINT_STATES = Topic(

@@ -115,7 +115,7 @@ class Incoming:
                 self._subscriptions[topic] = self._subscribe(topic, ReliabilityPolicy.BEST_EFFORT)
 
     def _subscribe(
-        self, topic: Topic[Any], reliability: ReliabilityPolicy = ReliabilityPolicy.RELIABLE
+        self, topic: Topic[Any], reliability: ReliabilityPolicy | None = None
     ) -> Subscription:
         qos = qos_profile(topic, RECORDER_DEPTH, reliability)
         return self._node.keep(self._node.create_polled_subscription(topic, qos))

@@ -112,7 +112,9 @@ class LiveBag:
 
     def _add(self, recorder: Recorder, topic: Topic[Any]) -> None:
         name = self._node.resolve_topic_name(topic.name)
-        self._channels[topic.name] = recorder.add_topic(name, topic.type_name, topic.depth)
+        policies = {"reliability": topic.reliability, "durability": topic.durability}
+        channel = recorder.add_topic(name, topic.type_name, topic.depth, **policies)
+        self._channels[topic.name] = channel
 
     def _record(self, act: Callable[[Recorder], None]) -> None:
         if self._recorder is None:

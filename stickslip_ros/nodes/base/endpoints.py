@@ -1,4 +1,4 @@
-"""Endpoints of topics in rclpy: message class, quality of service, what matches, what waits."""
+"""Endpoints of topics in rclpy: message class, what matches, what waits."""
 
 from collections.abc import Callable, Iterator
 from functools import cache
@@ -19,7 +19,7 @@ from rclpy.qos import (
 from rclpy.subscription import Subscription
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
-from stickslip_ros.record.topics import DURABILITY, HISTORY, RELIABILITY, Topic
+from stickslip_ros.record.topics import HISTORY, Topic
 
 ThingT = TypeVar("ThingT")
 
@@ -29,12 +29,12 @@ def qos_profile(
     depth: int | None = None,
     reliability: ReliabilityPolicy | None = None,
 ) -> QoSProfile:
-    """Return the quality of service of a topic, with a history of `depth` messages."""
+    """Return the quality of service of a topic, or one with another depth or reliability."""
     return QoSProfile(
         history=HistoryPolicy.get_from_short_key(HISTORY),
         depth=topic.depth if depth is None else depth,
-        reliability=reliability or ReliabilityPolicy.get_from_short_key(RELIABILITY),
-        durability=DurabilityPolicy.get_from_short_key(DURABILITY),
+        reliability=reliability or ReliabilityPolicy.get_from_short_key(topic.reliability),
+        durability=DurabilityPolicy.get_from_short_key(topic.durability),
     )
 
 
