@@ -48,8 +48,11 @@ class DriveExpressions:
         self._belt_acceleration = _by_time(self.drive, time, self._switches.belt, 0.0 * speed)
         self._normal = equations.normal_force(self.drive, time, self._switches.load)
 
-    def stick(self, backward: Transition, forward: Transition, lift: Transition) -> Flow:
-        """Return the flow in which the slide moves with the belt; guards lead to these."""
+    def stick(self, release: Callable[..., Mode], lift: Transition) -> Flow:
+        """Return the flow in which the slide moves with the belt; guards lead to these.
+
+        `release` is called with the sign of the slip.
+        """
         speed, acceleration, held = self._state[SPEED], self._belt_acceleration, self._reaction()
         if not self._system.steady:
             held += self.drive.mass * acceleration
@@ -57,8 +60,8 @@ class DriveExpressions:
         return Flow(
             rates=(speed, acceleration, *self._part_rates()),
             guards=(
-                Guard(self._normal * backward_limit - held, backward),
-                Guard(self._normal * forward_limit + held, forward),
+                Guard(self._normal * backward_limit - held, partial(release, sign=-1.0)),
+                Guard(self._normal * forward_limit + held, partial(release, sign=1.0)),
                 *self._lift_guards(lift),
             ),
             marks=self._marks_of_stick(),

@@ -68,7 +68,7 @@ class DriveSystem(DimensionlessDrive):
         """
         kind, drive = type(self), self.expressions
         if name == STICK:
-            return drive.stick(kind.release_backward, kind.release_forward, kind.lift)
+            return drive.stick(kind.release, kind.lift)
         return drive.slip(kind.reach_belt, kind.diverge, kind.lift, kind.switch_friction)
 
     def reach_belt(self, mode: Mode, instant: Instant) -> Mode:
@@ -78,13 +78,9 @@ class DriveSystem(DimensionlessDrive):
             return self._resting(mode, instant)
         return self._slip(mode, -mode.switches[SIGN], instant)
 
-    def release_backward(self, mode: Mode, instant: Instant) -> Mode:
-        """Slip backward where the reaction exceeds its limit."""
-        return self._slip(mode, -1.0, instant)
-
-    def release_forward(self, mode: Mode, instant: Instant) -> Mode:
-        """Slip forward where the reaction falls below its limit."""
-        return self._slip(mode, 1.0, instant)
+    def release(self, mode: Mode, instant: Instant, *, sign: float) -> Mode:
+        """Slip in a direction where the reaction leaves its limit."""
+        return self._slip(mode, sign, instant)
 
     def lift(self, mode: Mode, instant: Instant) -> Mode:
         """End the run: the slide lifts off the belt."""
