@@ -98,6 +98,11 @@ class ControlledDrive:
         return cls(drive, law, loop, reference, plant.duration, scenario.cycle_meter)
 
     @property
+    def controlled(self) -> bool:
+        """Whether a control law, or sampling, acts on the motion."""
+        return self.law is not None or self.sampled is not None
+
+    @property
     def period(self) -> float:
         """Unit of the durations of a study, s; see `unit_period`."""
         return unit_period(self.drive, self.duration)
@@ -189,17 +194,12 @@ def settle(case: ControlledDrive, start: MotionState, settling: SettlingOptions)
 
     Raises RunError if the motion is too stiff to integrate.
     """
-    drive, law, period = case.drive, case.law, case.period
-    control = law.continuous if law is not None and case.sampled is None else None
-    motion = RecordedMotion(drive, start.position, start.velocity, control, recording=False)
-    kept = start.memory is not None and len(start.memory) == len(drive.friction.states)
-    if kept or start.motor is not None:
-        memory = start.memory if kept else None
-        motion.restart(start.position, start.velocity, memory, start.motor)
+    drive, period, controlled = case.drive, case.period, case.controlled
+    run = _ControlledMotion(case, start)
+    motion = run.motion
     loads = drive.belt_speed != 0.0 and drive.has_spring
     loading = loading_time(drive) if loads else 0.0
     transient = settling.transient * period
-    controlled = law is not None or case.sampled is not None
     if controlled:  # otherwise one step covers the stick phase on a slow belt
         loading = min(loading, 50.0 * period)
         transient += loading
@@ -208,29 +208,12 @@ def settle(case: ControlledDrive, start: MotionState, settling: SettlingOptions)
     block, longest = cycles * period, cycles * (period + loading)
     if not drive.has_spring:  # forces alone make its cycles
         block = longest = case.duration
-    controller = loop = None
-    if case.sampled is not None:
-        loop = case.sampled.as_loop(motion)
-        block = max(block, loop.period)
-        if law is not None:
-            controller = Controller(law, case.reference, start.control)
-            simulate_sampled(loop, motion, controller, law.start_after, CycleMeter(1))
-
-        def advance(duration: float, section: _Section) -> None:
-            simulate_sampled(loop, motion, controller, duration, section.meter, observer=section)
-    else:
-        if law is not None and control is not None:
-            _start_control(motion, control, law.start_after, start)
-
-        def advance(duration: float, section: _Section) -> None:
-            motion.advance(duration)
-            if motion.recording:
-                measure_block(motion, section.meter, section)
+    block = max(block, run.sample_period)
 
     def observe() -> _Section:
         motion.recording = False
         section = _Section(case.meter(settling.cycles), settling.cycles, once=not drive.has_spring)
-        advance(transient, section)
+        run.advance(transient, section)
         if motion.sticking and not controlled and loads and drive.motor is None:
             left = (release_position(drive) - motion.position) / drive.belt_speed
             if left > period:  # the transient has only started
@@ -239,7 +222,7 @@ def settle(case: ControlledDrive, start: MotionState, settling: SettlingOptions)
         motion.recording = True
         done, step = 0.0, block
         while not motion.unbounded and done < longest and not (done and section.done):
-            advance(step, section)
+            run.advance(step, section)
             done, step = done + step, done + step  # cycles on a slow belt are that long
         if motion.unbounded:
             section.meter.unbounded = True
@@ -255,12 +238,53 @@ def settle(case: ControlledDrive, start: MotionState, settling: SettlingOptions)
         elif measures.trend not in (Trend.GROWING, Trend.DECAYING) or not section.meter.repeats:
             break
         section = observe()
-    state = motion.control_state if control is not None else None
-    if controller is not None and loop is not None:
-        answer(loop, controller)
-        state = tuple(map(float, controller.state))  # also those of a law that uses numpy
-    end = MotionState(motion.position, motion.velocity, state, motion.memory, motion.motor)
-    return section.settled(end)
+    return section.settled(run.end())
+
+
+class _ControlledMotion:
+    """The motion of a case from a start, after its control has started to act."""
+
+    def __init__(self, case: ControlledDrive, start: MotionState) -> None:
+        drive, law = case.drive, case.law
+        control = law.continuous if law is not None and case.sampled is None else None
+        motion = RecordedMotion(drive, start.position, start.velocity, control, recording=False)
+        kept = start.memory is not None and len(start.memory) == len(drive.friction.states)
+        if kept or start.motor is not None:
+            memory = start.memory if kept else None
+            motion.restart(start.position, start.velocity, memory, start.motor)
+        self.motion = motion
+        self._loop = None if case.sampled is None else case.sampled.as_loop(motion)
+        self._controller: Controller | None = None
+        if self._loop is not None and law is not None:
+            self._controller = Controller(law, case.reference, start.control)
+            after = law.start_after
+            simulate_sampled(self._loop, motion, self._controller, after, CycleMeter(1))
+        elif law is not None and control is not None:
+            _start_control(motion, control, law.start_after, start)
+
+    @property
+    def sample_period(self) -> float:
+        """Time between samples, s; 0 without sampling."""
+        return 0.0 if self._loop is None else self._loop.period
+
+    def advance(self, duration: float, section: "_Section") -> None:
+        """Advance by a duration, s, and let a section take what is recorded."""
+        meter, controller = section.meter, self._controller
+        if self._loop is not None:
+            simulate_sampled(self._loop, self.motion, controller, duration, meter, observer=section)
+            return
+        self.motion.advance(duration)
+        if self.motion.recording:
+            measure_block(self.motion, meter, section)
+
+    def end(self) -> MotionState:
+        """Return the state at the end, after a last answer of a sampled controller."""
+        motion, controller = self.motion, self._controller
+        state = None if motion.control is None else motion.control_state
+        if controller is not None and self._loop is not None:
+            answer(self._loop, controller)
+            state = tuple(map(float, controller.state))  # also those of a law that uses numpy
+        return MotionState(motion.position, motion.velocity, state, motion.memory, motion.motor)
 
 
 def _start_control(
