@@ -93,8 +93,7 @@ def add_recordings(parser: argparse.ArgumentParser, what: str) -> None:
     parser.add_argument("recordings", metavar="RECORDING", nargs="+", type=Path, help=what)
 
 
-def add_reading(parser: argparse.ArgumentParser) -> None:
-    """Add the options that say how recordings are read: see `reading_of`."""
+def _add_table_form(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--columns",
         metavar="QUANTITY=COLUMN,...",
@@ -138,6 +137,11 @@ def add_reading(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="show displacements as angles, rad, and forces as torques, N m",
     )
+
+
+def add_reading(parser: argparse.ArgumentParser) -> None:
+    """Add the options that say how recordings are read: see `reading_of`."""
+    _add_table_form(parser)
     parser.add_argument(
         "--from",
         dest="start",

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import groupby, pairwise
 from typing import Any
 
@@ -136,34 +136,24 @@ class Trajectories:
         count = len(self.measured)
         outputs = np.full(count, np.nan)
         by_names, by_start = np.zeros((count, len(names))), np.zeros((count, 2))
-        fastest, long = self.fastest, _LONG_DELAY * self.records[0].period
-
-        def step(name: str, share: float) -> float:
-            size = long if name in (DELAY, LAG) else self.law.size(name, values, fastest)
-            return share * max(abs(values[name]), size)
-
         others = [name for name in names if name in (DELAY, LAG, *self.law.by_differences)]
         by_equations = [name for name in names if name not in others]
         # At 0 a constant may drop out of the equations, and its derivatives with it.
-        least = {name: step(name, _LEAST) for name in by_equations if values[name] == 0.0}
-        values = {**values, **least}
+        zeros = [name for name in by_equations if values[name] == 0.0]
+        values = {**values, **self._steps(values, zeros, _LEAST)}
         try:
             drive = self._drive(values)
             moved = [
-                (step(name, _STEP), self._drive({**values, name: values[name] + step(name, _STEP)}))
-                for name in by_equations
+                (step, self._drive({**values, name: values[name] + step}))
+                for name, step in self._steps(values, by_equations, _STEP).items()
             ]
 
             def by_coordinates(function: Callable[[Drive], FloatArray]) -> FloatArray:
                 base = function(drive)
-                columns = [(function(other) - base) / change for change, other in moved]
+                columns = [(function(other) - base) / step for step, other in moved]
                 return np.column_stack(columns) if columns else np.empty((len(base), 0))
 
-            def of_system(other: Drive) -> FloatArray:
-                system = drive_system(in_units_of(drive, other))
-                return np.array([system.constants[name] for name in system.free_constants])
-
-            of_constants = by_coordinates(of_system)
+            of_constants = by_coordinates(partial(_constants_of, drive))
             scaled, delay = in_units_of(drive, drive), values[DELAY]
             units = 1.0 / scaled.length_scale, 1.0 / scaled.speed_scale
             runs = (
@@ -188,11 +178,21 @@ class Trajectories:
         except (InvalidInputError, RunError):
             outputs[:] = np.nan
         outputs = self._bounded(outputs)
-        for name in others:
-            change = step(name, _MOTION_STEP)
-            moved_outputs = self._predicted({**values, name: values[name] + change}, starts)
-            by_names[:, names.index(name)] = (moved_outputs - outputs) / change
+        for name, step in self._steps(values, others, _MOTION_STEP).items():
+            moved_outputs = self._predicted({**values, name: values[name] + step}, starts)
+            by_names[:, names.index(name)] = (moved_outputs - outputs) / step
         return outputs, by_names, by_start
+
+    def _steps(
+        self, values: Mapping[str, float], names: Sequence[str], share: float
+    ) -> dict[str, float]:
+        """Return a step of each coordinate, by its size."""
+        fastest, long = self.fastest, _LONG_DELAY * self.records[0].period
+        sizes = {
+            name: long if name in (DELAY, LAG) else self.law.size(name, values, fastest)
+            for name in names
+        }
+        return {name: share * max(abs(values[name]), size) for name, size in sizes.items()}
 
     def _predicted(self, values: Mapping[str, float], starts: FloatArray) -> FloatArray:
         """Return the outputs of all segments; far away where there is no motion."""
@@ -236,6 +236,12 @@ class Trajectories:
         """Fastest speed relative to the belt, m/s, by the starts of the segments."""
         belts = [segment.belt_speed for segment in self.segments]
         return max(float(np.abs(self.starts[:, 1] - belts).max()), 1e-12)
+
+
+def _constants_of(drive: Drive, other: Drive) -> FloatArray:
+    """Return the free constants of another drive, in the units of a drive."""
+    system = drive_system(in_units_of(drive, other))
+    return np.array([system.constants[name] for name in system.free_constants])
 
 
 def segments_of(predictors: Sequence[Predictor], length: float) -> Sequence[Segment]:

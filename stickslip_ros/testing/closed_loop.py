@@ -117,12 +117,12 @@ class ClosedLoop:
         self._to_control = controller
         self._is_law = isinstance(controller, str) and controller != _EXTERNAL
         named = isinstance(controller, str) and controller not in (_OF_SCENARIO, _EXTERNAL)
-        self._law = str(controller) if named else None
+        law = str(controller) if named else None
         scenario_of_test = load_scenario(
             fspath(scenario),
             [*_OF_A_TEST, *([f"{_EXPECTS_CONTROL}=false"] if controller is None else [])],
             self.namespace,
-            controller=self._law,
+            controller=law,
             other_nodes=not self._is_law and controller is not None,
         )
         self.scenario = self._changed(scenario_of_test, overrides)
