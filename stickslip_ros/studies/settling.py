@@ -14,7 +14,7 @@ from stickslip_ros.measures.cycle_measures import LEAST_CYCLES, RESTS, Measures,
 from stickslip_ros.measures.cycle_meter import CycleMeter
 from stickslip_ros.measures.sample_meter import MeasuredMotion
 from stickslip_ros.model.constants import constants_of
-from stickslip_ros.model.control import ContinuousControl, ControlLaw
+from stickslip_ros.model.control import ControlLaw
 from stickslip_ros.model.drive import Drive
 from stickslip_ros.motion import RecordedMotion
 from stickslip_ros.motion.controller import Controller, ReferenceSource, answer, no_reference
@@ -260,7 +260,13 @@ class _ControlledMotion:
             after = law.start_after
             simulate_sampled(self._loop, motion, self._controller, after, CycleMeter(1))
         elif law is not None and control is not None:
-            _start_control(motion, control, law.start_after, start)
+            # The states of the control run alone until its force acts.
+            motion.control = control if law.start_after == 0.0 else control.silenced()
+            if start.control is not None:
+                motion.control_state = start.control
+            if law.start_after > 0.0:
+                motion.advance(law.start_after)
+                motion.control = control
 
     @property
     def sample_period(self) -> float:
@@ -285,18 +291,6 @@ class _ControlledMotion:
             answer(self._loop, controller)
             state = tuple(map(float, controller.state))  # also those of a law that uses numpy
         return MotionState(motion.position, motion.velocity, state, motion.memory, motion.motor)
-
-
-def _start_control(
-    motion: RecordedMotion, control: ContinuousControl, start_after: float, start: MotionState
-) -> None:
-    """Run the states of the control alone for `start_after` (s), then let its force act."""
-    motion.control = control if start_after == 0.0 else control.silenced()
-    if start.control is not None:
-        motion.control_state = start.control
-    if start_after > 0.0:
-        motion.advance(start_after)
-        motion.control = control
 
 
 def _is_settled(measures: Measures) -> bool:
