@@ -154,7 +154,7 @@ class VariationalMotion(Motion):
         return self._derivatives.matrix
 
 
-class _Shot(Derivatives):
+class Shot(Derivatives):
     """Derivatives and breakpoints since a start, with the effort of all starts."""
 
     def __init__(self, recorder: BreakpointRecorder, budget: StepBudget) -> None:
@@ -211,23 +211,9 @@ class ShootingMotion(RecordedMotion):
         """
         detail, drive = Detail.MARKS | Detail.DERIVATIVES, replace(drive, actuator=IDEAL_ACTUATOR)
         super().__init__(drive, 0.0, 0.0, control, detail=detail)
-        self._shot = self.core.observer = _Shot(self.recorder, self.core.budget)
+        self.shot = self.core.observer = Shot(self.recorder, self.core.budget)
+        """The derivatives of the states by those at the start."""
         self.start(np.zeros(len(self.core.system.states)))
-
-    @property
-    def derivatives(self) -> FloatArray:
-        """Derivatives of the states (rows) by those at the start, dimensionless."""
-        return self._shot.matrix
-
-    @property
-    def landed(self) -> bool:
-        """Whether the slide has stuck since the start."""
-        return self._shot.landed
-
-    @property
-    def mode(self) -> Mode:
-        """The mode of the system at present."""
-        return self.core.mode
 
     @property
     def rate(self) -> FloatArray:
@@ -253,10 +239,6 @@ class ShootingMotion(RecordedMotion):
         state[self.core.system.slots.control] = np.asarray(filter_states) / self._length
         return state
 
-    def filter_states_of(self, state: FloatArray) -> FloatArray:
-        """Return the states of the control in a state; none without control."""
-        return state[self.core.system.slots.control]
-
     def start(self, state: FloatArray, mode: Mode | None = None) -> None:
         """Start again at `state`, at time zero and without breakpoints.
 
@@ -269,7 +251,7 @@ class ShootingMotion(RecordedMotion):
         if mode is not None and mode.flow == core.mode.flow:
             core.enter(mode)
         self.recorder.record_state(core.instant)
-        self._shot.restart(core.system, core.mode)
+        self.shot.restart(core.system, core.mode)
 
     def advance(self, duration: float) -> None:
         """Integrate over a duration, s; raises TooStiffError."""

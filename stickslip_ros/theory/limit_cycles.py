@@ -149,7 +149,7 @@ def _cycle_ahead(motion: ShootingMotion, turns: int) -> LimitCycle | None:
             return None
         if np.abs(state - before).max() < AGREEMENT * np.abs(state).max():
             break
-    return solve(motion, state, duration, motion.mode)
+    return solve(motion, state, duration, motion.core.mode)
 
 
 class _ReturnMap:
@@ -182,7 +182,7 @@ class _ReturnMap:
             return None
         turn, duration = found
         follows = len(self._motion.drive.friction.states) > 0
-        return solve(self._motion, turn if follows else state, duration, self._motion.mode)
+        return solve(self._motion, turn if follows else state, duration, self._motion.core.mode)
 
     def brackets(self) -> Iterator[tuple[float, float]]:
         """Yield pairs of distances between which the growth changes sign."""
@@ -190,7 +190,7 @@ class _ReturnMap:
         outer, turned, landed = self._innermost, False, False
         corners = self._corners()
         while True:
-            growth, slope, lands = self.growth(outer), self._slope(), self._motion.landed
+            growth, slope, lands = self.growth(outer), self._slope(), self._motion.shot.landed
             turns = growth != -outer
             if self._motion.unbounded or (turned and not turns):
                 return
@@ -231,7 +231,7 @@ class _ReturnMap:
 
     def _lands(self, distance: float) -> bool:
         self.growth(distance)
-        return self._motion.landed
+        return self._motion.shot.landed
 
     def _corners(self) -> list[float]:
         """Return two distances, just inside and just outside a cycle that sticks, if there is one.
@@ -268,7 +268,7 @@ class _ReturnMap:
 
         There Y = X' is zero.
         """
-        return float(self._motion.derivatives[0, 0]) - 1.0
+        return float(self._motion.shot.matrix[0, 0]) - 1.0
 
     def _state(self, distance: float) -> FloatArray:
         return self._rest - distance * np.eye(len(self._rest))[POSITION]

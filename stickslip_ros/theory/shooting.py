@@ -173,7 +173,7 @@ class _Shot:
             return None
         residual = motion.state - start
         miss = float(np.abs(residual).max()) / max(abs(float(start[0])), distance)
-        found = motion.derivatives, motion.rate, motion.landed, motion.mode
+        found = motion.shot.matrix, motion.rate, motion.shot.landed, motion.core.mode
         return cls(unknowns, residual, miss, *found)
 
     def newton_step(self) -> FloatArray:
@@ -241,7 +241,9 @@ def _cycle(motion: ShootingMotion, shot: _Shot) -> LimitCycle | None:
         return None
     return LimitCycle(
         position=float(start[0]) * drive.length_scale,
-        filter_states=tuple((motion.filter_states_of(start) * drive.length_scale).tolist()),
+        filter_states=tuple(
+            (start[motion.core.system.slots.control] * drive.length_scale).tolist()
+        ),
         period=period,
         multipliers=shot.multipliers(),
         measures=replace(measures, steady=True, trend=None),

@@ -171,7 +171,7 @@ def test_derivatives_by_the_start_alone(drive: Drive, gains: Washout | None) -> 
         found = [end(start + each, duration) - end(start - each, duration) for each in steps]
         end(start, duration)
         landings += motion.sticking
-        assert motion.derivatives == pytest.approx(
+        assert motion.shot.matrix == pytest.approx(
             np.transpose(found) / (2.0 * step), rel=1e-5 if own else 0.0, abs=1e-7 if own else 3e-8
         )
     assert landings > 0 or own
