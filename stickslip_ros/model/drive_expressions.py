@@ -12,7 +12,7 @@ from stickslip_ros.model.constants import constants_of
 from stickslip_ros.model.dimensionless_drive import DimensionlessDrive
 from stickslip_ros.model.drive import UNBOUNDED_SPEED, Drive, DriveConstants
 from stickslip_ros.model.drive_forces import DriveForces
-from stickslip_ros.model.drive_layout import SIGN, SPEED
+from stickslip_ros.model.drive_layout import SIGN, SPEED, DriveSwitches
 from stickslip_ros.model.hybrid import Flow, Guard, Instant, Mode, Transition
 from stickslip_ros.model.motor import Motor
 from stickslip_ros.model.rounding import HYSTERESIS, LIFT_ROUNDING
@@ -41,7 +41,8 @@ class DriveExpressions:
         if control is not None:
             control = with_symbols(control, "control", constants)
         self._forces = DriveForces(self.drive, control, system.slots)
-        self._sign, self._switches = switches[SIGN], system.switch_slots.split(switches)
+        self._sign = switches[SIGN]
+        self._switches = DriveSwitches(*(switches[slot] for slot in system.switch_slots))
         self.belt_speed = equations.belt_speed(self.drive, time, self._switches.belt)
         """Speed of the belt."""
         speed = self._state[SPEED]

@@ -34,11 +34,6 @@ class DriveSwitches(NamedTuple):
     motor: Any
     """That of a motor with dry friction: sgn(X' - v_belt), 0 where it sticks."""
 
-    def split(self, switches: Sequence[Any]) -> "DriveSwitches":
-        """Return the values of these slots."""
-        law, belt, load, motor = self
-        return DriveSwitches(switches[law], switches[belt], switches[load], switches[motor])
-
 
 def states_of(
     drive: Drive, control: ContinuousControl | None

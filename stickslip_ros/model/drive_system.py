@@ -45,7 +45,9 @@ class DriveSystem(DimensionlessDrive):
         """Whether the slide can move with the belt: not under a law that has a memory."""
         self.many_steps = not law.sticks or bool(self.drive.actuator.states)
         self.limits_steps = law.characteristic_speed != inf and law.sticks
+        """Whether `longest_step` limits the steps of the integration."""
         self.has_parts = len(law.switches) > 0
+        """Whether several margins may fall to zero at one instant, see `apply_pending_guards`."""
         self._frequency = drive.angular_frequency
         self.forward_limit, self.backward_limit = map(float, law.limits)
         largest = max(self.forward_limit, self.backward_limit)
@@ -133,7 +135,11 @@ class DriveSystem(DimensionlessDrive):
         return self._settled_at(self.belt_speed(stick, instant.time), stick, instant)
 
     def settled(self, mode: Mode, instant: Instant) -> Mode:
-        """Return the mode that continues, mostly the same; see `HybridSystem.settled`."""
+        """Return the mode that continues, mostly the same.
+
+        It is asked at the start of each advance, since inputs may have changed. It moves the state
+        off the guards of a mode that continues; that of another one follows where it is entered.
+        """
         state, sign = instant.state, mode.switches[SIGN]
         if self.has_parts:
             if (following := self.apply_pending_guards(mode, instant)) is not mode:
@@ -169,7 +175,10 @@ class DriveSystem(DimensionlessDrive):
             self.lift(mode, instant)
 
     def apply_pending_guards(self, mode: Mode, instant: Instant) -> Mode:
-        """Return the mode after the margins of the law that rounding has put below zero."""
+        """Return the mode after the margins of the law that rounding has put below zero.
+
+        heyoka finds the first guard of several at one instant.
+        """
         for _ in range(_MOST_AT_ONCE):
             margin = self._pending_margin(mode, instant)
             if margin is None:

@@ -8,7 +8,6 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from math import inf
 from typing import Any, NamedTuple, TypeVar
 
 import heyoka as hy
@@ -122,25 +121,6 @@ class HybridSystem(ABC):
         """Return a flow by its name; systems of one structure share it."""
         return self.shared(("flow", name), lambda: self.flow(name))
 
-    @abstractmethod
-    def starting_mode(self, instant: Instant) -> Mode:
-        """Return the mode in which a motion starts at an instant."""
-
-    @abstractmethod
-    def settled(self, mode: Mode, instant: Instant) -> Mode:
-        """Return the mode that continues at an instant, mostly the same one.
-
-        It is asked at the start of each advance, since inputs may have changed. It moves the state
-        off the guards of a mode that continues; that of another one follows where it is entered.
-        """
-
-    def is_unbounded(self, instant: Instant) -> bool:
-        """Return whether a motion that starts here counts as unbounded."""
-        return False
-
-    def nudge_off_guard(self, mode: Mode, instant: Instant) -> None:  # noqa: B027 - none by default
-        """Move the state, by rounding errors, off a guard of a mode that starts on it."""
-
     def has_closed_form(self, mode: Mode) -> bool:
         """Return whether `closed_form` solves the modes of this one's flow."""
         return False
@@ -151,42 +131,8 @@ class HybridSystem(ABC):
         """Advance the state for `duration` or up to a guard; return the guard and the time."""
         raise NotImplementedError
 
-    def next_switch_time(self, mode: Mode) -> float:
-        """Return the time at which a mode ends whatever the state; infinite by default."""
-        return inf
-
-    def switch_inputs(self, mode: Mode, instant: Instant) -> Mode:
-        """Return the mode after the corners that an instant has reached."""
-        return mode
-
-    has_parts = False
-    """Whether several margins may fall to zero at one instant, see `apply_pending_guards`."""
-
-    def apply_pending_guards(self, mode: Mode, instant: Instant) -> Mode:
-        """Return the mode after all margins that are below zero at an instant.
-
-        heyoka finds the first guard of several at one instant; rounding may put the others behind.
-        """
-        return mode
-
     many_steps = False
     """Whether an integration takes many steps, which must not depend on what is recorded."""
-
-    limits_steps = False
-    """Whether `longest_step` limits the steps of the integration."""
-
-    def longest_step(self, instant: Instant) -> float:
-        """Return the longest step that misses no feature of the rates."""
-        return inf
-
-    def overflow(self, mode: Mode, instant: Instant) -> Mode:
-        """Set the state of a motion whose rates are no longer finite; return its last mode."""
-        return mode
-
-    @cached_property
-    def autonomous(self) -> bool:
-        """Whether no flow depends on the time."""
-        return True
 
     @cached_property
     def variables(self) -> tuple[Any, ...]:

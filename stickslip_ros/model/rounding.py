@@ -1,7 +1,7 @@
 """What counts as rounding in a dimensionless motion of a drive, so that it decides nothing.
 
 heyoka misses an event in a step that starts on it. A mode that starts on one of its guards is
-therefore moved off it, by little more than rounding: see `HybridSystem.nudge_off_guard`.
+therefore moved off it, by little more than rounding: see `DriveSystem.nudge_off_guard`.
 """
 
 from math import ulp

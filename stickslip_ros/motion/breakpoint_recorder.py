@@ -56,7 +56,7 @@ class BreakpointRecorder:
         self._time = max(self._time, self._clock.time)
         self._recorded.append((self._time, instant.state[POSITION], instant.state[SPEED], False))
 
-    def set_stick_speed(self, core: HybridMotion[DriveSystem], drive: Drive) -> None:
+    def set_stick_speed(self, core: HybridMotion, drive: Drive) -> None:
         """Set the speed up to which a slide with a law that has a memory sticks to the guide."""
         automatic = STICK_SHARE * (drive.fastest_belt / drive.speed_scale or self._fastest)
         given = self._stick_speed

@@ -161,15 +161,13 @@ class IntegratorPool:
 
     def flow_of(self, mode: Mode) -> _Loaded:
         """Return the integrator of a mode, unless that has a closed form, and its transitions."""
-        return self._by_flow.get(mode.flow) or self._load(mode)
-
-    def _load(self, mode: Mode) -> _Loaded:
         name, system, flow = mode.flow, self._system, None
-        if self.derive or not system.has_closed_form(mode):
-            flow = self._borrow(name, self._detail)
-            flow.load(system)
-        loaded = self._by_flow[name] = flow, system.shared_flow(name).transitions
-        return loaded
+        if name not in self._by_flow:
+            if self.derive or not system.has_closed_form(mode):
+                flow = self._borrow(name, self._detail)
+                flow.load(system)
+            self._by_flow[name] = flow, system.shared_flow(name).transitions
+        return self._by_flow[name]
 
     def _borrow(self, name: str, detail: Detail) -> CompiledFlow:
         """Return the integrator of a flow, compiled if there is none of this structure yet."""

@@ -16,9 +16,7 @@ from stickslip_ros.samples import MotorSample
 class DriveView:
     """SI view of the motion of a `DriveSystem`."""
 
-    def __init__(
-        self, core: HybridMotion[DriveSystem], drive: Drive, control: ContinuousControl | None
-    ) -> None:
+    def __init__(self, core: HybridMotion, drive: Drive, control: ContinuousControl | None) -> None:
         """View the motion of a drive, with continuous control or without."""
         self.core = core
         """The motion, dimensionless."""

@@ -1,12 +1,12 @@
-"""Motion of a hybrid system: a state vector and a mode, integrated to machine precision."""
+"""Motion of a drive as a hybrid system: a state and a mode, integrated to machine precision."""
 
 from array import array
 from math import inf
-from typing import Generic, TypeVar
 
 import heyoka as hy
 
-from stickslip_ros.model.hybrid import HybridSystem, Instant, Mode
+from stickslip_ros.model.drive_system import DriveSystem
+from stickslip_ros.model.hybrid import Instant, Mode
 from stickslip_ros.model.rounding import TIME_ROUNDING
 from stickslip_ros.motion.compiled_flow import CompiledFlow, Detail, IntegratorPool
 from stickslip_ros.motion.phase import DIVERGENCE, Phase, PhaseObserver
@@ -18,8 +18,6 @@ from stickslip_ros.motion.short_step import (
     ShortStep,
     short_step,
 )
-
-_System = TypeVar("_System", bound=HybridSystem)
 
 STEPS_PER_UNIT = 10_000
 """Integration steps that a motion may take for each unit of time, in the long run."""
@@ -62,7 +60,7 @@ class StepBudget:
             raise TooManyStepsError
 
 
-class HybridMotion(Generic[_System]):
+class HybridMotion:
     """Motion of a hybrid system: phases in its modes, and the transitions between them.
 
     heyoka's adaptive Taylor method integrates the flow of a mode and finds the instant at which the
@@ -74,16 +72,20 @@ class HybridMotion(Generic[_System]):
     until the next one is entered. Keep no view of it.
     """
 
-    def __init__(self, system: _System, state: list[float], detail: Detail = Detail.STATES) -> None:
+    def __init__(
+        self, system: DriveSystem, state: list[float], detail: Detail = Detail.STATES
+    ) -> None:
         """Start at time zero with all inputs at zero."""
         self.budget = StepBudget()
         """Work that the motion may still take."""
-        self.observer: PhaseObserver[_System] | None = None
+        self.observer: PhaseObserver | None = None
         """Takes note of the phases, if there is one."""
         self._integrators = IntegratorPool(detail)
         self.change(system, state, [0.0] * len(system.inputs), 0.0)
 
-    def change(self, system: _System, state: list[float], inputs: list[float], time: float) -> None:
+    def change(
+        self, system: DriveSystem, state: list[float], inputs: list[float], time: float
+    ) -> None:
         """Continue with another system, from its state and its inputs on."""
         self.system = system
         """System in motion."""
@@ -110,7 +112,7 @@ class HybridMotion(Generic[_System]):
         if self.system.constants[name] != value:
             self._integrators.set_constant(name, value)
 
-    def watch(self, observer: PhaseObserver[_System] | None, detail: Detail) -> None:
+    def watch(self, observer: PhaseObserver | None, detail: Detail) -> None:
         """Continue with another observer and detail."""
         self.observer = observer
         self._integrators.set_detail(detail)
@@ -246,7 +248,7 @@ class HybridMotion(Generic[_System]):
         phase.following = following
         return following
 
-    def _report(self, observer: PhaseObserver[_System], phase: Phase) -> None:
+    def _report(self, observer: PhaseObserver, phase: Phase) -> None:
         """Let an observer take a phase that has just passed."""
         marks = () if self.flow is None else self.flow.take_marks()
         phase.points = (*marks, (None, self.instant.state[0], self.instant.state[1]))

@@ -2,12 +2,11 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol, TypeVar
+from typing import Protocol
 
-from stickslip_ros.model.hybrid import HybridSystem, Instant, Mode
+from stickslip_ros.model.drive_system import DriveSystem
+from stickslip_ros.model.hybrid import Instant, Mode
 from stickslip_ros.motion.compiled_flow import CompiledFlow
-
-_System = TypeVar("_System", bound=HybridSystem, contravariant=True)
 
 DIVERGENCE = -1
 """Stands for a guard where the rates exceed any bound."""
@@ -38,13 +37,13 @@ class Phase:
     """State at the guard: the mode that follows may set a part of it."""
 
 
-class PhaseObserver(Protocol[_System]):
+class PhaseObserver(Protocol):
     """Takes note of the phases of a motion."""
 
     def begin(self, mode: Mode, flow: CompiledFlow | None, now: float, end: float) -> float:
         """Take note of the start of a phase at the time `now`; return its latest end."""
         ...
 
-    def take(self, phase: Phase, system: _System, instant: Instant) -> None:
+    def take(self, phase: Phase, system: DriveSystem, instant: Instant) -> None:
         """Take note of a phase that ends at an instant."""
         ...

@@ -4,7 +4,8 @@ from collections.abc import Callable
 
 import heyoka as hy
 
-from stickslip_ros.model.hybrid import HybridSystem, Instant, Mode
+from stickslip_ros.model.drive_system import DriveSystem
+from stickslip_ros.model.hybrid import Instant, Mode
 from stickslip_ros.motion.compiled_flow import CompiledFlow
 
 LONGEST_STEP = 64.0
@@ -30,7 +31,7 @@ Where a guard or a corner is reached, it returns False, and leaves the state as 
 
 
 def short_step(
-    system: HybridSystem, mode: Mode, instant: Instant, flow: CompiledFlow | None, corner: float
+    system: DriveSystem, mode: Mode, instant: Instant, flow: CompiledFlow | None, corner: float
 ) -> ShortStep:
     """Return what advances in a mode with this flow, to the same bits as the general case.
 
