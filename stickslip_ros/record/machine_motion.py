@@ -3,6 +3,7 @@
 from collections import Counter
 from dataclasses import replace
 from math import nan
+from typing import NamedTuple
 
 import numpy as np
 
@@ -27,6 +28,13 @@ _JUMP = 10.0
 turns."""
 
 
+class _Recorded(NamedTuple):
+    """What the messages have of the joint."""
+
+    position: bool
+    velocity: bool
+
+
 class MachineMotion:
     """The motion of a joint of another machine, read block by block.
 
@@ -40,32 +48,33 @@ class MachineMotion:
         """Take joint, topic and place of the messages, and the belt speed (m/s) of no belt."""
         self._joint, self._topic, self._where = joint, topic, where
         self._layout, self._belt_speed = layout, belt_speed
-        self.estimated = False
-        """Whether velocities are those of the positions."""
-        self._recorded: tuple[bool, bool] | None = None
+        self._recorded: _Recorded | None = None
         self._left_out = Counter[str]()
         self._sources = _Sources(joint, topic, where, layout)
         self._fault = ""
+        """Why velocities are those of the positions; empty: they are those recorded."""
         self._belt = nan
         self._last: SampleColumns | None = None
+
+    @property
+    def estimated(self) -> bool:
+        """Whether velocities are those of the positions."""
+        return self._fault != ""
 
     @property
     def notes(self) -> list[str]:
         """Sentences on what was left out, and what is assumed."""
         if self._recorded is None:
             return []
-        has_position, _ = self._recorded
         notes = [
             f"{number} joint states on {self._topic} {why} and are left out"
             for why, number in self._left_out.items()
         ]
         notes += self._sources.notes
-        if not has_position:
+        if not self._recorded.position:
             notes.append("the position is not recorded: it is the integral of the velocity")
         elif self._fault:
             notes.append(f"the velocity {self._fault}: it is the difference of the positions")
-        elif self.estimated:
-            notes.append("the velocity is not recorded: it is the difference of the positions")
         if self._belt_speed is None and self._layout.belt_joint is None:
             notes.append(
                 "the belt velocity is not recorded: the belt counts as at rest, unless "
@@ -93,7 +102,7 @@ class MachineMotion:
         fault, spikes = lost_velocities(time, position, recorded)
         velocity = samples.velocity.copy()
         if fault is not None:
-            self.estimated, self._fault = True, fault
+            self._fault = fault
             velocity[valid] = differences(time, position)
         elif spikes.any():
             why = "have a velocity that jumps away and back, as the positions do not,"
@@ -112,14 +121,14 @@ class MachineMotion:
         position, velocity = np.isfinite(samples.position), np.isfinite(samples.velocity)
         if self._recorded is None and (position | velocity).any():
             both, positions = map(np.count_nonzero, (position & velocity, position))
-            self._recorded = bool(positions), bool(2 * both >= positions)
+            self._recorded = _Recorded(bool(positions), bool(2 * both >= positions))
             self._check_effort(samples.friction_force)
-        has_position, has_velocity = self._recorded or (False, False)
+        recorded = self._recorded or _Recorded(False, False)
         kept = position | velocity
         for why, lacking in (
             (f"tell nothing of {self._joint}", ~kept),
-            ("have no position", kept & ~position & has_position),
-            ("have no velocity", kept & ~velocity & has_velocity),
+            ("have no position", kept & ~position & recorded.position),
+            ("have no velocity", kept & ~velocity & recorded.velocity),
         ):
             if lacking.any():
                 self._left_out[why] += int(np.count_nonzero(lacking))
@@ -159,16 +168,15 @@ class MachineMotion:
         samples = replace(samples, friction_force=nothing, belt_velocity=belt)
         if len(samples) == 0 or self._recorded is None:
             return samples
-        has_position, has_velocity = self._recorded
         whole = samples if self._last is None else self._last.followed_by(samples)
         steps = np.diff(whole.stamp) / NANOSECONDS
-        if not has_position:
+        if not self._recorded.position:
             mean = (whole.velocity[1:] + whole.velocity[:-1]) / 2.0
             start = 0.0 if self._last is None else float(self._last.position[0])
             position = start + np.cumsum(np.append([] if self._last else [0.0], mean * steps))
             samples = replace(samples, position=position)
-        if not has_velocity:
-            self.estimated = True
+        if not self._recorded.velocity:
+            self._fault = "is not recorded"
             velocity = np.diff(whole.position) / steps
             if self._last is None:
                 velocity = np.append(velocity[:1] if len(velocity) else [0.0], velocity)
