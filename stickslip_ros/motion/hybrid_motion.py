@@ -224,8 +224,9 @@ class HybridMotion:
         elapsed = taylor.time
         if outcome == _STEP_LIMIT:  # the rates leave a step no length
             return Phase(mode, origin + elapsed, DIVERGENCE, origin=origin)
-        end, bound = origin + elapsed, elapsed + longest
-        return Phase(mode, end, -outcome - 1, None, origin, elapsed, bound)
+        guard, bound = -outcome - 1, elapsed + longest
+        end = origin + elapsed
+        return Phase(mode, end, guard, origin=origin, duration=elapsed, bound=bound)
 
     def _follow(self, phase: Phase, epoch: float) -> Mode | None:
         """Make the transition at the end of a phase; return the mode that follows."""
