@@ -1,5 +1,6 @@
 """The part of a bag that is replayed, its quality of service, and refusals."""
 
+from dataclasses import replace
 from math import inf
 from pathlib import Path
 
@@ -209,9 +210,10 @@ def test_a_recorded_profile_is_offered_again() -> None:
     assert profile.liveliness is LivelinessPolicy.AUTOMATIC
     assert profile.deadline.nanoseconds == 2_500_000_000
     assert (profile.history, profile.depth) == (HistoryPolicy.KEEP_LAST, DEEP)
-    ours = recorded_profile(offered_qos(JOINT_STATES.depth))
-    for policy in ("history", "depth", "reliability", "durability"):
-        assert getattr(ours, policy) == getattr(qos_profile(JOINT_STATES), policy)
+    for topic in (JOINT_STATES, replace(JOINT_STATES, durability="transient_local", depth=7)):
+        ours = recorded_profile(offered_qos(topic.depth, topic.reliability, topic.durability))
+        for policy in ("history", "depth", "reliability", "durability"):
+            assert getattr(ours, policy) == getattr(qos_profile(topic), policy)
     # No depth is too deep for the middleware; a latched topic keeps what it kept.
     assert recorded_profile(f"- {{history: keep_last, depth: {2**40}}}").depth == 100_000
     latched = recorded_profile("- {durability: transient_local, depth: 1, history: keep_last}")
