@@ -34,7 +34,7 @@ class Instant:
     """Instant of a motion, dimensionless."""
 
     state: "memoryview[float]"
-    """Values of the states."""
+    """Values of the states, mostly a view of the integrator in which they lie."""
     inputs: list[float]
     """Values of the inputs."""
     time: float = 0.0
