@@ -98,11 +98,6 @@ class ControlledDrive:
         return cls(drive, law, loop, reference, plant.duration, scenario.cycle_meter)
 
     @property
-    def controlled(self) -> bool:
-        """Whether a control law, or sampling, acts on the motion."""
-        return self.law is not None or self.sampled is not None
-
-    @property
     def period(self) -> float:
         """Unit of the durations of a study, s; see `unit_period`."""
         return unit_period(self.drive, self.duration)
@@ -194,7 +189,8 @@ def settle(case: ControlledDrive, start: MotionState, settling: SettlingOptions)
 
     Raises RunError if the motion is too stiff to integrate.
     """
-    drive, period, controlled = case.drive, case.period, case.controlled
+    drive, period = case.drive, case.period
+    controlled = case.law is not None or case.sampled is not None
     run = _ControlledMotion(case, start)
     motion = run.motion
     loads = drive.belt_speed != 0.0 and drive.has_spring
@@ -208,7 +204,8 @@ def settle(case: ControlledDrive, start: MotionState, settling: SettlingOptions)
     block, longest = cycles * period, cycles * (period + loading)
     if not drive.has_spring:  # forces alone make its cycles
         block = longest = case.duration
-    block = max(block, run.sample_period)
+    if run.loop is not None:
+        block = max(block, run.loop.period)
 
     def observe() -> _Section:
         motion.recording = False
@@ -253,12 +250,12 @@ class _ControlledMotion:
             memory = start.memory if kept else None
             motion.restart(start.position, start.velocity, memory, start.motor)
         self.motion = motion
-        self._loop = None if case.sampled is None else case.sampled.as_loop(motion)
+        self.loop = None if case.sampled is None else case.sampled.as_loop(motion)
         self._controller: Controller | None = None
-        if self._loop is not None and law is not None:
+        if self.loop is not None and law is not None:
             self._controller = Controller(law, case.reference, start.control)
             after = law.start_after
-            simulate_sampled(self._loop, motion, self._controller, after, CycleMeter(1))
+            simulate_sampled(self.loop, motion, self._controller, after, CycleMeter(1))
         elif law is not None and control is not None:
             # The states of the control run alone until its force acts.
             motion.control = control if law.start_after == 0.0 else control.silenced()
@@ -268,16 +265,11 @@ class _ControlledMotion:
                 motion.advance(law.start_after)
                 motion.control = control
 
-    @property
-    def sample_period(self) -> float:
-        """Time between samples, s; 0 without sampling."""
-        return 0.0 if self._loop is None else self._loop.period
-
     def advance(self, duration: float, section: "_Section") -> None:
         """Advance by a duration, s, and let a section take what is recorded."""
         meter, controller = section.meter, self._controller
-        if self._loop is not None:
-            simulate_sampled(self._loop, self.motion, controller, duration, meter, observer=section)
+        if self.loop is not None:
+            simulate_sampled(self.loop, self.motion, controller, duration, meter, observer=section)
             return
         self.motion.advance(duration)
         if self.motion.recording:
@@ -287,8 +279,8 @@ class _ControlledMotion:
         """Return the state at the end, after a last answer of a sampled controller."""
         motion, controller = self.motion, self._controller
         state = None if motion.control is None else motion.control_state
-        if controller is not None and self._loop is not None:
-            answer(self._loop, controller)
+        if controller is not None and self.loop is not None:
+            answer(self.loop, controller)
             state = tuple(map(float, controller.state))  # also those of a law that uses numpy
         return MotionState(motion.position, motion.velocity, state, motion.memory, motion.motor)
 
