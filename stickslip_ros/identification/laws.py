@@ -246,10 +246,7 @@ class LuGreAdapter(ExponentialAdapter):
     """A law with bristles, or elements, whose friction follows an exponential curve."""
 
     def __init__(
-        self,
-        name: str,
-        bristles: Sequence[str] = _BRISTLES,
-        by_differences: Sequence[str] = (),
+        self, name: str, bristles: Sequence[str] = _BRISTLES, by_differences: Sequence[str] = ()
     ) -> None:
         """Take its name, the coordinates of its memory, and what else takes differences."""
         self.name = name
@@ -310,12 +307,12 @@ class DirectionalAdapter(IdentifiedLaw):
 
 def _bristle_starts(values: Values) -> Sequence[Values]:
     """Return coordinates with bristles of some stiffnesses."""
-    stiffnesses = [ratio * values["stiffness"] for ratio in _STIFFNESS_RATIOS]
-    return [
-        {**values, "bristle_stiffness": stiffness}
-        | {"bristle_damping": _DAMPING_RATIO * sqrt(stiffness * values["mass"])}
-        for stiffness in stiffnesses
-    ]
+    starts: list[Values] = []
+    for ratio in _STIFFNESS_RATIOS:
+        stiffness = ratio * values["stiffness"]
+        damping = _DAMPING_RATIO * sqrt(stiffness * values["mass"])
+        starts.append({**values, "bristle_stiffness": stiffness, "bristle_damping": damping})
+    return starts
 
 
 def _by_direction(values: Values) -> tuple[Values, Values]:
