@@ -42,11 +42,10 @@ class CoulombAdapter(IdentifiedLaw):
     smallest = "static"
 
 
-class StictionAdapter(IdentifiedLaw):
+class StictionAdapter(CoulombAdapter):
     """Coulomb friction with stiction, of which slip tells the kinetic friction only."""
 
     name = "stiction"
-    least = 0.0, 0.0
     coordinates: Sequence[str] = ("kinetic", "rise", "viscous")
     smallest = "kinetic"
     identifiable_in_slip = False
