@@ -245,7 +245,10 @@ class LuGreAdapter(ExponentialAdapter):
     """A law with bristles, or elements, whose friction follows an exponential curve."""
 
     def __init__(
-        self, name: str, bristles: Sequence[str] = _BRISTLES, by_differences: Sequence[str] = ()
+        self,
+        name: str = "lugre",
+        bristles: Sequence[str] = _BRISTLES,
+        by_differences: Sequence[str] = (),
     ) -> None:
         """Take its name, the coordinates of its memory, and what else takes differences."""
         self.name = name
@@ -325,7 +328,7 @@ def _by_direction(values: Values) -> tuple[Values, Values]:
 
 
 EXPONENTIAL = ExponentialAdapter()
-LUGRE = LuGreAdapter("lugre")
+LUGRE = LuGreAdapter()
 DAHL = DahlAdapter()
 COMPETING: Sequence[IdentifiedLaw] = (
     CoulombAdapter(),
