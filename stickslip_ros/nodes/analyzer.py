@@ -33,6 +33,7 @@ from stickslip_ros.record.topics import (
     DIAGNOSTICS,
     DROPPED_FORCE,
     FREQUENCY,
+    JOINT_COMMANDS,
     JOINT_STATES,
     ONSET_SPEED,
     RECORDED,
@@ -59,7 +60,7 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
     def connect(self) -> None:
         """Refuse a bag that cannot be written; publish the measures."""
         if self.parameters.bag:
-            check_new_bag(self._bag.next_path(self.parameters.bag))
+            check_new_bag(self._bag.next_path(self.parameters))
         self._limit_cycle = [self.advertise(t) for t in (AMPLITUDE, STICK_FRACTION, FREQUENCY)]
         self._stability = {topic: self.advertise(topic) for topic in (DECAY_RATE, ONSET_SPEED)}
         self._health = self.subscribe(DIAGNOSTICS, self._note_timing)
@@ -119,10 +120,10 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
             self.get_logger().info(f"report: {json.dumps(report)}")
 
     def publishing_nodes(self) -> set[str]:
-        """Return the nodes that publish the recorded topics."""
+        """Return the nodes that publish the recorded topics, or commands to the plant."""
         return {
             writer.node_name
-            for topic in RECORDED_TOPICS
+            for topic in (*RECORDED_TOPICS, JOINT_COMMANDS)
             for writer in self.get_publishers_info_by_topic(topic.name)
         }
 

@@ -15,7 +15,7 @@ from stickslip_ros.errors import StickslipError
 from stickslip_ros.measures.timing import Timing
 from stickslip_ros.motion.sampled_loop import SampledLoop
 from stickslip_ros.nodes.base.managed import ManagedNode
-from stickslip_ros.record.topics import CONTROL_FORCE, JOINT_COMMANDS, RECORDED
+from stickslip_ros.record.topics import RECORDED, force_topics
 from stickslip_ros.samples import Sample
 from stickslip_ros.scenarios.parameters import PlantParameters
 
@@ -268,13 +268,12 @@ class LockstepPacer(Pacer):
             self._loop.hold()
         elif silent and patience_ends:
             self._loop.answers.controller_present = False
-            self._node.get_logger().warning(NO_FORCE)
         self._proceed()
 
     def _commander_exists(self) -> bool:
         return any(
             self._node.count_publishers(self._node.resolve_topic_name(topic.name))
-            for topic in (JOINT_COMMANDS, CONTROL_FORCE)
+            for topic in force_topics(self._node.parameters.force_type)
         )
 
 

@@ -12,7 +12,7 @@ from rclpy.publisher import Publisher
 from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 
-from stickslip_ros.errors import InvalidInputError, MessageError
+from stickslip_ros.errors import BagError, InvalidInputError
 from stickslip_ros.motion.answers import Verdict
 from stickslip_ros.motion.motion import Motion
 from stickslip_ros.motion.sampled_loop import LOCKSTEP_START, SampledLoop
@@ -33,9 +33,11 @@ from stickslip_ros.nodes.forecast import FORECAST_DURATION, Forecast
 from stickslip_ros.nodes.pacing import NO_FORCE, LockstepPacer, RealtimePacer, TimingMonitor
 from stickslip_ros.record.codec import (
     MOTOR,
+    force_layouts,
     joint_state_packer,
     pack_wrench,
     unpack_command,
+    unpack_force,
     unpack_wrench,
 )
 from stickslip_ros.record.topics import (
@@ -45,10 +47,10 @@ from stickslip_ros.record.topics import (
     CONTROL_FORCE,
     DISTURBANCE_FORCE,
     DROPPED_FORCE,
-    JOINT_COMMANDS,
     JOINT_STATES,
     RECORDED,
     TRUE_JOINT_STATES,
+    force_topics,
 )
 from stickslip_ros.samples import Sample
 from stickslip_ros.scenarios.parameters import Pace, PlantParameters
@@ -79,9 +81,14 @@ class PlantNode(ManagedNode[PlantParameters]):
         self._dropped_force = self.advertise(DROPPED_FORCE)
         self._answerable = 0
         """Stamp of the sample that may still be answered while the plant pauses, ns."""
-        self.subscribe_serialized(CONTROL_FORCE, partial(self._on_force, unpack_wrench))
+        force, commands = force_topics(self.parameters.force_type)
+        unpack: Callable[[bytes], tuple[int, float]] = unpack_wrench
+        if force != CONTROL_FORCE:
+            number, slide = self.parameters.force_number or None, self.parameters.slide_name
+            unpack = partial(unpack_force, force_layouts(slide, number)[force.type_name])
+        self.subscribe_serialized(force, partial(self._on_force, unpack))
         unpack = partial(unpack_command, joint=self.parameters.slide_name)
-        self.subscribe_serialized(JOINT_COMMANDS, partial(self._on_force, unpack))
+        self.subscribe_serialized(commands, partial(self._on_force, unpack))
         self.subscribe(DISTURBANCE_FORCE, self._on_disturbance, while_active=False)
         self.subscribe(RECORDED, lambda stamp: self._pacer.recorder_came_to(stamp))
         self.keep(self.create_service(Trigger, "~/reset", self._on_reset))
@@ -125,6 +132,7 @@ class PlantNode(ManagedNode[PlantParameters]):
             due = parameters.last_sample - round(self.elapsed * parameters.rate)
             last = min(max(due, 0), stampable)
         self._timing = TimingMonitor()
+        self._out_of_time = False
         self._pacer.start(last)
 
     def stop(self) -> None:
@@ -184,21 +192,29 @@ class PlantNode(ManagedNode[PlantParameters]):
             return ERROR, "the motion diverges (regime unbounded)", values
         if pacer.failure:
             return ERROR, pacer.failure, {**values, FAILURE: pacer.failure}
-        complaints = [pacer.complaint]
         controlled = self.parameters.expects_control and loop.answers.controller_present
-        if self.parameters.expects_control and not controlled:
-            complaints.append(NO_FORCE)
-        complaints.append(
-            self._timing.check(
-                loop.sample_number + 1,
-                loop.answers.late_forces,
-                pacer.missed_deadlines,
-                controlled=controlled,
-            )
+        timing = self._timing.check(
+            loop.sample_number + 1,
+            loop.answers.late_forces,
+            pacer.missed_deadlines,
+            controlled=controlled,
         )
-        complaints.append(self.dropped.complaint)
-        complaints += self.duplicate_publishers(CONTROL_FORCE, DISTURBANCE_FORCE)
+        lost = NO_FORCE if self.parameters.expects_control and not controlled else ""
+        self._log_timing(lost or timing)
+        complaints = [pacer.complaint, lost, timing, self.dropped.complaint]
+        complaints += self.duplicate_publishers(
+            *force_topics(self.parameters.force_type), DISTURBANCE_FORCE
+        )
         return diagnosis(complaints, values)
+
+    def _log_timing(self, complaint: str) -> None:
+        """Log the first complaint about forces and deadlines, and its end."""
+        if bool(complaint) != self._out_of_time:
+            self._out_of_time = bool(complaint)
+            if complaint:
+                self.get_logger().warning(complaint)
+            else:
+                self.get_logger().info("forces and samples are in time again")
 
     def _publish(self, sample: Sample) -> None:
         self._topics.publish(sample)
@@ -219,7 +235,7 @@ class PlantNode(ManagedNode[PlantParameters]):
     def _on_force(self, unpack: Callable[[bytes], tuple[int, float]], message: bytes) -> None:
         try:
             stamp, force = unpack(message)
-        except MessageError as error:
+        except BagError as error:
             if self.active:
                 self.dropped.add(f"control force: {error}")
             return
@@ -227,6 +243,10 @@ class PlantNode(ManagedNode[PlantParameters]):
         if not self.active:
             if stamp != self._answerable:
                 self._dropped_force.publish(wrench)
+            return
+        if not self.parameters.expects_control:
+            self.dropped.add(f"control force {force} N: expects_control is false")
+            self._dropped_force.publish(wrench)
             return
         with self._lock:
             if self.parameters.command_rule == "newest":

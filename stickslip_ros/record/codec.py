@@ -216,6 +216,15 @@ def unpack_command(data: bytes, joint: str) -> tuple[int, float]:
     return stamp, force
 
 
+def unpack_force(layout_of: Callable[[bytes], Layout], data: bytes) -> tuple[int, float]:
+    """Read stamp (ns, 0 without one) and force (N) by one of `force_layouts`.
+
+    Raises what the layout does.
+    """
+    stamp, (force,) = layout_of(data).read(data)
+    return stamp, force
+
+
 def unpack_header(data: bytes) -> int:
     """Read the stamp (ns) from a serialized std_msgs/msg/Header, or a message starting with one.
 
@@ -424,7 +433,7 @@ def _array_layout(data: bytes, number: int | None) -> Layout:
     if number is None and count > 1:
         raise BagError(
             f"an array of forces has {count} numbers: --force-topic 'NAME[1]' takes the first, as "
-            "force_number 1 of the analyzer does"
+            "force_number 1 of a node does"
         )
     if (number or 1) > count:
         raise MessageError(f"an array of forces has {count} numbers, and no number {number or 1}")

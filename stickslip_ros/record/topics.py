@@ -4,7 +4,7 @@ Names are relative to the namespace.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Generic, TypeVar
 
 from stickslip_ros.record.codec import (
@@ -182,3 +182,11 @@ RECORDED_IF_PUBLISHED = (DROPPED_FORCE, REFERENCE, TRUE_JOINT_STATES, APPLIED_FO
 """Topics that a bag has only if a node publishes them."""
 RECORDED_TOPICS = (JOINT_STATES, CONTROL_FORCE, APPLIED_DISTURBANCE, *RECORDED_IF_PUBLISHED)
 """Topics that the analyzer records."""
+
+
+def force_topics(force_type: str) -> tuple[Topic[Any], Topic[Any]]:
+    """Return the topics from which a plant takes forces, with messages of that type on the first.
+
+    The second takes commands as ros2_control sends them.
+    """
+    return replace(CONTROL_FORCE, type_name=force_type), JOINT_COMMANDS

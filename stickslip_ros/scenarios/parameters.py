@@ -32,7 +32,7 @@ from stickslip_ros.model.sensor import EXACT_SENSOR, Sensor
 from stickslip_ros.motion.controller import Controller
 from stickslip_ros.motion.sampled_loop import LOCKSTEP_START, SampledLoop
 from stickslip_ros.record import ForceSource, TimeSource
-from stickslip_ros.record.codec import FORCE_TYPES
+from stickslip_ros.record.codec import FORCE_TYPES, UNSTAMPED
 from stickslip_ros.scenarios import Pace
 from stickslip_ros.scenarios.curve_file import Pairs
 from stickslip_ros.scenarios.foreign_laws import CONTROLLERS
@@ -170,6 +170,18 @@ class PlantParameters(DriveConstants, NodeParameters):
         "stamp; in lockstep the first one after each sample, in real time each from its arrival.",
         choices=("answer", "newest"),
     )
+    force_type: str = at_build(
+        FORCE_TYPES[0],
+        "Type of the messages on `control_force`; those without a stamp need the rule newest.",
+        choices=FORCE_TYPES,
+    )
+    force_number: int = at_build(
+        0,
+        "Number of the force in the arrays on `control_force`, from 1; 0: they have only one.",
+        whole=True,
+        at_least=0,
+        at_most=1000,
+    )
     command_timeout: float = at_rest(
         0.02,
         "Wall time after which a sample without a command holds the last one (newest, lockstep).",
@@ -213,6 +225,11 @@ class PlantParameters(DriveConstants, NodeParameters):
         if 0.0 < self.stiffness < SMALLEST:  # the scales of the drive overflow
             raise ValueError(
                 f"stiffness = {self.stiffness} N/m is invalid: must be 0 or at least {SMALLEST:g}"
+            )
+        if self.force_type in UNSTAMPED and self.command_rule != "newest":
+            raise ValueError(
+                f"force_type = {self.force_type} is refused with command_rule = "
+                f"{self.command_rule}: its messages have no stamp; command_rule must be newest"
             )
         if (self.force_delay + self.force_jitter) * self.rate > 1e6:
             raise ValueError(
@@ -423,6 +440,12 @@ class AnalyzerParameters(MachineParameters):
     """Parameters of the analyzer node."""
 
     bag: str = at_rest("", "Directory to record to; empty: no recording.")
+    bag_exists: Literal["refuse", "next"] = at_rest(
+        "refuse",
+        "If the directory exists: refuse it, or record to the next one that does not, with _2, _3, "
+        "... behind its name.",
+        choices=("refuse", "next"),
+    )
     window: int = at_rest(
         20, "Number of cycles to average.", "cycles", whole=True, at_least=1, at_most=100_000
     )

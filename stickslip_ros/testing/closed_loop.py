@@ -29,6 +29,7 @@ from stickslip_ros.nodes.running.composition import Composition
 from stickslip_ros.nodes.running.controller_search import ControllerSearch
 from stickslip_ros.nodes.running.user_controller import ControllerThread
 from stickslip_ros.record.recorder import check_new_bag
+from stickslip_ros.record.topics import force_topics
 from stickslip_ros.scenarios import DEFAULT_NAMESPACE, LONGEST_NAMESPACE, full_name
 from stickslip_ros.scenarios.files import Scenario, load_scenario
 from stickslip_ros.scenarios.parameters import CONTROLLER_PARAMETERS
@@ -368,7 +369,12 @@ class ClosedLoop:
 
     def _find_controller(self, nodes: Composition) -> list[str]:
         """Wait for a controller, bring it up and return its full name; RunError if none appears."""
-        search = ControllerSearch(nodes.plant, self.namespace, nodes.nodes)
+        search = ControllerSearch(
+            nodes.plant,
+            self.namespace,
+            nodes.nodes,
+            force_topics(self.scenario.plant.force_type),
+        )
         elsewhere = self.controller is None
         timeout = _PROCESS_TIMEOUT if elsewhere else _NODE_TIMEOUT
 

@@ -93,6 +93,22 @@ def test_a_killed_analyzer_holds_the_plant_up_once_and_no_longer_than_the_timeou
     assert watch.longest_gap() >= timeout
 
 
+def test_in_real_time_the_log_tells_that_the_controller_is_lost_and_that_it_is_back(
+    graph: Graph, watch: Watch
+) -> None:
+    controller = graph.add(WashoutControllerNode, wait_for=["observer", "plant"])
+    slow = {"pace": "realtime", "rate": 20.0, "force_timeout": 0.3}
+    plant = add_plant(graph, controller, **slow)
+    watch.wait_for(10)
+    graph.deactivate("washout_controller")
+    graph.wait_until(lambda: watch.log_lines(NO_FORCE), "the loss is logged")
+    watch.further_health(2)
+    controller.trigger_activate()
+    graph.wait_until(lambda: watch.log_lines("in time again"), "the return is logged")
+    plant.trigger_deactivate()
+    assert len(watch.log_lines(NO_FORCE)) == 1
+
+
 def test_time_in_which_the_plant_does_not_run_is_not_silence_of_others(
     graph: Graph, watch: Watch, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -9,10 +9,12 @@ import pytest
 import yaml
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray
 
+from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.nodes.plant import PlantNode
 from stickslip_ros.record.codec import joint_state_columns
-from stickslip_ros.record.topics import CLOCK, JOINT_COMMANDS, JOINT_STATES
+from stickslip_ros.record.topics import CLOCK, JOINT_COMMANDS, JOINT_STATES, force_topics
 from stickslip_ros.samples import SampleColumns
 from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.scenarios.parameters import PlantParameters
@@ -113,6 +115,25 @@ def test_in_real_time_each_command_acts_when_it_comes(graph: Graph) -> None:
     states, counts = run(graph, plant, heard)
     assert counts["dropped_messages"] == 0
     assert np.abs(states.velocity[-50:]).max() < 0.25 * np.abs(states.velocity[:50]).max()
+
+
+def test_a_force_of_an_array_acts_as_the_newest(graph: Graph) -> None:
+    heard = graph.listen(JOINT_STATES)
+    kind = "std_msgs/msg/Float64MultiArray"
+    force = graph.publisher(force_topics(kind)[0])
+    plant = graph.add(
+        PlantNode, command_rule="newest", command_timeout=PATIENCE, reply_timeout=PATIENCE,
+        force_type=kind, force_number=2, effort="actuator", wait_for=["observer"],
+    )  # fmt: skip
+    for number in range(4):
+        graph.wait_until(lambda n=number: len(heard) > n, "the sample")
+        force.publish(Float64MultiArray(data=[7.0, 0.25 * number]))
+    graph.wait_until(lambda: len(heard) == 5, "the last sample")
+    assert [state.effort[0] for state in heard[1:]] == [0.0, 0.25, 0.5, 0.75]
+    force.publish(Float64MultiArray(data=[7.0]))
+    graph.wait_until(lambda: "no number 2" in plant.dropped.complaint, "it is refused")
+    with pytest.raises(InvalidInputError, match=r"force_type .* command_rule must be newest"):
+        load_scenario("paper", [f"plant.force_type={kind}"])
 
 
 def test_commands_without_an_effort_of_the_slide_are_refused_and_counted(graph: Graph) -> None:

@@ -38,6 +38,7 @@ CONFLICTS = (
     "must be the path of a CSV file",
     "must be at least friction.",
     "must be 0 with velocity = difference",
+    "command_rule must be newest",
 )
 """Why a value is refused that is good, but not with the others."""
 

@@ -52,6 +52,21 @@ class Informed(VelocityFeedback):
         self.received = info["received_timestamp"]
 
 
+class Commanding(Node):
+    """Commands an effort, as controllers of ros2_control do: its stamps are of its own clock."""
+
+    def __init__(self, name: str = "position_loop", **options: Any) -> None:
+        super().__init__(name, **options)
+        self.commands = self.create_publisher(JointState, "joint_commands", 1)
+        self.create_subscription(JointState, "joint_states", self.command, 10)
+
+    def command(self, state: JointState) -> None:
+        effort = -GAIN * state.velocity[state.name.index("slide")]
+        command = JointState(name=["slide"], effort=[effort])
+        command.header.stamp = self.get_clock().now().to_msg()
+        self.commands.publish(command)
+
+
 class Raising(WithoutArguments):
     def answer(self, state: JointState) -> None:
         super().answer(state)

@@ -21,12 +21,14 @@ from sensor_msgs.msg import JointState
 from stickslip_ros.errors import BagError, InvalidInputError, RunError
 from stickslip_ros.motion.motion import Motion
 from stickslip_ros.motion.sampled_loop import LOCKSTEP_START, SampledLoop
+from stickslip_ros.nodes.base.managed import WARN
+from stickslip_ros.nodes.running.user_controller import ControllerThread
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
 from stickslip_ros.record.reader import Recording
 from stickslip_ros.record.recorder import Recorder
 from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.testing import ClosedLoop, RunResult
-from tests.nodes.graph import PATIENCE
+from tests.nodes.graph import PATIENCE, wait_for
 from tests.testing import controllers
 from tests.testing.controllers import GAIN, VelocityFeedback, WithoutArguments
 
@@ -76,6 +78,34 @@ def test_a_controller_of_ones_own_acts_as_it_does_without_ros() -> None:
 def test_every_kind_of_controller_answers_every_sample(controller: Any) -> None:
     with ClosedLoop("paper", controller=controller) as loop:
         assert_every_sample_is_answered(loop.run(0.5))
+
+
+COMMANDS = "plant.command_rule=newest", "plant.effort=actuator"
+
+
+def test_a_controller_that_commands_efforts_closes_the_loop_and_its_forces_are_recorded() -> None:
+    with ClosedLoop(
+        "paper", *COMMANDS, "plant.command_timeout=60.0", controller=controllers.Commanding
+    ) as loop:
+        result = loop.run(1.0)
+    expected = [-GAIN * velocity for velocity in result.states.velocity[:-1]]
+    assert result.forces.force[1:].tolist() == expected
+
+
+def test_commands_that_nobody_expects_do_not_act_and_mark_the_result() -> None:
+    with ClosedLoop("paper", controller=None) as loop:
+        alone = loop.run(2.0)
+    with ClosedLoop("paper", *COMMANDS, "plant.pace=realtime", controller=None) as loop:
+        node = controllers.Commanding(context=loop.context, namespace=loop.namespace)
+        beside = ControllerThread(node)
+        beside.start()
+        wait_for(lambda: node.commands.get_subscription_count(), "the plant hears it")
+        result = loop.run(2.0)
+        beside.close()
+    assert result.states.position.tolist() == alone.states.position.tolist()
+    told = result.diagnostics["plant"]
+    assert told.level == WARN
+    assert "expects_control is false" in told.message
 
 
 @pytest.mark.long

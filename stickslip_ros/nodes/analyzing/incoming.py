@@ -1,7 +1,6 @@
 """The messages that the analyzer takes in, each with a stamp in the time of the run."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 from itertools import islice
 from typing import Any, NamedTuple
 
@@ -21,6 +20,7 @@ from stickslip_ros.record.topics import (
     RECORDER_DEPTH,
     REFERENCE,
     Topic,
+    force_topics,
 )
 from stickslip_ros.stamps import END_OF_TIME, NANOSECONDS
 
@@ -40,7 +40,7 @@ class Message(NamedTuple):
 def recorded_topics(force_type: str) -> list[Topic[Any]]:
     """Return the topics to record, for control forces of that type, or by `effort`."""
     kind = CONTROL_FORCE.type_name if force_type == "effort" else force_type
-    force = replace(CONTROL_FORCE, type_name=kind)
+    force, _ = force_topics(kind)
     return [force if topic == CONTROL_FORCE else topic for topic in RECORDED_TOPICS]
 
 

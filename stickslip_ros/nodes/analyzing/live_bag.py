@@ -6,6 +6,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -33,10 +34,11 @@ class LiveBag:
         self._opened = Counter[str]()
         self._recorder: Recorder | None = None
 
-    def next_path(self, name: str) -> Path:
+    def next_path(self, parameters: AnalyzerParameters) -> Path:
         """Return the path of the next bag of that name: from the second on they are numbered."""
-        before = self._opened[name]
-        return Path(name + (f"_{before + 1}" if before else ""))
+        name, passes = parameters.bag, parameters.bag_exists == "next"
+        paths = (Path(name + (f"_{n}" if n > 1 else "")) for n in count(self._opened[name] + 1))
+        return next(path for path in paths if not (passes and path.exists()))
 
     def open(self, parameters: AnalyzerParameters, topics: Iterable[Topic[Any]]) -> None:
         """Start a bag with these topics, if the parameters name one.
@@ -49,7 +51,7 @@ class LiveBag:
         if not parameters.bag:
             return
         recorder = Recorder(
-            self.next_path(parameters.bag),
+            self.next_path(parameters),
             parameters.compression,
             max_bag_size=parameters.max_bag_size,
             max_bag_duration=parameters.max_bag_duration,

@@ -27,6 +27,7 @@ from stickslip_ros.nodes.base.process import ROS_ARGUMENTS, ros_session
 from stickslip_ros.nodes.base.spinner import Spinner, signal_handlers_kept, stop_on_signals
 from stickslip_ros.nodes.running.controller_search import ControllerSearch
 from stickslip_ros.nodes.running.run_monitor import Notify, OnSimulatedTime, RunMonitor
+from stickslip_ros.record.topics import force_topics
 from stickslip_ros.scenarios import full_name
 from stickslip_ros.scenarios.files import Scenario, parameter_file
 from stickslip_ros.scenarios.sections import section_matches
@@ -63,6 +64,11 @@ def node_parameters(scenario: Scenario, bag: Path) -> dict[str, dict[str, Any]]:
     """
     values = scenario.as_dict()
     values["analyzer"]["bag"] = str(bag)
+    # A command does not tell at which sample it acts; the effort of the actuator does.
+    plant = scenario.plant
+    if plant.command_rule == "newest" and plant.effort == "actuator":
+        joints = {"joint": plant.slide_name, "belt_joint": plant.belt_name}
+        values["analyzer"] |= {"force_type": "effort", **joints}
     # The analyzer may know the parameters of the plant of a short run only at its end.
     reading = scenario.reading
     if reading.stick_speed and not reading.noisy:
@@ -149,7 +155,9 @@ class _Supervisor:
         self._failure: str | None = None
         stop_on_signals(self._spinner.executor, self._stop, self._hurry)
         self._spinner.is_cut_short = self._is_ended
-        self._search = ControllerSearch(self._node, namespace, ("analyzer", "plant"))
+        self._search = ControllerSearch(
+            self._node, namespace, ("analyzer", "plant"), force_topics(scenario.plant.force_type)
+        )
         self._processes = ChildProcesses()
         self._nodes = _ManagedNodes(self._spinner, self._node)
         self._monitor = RunMonitor(
