@@ -3,10 +3,12 @@
 from pathlib import Path
 
 from launch import LaunchDescription
+from launch.substitutions import PathJoinSubstitution
 from launch_ros.actions import Node
+from launch_ros.substitutions import FindPackageShare
 
 HERE = Path(__file__).parent
-DRIVE = HERE.parents[1] / "config" / "feed_drive.yaml"
+DRIVE = PathJoinSubstitution([FindPackageShare("stickslip_ros"), "config", "feed_drive.yaml"])
 
 
 def generate_launch_description() -> LaunchDescription:
