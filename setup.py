@@ -65,6 +65,7 @@ setup(
             "app/dashboard/*.css",
             "app/dashboard/*.js",
             "nodes/base/*.xml",
+            "show/*.jinja",
         ]
     },
     data_files=[

@@ -91,6 +91,16 @@ class Reference(NamedTuple):
     acceleration: float | None = None
     """Acceleration, m/s^2."""
 
+    @property
+    def filled(self) -> tuple[float, float, float]:
+        """Position, velocity and acceleration, 0 for what is not given."""
+        position, velocity, acceleration = self
+        return (
+            0.0 if position is None else position,
+            0.0 if velocity is None else velocity,
+            0.0 if acceleration is None else acceleration,
+        )
+
 
 NO_REFERENCE = Reference()
 """The reference where there is none."""

@@ -22,6 +22,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "stability": ("Analyze", "compute equilibrium, critical speeds and gains, and limit cycles"),
     "design": ("Design", "propose controller gains that suppress the vibration"),
     "compare": ("Design", "compare control laws: which one holds the drive, with what force"),
+    "export": ("Design", "write a control law as C or Structured Text, for a drive"),
     "list": ("Scenarios", "list the scenarios, friction laws and control laws"),
     "show": ("Scenarios", "show every parameter of a scenario and where its value comes from"),
     "new": ("Scenarios", "write a commented scenario file to edit"),
@@ -48,6 +49,7 @@ EXAMPLES: dict[str, str] = {
     "design": "stickslip design feed_drive --belt-speed 0.01:0.05 --out designed.yaml",
     "compare": "stickslip compare feed_drive --controllers washout,pid,sliding_mode "
     "--over plant.belt_speed=0.01:0.04:4 --seeds 20 --spread 0.2 --workers 2 --html compared.html",
+    "export": "stickslip export designed.yaml --out washout.c",
     "list": "stickslip list",
     "show": "stickslip show feed_drive",
     "new": "stickslip new my_drive.yaml --from feed_drive",

@@ -1,6 +1,7 @@
 """Elementary functions of numbers, arrays and heyoka expressions alike, and zeros of functions."""
 
 from collections.abc import Callable
+from math import exp as float_exp
 from math import expm1 as float_expm1
 from math import sin as float_sin
 from typing import Any
@@ -18,6 +19,8 @@ _ROUNDING: Any = 4.0 * np.finfo(float).eps
 def _function(name: str, x: Any) -> Any:
     if isinstance(x, int | float | complex | np.ndarray | np.generic):
         return getattr(np, name)(x)
+    if hasattr(x, name):  # a symbol of an exported law
+        return getattr(x, name)()
     import heyoka  # what computes with no expressions does not load it
 
     return getattr(heyoka, name)(x)
@@ -25,7 +28,7 @@ def _function(name: str, x: Any) -> Any:
 
 def exp(x: Any) -> Any:
     """Return the exponential of a float, an array or an expression."""
-    return _function("exp", x)
+    return float_exp(x) if type(x) is float else _function("exp", x)
 
 
 def sin(x: Any) -> Any:

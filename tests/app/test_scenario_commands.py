@@ -164,3 +164,19 @@ def test_the_schema_tells_unit_meaning_default_and_choices(stickslip: Run) -> No
     }
     assert "coulomb" in plant["friction"]["properties"]["law"]["enum"]
     assert plant["wait_for"]["items"] == {"type": "string"}
+
+
+def test_export_writes_the_law_in_the_language_of_the_file(stickslip: Run, tmp_path: Path) -> None:
+    for ending, first in ((".c", "/*"), (".st", "(*")):
+        path = tmp_path / f"law{ending}"
+        done = stickslip("export", "feed_drive", "--out", str(path))
+        assert (done.returncode, done.stderr) == (0, "")
+        assert "washout at 1000 Hz" in done.stdout
+        assert path.read_text().startswith(first)
+    for arguments, why in (
+        (("feed_drive", "--out", "law.py"), "must end in .c or .st"),
+        (("feed_drive", "--no-control", "--out", "law.c"), "no law to export"),
+    ):
+        refused = stickslip("export", *arguments)
+        assert refused.returncode == 2
+        assert why in refused.stderr

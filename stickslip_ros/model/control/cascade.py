@@ -70,7 +70,7 @@ class Cascade(ControlLaw, TwoBodyControl):
         self, state: State, elapsed: float, sample: Sample, reference: Reference
     ) -> tuple[float, State]:
         integral, rate, *own = state
-        position, velocity, acceleration = (each or 0.0 for each in reference)
+        position, velocity, acceleration = reference.filled
         error = self.position_gain * (position - sample.of(self.feedback).position) + velocity
         error -= sample.of(self.velocity_feedback).velocity
         added, own = self.washout.respond((own[0], own[1]), elapsed, sample, reference)

@@ -54,7 +54,7 @@ class DisturbanceObserver(FeedbackLaw):
         disturbance = momentum_flow - filtered
         error, rate = tracking_error(seen, reference)
         force = self.position_gain * error + self.velocity_gain * rate - disturbance
-        force += self.nominal_mass * (reference.acceleration or 0.0)
+        force += self.nominal_mass * reference.filled[2]
         return force, (filtered, self.limited(force) + momentum_flow)
 
     @override

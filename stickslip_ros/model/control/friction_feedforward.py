@@ -1,7 +1,6 @@
 """PID control with the friction of the reference as a feed-forward."""
 
 from dataclasses import dataclass, replace
-from math import exp
 from typing import ClassVar, Self
 
 import numpy as np
@@ -12,6 +11,7 @@ from stickslip_ros.model.control.base import State
 from stickslip_ros.model.control.pid import Pid, moved_mass, tracking_error
 from stickslip_ros.model.drive import Drive
 from stickslip_ros.model.friction import Exponential
+from stickslip_ros.model.functions import exp
 from stickslip_ros.samples import Reference, Sample
 
 _SHARES = np.geomspace(1e-5, 1e2, 2000)
@@ -44,8 +44,9 @@ class FrictionFeedforward(Pid):
         self, state: State, elapsed: float, sample: Sample, reference: Reference
     ) -> tuple[float, State]:
         error, rate = tracking_error(sample.of(self.feedback), reference)
-        speed = (reference.velocity or 0.0) - sample.belt_velocity
-        forward = self.nominal_mass * (reference.acceleration or 0.0) + self.viscous_damping * speed
+        _, velocity, acceleration = reference.filled
+        speed = velocity - sample.belt_velocity
+        forward = self.nominal_mass * acceleration + self.viscous_damping * speed
         if speed != 0.0:
             forward += self.size(abs(speed)) * (1.0 if speed > 0.0 else -1.0)
         force, integral = self.force_and_integral(state[0], elapsed, error, rate, forward)

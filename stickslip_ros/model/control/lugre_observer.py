@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from math import expm1
 from typing import ClassVar, Self
 
 from typing_extensions import override
@@ -12,6 +11,7 @@ from stickslip_ros.model.control.base import LinearFeedback, State
 from stickslip_ros.model.control.friction_feedforward import FrictionFeedforward
 from stickslip_ros.model.control.pid import tracking_error
 from stickslip_ros.model.drive import Drive
+from stickslip_ros.model.functions import expm1
 from stickslip_ros.samples import Reference, Sample
 
 _DEFLECTION = 1e-5
@@ -53,7 +53,7 @@ class LugreObserver(FrictionFeedforward):
         change = speed + self.observer_gain * error - decay * deflection
         friction = self.bristle_stiffness * deflection + self.bristle_damping * change
         friction += self.viscous_damping * speed
-        friction += self.nominal_mass * (reference.acceleration or 0.0)
+        friction += self.nominal_mass * reference.filled[2]
         force, integral = self.force_and_integral(integral, elapsed, error, rate, friction)
         return force, (integral, deflection)
 

@@ -72,9 +72,7 @@ class Pid(FeedbackLaw):
         integral += self.integral_gain * elapsed * error
         force = self.position_gain * error + integral + self.velocity_gain * rate + forward
         excess = force - self.limited(force)
-        if excess:
-            integral += expm1(-elapsed / self.tracking_time) * excess
-        return force, integral
+        return force, integral + expm1(-elapsed / self.tracking_time) * excess
 
     @override
     def linear_feedback(self, period: float) -> LinearFeedback | None:
@@ -94,8 +92,8 @@ class Pid(FeedbackLaw):
 
 def tracking_error(body: Sample | MotorSample, reference: Reference) -> tuple[float, float]:
     """Return the errors of position, m, and velocity, m/s; what has no reference is held at 0."""
-    position, velocity, _ = reference
-    return (position or 0.0) - body.position, (velocity or 0.0) - body.velocity
+    position, velocity, _ = reference.filled
+    return position - body.position, velocity - body.velocity
 
 
 def moved_mass(drive: Drive) -> float:

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import copysign
 from typing import ClassVar
 
 from typing_extensions import override
@@ -43,7 +42,7 @@ class ResetIntegral(Pid):
         integral, side = state
         error, rate = tracking_error(sample.of(self.feedback), reference)
         if abs(error) > self.reset_band:
-            before, side = side, copysign(1.0, error)
+            before, side = side, 1.0 if error > 0.0 else -1.0
             if before == -side:
                 integral *= -self.reset_share
         force, integral = self.force_and_integral(integral, elapsed, error, rate, 0.0)

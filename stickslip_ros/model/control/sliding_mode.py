@@ -46,7 +46,7 @@ class SlidingMode(FeedbackLaw):
         error, rate = tracking_error(sample.of(self.feedback), reference)
         distance, layer = rate + self.slope * error, self.boundary_layer
         share = distance / layer if layer > abs(distance) else (distance > 0.0) - (distance < 0.0)
-        force = self.nominal_mass * ((reference.acceleration or 0.0) + self.slope * rate)
+        force = self.nominal_mass * (reference.filled[2] + self.slope * rate)
         return force + self.switching_force * share, state
 
     @override

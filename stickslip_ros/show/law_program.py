@@ -1,0 +1,291 @@
+"""A control law as a program of assignments and decisions, found by running the law on symbols."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from math import isfinite
+from typing import Any, Union
+
+from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.model.control import ControlLaw
+from stickslip_ros.samples import MotorSample, Reference, Sample
+
+_MOST_DECISIONS = 12
+"""Decisions, one after the other, up to which a law is worth a program."""
+
+Operand = Union["Symbol", float]
+"""A number, or what the program computes."""
+
+
+@dataclass(frozen=True, eq=False)
+class Symbol:
+    """A value of the program: an input, or an operation on other values.
+
+    It computes like a float; a comparison decides by the path that is being run.
+    """
+
+    operation: str
+    """Name of the input, state or function, or the operator."""
+    operands: tuple[Operand, ...] = ()
+    """What is operated on; nothing for an input."""
+    explorer: "_Explorer | None" = None
+
+    def _with(self, operation: str, *operands: Operand) -> "Symbol":
+        assert self.explorer is not None
+        return self.explorer.symbol(operation, *operands)
+
+    def __add__(self, other: Operand) -> Operand:
+        if _is(other, 0.0):
+            return self
+        negative = _negative(other)
+        return self._with("+", self, other) if negative is None else self - negative
+
+    def __radd__(self, other: Operand) -> Operand:
+        return self if _is(other, 0.0) else self._with("+", other, self)
+
+    def __sub__(self, other: Operand) -> Operand:
+        if _is(other, 0.0) or other is self:
+            return 0.0 if other is self else self
+        negative = _negative(other)
+        return self._with("-", self, other) if negative is None else self + negative
+
+    def __rsub__(self, other: Operand) -> Operand:
+        return -self if _is(other, 0.0) else self._with("-", other, self)
+
+    def __mul__(self, other: Operand) -> Operand:
+        if _is(other, 0.0) or _is(other, 1.0):
+            return self if other else 0.0
+        return self._with("*", self, other)
+
+    def __rmul__(self, other: Operand) -> Operand:
+        return self * other if isinstance(other, Symbol) else self._scaled(other)
+
+    def _scaled(self, factor: float) -> Operand:
+        if _is(factor, 0.0) or _is(factor, 1.0):
+            return self if factor else 0.0
+        return self._with("*", factor, self)
+
+    def __truediv__(self, other: Operand) -> Operand:
+        return self._with("/", self, other)
+
+    def __rtruediv__(self, other: Operand) -> Operand:
+        return self._with("/", other, self)
+
+    def __pow__(self, exponent: float) -> Operand:
+        return self if _is(exponent, 1.0) else self._with("pow", self, exponent)
+
+    def __neg__(self) -> Operand:
+        return self._with("-", self)
+
+    def __abs__(self) -> Operand:
+        return self._with("fabs", self)
+
+    def exp(self) -> Operand:
+        """Return the exponential."""
+        return self._with("exp", self)
+
+    def expm1(self) -> Operand:
+        """Return the exponential less 1."""
+        return self._with("expm1", self)
+
+    def __lt__(self, other: Operand) -> bool:
+        return self._decides("<", other)
+
+    def __le__(self, other: Operand) -> bool:
+        return self._decides("<=", other)
+
+    def __gt__(self, other: Operand) -> bool:
+        return self._decides(">", other)
+
+    def __ge__(self, other: Operand) -> bool:
+        return self._decides(">=", other)
+
+    def __eq__(self, other: object) -> bool:
+        return other is self or (isinstance(other, float | Symbol) and self._decides("==", other))
+
+    __hash__ = object.__hash__
+
+    def __bool__(self) -> bool:
+        return not self._decides("==", 0.0)
+
+    def _decides(self, comparison: str, other: Operand) -> bool:
+        if not isinstance(other, Symbol) and not isfinite(other):  # without a limit
+            return (other > 0.0) == (comparison in ("<", "<="))
+        assert self.explorer is not None
+        return self.explorer.decide(self._with(comparison, self, other))
+
+
+@dataclass(frozen=True, eq=False)
+class Decision:
+    """What the program does if a comparison holds, and if it does not."""
+
+    condition: Symbol
+    holds: "Result | Decision"
+    fails: "Result | Decision"
+
+    @property
+    def key(self) -> tuple[Any, ...]:
+        """What equal decisions of a program have in common."""
+        return id(self.condition), self.holds.key, self.fails.key
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """Force, N, and state after the sample, in the order of the law."""
+
+    force: Operand
+    state: tuple[Operand, ...]
+
+    @property
+    def values(self) -> tuple[Operand, ...]:
+        """The new state, and then the force."""
+        return *self.state, self.force
+
+    @property
+    def key(self) -> tuple[Any, ...]:
+        """What equal results of a program have in common."""
+        return tuple(id(value) if isinstance(value, Symbol) else value for value in self.values)
+
+
+@dataclass(frozen=True)
+class LawProgram:
+    """A control law at a fixed rate."""
+
+    law: ControlLaw
+    states: tuple[str, ...]
+    """Names of the states."""
+    inputs: tuple[str, ...]
+    """Names of the inputs that the law uses."""
+    first: Result | Decision
+    """What it does at the first sample, from no state."""
+    next: Result | Decision
+    """What it does at a further sample."""
+
+
+_CONTRARY = {"<": ">", ">": "<"}
+
+_Run = Callable[[Callable[[str], Symbol]], Result]
+"""Runs a law on symbols that the argument makes by name."""
+
+
+class _Explorer:
+    """Runs laws along one way through their decisions after the other; equal symbols are one."""
+
+    def __init__(self) -> None:
+        self._symbols: dict[tuple[Any, ...], Symbol] = {}
+        self._given: tuple[bool, ...] = ()
+        self._taken: dict[Symbol, bool] = {}
+
+    def symbol(self, operation: str, *operands: Operand) -> Symbol:
+        key = operation, *(id(o) if isinstance(o, Symbol) else (o,) for o in operands)
+        return self._symbols.setdefault(key, Symbol(operation, operands, self))
+
+    def decide(self, condition: Symbol) -> bool:
+        contrary = _CONTRARY.get(condition.operation)
+        if contrary and self._taken.get(self.symbol(contrary, *condition.operands)):
+            return False
+        if condition not in self._taken:
+            number = len(self._taken)
+            self._taken[condition] = number >= len(self._given) or self._given[number]
+        return self._taken[condition]
+
+    def tree(self, run: _Run, given: tuple[bool, ...] = ()) -> Result | Decision:
+        """Return the decisions and results on all ways that begin with the decisions given."""
+        if len(given) > _MOST_DECISIONS:
+            raise ValueError("too many decisions")
+        self._given, self._taken = given, {}
+        result = run(self.symbol)
+        if len(self._taken) == len(given):
+            if not all(isinstance(v, Symbol) or isfinite(v) for v in result.values):
+                raise ValueError("not finite")
+            return result
+        condition = [*self._taken][len(given)]
+        holds, fails = (self.tree(run, (*given, holds)) for holds in (True, False))
+        return holds if holds.key == fails.key else Decision(condition, holds, fails)
+
+
+_INPUTS = (
+    "position", "velocity", "belt_velocity", "motor_position", "motor_velocity",
+    "reference_position", "reference_velocity", "reference_acceleration",
+)  # fmt: skip
+
+
+def law_program(law: ControlLaw, period: float) -> LawProgram:
+    """Return the program of a law.
+
+    Parameters
+    ----------
+    law : ControlLaw
+        Law; its limit of the force and its delay of the start are left to the user of the program.
+    period : float
+        Sample period, s.
+
+    Raises
+    ------
+    InvalidInputError
+        If the law computes with something other than sums, products, powers, exponentials and
+        comparisons, or has too many ways to answer.
+    """
+    states = tuple(f"self.{name}" for name in law.state_units)
+
+    def first(symbol: Callable[[str], Symbol]) -> Result:
+        sample, reference = _inputs(symbol, law)
+        state = law.initial_state(sample, reference)
+        return Result(*law.respond(state, 0.0, sample, reference))
+
+    def following(symbol: Callable[[str], Symbol]) -> Result:
+        state: Any = tuple(map(symbol, states))
+        return Result(*law.respond(state, period, *_inputs(symbol, law)))
+
+    try:
+        explorer = _Explorer()
+        trees = explorer.tree(first), explorer.tree(following)
+    except (TypeError, AttributeError, ValueError, OverflowError, AssertionError):
+        raise InvalidInputError(
+            f"the control law {law.name} cannot be exported: it computes with more than sums, "
+            "products, powers, exponentials and comparisons"
+        ) from None
+    used = {s.operation for tree in trees for s in _symbols(tree) if not s.operands}
+    if unknown := sorted(used - {*states, *_INPUTS}):
+        raise InvalidInputError(
+            f"the control law {law.name} cannot be exported: it uses {', '.join(unknown)} of the "
+            "samples"
+        )
+    return LawProgram(law, states, tuple(name for name in _INPUTS if name in used), *trees)
+
+
+def _inputs(symbol: Callable[[str], Symbol], law: ControlLaw) -> tuple[Any, Any]:
+    motor = MotorSample._make(map(symbol, _INPUTS[3:5]))
+    sample = Sample._make([*map(symbol, Sample._fields[:-1]), motor])
+    reference: Any = map(symbol, _INPUTS[5:]) if law.follows_reference else ()
+    return sample, Reference(*reference)
+
+
+def _symbols(tree: Result | Decision) -> Iterator[Symbol]:
+    """Yield every symbol of a tree, those of shared operands repeatedly."""
+    if isinstance(tree, Decision):
+        yield from _within(tree.condition)
+        yield from _symbols(tree.holds)
+        yield from _symbols(tree.fails)
+        return
+    for value in tree.values:
+        yield from _within(value)
+
+
+def _within(value: Operand) -> Iterator[Symbol]:
+    if isinstance(value, Symbol):
+        yield value
+        for operand in value.operands:
+            yield from _within(operand)
+
+
+def _is(value: Operand, number: float) -> bool:
+    return not isinstance(value, Symbol) and value == number
+
+
+def _negative(value: Operand) -> Operand | None:
+    """Return the value with the other sign if it is a negative number, or one times something."""
+    if not isinstance(value, Symbol):
+        return -value if value < 0.0 else None
+    if value.operation == "*" and isinstance(factor := value.operands[0], float) and factor < 0.0:
+        return -factor * value.operands[1]
+    return None
