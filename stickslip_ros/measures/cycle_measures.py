@@ -74,8 +74,8 @@ RESTS = (Regime.EQUILIBRIUM, Regime.HELD, Regime.STUCK)
 _LABELS = {
     Regime.STICK_SLIP: "stick-slip",
     Regime.PURE_SLIP: "pure slip",
-    Regime.EQUILIBRIUM: "equilibrium",
-    Regime.HELD: "held within the resolution",
+    Regime.EQUILIBRIUM: "steady sliding",
+    Regime.HELD: "steady sliding, to the resolution",
     Regime.STUCK: "stuck",
     Regime.UNBOUNDED: "unbounded",
     Regime.UNDERSAMPLED: "undersampled",

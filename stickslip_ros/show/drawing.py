@@ -76,9 +76,11 @@ class Pane(NamedTuple):
 
 
 def measures_text(measures: Measures, units: Units) -> str:
-    """Return regime, amplitude, frequency and stick fraction as a line of text."""
+    """Return regime, amplitude, frequency and stick fraction at the end as a line of text."""
     trend = trend_text(vars(measures), units.text)
     regime = Regime.label(measures.regime, measures.cycles)
+    if measures.regime is not None:
+        regime = f"at the end: {regime}"
     texts = [f"{regime}{trend and f', not steady: {trend}'}"]
     for name in ("amplitude", "frequency", "stick_fraction"):
         value, (label, unit, _) = getattr(measures, name), MEASURES[name]

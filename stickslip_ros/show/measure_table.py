@@ -18,10 +18,7 @@ _SENT = {
 }
 """The measure of the force that acted, and the label of the sent force where the two differ."""
 
-_MEANING: dict[str | None, str] = {
-    Regime.EQUILIBRIUM: " (steady sliding)",
-    Regime.PURE_SLIP: " (vibration without sticking)",
-}
+_MEANING: dict[str | None, str] = {Regime.PURE_SLIP: " (vibration without sticking)"}
 """What a machine does in a regime that has its name from dynamics."""
 
 _SAME_SCALE = {

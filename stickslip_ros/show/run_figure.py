@@ -394,7 +394,7 @@ class _OneRun(_Panels):
         handles = draw_law(axes, self._drive, self._history, self._last, self.units, short=short)
         if short:
             return handles
-        rest = Line2D([], [], **BELT, label="slide at rest")
+        rest = Line2D([], [], **BELT, label="steady sliding")
         axes.legend(handles=[*handles, rest], loc="best")
         return []
 

@@ -24,7 +24,7 @@ def test_before_and_after_a_bag_and_a_picture(
         timeout=4 * PATIENCE,
     )
     assert done.returncode == 0, done.stderr
-    for shown in ("before", "after", "434.1 µm", "stick-slip", "equilibrium", "119.8 N"):
+    for shown in ("before", "after", "434.1 µm", "stick-slip", "steady sliding", "119.8 N"):
         assert shown in done.stdout
     (bag,) = (tmp_path / "bags").glob("feed_drive-*Z")
     (picture,) = (tmp_path / "bags").glob("*.png")

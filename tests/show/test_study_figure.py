@@ -78,7 +78,7 @@ def test_a_diagram_names_axes_regimes_and_transitions() -> None:
     assert stick_fraction.get_xlabel() == "belt speed $v_0$ (dimensionless)"
     assert "no control" in figure.get_suptitle()
     assert legend_texts(figure) == [
-        "stick-slip", "pure slip", "equilibrium", "not steady yet",
+        "stick-slip", "pure slip", "steady sliding", "not steady yet",
         "critical feed speed (Hopf) 0.48876", "stick-slip onset speed 0.43947",
     ]  # fmt: skip
     shown = {line.get_color(): line.get_marker() for line in section.lines if len(line.get_xdata())}
@@ -225,7 +225,7 @@ def test_of_a_grid_each_basin_has_its_cells(style: str) -> None:
         drawn = places(axes)[colour].round(9)
         assert sorted(map(tuple, drawn.tolist())) == sorted(map(tuple, starts.tolist()))
     assert legend_texts(figure) == [
-        "stick-slip, amplitude 0.318: 68.8 % ± 0.7 %", "equilibrium: 31.2 % ± 0.7 %",
+        "stick-slip, amplitude 0.318: 68.8 % ± 0.7 %", "steady sliding: 31.2 % ± 0.7 %",
         "belt speed", "equilibrium",
     ]  # fmt: skip
     assert "the motion that each of 1200 starts leads to" in figure.get_suptitle().replace(

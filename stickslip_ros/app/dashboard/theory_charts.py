@@ -111,7 +111,7 @@ def friction_chart(curve: FrictionCurve, drive: Drive) -> Options:
         series.append(line("motion", BLUE))
     if drive.belt_speed:
         rest = float(drive.friction.at_rest(drive.belt_speed))
-        series.append(_point("slide at rest", -drive.belt_speed / speed, rest))
+        series.append(_point("steady sliding", -drive.belt_speed / speed, rest))
     names = [s["name"] for s in series]
     return _options(label, units.plain("friction coefficient"), series, names)
 

@@ -160,7 +160,7 @@ def test_a_limit_cycle_is_seen_stopped_and_changed(
     control.click()
     expect(control).to_be_checked()
     wait_for(lambda: last_amplitude(page) < 200.0, "the limit cycle collapses")
-    expect(page.get_by_text("equilibrium", exact=True)).to_be_visible()
+    expect(page.get_by_text("steady sliding", exact=True)).to_be_visible()
     page.get_by_text("10 periods").click()
     wait_for(lambda: 0.0 <= swing(page) < 50.0, "the collapse is drawn")
 
@@ -286,11 +286,11 @@ def test_what_an_engineer_does(start_stickslip: Start, page: Page, tmp_path: Pat
     gain.press("Enter")
     wait_for(lambda: page.evaluate(CROSSED) is True, "more gain is on the stable side")
     control.click()
-    expect(page.get_by_text("equilibrium", exact=True).first).to_be_visible()
+    expect(page.get_by_text("steady sliding", exact=True).first).to_be_visible()
     page.get_by_role("button", name="Store B").click()
     row = page.get_by_role("row").filter(has=page.get_by_text("regime", exact=True))
     expect(row).to_contain_text("stick-slip")
-    expect(row).to_contain_text("equilibrium")
+    expect(row).to_contain_text("steady sliding")
     assert accessibility(page) == []
 
     # Before and after are in the window of 200 periods, and in its samples.
