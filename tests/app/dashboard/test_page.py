@@ -129,7 +129,7 @@ DISCONNECTED = """() => {
 
 FRICTION = """() => {
     const series = window.getElement(stickslip.friction)?.chart?.getOption()?.series ?? [];
-    return series.find((one) => one.name === "slide at rest")?.data[0][0] ?? null;
+    return series.find((one) => one.name === "steady sliding")?.data[0][0] ?? null;
 }"""
 """Relative speed of the operating point on the friction curve, in its unit."""
 

@@ -141,7 +141,7 @@ def test_the_diagram_has_branches_and_the_present_belt_speed(reference: dict[str
 
 def test_the_friction_curve_has_the_operating_point() -> None:
     options = friction_chart(friction_curve(PLANT), DRIVE)
-    curve, point = series(options, "in steady slip"), series(options, "slide at rest")
+    curve, point = series(options, "in steady slip"), series(options, "steady sliding")
     assert np.ptp(curve[:, 1]) == pytest.approx(2.0 * PLANT["friction.static"], rel=1e-3)
     assert point[0, 0] == -40.0
     assert np.interp(-40.0, *curve.T) == pytest.approx(point[0, 1], rel=1e-3)
