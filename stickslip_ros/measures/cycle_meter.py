@@ -158,8 +158,8 @@ class CycleMeter:
         self._parts: list[_Stretch] = []
         """Parts of the stretch since the last crossing."""
         self._whole = False
-        self._slid = inf
-        """Time, s, until which it slid."""
+        self._slid, self._stuck = inf, 0.0
+        """Time, s, until which it slid; longest stick between two slides on a belt at rest, s."""
 
     def feed(
         self, breakpoints: Breakpoints, belt_speed: float, fastest_belt: float | None = None
@@ -200,8 +200,12 @@ class CycleMeter:
             self._parts, self._whole, last = [], True, edge
         self._follow(columns, last, len(breakpoints) - 1)
         (slides,) = (~breakpoints.sticking[1:]).nonzero()
-        if len(slides) > 0 or self._slid == inf:
-            self._slid = columns[0][slides[-1] + 1 if len(slides) > 0 else 0]
+        if len(slides) > 0:
+            ends = breakpoints.time[slides + 1]
+            if belt_speed == 0.0:
+                sticks = breakpoints.time[slides] - np.append(self._slid, ends[:-1])
+                self._stuck = max(self._stuck, float(sticks.max()))
+            self._slid = float(ends[-1])
         self._last = breakpoints[len(breakpoints) - 1 :]
         return completed
 
@@ -220,8 +224,10 @@ class CycleMeter:
     def _measures(self) -> Measures:
         period = self._cycles[-1].period if self._cycles else 0.0
         now = self._parts[-1].end if self._parts else 0.0
-        if self._belt_speed == 0.0 and now > self._slid and now - self._slid >= period:
-            steady = True if self._lasts(now - self._slid) else None
+        # Without a slide there is no crossing either.
+        stuck = now - (self._slid if self._slid < inf or not self._parts else self._parts[0].start)
+        if self._belt_speed == 0.0 and stuck > self._stuck and stuck >= period:
+            steady = True if self._lasts(stuck) else None
             return without_cycles(self._recent_motion(), Regime.STUCK, steady=steady)
         since_turn = now - self._parts[0].start if self._parts else 0.0
         held = self._held(since_turn > STALE_PERIODS * period) if self.within else None

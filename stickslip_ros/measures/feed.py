@@ -57,7 +57,8 @@ def mean_feed(time: FloatArray, position: FloatArray) -> float | None:
 def moving_part(samples: SampleColumns) -> slice:
     """Return the rows between the standstills before and after a motion, all where there are none.
 
-    A standstill is twice as long as any stretch in between in which the position stays.
+    A standstill is twice as long as any stretch in between in which the position stays. On a belt
+    that moves, one after the motion alone is the equilibrium to which it tends.
     """
     rows = np.flatnonzero(samples.is_valid)
     if len(rows) < _FEWEST:
@@ -80,6 +81,8 @@ def moving_part(samples: SampleColumns) -> slice:
         return slice(0, len(samples))
     longest = 2 * max(int(np.diff(changes).max()), _FEWEST)
     begin = rows[first] if first > longest else 0
+    if begin == 0 and samples.belt_velocity[rows].any():
+        return slice(0, len(samples))
     end = rows[last] + 1 if len(position) - 1 - last > longest else len(samples)
     return slice(int(begin), int(end))
 

@@ -166,6 +166,16 @@ def test_sticking_now_and_then_on_a_belt_at_rest_is_not_stuck() -> None:
     assert 0.2 < measures.stick_fraction < 0.8
 
 
+def test_a_slide_that_creeps_on_a_guide_at_rest_is_not_stuck_while_it_rests() -> None:
+    """It rests for 1 s before each slip of 0.1 s, and then for good."""
+    time = np.cumsum([0.0, *[1.0, 0.05, 0.05] * 6, 0.7, 0.5])
+    slipping = np.array([False, *[False, True, True] * 6, False, False])
+    velocity = np.where(np.roll(slipping, -1) & slipping, 0.02, 0.0)
+    creeping = Breakpoints(time, np.cumsum(0.0005 * slipping), velocity, ~slipping)
+    assert measured(creeping[:-1], belt_speed=0.0).regime is None
+    assert measured(creeping, belt_speed=0.0).regime is Regime.STUCK
+
+
 def test_a_motion_reported_as_diverging_is_unbounded() -> None:
     meter = CycleMeter(window=20)
     meter.feed(vibration(5.25), 1.0)
