@@ -22,7 +22,7 @@ import numpy as np
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import RunError
 from stickslip_ros.measures.cycle_measures import Regime
-from stickslip_ros.measures.slips import SlipMeter, SlipThreshold
+from stickslip_ros.measures.slips import SlipThreshold, slip_report, slips_in
 from stickslip_ros.model.drive import Drive
 from stickslip_ros.model.friction import (
     Exponential,
@@ -108,9 +108,8 @@ class Features:
 
 def features(time: FloatArray, position: FloatArray, stiffness: float) -> Features:
     """Return the features of a motion by its slips."""
-    meter = SlipMeter(SlipThreshold(LEAST_DROP / stiffness))
-    meter.feed(time, position)
-    report = meter.report(0.0)
+    threshold = SlipThreshold(LEAST_DROP / stiffness)
+    report = slip_report(slips_in(time, position, threshold), threshold, 0.0)
     if report["regime"] is None or report["count"] < 3:
         return Features(Regime.EQUILIBRIUM.value)
     period = float(np.median(np.diff(report["each"]["time"])))

@@ -24,7 +24,7 @@ class RunAnalysis:
     mean_cycle: MeanCycle | None
     """Mean cycle under noise; None for exact samples, and cycles that are not alike."""
     slips: Mapping[str, Any] | None
-    """Slips as `SlipMeter.report` has them; None if they were not asked for."""
+    """Slips as `slip_report` has them; None if they were not asked for."""
 
 
 class RunObserver(MotionObserver, Protocol):

@@ -1,6 +1,5 @@
 """Slip by slip: drops of a position that sticks and slips, for cycles that are not alike."""
 
-from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import isfinite, nan
@@ -20,10 +19,8 @@ _STICKING_RATIO = 2.5
 """Time from a slip to the next, in slip times, from which a motion sticks; in a sine it is two."""
 _LEAST_SAMPLES = 8
 """Number of samples for the fit of a stick."""
-_PART = 4096
-"""Number of samples that are searched at once."""
-_MOST_SAMPLES, _MOST_SLIPS = 2_000_000, 100_000
-"""Numbers of samples and of slips that are kept."""
+_MOST_SLIPS = 100_000
+"""Number of slips in a report: the last ones."""
 _QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 
 
@@ -78,45 +75,56 @@ class SlipThreshold:
                 raise InvalidInputError(f"{name} = {value} is invalid: must be above 0 ({unit})")
 
 
-def slips_in(
-    time: FloatArray, position: FloatArray, drop: float, span: int, landing: int | None = None
-) -> list[tuple[Slip, int]]:
-    """Return the slips that positions (m) at times (s) complete, and the row at which each ends.
+def slips_in(time: FloatArray, position: FloatArray, threshold: SlipThreshold) -> list[Slip]:
+    """Return the slips of a slide on a belt that moves forward, from positions (m) at times (s).
 
-    A slip is a drop of more than `drop` (m) within `span` samples, of medians over five samples. It
-    ends at the lowest position before a rise by half of it, or before `span` samples without a
-    lower one. Its duration is that from a tenth to nine tenths of the drop, the transition duration
-    of IEEE Std 181.
-
-    They are looked for from the `landing` on, the row at which a stick begins; without one, from
-    the start on, and when the first stick began is not known.
+    A slip is a drop beyond the threshold, of medians over five samples. It ends at the lowest
+    position before a rise by half of it, or before as many samples without a lower one as it may
+    take. Its duration is that from a tenth to nine tenths of the drop, the transition duration of
+    IEEE Std 181. When the first stick began is not known.
     """
-    smooth, before = _smooth_and_highest(position, span)
-    found: list[tuple[Slip, int]] = []
+    found: list[Slip] = []
+    if len(time) <= 2 * _MEDIAN:
+        return found
+    drop, step = threshold.drop, float(time[_MEDIAN * 2] - time[0]) / (_MEDIAN * 2)
+    span = max(round(min(threshold.within / step, len(time))), 1) if step > 0.0 else 1
+    smooth, highest = _smooth_and_highest(position, span)
+    low = np.flatnonzero(smooth < highest - drop)
+    landing: int | None = None
     while True:
+        # Soon after a landing only what is higher since then counts.
         begin = landing or 0
-        highest = before[begin:].copy()
         since = smooth[begin : begin + span]
-        highest[: len(since)] = np.maximum.accumulate(since)
-        low = smooth[begin:] < highest - drop
-        if not low.any():
+        near = np.flatnonzero(since < np.maximum.accumulate(since) - drop)
+        later = low[np.searchsorted(low, begin + span) :][:1]
+        if not len(near) and not len(later):
             return found
-        start = begin + int(np.argmax(low))
-        fall = smooth[start:]
-        lowest = np.minimum.accumulate(fall)
-        rows = np.arange(len(fall))
+        start = begin + int(near[0]) if len(near) else int(later[0])
+        bottom = _landing(smooth, start, drop, span)
+        if bottom is None:
+            return found
+        top = max(start - span, begin)
+        top += int(np.argmax(smooth[top : start + 1]))
+        found.append(_slip(time, smooth, top, bottom, landing))
+        landing = bottom
+
+
+def _landing(smooth: FloatArray, start: int, drop: float, span: int) -> int | None:
+    """Return the row at which the slip from a row on ends; None if it is not recorded."""
+    count = 2 * span
+    while True:
+        fall = smooth[start : start + count]
+        lowest, rows = np.minimum.accumulate(fall), np.arange(len(fall))
         last = np.maximum.accumulate(np.where(fall <= lowest, rows, 0))
         first = np.maximum.accumulate(np.where(np.diff(lowest, prepend=np.inf) < 0.0, rows, 0))
         rests = last - first > span  # a slide on a guide at rest does not move at all
         over = rests | (fall > lowest + drop / 2.0) | (rows - last > span)
-        if not over.any():
-            return found
-        end = int(np.argmax(over))
-        bottom = start + int(first[end] if rests[end] else last[end])
-        top = max(start - span, begin)
-        top += int(np.argmax(smooth[top : start + 1]))
-        found.append((_slip(time, smooth, top, bottom, landing), bottom))
-        landing = bottom
+        if over.any():
+            end = int(np.argmax(over))
+            return start + int(first[end] if rests[end] else last[end])
+        if start + count >= len(smooth):
+            return None
+        count *= 2
 
 
 def _smooth_and_highest(position: FloatArray, span: int) -> tuple[FloatArray, FloatArray]:
@@ -149,80 +157,27 @@ def _slip(time: FloatArray, smooth: FloatArray, top: int, bottom: int, landing: 
     )
 
 
-class SlipMeter:
-    """Finds slips in positions, fed in blocks of any length; the belt moves forward.
+def slip_report(slips: list[Slip], threshold: SlipThreshold, belt_speed: float) -> dict[str, Any]:
+    """Return `count`, threshold, `regime`, distributions and each slip, for JSON; SI units.
 
-    It keeps the samples since the last slip, and calls `slips_in`.
+    The belt speed is for the share of the sticks' velocity; 0 if it is not known.
     """
-
-    def __init__(self, threshold: SlipThreshold) -> None:
-        self.threshold = threshold
-        self._slips: deque[Slip] = deque(maxlen=_MOST_SLIPS)
-        self.count = 0
-        """Number of slips."""
-        self._begin()
-
-    def _begin(self) -> None:
-        self._time, self._position = np.empty(0), np.empty(0)
-        self._span = self._searched = 0
-        self._landing: int | None = None
-
-    def feed(self, time: FloatArray, position: FloatArray) -> list[Slip]:
-        """Add the samples that follow, in s and m; return the slips that they complete."""
-        found: list[Slip] = []
-        for first in range(0, len(time), _PART):
-            self._time = np.append(self._time, time[first : first + _PART])
-            self._position = np.append(self._position, position[first : first + _PART])
-            if len(self._time) > 2 * _MEDIAN:
-                found += self._find()
-            if len(self._time) > _MOST_SAMPLES:
-                self._begin()
-        self._slips.extend(found)
-        self.count += len(found)
-        return found
-
-    def _find(self) -> list[Slip]:
-        time = self._time
-        if self._span == 0:
-            step = float(time[_MEDIAN * 2] - time[0]) / (_MEDIAN * 2)
-            span = min(self.threshold.within / step, _MOST_SAMPLES) if step > 0.0 else 1
-            self._span = max(round(span), 1)
-        # What was searched is not searched again while nothing drops; the filters reach back.
-        recent = self._position[max(self._searched - self._span - 2 * _MEDIAN, 0) :]
-        smooth, highest = _smooth_and_highest(recent, self._span)
-        if not (smooth < highest - self.threshold.drop).any():
-            self._searched = len(time)
-            return []
-        found = slips_in(time, self._position, self.threshold.drop, self._span, self._landing)
-        if found:
-            self._searched = 0
-            # What is found must not depend on the blocks: the filters reach back.
-            kept = max(found[-1][1] - self._span - _MEDIAN, 0)
-            self._time, self._position = time[kept:], self._position[kept:]
-            self._landing = found[-1][1] - kept
-        return [slip for slip, _ in found]
-
-    def report(self, belt_speed: float) -> dict[str, Any]:
-        """Return `count`, threshold, `regime`, distributions and each slip, for JSON; SI units.
-
-        The belt speed is for the share of the sticks' velocity; 0 if it is not known.
-        """
-        slips = list(self._slips)
-        columns = {name: [slip[k] for slip in slips] for k, name in enumerate(Slip._fields)}
-        report: dict[str, Any] = {
-            "count": self.count,
-            "least_drop": self.threshold.drop,
-            "within": self.threshold.within,
-            "regime": regime_of(slips),
-            "belt_speed": belt_speed,
-        }
-        for name in ("stick_time", "drop", "slip_time", "stick_velocity"):
-            report[name] = _distribution(np.array(columns[name]))
-        each = {
-            name: [value if isfinite(value) else None for value in values]
-            for name, values in columns.items()
-        }
-        return {**report, "each": each}
+    count, slips = len(slips), slips[-_MOST_SLIPS:]
+    columns = {name: [slip[k] for slip in slips] for k, name in enumerate(Slip._fields)}
+    report: dict[str, Any] = {
+        "count": count,
+        "least_drop": threshold.drop,
+        "within": threshold.within,
+        "regime": regime_of(slips),
+        "belt_speed": belt_speed,
+    }
+    for name in ("stick_time", "drop", "slip_time", "stick_velocity"):
+        report[name] = _distribution(np.array(columns[name]))
+    each = {
+        name: [value if isfinite(value) else None for value in values]
+        for name, values in columns.items()
+    }
+    return {**report, "each": each}
 
 
 def regime_of(slips: Sequence[Slip]) -> Regime | None:

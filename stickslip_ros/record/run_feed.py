@@ -16,7 +16,7 @@ from stickslip_ros.measures.feed import moving_part, relative_to_feed
 from stickslip_ros.measures.run_meter import RunAnalysis, RunMeter, RunObserver
 from stickslip_ros.measures.run_report import report_of
 from stickslip_ros.measures.sample_assumptions import SampleAssumptions
-from stickslip_ros.measures.slips import SlipMeter, SlipThreshold
+from stickslip_ros.measures.slips import SlipThreshold, slip_report, slips_in
 from stickslip_ros.record.reader import RunBlock
 from stickslip_ros.record.table_clock import LONGEST
 from stickslip_ros.samples import ForceColumns, SampleColumns
@@ -208,7 +208,8 @@ class _SlipSearch:
     """Looks for slips in both directions."""
 
     def __init__(self, threshold: SlipThreshold) -> None:
-        self._drops, self._rises = SlipMeter(threshold), SlipMeter(threshold)
+        self._threshold = threshold
+        self._times, self._positions = [np.empty(0)], [np.empty(0)]
         self._belt_speed, self._last_stamp = 0.0, -1
 
     def feed(self, samples: SampleColumns, first: int) -> None:
@@ -218,23 +219,21 @@ class _SlipSearch:
             return
         self._belt_speed = float(samples.belt_velocity[-1])
         samples = samples[np.diff(samples.stamp, prepend=self._last_stamp) > 0]
-        sign = -1.0 if self._belt_speed < 0.0 else 1.0
-        time = (samples.stamp - first) / NANOSECONDS
-        self._drops.feed(time, sign * samples.position)
-        self._rises.feed(time, -sign * samples.position)
+        self._times.append((samples.stamp - first) / NANOSECONDS)
+        self._positions.append(samples.position * (-1.0 if self._belt_speed < 0.0 else 1.0))
         if len(samples):
             self._last_stamp = int(samples.stamp[-1])
 
     def report(self, noise: float | None, length: str) -> tuple[dict[str, Any], list[str]]:
         """Return the slips, drops or else rises of the position, and sentences on them."""
-        drops, rises, notes = self._drops, self._rises, list[str]()
-        rising = not drops.count and rises.count > 0
-        if rising:
+        time, position = np.concatenate(self._times), np.concatenate(self._positions)
+        notes, least = list[str](), self._threshold.drop
+        found = slips_in(time, position, self._threshold)
+        if not found and (found := slips_in(time, -position, self._threshold)):
             notes.append("the slips are rises of the position: drops there are none")
-        least = drops.threshold.drop
         if noise is not None and least < _NOISES * noise:
             notes.append(
                 f"the least drop of a slip, {quantity(least, length)}, is within the noise of "
                 f"the positions, {quantity(noise, length)}: some slips are noise"
             )
-        return (rises if rising else drops).report(self._belt_speed), notes
+        return slip_report(found, self._threshold, self._belt_speed), notes

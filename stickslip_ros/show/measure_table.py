@@ -156,7 +156,7 @@ def doubt(values: Mapping[str, Any]) -> str:
 
 
 def slip_table(slips: Mapping[str, Any], units: Units) -> TextTable:
-    """Return the table of the distributions that `SlipMeter.report` has."""
+    """Return the table of the distributions that `slip_report` has."""
     regime = Regime.label(slips["regime"])
     title = f"{slips['count']} slips of more than {units.text(slips['least_drop'], 'm')}: {regime}"
     rows = [

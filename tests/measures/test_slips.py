@@ -5,19 +5,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
-from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.measures import Regime, slips
+from stickslip_ros.measures import Regime
 from stickslip_ros.measures.sample_assumptions import SampleAssumptions
-from stickslip_ros.measures.slips import SlipMeter, SlipThreshold
+from stickslip_ros.measures.slips import SlipThreshold, slip_report, slips_in
 from stickslip_ros.record.report import report_of_recording
 from stickslip_ros.record.table_file import read_table
 from tests.measures import records
 
 BELT, SLIP_TIME = 1e-3, 0.04
+LEAST = SlipThreshold(1e-4)
 DATA = Path(
     os.environ.get("STICKSLIP_DATA", Path(__file__).parents[3] / "shared" / "data"),
     "paper_on_paper",
@@ -45,8 +43,7 @@ def sawtooth(noise: float = 0.0, seed: int = 1) -> tuple[np.ndarray, np.ndarray,
 @pytest.mark.parametrize("noise", [0.0, 5e-6])
 def test_the_slips_of_a_sawtooth_are_found(noise: float) -> None:
     time, position, drops = sawtooth(noise)
-    meter = SlipMeter(SlipThreshold(1e-4))
-    found = meter.feed(time, position)
+    found = slips_in(time, position, LEAST)
     assert [slip.drop for slip in found] == pytest.approx(drops.tolist(), abs=5e-6 + 4.0 * noise)
     # From a tenth to nine tenths, a half cosine takes 0.59 of its time.
     assert [slip.slip_time for slip in found] == pytest.approx([0.59 * SLIP_TIME] * 30, abs=3e-3)
@@ -55,50 +52,33 @@ def test_the_slips_of_a_sawtooth_are_found(noise: float) -> None:
     assert np.mean(speeds) == pytest.approx(BELT, rel=0.01)
     if noise:
         assert np.std(np.array(speeds) - BELT) == pytest.approx(np.mean(errors), rel=0.5)
-    report = meter.report(BELT)
+    report = slip_report(found, LEAST, BELT)
     assert report["count"] == 30
     assert report["regime"] is Regime.STICK_SLIP
     assert report["each"]["stick_time"][0] is None
     assert report["drop"]["mean"] == pytest.approx(drops.mean(), rel=0.02)
 
 
-@settings(max_examples=15, deadline=None)
-@given(st.lists(st.integers(1, 25_000), max_size=8).map(sorted))
-def test_blocks_of_any_length_give_the_same(starts: list[int]) -> None:
-    time, position, _ = sawtooth(5e-6)
-    meter, whole = SlipMeter(SlipThreshold(1e-4)), SlipMeter(SlipThreshold(1e-4))
-    for start, end in zip([0, *starts], [*starts, len(time)], strict=True):
-        meter.feed(time[start:end], position[start:end])
-    whole.feed(time, position)
-    assert meter.report(BELT) == whole.report(BELT)
-
-
 def test_impulses_and_slow_drops_are_no_slips() -> None:
     time = np.arange(20_000) * 1e-3
     position = -2e-4 * time
     position[500::1000] -= 1e-2
-    assert SlipMeter(SlipThreshold(1e-4)).feed(time, position) == []
+    assert slips_in(time, position, LEAST) == []
 
 
-def test_what_does_not_slip_is_searched_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    searched: list[int] = []
-    whole = slips._smooth_and_highest
-
-    def counted(position: FloatArray, span: int) -> tuple[FloatArray, FloatArray]:
-        searched.append(len(position))
-        return whole(position, span)
-
-    monkeypatch.setattr(slips, "_smooth_and_highest", counted)
-    time = np.arange(100_000) * 1e-3
-    SlipMeter(SlipThreshold(1e-4)).feed(time, BELT * time)
-    assert sum(searched) == pytest.approx(len(time), rel=0.05)
+def test_a_slip_that_is_not_recorded_as_a_whole_is_none() -> None:
+    time, position, drops = sawtooth()
+    (starts,) = np.nonzero(np.diff(position) < 0.0)
+    whole = slips_in(time, position, LEAST)
+    cut = int(starts[-1]) - 5  # before the end of the last one
+    assert len(drops) == len(whole)
+    assert slips_in(time[:cut], position[:cut], LEAST) == whole[:-1]
 
 
 def test_an_oscillation_is_no_stick_slip() -> None:
     time = np.arange(20_000) * 1e-3
-    meter = SlipMeter(SlipThreshold(1e-4))
-    meter.feed(time, 1e-3 * np.sin(2.0 * np.pi * 15.0 * time))
-    report = meter.report(BELT)
+    found = slips_in(time, 1e-3 * np.sin(2.0 * np.pi * 15.0 * time), LEAST)
+    report = slip_report(found, LEAST, BELT)
     assert report["count"] == pytest.approx(300, abs=2)
     assert report["regime"] is Regime.PURE_SLIP
 
@@ -123,9 +103,8 @@ def test_the_slips_of_paper_on_paper_are_those_that_are_seen() -> None:
     samples = read_table(DATA / "k168Nm_v42.mat", columns(168, 42)).samples
     time = (samples.stamp - samples.stamp[0]) * 1e-9
     part = (time < 60.0) & samples.is_valid
-    meter = SlipMeter(SlipThreshold(2e-3 / 168))
-    meter.feed(time[part], samples.position[part])
-    assert meter.count == pytest.approx(COUNTED_BY_HAND, rel=0.05)
+    found = slips_in(time[part], samples.position[part], SlipThreshold(2e-3 / 168))
+    assert len(found) == pytest.approx(COUNTED_BY_HAND, rel=0.05)
 
 
 @pytest.mark.long
