@@ -34,7 +34,7 @@ class TrendMeter:
         """Weight, and weighted time and value, of each part; made with the first of them."""
         self._count, self._each, self._largest = 0, 1, 0.0
         self._waiting: list[tuple[_Values, _Values]] = []
-        """Times and values that are not yet in the sums: short runs have no trend."""
+        """Times and values that are not yet in the sums: added together they take less time."""
         self._waiting_count = 0
 
     def feed(self, time: _Values, value: _Values) -> None:
@@ -45,17 +45,11 @@ class TrendMeter:
         if self._waiting_count >= _PARTS:
             self._add_waiting()
 
-    def _take_waiting(self) -> FloatArray:
-        """Return the times and the finite values that wait, shape (2, n)."""
-        new = np.concatenate([np.empty((2, 0)), *map(np.array, self._waiting)], axis=1)
-        new = new[:, np.isfinite(new[1])]
-        self._largest = max(self._largest, float(np.abs(new[1]).max(initial=0.0)))
-        self._waiting, self._waiting_count = [], 0
-        return new
-
     def _add_waiting(self) -> None:
-        time, value = self._take_waiting()
-        new = np.array([np.ones(len(time)), time, value]).T
+        time, value = np.concatenate([np.empty((2, 0)), *map(np.array, self._waiting)], axis=1)
+        self._waiting, self._waiting_count = [], 0
+        new = np.array([np.ones(len(time)), time, value]).T[np.isfinite(value)]
+        self._largest = max(self._largest, float(np.abs(new[:, 2]).max(initial=0.0)))
         if self._count == 0:
             self._sums = np.zeros((2 * _PARTS + 1, 3))
         while len(new) > 0:
@@ -88,14 +82,10 @@ class TrendMeter:
         """
         if self._count + self._waiting_count < _LEAST_PARTS:
             return None
-        if self._count == 0:  # each value is a part
-            every, values = self._take_waiting()
-            self._waiting, self._waiting_count = [(every, values)], len(every)
-        else:
-            self._add_waiting()
-            weight, *sums = self._sums.T
-            with np.errstate(invalid="ignore"):
-                every, values = np.array(sums)[:, weight == self._each] / self._each
+        self._add_waiting()
+        weight, *sums = self._sums.T
+        with np.errstate(invalid="ignore"):
+            every, values = np.array(sums)[:, weight == self._each] / self._each
         run = float(every[-1] - every[0]) if len(every) else 0.0
         lines: list[tuple[FloatArray, FloatArray]] = []
         for length in (max(run / 4.0, span), run / 2.0):
