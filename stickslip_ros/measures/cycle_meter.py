@@ -158,8 +158,8 @@ class CycleMeter:
         self._parts: list[_Stretch] = []
         """Parts of the stretch since the last crossing."""
         self._whole = False
-        self._slid, self._stuck = inf, 0.0
-        """Time, s, until which it slid; longest stick between two slides on a belt at rest, s."""
+        self._slid = inf, 0.0
+        """Time until which it slid, and longest stick between two slides on a belt at rest, s."""
 
     def feed(
         self, breakpoints: Breakpoints, belt_speed: float, fastest_belt: float | None = None
@@ -201,11 +201,11 @@ class CycleMeter:
         self._follow(columns, last, len(breakpoints) - 1)
         (slides,) = (~breakpoints.sticking[1:]).nonzero()
         if len(slides) > 0:
-            ends = breakpoints.time[slides + 1]
+            ends, (until, longest) = breakpoints.time[slides + 1], self._slid
             if belt_speed == 0.0:
-                sticks = breakpoints.time[slides] - np.append(self._slid, ends[:-1])
-                self._stuck = max(self._stuck, float(sticks.max()))
-            self._slid = float(ends[-1])
+                sticks = breakpoints.time[slides] - np.append(until, ends[:-1])
+                longest = max(longest, float(sticks.max()))
+            self._slid = float(ends[-1]), longest
         self._last = breakpoints[len(breakpoints) - 1 :]
         return completed
 
@@ -224,9 +224,10 @@ class CycleMeter:
     def _measures(self) -> Measures:
         period = self._cycles[-1].period if self._cycles else 0.0
         now = self._parts[-1].end if self._parts else 0.0
+        slid, longest = self._slid
         # Without a slide there is no crossing either.
-        stuck = now - (self._slid if self._slid < inf or not self._parts else self._parts[0].start)
-        if self._belt_speed == 0.0 and stuck > self._stuck and stuck >= period:
+        stuck = now - (slid if slid < inf or not self._parts else self._parts[0].start)
+        if self._belt_speed == 0.0 and stuck > longest and stuck >= period:
             steady = True if self._lasts(stuck) else None
             return without_cycles(self._recent_motion(), Regime.STUCK, steady=steady)
         since_turn = now - self._parts[0].start if self._parts else 0.0

@@ -443,8 +443,11 @@ def _extremes(
     part = position[first:last]
     smooth, slope, bend = _parabolas(part, narrow)
     speed = _parabolas(part, wide)[1] / period
+    # At a corner, as of a flat top, the rows beside it do not bend so, and there is no vertex.
+    bends = np.pad(np.abs(bend), 1, mode="edge")
+    least = np.minimum(np.minimum(bends[:-2], bends[2:]), bends[1:-1])
     with np.errstate(divide="ignore", invalid="ignore"):
-        smooth -= np.where(np.abs(slope) < 2.0 * np.abs(bend), slope**2 / (4.0 * bend), 0.0)
+        smooth -= np.where(np.abs(slope) < 2.0 * least, slope**2 / (4.0 * bend), 0.0)
     amplitudes = np.empty((3, len(rows) - 1))
     for each, (start, end) in enumerate(pairwise(rows)):
         inside = slice(start - first, end - first + 1)

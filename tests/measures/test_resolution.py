@@ -205,3 +205,15 @@ def test_standard_errors_cover_the_rounding_of_an_encoder_without_noise(
             covered += errors[-1] <= 1.96
     assert covered >= len(errors) - 1
     assert max(errors, default=0.0) < 4.0
+
+
+def test_a_flat_top_with_a_corner_has_no_amplitude_beyond_it() -> None:
+    """The error of an axis on a circle that stays at its reversals until it is 40 um behind."""
+    command = 0.05 * np.sin(2.0 * np.pi * 0.25 * 0.002 * np.arange(8000))
+    place = [0.0]
+    for each in command[1:].tolist():
+        place.append(min(max(place[-1], each - 4e-5), each + 4e-5))
+    time = 0.002 * np.arange(len(place))
+    found = measured(time, command - np.array(place), reading=UNKNOWN, belt=0.0)
+    assert found.amplitude == pytest.approx(4e-5, rel=1e-3)
+    assert found.period == pytest.approx(4.0, rel=1e-6)
