@@ -16,7 +16,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from typing_extensions import override
 
-from stickslip_ros.measures.cycle_measures import Cycle, measures_of
+from stickslip_ros.measures.cycle_measures import Cycle, Measures, measures_of
 from stickslip_ros.measures.sample_meter import SampleMeter
 from stickslip_ros.record.bag_layout import BagLayout
 from stickslip_ros.record.codec import joint_state_packer, pack_joint_state
@@ -84,6 +84,16 @@ def table(path: Path, samples: SampleColumns) -> Path:
     return path
 
 
+def agree(known: Measures, unknown: Measures) -> bool:
+    """Return whether regimes are the same, or sticks that are within their errors of none."""
+    if known.regime == unknown.regime or {known.regime, unknown.regime} <= RESTS:
+        return True
+    share, other, errors = known.stick_fraction, unknown.stick_fraction, known.errors
+    if share is None or other is None or errors is None:
+        return False
+    return abs(share - other) < 3.0 * errors["stick_fraction"]
+
+
 @example(5, 30.0)  # comes to rest on a belt that moves
 @examples(quick=2, thorough=60, deadline=None)
 @given(st.integers(0, 10_000), st.sampled_from([0.0, 30.0, 1000.0]))
@@ -108,5 +118,4 @@ def test_live_bag_and_table_give_one_answer(seed: int, steps: float) -> None:
         assert of_own == live
     if of_other["samples"] == of_table["samples"]:  # no dropouts, which are told otherwise
         assert measures_of(of_other) == measures_of(of_table)
-    regimes = {live.regime, of_table["regime"]}
-    assert len(regimes) == 1 or regimes <= RESTS or (None in regimes and of_table["notes"]), regimes
+    assert agree(live, measures_of(of_table)) or (of_table["regime"] is None and of_table["notes"])
