@@ -105,6 +105,7 @@ def test_claims_have_an_identifier_of_their_own() -> None:
     assert sum(len(chapter.claims) for chapter in CHAPTERS) == len(CLAIMS)
 
 
+@pytest.mark.long
 def test_what_is_computed_are_the_decidable_claims(without_figures: dict[str, Finding]) -> None:
     undecidable = [
         n for n, found in without_figures.items() if found.verdict is Verdict.UNDECIDABLE
@@ -120,6 +121,7 @@ def test_every_equation_and_every_figure_has_a_claim() -> None:
         assert re.search(rf"Fig\. ({number}|8 and {number})\b", places), number
 
 
+@pytest.mark.long
 def test_claims_about_equations_need_no_figure(without_figures: dict[str, Finding]) -> None:
     assert len(without_figures) > 100
     for claim in CLAIMS:
@@ -127,6 +129,7 @@ def test_claims_about_equations_need_no_figure(without_figures: dict[str, Findin
             check_form(claim, without_figures[claim.identifier])
 
 
+@pytest.mark.long
 def test_another_printed_number_gets_another_verdict(without_figures: dict[str, Finding]) -> None:
     tried = 0
     for claim in CLAIMS:

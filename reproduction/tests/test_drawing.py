@@ -91,7 +91,9 @@ def test_a_bifurcation_diagram_names_regimes_and_marks(style: str) -> None:
     ]  # fmt: skip
 
 
-@pytest.mark.parametrize("number", [3, 4, 5])
+@pytest.mark.parametrize(
+    "number", [5, *(pytest.param(each, marks=pytest.mark.long) for each in (3, 4))]
+)
 def test_the_title_of_every_diagram_fits(number: int) -> None:
     assert faults(paper_figure(compute_figure(number, points=3))) == []
 

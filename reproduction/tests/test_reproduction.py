@@ -74,6 +74,7 @@ def test_a_report_has_what_is_kept() -> None:
     assert verdict_counts(found)[Verdict.UNDECIDABLE] == len(CLAIMS)
 
 
+@pytest.mark.long
 def test_claims_that_need_no_figure_are_found_as_kept() -> None:
     found = findings_without_figures()
     assert len(found) > len(CLAIMS) / 2

@@ -9,7 +9,7 @@ import pytest
 from stickslip_ros.record.report import report_of_recording
 from tests.nodes.graph import PATIENCE
 
-pytestmark = pytest.mark.process
+pytestmark = [pytest.mark.long, pytest.mark.process]
 
 
 def test_before_and_after_a_bag_and_a_picture(

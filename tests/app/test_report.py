@@ -103,7 +103,7 @@ def test_a_bag_whose_law_is_gone_is_reported_as_one_of_a_law_with_a_memory(
     stickslip: Run, tmp_path: Path
 ) -> None:
     printed: list[str] = []
-    for law, page in (("rate_state", ("--plot", "run.svg", "--html", "run.html")), ("lugre", ())):
+    for law, page in (("rate_state", ("--html", "run.html")), ("lugre", ())):
         plant = {"friction.law": f'"{law}"', "mass": "1.0", "stiffness": "10.0", "rate": "100.0"}
         record(tmp_path / law, tables={"stickslip_ros/plant": plant})
         done = stickslip("report", law, *page)

@@ -92,7 +92,10 @@ CASES: dict[str, tuple[tuple[str, ...], Callable[[], Result], str]] = {
 """The arguments of commands, the same results from Python, and what they say, of a table too."""
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(n, marks=pytest.mark.long) if n.endswith("sensor") else n for n in CASES],
+)
 def test_a_command_prints_and_a_page_shows_what_python_returns(
     name: str, stickslip: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -241,7 +241,14 @@ def test_a_reader_that_closes_the_pipe_is_no_failure() -> None:
 
 
 @pytest.mark.process
-@pytest.mark.parametrize("closed", ["<&- >&- 2>&-", pytest.param("2>&-", marks=pytest.mark.long)])
+@pytest.mark.parametrize(
+    "closed",
+    [
+        "--composed <&- >&- 2>&-",
+        pytest.param("<&- >&- 2>&-", marks=pytest.mark.long),
+        pytest.param("2>&-", marks=pytest.mark.long),
+    ],
+)
 def test_a_run_does_without_standard_streams(
     process_environment: dict[str, str], tmp_path: Path, closed: str
 ) -> None:

@@ -20,8 +20,7 @@ SCRIPTS = sorted(
     if path.stem not in NODES and not path.stem.startswith("test_")
 )
 NOTEBOOKS = sorted(path.stem for path in EXAMPLES.glob("notebooks/*.ipynb"))
-# Those that read a bag or only simulate a little; the others take several seconds each.
-QUICK = {"replay_into_a_controller", "simulate_and_plot"}
+QUICK = {"replay_into_a_controller"}
 ELSEWHERE = {"compare_controllers"}  # test_controllers.py
 
 

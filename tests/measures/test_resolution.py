@@ -111,7 +111,9 @@ def test_a_moving_axis_is_not_stuck() -> None:
 @pytest.mark.parametrize(
     "reading", [UNKNOWN, NOISY, SampleAssumptions()], ids=["unknown", "noisy", "exact"]
 )
-@pytest.mark.parametrize("every", [1, 6, 10, 16, 21, 30])
+@pytest.mark.parametrize(
+    "every", [6, 16, 30, *(pytest.param(each, marks=pytest.mark.long) for each in (1, 10, 21))]
+)
 def test_few_samples_per_cycle_are_measured_or_said_to_be_too_few(
     every: int, reading: SampleAssumptions
 ) -> None:

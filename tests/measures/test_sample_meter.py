@@ -356,13 +356,13 @@ def test_no_samples_are_an_error(rows: list[tuple[int, float, float, float]], si
     assert np.isfinite([figure for figure in measured if isinstance(figure, float)]).all()
 
 
-@pytest.mark.parametrize("size", [1, 13000])
+@pytest.mark.parametrize("size", [1, 1900])
 @pytest.mark.parametrize(("shift", "strays"), [(-SECOND // 2, 1), (SECOND // 300, 2)])
 def test_the_motion_of_two_plants_on_one_topic_is_not_known(
     size: int, shift: int, strays: int
 ) -> None:
     """Their stamps go back, or come in order where both plants are in time."""
-    one = limit_cycle()[:200] if size == 1 else limit_cycle()
+    one = limit_cycle()[: 200 if size == 1 else 1000]
     both = one.followed_by(later(one, shift))
     both = both[np.arange(2 * len(one)).reshape(2, -1).T.ravel()]
     meter = RunMeter(window=20, reading=EXACT._replace(period=1e7))

@@ -15,7 +15,7 @@ FOUND: dict[str, Any] = json.loads(
 
 
 @pytest.mark.parametrize(
-    "seed", [*range(5), *(pytest.param(seed, marks=pytest.mark.long) for seed in range(5, 12))]
+    "seed", [*range(2), *(pytest.param(seed, marks=pytest.mark.long) for seed in range(2, 12))]
 )
 def test_no_change_alters_what_it_should_not(seed: int) -> None:
     assert {name: differences(seed, name) for name in CHANGES} == {name: [] for name in CHANGES}

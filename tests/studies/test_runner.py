@@ -126,10 +126,10 @@ def test_in_this_process_in_threads_and_in_any_order_the_points_are_the_same(nam
 
 
 @pytest.mark.process
-def test_in_processes_the_points_are_the_same() -> None:
+@pytest.mark.parametrize("name", ["sampled", pytest.param("up and down", marks=pytest.mark.long)])
+def test_in_processes_the_points_are_the_same(name: str) -> None:
     with local_processes(2) as processes:
-        for name in ("up and down", "sampled"):
-            assert computed(STUDIES[name], processes) == at_once(STUDIES[name])
+        assert computed(STUDIES[name], processes) == at_once(STUDIES[name])
 
 
 def test_an_executor_must_be_allowed_a_task() -> None:
