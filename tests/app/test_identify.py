@@ -20,7 +20,7 @@ _BY_NAME = dict(each.split("=") for each in _COLUMNS.split(","))
 @pytest.fixture
 def log(tmp_path: Path) -> Path:
     """A log of an axis without a spring."""
-    own = record("saturating", duration=2.5)
+    own = record("saturating", duration=4.0)
     time = own.period * np.arange(len(own.position))
     rows = np.column_stack([time, own.position, own.force / 2.0, own.reference])
     return written(tmp_path / "axis.csv", rows)

@@ -355,9 +355,6 @@ def test_laws_that_the_record_cannot_tell_apart_are_named() -> None:
     found = identify([study.record("stribeck", "narrow", 1, 1.2)], fixed={"normal_force": 1000.0})
     assert "predict held-out parts alike" in unidentified(found)["friction.law"]
     assert "run with relative speeds from rest" in unidentified(found)["friction.law"]
-    told = identify([study.record("stribeck", "taps", 1, 1.2)], fixed={"normal_force": 1000.0})
-    assert told.law == "stribeck"
-    assert "friction.law" not in unidentified(told)
 
 
 def test_errors_that_repeat_are_noted() -> None:
@@ -424,9 +421,10 @@ def test_the_study_of_100_seeds() -> None:
 @pytest.mark.long
 def test_bristles_are_told_and_their_constants_recovered() -> None:
     found = identify(
-        [study.record("lugre", "taps", 0, 2.0)], fixed={"normal_force": study.NORMAL_FORCE}
+        [study.record("lugre", "taps", 0, 1.5)], fixed={"normal_force": study.NORMAL_FORCE}
     )
     assert found.law == "lugre"
+    assert "friction.law" not in unidentified(found)
     assert "friction.bristle_stiffness" in found.fitted
     true = study.truth("lugre", "taps")
     check_errors(found, true)

@@ -29,7 +29,7 @@ def around_a_stick(stick_time: float, drop: float = 0.0) -> tuple[np.ndarray, np
     return time, landing - leaving + BELT * time
 
 
-@examples(quick=2, thorough=25)
+@examples(quick=2, thorough=12)
 @given(
     st.floats(0.003, 0.04),
     st.floats(-0.002, 0.002),

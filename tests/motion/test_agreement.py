@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks import agreement
-from benchmarks.agreement import cases
 from benchmarks.random_drives import KINDS, LAWS, PLACES
 
 FOUND: dict[str, Any] = json.loads(
@@ -23,13 +22,3 @@ def test_thirty_drives_of_each_law_and_each_course_agree() -> None:
     assert FOUND["differing"] == []
     uncompared = FOUND["all"]["drives"] - FOUND["all"]["compared"]
     assert len(FOUND["reference_not_accurate"]) == uncompared < 0.01 * FOUND["all"]["drives"]
-
-
-def test_each_place_and_direction_has_its_share() -> None:
-    chosen = cases(agreement.DRIVES)
-    assert len(chosen) == FOUND["all"]["drives"]
-    for place in PLACES:
-        own = [case for case in chosen if case.place == place]
-        assert {(case.kind, case.law, case.seed % 2) for case in own} == {
-            (kind, law, odd) for kind in KINDS for law in LAWS for odd in (0, 1)
-        }

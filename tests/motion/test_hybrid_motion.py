@@ -146,7 +146,7 @@ ROUNDED = Case(Drive(1.0, 0.0, 1e8, 1.0, 0.0, Stribeck(1.0, 0.0, 1e-4)), 0.0, 0.
 @example(STARTING, [])
 @example(SUDDEN, [])
 @example(ROUNDED, [0.71875, 2.2250738585e-313])
-@examples(quick=25, thorough=200)
+@examples(quick=25, thorough=100)
 def test_cutting_a_motion_anywhere_changes_nothing(case: Case, cuts: list[float]) -> None:
     duration = 5.0 / case.drive.angular_frequency
     whole, cut = case.motion(RecordedMotion), case.motion(RecordedMotion)
@@ -160,7 +160,7 @@ def test_cutting_a_motion_anywhere_changes_nothing(case: Case, cuts: list[float]
 
 
 @given(cases())
-@examples(quick=15, thorough=150)
+@examples(quick=15, thorough=75)
 def test_recording_changes_nothing(case: Case) -> None:
     recorded, bare = case.motion(RecordedMotion), case.motion()
     for motion in (recorded, bare):
@@ -169,7 +169,7 @@ def test_recording_changes_nothing(case: Case) -> None:
 
 
 @given(cases())
-@examples(quick=15, thorough=150)
+@examples(quick=15, thorough=75)
 def test_a_plain_drive_moves_as_any_other(case: Case) -> None:
     """The quick system of a plain drive and the general one describe the same motion."""
     quick = case.motion()
@@ -199,7 +199,7 @@ def test_units_do_not_matter(scales: tuple[float, float, float]) -> None:
 
 
 @given(cases(), cases())
-@examples(quick=15, thorough=150)
+@examples(quick=15, thorough=75)
 def test_motions_do_not_disturb_each_other(case: Case, other: Case) -> None:
     def run(one: Case, between: Callable[[], object] = lambda: None) -> tuple[float, float]:
         motion = one.motion()
@@ -216,7 +216,7 @@ def test_motions_do_not_disturb_each_other(case: Case, other: Case) -> None:
 
 
 @given(cases())
-@examples(quick=25, thorough=200)
+@examples(quick=25, thorough=100)
 def test_time_never_goes_back_and_there_is_no_endless_chatter(case: Case) -> None:
     check_phases(case)
 
@@ -283,7 +283,7 @@ def margins_of(motion: Motion, time: float) -> FloatArray:
 
 
 @given(cases())
-@examples(quick=15, thorough=150)
+@examples(quick=15, thorough=75)
 def test_no_guard_is_passed_over(case: Case) -> None:
     motion = case.motion()
     omega = case.drive.angular_frequency

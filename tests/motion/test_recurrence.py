@@ -58,7 +58,7 @@ def motion_of(drive: Drive, control: Washout | None) -> RecordedMotion:
     st.integers(0, 1000),
     st.none() | st.tuples(st.floats(0.1, 2.0), st.floats(-0.5, 0.2)),
 )
-@examples(quick=3, thorough=100)
+@examples(quick=3, thorough=40)
 def test_what_recurs_is_equal_to_the_last_bit(
     law: str, seed: int, gains: tuple[float, float] | None
 ) -> None:

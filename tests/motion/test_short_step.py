@@ -58,7 +58,7 @@ def observed(law: str, kind: str, place: str, seed: int, part: str, *, runs: boo
     st.integers(0, 1000),
     st.sampled_from([*PARTS]),
 )
-@examples(quick=4, thorough=100)
+@examples(quick=4, thorough=50)
 def test_the_motion_is_that_of_the_general_case(
     law: str, kind: str, place: str, seed: int, part: str
 ) -> None:

@@ -11,7 +11,6 @@ from pathlib import Path
 import pytest
 
 from benchmarks.parties import Slice, party, results_by_turns
-from benchmarks.slices import Row, table
 from tests.nodes.graph import PATIENCE
 
 ROUNDS = 3
@@ -57,11 +56,6 @@ def test_a_party_that_fails_is_named_with_the_reason_and_the_others_have_results
     assert results == {kind: [7] * ROUNDS for kind in ("never", "at the end")}
     reasons = REASONS | {"is killed": "it ended early, with status -6"}
     assert {row.what: row.failure for row in failures} == reasons
-
-
-def test_a_failure_is_a_line_of_the_table() -> None:
-    rows = [Row("steps", "1/s", 3.0, "peer", 2.0, 1.5), Row("twin", failure="no message came")]
-    assert "twin failed: no message came" in table({"": rows}).splitlines()
 
 
 @pytest.mark.process

@@ -51,17 +51,3 @@ def test_no_module_executes_data() -> None:
     assert len(modules) > 100
     for module in modules:
         assert offences(ast.parse(module.read_text(encoding="utf-8"))) == [], module
-
-
-def test_what_executes_data_is_noticed() -> None:
-    for code in (
-        "eval(text)",
-        "from pickle import loads",
-        "import marshal",
-        "yaml.load(text)",
-        "yaml.load(text, Loader=yaml.UnsafeLoader)",
-        "subprocess.run(text, shell=True)",
-        "os.system(text)",
-        "numpy.load(path, allow_pickle=True)",
-    ):
-        assert offences(ast.parse(code)), code

@@ -185,7 +185,7 @@ def changed(kind: str, chance: random.Random) -> bytes:
     return bytes(content)
 
 
-@examples(quick=40, thorough=300, deadline=None)
+@examples(quick=40, thorough=150, deadline=None)
 @given(seed=st.integers(0, 2**32))
 def test_a_csv_file_that_was_changed_is_measured_or_refused(
     tmp_path_factory: pytest.TempPathFactory, seed: int
@@ -211,7 +211,7 @@ def measure_or_refuse(tmp_path_factory: pytest.TempPathFactory, kind: str, seed:
 
 
 @pytest.mark.process  # of bytes that begin like a MAT file
-@examples(quick=40, thorough=300, deadline=None)
+@examples(quick=40, thorough=150, deadline=None)
 @given(content=st.binary(max_size=300) | st.text(alphabet="0159.,;:-T\t\n\"' xe#/µ", max_size=300))
 def test_any_bytes_are_measured_or_refused(
     tmp_path_factory: pytest.TempPathFactory, content: bytes | str
@@ -255,7 +255,7 @@ def faulty(chance: random.Random) -> tuple[bytes, dict[str, str]]:
     return "\n".join(lines).encode(), columns | {name: optional[name] for name in asked}
 
 
-@examples(quick=20, thorough=1000, deadline=None)
+@examples(quick=20, thorough=400, deadline=None)
 @given(seed=st.integers(0, 2**32))
 @example(seed=4900)  # times that repeat, between rests
 def test_a_table_with_faults_is_measured_or_refused(

@@ -191,7 +191,7 @@ def test_the_type_of_a_topic_is_known_from_a_summary_that_has_moved(sound, scrat
     check(damaged(sound.content, [("flip", name, 1), ("remove", first - 39, 40)]), sound, scratch)
 
 
-@examples(quick=50, thorough=150)
+@examples(quick=50, thorough=100)
 @given(st.data())
 def test_damage_is_survived(sound, scratch, data):
     check(damaged(sound.content, data.draw(edits(sound))), sound, scratch)

@@ -103,7 +103,7 @@ def values_of(draw: st.DrawFn, model: NodeParameters) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("node", NODE_PARAMETERS)
-@examples(quick=5, thorough=100)
+@examples(quick=5, thorough=40)
 @given(data=st.data())
 def test_flat_values_give_the_parameters_again(node: str, data: st.DataObject) -> None:
     model = NODE_PARAMETERS[node]

@@ -26,7 +26,7 @@ from stickslip_ros.record.report import report_of_recording
 from stickslip_ros.samples import SampleColumns
 from stickslip_ros.show.run_figure import LAST_CYCLES, DrawnRun, run_figure
 from stickslip_ros.show.run_history import RunHistory
-from stickslip_ros.show.style import SCREEN, STYLES, FigureStyle, save
+from stickslip_ros.show.style import SCREEN, STYLES, FigureStyle
 from tests.drives import FEED_DRIVE, PAPER
 from tests.show.texts import faults, in_styles, legend_texts
 
@@ -320,39 +320,6 @@ def test_implausible_values_are_omitted() -> None:
     assert np.isfinite(history.motion).all()
     for trace in (history.friction, history.control):
         assert len(trace.columns()[0]) == 0
-
-
-def hour() -> RunHistory:
-    """Return an hour at 1 kHz, with one peak in it."""
-    history = RunHistory()
-    meter = SampleMeter(20, history)
-    for number in np.split(np.arange(3_600_000), 180):
-        time = number * 1e-3
-        position = np.sin(100.0 * time) + 5.0 * (number == 1_234_567)
-        velocity = np.minimum(100.0 * np.cos(100.0 * time), 80.0)
-        belt = np.full(len(number), 80.0)
-        meter.feed(
-            SampleColumns(number * 1_000_000, position, velocity, velocity, number * 0.08, belt)
-        )
-        history.take_friction(time, velocity)
-        history.take_control(time, position, all_acted(position))
-    return history
-
-
-@pytest.mark.long
-def test_an_hour_is_few_points_with_its_peak_and_its_shade(tmp_path: Path) -> None:
-    history = hour()
-    figure = figure_of(history, CycleMeter(20).measures(), FEED_DRIVE)
-    for axes in figure.axes[:PORTRAIT]:
-        assert all(len(line.get_xdata()) < 5_000 for line in axes.lines)
-    time, position = np.array(figure.axes[POSITION].lines[1].get_xydata()).T
-    assert position.max() == pytest.approx(5.0 + np.sin(123_456.7))
-    assert time[np.argmax(position)] == pytest.approx(1234.567)
-    assert not np.isnan(position).any()
-    (shade,) = figure.axes[POSITION].images
-    assert np.mean(shade.get_array()) == pytest.approx(np.arccos(0.8) / np.pi, rel=0.03)
-    save(figure, tmp_path / "hour.svg")
-    assert (tmp_path / "hour.svg").stat().st_size < 1_000_000
 
 
 def test_a_motion_that_runs_away_on_a_belt_at_rest_has_no_equilibrium() -> None:

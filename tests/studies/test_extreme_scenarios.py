@@ -42,7 +42,7 @@ def _little_patience() -> Iterator[None]:
 
 
 @given(extremes("plant"), extremes(PAPER.controller.node), st.booleans())
-@examples(quick=20, thorough=200, suppress_health_check=[HealthCheck.too_slow])
+@examples(quick=20, thorough=100, suppress_health_check=[HealthCheck.too_slow])
 def test_any_scenario_ends(
     plant: dict[str, Any], controller: dict[str, Any], continuous: bool
 ) -> None:

@@ -178,14 +178,3 @@ def test_only_literals_are_parsed_and_text_comes_as_json() -> None:
     assert [name for name, text in texts.items() if PAGE_JS in ast.unparse(ast.parse(text))] == [
         "elements.py"
     ]
-
-
-def test_what_parses_text_is_noticed() -> None:
-    for code in (
-        "element.props(f'label=\"{name}\"')",
-        "element.style('color: ' + colour)",
-        "ui.html(text)",
-        "ui.run_javascript(f'show({name!r})')",
-        "element.on('click', js_handler=f'() => show({name})')",
-    ):
-        assert offences(code), code
