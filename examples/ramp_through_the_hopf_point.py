@@ -15,6 +15,7 @@ from matplotlib.figure import Figure
 
 import stickslip_ros as ss
 from stickslip_ros.motion.trajectory import Trajectory
+from stickslip_ros.theory.limit_cycles import limit_cycles
 
 RAMP = 2500.0
 """Time in which the belt slows down, and in which it speeds up."""
@@ -60,16 +61,17 @@ for axes, (title, (speeds, law)) in zip(panes, CASES.items(), strict=True):
         disturbance_amplitude=1e-4,
         disturbance_frequency=0.159,
         initial_position=theory.equilibrium_position,
+        rate=20.0,
     )
     found = ss.simulate(moving, 2 * RAMP).trajectory
-    speed, amplitude = amplitudes(found, 1000)
+    speed, amplitude = amplitudes(found, 200)
     turn = len(speed) // 2
     axes.plot(speed[:turn], amplitude[:turn], "C0", label="belt slows down")
     axes.plot(speed[turn:], amplitude[turn:], "C1--", label="belt speeds up")
     for belt_speed in np.linspace(slowest, fastest, 26):
         at_speed = ss.scenario(free, belt_speed=belt_speed)
-        for cycle in ss.stability(at_speed).open_loop["limit_cycles"]:
-            axes.plot(belt_speed, cycle["amplitude"], "k." if cycle["stable"] else "kx", ms=4)
+        for cycle in limit_cycles(at_speed.plant.as_drive()):
+            axes.plot(belt_speed, cycle.measures.amplitude, "k." if cycle.stable else "kx", ms=4)
     axes.axvline(hopf, color="C2", ls=":", label="critical feed speed (Hopf)")
     axes.set(title=title, xlabel="belt speed", ylabel="amplitude of the displacement")
     print(f"{title}: critical feed speed (Hopf) {hopf:.4f}")
