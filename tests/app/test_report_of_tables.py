@@ -74,6 +74,7 @@ def test_a_slip_time_of_any_size_is_taken(stickslip: Run, log: Path) -> None:
         assert (done.returncode, done.stderr) == (0, "")
 
 
+@pytest.mark.long
 def test_settings_of_matplotlib_change_no_figure(
     stickslip: Run,
     start_stickslip: Start,

@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable
+from itertools import count
 from threading import Event
 from typing import Any
 
@@ -18,7 +19,8 @@ from rclpy.subscription import Subscription
 from stickslip_ros.nodes.base.endpoints import message_class, qos_profile
 from stickslip_ros.nodes.base.managed import ManagedNode
 from stickslip_ros.nodes.base.spinner import Spinner
-from stickslip_ros.record.topics import DIAGNOSTICS
+from stickslip_ros.record.codec import pack_wrench, unpack_header
+from stickslip_ros.record.topics import CONTROL_FORCE, DIAGNOSTICS, JOINT_STATES
 
 PATIENCE = 120.0
 """How long a test waits, s, for what should happen at once on an idle machine."""
@@ -132,6 +134,16 @@ class Graph:
             lambda: made.get_subscription_count() >= readers, f"readers of {topic.name}"
         )
         return made
+
+    def answer_every_third_sample(self) -> None:
+        """Let the observer be a controller that is late two times of three."""
+        force, counted = self.publisher(CONTROL_FORCE), count()
+
+        def answer(message: bytes) -> None:
+            if next(counted) % 3 == 0:
+                force.publish(pack_wrench(unpack_header(message), 0.0))
+
+        self.subscribe(JOINT_STATES, answer)
 
     def close(self) -> None:
         """Take everything down."""

@@ -1,6 +1,5 @@
 """Missed deadlines and late forces: counted correctly, and told when they are too many."""
 
-from itertools import count
 from pathlib import Path
 from threading import Event, Lock
 
@@ -14,9 +13,7 @@ from stickslip_ros.nodes.analyzer import AnalyzerNode
 from stickslip_ros.nodes.base.managed import STATE
 from stickslip_ros.nodes.pacing import RealtimePacer, TimingMonitor
 from stickslip_ros.nodes.plant import PlantNode
-from stickslip_ros.record.codec import pack_wrench, unpack_header
 from stickslip_ros.record.report import report_of_recording
-from stickslip_ros.record.topics import CONTROL_FORCE, JOINT_STATES
 from stickslip_ros.samples import Sample
 from stickslip_ros.scenarios.parameters import PlantParameters
 from tests.nodes.graph import PATIENCE, Graph
@@ -102,14 +99,7 @@ def test_a_plant_whose_controller_answers_every_third_sample_warns_and_so_does_t
 ) -> None:
     health = graph.health("plant")
     graph.add(AnalyzerNode, bag=str(tmp_path / "bag"))
-    force = graph.publisher(CONTROL_FORCE)
-    counted = count()
-
-    def answer(message: bytes) -> None:
-        if next(counted) % 3 == 0:
-            force.publish(pack_wrench(unpack_header(message), 0.0))
-
-    graph.subscribe(JOINT_STATES, answer)
+    graph.answer_every_third_sample()
     plant = graph.add(PlantNode, pace="realtime", rate=500.0, wait_for=["observer", "analyzer"])
     graph.wait_until(
         lambda: any(

@@ -1,14 +1,10 @@
 """What two seconds of a run in real time say of the rest."""
 
-from itertools import count
-
 import pytest
 
 from stickslip_ros.nodes.base.managed import FORECAST
 from stickslip_ros.nodes.forecast import Forecast, forecast
 from stickslip_ros.nodes.plant import PlantNode
-from stickslip_ros.record.codec import pack_wrench, unpack_header
-from stickslip_ros.record.topics import CONTROL_FORCE, JOINT_STATES
 from tests.nodes.graph import Graph
 
 
@@ -46,14 +42,7 @@ def test_a_force_ends_the_wait_of_the_samples_before_it(monkeypatch: pytest.Monk
 
 
 def test_a_plant_forecasts_a_long_run_and_not_a_short_one(graph: Graph) -> None:
-    force = graph.publisher(CONTROL_FORCE)
-    counted = count()
-
-    def answer(message: bytes) -> None:
-        if next(counted) % 3 == 0:
-            force.publish(pack_wrench(unpack_header(message), 0.0))
-
-    graph.subscribe(JOINT_STATES, answer)
+    graph.answer_every_third_sample()
     plant = graph.add(PlantNode, pace="realtime", rate=200.0, wait_for=["observer"], duration=60.5)
     graph.wait_until(lambda: FORECAST in plant.diagnose()[2], "a forecast")
     sentence = plant.diagnose()[2][FORECAST]

@@ -132,27 +132,22 @@ def test_times_of_day_have_no_unit(tmp_path: Path) -> None:
     assert stamps.tolist() == [1_000_000 * number for number in range(50)]
 
 
-def test_units_above_the_names_are_used(tmp_path: Path) -> None:
-    text = "Trace 1\nms;mm\nt;x\n" + "".join(f"{n / 2:g};{n}\n" for n in range(50))
-    found = read(tmp_path, text, "t", "x")
+@pytest.mark.parametrize(
+    ("top", "time", "position", "form", "note"),
+    [
+        ("Trace 1\nms;mm\nt;x\n", "t", "x", ANY_FORM, "the first line skipped, units in line 2"),
+        ("t [ms];x [mm]\n", "#1", "#2", TableFormat(skip=1), "semicolons as separators"),
+        ("Zeit;Weg\nms;mm ±1 µm\n", "Zeit", "Weg", ANY_FORM, "decimal commas, units in line 2"),
+    ],
+)
+def test_units_above_and_below_the_names_and_of_skipped_names_are_used(
+    tmp_path: Path, top: str, time: str, position: str, form: TableFormat, note: str
+) -> None:
+    text = top + "".join(f"{n / 2:g};{n}\n" for n in range(50))
+    found = read(tmp_path, text.replace(".", ","), time, position, form)
     assert found.samples.stamp.tolist() == [500_000 * number for number in range(50)]
     assert found.samples.position == pytest.approx(1e-3 * np.arange(50.0))
-    assert "the first line skipped, units in line 2" in found.notes[0]
-
-
-def test_units_are_those_of_skipped_names_too(tmp_path: Path) -> None:
-    text = "t [ms],x [mm]\n" + "".join(f"{n},{n}\n" for n in range(50))
-    found = read(tmp_path, text, "#1", "#2", TableFormat(skip=1))
-    assert found.samples.stamp.tolist() == [1_000_000 * number for number in range(50)]
-    assert found.samples.position == pytest.approx(1e-3 * np.arange(50.0))
-
-
-def test_units_below_the_names_are_used(tmp_path: Path) -> None:
-    text = "Zeit;Weg\nms;mm ±1 µm\n" + "".join(f"{n / 2:g};{n}\n" for n in range(50))
-    found = read(tmp_path, text.replace(".", ","), "Zeit", "Weg")
-    assert found.samples.stamp.tolist() == [500_000 * number for number in range(50)]
-    assert found.samples.position == pytest.approx(1e-3 * np.arange(50.0))
-    assert "semicolons as separators, decimal commas, units in line 2" in found.notes[0]
+    assert note in found.notes[0]
 
 
 @pytest.mark.parametrize(

@@ -141,10 +141,17 @@ def test_parameters_of_a_command_are_those_of_the_scenario_unless_it_has_its_own
 
 
 @pytest.mark.long
-def test_a_managed_controller_that_does_not_start_is_reported() -> None:
+@pytest.mark.parametrize(
+    ("command", "sentence"),
+    [
+        (process(controllers.RefusingToStart), "/feed_drive/managed_feedback could not be activ"),
+        ([sys.executable, "-c", "raise SystemExit(3)"], r"SystemExit\(3\).* has ended \(exit stat"),
+    ],
+)
+def test_a_controller_that_does_not_start_is_reported(command: list[str], sentence: str) -> None:
     with (
-        pytest.raises(RunError, match="/feed_drive/managed_feedback could not be activated"),
-        ClosedLoop("paper", controller=process(controllers.RefusingToStart)) as loop,
+        pytest.raises(RunError, match=sentence),
+        ClosedLoop("paper", controller=command) as loop,
     ):
         loop.run(1.0)
 
@@ -373,16 +380,6 @@ def test_a_loop_has_to_be_open_and_to_run_for_some_time(tmp_path: Path) -> None:
                 loop.run(duration)
     with pytest.raises(BagError, match="exists already"):
         ClosedLoop("paper", bag=tmp_path)
-
-
-@pytest.mark.long
-def test_a_controller_process_that_ends_is_reported() -> None:
-    command = [sys.executable, "-c", "raise SystemExit(3)"]
-    with (
-        pytest.raises(RunError, match=r"SystemExit\(3\).* has ended \(exit status 3\)"),
-        ClosedLoop("paper", controller=command) as loop,
-    ):
-        loop.run(1.0)
 
 
 def test_where_the_default_context_is_in_use_the_loop_has_its_own() -> None:
