@@ -12,10 +12,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.model.constants import (
-    Parameter,
-    constants_of,
-)
+from stickslip_ros.model.constants import Parameter, constants_of
 from stickslip_ros.model.friction import (
     LAWS,
     Coulomb,

@@ -6,15 +6,7 @@ from math import expm1, inf, log, log1p, nextafter
 import numpy as np
 import pytest
 
-from benchmarks.dop853 import (
-    Curve,
-    Dop853Drive,
-    Signal,
-    exponential,
-    level,
-    none,
-    sine,
-)
+from benchmarks.dop853 import Curve, Dop853Drive, Signal, exponential, level, none, sine
 from stickslip_ros.model import signals
 from stickslip_ros.model.drive import Drive
 from stickslip_ros.model.friction import Coulomb, Directional, Exponential

@@ -21,12 +21,7 @@ from stickslip_ros.model.control import (
 from stickslip_ros.model.control.base import State
 from stickslip_ros.model.signals import ramp
 from stickslip_ros.motion import Motion
-from stickslip_ros.motion.controller import (
-    Controller,
-    ReferenceSource,
-    answer,
-    no_reference,
-)
+from stickslip_ros.motion.controller import Controller, ReferenceSource, answer, no_reference
 from stickslip_ros.motion.sampled_loop import SampledLoop
 from stickslip_ros.samples import Sample
 from tests.drives import PAPER

@@ -19,14 +19,7 @@ from stickslip_ros.model.constants import Scales
 from stickslip_ros.model.control import Washout
 from stickslip_ros.model.drive import Drive
 from stickslip_ros.model.drive_system import DriveSystem
-from stickslip_ros.model.friction import (
-    Coulomb,
-    Dahl,
-    Exponential,
-    FrictionLaw,
-    Linear,
-    Stribeck,
-)
+from stickslip_ros.model.friction import Coulomb, Dahl, Exponential, FrictionLaw, Linear, Stribeck
 from stickslip_ros.model.hybrid import HybridSystem, Instant
 from stickslip_ros.model.signals import NO_SIGNAL, Signal, ramp, sine
 from stickslip_ros.motion import Motion, RecordedMotion, compiled_flow

@@ -7,10 +7,7 @@ import pytest
 
 from benchmarks import dop853
 from benchmarks.dop853 import Dop853Drive, Signal
-from benchmarks.random_drives import (
-    sticks_of,
-    without_short,
-)
+from benchmarks.random_drives import sticks_of, without_short
 from stickslip_ros.model.drive import Drive
 from stickslip_ros.model.friction import (
     Coulomb,

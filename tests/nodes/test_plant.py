@@ -13,12 +13,7 @@ from stickslip_ros.motion.motion import Motion
 from stickslip_ros.motion.sampled_loop import SampledLoop
 from stickslip_ros.nodes.plant import PlantNode
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
-from stickslip_ros.record.codec import (
-    joint_state_columns,
-    pack_header,
-    pack_wrench,
-    unpack_wrench,
-)
+from stickslip_ros.record.codec import joint_state_columns, pack_header, pack_wrench, unpack_wrench
 from stickslip_ros.record.topics import (
     APPLIED_DISTURBANCE,
     CONTROL_FORCE,

@@ -17,12 +17,7 @@ from mcap.opcode import Opcode
 from zstandard import ZstdCompressor
 
 from stickslip_ros.errors import BagError
-from stickslip_ros.record.chunk import (
-    MESSAGE_SIZE,
-    DamageError,
-    MessageBlock,
-    records_in,
-)
+from stickslip_ros.record.chunk import MESSAGE_SIZE, DamageError, MessageBlock, records_in
 from stickslip_ros.record.codec import pack_joint_state
 from stickslip_ros.record.compression import (
     LARGEST,

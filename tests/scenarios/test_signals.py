@@ -6,15 +6,7 @@ from pathlib import Path
 import pytest
 
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.model.signals import (
-    NO_SIGNAL,
-    impulse,
-    ramp,
-    sine,
-    step,
-    table,
-    trapezoid,
-)
+from stickslip_ros.model.signals import NO_SIGNAL, impulse, ramp, sine, step, table, trapezoid
 from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.scenarios.parameters import PlantParameters
 from tests.scenarios.files import plant, refusal, scenario_file, section

@@ -19,12 +19,7 @@ from stickslip_ros.measures.cycle_meter import STEADY_CHANGE
 from stickslip_ros.motion.trajectory import TrajectoryRecorder
 from stickslip_ros.scenarios.files import Scenario, load_scenario
 from stickslip_ros.show.run_history import RunHistory
-from stickslip_ros.studies.settling import (
-    ControlledDrive,
-    MotionState,
-    SettlingOptions,
-    settle,
-)
+from stickslip_ros.studies.settling import ControlledDrive, MotionState, SettlingOptions, settle
 from stickslip_ros.studies.simulate import simulate
 
 Values = Mapping[str, float]

@@ -12,13 +12,7 @@ from hypothesis import strategies as st
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.measures.cycle_measures import Regime
 from stickslip_ros.scenarios.files import Scenario
-from stickslip_ros.studies.basin import (
-    POSITION,
-    VELOCITY,
-    Basins,
-    basin_study,
-    default_axes,
-)
+from stickslip_ros.studies.basin import POSITION, VELOCITY, Basins, basin_study, default_axes
 from stickslip_ros.studies.columns import Columns, Point
 from stickslip_ros.studies.plan import Axis, Continuation, Grid, Plan, RandomSample
 from stickslip_ros.studies.runner import compute_columns

@@ -8,13 +8,7 @@ import pytest
 
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.model.drive import Drive
-from stickslip_ros.model.friction import (
-    Coulomb,
-    Directional,
-    Exponential,
-    Linear,
-    LuGre,
-)
+from stickslip_ros.model.friction import Coulomb, Directional, Exponential, Linear, LuGre
 from stickslip_ros.theory.bifurcation_branches import BifurcationBranches
 from stickslip_ros.theory.limit_cycles import limit_cycles
 from stickslip_ros.theory.sticking import sticking_onset

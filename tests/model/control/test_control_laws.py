@@ -7,11 +7,7 @@ import pytest
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.measures import CycleMeter
-from stickslip_ros.model.control import (
-    CONTROL_LAWS,
-    VelocityFeedback,
-    Washout,
-)
+from stickslip_ros.model.control import CONTROL_LAWS, VelocityFeedback, Washout
 from stickslip_ros.motion import Motion, RecordedMotion
 from stickslip_ros.motion.controller import Controller
 from stickslip_ros.motion.sampled_loop import SampledLoop
