@@ -47,7 +47,7 @@ figure = Figure(figsize=(9.0, 4.2), layout="constrained")
 panes = figure.subplots(1, 2)
 for axes, (title, (speeds, law)) in zip(panes, CASES.items(), strict=True):
     slowest, fastest = speeds
-    free = ss.scenario("paper", expects_control=False, belt_speed=fastest, **law)
+    free = ss.scenario("paper", expects_control=False, belt_speed=fastest, rate=20.0, **law)
     theory = ss.stability(free)
     (hopf,) = theory.open_loop["hopf_speeds"]
     profile = folder / "belt.csv"
@@ -61,7 +61,6 @@ for axes, (title, (speeds, law)) in zip(panes, CASES.items(), strict=True):
         disturbance_amplitude=1e-4,
         disturbance_frequency=0.159,
         initial_position=theory.equilibrium_position,
-        rate=20.0,
     )
     found = ss.simulate(moving, 2 * RAMP).trajectory
     speed, amplitude = amplitudes(found, 200)
