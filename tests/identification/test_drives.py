@@ -421,7 +421,7 @@ def test_the_study_of_100_seeds() -> None:
 @pytest.mark.long
 def test_bristles_are_told_and_their_constants_recovered() -> None:
     found = identify(
-        [study.record("lugre", "taps", 0, 1.5)], fixed={"normal_force": study.NORMAL_FORCE}
+        [study.record("lugre", "taps", 0, 1.0)], fixed={"normal_force": study.NORMAL_FORCE}
     )
     assert found.law == "lugre"
     assert "friction.law" not in unidentified(found)
