@@ -13,6 +13,7 @@ import pytest
 from rclpy.logging import LoggingSeverity, set_logger_level
 
 from stickslip_ros.app.main import main
+from stickslip_ros.nodes.base.spinner import signal_handlers_kept
 from tests.nodes.conftest import domain, graph, process_environment  # noqa: F401 - used here
 from tests.nodes.graph import PATIENCE
 
@@ -36,7 +37,8 @@ class Run:
 
     def __call__(self, *arguments: str) -> Done:
         environment = mock.patch.dict(os.environ, self._environment, clear=True)
-        with environment, chdir(self._directory), pytest.raises(SystemExit) as ended:
+        here = chdir(self._directory)
+        with environment, here, signal_handlers_kept(), pytest.raises(SystemExit) as ended:
             main(arguments)
         set_logger_level("", LoggingSeverity.INFO)  # a run has raised it for the whole process
         return Done(arguments, ended.value.code, *self._capfd.readouterr())
