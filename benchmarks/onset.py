@@ -6,6 +6,9 @@ to five feeds, the lowest of which is 1.1 to 1.7 times the onset, and seen throu
 to 5 um. The onset that is found is compared with the Hopf point of the drive. Machines whose taps
 are ten steps of the encoder or more, and whose lowest feed is within 1.3 onsets, are `near`.
 
+Machines whose friction falls by at most 0.3 to 0.95 of the damping have no onset, and must not get
+a lower end of one.
+
 Then the feed of feed_drive falls by 1 mm/s per second from 1.6 onsets, with a tap of 5 um a second
 and an encoder of 0.5 um: when does the watch of the analyzer warn? It must not at 1.5 onsets.
 """
@@ -17,6 +20,7 @@ import sys
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
+from math import sqrt
 from typing import Any
 
 import numpy as np
@@ -58,8 +62,12 @@ class Machine:
         return self.tap >= 10.0 * self.step and self.feeds[0] <= 1.3
 
 
-def machine(seed: int) -> Machine:
-    """Return a machine with random constants."""
+def machine(seed: int, share: float | None = None) -> Machine:
+    """Return a machine with random constants.
+
+    With a share, friction nowhere falls by more than this share of the damping: there is no onset,
+    and feeds are in multiples of the one that there were.
+    """
     random = np.random.default_rng(seed)
 
     def between(low: float, high: float) -> float:
@@ -71,14 +79,16 @@ def machine(seed: int) -> Machine:
     friction: FrictionLaw
     if law == "stribeck":
         ratio = random.uniform(0.5, 0.95)
-        drop = damping / (1.0 - ratio**2) * 2.0 * near / ratio / 3.0 / normal
+        least = share or 1.0 / (1.0 - ratio**2)
+        drop = damping * least * 2.0 * near / ratio / 3.0 / normal
         friction = Stribeck(0.15 + drop, 0.15, near / ratio)
     else:
         ratio, exponent = random.uniform(0.8, 2.2), float(random.choice([1.0, 2.0]))
         exponent = exponent if law == "exponential" else 1.0
-        slope = exponent * ratio ** (exponent - 1.0) * np.exp(-(ratio**exponent))
+        at = ratio if share is None else sqrt((exponent - 1.0) / 2.0)  # the steepest
+        slope = exponent * at ** (exponent - 1.0) * np.exp(-(at**exponent))
         speed = near / ratio
-        drop = damping * speed / slope / normal
+        drop = (share or 1.0) * damping * speed / slope / normal
         friction = Exponential(0.15 + drop, 0.15, speed, 0.0, exponent)
         if law == "lugre":
             stiffness = 0.15 / near * omega / between(0.01, 0.2)
@@ -92,7 +102,10 @@ def machine(seed: int) -> Machine:
         belt_speed=near,
         friction=friction,
     )
-    onset = max(point.belt_speed for point in hopf_points(drive) if point.belt_speed < 3.0 * near)
+    points = [each.belt_speed for each in hopf_points(drive) if each.belt_speed < 3.0 * near]
+    if share is not None and points:  # bristles: an onset for all that
+        return machine(seed, 0.9 * share)
+    onset = max(points) if share is None else near
     step, tap = between(1e-7, 5e-6), between(5e-6, 5e-5)
     first, distance = random.uniform(1.1, 1.7), random.uniform(0.07, 0.15)
     feeds = first + distance * np.arange(int(random.integers(3, 6)))
@@ -118,9 +131,14 @@ def tapped(
     return np.round((found[0] + offset) / step) * step, found[1]
 
 
-def tried(seed: int) -> dict[str, Any]:
-    """Return what is found of a machine, in onsets."""
-    own, random = machine(seed), np.random.default_rng([seed, 1])
+def quiet(seed: int) -> dict[str, Any]:
+    """Return what is found of a machine without an onset."""
+    return tried(seed, float(np.random.default_rng([seed, 3]).uniform(0.3, 0.95)))
+
+
+def tried(seed: int, share: float | None = None) -> dict[str, Any]:
+    """Return what is found of a machine, in onsets; for `share` see `machine`."""
+    own, random = machine(seed, share), np.random.default_rng([seed, 1])
     own_runs = (
         tapped(replace(own.drive, belt_speed=feed * own.onset), own.tap, own.step, DURATION, random)
         for feed in own.feeds
@@ -169,6 +187,8 @@ def summary(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
         "limits": len(limits),
         "below_limit": float(np.mean([row["upper"] >= 1.0 for row in limits])),
         "near": len(near),
+        "near_limits": sum(row["upper"] is not None for row in near),
+        "near_median_limit": float(np.median([row["upper"] or np.inf for row in near])),
         "near_answers": len(exact),
         "near_median_error": float(np.median([abs(row["speed"] - 1.0) for row in exact])),
     }
@@ -179,6 +199,7 @@ def study(machines: int, runs: int, workers: int | None) -> dict[str, Any]:
     with ProcessPoolExecutor(workers) as pool:
         seeds = range(FIRST_SEED, FIRST_SEED + machines)
         rows = list(pool.map(tried, seeds, chunksize=5))
+        without = list(pool.map(quiet, seeds[: max(machines // 10, 1)], chunksize=5))
         falling, steady = (
             [job.result() for job in [pool.submit(watched, k, falls=falls) for k in range(runs)]]
             for falls in (True, False)
@@ -188,6 +209,8 @@ def study(machines: int, runs: int, workers: int | None) -> dict[str, Any]:
     return {
         "laws": {law: summary(each) for law, each in (groups | {"all": rows}).items()},
         "missed": [row for row in rows if row["speed"] and not row["lower"] <= 1 <= row["upper"]],
+        "quiet": len(without),
+        "quiet_lower_ends": [row for row in without if row["lower"] is not None],
         "runs": runs,
         "warned_before": len(warned),
         "median_warning": float(np.median(warned)) if warned else None,
@@ -200,8 +223,11 @@ def shortfalls(found: dict[str, Any]) -> list[str]:
     together, runs = found["laws"]["all"], found["runs"]
     asked = {
         "covered in less than 92 %": together["covered"] >= 0.92,
-        "answers of less than 90 %": together["near_answers"] >= 0.9 * together["near"],
+        "limits of less than 90 %": together["near_limits"] >= 0.9 * together["near"],
+        "a median limit of more than 1.1 onsets": together["near_median_limit"] <= 1.1,
         "a median error of more than 3 %": together["near_median_error"] <= 0.03,
+        "a lower end in more than 5 % without an onset": len(found["quiet_lower_ends"])
+        <= 0.05 * found["quiet"],
         "warned before less than 95 %": found["warned_before"] >= 0.95 * runs,
         "false warnings in more than 1 %": found["false_warnings"] <= max(0.01 * runs, 0),
     }

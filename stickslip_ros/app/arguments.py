@@ -332,6 +332,14 @@ def scenario_of(
             "--base SCENARIO takes omitted values from another scenario"
         )
         tell(sentence)
+    foreign = [name for name in scenario.gains_of_base if name not in unused]
+    if foreign:
+        start = f"{scenario.controller.node}.start_after"
+        foreign += [start] if scenario.files.get(start) == scenario.files[foreign[0]] else []
+        tell(
+            f"{scenario.path}: {', '.join(foreign)} are of {scenario.files[foreign[0]]}, for the "
+            "drive there; `stickslip design` finds gains for this one"
+        )
     warning = scenario.plant.friction.selected.warning()
     if warning is not None:
         tell(f"{scenario.path}: {warning}")

@@ -2,7 +2,7 @@
 
 import argparse
 
-from stickslip_ros.app.arguments import add_scenario, whole
+from stickslip_ros.app.arguments import add_scenario, law_constants, whole
 from stickslip_ros.app.output import progress_bar
 from stickslip_ros.app.result import add_results, check_results
 from stickslip_ros.app.study_command import add_workers, check_out, computed, finish, scenario_over
@@ -77,7 +77,8 @@ def run(arguments: argparse.Namespace) -> None:
     from stickslip_ros.api.comparison import ComparedLaws
     from stickslip_ros.studies.comparison import Outcomes, compared
 
-    scenario, axes = scenario_over(arguments)
+    proposed = law_constants("force_limit", "start_after")
+    scenario, axes = scenario_over(arguments, *([] if arguments.given else proposed))
     check_results(arguments)
     check_out(arguments.out)
     with progress_bar(f"gains for {scenario.name}", 1.0, lines=True) as progress:

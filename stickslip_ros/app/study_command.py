@@ -78,13 +78,16 @@ def add_workers(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def scenario_over(arguments: argparse.Namespace) -> "tuple[Scenario, list[Axis]]":
-    """Return the scenario, and the axes of --over, whose belt speeds must be likely ones."""
+def scenario_over(arguments: argparse.Namespace, *unused: str) -> "tuple[Scenario, list[Axis]]":
+    """Return the scenario, and the axes of --over, whose belt speeds must be likely ones.
+
+    Nothing is said of values that are `unused`, or vary.
+    """
     from stickslip_ros.studies.plan import Axis
 
     with naming("--over"):
         axes = [Axis.parse(text) for text in arguments.over]
-    scenario = scenario_of(arguments, unused=[axis.parameter for axis in axes])
+    scenario = scenario_of(arguments, unused=[*unused, *(axis.parameter for axis in axes)])
     belts = [axis for axis in axes if axis.parameter == "plant.belt_speed"]
     check_speeds(arguments, scenario, *(end for axis in belts for end in (axis.first, axis.last)))
     return scenario, axes

@@ -21,9 +21,10 @@ rates count as having larger errors."""
 _INTERVAL, _RISES, _REJECTED = 3.84, 10.8, 0.01
 """Chi^2 of the ends of a 95 % interval beyond the least, and by which a constant decay must be
 worse (0.1 %); probability below which a family is rejected."""
-_ONSETS, _SHAPES = np.geomspace(0.1, 1.0 - 1e-4, 1000), np.geomspace(0.1, 5.0, 120)
-"""Onsets, and speeds in a friction law, that are tried, in slowest feeds; what is compatible with
-the lowest onset has no lower limit."""
+_ONSETS = np.append(0.0, np.geomspace(0.1, 1.0 - 1e-4, 1000))
+_SHAPES = np.geomspace(0.1, 5.0, 120)
+"""Onsets, and speeds in a friction law, that are tried, in slowest feeds. Zero is a curve without
+an onset: what is compatible with it, or with the lowest onset, has no lower limit."""
 _WIDE, _AWAY = 0.1, 1.05
 """Length of an interval, in onsets, from which another run is advised; its feed, in upper limits,
 at least."""
@@ -49,10 +50,10 @@ class FeedDecay:
 
 
 class FamilyOnset(NamedTuple):
-    """The fit of one family of friction laws; without one the onset is infinite, m/s.
+    """The fit of one family of friction laws; the onset is infinite without one, m/s.
 
-    A family is rejected where the probability of a chi^2 as large is below 1 %. `decay_rate`
-    returns that at belt speeds, 1/s and m/s.
+    It is, too, where the curve that fits best has none. A family is rejected where the probability
+    of a chi^2 as large is below 1 %. `decay_rate` returns that at belt speeds, 1/s and m/s.
     """
 
     onset_speed: float
@@ -122,24 +123,35 @@ def onset_of(ring_downs: Sequence[RingDown], length: str = "m") -> Onset:
     A slide of mass m in steady slip decays at the rate (c + F'(v_b))/(2 m), where F is the friction
     force: each family of laws gives a curve of few constants over the belt speed v_b, which is
     extrapolated. Of all families that the data do not reject the union of the intervals counts.
+    Friction may fall too little for an onset: curves without one are hypotheses of each family.
+    Where a vibration grows, the onset is above.
     The ring-downs are of one machine and direction; `length` is the unit of their positions.
     """
-    feeds = [each for each in mean_decays(ring_downs) if each.decay_rate > 0.0]
+    means = mean_decays(ring_downs)
+    grows = (each.belt_speed for each in means if each.decay_rate < -2.0 * each.decay_error)
+    least_onset = max(grows, default=0.0)
+    feeds = [m for m in means if m.decay_rate > 0.0 and m.belt_speed > least_onset]
     if not feeds:
-        return Onset(feeds, {}, advice="no ring-down decays: there is nothing to extrapolate")
+        advice = "no ring-down decays: a run at a higher feed would tell a decay"
+        return Onset(feeds, {}, advice=advice)
     slowest, unit = feeds[0].belt_speed, f"{length}/s"
     if feeds[-1].belt_speed < _LEAST_RANGE * slowest:
-        run = f"a run at another feed, such as {quantity(0.9 * slowest, unit)}"
+        run = f"a run at another feed, such as {quantity(1.1 * slowest, unit)}"
         return Onset(feeds, {}, advice=f"one feed tells no onset: {run}, would tell it")
     values = [(each.belt_speed, each.decay_rate, each.decay_error) for each in feeds]
     speed, rate, error = np.array(values).T
     weight = 1.0 / (error**2 + (_SYSTEMATIC * rate) ** 2)
     constant = float(weight @ (rate - weight @ rate / weight.sum()) ** 2)
-    fits = {name: _fit(speed, rate, weight, *family) for name, family in _FAMILIES.items()}
+    data = speed, rate, weight, least_onset
+    fits = {name: _fit(*data, *family) for name, family in _FAMILIES.items()}
     families = {name: found for name, (found, _) in fits.items()}
     least = min(each.chi_square for each in families.values())
-    if constant - least < _RISES:
-        runs = f"runs below {quantity(slowest, unit)}, nearer the onset, or larger taps"
+    falls = np.polyfit(speed, rate, 1, w=np.sqrt(weight))[0] < 0.0
+    if falls or constant - least < _RISES:
+        side = f"below {quantity(slowest, unit)}, nearer the onset"
+        if falls or least_onset > 0.0:
+            side = f"above {quantity(feeds[-1].belt_speed, unit)}"
+        runs = f"runs {side}, or larger taps"
         advice = f"the decay does not rise with the feed by more than its errors: {runs} would tell"
         return Onset(feeds, {}, advice=advice)
     kept = [name for name, each in families.items() if not each.rejected]
@@ -153,15 +165,16 @@ def onset_of(ring_downs: Sequence[RingDown], length: str = "m") -> Onset:
         advice = f"no family of friction fits the decay: {runs} would tell whether friction changes"
         return Onset(feeds, families, advice=advice)
     possible = [fits[name][1] <= families[name].chi_square + _INTERVAL for name in kept]
-    rows = np.flatnonzero(np.any(possible, axis=0))
+    rows = np.flatnonzero(np.any(possible, axis=0))  # of _ONSETS
     # The ends are between two of the speeds that are tried.
     ends = max(rows[0] - 1, 0), min(rows[-1] + 1, len(_ONSETS) - 1)
     lower, upper = (float(_ONSETS[row] * slowest) for row in ends)
     following = max(_AWAY * upper, (upper + slowest) / 2.0)
     near = following > 0.97 * slowest
-    what, at = ("more or larger taps", slowest) if near else ("a run", following)
-    run = f"{what} at {quantity(at, unit)} would tell"
-    if rows[0] == 0:
+    run = f"a run at {quantity(following, unit)} would tell"
+    if near:
+        run = f"larger taps at {quantity(slowest, unit)}, or runs at more feeds above, would tell"
+    if rows[0] <= 1:
         advice = f"only an upper limit of the onset is known: {run} the onset"
         return Onset(feeds, families, upper=upper, advice=advice)
     likely = [exp((least - families[n].chi_square) / 2.0 - _FAMILIES[n][1]) for n in kept]
@@ -175,38 +188,48 @@ def _fit(
     speed: FloatArray,
     rate: FloatArray,
     weight: FloatArray,
+    least_onset: float,
     family: Callable[[FloatArray], FrictionLaw],
     count: int,
 ) -> tuple[FamilyOnset, FloatArray]:
     """Return the best fit of a family, and the least chi^2 for each onset.
 
     The decay rate is B (F'(v) - F'(onset)) with B > 0. F' must rise from the onset on, which is the
-    highest belt speed of zero decay.
+    highest belt speed of zero decay. Without an onset it is B (F'(v) - L) with L below all F'.
     """
     from scipy.special import gammaincc  # takes long to import
 
     onsets, shapes = _ONSETS * speed[0], _SHAPES[:, np.newaxis] * speed[0]
-    at_speed, at_onset = (np.atleast_2d(_slope(family(shapes), each)) for each in (speed, onsets))
+    at_speed = np.atleast_2d(_slope(family(shapes), speed))
+    at_onset = np.atleast_2d(_slope(family(shapes), onsets[1:]))
+    total, mean_rate = float(weight.sum()), float(np.average(rate, weights=weight))
+    mean = at_speed @ weight[:, np.newaxis] / total
+    own = at_speed - mean
+    squares, projected = own**2 @ weight, own @ (weight * rate)
+    # Without an onset: the best line over F' if it has no zero, else the nearest that has none.
+    gain = np.maximum(projected / np.maximum(squares, 1e-300), 1e-9 * mean_rate)
+    lowest = np.minimum(at_onset.min(axis=1), at_speed.min(axis=1))
+    without = np.minimum(mean[:, 0] - mean_rate / gain, (1.0 + 1e-9) * lowest)
+    at_onset = np.column_stack([without, at_onset])
     later = np.minimum.accumulate(at_onset[:, ::-1], axis=1)[:, ::-1]
     allowed = (at_onset <= later) & (at_onset < at_speed.min(axis=1, keepdims=True))
-    own, onset = at_speed - at_speed[:, :1], at_onset - at_speed[:, :1]
-    squares = (own**2 @ weight)[:, np.newaxis] - 2.0 * onset * (own @ weight)[:, np.newaxis]
-    squares += onset**2 * float(weight.sum())
-    projected = (own @ (weight * rate))[:, np.newaxis] - onset * float(weight @ rate)
+    allowed &= onsets >= least_onset
+    squares = squares[:, np.newaxis] + (at_onset - mean) ** 2 * total
+    projected = projected[:, np.newaxis] - (at_onset - mean) * total * mean_rate
     usable = allowed & (projected > 0.0) & (squares > 0.0)
     factor = np.divide(projected, squares, out=np.zeros_like(squares), where=usable)
     left = np.maximum(float(weight @ rate**2) - factor * projected, 0.0)
     chi_square = np.where(usable, left, inf)
     row, column = np.unravel_index(int(np.argmin(chi_square)), chi_square.shape)
     least, size = float(chi_square[row, column]), float(factor[row, column])
-    best, zero = family(shapes[row]), onsets[column : column + 1]
+    best, level = family(shapes[row]), at_onset[row, column]
     degrees, known = len(rate) - count, least < inf
     chance = float(gammaincc(degrees / 2.0, least / 2.0)) if degrees > 0 else float(known)
 
     def decay_rate(belt_speed: FloatArray) -> FloatArray:
-        return size * (_slope(best, belt_speed) - _slope(best, zero))
+        return size * (_slope(best, belt_speed) - level)
 
-    at = float(zero[0]) if known else inf
+    at = float(onsets[column]) if known and column else inf
     return FamilyOnset(at, least, chance, chance < _REJECTED, decay_rate), chi_square.min(axis=0)
 
 

@@ -88,6 +88,7 @@ def load_scenario(
     law = _law_in_use(files, namespace) if controller is None else known_law(controller)
     values: dict[str, dict[str, Any]] = {node: {} for node in NODE_PARAMETERS}
     sources: dict[str, str] = {}
+    paths: dict[str, Path] = {}
     other_sections: list[str] = []
     for file in reversed(files):
         with _contents_kept(file.path, given):
@@ -95,6 +96,7 @@ def load_scenario(
             for node, name, value in entries:
                 values[node][name] = NODE_PARAMETERS[node].absolute(name, value, file.path.parent)
                 sources[f"{node}.{name}"] = FILE if file is files[0] else BASE
+                paths[f"{node}.{name}"] = file.path
                 if file.path not in given:
                     NODE_PARAMETERS[node].check_bounds(name, value)
     models: dict[str, Any] = {
@@ -111,6 +113,7 @@ def load_scenario(
         path=path,
         other_sections=tuple(other_sections),
         sources=sources,
+        files=paths,
         other_controllers={
             other: models[controller_node(other)]
             for other in CONTROLLER_PARAMETERS

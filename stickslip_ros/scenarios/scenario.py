@@ -49,6 +49,8 @@ class Scenario:
     sources: Mapping[str, str] = field(default_factory=dict[str, str], compare=False, repr=False)
     """Source of each value, by NODE.PARAMETER: `FILE`, `BASE` or `OVERRIDE`; defaults are not
     listed."""
+    files: Mapping[str, Path] = field(default_factory=dict[str, Path], compare=False, repr=False)
+    """The file that a value is from, by NODE.PARAMETER; it is `path` or one of the `bases`."""
     other_controllers: Mapping[str, ControllerParameters] = field(
         default_factory=dict[str, ControllerParameters], compare=False, repr=False
     )
@@ -111,6 +113,24 @@ class Scenario:
     def left_to_defaults(self) -> list[str]:
         """Parameters of drive, rate and controller left at their defaults, as NODE.PARAMETER."""
         return [name for name in self.names_of_drive() if name not in self.sources]
+
+    @property
+    def gains_of_base(self) -> list[str]:
+        """Gains, as NODE.PARAMETER, from a base of the file that the drive is from.
+
+        They are for the drive of that base. At which speed the belt moves does not count.
+        """
+        order, law = [self.path, *self.bases], self.controller.control_law
+        drive = [f"plant.{name}" for name in self.plant.drive_names() if name != "belt_speed"]
+        nearest = min((order.index(self.files[n]) for n in drive if n in self.files), default=None)
+        gains = [f"{self.controller.node}.{name}" for name in law.tuned]
+        if nearest is None or not self.plant.expects_control:
+            return []
+        return [
+            name
+            for name in gains
+            if self.sources.get(name) == BASE and order.index(self.files[name]) > nearest
+        ]
 
     def names_of_drive(self) -> list[str]:
         """Return the parameters of drive, rate and controller, as NODE.PARAMETER.

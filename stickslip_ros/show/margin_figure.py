@@ -21,7 +21,7 @@ def margin_figure(
     axes.errorbar(speed / scale, rate, error, fmt=".", color=BLUE, capsize=3.0, label="measured")
     for name, family in onset.families.items():
         if not family.rejected:
-            over = np.linspace(family.onset_speed, speed[-1], 200)
+            over = np.linspace(min(family.onset_speed, 0.5 * speed[0]), speed[-1], 200)
             axes.plot(over / scale, family.decay_rate(over), lw=1.0, label=name)
     if onset.upper is not None:
         ends = (onset.lower or 0.0) / scale, onset.upper / scale

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.onset import summary, tried
+from benchmarks.onset import quiet, summary, tried
 from stickslip_ros.measures.onset import mean_decays, onset_of
 from stickslip_ros.measures.ring_down import RingDown
 from stickslip_ros.model.drive import Drive
@@ -35,8 +35,11 @@ def drive_with(friction: FrictionLaw) -> Drive:
 def decaying(
     drive: Drive, ratios: tuple[float, ...], share: float = 0.005, seed: int = 0
 ) -> tuple[list[RingDown], float]:
-    """Return five ring-downs at each feed, with an error that is a share, and the Hopf speed."""
-    hopf = max(point.belt_speed for point in hopf_points(drive))
+    """Return five ring-downs at each feed, with an error that is a share, and the Hopf speed.
+
+    Feeds are in Hopf speeds, or without one in 40 mm/s.
+    """
+    hopf = max((point.belt_speed for point in hopf_points(drive)), default=0.04)
     random = np.random.default_rng(seed)
     found: list[RingDown] = []
     for speed in (ratio * hopf for ratio in ratios):
@@ -53,7 +56,7 @@ def decaying(
 @pytest.mark.parametrize("name", LAWS)
 def test_the_interval_contains_the_hopf_speed(name: str) -> None:
     for seed in range(10):
-        own, hopf = decaying(drive_with(LAWS[name]), (1.2, 1.3, 1.4, 1.5), seed=seed)
+        own, hopf = decaying(drive_with(LAWS[name]), (1.1, 1.2, 1.35, 1.5), seed=seed)
         onset = onset_of(own)
         assert onset.speed is not None
         assert onset.lower is not None
@@ -62,6 +65,38 @@ def test_the_interval_contains_the_hopf_speed(name: str) -> None:
         assert onset.lower <= onset.speed <= onset.upper
         assert name == "lugre" or not onset.families[name].rejected
         assert onset.speed == pytest.approx(hopf, rel=0.06)
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_there_is_no_lower_end_where_friction_falls_less_than_the_damping(name: str) -> None:
+    for seed, share in enumerate((0.3, 0.5, 0.7, 0.9)):
+        drive = drive_with(LAWS[name])
+        speeds = np.linspace(1e-4, 0.2, 2000)
+        falls = -np.gradient(drive.friction.at_rest(speeds), speeds).min()
+        drive = replace(drive, normal_force=share * drive.damping / falls)
+        assert not hopf_points(drive)
+        for ratios in ((0.5, 0.6, 0.8), (0.9, 1.0, 1.1, 1.3, 1.5)):
+            own, _ = decaying(drive, ratios, seed=seed)
+            assert onset_of(own).lower is None
+
+
+def test_a_vibration_that_grows_is_below_the_onset() -> None:
+    """What is advised is no feed below the onset."""
+    own, hopf = decaying(drive_with(LAWS["stribeck"]), (1.02, 1.1))
+    grows = replace(own[0], belt_speed=0.99 * hopf, decay_rate=-0.3, decay_error=0.01)
+    onset = onset_of([grows, *own])
+    assert onset.lower is not None
+    assert onset.upper is not None
+    assert 0.98 * hopf < onset.lower < hopf < onset.upper
+    assert "no ring-down decays: a run at a higher feed" in onset_of([grows]).advice
+    advice = onset_of([grows, *own[:5]]).advice
+    assert f"such as {1e3 * 1.1 * own[0].belt_speed:.4g} mm/s" in advice
+
+
+def test_where_the_decay_falls_with_the_feed_higher_ones_are_advised() -> None:
+    rates = [(0.02, 6.0), (0.03, 5.0), (0.04, 3.0)]
+    falling = [RingDown(0.0, 1.0, v, rate, 0.01, 16.0, 1e-3, 1e-5) for v, rate in rates]
+    assert "runs above 40 mm/s" in onset_of(falling).advice
 
 
 def test_a_family_that_fits_gives_the_decay_at_any_feed() -> None:
@@ -104,7 +139,7 @@ def test_far_from_the_onset_only_an_upper_limit_is_told() -> None:
     assert onset.upper is not None
     assert onset.upper > hopf
     assert "only an upper limit" in onset.advice
-    assert "a run at" in onset.advice or "taps at" in onset.advice
+    assert "a run at" in onset.advice
 
 
 def test_errors_that_are_common_to_equal_taps_are_not_averaged_out() -> None:
@@ -124,5 +159,7 @@ def test_machines_of_three_laws_are_covered() -> None:
     rows = [tried(seed) for seed in range(30)]
     found = summary(rows)
     assert found["covered"] >= 0.92
-    assert found["near_answers"] == found["near"]
-    assert found["near_median_error"] <= 0.03
+    assert found["below_limit"] >= 0.95
+    assert found["near_limits"] == found["near"]
+    assert found["near_median_limit"] <= 1.1
+    assert [row["lower"] for row in map(quiet, range(10))] == 10 * [None]
