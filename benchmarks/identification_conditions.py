@@ -3,6 +3,8 @@
 - `axis RATE DWELL`: an axis of 38 kg under position control with that share of rest, an encoder of
   2 um and noise of 0.5 N; the law is `coulomb`.
 - `uneven`: steps of 10 or 12 ms, force and position read at once, on an axis of 4 kg.
+- `coast LAW`: an axis of 40 kg, given, coasts to rest three times, with no force; its motion is
+  integrated by SciPy, the encoder has 1 um and noise of 2 um.
 - `late DELAY LAG`, ms: the run `taps` of the drive of `benchmarks.identification`, whose force is
   late; the law is `stribeck`.
 
@@ -12,13 +14,16 @@ The law is named; of axes it is chosen, too, in some of the seeds. For drives on
 
 import argparse
 import json
+from collections.abc import Callable
 from dataclasses import replace
-from math import inf
+from math import exp, inf
 from typing import Any
 
 import numpy as np
+from scipy.integrate import solve_ivp
 
 from benchmarks import identification as study
+from stickslip_ros.arrays import FloatArray
 from stickslip_ros.identification.even_clock import evenly_spaced
 from stickslip_ros.identification.identified_law import DELAY, LAG
 from stickslip_ros.identification.identify import identify
@@ -32,12 +37,29 @@ CASES = (
     *(f"axis {rate} 0" for rate in (250, 500, 1000, 2000)),
     *(f"axis 500 {dwell}" for dwell in (0.1, 0.45, 0.72)),
     "uneven",
+    "coast coulomb",
+    "coast exponential",
     *(f"late {delay} 0" for delay in (1, 2, 5)),
     *(f"late 0 {lag}" for lag in (1, 2, 5)),
     "late 1 1",
 )
 SERVO = Servo(position_gain=1.5e5, velocity_gain=3.3e3, difference_samples=2, limit=inf)
 AXIS = Drive(38.0, 0.0, 0.0, 1.0, 0.0, Directional(Coulomb(17.0, 140.0), Coulomb(21.0, 180.0)))
+COASTING: dict[str, Callable[[float], float]] = {
+    "coulomb": lambda speed: 9.0 + 14.0 * speed,
+    "exponential": lambda speed: 8.0 + 7.0 * exp(-speed / 0.1) + 10.0 * speed,
+}
+COASTING_MASS = 40.0
+COASTING_VALUES = {
+    "coulomb": {"friction.static": 9.0, "friction.viscous": 14.0},
+    "exponential": {
+        "friction.static": 15.0,
+        "friction.kinetic": 8.0,
+        "friction.decay_speed": 0.1,
+        "friction.viscous": 10.0,
+    },
+}
+"""Friction of axes that coast, N, by the speed, m/s; mass, kg; constants."""
 AXIS_VALUES = 38.0, 17.0, 140.0, 21.0, 180.0
 
 
@@ -83,12 +105,53 @@ def uneven_record(seed: int, count: int = 5000) -> Record:
     return evenly_spaced("log", np.rint(1e9 * time).astype(np.int64), columns)[0]
 
 
-def axis_of(case: str, seed: int) -> Record:
-    """Return the record of a case without a spring."""
-    kind, *numbers = case.split()
+def coasting_record(law: str, seed: int, run: int) -> Record:
+    """Return a run of an axis that coasts to rest, and rests for 0.3 s."""
+    random = np.random.default_rng([seed, run])
+
+    def moved(_: float, state: FloatArray) -> list[float]:
+        falls = (state[1] > 0.0) * COASTING[law](state[1])
+        return [state[1], -falls / COASTING_MASS]
+
+    def rests(_: float, state: FloatArray) -> float:
+        return state[1]
+
+    rests.terminal = True
+    start = [0.0, random.uniform(0.3, 0.8)]
+    found = solve_ivp(
+        moved,
+        (0.0, 60.0),
+        start,
+        events=rests,
+        rtol=1e-10,
+        atol=1e-12,
+        max_step=0.05,
+        dense_output=True,
+    )
+    end = float(found.t[-1])
+    time = np.arange(0.0, end + 0.3, 1e-3)
+    position = found.sol(np.minimum(time, end))[0] + 2e-6 * random.standard_normal(len(time))
+    return Record("coast", 1e-3, np.rint(position / 1e-6) * 1e-6, np.zeros(len(time)))
+
+
+def records_of(case: str, seed: int) -> list[Record]:
+    """Return the records of a case without a spring."""
+    kind, *rest = case.split()
+    if kind == "coast":
+        return [coasting_record(rest[0], seed, run) for run in range(3)]
     if kind == "uneven":
-        return uneven_record(seed)
-    return axis_record(int(numbers[0]), float(numbers[1]), seed)
+        return [uneven_record(seed)]
+    return [axis_record(int(rest[0]), float(rest[1]), seed)]
+
+
+def law_of(case: str) -> str:
+    """Return the law of a case without a spring."""
+    return case.split()[1] if case.startswith("coast") else "coulomb"
+
+
+def given_of(case: str) -> dict[str, float]:
+    """Return the constants that are given in a case without a spring."""
+    return {"mass": COASTING_MASS} if case.startswith("coast") else {}
 
 
 def tried(case: str, seed: int) -> tuple[dict[str, list[float]], float]:
@@ -101,7 +164,8 @@ def tried(case: str, seed: int) -> tuple[dict[str, list[float]], float]:
         found = identify([own], "stribeck", {"normal_force": study.NORMAL_FORCE})
     else:
         true = named(*(AXIS_VALUES if kind == "axis" else (4.0, 7.0, 11.0, 7.0, 11.0)))
-        found = identify([axis_of(case, seed)], "coulomb")
+        true = COASTING_VALUES[numbers[0]] if kind == "coast" else true
+        found = identify(records_of(case, seed), law_of(case), given_of(case))
     errors = {
         name: [each.value - true.get(name, 0.0), each.standard_error]
         for name, each in found.fitted.items()
@@ -117,7 +181,7 @@ def summary(case: str, seeds: int, choices: int = 0) -> dict[str, Any]:
     trials = [tried(case, seed) for seed in range(seeds)]
     pairs = [pair for errors, _ in trials for pair in errors.values()]
     choices = 0 if case.startswith("late") else min(choices, seeds)
-    chosen = [identify([axis_of(case, seed)]).law for seed in range(choices)]
+    chosen = [identify(records_of(case, seed), fixed=given_of(case)).law for seed in range(choices)]
     return {
         "case": case,
         "seeds": seeds,
@@ -125,7 +189,7 @@ def summary(case: str, seeds: int, choices: int = 0) -> dict[str, Any]:
         "covered": float(np.mean([abs(error) <= study.QUANTILE * s for error, s in pairs])),
         "delays": [delay for _, delay in trials],
         "choices": choices,
-        "right": chosen.count("coulomb"),
+        "right": chosen.count(law_of(case)),
     }
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.identification.choice import AUTO
+from stickslip_ros.identification.covariance import BLOCKS
 from stickslip_ros.identification.filtered import END, START, filtered, mean_forces
 from stickslip_ros.identification.identified_law import DELAY, IdentifiedLaw
 from stickslip_ros.identification.laws import SaturatingAdapter, TableAdapter
@@ -23,6 +24,8 @@ _DELAYS = np.arange(-1.0, 4.01, 0.25)
 _DELAY_STEPS = 0.05 * np.arange(-5.0, 6.0)
 """Changes of the best one that are tried, periods."""
 _KNOTS = 9
+_GAIN = 0.1
+"""Speed that an axis that coasts may seem to gain, as a share of what it loses."""
 _DEFLECTIONS = (1e-5, 1e-4, 1e-3)
 """Deflections that are tried first, shares of the range of the positions."""
 _CANDIDATES_TIME = 0.6
@@ -37,17 +40,19 @@ class AxisTask:
     def __init__(
         self, records: Sequence[Record], fixed: Mapping[str, float], limit: TimeLimit
     ) -> None:
-        if all(not record.held_force.any() for record in records):
+        coasts = all(not record.held_force.any() for record in records)
+        if coasts and "mass" not in fixed:
             given = any(record.force is not None for record in records)
             hint = (
                 ""
                 if given
-                else "; name its column, as in --columns force=u, or of a bag its --force-topic, "
-                "or --force effort"
+                else "name its column, as in --columns force=u, or of a bag its --force-topic, "
+                "or --force effort; "
             )
             raise InvalidInputError(
                 f"{'the recorded force is always 0' if given else 'no force is recorded'}: without "
-                f"a force neither mass nor friction of an axis is identifiable{hint}"
+                f"a force only the ratio of friction and mass of an axis is identifiable; {hint}of "
+                "an axis that coasts give the mass, as in --fix plant.mass=95"
             )
         self.records, self.limit = records, limit
         self.left: list[str] = []
@@ -55,12 +60,25 @@ class AxisTask:
         given_constants = {name: fixed[name] for name in LINEAR if name in fixed}
         self.fixed = {**dict.fromkeys(LINEAR[1:], 0.0), **given_constants}
         self.free = [name for name in LINEAR if name not in self.fixed]
-        self.delay: float | None = fixed.get(DELAY)
+        self.delay: float | None = fixed.get(DELAY, 0.0 if coasts else None)
         # Where the slide never rests it is as in the published method: the force is that at the
         # instant of a sample. Otherwise it is held until the next one.
         self.rows = Rows.of([filtered(record, decimated=True) for record in records])
         if self.delay is not None or self.rows.resting:
             self.rows = self._rows(self.delay or 0.0)
+        if coasts and "bias_force" not in fixed:
+            self._require_coasting()
+
+    def _require_coasting(self) -> None:
+        """Raise InvalidInputError if the axis gains speed: a force acts that is not recorded."""
+        for part, record in zip(self.rows.parts, self.records, strict=True):
+            blocks = np.array_split(np.abs(part.rows(part.velocity)), BLOCKS)
+            changes = np.diff([float(block.mean()) for block in blocks])
+            if changes[changes > 0.0].sum() > _GAIN * -changes[changes < 0.0].sum():
+                raise InvalidInputError(
+                    f"{record.name}: the axis gains speed, and no force is recorded: record it, or "
+                    "choose a part in which the axis coasts, by --from and --to"
+                )
 
     def candidates(
         self, law: str, laws: Sequence[IdentifiedLaw], progress: Callable[[str], None]

@@ -57,7 +57,7 @@ class Regression(Fit):
     @property
     @override
     def scale(self) -> float:
-        return rms(self.rows.force)
+        return rms(self.rows.force) or rms(self.system[1])
 
     @property
     @override

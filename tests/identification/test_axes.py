@@ -55,6 +55,26 @@ def test_an_axis_that_sticks_or_turns_slowly_has_no_delay(case: str) -> None:
         assert abs(error) < 4.0 * standard_error, name
 
 
+@pytest.mark.parametrize("law", ["coulomb", "exponential"])
+def test_an_axis_that_coasts_tells_friction_if_its_mass_is_given(law: str) -> None:
+    errors, delay = conditions.tried(f"coast {law}", 3)
+    assert delay == 0.0
+    assert errors.keys() == conditions.COASTING_VALUES[law].keys()
+    for name, (error, standard_error) in errors.items():
+        assert abs(error) < 3.0 * standard_error, name
+        assert standard_error < 0.5 * conditions.COASTING_VALUES[law][name], name
+
+
+def test_an_axis_that_gains_speed_does_not_coast() -> None:
+    own = conditions.coasting_record("coulomb", 3, 0)
+    found = identify([replace(own, force=0.0 * own.position)], "coulomb", {"mass": 40.0})
+    assert "no force is recorded: none is taken to act beside friction" in notes(found)
+    assert found.force_error(own) is None
+    pushed = replace(own, position=own.position[::-1].copy())
+    with pytest.raises(InvalidInputError, match="gains speed, and no force is recorded"):
+        identify([pushed], "coulomb", {"mass": 40.0})
+
+
 @pytest.mark.parametrize("rate", [250, 1000])
 def test_intervals_without_noise(rate: int) -> None:
     """What filters and differences leave, with the same sign everywhere, is within them."""
@@ -168,7 +188,12 @@ def test_what_is_refused() -> None:
         ([own], "auto", {"force_delay": -0.5}, "plant.force_delay = -0.5 is invalid"),
         ([own], "auto", {"mas": 1.0}, r"plant.mas is invalid: did you mean plant.mass\? must be "),
         ([own], "auto", {"xyz": 1.0}, "plant.xyz is invalid: must be one of plant.mass, "),
-        ([replace(own, force=None)], "auto", {}, r"no force is recorded.* name its column"),
+        (
+            [replace(own, force=None)],
+            "auto",
+            {},
+            r"no force is recorded.* name its column.* give the mass",
+        ),
         ([replace(own, force=0.0 * own.force)], "auto", {}, r"recorded force is always 0[^;]*$"),
         ([replace(own, force=-own.force)], "coulomb", {}, r"the mass comes out as 0.* sign"),
         ([replace(own, position=0.0 * own.position)], "auto", {}, "has 1 value in 12000 samples"),
