@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TextIO
 
 import numpy as np
+from scipy.special import betaincinv
 from typing_extensions import override
 
 from stickslip_ros.api.page import Summary
@@ -50,12 +51,20 @@ class Rank(NamedTuple):
     """Share of the cases that it holds."""
     held_error: float
     """Its standard error; NaN with one seed."""
+    held_interval: tuple[float, float]
+    """Its 95 % interval as of independent cases (Clopper, Pearson, Biometrika 26, 1934)."""
     means: Mapping[str, tuple[float, float]]
     """Mean and standard error of columns of `OUTCOMES`, over the cases where they exist."""
     at_limit: float
     """Mean share of samples at the force limit."""
     failures: int
     """Number of cases that diverged or failed."""
+
+    @property
+    def held_text(self) -> str:
+        """Share of the cases that it holds, with its interval."""
+        low, high = self.held_interval
+        return f"{self.held:.1%} ({low:.1%} to {high:.1%})"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -85,7 +94,10 @@ class ComparedLaws(TabularResult):
             means = {name: _mean_of_seeds(self._array(name)[row]) for name in _MEANS[positioning]}
             at_limit = float(np.nan_to_num(self._array("at_limit")[row]).mean())
             failures = int(np.isnan(self._array("rms_velocity")[row]).sum())
-            ranks.append(Rank(law, share, error, means, at_limit, failures))
+            won, cases = int(np.nansum(held[row])), held[row].size
+            ends = betaincinv([won, won + 1], [cases - won + 1, cases - won], [0.025, 0.975])
+            low, high = np.where(np.isnan(ends), [0.0, 1.0], ends).tolist()  # of all cases, or none
+            ranks.append(Rank(law, share, error, (low, high), means, at_limit, failures))
         second, third, *_ = _MEANS[positioning]
 
         def order(rank: Rank) -> tuple[float, ...]:
@@ -94,6 +106,14 @@ class ComparedLaws(TabularResult):
             )
 
         return tuple(sorted(ranks, key=order))
+
+    @property
+    def verdict(self) -> str:
+        """The best law, and all whose intervals of the cases held overlap its."""
+        least = self.ranks[0].held_interval[0]
+        alike = [rank for rank in self.ranks if rank.held_interval[1] >= least]
+        laws = ", ".join(f"{rank.law} holds {rank.held_text}" for rank in alike)
+        return f"{laws} of its cases{': not told apart' if len(alike) > 1 else ''}"
 
     def held_at_points(self, law: str) -> FloatArray:
         """Return the share of the cases that a law holds, at each point of the parameters.
@@ -175,6 +195,7 @@ class ComparedLaws(TabularResult):
                 "law": rank.law,
                 "held": rank.held,
                 "held_error": rank.held_error,
+                "held_interval": [*rank.held_interval],
                 **{name: mean for name, (mean, _) in rank.means.items()},
                 **{f"{name}_error": error for name, (_, error) in rank.means.items()},
                 "delay_margin": self.tuned[rank.law].delay_margin
@@ -216,13 +237,14 @@ class ComparedLaws(TabularResult):
             rows.append(
                 [
                     rank.law,
-                    f"{rank.held:.1%}" + _plus_minus(f"{rank.held_error:.1%}", rank.held_error),
+                    rank.held_text,
                     *(_with_error(units, *rank.means[name], OUTCOMES[name].unit) for name in names),
                     margin,
                     f"{rank.at_limit:.1%}",
                 ]
             )
         where = "of the belt speed" if self._task == "regulation" else "of the reference's motion"
+        yield self.verdict
         title = (
             f"{self.scenario.name}, {self._task}: points {points}, disturbances {disturbances}, "
             f"seeds {seeds}, constants off by up to {plan.spread:.0%}; held within "
@@ -249,10 +271,8 @@ class ComparedLaws(TabularResult):
 
     @override
     def _summary(self) -> Summary:
-        best = self.ranks[0]
-        verdict = f"{best.law} holds {best.held:.1%} of its cases"
         parameters = scenario_tables(self.scenario, used=True)
-        return Summary("Comparison of control laws", self.scenario.name, verdict, parameters)
+        return Summary("Comparison of control laws", self.scenario.name, self.verdict, parameters)
 
 
 def compare(

@@ -70,11 +70,8 @@ class Margin(Result):
             return "the onset of vibration cannot be told"
         speeds = [fit.speed, fit.lower, fit.upper, self.least_feed]
         onset, lower, upper, least = (self.units.text(speed, "m/s") for speed in speeds)
-        text = (
-            f"at {onset} (95 % interval {lower} to {upper})"
-            if fit.lower
-            else f"below {upper}, if at all"
-        )
+        text = f"at {onset} (95 % interval {lower} to {upper})"
+        text = text if fit.lower else f"below {upper}, if at all"
         return (
             f"vibration starts {text}; the least feed with a margin of {self.margin:g} is {least}"
         )

@@ -125,13 +125,16 @@ class Stability(Result):
         return stability_tables(self.scenario, vars(self), dict(self.notes))
 
 
-def stability(scenario: ScenarioLike) -> Stability:
+def stability(scenario: ScenarioLike, spread: float = 0.0) -> Stability:
     """Return equilibrium, critical speeds and gains, and limit cycles of a scenario.
 
     Parameters
     ----------
     scenario : Scenario, str or Path
         The scenario, its name or its path.
+    spread : float
+        Largest deviation of the constants of the drive, as a share, as for `compare`: the critical
+        feed speed has an interval for it.
 
     Returns
     -------
@@ -141,7 +144,7 @@ def stability(scenario: ScenarioLike) -> Stability:
     Raises
     ------
     InvalidInputError
-        If the scenario is not allowed.
+        If the scenario or the spread is not allowed, or theory does not cover the spread.
 
     Examples
     --------
@@ -151,5 +154,5 @@ def stability(scenario: ScenarioLike) -> Stability:
     (False, True)
     """
     chosen = as_scenario(scenario)
-    sections, notes = stabilities.stability(chosen)
+    sections, notes = stabilities.stability(chosen, spread)
     return Stability(chosen, **sections, notes=notes)

@@ -333,9 +333,7 @@ def scenario_of(
         )
         tell(sentence)
     foreign = [name for name in scenario.gains_of_base if name not in unused]
-    if foreign:
-        start = f"{scenario.controller.node}.start_after"
-        foreign += [start] if scenario.files.get(start) == scenario.files[foreign[0]] else []
+    if any(not name.endswith(".start_after") for name in foreign):
         tell(
             f"{scenario.path}: {', '.join(foreign)} are of {scenario.files[foreign[0]]}, for the "
             "drive there; `stickslip design` finds gains for this one"

@@ -59,9 +59,7 @@ def run(arguments: argparse.Namespace) -> None:
         text = short_file(scenario, heading, base)
     with writing("FILE", path), written(path) as file:
         file.write(text)
-    node, law = scenario.controller.node, scenario.controller.control_law
     design = printable(shlex.join(["stickslip", "design", str(path)]))
-    said = f"; the gains of {printable(scenario.name)} are for its drive: `{design}` finds others"
-    given = scenario.given.intersection(f"{node}.{name}" for name in law.tuned)
-    said = said if given and scenario.plant.expects_control else ""
+    tuned = scenario.plant.expects_control and scenario.controller.control_law.tuned
+    said = f", `{design}` finds gains for it" if tuned else ""
     print(f"{printable(str(path))} is written: `{command}` simulates it{said}")

@@ -17,6 +17,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "linear gain, and the critical gain over the delay of the force; with --no-control the "
         "bifurcation diagram over the belt speed, with stable and unstable limit cycles",
     )
+    parser.add_argument(
+        "--spread",
+        type=float,
+        default=0.0,
+        metavar="SHARE",
+        help="deviation of the constants, as in 0.2: gives the critical feed speed an interval",
+    )
     add_json(parser)
 
 
@@ -32,7 +39,7 @@ def run(arguments: argparse.Namespace) -> None:
         if reason is not None:
             raise InvalidInputError(f"--plot {arguments.plot}: there is nothing to draw: {reason}")
     with progress_bar(f"theory of {scenario.name}", None):
-        result = stability(scenario)
+        result = stability(scenario, arguments.spread)
     with progress_bar("drawing", None):
         write_results(arguments, result)
     print_result(arguments, result)

@@ -40,19 +40,14 @@ class AxisTask:
     def __init__(
         self, records: Sequence[Record], fixed: Mapping[str, float], limit: TimeLimit
     ) -> None:
-        coasts = all(not record.held_force.any() for record in records)
+        coasts = not any(record.held_force.any() for record in records)
         if coasts and "mass" not in fixed:
             given = any(record.force is not None for record in records)
-            hint = (
-                ""
-                if given
-                else "name its column, as in --columns force=u, or of a bag its --force-topic, "
-                "or --force effort; "
-            )
             raise InvalidInputError(
                 f"{'the recorded force is always 0' if given else 'no force is recorded'}: without "
-                f"a force only the ratio of friction and mass of an axis is identifiable; {hint}of "
-                "an axis that coasts give the mass, as in --fix plant.mass=95"
+                "one only the ratio of friction and mass of an axis is identifiable; name its "
+                "column, as in --columns force=u, or of a bag its --force-topic, or --force "
+                "effort; or give the mass of an axis that coasts, as in --fix plant.mass=95"
             )
         self.records, self.limit = records, limit
         self.left: list[str] = []
@@ -76,8 +71,8 @@ class AxisTask:
             changes = np.diff([float(block.mean()) for block in blocks])
             if changes[changes > 0.0].sum() > _GAIN * -changes[changes < 0.0].sum():
                 raise InvalidInputError(
-                    f"{record.name}: the axis gains speed, and no force is recorded: record it, or "
-                    "choose a part in which the axis coasts, by --from and --to"
+                    f"{record.name}: the axis gains speed, and no force is recorded; choose a part "
+                    "in which it coasts, by --from and --to"
                 )
 
     def candidates(

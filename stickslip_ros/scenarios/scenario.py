@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from math import inf
 from pathlib import Path
 from typing import Any, Self
 
@@ -115,22 +116,20 @@ class Scenario:
         return [name for name in self.names_of_drive() if name not in self.sources]
 
     @property
-    def gains_of_base(self) -> list[str]:
-        """Gains, as NODE.PARAMETER, from a base of the file that the drive is from.
+    def gains(self) -> list[str]:
+        """What of the controller belongs to a drive, gains and start, as NODE.PARAMETER."""
+        names = (*self.controller.control_law.tuned, "start_after")
+        return [f"{self.controller.node}.{name}" for name in names]
 
-        They are for the drive of that base. At which speed the belt moves does not count.
-        """
-        order, law = [self.path, *self.bases], self.controller.control_law
+    @property
+    def gains_of_base(self) -> list[str]:
+        """Those of `gains` from a base of the file that the drive, but for its feed, is from."""
+        order = [self.path, *self.bases]
+        place = {name: order.index(path) for name, path in self.files.items()}
         drive = [f"plant.{name}" for name in self.plant.drive_names() if name != "belt_speed"]
-        nearest = min((order.index(self.files[n]) for n in drive if n in self.files), default=None)
-        gains = [f"{self.controller.node}.{name}" for name in law.tuned]
-        if nearest is None or not self.plant.expects_control:
-            return []
-        return [
-            name
-            for name in gains
-            if self.sources.get(name) == BASE and order.index(self.files[name]) > nearest
-        ]
+        nearest = min((place[name] for name in drive if name in place), default=inf)
+        used = self.gains if self.plant.expects_control else []
+        return [n for n in used if place.get(n, 0) > nearest and self.sources[n] != OVERRIDE]
 
     def names_of_drive(self) -> list[str]:
         """Return the parameters of drive, rate and controller, as NODE.PARAMETER.

@@ -20,18 +20,15 @@ _TYPES = {bool: "boolean", int: "integer", float: "number", str: "string"}
 def short_file(scenario: Scenario, heading: str, base: str) -> str:
     """Return the text of a scenario file with the drive, its rate and its controller.
 
-    Gains and start of the controller, which belong to a drive, and all else are left to the `base`.
-    A comment beside each parameter gives its meaning and what is
-    allowed. `heading` is the comment at the top, line by line.
+    The gains, and all else, are left to the `base`. A comment beside each parameter gives its
+    meaning and what is allowed. `heading` is the comment at the top, line by line.
     """
     lines = [f"# {line}" for line in heading.splitlines()]
     lines += ["", f"/**/{BASE_SECTION}:", f"  {PARAMETERS_KEY}:"]
     lines += [f"    base: {json.dumps(base)}  # gives what this file omits"]
-    shown, values = scenario.names_of_drive(), scenario.as_dict()
-    gains = [*scenario.controller.control_law.tuned, "start_after"]
-    for node, parameters in values.items():
-        left = gains if node == scenario.controller.node else []
-        names = [name for name in parameters if f"{node}.{name}" in shown and name not in left]
+    shown = {*scenario.names_of_drive()}.difference(scenario.gains)
+    for node, parameters in scenario.as_dict().items():
+        names = [name for name in parameters if f"{node}.{name}" in shown]
         lines += ["", f"/**/{node}:", f"  {PARAMETERS_KEY}:"] if names else []
         for name in names:
             text = ros_yaml.dump({name: parameters[name]}).replace('"', "", 2).rstrip()

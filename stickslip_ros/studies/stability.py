@@ -16,6 +16,7 @@ from stickslip_ros.model.drive_layout import POSITION, SPEED
 from stickslip_ros.model.friction import Stribeck
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.scenarios.parameters import PlantParameters
+from stickslip_ros.studies.comparison import drawn
 from stickslip_ros.text import quantity
 from stickslip_ros.theory.bifurcation_branches import BifurcationBranches
 from stickslip_ros.theory.critical_gains import (
@@ -52,6 +53,9 @@ Section = dict[str, Any]
 Notes = dict[str, str]
 """Why a quantity does not exist, or what it omits, by its place in the sections."""
 
+_DRIVES = 100
+"""Drives that are drawn for an interval."""
+
 _NO_CONTROL = "the scenario has no controller"
 
 _STICKING = ("onset_speed_approximate", "onset_speed", "speed_ranges", "searched_speeds")
@@ -71,9 +75,10 @@ class _Noted(NamedTuple):
     """Why it does not exist, or what it omits; None if there is nothing to say."""
 
 
-def stability(scenario: Scenario) -> tuple[Section, Notes]:
+def stability(scenario: Scenario, spread: float = 0.0) -> tuple[Section, Notes]:
     """Return the theoretical quantities of the scenario, in SI units, and notes on them.
 
+    With a `spread` of the constants, the critical feed speed has an interval, too.
     Raises InvalidInputError if belt or load follow a signal.
     """
     plant = scenario.plant
@@ -90,8 +95,30 @@ def stability(scenario: Scenario) -> tuple[Section, Notes]:
             "sampled_loop": _sampled_loop(drive, law, plant),
         }
     )
+    if spread:
+        feed, notes["open_loop.critical_feed"] = _critical_feed(scenario, spread)
+        section["open_loop"]["critical_feed"] = feed
     forms, more = _separated({"closed_forms": _closed_forms(drive, section)})
     return section | forms, notes | more
+
+
+def _critical_feed(scenario: Scenario, spread: float) -> tuple[Section, str]:
+    """Return the 95 % interval of the highest critical feed speed for a spread, and a note on it.
+
+    It is that of drives whose constants are `drawn` as for a comparison; 0 stands for none.
+    """
+    if not 0.0 < spread <= 0.9:
+        raise InvalidInputError(f"spread {spread:g}: must be above 0 and at most 0.9")
+    varied = [scenario.changed(drawn(scenario, seed, spread)) for seed in range(_DRIVES)]
+    points = [hopf_points(each.plant.as_drive()) for each in varied]
+    speeds = [max((point.belt_speed for point in found), default=0.0) for found in points]
+    low, high = ends = np.quantile(speeds, [0.025, 0.975]).tolist()
+    drive, without = scenario.plant.as_drive(), speeds.count(0.0)
+    note = (
+        f"{number_text(drive, low, 'm/s')} to {number_text(drive, high, 'm/s')} in 95 % of "
+        f"{_DRIVES} drives with constants off by up to {spread:.0%}; {without} of them have none"
+    )
+    return {"spread": spread, "drives": _DRIVES, "without": without, "interval": ends}, note
 
 
 def _separated(section: Section) -> tuple[Section, Notes]:

@@ -10,6 +10,8 @@ from matplotlib.figure import Figure
 import stickslip_ros as ss
 from stickslip_ros.errors import InvalidInputError, RunError
 from stickslip_ros.scenarios.files import load_scenario
+from stickslip_ros.studies.comparison import drawn
+from tests.theory.closed_forms import CubicLoop
 
 DELAYED = {"force_delay": 0.0025, "actuator_time_constant": 2e-3}
 DIFFERENCE = {"sensor_velocity": "difference", "sensor_difference_samples": 3}
@@ -103,3 +105,23 @@ def test_a_design_runs_and_keeps_to_its_limit() -> None:
     assert frame.attrs["units"]["peak_force"] == "N"
     assert isinstance(one.plot(), Figure)
     assert one.margins is not None
+
+
+def test_the_critical_feed_speed_has_an_interval_for_a_spread_of_the_constants() -> None:
+    drive = load_scenario("feed_drive", ["plant.expects_control=false"])
+    found = ss.stability(drive, spread=0.5)
+    speeds: list[float] = []
+    for seed in range(100):
+        varied = drive.changed(drawn(drive, seed, 0.5)).plant.as_drive()
+        loop = CubicLoop.from_drive(varied)
+        assert loop is not None
+        speeds.append((loop.hopf_speed or 0.0) * varied.speed_scale)
+    interval = np.quantile(speeds, [0.025, 0.975]).tolist()
+    assert found.open_loop["critical_feed"]["interval"] == pytest.approx(interval, rel=1e-9)
+    without = speeds.count(0.0)
+    assert found.open_loop["critical_feed"]["without"] == without
+    text = f"in 95 % of 100 drives with constants off by up to 50%; {without} of them have none"
+    assert text in str(found)
+    assert "critical_feed" not in ss.stability(drive).open_loop
+    with pytest.raises(InvalidInputError, match="must be above 0 and at most"):
+        ss.stability(drive, spread=1.5)

@@ -102,6 +102,36 @@ def test_new_writes_the_drive_and_its_controller(
     assert mine.sources["plant.pace"] == "base"
 
 
+def test_gains_are_told_to_be_of_another_drive(stickslip: Run, tmp_path: Path) -> None:
+    """`new` leaves them out, and a command says where they are from, unless it needs none."""
+    done = stickslip("new", "mine.yaml")
+    assert "`stickslip design mine.yaml` finds gains for it" in done.stdout
+    path = tmp_path / "mine.yaml"
+    text = path.read_text().replace("mass: 100.0", "mass: 45.0")
+    assert "gain: " not in text.replace("cubic_gain: ", "")
+    assert "start_after" not in text
+    path.write_text(text)
+    (tmp_path / "slower.yaml").write_text(
+        "/**/scenario: {ros__parameters: {base: mine.yaml}}\n"
+        "/**/plant: {ros__parameters: {belt_speed: 0.03}}\n"
+    )
+    names = ("corner_frequency", "linear_gain", "start_after")
+    listed = ", ".join(f"washout_controller.{name}" for name in names)
+    gain = "washout_controller.linear_gain=-1000"
+    for arguments, told in (
+        (("mine.yaml",), f"mine.yaml: {listed} are of "),
+        (("slower.yaml",), f"slower.yaml: {listed} are of "),
+        (("mine.yaml", "-p", gain), "corner_frequency, washout_controller.start_after are of "),
+        (("mine.yaml", "-p", gain, "-p", "washout_controller.corner_frequency=9"), ""),
+        (("mine.yaml", "--no-control"), ""),
+        (("feed_drive", "-p", "plant.mass=45"), ""),
+    ):
+        said = stickslip("simulate", *arguments, "--duration", "0.1").stderr
+        assert told in said
+        assert ("feed_drive.yaml, for the drive there; `stickslip design`" in said) is bool(told)
+    assert "are of" not in stickslip("design", "mine.yaml").stderr
+
+
 def test_new_keeps_lists_and_texts(stickslip: Run, tmp_path: Path) -> None:
     (tmp_path / "other.yaml").write_text(
         '/**/plant: {ros__parameters: {wait_for: [analyzer, "b"]}}\n'

@@ -7,14 +7,17 @@ import numpy as np
 import pytest
 
 import stickslip_ros as ss
+from stickslip_ros.api.comparison import ComparedLaws
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.model.control import VelocityFeedback
 from stickslip_ros.scenarios.files import Scenario, load_scenario
-from stickslip_ros.studies.case_outcome import Disturbance, simulate_case
-from stickslip_ros.studies.comparison import Cases, Comparison, compared, drawn
+from stickslip_ros.studies.case_outcome import Disturbance, Outcome, simulate_case
+from stickslip_ros.studies.comparison import Cases, Comparison, Outcomes, compared, drawn
 from stickslip_ros.studies.plan import Axis
 from stickslip_ros.studies.study import compute
 
+INTERVALS = {0: (0.858, 1.0), 3: (0.676, 0.973), 9: (0.406, 0.812)}
+"""Of Clopper and Pearson, 95 %, by the number of 24 cases that are lost."""
 LAWS = "washout,velocity_feedback"
 GAINS = {
     "washout": {"corner_frequency": 20.0, "linear_gain": -6000.0},
@@ -37,6 +40,23 @@ def outcome(scenario: Scenario, disturbance: str = "step", duration: float = 3.0
     parsed = Disturbance.parse(disturbance, scenario)
     disturbed = scenario.changed(parsed.parameters(duration))
     return simulate_case(disturbed, duration, parsed, 0.05)
+
+
+def test_the_verdict_names_all_laws_that_the_cases_do_not_tell_apart() -> None:
+    study = comparison(seeds=12)
+    for lost, told in ((0, False), (3, False), (9, True)):
+        outcomes = Outcomes(study.plan.size)
+        held = np.arange(study.plan.size) >= lost  # of the 24 cases of the washout law
+        outcomes.enter(Outcome(k, held=bool(own)) for k, own in enumerate(held))
+        found = ComparedLaws(study, outcomes, {})
+        *_, worst = found.ranks
+        assert worst.held_interval == pytest.approx(INTERVALS[lost], abs=5e-4)
+        assert ("washout holds" in found.verdict) is not told
+        assert "velocity_feedback holds 100.0% (85.8% to 100.0%)" in found.verdict
+        assert ("not told apart" in found.verdict) is not told
+        assert found.verdict in str(found)
+        printed = found.to_dict()["ranks"][-1]
+        assert printed["held_interval"] == [*worst.held_interval]
 
 
 def test_a_drive_that_is_damped_is_held_and_one_that_is_not_sticks() -> None:
