@@ -310,6 +310,10 @@ def test_activated_again_it_opens_a_further_bag(graph: Graph, tmp_path: Path) ->
     analyzer.set_parameters_atomically([Parameter("bag", value=str(tmp_path / "other"))])
     analyzer.trigger_activate()
     assert analyzer.diagnose()[2]["bag"] == str(tmp_path / "other")
+    analyzer.trigger_deactivate()
+    analyzer.set_parameters_atomically([Parameter("bag", value="")])
+    analyzer.trigger_activate()
+    assert "bag" not in analyzer.diagnose()[2]
 
 
 def test_a_bag_that_exists_is_refused_and_left_alone(graph: Graph, tmp_path: Path) -> None:

@@ -27,7 +27,7 @@ class LiveBag:
     def __init__(self, node: Node) -> None:
         """Prepare for bags with the topics as the node names them, and with its log."""
         self.directory: Path | None = None
-        """Directory of the newest bag; None before the first."""
+        """Directory of the bag of the newest activation; None without one."""
         self.failure = ""
         """Why the bag can no longer be written; empty if it can."""
         self._node = node
@@ -45,7 +45,7 @@ class LiveBag:
 
         Raises BagError if it cannot be written; then none is left.
         """
-        self._recorder, self.failure = None, ""
+        self._recorder, self.failure, self.directory = None, "", None
         self._channels: dict[str, int] = {}
         self._flushed_at = time.monotonic()
         if not parameters.bag:

@@ -13,7 +13,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 
 from stickslip_ros.arrays import IntArray
 from stickslip_ros.errors import BagError, InvalidInputError
-from stickslip_ros.measures.cycle_measures import Cycle
+from stickslip_ros.measures.cycle_measures import Cycle, Regime
 from stickslip_ros.measures.noise import import_for_noise
 from stickslip_ros.measures.onset_watch import OnsetWatch
 from stickslip_ros.measures.ring_down import RingDown
@@ -84,11 +84,12 @@ class LiveMeasures:
     def text(self) -> str:
         """Return the measures of the last window of cycles in words."""
         measures = self.meter.motion.measures(quick=True)
+        regime = str(measures.regime or Regime.label(None, self.cycles))
         if measures.amplitude is None or measures.frequency is None:
-            return f"{measures.regime}"
+            return regime
         share = measures.stick_fraction
         return (
-            f"{measures.regime}: amplitude {quantity(measures.amplitude, 'm')}, "
+            f"{regime}: amplitude {quantity(measures.amplitude, 'm')}, "
             f"frequency {quantity(measures.frequency, 'Hz')}, "
             f"stick fraction {'not known' if share is None else f'{share:.3g}'}"
         )

@@ -21,4 +21,6 @@ def test_the_text_has_what_is_known(
     found = replace(cycle, period=0.5, frequency=2.0, stick_fraction=share)
     live = LiveMeasures(AnalyzerParameters(), DroppedMessages.__new__(DroppedMessages))
     monkeypatch.setattr(live.meter.motion, "measures", lambda *, quick: found)
-    assert live.text() == f"{regime}: amplitude 1 mm, frequency 2 Hz, {end}"
+    live.cycles = 4
+    name = "stick_slip" if regime else "regime not known"
+    assert live.text() == f"{name}: amplitude 1 mm, frequency 2 Hz, {end}"
