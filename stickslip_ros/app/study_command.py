@@ -79,10 +79,7 @@ def add_workers(parser: argparse.ArgumentParser) -> None:
 
 
 def scenario_over(arguments: argparse.Namespace, *unused: str) -> "tuple[Scenario, list[Axis]]":
-    """Return the scenario, and the axes of --over, whose belt speeds must be likely ones.
-
-    Nothing is said of values that are `unused`, or vary.
-    """
+    """Return the scenario, for what is not `unused`, and the axes of --over, of likely speeds."""
     from stickslip_ros.studies.plan import Axis
 
     with naming("--over"):

@@ -25,7 +25,7 @@ _DELAY_STEPS = 0.05 * np.arange(-5.0, 6.0)
 """Changes of the best one that are tried, periods."""
 _KNOTS = 9
 _GAIN = 0.1
-"""Speed that an axis that coasts may seem to gain, as a share of what it loses."""
+"""Speed that an axis that coasts may seem to gain, as a share of the fastest."""
 _DEFLECTIONS = (1e-5, 1e-4, 1e-3)
 """Deflections that are tried first, shares of the range of the positions."""
 _CANDIDATES_TIME = 0.6
@@ -43,11 +43,12 @@ class AxisTask:
         coasts = not any(record.held_force.any() for record in records)
         if coasts and "mass" not in fixed:
             given = any(record.force is not None for record in records)
+            hint = "; name its column, as in --columns force=u, or of a bag its --force-topic, or "
             raise InvalidInputError(
                 f"{'the recorded force is always 0' if given else 'no force is recorded'}: without "
-                "one only the ratio of friction and mass of an axis is identifiable; name its "
-                "column, as in --columns force=u, or of a bag its --force-topic, or --force "
-                "effort; or give the mass of an axis that coasts, as in --fix plant.mass=95"
+                "one only the ratio of friction and mass of an axis is identifiable: if it coasts, "
+                "give its mass, as in --fix plant.mass=95"
+                + ("" if given else f"{hint}--force effort")
             )
         self.records, self.limit = records, limit
         self.left: list[str] = []
@@ -61,15 +62,11 @@ class AxisTask:
         self.rows = Rows.of([filtered(record, decimated=True) for record in records])
         if self.delay is not None or self.rows.resting:
             self.rows = self._rows(self.delay or 0.0)
-        if coasts and "bias_force" not in fixed:
-            self._require_coasting()
-
-    def _require_coasting(self) -> None:
-        """Raise InvalidInputError if the axis gains speed: a force acts that is not recorded."""
-        for part, record in zip(self.rows.parts, self.records, strict=True):
-            blocks = np.array_split(np.abs(part.rows(part.velocity)), BLOCKS)
-            changes = np.diff([float(block.mean()) for block in blocks])
-            if changes[changes > 0.0].sum() > _GAIN * -changes[changes < 0.0].sum():
+        for part, record in zip(self.rows.parts, records, strict=True):
+            blocks = np.array_split(np.abs(part.velocity), BLOCKS)
+            speeds = np.array([float(block.mean()) for block in blocks])
+            gain = float((speeds - np.minimum.accumulate(speeds)).max())
+            if coasts and "bias_force" not in fixed and gain > _GAIN * float(speeds.max()):
                 raise InvalidInputError(
                     f"{record.name}: the axis gains speed, and no force is recorded; choose a part "
                     "in which it coasts, by --from and --to"

@@ -132,8 +132,7 @@ def onset_of(ring_downs: Sequence[RingDown], length: str = "m") -> Onset:
     least_onset = max(grows, default=0.0)
     feeds = [m for m in means if m.decay_rate > 0.0 and m.belt_speed > least_onset]
     if not feeds:
-        advice = "no ring-down decays: a run at a higher feed would tell a decay"
-        return Onset(feeds, {}, advice=advice)
+        return Onset(feeds, {}, advice="no ring-down decays: a run at a higher feed would tell one")
     slowest, unit = feeds[0].belt_speed, f"{length}/s"
     if feeds[-1].belt_speed < _LEAST_RANGE * slowest:
         run = f"a run at another feed, such as {quantity(1.1 * slowest, unit)}"
@@ -142,18 +141,16 @@ def onset_of(ring_downs: Sequence[RingDown], length: str = "m") -> Onset:
     speed, rate, error = np.array(values).T
     weight = 1.0 / (error**2 + (_SYSTEMATIC * rate) ** 2)
     constant = float(weight @ (rate - weight @ rate / weight.sum()) ** 2)
-    data = speed, rate, weight, least_onset
-    fits = {name: _fit(*data, *family) for name, family in _FAMILIES.items()}
+    fits = {n: _fit(speed, rate, weight, least_onset, *f) for n, f in _FAMILIES.items()}
     families = {name: found for name, (found, _) in fits.items()}
     least = min(each.chi_square for each in families.values())
     falls = np.polyfit(speed, rate, 1, w=np.sqrt(weight))[0] < 0.0
     if falls or constant - least < _RISES:
-        side = f"below {quantity(slowest, unit)}, nearer the onset"
-        if falls or least_onset > 0.0:
-            side = f"above {quantity(feeds[-1].belt_speed, unit)}"
-        runs = f"runs {side}, or larger taps"
-        advice = f"the decay does not rise with the feed by more than its errors: {runs} would tell"
-        return Onset(feeds, {}, advice=advice)
+        beyond = falls or least_onset > 0.0
+        lowest = f"below {quantity(slowest, unit)}, nearer the onset"
+        runs = f"above {quantity(feeds[-1].belt_speed, unit)}" if beyond else lowest
+        advice = "the decay does not rise with the feed by more than its errors: runs"
+        return Onset(feeds, {}, advice=f"{advice} {runs}, or larger taps would tell")
     kept = [name for name, each in families.items() if not each.rejected]
     excess = least / max(len(feeds) - 3, 1)
     if not kept and excess < _SCATTER:
@@ -171,15 +168,13 @@ def onset_of(ring_downs: Sequence[RingDown], length: str = "m") -> Onset:
     lower, upper = (float(_ONSETS[row] * slowest) for row in ends)
     following = max(_AWAY * upper, (upper + slowest) / 2.0)
     near = following > 0.97 * slowest
-    run = f"a run at {quantity(following, unit)} would tell"
-    if near:
-        run = f"larger taps at {quantity(slowest, unit)}, or runs at more feeds above, would tell"
+    further = f"larger taps at {quantity(slowest, unit)}, or runs at more feeds above,"
+    run = f"{further if near else f'a run at {quantity(following, unit)}'} would tell"
     if rows[0] <= 1:
         advice = f"only an upper limit of the onset is known: {run} the onset"
         return Onset(feeds, families, upper=upper, advice=advice)
     likely = [exp((least - families[n].chi_square) / 2.0 - _FAMILIES[n][1]) for n in kept]
-    weights = np.array(likely)
-    found = float(weights @ [families[name].onset_speed for name in kept] / weights.sum())
+    found = float(np.average([families[name].onset_speed for name in kept], weights=likely))
     advice = f"{run} it more exactly" if upper - lower > _WIDE * found else ""
     return Onset(feeds, families, found, lower, upper, advice)
 

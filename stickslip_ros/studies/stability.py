@@ -112,11 +112,11 @@ def _critical_feed(scenario: Scenario, spread: float) -> tuple[Section, str]:
     varied = [scenario.changed(drawn(scenario, seed, spread)) for seed in range(_DRIVES)]
     points = [hopf_points(each.plant.as_drive()) for each in varied]
     speeds = [max((point.belt_speed for point in found), default=0.0) for found in points]
-    low, high = ends = np.quantile(speeds, [0.025, 0.975]).tolist()
-    drive, without = scenario.plant.as_drive(), speeds.count(0.0)
+    ends, without = np.quantile(speeds, [0.025, 0.975]).tolist(), speeds.count(0.0)
+    low, high = (number_text(scenario.plant.as_drive(), end, "m/s") for end in ends)
     note = (
-        f"{number_text(drive, low, 'm/s')} to {number_text(drive, high, 'm/s')} in 95 % of "
-        f"{_DRIVES} drives with constants off by up to {spread:.0%}; {without} of them have none"
+        f"{low} to {high} in 95 % of {_DRIVES} drives with constants off by up to {spread:.0%}; "
+        f"{without} of them have none"
     )
     return {"spread": spread, "drives": _DRIVES, "without": without, "interval": ends}, note
 
