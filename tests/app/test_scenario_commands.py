@@ -111,10 +111,11 @@ def test_gains_are_told_to_be_of_another_drive(stickslip: Run, tmp_path: Path) -
     assert "gain: " not in text.replace("cubic_gain: ", "")
     assert "start_after" not in text
     path.write_text(text)
-    (tmp_path / "slower.yaml").write_text(
-        "/**/scenario: {ros__parameters: {base: mine.yaml}}\n"
-        "/**/plant: {ros__parameters: {belt_speed: 0.03}}\n"
-    )
+    for name, base in (("slower", "mine.yaml"), ("same", "feed_drive")):
+        (tmp_path / f"{name}.yaml").write_text(
+            f"/**/scenario: {{ros__parameters: {{base: {base}}}}}\n"
+            "/**/plant: {ros__parameters: {belt_speed: 0.03}}\n"
+        )
     names = ("corner_frequency", "linear_gain", "start_after")
     listed = ", ".join(f"washout_controller.{name}" for name in names)
     gain = "washout_controller.linear_gain=-1000"
@@ -124,6 +125,7 @@ def test_gains_are_told_to_be_of_another_drive(stickslip: Run, tmp_path: Path) -
         (("mine.yaml", "-p", gain), "corner_frequency, washout_controller.start_after are of "),
         (("mine.yaml", "-p", gain, "-p", "washout_controller.corner_frequency=9"), ""),
         (("mine.yaml", "--no-control"), ""),
+        (("same.yaml",), ""),
         (("feed_drive", "-p", "plant.mass=45"), ""),
     ):
         said = stickslip("simulate", *arguments, "--duration", "0.1").stderr

@@ -70,6 +70,7 @@ def test_an_axis_that_gains_speed_does_not_coast() -> None:
     found = identify([replace(own, force=0.0 * own.position)], "coulomb", {"mass": 40.0})
     assert "no force is recorded: none is taken to act beside friction" in notes(found)
     assert found.force_error(own) is None
+    assert found.chosen.error < 0.5  # of the inertia
     pushed = replace(own, position=own.position[::-1].copy())
     with pytest.raises(InvalidInputError, match="gains speed, and no force is recorded"):
         identify([pushed], "coulomb", {"mass": 40.0})
