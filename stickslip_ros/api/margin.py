@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -57,8 +58,8 @@ class Margin(Result):
             yield TextTable("decay", [quantity.label for quantity in shown.values()], rows)
         if self.onset.families:
             rows = [
-                [name, *texts([feed.onset_speed], "m/s"), *texts(feed[2:4], "")]
-                for name, feed in self.onset.families.items()
+                [name, texts([fit[0]], "m/s")[0] if fit[0] < inf else "none", *texts(fit[2:4], "")]
+                for name, fit in self.onset.families.items()
             ]
             yield TextTable("friction", ["law", "onset", "probability", "rejected"], rows)
         yield from self.notes

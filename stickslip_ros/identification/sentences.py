@@ -34,7 +34,8 @@ def notes(findings: Findings) -> Sequence[str]:
             "of what it predicts; an input may be missing (a disturbance, the velocity of the "
             "belt), or have another sign or unit"
         )
-    if not any(record.held_force.any() for record in findings.records):
+    axis = not findings.chosen.has_spring
+    if axis and not any(record.held_force.any() for record in findings.records):
         texts.append("no force is recorded: none is taken to act beside friction")
     for name in dict.fromkeys(record.name for record in findings.records):
         records = [record for record in findings.records if record.name == name]

@@ -12,7 +12,7 @@ HOPF = 0.0488763
 """Of feed_drive, m/s."""
 
 
-def logged(folder: Path, feed: float) -> Path:
+def logged(folder: Path, feed: float, **parameters: float) -> Path:
     """Write a run of feed_drive with a tap of 30 um at 3 s, by an encoder of 0.5 um."""
     drive = ss.scenario(
         "feed_drive",
@@ -22,6 +22,7 @@ def logged(folder: Path, feed: float) -> Path:
         disturbance_kind="impulse",
         disturbance_amplitude=300.0,
         disturbance_start=3.0,
+        **parameters,
     )
     path = folder / f"{1e3 * feed:g}.csv"
     ss.simulate(drive, duration=5.0).to_pandas().to_csv(path)
@@ -69,6 +70,20 @@ def test_a_sentence_says_what_would_tell_it(logs: list[str], stickslip: Run) -> 
     assert done.stdout == ""
     assert "the belt is at rest" in done.stderr
     assert "at least 0 and below 1" in stickslip("margin", logs[0], "--margin", "1").stderr
+
+
+def test_a_machine_that_may_never_vibrate_has_no_lower_end(stickslip: Run, tmp_path: Path) -> None:
+    """Friction falls by 0.66 of the damping at the most."""
+    feeds = 0.035, 0.04, 0.045, 0.05
+    names = [str(logged(tmp_path, feed, friction_static=0.2544)) for feed in feeds]
+    said = stickslip("margin", *names, "--plot", "margin.png").stdout
+    assert "vibration starts below" in said
+    assert "mm/s, if at all; the least feed" in said
+    assert "stribeck                 none" in said
+    printed = stickslip.json("margin", *names)
+    assert printed["onset_speed"] is printed["interval"][0] is None
+    assert printed["families"][0]["onset_speed"] is None
+    assert differences("margin", printed) == []
 
 
 def test_both_directions_are_refused(logs: list[str], stickslip: Run, tmp_path: Path) -> None:
