@@ -224,6 +224,8 @@ def identify(
     period: float | None = None,
     where: str | None = None,
     session: int | None = None,
+    second: Path | str | None = None,
+    shift: float = 0.0,
     rotary: bool = False,
     check: Sequence[Path | str] = (),
     progress: Callable[[str], None] = lambda _: None,
@@ -249,7 +251,7 @@ def identify(
         Belt speed, m/s, in place of what the recordings have.
     joint, belt_joint, states_topic, force_topic, time, force : optional
         Where bags of another machine have motion and force, as for `read_bag`.
-    decimal, skip, encoding, period, where, session : optional
+    decimal, skip, encoding, period, where, session, second, shift : optional
         Form of the tables, as for `read_table`.
     rotary : bool, optional
         Whether displacements are angles, rad, and forces torques, N m: they are shown as such.
@@ -293,7 +295,11 @@ def identify(
         end=end,
         namespace=namespace,
         belt_speed=belt_speed,
-        form=TableFormat(decimal, skip, encoding, rotary, period, where, session),
+        form=TableFormat(
+            *(decimal, skip, encoding, rotary, period, where, session),
+            second=None if second is None else Path(second),
+            shift=shift,
+        ),
         layout=BagLayout(joint, belt_joint, states_topic, force_topic, time, force),
     )
     records = [record for path in fitted for record in read[path]]

@@ -268,6 +268,8 @@ def read_table(
     period: float | None = None,
     where: str | None = None,
     session: int | None = None,
+    second: Path | str | None = None,
+    shift: float = 0.0,
 ) -> RecordedRun:
     """Read a run from a table as text, such as a CSV file, or a MAT file, and measure it.
 
@@ -296,6 +298,9 @@ def read_table(
     period, where, session : optional
         Time from row to row of a table without times, s, found by default in a line above them;
         rows that are read, as in `"joint_name=elbow"`; which session, from 1, if time starts again.
+    second, shift : optional
+        Another table of the same run, whose columns are `2:NAME`; what is added to the times of
+        columns that have times of their own, s.
 
     Returns
     -------
@@ -337,6 +342,8 @@ def read_table(
         period=period,
         where=where,
         session=session,
+        second=None if second is None else Path(second),
+        shift=shift,
     )
 
 

@@ -133,6 +133,20 @@ def _add_table_form(parser: argparse.ArgumentParser) -> None:
         help="which session of a table is read, where the time starts again",
     )
     parser.add_argument(
+        "--second",
+        type=Path,
+        metavar="FILE",
+        help="another table of the same run: its columns are 2:NAME, at its own times",
+    )
+    parser.add_argument(
+        "--shift",
+        type=shift,
+        default=0.0,
+        metavar="S",
+        help="what is added to times of their own that columns of a table have, as -20ms "
+        "(default: 0)",
+    )
+    parser.add_argument(
         "--rotary",
         action="store_true",
         help="show displacements as angles, rad, and forces as torques, N m",
@@ -446,5 +460,6 @@ def _number(what: str, unit: str, least: float, text: str) -> float:
 seconds = partial(_number, "a time in seconds, 0 or more", "s", 0.0)
 speed = partial(_number, "a speed in m/s, 0 or more", "m/s", 0.0)
 length = partial(_number, "a length in m above 0", "m", ulp(0.0))
+shift = partial(_number, "a time in seconds", "s", -inf)
 velocity = partial(_number, "a velocity in m/s", "m/s", -inf)
 """Parse what an option is given: a finite number, or one with a unit."""

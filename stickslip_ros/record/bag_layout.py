@@ -1,7 +1,7 @@
 """Where a bag has the motion and the forces of a drive: topics, joints, and what times count."""
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import inf
 from typing import Any, NamedTuple, Self, get_args
@@ -83,13 +83,20 @@ class DriveInBag:
 
     @cached_property
     def layout(self) -> BagLayout:
-        """The layout that was given or, without one, that the analyzer used."""
-        if self.given_layout != ANY_LAYOUT:
-            return self.given_layout
+        """The layout that was given and, where it tells nothing, that the analyzer used.
+
+        What the analyzer used is that of its own topics.
+        """
+        given = self.given_layout
+        if given.states_topic is not None:
+            return given
         kept = {name: text.strip('"') for name, text in self.analyzer.items()}
-        joint, belt = (kept.get(name) or None for name in ("joint", "belt_joint"))
-        force = "effort" if kept.get("force_type") == "effort" else "topic"
-        return BagLayout(joint, belt, force=force)
+        joint, belt = (
+            getattr(given, name) or kept.get(name) or None for name in ("joint", "belt_joint")
+        )
+        by_effort = kept.get("force_type") == "effort" and given.force_topic is None
+        force = "effort" if by_effort else given.force
+        return replace(given, joint=joint, belt_joint=belt if belt != joint else None, force=force)
 
     @cached_property
     def belt_speed(self) -> float | None:

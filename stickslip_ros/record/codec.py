@@ -280,6 +280,24 @@ def references_in(data: bytes, begin: IntArray, end: IntArray) -> tuple[Referenc
     return ReferenceColumns(stamp, *values), refused
 
 
+def controller_references_in(
+    data: bytes, begin: IntArray, end: IntArray, joint: str | None = None
+) -> tuple[ReferenceColumns, Refused]:
+    """Decode the references in states of a JointTrajectoryController, of a joint or the only one.
+
+    The messages are `data[begin[i] : end[i]]`; also return what is refused.
+    """
+
+    def layout_of(message: bytes) -> Layout:
+        joints = _ControllerJoints(message, "controller state")
+        joints.sequences = joints.reference
+        name = joints.names[0] if joint is None and joints.names else joint
+        return joints.layout_of(joints.place(0, name), joints.place(1, name))
+
+    _, stamp, values, refused = decode(data, begin, end, layout_of, 2)
+    return ReferenceColumns(stamp, *values), refused
+
+
 def _unpackable(kind: str, stamp: int, error: struct.error) -> MessageError:
     return MessageError(
         f"a {kind} with the stamp {stamp} ns cannot be serialized ({error}); "
@@ -398,14 +416,16 @@ class _ControllerJoints(_Joints):
         for point in ("reference", "feedback"):  # desired and actual, in older versions
             fields = [message.doubles(message.count()) for _ in range(4)]
             if point == "reference":
+                self.reference = fields
                 message.skip_duration()
         return [*fields[:2], fields[3]]
 
 
+CONTROLLER_STATE = "control_msgs/msg/JointTrajectoryControllerState"
 STATE_TYPES = {
     "sensor_msgs/msg/JointState": _Joints,
     "control_msgs/msg/DynamicJointState": _DynamicJoints,
-    "control_msgs/msg/JointTrajectoryControllerState": _ControllerJoints,
+    CONTROLLER_STATE: _ControllerJoints,
 }
 """What reads messages with the motion of joints, by their types."""
 

@@ -66,6 +66,8 @@ class Expression:
         InvalidInputError, which names the `source`, for a text that is no expression.
         """
         name = text.strip()
+        if name[:1] == "#" and name not in columns:  # of a comment, in which the names are
+            name = name[1:].strip() if name[1:].strip() in columns else name
         if name in columns:
             return cls(text, True, (columns[name],), ast.Name("_0"))
         places: dict[int, str] = {}

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from math import inf
 from pathlib import Path
 from typing import Any, Generic, NamedTuple, Self, TypeVar
@@ -14,8 +14,15 @@ from stickslip_ros.errors import BagError
 from stickslip_ros.record.bag_files import BagFiles
 from stickslip_ros.record.bag_layout import ANY_LAYOUT, BagLayout, DriveInBag
 from stickslip_ros.record.cdr import Refused
-from stickslip_ros.record.codec import joint_states_in, references_in, wrenches_in
+from stickslip_ros.record.codec import (
+    CONTROLLER_STATE,
+    controller_references_in,
+    joint_states_in,
+    references_in,
+    wrenches_in,
+)
 from stickslip_ros.record.force_reader import ForceReader
+from stickslip_ros.record.imperfections import play_note, ripple_note
 from stickslip_ros.record.motion_reader import MotionReader
 from stickslip_ros.record.source import Block, Source
 from stickslip_ros.record.topics import (
@@ -190,13 +197,24 @@ class Recording:
 
     @cached_property
     def references(self) -> ReferenceColumns:
-        """All references of the controller."""
-        return self._columns(REFERENCE, references_in)
+        """All references of the controller; those in the states of a JointTrajectoryController."""
+        states, drive = self._drive.name(JOINT_STATES), self._drive
+        if self.topics.get(states) != CONTROLLER_STATE or drive.name(REFERENCE):
+            return self._columns(REFERENCE, references_in)
+        decode = partial(controller_references_in, joint=drive.layout.joint)
+        references = self._columns(REFERENCE, decode, states)
+        if np.array_equal(references.stamp, self.joint_states.stamp):
+            notes = (*play_note(references.position, self.joint_states.position, "m"),)
+            self._readings[REFERENCE.name] = replace(self._readings[REFERENCE.name], notes=notes)
+        return references
 
     @property
     def dropped_known(self) -> bool:
-        """Whether the bag tells which control forces did not act; some older ones do not."""
-        return self._drive.name(DROPPED_FORCE) != ""
+        """Whether it is known which control forces did not act; some older bags do not tell.
+
+        By the times of the log a force is not found among those that were sent.
+        """
+        return self._drive.name(DROPPED_FORCE) != "" and self._drive.layout.time != "log"
 
     def name_of(self, topic: Topic[Any]) -> str:
         """Return the full name that a topic of the drive has, whether the bag has it or not.
@@ -254,13 +272,18 @@ class Recording:
         self,
         topic: Topic[Any],
         decode: Callable[[bytes, IntArray, IntArray], tuple[ColumnsT, Refused]],
+        name: str | None = None,
     ) -> ColumnsT:
-        """Return all columns of a topic as one."""
-        name, nothing = self._drive.name(topic), np.empty(0, np.int64)
+        """Return all columns of a topic as one; by the times of the log, those of whole blocks."""
+        name = self._drive.name(topic) if name is None else name
+        nothing, by_log = np.empty(0, np.int64), self._drive.layout.time == "log"
         parts: list[ColumnsT] = []
         counts: dict[str, Refused] = {}
         for block in self.source.blocks(name):
             part, refused = decode(*block.messages)
+            if by_log:
+                whole = len(part) == len(block.log_time)
+                part = replace(part, stamp=block.log_time) if whole else part[:0]
             parts.append(part)
             _count(counts, name, refused)
         columns = decode(b"", nothing, nothing)[0].followed_by(*parts)
@@ -286,6 +309,8 @@ class _RunReader:
         self._drive, self._by_effort = drive, drive.layout.force == "effort"
         topics = map(drive.name, (JOINT_STATES, CONTROL_FORCE, DROPPED_FORCE))
         self._states, self._forces, self._dropped = topics
+        if drive.layout.time == "log":
+            self._dropped = ""
         if self._by_effort:
             self._forces = ""
         self._motion = MotionReader(
@@ -344,7 +369,10 @@ class _RunReader:
             )
 
     def _reading(self, run: RunBlock) -> Reading[RunBlock]:
-        notes = self._motion.notes
+        notes, states = self._motion.notes, run.joint_states
+        if self._by_effort:
+            time = (states.stamp - states.stamp[:1]) / NANOSECONDS
+            notes += ripple_note(time, states.position, run.control_forces.force, ("m", "N"))
         if self._force.unstamped:
             notes.append(f"the forces on {self._forces} have no stamps: their log times count")
         return Reading(run, tuple(notes), _sentences(self._refused))

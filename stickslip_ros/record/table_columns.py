@@ -1,10 +1,10 @@
 """The columns of a table in a file, whatever its format."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Collection, Generator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Collection, Generator, Iterable, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from math import inf
+from math import inf, isfinite, nan
 from pathlib import Path
 from typing import Any
 
@@ -44,6 +44,10 @@ class TableFormat:
     """Column and value of the rows that are read, as in `joint=elbow`."""
     session: int | None = None
     """Which one of the sessions is read; each starts where the time does again."""
+    second: Path | None = None
+    """Another table of the same run: its columns are `2:NAME`, and it has a clock of its own."""
+    shift: float = 0.0
+    """What is added to times of their own that columns have, s."""
 
     def __post_init__(self) -> None:
         """Refuse what no table has."""
@@ -55,6 +59,8 @@ class TableFormat:
             raise InvalidInputError(f"period = {self.period} is invalid: must be above 0 s")
         if self.session is not None and self.session < 1:
             raise InvalidInputError(f"session = {self.session} is invalid: must be at least 1")
+        if not isfinite(self.shift):
+            raise InvalidInputError(f"shift = {self.shift} is invalid: must be a finite number, s")
         try:
             "1".encode(self.encoding or "utf-8").decode(self.encoding or "utf-8")
         except (LookupError, ValueError):
@@ -82,6 +88,8 @@ class Table(ABC):
     """Cells of the columns in a line of units; empty without one."""
     clocks: Collection[int] = ()
     """Places of the columns that are dates or times of day, once they are read: they are in s."""
+    start: int | None = None
+    """The first of these instants, ns."""
     period: tuple[float, float] | None = None
     """Period of the rows that a line above them tells, s and in its own unit."""
     decimal = "."
@@ -107,6 +115,36 @@ class Table(ABC):
     @abstractmethod
     def line(self, row: int) -> str:
         """Return where a row is in the file, for a message."""
+
+    @property
+    def wanted(self) -> tuple[int, str, float] | None:
+        """Column, and its value as a text and a number, of the rows that are read; None: all."""
+        if self.form.where is None:
+            return None
+        name, _, value = (part.strip(" '\"") for part in self.form.where.rpartition("="))
+        if name not in self.columns:
+            raise InvalidInputError(
+                f"where = {shown(self.form.where)} is invalid: must be COLUMN=VALUE, with one of "
+                f"{listed(self.columns)}"
+            )
+        with suppress(ValueError):
+            return self.columns[name], value, float(value)
+        return self.columns[name], value, nan
+
+    def nothing_where(self, place: int, values: Iterable[str]) -> InvalidInputError:
+        """Return the error of a table none of whose rows is wanted, with some it has."""
+        has = listed(dict.fromkeys(values, 0))
+        return InvalidInputError(
+            f"{self.path}: no row has {self.form.where}; {self.name(place)} has {has}"
+        )
+
+    def clock_beside(self, clock: Sequence[int], places: Sequence[int]) -> tuple[int, ...]:
+        """Return the places of the times of columns that have others than those of the clock.
+
+        Raises InvalidInputError if they have different ones.
+        """
+        del clock, places
+        return ()
 
     def has(self, text: str) -> bool:
         """Return whether the table has all columns of an expression."""

@@ -2,18 +2,19 @@
 
 import os
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import nan
 from pathlib import Path
 
 import numpy as np
 
-from stickslip_ros.arrays import FloatArray
+from stickslip_ros.arrays import FloatArray, IntArray
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.files import open_regular
 from stickslip_ros.record.converted_bag import OTHER_BAGS
 from stickslip_ros.record.faults import differences
 from stickslip_ros.record.foreign_file import format_of, read_foreign
+from stickslip_ros.record.joined_table import JoinedTable
 from stickslip_ros.record.reader import RunBlock
 from stickslip_ros.record.table_clock import stamps_of
 from stickslip_ros.record.table_columns import ANY_FORM, Table, TableFormat, reading_file
@@ -56,16 +57,23 @@ class VectorTable(Table):
         self.units = [units[name] for name in vectors]
         self.columns = {name: place for place, name in enumerate(vectors)}
         self._vectors = [*vectors.values()]
+        self._rows: IntArray | None = None
 
     def read(self, places: Sequence[int]) -> list[FloatArray]:
-        """Return vectors by their places."""
-        if self.form.where is not None:
-            raise InvalidInputError(f"{self.path}: where = {self.form.where} needs a text")
-        return [self._vectors[place] for place in places]
+        """Return vectors by their places, or the rows of them that are wanted."""
+        if self.wanted is None:
+            return [self._vectors[place] for place in places]
+        column, _, number = self.wanted
+        values = self._vectors[column]
+        self._rows = np.flatnonzero(values == number)
+        if not len(self._rows):
+            raise self.nothing_where(column, (f"{each:g}" for each in np.unique(values)))
+        found = [self._vectors[place] for place in places]
+        return [each[self._rows] if len(each) == len(values) else each for each in found]
 
     def line(self, row: int) -> str:
         """Return the number of a row, for a message."""
-        return f"row {row + 1}"
+        return f"row {row + 1 if self._rows is None else self._rows[row] + 1}"
 
 
 def is_table(path: Path) -> bool:
@@ -79,7 +87,13 @@ def is_table(path: Path) -> bool:
 
 
 def table_of(path: Path, form: TableFormat = ANY_FORM) -> Table:
-    """Return the table in a text, or in a file of another tool; raises BagError."""
+    """Return the table in a text, or in a file of another tool; raises BagError.
+
+    If a second one is given, both are joined.
+    """
+    if form.second is not None:
+        first, second = replace(form, second=None), replace(form, second=None, where=None)
+        return JoinedTable(table_of(path, first), table_of(form.second, second))
     with reading_file(path), open_regular(path) as stream:
         foreign = format_of(path, stream)
         if foreign is None:

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isnan, nan
 from typing import Any, NamedTuple
 
@@ -13,10 +13,12 @@ from stickslip_ros.errors import BagError, InvalidInputError
 from stickslip_ros.quantities import ROTARY
 from stickslip_ros.record.expressions import Expression
 from stickslip_ros.record.faults import Jumps, lost_velocities, shift_note
+from stickslip_ros.record.imperfections import play_note, ripple_note
 from stickslip_ros.record.table_clock import check_turns, even_times, in_order, unit_of_steps
 from stickslip_ros.record.table_columns import ROW, Table, reading_file
-from stickslip_ros.record.units import Unit, units_in
+from stickslip_ros.record.units import Unit, is_acceleration, units_in
 from stickslip_ros.samples import LARGEST
+from stickslip_ros.stamps import NANOSECONDS
 from stickslip_ros.text import must_be_one_of, quantity
 
 QUANTITIES = (
@@ -33,8 +35,8 @@ QUANTITIES = (
 
 _UNITS = {"time": "s", "position": "m", "reference": "m", "velocity": "m/s", "belt_velocity": "m/s"}
 """Units of quantities; the others are forces."""
-_FORCES = ("force", "disturbance", "friction_force")
-"""Quantities that hold until the next value."""
+_MOTION, _FORCES = ("position", "velocity"), ("force", "disturbance", "friction_force")
+"""Quantities of which rows without a number lack samples; those that hold until the next value."""
 _MERGED_SHARE, _BETWEEN_SHARE = 0.3, 0.05
 """Share of the rows with a position that lack another quantity, from which it was recorded between
 them; fewest of its values, as a share of the positions."""
@@ -42,6 +44,10 @@ _SMALLEST_TURN, _SAME_TURN = 256.0, 0.01
 """Least turn of a counter that wraps once; relative difference of a jump from it."""
 _NUMBER = re.compile(r"_?\d*$")
 """What the names of several columns of times differ by: Time_1 and Time_2."""
+_LARGE = 100.0
+"""Range of positions without a unit, from which it is said that they are taken as m or rad."""
+_UNSEEN = 0.005
+"""Share of the times at which a quantity of another clock may be unknown without a word."""
 
 
 class Quantities(NamedTuple):
@@ -88,15 +94,17 @@ def quantities_of(
         if own is times[clock] or np.array_equal(own, times[clock], equal_nan=True):
             values[name] = _picked(value, rows)
         else:
-            own, value = (_picked(each, part) for each in (own, value))
+            if own.shape == times[clock].shape:
+                own, value = (_picked(each, part) for each in (own, value))
             values[name] = _at(time, own, value, hold=name in _FORCES)
-            notes.append(f"{name} has times of its own, those of column #{clocks[name][0] + 1}")
+            values[name][time > np.nanmax(own) + np.nanmedian(np.diff(own))] = nan
+            notes += _of_another_clock(table, name, clocks[name], time, own)
     present = np.isfinite(values[needed])
     if not present.any():
         raise InvalidInputError(
             f"{table.path}: no row has a time and a {needed}, {asked[needed].text}"
         )
-    for name in [name for name in values if name not in ("position", "velocity")]:
+    for name in [name for name in values if name not in _MOTION and clocks[name] == clock]:
         values[name], note = _merged(name, time, values[name], present)
         notes += note
     values["time"], note = even_times(time)
@@ -108,10 +116,7 @@ def quantities_of(
         values["position"][present] = moved
         notes.append("the position is not recorded: it is the integral of the velocity")
         return Quantities(values, notes)
-    notes += _without_lost_positions(cells, values, rows)
-    if "velocity" in values:
-        notes += _without_lost_velocities(table, values, rows)
-    return Quantities(values, notes)
+    return Quantities(values, [*notes, *_faults(cells, values, rows)])
 
 
 def speed_and_force(table: Table, columns: Mapping[str, str]) -> Quantities:
@@ -161,10 +166,11 @@ class _Cells:
         if not rows:
             raise BagError(f"{table.path}: the file cannot be read: it has no rows")
         for place, column in columns.items():
-            if len(column) not in (1, rows):
+            lead = (table.clock_beside(leading, [place]) or leading)[0]
+            if len(column) not in (1, len(columns[lead])):
                 raise InvalidInputError(
                     f"{table.path}: {table.name(place)} has {len(column)} numbers and "
-                    f"{table.name(leading[0])} {rows}: columns must have the same length"
+                    f"{table.name(lead)} {len(columns[lead])}: columns must have the same length"
                 )
         notes = [*table.notes, *_lost_cells(table, columns, asked)]
         factors: dict[str, float] = {}
@@ -175,6 +181,8 @@ class _Cells:
             units |= found
             if name == "time" and each.bare and not found:
                 unknown_unit = each.places[0] not in table.clocks
+            if name == "position" and each.bare and not found:
+                notes += _large_note(table, columns[each.places[0]], each)
             if name == "time" and ROW in each.places:
                 by = "--period" if table.form.period else "a line above them"
                 text = quantity(float(each.text[4:]), "s")
@@ -240,10 +248,22 @@ class _Cells:
             step = float(np.median(np.diff(_picked(found[clock], rows)))) if len(rows) > 1 else 0.0
             factor, note = unit_of_steps(step, self.table.period, self.table.number(clock[0]))
             self.notes.extend(note)
+        if self.table.form.shift and len(found) == 1:
+            raise InvalidInputError(
+                f"{self.table.path}: shift is for columns with times of their own, and all have "
+                f"those of {asked.text}"
+            )
         first = found[clock][rows[0]]
         for places, each in found.items():
-            since = each - first if first else each
-            found[places] = np.asarray(since if factor == 1.0 else since * factor, float)
+            since, own = each - first if first else each, factor
+            if places != clock:
+                own, units = _factor(self.table, "time", replace(asked, places=places))
+                if not (units or self.table.clock_beside(clock, places)):
+                    own = factor
+                if own != factor:
+                    since, own = each * own - first * factor, 1.0
+            since = np.asarray(since if own == 1.0 else since * own, float)
+            found[places] = since if places == clock else since + self.table.form.shift
         return found, rows
 
 
@@ -280,6 +300,8 @@ def _clocks(table: Table, clock: tuple[int, ...], asked: Expression) -> tuple[in
     They are those of the time or, if this is one column, the last one before a column that is named
     like it, such as Time_2 after Time_1.
     """
+    if clock[0] != ROW and (beside := table.clock_beside(clock, asked.places)):
+        return beside
     stems, first = [_NUMBER.sub("", name) for name in table.names], clock[0]
     if len(clock) > 1 or first == ROW or not stems[first]:
         return clock
@@ -289,6 +311,22 @@ def _clocks(table: Table, clock: tuple[int, ...], asked: Expression) -> tuple[in
         for place in asked.places
     }
     return tuple(own) if len(own) == 1 and alike[0] == first else clock
+
+
+def _of_another_clock(
+    table: Table, name: str, clock: Sequence[int], time: FloatArray, own: FloatArray
+) -> Iterator[str]:
+    """Yield a sentence on a quantity with times of its own; refuse times apart from the others."""
+    start, end = float(np.nanmin(own)), float(np.nanmax(own))
+    text = f"{name} has times of its own, those of {table.name(clock[0])}"
+    if not (start <= time[-1] and end >= time[0]):
+        shift = float(f"{table.form.shift + time[0] - start:.6g}")
+        raise InvalidInputError(
+            f"{table.path}: {text}, from {start:.6g} s to {end:.6g} s after the first of the "
+            f"others, which end at {time[-1]:.6g} s: --shift {shift:g} lets both start together"
+        )
+    outside = float(np.mean((time < start) | (time > end)))
+    yield text + f", and is not known at {outside:.0%} of the others" * (outside >= _UNSEEN)
 
 
 def _times(clock: Expression, cells: Sequence[Any]) -> Any:
@@ -326,6 +364,11 @@ def _factor(table: Table, kind: str, asked: Expression) -> tuple[float, dict[str
         name = table.name(place).removeprefix("column ")
         which = f"{table.path}: {kind}, {table.name(place)},"
         column = table.number(place) if len(asked.places) == 1 else f"({asked.text})"
+        if kind in _MOTION and is_acceleration(table.names[place]):
+            raise InvalidInputError(
+                f"{which} is an acceleration by its name, and no {kind}: if it is one, {kind}="
+                f"{column}*1 takes it"
+            )
         readings = units_in(table.names[place], table.units[place], target)
         if len(readings) > 1:
             texts = [f"{each.text or target} ({each.factor:g} {each.target})" for each in readings]
@@ -362,6 +405,17 @@ def _units_notes(table: Table, found: Mapping[str, Unit]) -> Iterator[str]:
         yield f"{angles[0]} is of a rotary axis: what is in m is in rad, as --rotary shows"
 
 
+def _large_note(table: Table, column: Any, asked: Expression) -> Iterator[str]:
+    """Yield a sentence on a position without a unit, if it may be in another one than m."""
+    unit = "rad" if table.form.rotary else "m"
+    low, high = float(np.nanmin(column)), float(np.nanmax(column))
+    if high - low >= _LARGE and (column.dtype.kind == "i" or unit == "m"):
+        yield (
+            f"the position, {asked.text}, has no unit and counts in {unit}, from {low:.6g} to "
+            f"{high:.6g}: in another one, *NUMBER converts it"
+        )
+
+
 def _measurable(values: FloatArray) -> FloatArray:
     """Return values with NaN for those above 1e100, and zero for those below 1e-100."""
     found = np.atleast_1d(values)
@@ -378,6 +432,18 @@ def _measurable(values: FloatArray) -> FloatArray:
 def _picked(values: FloatArray, rows: range | IntArray) -> FloatArray:
     """Return the values of some rows, or of all, which is a range."""
     return values if isinstance(rows, range) else values[rows]
+
+
+def _faults(cells: _Cells, values: dict[str, FloatArray], rows: range | IntArray) -> Iterator[str]:
+    """Leave out what no motion makes; yield sentences on this, and on what the values show."""
+    yield from _without_lost_positions(cells, values, rows)
+    if "velocity" in values:
+        yield from _without_lost_velocities(cells.table, values, rows)
+    units = ("rad", "N m") if cells.table.form.rotary else ("m", "N")
+    if "reference" in values:
+        yield from play_note(values["reference"], values["position"], units[0])
+    if "force" in values:
+        yield from ripple_note(values["time"], values["position"], values["force"], units)
 
 
 def _without_lost_positions(
@@ -453,7 +519,7 @@ def _at(at: FloatArray, time: FloatArray, values: FloatArray, *, hold: bool) -> 
     time, values = time[known], values[known]
     if not hold:
         return np.interp(at, time, values, left=nan, right=nan)
-    last = np.searchsorted(time, at, "right") - 1
+    last = np.searchsorted(time, at + 0.5 / NANOSECONDS, "right") - 1
     return np.where(last >= 0, values[last], nan)
 
 

@@ -3,22 +3,17 @@
 import re
 import warnings
 from collections.abc import Iterator, Sequence
-from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import replace
 from io import TextIOWrapper
-from math import nan
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from typing_extensions import override
 
 from stickslip_ros.arrays import IntArray
-from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.record.expressions import listed
 from stickslip_ros.record.table_columns import Table, TableFormat
 from stickslip_ros.record.text_form import TAIL, TIME, form_of, opened
-from stickslip_ros.text import shown
 
 _MOST_NUMBERS, _CHUNK = 1 << 28, 1 << 18
 """Numbers in the columns that are used, and cells that are read at once."""
@@ -26,43 +21,8 @@ _DAY = 86_400.0
 _SKIPPED = re.compile(r"Skipping line (\d+)")
 
 
-@dataclass(frozen=True)
-class _Lines:
-    """The lines of the rows that were read."""
-
-    first: int
-    """Number of the first one, from 1."""
-    omitted: Sequence[int] = ()
-    """Numbers of lines that are blank or refused, in order."""
-    refused: Sequence[int] = ()
-    """Numbers of lines with more cells than the others."""
-    kept: IntArray | None = None
-    """Places of the rows that were asked for; None: of all."""
-
-    def number(self, row: int) -> int:
-        """Return the number of the line of a row."""
-        if self.kept is not None:
-            return self.first + int(self.kept[row])
-        line = self.first + row
-        for omitted in self.omitted:
-            line += omitted <= line
-        return line
-
-
-class _Wanted(NamedTuple):
-    """The rows that are read: those with a value in a column, as a text or a number."""
-
-    place: int
-    text: str
-    number: float
-
-    def rows_of(self, frame: Any) -> Any:
-        """Return those of a frame."""
-        import pandas as pd
-
-        text = frame[self.place].astype(str).str.strip(" \t'\"")
-        same = pd.to_numeric(text, errors="coerce") == self.number
-        return frame[(text == self.text) | same]
+class _OtherMarkError(Exception):
+    """A decimal mark is not what it was taken for; its text is the mark."""
 
 
 class TextTable(Table):
@@ -84,7 +44,8 @@ class TextTable(Table):
             self._text = text = form_of(stream, given)
         self.names, self.units, self.columns = text.names, text.units, text.columns
         self.decimal, self.period = text.decimal, text.period
-        self._lines = _Lines(text.first + 1)
+        self._refused: Sequence[int] = ()
+        self._kept: IntArray | None = None
         self._decimal_commas = False
 
     @property
@@ -108,7 +69,7 @@ class TextTable(Table):
         notes = [*self._converted]
         if features:
             notes.append(f"the table is read with {', '.join(features)}")
-        if refused := self._lines.refused:
+        if refused := self._refused:
             notes.append(
                 f"{len(refused)} lines have more cells than the others and are left out, the "
                 f"first is line {refused[0]}"
@@ -117,16 +78,23 @@ class TextTable(Table):
 
     @override
     def line(self, row: int) -> str:
-        return f"line {self._lines.number(row)}"
+        number = self._text.first + 1 + (row if self._kept is None else int(self._kept[row]))
+        for refused in self._refused:
+            number += refused <= number
+        return f"line {number}"
 
     @override
     def read(self, places: Sequence[int]) -> list[Any]:
         """Return columns as arrays of shape (rows,); times become seconds from the first one."""
+        try:
+            return self._read(places)
+        except _OtherMarkError as error:  # what was read so far had another meaning
+            self.form = replace(self.form, decimal=str(error))
+            return self._read(places)
+
+    def _read(self, places: Sequence[int]) -> list[Any]:
         parts: dict[int, list[Any]] = {place: [] for place in places}
-        wanted, first = self._wanted(), self._lines.first
-        kept: list[Any] = []
-        blank: list[int] = []
-        rows = 0
+        wanted, kept, rows = self.wanted, list[IntArray](), 0
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             for frame in self._frames():
@@ -134,24 +102,22 @@ class TextTable(Table):
                 if rows * len(places) > _MOST_NUMBERS:
                     raise ValueError(f"it has more than {_MOST_NUMBERS} numbers")
                 if frame[places[0]].hasnans:
-                    empty = frame.isna().all(axis=1)
-                    blank += [first + row for row in frame.index[empty]]
-                    frame = frame[~empty]
+                    frame = frame[~frame.isna().all(axis=1)]
                 if wanted is not None:
-                    frame = wanted.rows_of(frame)
-                    kept.append(frame.index.to_numpy())
+                    frame = _rows_of(frame, *wanted)
+                kept.append(frame.index.to_numpy())
                 for place in places:
                     parts[place].append(self._values(frame[place]))
-        skipped = [
-            number for warning in caught for number in _SKIPPED.findall(str(warning.message))
-        ]
-        refused = [first - 1 + int(number) for number in skipped]
-        if wanted is not None and not any(map(len, kept)):
-            raise self._nothing_where(wanted.place)
-        places_kept = np.concatenate(kept) if kept else None
-        self._lines = _Lines(first, sorted([*blank, *refused]), refused, places_kept)
+        found = [number for each in caught for number in _SKIPPED.findall(str(each.message))]
+        self._refused = [self._text.first + int(number) for number in found]
+        self._kept = np.concatenate(kept)
+        if wanted is not None and not len(self._kept):
+            texts = (row[wanted[0]] for row in self._text.first_rows)
+            raise self.nothing_where(wanted[0], texts)
+        if len(self._kept) == rows:
+            self._kept = None
         self.clocks = {place for place in places if parts[place][0].dtype.kind in "mM"}
-        return [_joined(parts.pop(place)) for place in places]
+        return [self._joined(parts.pop(place)) for place in places]
 
     def _frames(self) -> Iterator[Any]:
         """Yield the rows, in parts, as frames of pandas."""
@@ -173,7 +139,7 @@ class TextTable(Table):
                 names=range(text.width),
                 index_col=False,
                 sep=r"\s+" if text.separator == " " else text.separator,
-                decimal=text.decimal,
+                decimal=self.form.decimal or text.decimal,
                 skipinitialspace=text.has_blanks,
                 skip_blank_lines=False,
                 on_bad_lines="warn",
@@ -183,25 +149,22 @@ class TextTable(Table):
             )
             yield from frames
 
-    def _wanted(self) -> _Wanted | None:
-        """Return which rows are read; None: all."""
-        if self.form.where is None:
-            return None
-        name, _, value = (part.strip(" '\"") for part in self.form.where.rpartition("="))
-        if name not in self.columns:
-            raise InvalidInputError(
-                f"where = {shown(self.form.where)} is invalid: must be COLUMN=VALUE, with one of "
-                f"{listed(self.columns)}"
-            )
-        with suppress(ValueError):
-            return _Wanted(self.columns[name], value, float(value))
-        return _Wanted(self.columns[name], value, nan)
-
-    def _nothing_where(self, place: int) -> InvalidInputError:
-        values = dict.fromkeys((row[place] for row in self._text.first_rows), 0)
-        return InvalidInputError(
-            f"{self.path}: no row has {self.form.where}; {self.name(place)} has {listed(values)}"
-        )
+    def _joined(self, parts: Sequence[Any]) -> Any:
+        """Return the parts of a column as one; instants in s from the first, over midnights."""
+        try:
+            values = np.concatenate(parts)
+        except TypeError:
+            raise ValueError("a column has both numbers and times") from None
+        if values.dtype.kind not in "mM":
+            return values
+        known = ~np.isnat(values)
+        since, instants = np.full(len(values), np.nan), values[known].astype(np.int64)
+        if len(instants):
+            self.start = int(instants[0]) if self.start is None else self.start
+            since[known] = (instants - self.start) / 1e9
+        if values.dtype.kind == "m":
+            since[known] = np.unwrap(since[known], period=_DAY)
+        return since
 
     def _values(self, cells: Any) -> Any:
         """Return numbers, or instants, of a column as pandas has read it."""
@@ -216,18 +179,28 @@ class TextTable(Table):
         instant = next(filter(None, map(TIME.fullmatch, text.dropna()[:TAIL])), None)
         if instant is not None:
             return _instants(text, instant)
-        given = self.form.decimal
-        if given:
-            text = text.str.replace("," if given == "." else ".", "", regex=False)
-        elif text.str.contains(r",\d*\.").any():  # the commas group digits
-            text = text.str.replace(",", "", regex=False)
-        elif text.str.contains(r"\.\d*,").any():
-            text = text.str.replace(".", "", regex=False)
-        if (given or ",") == "," and text.str.contains(",", regex=False).any():
+        if self.form.decimal is None:
+            grouped = ((".", r",\d*\."), (",", r"\.\d*,"))  # commas, or points, group digits
+            marks = (mark for mark, pattern in grouped if text.str.contains(pattern).any())
+            points = self.decimal == "," and text.str.contains(".", regex=False).any()
+            if mark := next(marks, "," * bool(points)):
+                raise _OtherMarkError(mark)
+        if self.form.decimal is not None:
+            text = text.str.replace("," if self.form.decimal == "." else ".", "", regex=False)
+        if self.form.decimal != "." and text.str.contains(",", regex=False).any():
             self._decimal_commas = True
             text = text.str.replace(",", ".", regex=False)
         numbers: Any = pd.to_numeric(text, errors="coerce")
         return numbers.to_numpy(float, na_value=np.nan)
+
+
+def _rows_of(frame: Any, place: int, value: str, number: float) -> Any:
+    """Return the rows of a frame with a value, as a text or a number, in a column."""
+    import pandas as pd
+
+    text = frame[place].astype(str).str.strip(" \t'\"")
+    same = pd.to_numeric(text, errors="coerce") == number
+    return frame[(text == value) | same]
 
 
 def _instants(text: Any, like: re.Match[str]) -> Any:
@@ -243,20 +216,3 @@ def _instants(text: Any, like: re.Match[str]) -> Any:
         day_first = "." in (like["date"] or "")
         instants = pd.to_datetime(text, dayfirst=day_first, utc=True, errors="coerce")
     return instants.dt.tz_localize(None).to_numpy("datetime64[ns]")
-
-
-def _joined(parts: Sequence[Any]) -> Any:
-    """Return the parts of a column as one; instants in s from the first, over midnights."""
-    try:
-        values = np.concatenate(parts)
-    except TypeError:
-        raise ValueError("a column has both numbers and times") from None
-    if values.dtype.kind not in "mM":
-        return values
-    known = ~np.isnat(values)
-    since = np.full(len(values), np.nan)
-    if known.any():
-        since[known] = (values[known] - values[known][0]).astype(np.int64) / 1e9
-    if values.dtype.kind == "m":
-        since[known] = np.unwrap(since[known], period=_DAY)
-    return since

@@ -30,6 +30,8 @@ _SPELLINGS = tuple(
         ("turn/s", "R/T", "k", "hz|rps"),
         ("turn/min", "R/T", "", "rpm|upm"),
         ("m/s", "L/T", "m", "mps"),
+        ("km/hour", "L/T", "", "kmh|kph"),
+        ("inch/s", "L/T", "", "ips"),
         ("inch", "L", "", "in|inch(?:es)?|zoll|pulgadas?|pouces?|pollic[ei]"),
         ("ft", "L", "", "ft|foot|feet"),
         ("thou", "L", "", "thou|mils?"),
@@ -55,10 +57,14 @@ _COUNTS = re.compile(
     r"counts?|cts|inc|incr(?:ements?)?|ink(?:r\w*)?|puls\w*|impuls\w*|pls|ticks?|steps|lsb|digits?|erpm"
 )
 """Words for numbers of an encoder, a motor or a clock, of which only the owner knows the size."""
+_ACCELERATION = re.compile(r"acc(?:el\w*)?$|beschl|accél|acel")
+"""Words for an acceleration."""
 _BRACKETED = re.compile(r"[\[(<{]\s*([^\[\](){}<>]*[^\[\](){}<>\s])\s*[\])>}]")
 _MARK = re.compile(r"\s*[/,]\s*|\s+(?:in|en|em)\s+")
-_START = re.compile(r"(?<![^\W_])(?=[^\W_])|(?<=[^\W\d_A-Z])(?=[A-Z])|(?<=\d)(?=[^\W\d_])")
-"""Where a word starts: after a mark, in PosMM, and after a number."""
+_START = re.compile(
+    r"(?<![^\W_])(?=[^\W_])|(?<=[^\W\d_A-Z])(?=[A-Z])|(?<=\d)(?=[^\W\d_])|(?<=[^\x00-\u03ff])(?=[a-zA-Zµμ])"
+)
+"""Where a word starts: after a mark, in PosMM, after a number, and after letters of the east."""
 _DOUBTFUL, _DOUBTFUL_ALONE = ("in", "min", "h", "d"), ("cm", "dm")
 """Units that may be other words at the end of a name, or where they are all of it."""
 _LONGEST = 200
@@ -102,6 +108,11 @@ def are_units(cells: Sequence[str]) -> bool:
         if len(unit) > 1 or unit in "msNAVKgh%"
     )
     return 2 * known > len(units)
+
+
+def is_acceleration(name: str) -> bool:
+    """Return whether the name of a column is that of an acceleration."""
+    return any(map(_ACCELERATION.match, re.findall(r"[^\W\d_]+", name.casefold())))
 
 
 def without_unit(name: str) -> str:
@@ -181,6 +192,10 @@ def _last(name: str, target: str) -> Iterator[Unit]:
                 if word.casefold() in _DOUBTFUL:
                     yield Unit("", 1.0, target)
     yield from (Unit(word, nan, target) for word in words if _counts(word))
+    for word in (name[start:] for start in starts[-2:] if start):
+        long = len(word) > 1 and word.casefold() not in _DOUBTFUL and _parsed(word)
+        if long or word == "V":
+            yield Unit(word, nan, target)
 
 
 def _counts(text: str) -> bool:

@@ -383,7 +383,7 @@ def of_ros2_control(path: Path, kind: str, chance: random.Random | None = None) 
                 parts = [[of["InterfaceValue"](names, np.array(each)) for names, each in joints]]
             else:
                 feedback = point([5.0, x], [0.0, 1.0], [], [0.0, 7.0])
-                parts = [point([9.0, 9.0], [9.0, 9.0]), feedback, point()]
+                parts = [point([8.0, 9.0], [8.0, 3.0]), feedback, point()]
             message = of[kind](header, ["a", "b"], *parts)
             data = bytearray(store.serialize_cdr(message, f"control_msgs/msg/{kind}"))
             if chance:
@@ -401,7 +401,11 @@ def test_topics_of_ros2_control_are_joint_states(tmp_path: Path, kind: str) -> N
         layout = BagLayout(joint="b", states_topic=topic, force="effort")
         with Recording(tmp_path / "bag", layout=layout) as recording:
             states, forces = recording.joint_states, recording.control_forces
+            references = recording.references
         assert states.position == pytest.approx(np.arange(150) * STEP * 1e-9)
+        if kind != "DynamicJointState":
+            assert references.stamp.tolist() == states.stamp.tolist()
+            assert ({*references.position}, {*references.velocity}) == ({9.0}, {3.0})
         assert set(states.velocity) == {1.0}
         assert set(forces.force) == {7.0}
     with pytest.raises(BagError, match="are of the joints a, b: --joint NAME must choose one"):

@@ -11,6 +11,7 @@ from scipy.io import savemat
 from stickslip_ros.errors import BagError, InvalidInputError
 from stickslip_ros.measures.slips import SlipThreshold
 from stickslip_ros.record.report import report_of_recording
+from stickslip_ros.record.table_columns import TableFormat
 from stickslip_ros.record.table_file import is_table, read_table
 
 TIME = np.arange(2001) * 1e-3
@@ -114,6 +115,17 @@ def test_times_that_repeat_and_velocities_that_are_missing_are_noted(tmp_path: P
         "10 rows have a position and no velocity: it is the difference of the positions",
     ):
         assert note in recording.notes
+
+
+@pytest.mark.process
+def test_rows_of_vectors_are_those_that_are_wanted(tmp_path: Path) -> None:
+    path, columns = tmp_path / "log.mat", {"time": "log.t", "position": "log.x"}
+    time, joint = np.repeat(np.arange(40.0), 2), np.tile([1.0, 2.0], 40)
+    savemat(path, {"log": {"t": time, "x": time * joint, "joint": joint}, "rate": 7.0})
+    found = read_table(path, columns, form=TableFormat(where="log.joint=2"))
+    assert found.samples.position.tolist() == [2.0 * each for each in range(40)]
+    with pytest.raises(InvalidInputError, match=r"has log.joint=3; column log.joint has 1, 2"):
+        read_table(path, columns, form=TableFormat(where="log.joint=3"))
 
 
 def test_only_tables_are_tables(tmp_path: Path) -> None:

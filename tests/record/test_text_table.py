@@ -282,7 +282,7 @@ def test_rows_of_one_joint_are_read(tmp_path: Path) -> None:
 
 def test_sessions_are_read_one_by_one(tmp_path: Path) -> None:
     times = [*range(40), *range(9)]
-    lines = [f"{t},{n},{n + 0.5},{-n}" for n, t in enumerate(times)]
+    lines = [f"{t},{n},{t + 0.5},{-n}" for n, t in enumerate(times)]
     path, columns = tmp_path / "log.csv", {"time": "Name", "position": "x", "force": "F"}
     path.write_text("Name,x,Name,F\n" + "\n".join(lines))
     with pytest.raises(InvalidInputError, match="line 42, where a session of its own starts: --"):
@@ -312,6 +312,24 @@ def test_times_that_go_back_are_refused_with_a_way(
     said = str(refused.value).partition("time=")[2]
     found = read(tmp_path, text, said or time, "x", form).samples
     assert found.stamp.tolist() == [1_000_000 * number for number in range(len(times))]
+
+
+def test_a_comma_means_the_same_in_all_rows(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of positions in parts the first one tells nothing: 1,234 counts is no 1.234."""
+    monkeypatch.setattr("stickslip_ros.record.text_table._CHUNK", 60)
+    cells = [f"{each:,}" for each in range(1200, 1300)] + [f"{each:,}.5" for each in range(99)]
+    text = "t;x;\n" + "".join(f"{n};{each};a\n" for n, each in enumerate(cells))
+    found = read(tmp_path, text.replace(".5", ",5").replace("1,", "1.", 100), "t", "x")
+    assert found.samples.position[[0, 100]].tolist() == [1200.0, 0.5]
+
+
+def test_a_line_is_that_of_the_file_below_lines_that_are_left_out(tmp_path: Path) -> None:
+    lines = [f"{n},{n}" for n in range(60)]
+    lines[10], lines[20], lines[40] = "1,2,3,4", "", "40,oops"
+    found = read(tmp_path, "t,x\n" + "\n".join(lines), "t", "x")
+    assert any("the first is line 42" in note for note in found.notes), found.notes
 
 
 def test_a_counter_that_wraps_once_is_refused_with_the_expression(tmp_path: Path) -> None:
