@@ -4,6 +4,7 @@ A text is read like any other table. The libraries are imported where they are n
 are installed is up to the user.
 """
 
+import json
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from io import BytesIO
@@ -152,6 +153,34 @@ def _of_yaml(content: bytes) -> str:
     return pd.DataFrame(rows).to_csv(index=False)
 
 
+def _of_json(content: bytes) -> str:
+    """Read the longest list of rows, or the vectors, that are anywhere in objects of objects."""
+    import pandas as pd
+
+    found: dict[str, Any] = {}
+
+    def search(name: str, value: Any) -> None:
+        if isinstance(value, list) and value and isinstance(value[0], list | dict):
+            found[name] = pd.DataFrame(value)
+        elif isinstance(value, dict):
+            parts: dict[str, Any] = value
+            vectors = {key: each for key, each in parts.items() if each and isinstance(each, list)}
+            numbers = {key: each for key, each in vectors.items() if type(each[0]) in (int, float)}
+            if len({*map(len, numbers.values())}) == 1:
+                found[name] = pd.DataFrame(numbers)
+            for key, each in parts.items():
+                search(f"{name}.{key}".strip("."), each)
+
+    search("", json.loads(content))
+    if not found:
+        sys.exit("it is JSON, and has neither a list of rows nor vectors")
+    name = max(found, key=lambda each: len(found[each]))
+    if len(found) > 1:
+        print(f"{name} is read, the longest of {', '.join(found)}", file=sys.stderr)
+    named = any(isinstance(each, str) for each in found[name].columns)
+    return found[name].to_csv(index=False, header=named)
+
+
 def _fields(name: str, value: Any) -> Iterator[tuple[str, Any]]:
     """Yield the fields of a message by their paths; elements of joints by the names of these."""
     if isinstance(value, Mapping):
@@ -174,7 +203,7 @@ def _fields(name: str, value: Any) -> Iterator[tuple[str, Any]]:
         yield name, value
 
 
-MAT = Adapter("a MAT file of version 7.3", "h5py", _of_mat)
+MAT = Adapter("an HDF5 file, as MAT of version 7.3,", "h5py", _of_mat)
 _YAML = Adapter("YAML", "PyYAML", _of_yaml)
 BY_START = {
     b"MATLAB": MAT,
@@ -183,5 +212,10 @@ BY_START = {
     b"TDSm": Adapter("a TDMS file", "npTDMS", _of_tdms),
 }
 """Adapters by the first bytes of a file."""
-BY_END = {".mat": MAT, ".yaml": _YAML, ".yml": _YAML}
+_JSON = Adapter("JSON", "pandas", _of_json)
+BY_END = {
+    **dict.fromkeys((".mat", ".h5", ".hdf5"), MAT),
+    **dict.fromkeys((".yaml", ".yml"), _YAML),
+    ".json": _JSON,
+}
 """Adapters by the end of its name."""

@@ -25,11 +25,14 @@ _BAND, _LOBE = 1.5, 3
 """Ratio of frequencies around a peak to which it is compared, and places beside it that are not."""
 
 
-def play_note(reference: FloatArray, position: FloatArray, unit: str) -> Iterator[str]:
+def play_note(
+    reference: FloatArray, position: FloatArray, unit: str, what: str = "the reference"
+) -> Iterator[str]:
     """Yield a sentence on the play between a position and its reference, if they show one.
 
     Their difference has one value forward and another one backward, whatever the speed, and between
-    the two the position stands. `unit` is that of both, arrays of shape (samples,).
+    the two the position stands. `unit` is that of both, arrays of shape (samples,), and `what` the
+    name of the reference.
     """
     known = np.isfinite(reference) & np.isfinite(position)
     reference, position = reference[known], position[known]
@@ -53,7 +56,7 @@ def play_note(reference: FloatArray, position: FloatArray, unit: str) -> Iterato
         return
     if np.mean(by_position[through] < _STANDING * by_reference[through]) >= _USUAL:
         yield (
-            f"the position stands at {count} reversals until the reference has moved by "
+            f"the position stands at {count} reversals until {what} has moved by "
             f"{quantity(float(f'{play:.2g}'), unit)}: that is play between them, or friction "
             "behind a spring"
         )

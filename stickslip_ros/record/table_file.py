@@ -30,7 +30,7 @@ TABLE_SUFFIXES = (
 _OTHERS = {
     b"\xd0\xcf\x11\xe0": "an old workbook of Excel: save it as .xlsx",
     b"RIFF": "sound: read it with scipy.io.wavfile, and save it by scipy.io.savemat",
-    ".json": "JSON: pandas.DataFrame(...).to_csv(table) writes a list of rows in it",
+    ".svdx": "a project of TwinCAT Scope, which exports it as CSV",
 }
 """What other files are, by their first bytes or end, and how they become tables."""
 _BAG_SUFFIXES = (".mcap", ".db3", ".bag")
@@ -95,12 +95,12 @@ def table_of(path: Path, form: TableFormat = ANY_FORM) -> Table:
         first, second = replace(form, second=None), replace(form, second=None, where=None)
         return JoinedTable(table_of(path, first), table_of(form.second, second))
     with reading_file(path), open_regular(path) as stream:
+        start = os.pread(stream.fileno(), _START, 0)
+        for sign, what in _OTHERS.items():
+            if sign in (path.suffix.lower(), start[: len(sign)]):
+                raise ValueError(f"it is {what}")
         foreign = format_of(path, stream)
         if foreign is None:
-            start = os.pread(stream.fileno(), _START, 0)
-            for sign, what in _OTHERS.items():
-                if sign in (path.suffix.lower(), start[: len(sign)]):
-                    raise ValueError(f"it is {what}")
             return TextTable(path, form)
         content = read_foreign(stream, foreign, _MOST_NUMBERS)
         if content.text is not None:

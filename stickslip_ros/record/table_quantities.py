@@ -33,7 +33,18 @@ QUANTITIES = (
 )
 """Quantities of a run that a table may have; time and position it must have."""
 
-_UNITS = {"time": "s", "position": "m", "reference": "m", "velocity": "m/s", "belt_velocity": "m/s"}
+_DRIVING = "what drives it"
+"""A position of what drives the slide, by which play is found, that is not asked for."""
+_DRIVES = re.compile(r"(?i)mot|enc|spind|screw|c?mdpos|cmd|soll|ref|set|target|consigne|vis\b")
+"""Starts of words for it in names of columns."""
+_UNITS = {
+    _DRIVING: "m",
+    "time": "s",
+    "position": "m",
+    "reference": "m",
+    "velocity": "m/s",
+    "belt_velocity": "m/s",
+}
 """Units of quantities; the others are forces."""
 _MOTION, _FORCES = ("position", "velocity"), ("force", "disturbance", "friction_force")
 """Quantities of which rows without a number lack samples; those that hold until the next value."""
@@ -80,6 +91,8 @@ def quantities_of(
     clock = asked["time"].places
     if not clock:
         raise InvalidInputError(f"{table.path}: time = {columns['time']} must be a column")
+    if needed == "position" and (driven := _driving_column(table, asked)):
+        asked[_DRIVING] = driven
     clocks = {name: _clocks(table, clock, each) for name, each in asked.items()}
     cells = _Cells.of(table, asked, clock, *clocks.values())
     notes = cells.notes
@@ -294,6 +307,22 @@ def _asked(
     return asked
 
 
+def _driving_column(table: Table, asked: Mapping[str, Expression]) -> Expression | None:
+    """Return the column that may be the position of what drives the slide, if there is one."""
+    used = {place for each in asked.values() for place in each.places}
+    if "reference" in asked or len(asked["position"].places) != 1:
+        return None
+    for place, name in enumerate(table.names):
+        words = re.findall(r"[^\W\d_]+", name)
+        if place in used or not any(map(_DRIVES.match, words)):
+            continue
+        readings = units_in(name, table.units[place], "m")
+        known = units_in(table.names[(own := asked["position"].places[0])], table.units[own], "m")
+        if asked["position"].bare and readings == known and len(readings) <= 1:
+            return Expression.read(table.path, table.number(place), table.columns)
+    return None
+
+
 def _clocks(table: Table, clock: tuple[int, ...], asked: Expression) -> tuple[int, ...]:
     """Return the columns of the times of an expression.
 
@@ -440,8 +469,10 @@ def _faults(cells: _Cells, values: dict[str, FloatArray], rows: range | IntArray
     if "velocity" in values:
         yield from _without_lost_velocities(cells.table, values, rows)
     units = ("rad", "N m") if cells.table.form.rotary else ("m", "N")
-    if "reference" in values:
-        yield from play_note(values["reference"], values["position"], units[0])
+    for name in {"reference", _DRIVING} & {*values}:
+        what = f"the {name}" if name != _DRIVING else cells.table.name(cells.asked[name].places[0])
+        yield from play_note(values[name], values["position"], units[0], what)
+    values.pop(_DRIVING, None)
     if "force" in values:
         yield from ripple_note(values["time"], values["position"], values["force"], units)
 

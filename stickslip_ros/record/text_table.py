@@ -14,6 +14,7 @@ from typing_extensions import override
 from stickslip_ros.arrays import IntArray
 from stickslip_ros.record.table_columns import Table, TableFormat
 from stickslip_ros.record.text_form import TAIL, TIME, form_of, opened
+from stickslip_ros.record.units import NO_UNITS
 
 _MOST_NUMBERS, _CHUNK = 1 << 28, 1 << 18
 """Numbers in the columns that are used, and cells that are read at once."""
@@ -42,7 +43,8 @@ class TextTable(Table):
         self.path, self.form, self._content, self._converted = path, given, content, notes
         with opened(path, content) as stream:
             self._text = text = form_of(stream, given)
-        self.names, self.units, self.columns = text.names, text.units, text.columns
+        self.names, self.columns = text.names, text.columns
+        self.units = [text.units[place] or self._unit(place) for place in range(text.width)]
         self.decimal, self.period = text.decimal, text.period
         self._refused: Sequence[int] = ()
         self._kept: IntArray | None = None
@@ -52,6 +54,12 @@ class TextTable(Table):
     @override
     def turns(self) -> tuple[str, Sequence[str]] | None:
         return next(filter(None, map(self._turn, range(self._text.width))), None)
+
+    def _unit(self, place: int) -> str:
+        """Return the unit of a column that is in all rows of a column `unit` behind it."""
+        behind = [name.lower() for name in self.names[place + 1 : place + 2]]
+        cells = {row[place + 1] for row in self._text.first_rows if behind}
+        return cells.pop() if behind and behind[0] in NO_UNITS[3:] and len(cells) == 1 else ""
 
     def _turn(self, place: int) -> tuple[str, list[str]] | None:
         """Return the values of a column that take turns, and its name."""

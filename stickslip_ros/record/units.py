@@ -69,7 +69,9 @@ _DOUBTFUL, _DOUBTFUL_ALONE = ("in", "min", "h", "d"), ("cm", "dm")
 """Units that may be other words at the end of a name, or where they are all of it."""
 _LONGEST = 200
 """Characters of a name in which a unit is looked for."""
-_SAMPLING = re.compile(r"(?i)sampl|abtast|échantil|muestr|campion|zyklus|^\W*(?:interval|period)")
+_SAMPLING = re.compile(
+    r"(?i)sampl|abtast|échantil|muestr|campion|zyklus|^\W*(?:interval|period|dt\b)"
+)
 """Words for the sampling of a table."""
 
 
@@ -227,7 +229,12 @@ def _factor(unit: str, target: str) -> float:
 @cache
 def _parsed(text: str) -> tuple[tuple[str, str], ...]:
     """Return the readings of a text as a unit: what pint calls it, and its dimension."""
-    plain = re.sub("[µμ]", "u", text).replace("°", "deg").replace("⁻¹", "-1").replace("%", " % ")
+    plain = (
+        re.sub("[µμ]", "u", re.sub('["″]', "inch", text))
+        .replace("°", "deg")
+        .replace("⁻¹", "-1")
+        .replace("%", " % ")
+    )
     plain = re.sub(r"(?i)(?<![^\W\d_])(?:per|pro|por|par)(?![^\W\d_])", "/", plain)
     if len(plain) > 40 or not re.fullmatch(r"[\w\s/.*·⋅^%²-]+", plain):
         return ()

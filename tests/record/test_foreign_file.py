@@ -1,5 +1,6 @@
 """Files of other tools, written by their libraries: what is read of them, and what is refused."""
 
+import json
 import re
 import sys
 from collections.abc import Callable
@@ -49,6 +50,24 @@ def test_files_of_version_7_3_have_the_same_vectors() -> None:
         log["name"] = np.frombuffer(b"drive", "S1")
         file["data"] = np.array([[1.0] * 5, [4.0] * 5])
     checked(adapters._of_hdf5(stream.getvalue()))
+
+
+@pytest.mark.parametrize(
+    ("content", "text"),
+    [
+        ({"units": "m", "slow": [[0, 1.5]], "fast": [[0, 1.5], [1, 2]]}, "0,1.5\n1,2.0\n"),
+        ({"meta": {"b": [1, 2]}, "data": [{"t": each} for each in range(3)]}, "t\n0\n1\n2\n"),
+        ({"log": {"name": "axis", "t": [0, 1], "x": [2, 3], "n": []}}, "t,x\n0,2\n1,3\n"),
+    ],
+)
+def test_json_has_rows_or_vectors(content: object, text: str) -> None:
+    assert adapters._of_json(json.dumps(content).encode()) == text
+
+
+def test_json_without_a_table_is_refused() -> None:
+    for content in ({}, [], 7, {"a": [], "b": "c"}, [1.0, 2.0]):
+        with pytest.raises(SystemExit, match="neither a list of rows nor vectors"):
+            adapters._of_json(json.dumps(content).encode())
 
 
 def _external(group: h5py.Group, other: Path) -> None:

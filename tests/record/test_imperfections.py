@@ -109,6 +109,9 @@ def test_tables_have_the_sentences_and_files_two_clocks(tmp_path: Path) -> None:
     assert "until the reference has moved by 200 µm" in notes
     assert "N to either side each 2 mm" in notes, notes
     assert "force has times of its own, those of column 2:t" in notes
+    del columns["reference"]
+    unasked = read_table(first, columns, form=TableFormat(second=second, shift=-100.0))
+    assert "until column motor [mm] has moved by 200 µm" in " ".join(unasked.notes)
     half = read_table(first, columns, form=TableFormat(second=second, shift=-104.0))
     assert "and is not known at 67% of the others" in " ".join(half.notes)
     assert np.isnan(half.forces.force[-900:]).all()

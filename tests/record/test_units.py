@@ -28,12 +28,12 @@ HEADERS = {
         "|x-mm|x_mm|x [mm]"
         "|x (mm)|x <mm>|X_MM|Position mm (act)|pos_mm_act|déplacement en mm|Posición (mm)"
         "|spostamento [mm]"
-        "|Weg in Millimeter|Weg (in mm)|course (millimètres)|x [1e-3 m]|mm",
+        "|Weg in Millimeter|位移mm|Weg (in mm)|course (millimètres)|x [1e-3 m]|mm",
         1e-6: "x [um]|x (µm)|x [micron]|vdcdt_um|Weg / µm",
         1e-4: "x [0.1 mm]|x (0,1 mm)",
         1e-2: "pos_cm",
         1e-9: "pos_nm",
-        0.0254: "X [in]|X [inch]|x_inch|x / in|Position, in|position in inches|Weg in Zoll"
+        0.0254: "X [in]|X [inch]|x_inch|x / in|x [″]|Position, in|position in inches|Weg in Zoll"
         "|posición en pulgadas",
         2.54e-5: "X (thou)|x_mil",
         1.0: "x [m]|x_m|Weg in m|tacho_meters|phi_rad",
@@ -55,7 +55,7 @@ HEADERS = {
         "|giri/min|motor rev/min",
         TURN: "n [rev/s]|f [Hz]",
         DEGREE: "w [deg/s]|w_deg_s",
-        DOUBTFUL: "n [1/s]|vel_counts_s|v [mm]|erpm",
+        DOUBTFUL: "n [1/s]|vel_counts_s|v [mm]|erpm|v_mm|speed_ms",
         NO_UNIT: "v|v_m|v_s|v_min|v_max|Servo motor speed|vel",
     },
     "N": {
@@ -64,7 +64,7 @@ HEADERS = {
         1e-3: "torque_mNm|M [N mm]|F [mN]",
         10.0: "F_daN",
         9.80665: "load [kgf]",
-        DOUBTFUL: "force_mn|I [A]|load [kg]|torque [%]",
+        DOUBTFUL: "force_mn|I [A]|load [kg]|torque [%]|force_kg|cell_mV|u_V|p_bar",
         NO_UNIT: "F|force|torque|u|A|current_A|x_max",
     },
 }  # fmt: skip
