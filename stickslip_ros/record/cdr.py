@@ -102,7 +102,6 @@ class Decoder:
         self._advance(alignment=4, size=8)
 
     def _advance(self, alignment: int, size: int) -> int:
-        """Skip the next field and return where it starts."""
         offset = -(-(self._place - _ENCAPSULATION) // alignment) * alignment
         start = _ENCAPSULATION + offset
         if start + size > len(self.data):

@@ -5,11 +5,7 @@ from typing import Any
 
 from typing_extensions import override
 
-from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.record.table_columns import Table
-
-SECOND = "2:"
-"""What comes before the name or number of a column of the second table."""
+from stickslip_ros.record.table_columns import SECOND, Table
 
 
 class JoinedTable(Table):
@@ -19,7 +15,8 @@ class JoinedTable(Table):
         """Take both tables."""
         self.path, self.form, self.period = first.path, first.form, first.period
         self.decimal = first.decimal
-        self._tables, self._width = (first, second), len(first.names)
+        self._tables = first, second
+        self.second_from = self._width = len(first.names)
         self.names, self.units = [*first.names, *second.names], [*first.units, *second.units]
         later = {f"{SECOND}{name}": self._width + at for name, at in second.columns.items()}
         self.columns = {**first.columns, **later}
@@ -55,30 +52,3 @@ class JoinedTable(Table):
     @override
     def line(self, row: int) -> str:
         return self._tables[0].line(row)
-
-    @override
-    def name(self, place: int) -> str:
-        if place < self._width:
-            return self._tables[0].name(place)
-        return self._tables[1].name(place - self._width).replace("column ", f"column {SECOND}", 1)
-
-    @override
-    def number(self, place: int) -> str:
-        if place < self._width:
-            return self._tables[0].number(place)
-        return f"'{SECOND}{self._tables[1].number(place - self._width)}'"
-
-    @override
-    def clock_beside(self, clock: Sequence[int], places: Sequence[int]) -> tuple[int, ...]:
-        later = [place >= self._width for place in places]
-        if not any(later):
-            return ()
-        if not all(later):
-            names = " and ".join(map(self.name, places))
-            raise InvalidInputError(f"{self.path}: {names} have clocks of their own")
-        first, second = self._tables
-        found: list[int] = []
-        for place in clock:
-            names = [name for name, each in first.columns.items() if each == place]
-            found += [second.columns[name] for name in names if name in second.columns][-1:]
-        return tuple(self._width + place for place in found)

@@ -80,8 +80,6 @@ _CHUNK_HEAD_SIZE = HEAD.size + _CHUNK_LENGTH + 4
 
 
 class _Record(NamedTuple):
-    """A record of a file, and the content if it is a chunk."""
-
     opcode: int
     start: int
     end: int
@@ -274,7 +272,6 @@ class McapFile:
             self._add_gap(start, start + HEAD.size + len(content))
 
     def _add_gap(self, start: int, end: int) -> None:
-        """Note that these bytes cannot be read."""
         self._gaps[start] = max(end, self._gaps.get(start, end))
 
     def _define(
@@ -320,7 +317,6 @@ class McapFile:
         return _Record(opcode if begin + length <= self._size else 0, start, begin + length)
 
     def _is_loose(self, record: _Record) -> bool:
-        """Whether a record is a message outside chunks."""
         channel = int.from_bytes(self._read(record.begin, record.begin + 2), "little")
         sound = channel in self.channels and MESSAGE_LENGTH <= record.end - record.begin <= LARGEST
         # If a file has chunks, all messages are in them; this is damaged data.

@@ -156,7 +156,6 @@ def _information(
 
 
 def _listed(metadata: Path) -> set[str]:
-    """Return the files that a `metadata.yaml` lists."""
     with TextIOWrapper(open_regular(metadata), encoding="utf-8") as file:
         text = file.read(_LARGEST_METADATA + 1)
     if len(text) > _LARGEST_METADATA:

@@ -97,8 +97,6 @@ class MotionReader:
 
 @dataclass(frozen=True)
 class _Joint:
-    """The slide among the joints."""
-
     name: str | None
     """None for the slide of our plant."""
     layout_of: Callable[[bytes], Layout]

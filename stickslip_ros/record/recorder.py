@@ -215,7 +215,6 @@ class Recorder:
         self.close()
 
     def _open_file(self) -> None:
-        """Start the next file."""
         path = self.directory / f"{self.directory.name}_{self._files}.mcap"
         self._file = FileWriter(path, self._compression, self._definitions)
         self._add_message = self._file.writer.add_message
@@ -244,7 +243,6 @@ class Recorder:
         _sync_directories([self.directory])
 
     def _in_background(self, task: Callable[..., None], *arguments: Any) -> Future[None]:
-        """Queue a task for the background thread."""
         self._tasks.append(self._background.submit(task, *arguments))
         return self._tasks[-1]
 

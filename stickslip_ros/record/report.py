@@ -103,7 +103,7 @@ def report_of_recording(
     ) as recording:
         meter = _meter_for(recording, window, stick_speed, observer)
         if part.is_whole:
-            meter.published = _published_at_recording(recording)
+            meter.published = _kept_number(recording, "timing", "published")
         run = RunFeed(meter, part, observer, take, slips)
         # Measuring each chunk by itself would take twice as long.
         for block in recording.blocks(least=20_000):
@@ -120,8 +120,9 @@ def _meter_for(
     stick_speed: float | None,
     observer: RunObserver | None,
 ) -> RunMeter:
+    kept = _kept_number(recording, "analyzer", "window") or 0
     meter = RunMeter(
-        window or _window_at_recording(recording),
+        window or (kept if 0 < kept <= 100_000 else _DEFAULT_WINDOW),
         dropped_known=recording.dropped_known,
         observer=observer,
         reading=reading_at_recording(recording, stick_speed),
@@ -145,7 +146,6 @@ def _nothing_in(
 def _completed(
     report: dict[str, Any], recording: Recording | TableRecording, *, has_states: bool
 ) -> dict[str, Any]:
-    """Return a report with what the recording lacks."""
     notes, missing = [*recording.notes, *report["notes"]], recording.missing
     plant = recording.metadata("stickslip_ros/plant") or {}
     if report["peak_force"] is None and plant.get("expects_control") == "true":
@@ -174,24 +174,12 @@ def reading_at_recording(
 
 def _timing_of_recording(recording: Recording | TableRecording) -> Timing | None:
     kept = recording.metadata("stickslip_ros/timing") or {}
-    try:
-        timing = Timing(*(int(kept[name]) for name in Timing._fields))
-    except (KeyError, ValueError):
-        return None
-    return timing if min(timing) >= 0 and max(timing) == timing.samples else None
-
-
-def _published_at_recording(recording: Recording | TableRecording) -> int | None:
-    kept = recording.metadata("stickslip_ros/timing") or {}
     with suppress(KeyError, ValueError):
-        return int(kept["published"])
-    return None
+        timing = Timing(*(int(kept[name]) for name in Timing._fields))
+        return timing if min(timing) >= 0 and max(timing) == timing.samples else None
 
 
-def _window_at_recording(recording: Recording | TableRecording) -> int:
-    kept = recording.metadata("stickslip_ros/analyzer") or {}
-    try:
-        window = int(kept["window"])
-    except (KeyError, ValueError):
-        return _DEFAULT_WINDOW
-    return window if 0 < window <= 100_000 else _DEFAULT_WINDOW
+def _kept_number(recording: Recording | TableRecording, table: str, name: str) -> int | None:
+    kept = recording.metadata(f"stickslip_ros/{table}") or {}
+    with suppress(KeyError, ValueError):
+        return int(kept[name])

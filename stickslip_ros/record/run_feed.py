@@ -205,8 +205,6 @@ class RunFeed:
 
 
 class _SlipSearch:
-    """Looks for slips in both directions."""
-
     def __init__(self, threshold: SlipThreshold) -> None:
         self._threshold = threshold
         self._times, self._positions = [np.empty(0)], [np.empty(0)]

@@ -1,9 +1,11 @@
 """The columns of a table in a file, whatever its format."""
 
+import re
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Generator, Iterable, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from itertools import filterfalse
 from math import inf, isfinite, nan
 from pathlib import Path
 from typing import Any
@@ -22,6 +24,9 @@ _OWN_COLUMNS = {
 }
 """Columns of the files that `stickslip simulate --out` writes; the first one that exists."""
 
+SECOND = "2:"
+"""What comes before the name or number of a column of a second table."""
+_NUMBERED = re.compile(rf"(?:{SECOND})?#\d+$")
 ROW = -1
 """Place of the number of a row, which every table has."""
 
@@ -88,6 +93,8 @@ class Table(ABC):
     """Cells of the columns in a line of units; empty without one."""
     clocks: Collection[int] = ()
     """Places of the columns that are dates or times of day, once they are read: they are in s."""
+    second_from: int | None = None
+    """Place of the first column of a second table, which has times of its own."""
     start: int | None = None
     """The first of these instants, ns."""
     period: tuple[float, float] | None = None
@@ -138,14 +145,6 @@ class Table(ABC):
             f"{self.path}: no row has {self.form.where}; {self.name(place)} has {has}"
         )
 
-    def clock_beside(self, clock: Sequence[int], places: Sequence[int]) -> tuple[int, ...]:
-        """Return the places of the times of columns that have others than those of the clock.
-
-        Raises InvalidInputError if they have different ones.
-        """
-        del clock, places
-        return ()
-
     def has(self, text: str) -> bool:
         """Return whether the table has all columns of an expression."""
         try:
@@ -156,13 +155,14 @@ class Table(ABC):
 
     def name(self, place: int) -> str:
         """Return the name of a column for a message."""
-        names = (name for name, each in self.columns.items() if each == place and name[:1] != "#")
-        return f"column {next(names, self.number(place))}"
+        known = (name for name, each in self.columns.items() if each == place)
+        return f"column {next(filterfalse(_NUMBERED.match, known), self.number(place))}"
 
     def number(self, place: int) -> str:
         """Return the number of a column, as expressions have it."""
-        numbers = (name for name, each in self.columns.items() if each == place and name[:1] == "#")
-        return next(numbers, f"#{place + 1}")
+        known = (name for name, each in self.columns.items() if each == place)
+        number = next(filter(_NUMBERED.match, known), f"#{place + 1}")
+        return number if number[0] == "#" else f"'{number}'"
 
     @property
     def own_columns(self) -> dict[str, str]:

@@ -15,7 +15,7 @@ from stickslip_ros.record.expressions import Expression
 from stickslip_ros.record.faults import Jumps, lost_velocities, shift_note
 from stickslip_ros.record.imperfections import play_note, ripple_note
 from stickslip_ros.record.table_clock import check_turns, even_times, in_order, unit_of_steps
-from stickslip_ros.record.table_columns import ROW, Table, reading_file
+from stickslip_ros.record.table_columns import ROW, SECOND, Table, reading_file
 from stickslip_ros.record.units import Unit, is_acceleration, units_in
 from stickslip_ros.samples import LARGEST
 from stickslip_ros.stamps import NANOSECONDS
@@ -179,7 +179,7 @@ class _Cells:
         if not rows:
             raise BagError(f"{table.path}: the file cannot be read: it has no rows")
         for place, column in columns.items():
-            lead = (table.clock_beside(leading, [place]) or leading)[0]
+            lead = (_clock_beside(table, leading, [place]) or leading)[0]
             if len(column) not in (1, len(columns[lead])):
                 raise InvalidInputError(
                     f"{table.path}: {table.name(place)} has {len(column)} numbers and "
@@ -271,7 +271,7 @@ class _Cells:
             since, own = each - first if first else each, factor
             if places != clock:
                 own, units = _factor(self.table, "time", replace(asked, places=places))
-                if not (units or self.table.clock_beside(clock, places)):
+                if not (units or _clock_beside(self.table, clock, places)):
                     own = factor
                 if own != factor:
                     since, own = each * own - first * factor, 1.0
@@ -329,7 +329,7 @@ def _clocks(table: Table, clock: tuple[int, ...], asked: Expression) -> tuple[in
     They are those of the time or, if this is one column, the last one before a column that is named
     like it, such as Time_2 after Time_1.
     """
-    if clock[0] != ROW and (beside := table.clock_beside(clock, asked.places)):
+    if beside := _clock_beside(table, clock, asked.places):
         return beside
     stems, first = [_NUMBER.sub("", name) for name in table.names], clock[0]
     if len(clock) > 1 or first == ROW or not stems[first]:
@@ -340,6 +340,22 @@ def _clocks(table: Table, clock: tuple[int, ...], asked: Expression) -> tuple[in
         for place in asked.places
     }
     return tuple(own) if len(own) == 1 and alike[0] == first else clock
+
+
+def _clock_beside(table: Table, clock: Sequence[int], places: Sequence[int]) -> tuple[int, ...]:
+    """Return the times of columns of a second table, which are named like those of the clock."""
+    first = table.second_from
+    later = [first is not None and place >= first for place in places]
+    if not any(later):
+        return ()
+    if not all(later):
+        names = " and ".join(map(table.name, places))
+        raise InvalidInputError(f"{table.path}: {names} have clocks of their own")
+    found: list[int] = []
+    for place in clock:
+        names = [SECOND + name for name, each in table.columns.items() if each == place]
+        found += [table.columns[name] for name in names if name in table.columns][-1:]
+    return tuple(found)
 
 
 def _of_another_clock(
@@ -359,7 +375,6 @@ def _of_another_clock(
 
 
 def _times(clock: Expression, cells: Sequence[Any]) -> Any:
-    """Return the times that a table has, in its unit."""
     counts = len(cells) > 1 or cells[0].dtype.kind == "i"
     exact = np.longdouble if counts else float  # a float has no digits for ns since 1970
     return clock.value([np.asarray(each, exact) for each in cells])
@@ -368,7 +383,6 @@ def _times(clock: Expression, cells: Sequence[Any]) -> Any:
 def _lost_cells(
     table: Table, cells: Mapping[int, Any], asked: Mapping[str, Expression]
 ) -> Iterator[str]:
-    """Yield sentences on cells that are left out."""
     for place in dict.fromkeys(place for each in asked.values() for place in each.places):
         column = cells[place]
         if column.min() >= -LARGEST and column.max() <= LARGEST:
@@ -425,7 +439,6 @@ def _factor(table: Table, kind: str, asked: Expression) -> tuple[float, dict[str
 
 
 def _units_notes(table: Table, found: Mapping[str, Unit]) -> Iterator[str]:
-    """Yield sentences on the units of columns."""
     if found:
         units = [f"{name}: {each.text}" for name, each in found.items()]
         yield f"units: {'; '.join(dict.fromkeys(units))}"
@@ -459,7 +472,6 @@ def _measurable(values: FloatArray) -> FloatArray:
 
 
 def _picked(values: FloatArray, rows: range | IntArray) -> FloatArray:
-    """Return the values of some rows, or of all, which is a range."""
     return values if isinstance(rows, range) else values[rows]
 
 

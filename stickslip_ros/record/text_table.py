@@ -62,7 +62,6 @@ class TextTable(Table):
         return cells.pop() if behind and behind[0] in NO_UNITS[3:] and len(cells) == 1 else ""
 
     def _turn(self, place: int) -> tuple[str, list[str]] | None:
-        """Return the values of a column that take turns, and its name."""
         cells = [row[place] for row in self._text.first_rows]
         turn = [*dict.fromkeys(cells)]
         in_turn = all(cell == turn[row % len(turn)] for row, cell in enumerate(cells))
@@ -128,7 +127,6 @@ class TextTable(Table):
         return [self._joined(parts.pop(place)) for place in places]
 
     def _frames(self) -> Iterator[Any]:
-        """Yield the rows, in parts, as frames of pandas."""
         import pandas as pd
 
         text = self._text

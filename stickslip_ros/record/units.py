@@ -218,7 +218,6 @@ def _read(text: str, target: str) -> Iterator[Unit]:
 
 @cache
 def _factor(unit: str, target: str) -> float:
-    """Return by what numbers of a unit are multiplied for another one."""
     if unit == target:
         return 1.0
     if "turn" in unit:
