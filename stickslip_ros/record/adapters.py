@@ -59,7 +59,10 @@ def _of_hdf5(content: bytes) -> Vectors:
             if isinstance(each, h5py.Group):
                 yield from of_group(f"{prefix}{name}.", each)
             elif each.dtype.kind in "biuf":
-                yield from _vectors(prefix + name, np.squeeze(each[()].T))
+                unit = each.attrs.get("units", each.attrs.get("unit", ""))
+                unit = unit.decode() if isinstance(unit, bytes) else str(unit)
+                for key, _, values in _vectors(prefix + name, np.squeeze(each[()].T)):
+                    yield key, unit, values
 
     with h5py.File(BytesIO(content)) as file:
         yield from of_group("", file)
@@ -97,6 +100,10 @@ def _of_numpy(content: bytes) -> Vectors:
             yield from _vectors(name, np.squeeze(arrays[name]))
 
 
+def _of_array(content: bytes) -> Vectors:
+    return _vectors("data", np.squeeze(np.load(BytesIO(content), allow_pickle=False)))
+
+
 def _of_excel(content: bytes) -> str:
     import pandas as pd
 
@@ -112,6 +119,8 @@ def _of_parquet(content: bytes) -> str:
     import pandas as pd
 
     table: Any = pd.read_parquet(BytesIO(content), engine="pyarrow")
+    for name in table.select_dtypes("timedelta"):
+        table[name] = table[name].dt.total_seconds()
     has_index = not isinstance(table.index, pd.RangeIndex)
     return table.to_csv(index=has_index)
 
@@ -217,5 +226,6 @@ BY_END = {
     **dict.fromkeys((".mat", ".h5", ".hdf5"), MAT),
     **dict.fromkeys((".yaml", ".yml"), _YAML),
     ".json": _JSON,
+    ".npy": Adapter("a numpy array", "numpy", _of_array),
 }
 """Adapters by the end of its name."""

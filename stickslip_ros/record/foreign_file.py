@@ -64,7 +64,7 @@ def _main(form: str, most: int) -> None:
             sys.stdout.buffer.write(_TEXT + table.encode())
             return
         # With a sign in its name, for numpy takes some names itself.
-        vectors = {f"{unit}={name}": values for name, unit, values in table}
+        vectors = {f"{unit.replace('=', ' ')}={name}": values for name, unit, values in table}
     if sum(map(len, vectors.values())) > most:
         sys.exit(f"it has more than {most} numbers")
     target = BytesIO()

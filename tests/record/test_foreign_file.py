@@ -70,6 +70,22 @@ def test_json_without_a_table_is_refused() -> None:
             adapters._of_json(json.dumps(content).encode())
 
 
+def test_vectors_have_the_units_of_their_attributes() -> None:
+    stream = BytesIO()
+    with h5py.File(stream, "w") as file:
+        for name, unit in {"x": "mm", "t": b"ms"}.items():
+            file[name] = TIME
+            file[name].attrs["unit"] = unit
+    assert [found[:2] for found in adapters._of_hdf5(stream.getvalue())] == [
+        ("t", "ms"),
+        ("x", "mm"),
+    ]
+    array = BytesIO()
+    np.save(array, np.column_stack([TIME, 2.0 * TIME]))
+    found = {name: each.tolist() for name, _, each in adapters._of_array(array.getvalue())}
+    assert found == {"data[1]": TIME.tolist(), "data[2]": (2.0 * TIME).tolist()}
+
+
 def _external(group: h5py.Group, other: Path) -> None:
     group.create_dataset("x", (8,), "u1", external=[(str(other), 0, 8)])
 
