@@ -166,28 +166,28 @@ def _of_json(content: bytes) -> str:
     """Read the longest list of rows, or the vectors, that are anywhere in objects of objects."""
     import pandas as pd
 
-    found: dict[str, Any] = {}
+    tables: dict[str, Any] = {}
 
     def search(name: str, value: Any) -> None:
         if isinstance(value, list) and value and isinstance(value[0], list | dict):
-            found[name] = pd.DataFrame(value)
+            tables[name] = pd.DataFrame(value)
         elif isinstance(value, dict):
             parts: dict[str, Any] = value
-            vectors = {key: each for key, each in parts.items() if each and isinstance(each, list)}
-            numbers = {key: each for key, each in vectors.items() if type(each[0]) in (int, float)}
+            vectors = {key: item for key, item in parts.items() if item and isinstance(item, list)}
+            numbers = {key: item for key, item in vectors.items() if type(item[0]) in (int, float)}
             if len({*map(len, numbers.values())}) == 1:
-                found[name] = pd.DataFrame(numbers)
-            for key, each in parts.items():
-                search(f"{name}.{key}".strip("."), each)
+                tables[name] = pd.DataFrame(numbers)
+            for key, item in parts.items():
+                search(f"{name}.{key}".strip("."), item)
 
     search("", json.loads(content))
-    if not found:
+    if not tables:
         sys.exit("it is JSON, and has neither a list of rows nor vectors")
-    name = max(found, key=lambda each: len(found[each]))
-    if len(found) > 1:
-        print(f"{name} is read, the longest of {', '.join(found)}", file=sys.stderr)
-    named = any(isinstance(each, str) for each in found[name].columns)
-    return found[name].to_csv(index=False, header=named)
+    name = max(tables, key=lambda item: len(tables[item]))
+    if len(tables) > 1:
+        print(f"{name} is read, the longest of {', '.join(tables)}", file=sys.stderr)
+    named = any(isinstance(item, str) for item in tables[name].columns)
+    return tables[name].to_csv(index=False, header=named)
 
 
 def _fields(name: str, value: Any) -> Iterator[tuple[str, Any]]:

@@ -51,7 +51,7 @@ def play_note(
     )
     through = by_reference > _INSIDE * play
     count = np.count_nonzero(through)
-    spread = max(rms(each - np.median(each)) for each in sides)
+    spread = max(rms(side - np.median(side)) for side in sides)
     if count < _PASSAGES or spread > _SPREAD * play:
         return
     if np.mean(by_position[through] < _STANDING * by_reference[through]) >= _USUAL:
@@ -111,13 +111,13 @@ def ripple_note(
     if np.max(by_time) > _AS_GOOD * power / len(at):
         return
     near = np.linspace(peak - 1.0, peak + 1.0, 41)
-    turns = near[np.argmax([abs(weighted @ np.exp(1j * np.pi * each * place)) for each in near])]
+    turns = near[np.argmax([abs(weighted @ np.exp(1j * np.pi * turn * place)) for turn in near])]
     waves = np.column_stack([causes, np.cos(np.pi * turns * place), np.sin(np.pi * turns * place)])
     amplitude = float(np.hypot(*np.linalg.lstsq(waves, pull)[0][-2:]))
     if amplitude > _LEAST * rms(pull):
         length, size = (
-            quantity(float(f"{each:.2g}"), unit)
-            for each, unit in zip((2.0 * span / turns, amplitude), units, strict=True)
+            quantity(float(f"{value:.2g}"), unit)
+            for value, unit in zip((2.0 * span / turns, amplitude), units, strict=True)
         )
         yield f"the force ripples over the position, by {size} to either side each {length}"
 
@@ -126,7 +126,7 @@ def _line(cell: IntArray, values: FloatArray, bounds: Sequence[int]) -> tuple[in
     """Return the double of the frequency of a line that passes have in common, and its power."""
     cells = int(cell.max()) + 1
     total, single = np.zeros(cells // 2, complex), np.zeros(cells // 2)
-    passes = [slice(*each) for each in pairwise(bounds)]
+    passes = [slice(*pair) for pair in pairwise(bounds)]
     for part in sorted(passes, key=lambda part: part.start - part.stop)[:_PASSES]:
         wave = np.fft.rfft(np.bincount(cell[part], values[part], 2 * cells))[: cells // 2]
         total += wave

@@ -18,7 +18,7 @@ class JoinedTable(Table):
         self._tables = first, second
         self.second_from = self._width = len(first.names)
         self.names, self.units = [*first.names, *second.names], [*first.units, *second.units]
-        later = {f"{SECOND}{name}": self._width + at for name, at in second.columns.items()}
+        later = {f"{SECOND}{name}": self._width + place for name, place in second.columns.items()}
         self.columns = {**first.columns, **later}
 
     @property
@@ -35,19 +35,19 @@ class JoinedTable(Table):
     @override
     def read(self, places: Sequence[int]) -> list[Any]:
         """Return columns, which have the lengths of their tables; times of both have one zero."""
-        columns, clocks, starts = dict[int, Any](), set[int](), list[int | None]()
+        columns, clocks, starts = dict[int, Any](), set[int](), list[tuple[str, int] | None]()
         for table, offset in zip(self._tables, (0, self._width), strict=True):
-            own = [at for at in places if (at < self._width) == (offset == 0)]
-            found = table.read([at - offset for at in own]) if own else []
-            columns |= dict(zip(own, found, strict=True))
-            clocks |= {at + offset for at in table.clocks}
+            used = [place for place in places if (place < self._width) == (offset == 0)]
+            values = table.read([place - offset for place in used]) if used else []
+            columns |= dict(zip(used, values, strict=True))
+            clocks |= {place + offset for place in table.clocks}
             starts.append(table.start)
         first, second = starts
-        for at in clocks:
-            if at >= self._width and first is not None and second is not None:
-                columns[at] = columns[at] + (second - first) / 1e9
+        for place in clocks:
+            if place >= self._width and first and second and first[0] == second[0]:
+                columns[place] = columns[place] + (second[1] - first[1]) / 1e9
         self.clocks = clocks
-        return [columns[at] for at in places]
+        return [columns[place] for place in places]
 
     @override
     def line(self, row: int) -> str:

@@ -67,6 +67,8 @@ def in_order(
         what += f", where a session of its own starts: --session 1 takes the first of {sizes} rows"
     else:
         what += ": rows must be in the order of time"
+        if table.period:
+            what += f"; without one they are {table.period[0]:g} s apart, by a line above them"
     raise InvalidInputError(f"{table.path}: the time {what}")
 
 

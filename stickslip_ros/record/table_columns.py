@@ -95,8 +95,8 @@ class Table(ABC):
     """Places of the columns that are dates or times of day, once they are read: they are in s."""
     second_from: int | None = None
     """Place of the first column of a second table, which has times of its own."""
-    start: int | None = None
-    """The first of these instants, ns."""
+    start: tuple[str, int] | None = None
+    """Their kind, as numpy has it, and the first of them, ns."""
     period: tuple[float, float] | None = None
     """Period of the rows that a line above them tells, s and in its own unit."""
     decimal = "."

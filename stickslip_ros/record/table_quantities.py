@@ -309,16 +309,18 @@ def _asked(
 
 def _driving_column(table: Table, asked: Mapping[str, Expression]) -> Expression | None:
     """Return the column that may be the position of what drives the slide, if there is one."""
-    used = {place for each in asked.values() for place in each.places}
+    used = {place for expression in asked.values() for place in expression.places}
     if "reference" in asked or len(asked["position"].places) != 1:
         return None
+    position = asked["position"].places[0]
+    known = units_in(table.names[position], table.units[position], "m")
+    factors = [unit.factor for unit in known]
     for place, name in enumerate(table.names):
         words = re.findall(r"[^\W\d_]+", name)
         if place in used or not any(map(_DRIVES.match, words)):
             continue
-        readings = units_in(name, table.units[place], "m")
-        known = units_in(table.names[(own := asked["position"].places[0])], table.units[own], "m")
-        if asked["position"].bare and readings == known and len(readings) <= 1:
+        readings = [unit.factor for unit in units_in(name, table.units[place], "m")]
+        if asked["position"].bare and readings == factors and len(readings) <= 1:
             return Expression.read(table.path, table.number(place), table.columns)
     return None
 
@@ -351,11 +353,11 @@ def _clock_beside(table: Table, clock: Sequence[int], places: Sequence[int]) -> 
     if not all(later):
         names = " and ".join(map(table.name, places))
         raise InvalidInputError(f"{table.path}: {names} have clocks of their own")
-    found: list[int] = []
+    times: list[int] = []
     for place in clock:
-        names = [SECOND + name for name, each in table.columns.items() if each == place]
-        found += [table.columns[name] for name in names if name in table.columns][-1:]
-    return tuple(found)
+        names = [SECOND + name for name, column in table.columns.items() if column == place]
+        times += [table.columns[name] for name in names if name in table.columns][-1:]
+    return tuple(times)
 
 
 def _of_another_clock(

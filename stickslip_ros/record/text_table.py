@@ -115,8 +115,9 @@ class TextTable(Table):
                 kept.append(frame.index.to_numpy())
                 for place in places:
                     parts[place].append(self._values(frame[place]))
-        found = [number for each in caught for number in _SKIPPED.findall(str(each.message))]
-        self._refused = [self._text.first + int(number) for number in found]
+        texts = (str(warning.message) for warning in caught)
+        skipped = [number for text in texts for number in _SKIPPED.findall(text)]
+        self._refused = [self._text.first + int(number) for number in skipped]
         self._kept = np.concatenate(kept)
         if wanted is not None and not len(self._kept):
             texts = (row[wanted[0]] for row in self._text.first_rows)
@@ -166,8 +167,9 @@ class TextTable(Table):
         known = ~np.isnat(values)
         since, instants = np.full(len(values), np.nan), values[known].astype(np.int64)
         if len(instants):
-            self.start = int(instants[0]) if self.start is None else self.start
-            since[known] = (instants - self.start) / 1e9
+            kind, first = values.dtype.kind, int(instants[0])
+            self.start = self.start or (kind, first)
+            since[known] = (instants - (self.start[1] if self.start[0] == kind else first)) / 1e9
         if values.dtype.kind == "m":
             since[known] = np.unwrap(since[known], period=_DAY)
         return since

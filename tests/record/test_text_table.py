@@ -415,7 +415,7 @@ def test_what_is_said_of_the_form_is_used(
     [
         ("log.xls", b"\xd0\xcf\x11\xe0\0\1", "save it as .xlsx"),
         ("log.wav", b"RIFF\0\1", "wavfile"),
-        ("log.json", b'{"rows": [[1, 2],', "pandas"),
+        ("log.svdx", b"PK\3\4", "TwinCAT Scope"),
     ],
 )
 def test_files_of_other_tools_are_refused_by_name(
