@@ -119,6 +119,23 @@ def test_of_several_joints_one_must_be_chosen(tmp_path: Path) -> None:
     assert not run.samples.belt_velocity.any()
 
 
+def test_what_the_analyzer_used_holds_beside_other_options(tmp_path: Path) -> None:
+    messages = [
+        (
+            STATES,
+            recorded(i),
+            state(recorded(i), ["elbow", "axis"], [0.1, x], [0.0, 1.0], [2.0, 3.0]),
+        )
+        for i, x in enumerate(POSITION.tolist())
+    ]
+    kept = {"joint": '"axis"', "belt_joint": '"elbow"', "force_type": '"effort"'}
+    write_bag(tmp_path / "bag", messages, tables={"stickslip_ros/analyzer": kept})
+    for layout, effort in (({}, 3.0), ({"time": "log"}, 3.0), ({"joint": "elbow"}, 2.0)):
+        run = ss.read_bag(tmp_path / "bag", **layout)
+        assert np.array_equal(run.samples.position == 0.1, [effort == 2.0] * len(TIME))
+        assert set(run.forces.force) == {effort}
+
+
 def test_joints_in_messages_of_their_own_are_several(tmp_path: Path) -> None:
     write_bag(
         tmp_path / "bag",
