@@ -8,8 +8,8 @@ import numpy as np
 from stickslip_ros.arrays import FloatArray, IntArray, rms
 from stickslip_ros.text import quantity
 
-_FEWEST = 200
-"""Fewest samples that are judged."""
+_FEWEST, _MOST = 200, 1 << 18
+"""Fewest samples that are judged, and most of a ripple."""
 _INSIDE, _SPREAD, _STANDING = 0.3, 0.05, 0.1
 """Distance from the middle of a play that is inside, its spread at the sides, and how far the
 position may move inside for each move of the reference."""
@@ -73,7 +73,7 @@ def ripple_note(
     rarely. A vibration that starts at each reversal, and explains the residual as well, is none.
     The arrays have the shape (samples,), `units` are those of position and force.
     """
-    known = np.isfinite(time) & np.isfinite(position) & np.isfinite(force)
+    known = np.flatnonzero(np.isfinite(time) & np.isfinite(position) & np.isfinite(force))[:_MOST]
     time, position, force = time[known], position[known], force[known]
     middle = slice(_AROUND, len(time) - _AROUND)
     if len(time) < _FEWEST:
