@@ -262,6 +262,8 @@ class Recording:
         for reading in _RunReader(self._drive).blocks(least):
             self._readings[JOINT_STATES.name] = replace(reading, columns=None)
             yield reading.columns
+        if self.topics.get(self._drive.name(JOINT_STATES)) == CONTROLLER_STATE:
+            _ = self.references  # of which there may be a note
 
     @cached_property
     def _run(self) -> RunBlock:
