@@ -260,7 +260,7 @@ def identify(
     progress : callable, optional
         Receives the name of the friction law that is tried.
     time_limit : float, optional
-        Processor time for `"auto"`, s, after which the best law so far is taken.
+        Work for `"auto"`, in s of a usual processor, after which the best law so far is taken.
 
     Returns
     -------

@@ -43,7 +43,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=float,
         default=60.0,
         metavar="S",
-        help="processor time for auto, s; then the best law so far is taken (default: %(default)g)",
+        help="work for auto, in s of a usual processor on any machine; then the best law so far is "
+        "taken (default: %(default)g)",
     )
     parser.add_argument(
         "--fix",

@@ -51,6 +51,8 @@ class Filtered:
     """Whether rows are decimated; otherwise they are those where the slide clearly slips."""
     weight: FloatArray | None
     """Weight of each sample in decimated rows, 0 where the slide rests; None: it never does."""
+    path: float | None
+    """Path behind a reversal that is left out, m; None: only near rests."""
     slipping: BoolArray
     """Whether the slide clearly slips, in one direction, for half of the length of the filter on
     both sides: such rows are to start a search."""
@@ -94,11 +96,15 @@ def _chebyshev(decimation: int) -> FloatArray:
     return np.asarray(cheby1(8, 0.05, 0.8 / decimation, output="sos"))
 
 
-def filtered(record: Record, *, decimated: bool, delay: float | None = None) -> Filtered:
+def filtered(
+    record: Record, *, decimated: bool, delay: float | None = None, path: float | None = None
+) -> Filtered:
     """Return the filtered columns of a record, without both ends.
 
     Rows are decimated for motions whose friction changes slowly. `delay` is the time from a sample
-    until its force acts, s; by default the force at a sample is the one that answers it.
+    until its force acts, s; by default the force at a sample is the one that answers it. With a
+    path, m, rows near all reversals are left out, and those until the slide has gone as far; by
+    default only those near rests.
     """
     from scipy.signal import butter, filtfilt  # takes long to import
 
@@ -117,7 +123,8 @@ def filtered(record: Record, *, decimated: bool, delay: float | None = None) -> 
     # The velocity is meant over the same time.
     velocity[1:-1] -= np.diff(velocity, 2) / 12.0
     relative = velocity - smooth(record.belt_velocity)
-    weight = _moving_weight(record, relative, acceleration, rate / cutoff) if decimated else None
+    width = rate / cutoff
+    weight = _moving_weight(record, relative, acceleration, width, path) if decimated else None
     if weight is not None:
         # The low-pass would carry the jump where the slide stops into the rows beside it; that of
         # the rows is enough for noise.
@@ -136,6 +143,7 @@ def filtered(record: Record, *, decimated: bool, delay: float | None = None) -> 
         force[inside],
         decimated,
         weight,
+        path,
         _slipping(relative[inside], 0.5 * rate / cutoff),
         _slipping(relative[inside], 2.0 * rate / cutoff),
     )
@@ -158,21 +166,29 @@ def _slipping(relative: FloatArray, reach: float) -> BoolArray:
 
 
 def _moving_weight(
-    record: Record, relative: FloatArray, acceleration: FloatArray, width: float
+    record: Record,
+    relative: FloatArray,
+    acceleration: FloatArray,
+    width: float,
+    path: float | None,
 ) -> FloatArray | None:
-    """Return the weight of each sample in rows that tell of slip; None if the slide never rests.
+    """Return the weight of each sample in rows that tell of slip; None if all do.
 
     While it rests, friction is what the other forces ask for, and tells nothing of the law. The
-    weight is zero there, near reversals, where it may stick between samples, and at both ends.
-    `width` is the period of the cutoff in samples.
+    weight is zero there, near reversals, where it may stick between samples, up to a path, m,
+    behind them, along which bristles deflect, and at both ends. Without a path it is None if the
+    slide never rests. `width` is the period of the cutoff in samples.
     """
     from scipy.ndimage import maximum_filter1d
 
     left_out = np.zeros(len(relative), bool)
     for low, high in rests(record, relative):
         left_out[low:high] = True
-    if not left_out.any():
+    if path is None and not left_out.any():
         return None
+    place = record.period * np.cumsum(np.abs(relative))
+    turned = np.diff(np.sign(relative), prepend=0.0) != 0.0
+    left_out |= place - np.maximum.accumulate(np.where(turned, place, 0.0)) < (path or 0.0)
     reversing = _REVERSAL_SAMPLES * record.period * np.abs(acceleration)
     left_out |= np.abs(relative) < reversing
     left_out[:START] = left_out[-END:] = True

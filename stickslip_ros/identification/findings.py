@@ -116,6 +116,8 @@ class Findings:
     @property
     def slowest(self) -> float:
         """Slowest speed |v_r| that was recorded for long, m/s."""
+        if slowest := min(float(curve.speed[0]) for curve in self.curves):
+            return slowest  # the curve of an axis without rows near reversals
         speeds = np.concatenate(self._speeds)
         return float(np.quantile(speeds[speeds > _STILL_SPEED * float(speeds.max())], 0.02))
 
@@ -176,6 +178,12 @@ class Findings:
         """
         return cache(self.chosen.free_run)
 
+    def free_run_error(self, record: Record) -> float:
+        """Return the rms error of `free_run`, m; infinite of an unbounded motion."""
+        away = self.free_run(record) - record.position
+        error = rms(away[~(record.lost | (self.chosen.has_spring & np.isnan(away)))])
+        return error if isfinite(error) else inf
+
     @cached_property
     def residuals(self) -> Callable[[Record], Residuals]:
         """What the model leaves of a record.
@@ -192,12 +200,10 @@ class Findings:
         recorded. What is unbounded is infinite.
         """
         record.require_motion()
-        away, has_spring = self.free_run(record) - record.position, self.chosen.has_spring
-        error = rms(away[~(record.lost | (has_spring & np.isnan(away)))])
         check = {
             "force_error": self.force_error(record),
-            "free_run_error": error if isfinite(error) else inf,
-            "segment_error": rms(self.residuals(record).error) if has_spring else None,
+            "free_run_error": self.free_run_error(record),
+            "segment_error": rms(self.residuals(record).error) if self.chosen.has_spring else None,
             "position_error": None,
             "closed_loop_force_error": None,
         }

@@ -177,6 +177,11 @@ class Fit(ABC):
         return 1.0
 
     @property
+    def doubt(self) -> str:
+        """Why the law is not that of the records, as far as they tell; empty: it may be."""
+        return ""
+
+    @property
     def repetition(self) -> int | None:
         """Number of samples after which the errors of position repeat; None if they do not."""
         return None

@@ -32,7 +32,7 @@ FIXABLE = (
 _CONSTANTS = {name for law in LAWS.values() for name in constants_of(law)}
 """Constants of friction laws, those of other packages among them."""
 AUTO_TIME = 60.0
-"""Processor time that the choice of a law may take by default, s."""
+"""Work that the choice of a law may take by default, in s of a usual processor."""
 _FITTING_SHARE = 0.8
 """Share of the time for fits: a step that has begun ends, and predictions follow."""
 _DELAYS = -1.0, 20.0
@@ -88,9 +88,9 @@ def identify(
     A belt that is at rest in all records means an axis that no spring holds, unless a stiffness is
     given: then, and on a belt that moves, the slide is on a spring. `fixed` has the known
     constants, of `FIXABLE`, beside the delay that a record may have. `progress` receives the name
-    of each law before it is fitted. `AUTO` ends after `time_limit`, s, with the best law so far; a
-    single law takes its time. Raises InvalidInputError if a name or a value is not allowed, or no
-    model is identifiable.
+    of each law before it is fitted. `AUTO` ends after the work that a processor usually does in
+    `time_limit`, s, with the best law so far; a single law takes its time. Raises
+    InvalidInputError if a name or a value is not allowed, or no model is identifiable.
     """
     if not records:
         raise InvalidInputError("no recording is given: must be at least one")
@@ -124,7 +124,9 @@ def identify(
     chosen, as_good = choose(in_choice or candidates)
     if isinstance(chosen, Regression):
         chosen.require("mass")
-        chosen = adjusted(chosen, records) if chosen.law.name == TableAdapter.name else chosen
+        # What bristles do near reversals is none of the curve's: a free run has it.
+        if chosen.law.name == TableAdapter.name and chosen.rows.parts[0].path is None:
+            chosen = adjusted(chosen, records)
     return Findings(records, candidates, chosen, as_good, fixed, task.left)
 
 

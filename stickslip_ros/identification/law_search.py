@@ -16,6 +16,7 @@ from stickslip_ros.identification.predictor import Predictor
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.refinement import Refinement
 from stickslip_ros.identification.regression import Regression, regress
+from stickslip_ros.identification.rests import static_force
 from stickslip_ros.identification.rows import LINEAR, Rows
 from stickslip_ros.identification.search import refine
 from stickslip_ros.identification.segment_starts import Errors, best_starts
@@ -32,6 +33,10 @@ _ROUNDING = 1.4
 """Errors, in rounding errors of the encoder, up to which no other start is tried."""
 _WHITE_CORRELATION = 0.3
 """Correlation of successive errors up to which they are noise: rounding leaves some."""
+_EXACT_SHARE = 1e-9
+"""Share of the motion up to which an error is none: recordings of simulations have no noise."""
+_NEAR_SHARE = 1e-3
+"""Share of the motion from which on an error needs no other start."""
 _SHAPES = (0.1, 0.3, 0.8)
 """Shapes from which the search starts, besides that of the regression: shares of the speeds."""
 _GIVEN_UP_LOSS_RATIO = 100.0
@@ -107,7 +112,7 @@ class LawSearch:
         starts = [
             start
             for shape in (None, *shapes)
-            for start in law.starts(self._start(law, self._regression(law.one_way, shape)), fastest)
+            for start in self._starts(law, self._regression(law.one_way, shape), fastest)
         ]
         return self._nearest(law, starts)
 
@@ -126,6 +131,21 @@ class LawSearch:
             if is_white(more) or _is_rounding(more):
                 break
         return min(extended, key=loss_of)
+
+    def _starts(
+        self, law: IdentifiedLaw, fit: Regression, fastest: float
+    ) -> Sequence[Mapping[str, float]]:
+        """Return the coordinates from which a law is searched: first those that rests tell."""
+        values = self._start(law, fit)
+        starts = law.starts(values, fastest)
+        if law.identifiable_in_slip or len(self.rows.directions) > 1:
+            return starts
+        (sign,), static = self.rows.directions, -inf
+        for record in self.records:
+            held = record.held_force + values["bias_force"] - values["stiffness"] * record.position
+            static = max(static, static_force(record, held, sign)[0])
+        rise = static - law.static_force({**values, "rise": 0.0})
+        return [{**values, "rise": rise}, *starts] if rise > 0.0 else starts
 
     def _start(self, law: IdentifiedLaw, fit: Regression) -> dict[str, float]:
         """Return the coordinates that a regression gives, within their bounds."""
@@ -162,6 +182,8 @@ class LawSearch:
             tried.append(refine(short, names, self._known(law, values), most=_FIRST_STEPS))
             if is_white(tried[-1]) or tried[-1].loss > most:
                 return tried[-1:]
+            if rms(tried[-1].residual) < _NEAR_SHARE * tried[-1].scale:
+                break
         settled: list[Refinement] = []
         for near in sorted(tried, key=loss_of)[:_FINALISTS]:
             settled.append(self._settled(near))
@@ -244,8 +266,9 @@ class LawSearch:
 
 
 def is_white(fit: Refinement) -> bool:
-    """Return whether the errors of a fit are noise, as far as their successive ones tell."""
-    return abs(fit.correlation) < _WHITE_CORRELATION
+    """Return whether errors are noise, as far as their successive ones tell, or none."""
+    exact = rms(fit.residual) < _EXACT_SHARE * fit.scale
+    return exact or abs(fit.correlation) < _WHITE_CORRELATION
 
 
 def _is_rounding(fit: Refinement) -> bool:

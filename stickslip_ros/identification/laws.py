@@ -41,6 +41,12 @@ class CoulombAdapter(IdentifiedLaw):
     coordinates: Sequence[str] = ("static", "viscous")
     smallest = "static"
 
+    @override
+    def bounds(self, name: str, values: Values, fastest: float) -> tuple[float, float]:
+        low, high = super().bounds(name, values, fastest)
+        # Friction that falls for ever would drive the slide: other laws fall, and end.
+        return max(low, -values["damping"]) if name == "viscous" else low, high
+
 
 class StictionAdapter(CoulombAdapter):
     """Coulomb friction with stiction, of which slip tells the kinetic friction only."""
@@ -160,6 +166,14 @@ class ExponentialAdapter(IdentifiedLaw):
     @override
     def bounds(self, name: str, values: Values, fastest: float) -> tuple[float, float]:
         return _EXPONENTS if name == "exponent" else super().bounds(name, values, fastest)
+
+
+class GaussianAdapter(ExponentialAdapter):
+    """The exponential law with the exponent n = 2 in a regression."""
+
+    @override
+    def coordinates_of(self, forces: Sequence[float], shape: float) -> dict[str, float]:
+        return {**super().coordinates_of(forces, shape), "exponent": 2.0}
 
 
 class TableAdapter(IdentifiedLaw):
@@ -327,7 +341,7 @@ def _by_direction(values: Values) -> tuple[Values, Values]:
     return values, {**values, **reverse}
 
 
-EXPONENTIAL = ExponentialAdapter()
+EXPONENTIAL, GAUSSIAN = ExponentialAdapter(), GaussianAdapter()
 LUGRE = LuGreAdapter()
 DAHL = DahlAdapter()
 COMPETING: Sequence[IdentifiedLaw] = (

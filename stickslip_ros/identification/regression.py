@@ -9,9 +9,9 @@ from typing_extensions import override
 
 from stickslip_ros.arrays import FloatArray, rms
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.identification.covariance import BLOCKS
+from stickslip_ros.identification.covariance import BLOCKS, block_covariance
 from stickslip_ros.identification.filtered import filtered
-from stickslip_ros.identification.fit import Fit, ForceErrors
+from stickslip_ros.identification.fit import Fit, ForceErrors, Friction
 from stickslip_ros.identification.free_run import free_run
 from stickslip_ros.identification.identified_law import DELAY, IdentifiedLaw
 from stickslip_ros.identification.laws import DirectionalAdapter
@@ -21,6 +21,10 @@ from stickslip_ros.identification.rows import Rows
 
 _FASTEST_SHAPE = 4.0
 """Largest shape of a curve that is sought, in fastest speeds."""
+_CLEAR_ERRORS = 4.0
+"""Standard errors of the mean residual at a speed from which it is more than noise."""
+_BINS = 10
+"""Bins of speed in which the residuals of a direction are averaged."""
 _LEAST_ERROR = 1e-4
 """Least error of rows, as a share of the forces: without noise, filters and differences leave up to
 a quarter of it, with the same sign in all blocks."""
@@ -88,12 +92,13 @@ class Regression(Fit):
 
     @override
     def curve_speeds(self, fastest: float) -> FloatArray:
-        speeds = self.curve.speeds
-        return self.rows.curve_speeds if speeds is None else speeds
+        speeds = self.rows.curve_speeds if self.curve.speeds is None else self.curve.speeds
+        return speeds[1:] if self.rows.resting else speeds  # nothing is known of slower slip
 
     @override
     def errors(self, record: Record) -> ForceErrors:
-        columns = filtered(record, decimated=True, delay=self.rows.delay)
+        path = self.rows.parts[0].path
+        columns = filtered(record, decimated=True, delay=self.rows.delay, path=path)
         rows = replace(Rows.of([columns]), directions=self.directions)
         error = replace(self, rows=rows).residual
         friction = -rows.friction_terms(self.curve, self.shapes) @ self.unknowns[len(self.free) :]
@@ -140,6 +145,55 @@ class Regression(Fit):
         """Known forces less those of the model, N, by row."""
         design, wanted = self.system
         return wanted - design @ self.unknowns
+
+    @cached_property
+    def misfit(self) -> Sequence[tuple[FloatArray, FloatArray, FloatArray]]:
+        """What is left of friction over the speed, by direction: arrays of shape (bins,).
+
+        Mean speed, m/s, mean of the friction that was measured less that of the curve, N, and its
+        standard error, N.
+        """
+        bins: list[tuple[FloatArray, FloatArray, FloatArray]] = []
+        for sign in self.directions:
+            rows = self.rows.relative_speed * sign > 0.0
+            speed, left = sign * self.rows.relative_speed[rows], sign * self.residual[rows]
+            place = np.argsort(np.argsort(speed)) * _BINS // len(speed)
+            member = (place[:, None] == np.arange(_BINS)).astype(float)
+            mean, middle = (member.T @ values / member.sum(axis=0) for values in (left, speed))
+            covariance = block_covariance(member, left - member @ mean)
+            bins.append((middle, mean, np.sqrt(np.diag(covariance))))
+        return bins
+
+    @property
+    @override
+    def doubt(self) -> str:
+        damping = self.constants["damping"]
+        if any(way.get("viscous", 0.0) + damping < 0.0 for way in self.coordinates):
+            return "its viscous friction is negative"
+        for speed, mean, error in self.misfit:
+            size = np.abs(mean) - np.maximum(_CLEAR_ERRORS * error, self.least_gain * self.scale)
+            worst = int(np.argmax(size))
+            if size[worst] > 0.0:
+                return (
+                    f"its errors have structure over the speed: {mean[worst]:+.3g} N at "
+                    f"{1e3 * speed[worst]:.3g} mm/s"
+                )
+        return ""
+
+    @override
+    def friction(self, sign: float, fastest: float) -> Friction:
+        curve = super().friction(sign, fastest)
+        speed, mean, error = self.misfit[[*self.directions].index(sign)]
+        # The band has what was measured, where the curve misses it by more than noise.
+        missed = np.sqrt(np.maximum(mean * mean - error * error, 0.0))
+        errors = np.hypot(curve.standard_error, np.interp(curve.speed, speed, missed))
+        if not self.curve.shaped and self.curve.speeds is not None:
+            # A straight line misses a quarter of what its knots are off the chord beside them.
+            low, high = curve.speed[:-2], curve.speed[2:]
+            share = (curve.speed[1:-1] - low) / (high - low)
+            chord = curve.force[:-2] + share * (curve.force[2:] - curve.force[:-2])
+            errors = np.hypot(errors, 0.25 * np.pad(np.abs(curve.force[1:-1] - chord), 1, "edge"))
+        return replace(curve, standard_error=errors)
 
     @override
     def linearized(self) -> tuple[FloatArray, FloatArray, int]:

@@ -72,9 +72,14 @@ class Rows:
         return any(part.weight is not None for part in self.parts)
 
     @cached_property
+    def relative_speed(self) -> FloatArray:
+        """Velocity less that of the belt, m/s."""
+        return np.concatenate([part.rows(part.relative_speed) for part in self.parts])
+
+    @cached_property
     def speeds(self) -> FloatArray:
         """Sliding speeds above zero, m/s, sorted."""
-        speeds = np.abs(np.concatenate([part.rows(part.relative_speed) for part in self.parts]))
+        speeds = np.abs(self.relative_speed)
         return np.sort(speeds[speeds > 0.0])
 
     @cached_property

@@ -11,6 +11,8 @@ from stickslip_ros.identification.record import FEWEST, Record
 
 _VAGUE_ERROR = 0.5
 """Standard error, as a share of the value, from which a constant counts as not identifiable."""
+_FAR_SHARE = 0.3
+"""Error of a free run, as a share of the motion, from which the fit says so."""
 _USED_SHARE = 0.6
 """Share of the samples below which the fit says that it used some of them only."""
 _MISSING_SHARE = 1e-3
@@ -37,6 +39,12 @@ def notes(findings: Findings) -> Sequence[str]:
     axis = not findings.chosen.has_spring
     if axis and not any(record.held_force.any() for record in findings.records):
         texts.append("no force is recorded: none is taken to act beside friction")
+    if doubt := findings.chosen.doubt:
+        texts.append(
+            f"the law {findings.law} is not that of the recordings: {doubt}; its band has what was "
+            "measured"
+        )
+    texts += _far_run(findings, findings.records[0])
     for name in dict.fromkeys(record.name for record in findings.records):
         records = [record for record in findings.records if record.name == name]
         texts += [f"{name}: {note}" for note in records[0].notes]
@@ -77,19 +85,32 @@ def notes(findings: Findings) -> Sequence[str]:
     return texts
 
 
+def _far_run(findings: Findings, record: Record) -> list[str]:
+    """Return whether the free run through a record is far from its motion."""
+    share = findings.free_run_error(record) / float(np.std(record.position))
+    if share < _FAR_SHARE:
+        return []
+    worse = ", and worse than none" if share > 1.0 else ""
+    return [
+        f"{record.name}: the free run is off by {share:.0%} of the motion{worse}: a simulation "
+        "without feedback does not follow the machine"
+    ]
+
+
 def notes_on(findings: Findings, record: Record) -> Sequence[str]:
     """Return sentences on what cannot be predicted of a record, and why."""
+    known = [*record.notes, *_far_run(findings, record)]
     if findings.servo is None or record.reference is None or record.force is None:
-        return record.notes
+        return known
     led = record.led
     if led is None:
         why = f"has no {FEWEST} samples in a row: the closed loop is not predicted"
-        return [*record.notes, f"the reference of {record.name} {why}"]
+        return [*known, f"the reference of {record.name} {why}"]
     share = float(np.mean(findings.servo.added(led) != 0.0))
     if share < _ADDED_SHARE:
-        return record.notes
+        return known
     return [
-        *record.notes,
+        *known,
         f"the controller that was found does not explain {share:.0%} of the forces of "
         f"{record.name}: they are taken as forces added to its command; if another controller "
         "acted, its closed loop is not predicted",

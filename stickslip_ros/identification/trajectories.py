@@ -29,6 +29,9 @@ _ROUGH_SAMPLES = 5
 """Samples at the start of a record whose velocity is rough."""
 _LONG_DELAY = 100.0
 """Size of a delay and of a lag from which steps are made, in sample periods."""
+_RUN_TIME, _DIFFERENCE_TIME, _MEMORY_TIMES = 1e-5, 7e-6, 5.0
+"""Usual processor time of a sample with its derivatives, s, of each difference, s, and how many
+times as long a memory takes."""
 _UNBOUNDED_ERROR = 10.0
 """Error of a motion that is not bounded, in spans of the record."""
 
@@ -138,6 +141,8 @@ class Trajectories:
         by_names, by_start = np.zeros((count, len(names))), np.zeros((count, 2))
         others = [name for name in names if name in (DELAY, LAG, *self.law.by_differences)]
         by_equations = [name for name in names if name not in others]
+        work = _RUN_TIME + _DIFFERENCE_TIME * len(others)
+        self.limit.spend(count * work * (_MEMORY_TIMES if self.law.memory else 1.0))
         # At 0 a constant may drop out of the equations, and its derivatives with it.
         zeros = [name for name in by_equations if values[name] == 0.0]
         values = {**values, **self._steps(values, zeros, _LEAST)}

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks import falling_friction_axes as falling
 from benchmarks import identification_conditions as conditions
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.identification.findings import Findings
@@ -213,20 +214,45 @@ def test_what_is_refused() -> None:
 def test_the_choice_of_a_law_ends_with_the_best_so_far() -> None:
     found = identify([record("coulomb", 4.0)], time_limit=1e-3)
     assert found.law == "coulomb"
-    assert any("stribeck, exponential, table, lugre; more time is" in each for each in notes(found))
+    assert any("stribeck, exponential, table; more time is" in each for each in notes(found))
     with pytest.raises(InvalidInputError, match="time limit 0 s is invalid: must be above 0 s"):
         identify([record("coulomb", 4.0)], time_limit=0.0)
 
 
-def test_an_encoder_that_drops_out_leaves_no_traceback() -> None:
-    """No mass explains the jumps; the run of nearly none is unbounded."""
+def test_an_encoder_that_drops_out_leaves_the_model_right() -> None:
+    """The slide seems to reverse there: such rows are left out."""
     own, random = record("coulomb", 4.0), np.random.default_rng(1)
     position = own.position.copy()
     for place in random.integers(100, len(position) - 100, 12).tolist():
         position[place : place + int(random.integers(1, 6))] = 0.0
     found = identify([replace(own, position=position)], "table", {"force_delay": 0.0})
-    assert any("does not describe the recordings" in note for note in notes(found))
-    assert found.check(own)["force_error"] > 0.1
+    assert any("check the units" in note for note in notes(found))
+    assert found.fitted["mass"].value == pytest.approx(95.0, rel=1e-3)
+    assert found.check(own)["force_error"] < 1e-3
+
+
+def test_friction_that_falls_with_presliding() -> None:
+    """Bristles of 15 um: what they do near reversals is not taken for the curve."""
+    own, true = falling.records((2,), 6.0)[2], falling.axis(2)
+    judged = falling.judged(2, identify([own]))
+    assert judged["law"] == "exponential"
+    assert judged["worst"] < 0.02
+    assert judged["inside"] >= 0.9 * judged["driven"] > 50
+    flat = identify([own], "coulomb")
+    (why,) = [note for note in notes(flat) if "is not that of the recordings" in note]
+    assert "structure over the speed" in why
+    for curve in flat.curves:  # its band has what it misses
+        slow = curve.speed < 0.02
+        assert (curve.standard_error[slow] > 0.01 * true.friction(curve.speed[slow])).any()
+
+
+def test_the_committed_study_of_falling_friction() -> None:
+    """What is said to be known of friction is inside, and no free run is far off without a note."""
+    study = json.loads(Path(falling.__file__).with_suffix(".json").read_text(encoding="utf-8"))
+    assert len(study["cases"]) == falling.AXES
+    assert study["silent"] == []
+    assert study["inside"] >= 0.9 * study["known"]
+    assert study["known"] >= 0.8 * study["driven"]
 
 
 def test_the_constants_of_other_laws_of_an_axis() -> None:
