@@ -17,7 +17,7 @@ said to be known; and the free runs that are off by more than 30 % of the motion
 import argparse
 import json
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from time import process_time
@@ -173,7 +173,6 @@ def judged(number: int, found: Findings) -> dict[str, Any]:
     assert error is not None
     mass = found.fitted["mass"]
     return {
-        "axis": asdict(true),
         "law": found.law,
         "mass": (mass.value - true.mass) / mass.standard_error,
         "driven": driven,
@@ -193,7 +192,7 @@ def summary(numbers: Sequence[int], law: str = "auto") -> dict[str, Any]:
         begun = process_time()
         case = judged(number, identify([made[number]], law))
         cases.append({"number": number, **case, "seconds": process_time() - begun})
-        print({n: v for n, v in cases[-1].items() if n != "axis"}, flush=True)
+        print(cases[-1], flush=True)
     counts = {name: sum(case[name] for case in cases) for name in ("driven", "known", "inside")}
     silent = [c["number"] for c in cases if c["free_run"] > FAR and not c["warned"]]
     return {"cases": cases, **counts, "share": counts["inside"] / counts["known"], "silent": silent}

@@ -27,6 +27,7 @@ from stickslip_ros.studies.case_outcome import OUTCOMES, is_positioning
 from stickslip_ros.studies.comparison import DISTURBANCES, Comparison, Outcomes, compared
 from stickslip_ros.studies.plan import Axis
 from stickslip_ros.studies.runner import CountPoints, compute_columns
+from stickslip_ros.studies.spread import spread_text
 from stickslip_ros.studies.tuning import Tuned
 from stickslip_ros.tables import TextTable
 
@@ -247,7 +248,7 @@ class ComparedLaws(TabularResult):
         yield self.verdict
         title = (
             f"{self.scenario.name}, {self._task}: points {points}, disturbances {disturbances}, "
-            f"seeds {seeds}, constants off by up to {plan.spread:.0%}; held within "
+            f"seeds {seeds}, constants {spread_text(plan.spread)}; held within "
             f"{plan.tolerance:.2g} {where}"
         )
         labels = [OUTCOMES[name].label for name in names]
@@ -283,7 +284,7 @@ def compare(
     disturbances: str | Sequence[str] = DISTURBANCES,
     given: str | Sequence[str] = (),
     seeds: int = 1,
-    spread: float = 0.0,
+    spread: float | str = 0.0,
     duration: float = 6.0,
     tolerance: float | None = None,
     workers: int = 1,
@@ -313,8 +314,9 @@ def compare(
         Laws whose constants are those of the scenario, without tuning.
     seeds : int
         Number of seeds of the noise of the sensor and of the constants of the drive.
-    spread : float
-        Largest deviation of the constants of the drive, as a share.
+    spread : float or str
+        Largest deviation of the constants of the drive, as a share, or `"fit"`: as the fit that
+        wrote the scenario leaves them open.
     duration : float
         Duration of a case, s.
     tolerance : float, optional

@@ -436,6 +436,11 @@ def namespace_of(text: str) -> str:
     return namespace
 
 
+def spread_of(text: str) -> float | str:
+    """Return a spread of constants from a text: a share, or fit."""
+    return text if text == "fit" else float(text)
+
+
 def whole(what: str, least: int, most: int) -> Callable[[str], int]:
     """Return what parses a whole number; `what` it is has places for the bounds."""
 

@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 from math import inf, isfinite
+from typing import Any
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.rests import static_force
 from stickslip_ros.identification.servo import Servo, closed_loop, servo_of
 from stickslip_ros.model.drive import Drive
+from stickslip_ros.scenarios.sections import FIT_COLUMNS
 
 _STILL_SPEED = 0.02
 """Share of the fastest speed below which a slide may stick."""
@@ -75,17 +77,35 @@ class Findings:
     @cached_property
     def correlations(self) -> Sequence[tuple[str, str, float]]:
         """Pairs of constants whose errors go together, with their correlation."""
-        names, _, covariance = self._constants
-        errors = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-        with np.errstate(invalid="ignore", divide="ignore"):
-            shares = covariance / np.outer(errors, errors)
-        near = np.tril(np.isfinite(shares) & (np.abs(shares) > _NAMED_CORRELATION), -1)
+        names, shares = [*self.fitted], self._correlation
+        near = np.tril(np.abs(shares) > _NAMED_CORRELATION, -1)
         return [(names[j], names[i], float(shares[i, j])) for i, j in np.argwhere(near).tolist()]
 
     @cached_property
     def _constants(self) -> tuple[list[str], FloatArray, FloatArray]:
         """Names, values and covariance of the constants that are parameters of the plant."""
         return self.chosen.parameters(self.normal_force)
+
+    @property
+    def spread(self) -> dict[str, list[Any]]:
+        """What the fit leaves open, as a scenario keeps it; see `Scenario.fit`."""
+        columns = (
+            [f"plant.{name}" for name in self.fitted],
+            [estimate.standard_error for estimate in self.fitted.values()],
+            self._correlation.ravel().tolist(),
+        )
+        return dict(zip(FIT_COLUMNS, columns, strict=True)) if self.fitted else {}
+
+    @cached_property
+    def _correlation(self) -> FloatArray:
+        """Correlations of the constants; 0 where one is unbounded or exact."""
+        _, _, covariance = self._constants
+        errors = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+        with np.errstate(invalid="ignore", divide="ignore"):
+            shares = covariance / np.outer(errors, errors)
+        shares = np.where(np.isfinite(shares), shares, 0.0)
+        np.fill_diagonal(shares, 1.0)
+        return shares
 
     @cached_property
     def rivals(self) -> Sequence[str]:

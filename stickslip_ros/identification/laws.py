@@ -139,6 +139,7 @@ class ExponentialAdapter(IdentifiedLaw):
     """
 
     name = "exponential"
+    first_exponent = 1.0
     least = 0.0, 0.0, -np.inf
     shaped = True
     coordinates: Sequence[str] = ("kinetic", "rise", "decay_speed", "viscous", "exponent")
@@ -157,7 +158,7 @@ class ExponentialAdapter(IdentifiedLaw):
 
     @override
     def coordinates_of(self, forces: Sequence[float], shape: float) -> dict[str, float]:
-        return {**super().coordinates_of(forces, shape), "exponent": 1.0}
+        return {**super().coordinates_of(forces, shape), "exponent": self.first_exponent}
 
     @override
     def starts(self, values: Values, fastest: float) -> Sequence[Values]:
@@ -169,11 +170,9 @@ class ExponentialAdapter(IdentifiedLaw):
 
 
 class GaussianAdapter(ExponentialAdapter):
-    """The exponential law with the exponent n = 2 in a regression."""
+    """The exponential law whose exponent is 2 in a regression."""
 
-    @override
-    def coordinates_of(self, forces: Sequence[float], shape: float) -> dict[str, float]:
-        return {**super().coordinates_of(forces, shape), "exponent": 2.0}
+    first_exponent = 2.0
 
 
 class TableAdapter(IdentifiedLaw):

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from contextlib import ExitStack
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -43,7 +44,8 @@ def written_scenario(findings: Findings, path: Path) -> list[Path]:
                 curves.append(file)
                 files[f"plant.{group}file"] = str(file.absolute())
         # A scenario reads its curves: it can only be made when they are written.
-        text = commented_file(_scenario(findings, laws, files), _heading(findings, path))
+        made = replace(_scenario(findings, laws, files), fit=findings.spread)
+        text = commented_file(made, _heading(findings, path))
         for file in curves:
             text = text.replace(str(file.absolute()), file.name)
         with written(path, then=undo.pop_all) as stream:

@@ -119,6 +119,7 @@ def load_scenario(
             for other in CONTROLLER_PARAMETERS
             if other != law and controller_node(other) in models
         },
+        fit=next((file.fit for file in files if file.fit), {}),
         bases=tuple(file.path for file in files[1:]),
     )
     for name, why in scenario.unused().items():

@@ -56,6 +56,9 @@ class Scenario:
         default_factory=dict[str, ControllerParameters], compare=False, repr=False
     )
     """Parameters of other controllers that the file has sections for, by control law."""
+    fit: Mapping[str, Any] = field(default_factory=dict[str, Any], compare=False, repr=False)
+    """What a fit leaves open of the plant: `names`, `standard_errors`, SI units, and `correlations`
+    row by row; empty without one."""
     bases: tuple[Path, ...] = field(default=(), compare=False, repr=False)
     """The files that complete the scenario file, the nearest first."""
 

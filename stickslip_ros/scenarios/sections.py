@@ -17,6 +17,8 @@ from stickslip_ros.text import did_you_mean, shown
 _PATTERN = re.compile(r"(/(\*\*?|[A-Za-z_]\w*))+", re.ASCII)
 _LARGEST_FILE = 1_000_000
 """Largest number of characters in a scenario file."""
+FIT_COLUMNS = "names", "standard_errors", "correlations"
+"""Lists of a fit: those of correlations row by row."""
 BASE_SECTION = "scenario"
 """Last part of the name of the section that names the base and belongs to no node."""
 
@@ -29,6 +31,8 @@ class ScenarioFile(NamedTuple):
     """Node name patterns, each with its parameters by flat name."""
     base: str | None
     """Name or path of the scenario that supplies the omitted parameters."""
+    fit: Mapping[str, Any]
+    """Names, standard errors and correlations of constants that were fitted; see `Scenario`."""
 
     def named_nodes(self, namespace: str) -> set[str]:
         """Return the names of the nodes that have a section of their own in `namespace`."""
@@ -85,19 +89,37 @@ def read_file(path: Path, namespace: str) -> ScenarioFile:
     """
     sections: list[tuple[str, Mapping[str, Any]]] = []
     base: str | None = None
+    fit: Mapping[str, Any] = {}
     for name, parameters in _sections(path).items():
         pattern = f"/{name.removeprefix('/')}"
         is_base = section_matches(pattern, full_name(namespace, BASE_SECTION))
         if is_base and pattern.endswith(f"/{BASE_SECTION}"):
-            base = parameters.get("base")
-            if len(parameters) != 1 or not isinstance(base, str) or not base:
+            given = {name.removeprefix("fit."): value for name, value in parameters.items()}
+            base = given.pop("base", None)
+            fit = given
+            named = base is None if fit else isinstance(base, str) and base
+            if not named or (fit and not _is_fit(fit)):
                 raise InvalidInputError(
                     f"{path}: section {pattern}: {shown(parameters)} is invalid: must be base, the "
-                    "name or the path of a scenario"
+                    "name or the path of a scenario, or the fit that `stickslip identify` writes"
                 )
         else:
             sections.append((pattern, parameters))
-    return ScenarioFile(path, sections, base)
+    return ScenarioFile(path, sections, base, fit)
+
+
+def _is_fit(fit: Mapping[str, Any]) -> bool:
+    """Return whether a fit has names, as many standard errors, and the correlations of all."""
+    names, plant = fit.get("names"), NODE_PARAMETERS["plant"].known
+    if {*fit} != {*FIT_COLUMNS} or not isinstance(names, list):
+        return False
+    counts = len(names), len(names) ** 2
+    return all(str(name).removeprefix("plant.") in plant for name in names) and all(
+        isinstance(fit[column], list)
+        and len(fit[column]) == count
+        and all(isinstance(value, float) for value in fit[column])
+        for column, count in zip(FIT_COLUMNS[1:], counts, strict=True)
+    )
 
 
 def section_matches(pattern: str, node: str) -> bool:

@@ -11,9 +11,13 @@ from stickslip_ros.scenarios import ros_yaml
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, NodeParameters
 from stickslip_ros.scenarios.ros_yaml import PARAMETERS_KEY
-from stickslip_ros.scenarios.sections import BASE_SECTION
+from stickslip_ros.scenarios.sections import BASE_SECTION, FIT_COLUMNS
 
 _WIDTH = 100
+_FIT = (
+    "What the fit leaves open, for --spread fit: standard errors of constants of the plant, in SI "
+    "units, and their correlations row by row."
+)
 _TYPES = {bool: "boolean", int: "integer", float: "number", str: "string"}
 
 
@@ -44,6 +48,10 @@ def commented_file(scenario: Scenario, heading: str) -> str:
     line by line.
     """
     lines = [part for line in heading.splitlines() for part in _comment(line, "")]
+    if scenario.fit:
+        lines += ["", *_comment(_FIT, ""), f"/**/{BASE_SECTION}:", f"  {PARAMETERS_KEY}:"]
+        block = ros_yaml.dump({"fit": scenario.fit}).splitlines()
+        lines += [f"    {line.replace(chr(34), '') if ':' in line else line}" for line in block]
     unused = scenario.unused()
     for node, used in scenario.as_dict().items():
         parameters = own_first(NODE_PARAMETERS[node])
@@ -107,7 +115,9 @@ def scenario_schema() -> dict[str, Any]:
         "minLength": 1,
         "description": "Name or path of the scenario that gives what this file omits.",
     }
-    sections[BASE_SECTION] = _schema_of_section({"base": base}, required=["base"])
+    lists = {column: {"type": "array"} for column in FIT_COLUMNS}
+    fit = {"type": "object", "properties": lists, "required": [*FIT_COLUMNS]}
+    sections[BASE_SECTION] = _schema_of_section({"base": base, "fit": fit})
     return {
         "$schema": "http://json-schema.org/draft-07/schema#",
         "title": "Scenario of stickslip_ros",

@@ -15,6 +15,7 @@ from stickslip_ros.scenarios.parameters import known_law
 from stickslip_ros.studies.case_outcome import Disturbance, Outcome, is_positioning, simulate_case
 from stickslip_ros.studies.plan import Axis, Grid
 from stickslip_ros.studies.settling import MotionState, check_reference
+from stickslip_ros.studies.spread import Spread, check_spread, drawn
 from stickslip_ros.studies.study import PointStudy
 from stickslip_ros.studies.tuning import Goal, Tuned, tune, with_law
 from stickslip_ros.text import shown
@@ -73,8 +74,8 @@ class Cases:
     """Values of parameters that vary; None for those of the scenario."""
     disturbances: tuple[Disturbance, ...]
     seeds: int = 1
-    spread: float = 0.0
-    """Largest deviation of a constant of the drive, as a share."""
+    spread: Spread = 0.0
+    """Largest deviation of a constant of the drive, as a share, or `FIT`."""
     duration: float = 6.0
     """Duration of a case, s."""
     tolerance: float = FEED_TOLERANCE
@@ -160,22 +161,6 @@ class Comparison(PointStudy[Cases]):
             check_reference(self.scenario_of(number))
 
 
-def drawn(scenario: Scenario, seed: int, spread: float) -> dict[str, float]:
-    """Return constants of the drive that are off by at most a share, by NODE.PARAMETER.
-
-    Each constant with a unit but the belt speed and the bias force is multiplied by a factor of
-    its own, uniformly distributed; coefficients of friction change with the normal force.
-    """
-    plant, rng = scenario.plant, np.random.default_rng((seed, 1))
-    values, known = plant.flat(), plant.known
-    changes: dict[str, float] = {}
-    for name in plant.drive_names():
-        if known[name].unit and name not in ("belt_speed", "bias_force") and values[name]:
-            factor = 1.0 + spread * float(rng.uniform(-1.0, 1.0))
-            changes[f"plant.{name}"] = values[name] * factor
-    return changes
-
-
 def compared(
     scenario: Scenario,
     controllers: str | Sequence[str],
@@ -184,7 +169,7 @@ def compared(
     disturbances: str | Sequence[str] = DISTURBANCES,
     given: str | Sequence[str] = (),
     seeds: int = 1,
-    spread: float = 0.0,
+    spread: Spread = 0.0,
     duration: float = 6.0,
     tolerance: float | None = None,
     progress: Progress = lambda _: None,
@@ -199,8 +184,8 @@ def compared(
     InvalidInputError
         If an argument is not allowed, or a law has no gains that make all loops stable.
     """
-    limits = {"seeds": (seeds, 1, 100_000), "spread": (spread, 0.0, 0.9)}
-    limits["duration"] = (duration, 0.01, 1e5)
+    check_spread(spread)
+    limits = {"seeds": (seeds, 1, 100_000), "duration": (duration, 0.01, 1e5)}
     for name, (value, low, high) in limits.items():
         if not low <= value <= high:
             raise InvalidInputError(f"{name} {value:g}: must be from {low:g} to {high:g}")
