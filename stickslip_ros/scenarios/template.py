@@ -134,16 +134,12 @@ def scenario_schema() -> dict[str, Any]:
     }
 
 
-def _schema_of_section(
-    properties: Mapping[str, Any], required: list[str] | None = None
-) -> dict[str, Any]:
+def _schema_of_section(properties: Mapping[str, Any]) -> dict[str, Any]:
     parameters: dict[str, Any] = {
         "type": "object",
         "properties": properties,
         "additionalProperties": False,
     }
-    if required:
-        parameters["required"] = required
     return {
         "type": "object",
         "properties": {PARAMETERS_KEY: parameters},

@@ -177,7 +177,7 @@ def test_the_schema_refuses_what_is_wrong(schema: Any) -> None:
         ("/**/plant: {ros__parameters: {mass: heavy}}", "heavy"),
         ("/**/plant: {ros__parameters: {friction: {law: sticky}}}", "sticky"),
         ("/**/plant: {mass: 1.0}", "ros__parameters"),
-        ("/**/scenario: {ros__parameters: {bas: paper}}", "base"),
+        ("/**/scenario: {ros__parameters: {bas: paper}}", "'bas'"),
         ("/**/analyzer: {ros__parameters: {window: 0}}", "0"),
     ):
         errors = list(schema.iter_errors(yaml.safe_load(text)))

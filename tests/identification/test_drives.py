@@ -29,7 +29,7 @@ from stickslip_ros.identification.sentences import notes, unidentified
 from stickslip_ros.identification.time_limit import TimeLimit
 from stickslip_ros.model.actuator import Actuator
 from stickslip_ros.model.drive import Drive
-from stickslip_ros.model.friction import Coulomb, Directional, FrictionLaw, Stiction, Table
+from stickslip_ros.model.friction import Coulomb, Directional, FrictionLaw, Table
 from stickslip_ros.model.signals import table
 from stickslip_ros.motion import Motion
 from stickslip_ros.show.identification_table import identification_tables
@@ -90,19 +90,6 @@ def test_time_passes_with_work_alone() -> None:
     assert not limit.is_over
     limit.spend(2.0)
     assert limit.is_over
-
-
-@pytest.mark.long
-def test_stiction_is_searched_from_what_rests_tell() -> None:
-    """Long rests and short slips without noise: of other starts none leads to the constants."""
-    drive = Drive(8.0, 0.0, 2000.0, 1.0, 0.006, Stiction(24.0, 16.0, 0.0))
-    count = 2500
-    start = Record("slow", 4e-3, np.zeros(count), np.full(count, 0.006))
-    position = Predictor(start).positions(drive, 0.0)
-    found = identify([replace(start, position=position)], "stiction", {"mass": 8.0})
-    assert found.fitted["stiffness"].value == pytest.approx(2000.0, rel=1e-3)
-    assert found.fitted["friction.static"].value == pytest.approx(24.0, rel=1e-3)
-    assert found.fitted["friction.kinetic"].value == pytest.approx(16.0, rel=1e-3)
 
 
 @pytest.mark.long
