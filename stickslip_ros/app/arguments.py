@@ -436,7 +436,7 @@ def namespace_of(text: str) -> str:
     return namespace
 
 
-def spread_of(text: str) -> float | str:
+def spread(text: str) -> float | str:
     """Return a spread of constants from a text: a share, or fit."""
     return text if text == "fit" else float(text)
 

@@ -2,7 +2,7 @@
 
 import argparse
 
-from stickslip_ros.app.arguments import add_scenario, law_constants, spread_of, whole
+from stickslip_ros.app.arguments import add_scenario, law_constants, spread, whole
 from stickslip_ros.app.output import progress_bar
 from stickslip_ros.app.result import add_results, check_results
 from stickslip_ros.app.study_command import add_workers, check_out, computed, finish, scenario_over
@@ -53,7 +53,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--spread",
-        type=spread_of,
+        type=spread,
         default=0.0,
         metavar="SHARE",
         help="largest deviation of the constants of the drive, as in 0.2, or fit: as the fit of "
