@@ -125,16 +125,16 @@ class Stability(Result):
         return stability_tables(self.scenario, vars(self), dict(self.notes))
 
 
-def stability(scenario: ScenarioLike, spread: float = 0.0) -> Stability:
+def stability(scenario: ScenarioLike, spread: float | str = 0.0) -> Stability:
     """Return equilibrium, critical speeds and gains, and limit cycles of a scenario.
 
     Parameters
     ----------
     scenario : Scenario, str or Path
         The scenario, its name or its path.
-    spread : float
-        Largest deviation of the constants of the drive, as a share, as for `compare`: the critical
-        feed speed has an interval for it.
+    spread : float or str
+        Largest deviation of the constants of the drive, as a share, or `"fit"`, as for `compare`:
+        the critical feed speed has an interval for it.
 
     Returns
     -------

@@ -100,6 +100,16 @@ class AxisTask:
         self.rows = self._delayed(Rows.of(parts), near.rows.delay)
         away = self._fitted(self._table, self.rows)
         if bristles or rms(away.residual) < _REVERSAL_ERROR_RATIO * rms(near.residual):
+            self.rows = self._delayed(self.rows, self.delay or 0.0)
+        else:
+            self.rows = near.rows
+
+    @property
+    def _table(self) -> TableAdapter:
+        """Friction at the speeds of the rows; without rows near rest it is constant below."""
+        knots = np.quantile(self.rows.speeds, np.linspace(0.0, 1.0, _KNOTS))
+        knots[0] = self.rows.curve_speeds[1] if self.rows.resting else 0.0
+        return TableAdapter(np.unique([0.0, *knots]), knots)
 
     def candidates(
         self, law: str, laws: Sequence[IdentifiedLaw], progress: Callable[[str], None]

@@ -16,7 +16,7 @@ from stickslip_ros.model.drive_layout import POSITION, SPEED
 from stickslip_ros.model.friction import Stribeck
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.scenarios.parameters import PlantParameters
-from stickslip_ros.studies.comparison import drawn
+from stickslip_ros.studies.spread import Spread, check_spread, drawn, spread_text
 from stickslip_ros.text import quantity
 from stickslip_ros.theory.bifurcation_branches import BifurcationBranches
 from stickslip_ros.theory.critical_gains import (
@@ -75,7 +75,7 @@ class _Noted(NamedTuple):
     """Why it does not exist, or what it omits; None if there is nothing to say."""
 
 
-def stability(scenario: Scenario, spread: float = 0.0) -> tuple[Section, Notes]:
+def stability(scenario: Scenario, spread: Spread = 0.0) -> tuple[Section, Notes]:
     """Return the theoretical quantities of the scenario, in SI units, and notes on them.
 
     With a `spread` of the constants, the critical feed speed has an interval, too.
@@ -102,20 +102,19 @@ def stability(scenario: Scenario, spread: float = 0.0) -> tuple[Section, Notes]:
     return section | forms, notes | more
 
 
-def _critical_feed(scenario: Scenario, spread: float) -> tuple[Section, str]:
+def _critical_feed(scenario: Scenario, spread: Spread) -> tuple[Section, str]:
     """Return the 95 % interval of the highest critical feed speed for a spread, and a note on it.
 
     It is that of drives whose constants are `drawn` as for a comparison; 0 stands for none.
     """
-    if not 0.0 < spread <= 0.9:
-        raise InvalidInputError(f"spread {spread:g}: must be above 0 and at most 0.9")
+    check_spread(spread)
     varied = [scenario.changed(drawn(scenario, seed, spread)) for seed in range(_DRIVES)]
     points = [hopf_points(each.plant.as_drive()) for each in varied]
     speeds = [max((point.belt_speed for point in found), default=0.0) for found in points]
     ends, without = np.quantile(speeds, [0.025, 0.975]).tolist(), speeds.count(0.0)
     low, high = (number_text(scenario.plant.as_drive(), end, "m/s") for end in ends)
     note = (
-        f"{low} to {high} in 95 % of {_DRIVES} drives with constants off by up to {spread:.0%}; "
+        f"{low} to {high} in 95 % of {_DRIVES} drives with constants {spread_text(spread)}; "
         f"{without} of them have none"
     )
     return {"spread": spread, "drives": _DRIVES, "without": without, "interval": ends}, note
