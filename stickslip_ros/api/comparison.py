@@ -12,6 +12,7 @@ import numpy as np
 from scipy.special import betaincinv
 from typing_extensions import override
 
+from stickslip_ros.api.design import gains, gains_text
 from stickslip_ros.api.page import Summary
 from stickslip_ros.api.results import Parts, Table, TabularResult, attributes, column
 from stickslip_ros.api.scenarios import ScenarioLike, as_scenario
@@ -28,7 +29,7 @@ from stickslip_ros.studies.comparison import DISTURBANCES, Comparison, Outcomes,
 from stickslip_ros.studies.plan import Axis
 from stickslip_ros.studies.runner import CountPoints, compute_columns
 from stickslip_ros.studies.spread import spread_text
-from stickslip_ros.studies.tuning import Tuned
+from stickslip_ros.studies.tuning import Tuned, with_law
 from stickslip_ros.tables import TextTable
 
 if TYPE_CHECKING:
@@ -41,6 +42,9 @@ _MEANS = {
     True: ("final_error", "rms_force", "settling_time", "peak_force", "hunting_amplitude"),
 }
 """What the table has means of, by whether the task is positioning, the second criterion first."""
+
+_SETTLED = 4.6
+"""Times in which a deviation decays by a factor e, until a hundredth of it is left."""
 
 
 class Rank(NamedTuple):
@@ -83,6 +87,12 @@ class ComparedLaws(TabularResult):
     def scenario(self) -> Scenario:
         """The scenario of the drive."""
         return self.study.scenario
+
+    @property
+    def scenarios(self) -> dict[str, Scenario]:
+        """The scenario of the drive with each law and its gains, by name of the law."""
+        laws = self.study.plan.laws
+        return {law: with_law(self.scenario, law, constants) for law, constants in laws.items()}
 
     @cached_property
     def ranks(self) -> tuple[Rank, ...]:
@@ -135,14 +145,37 @@ class ComparedLaws(TabularResult):
     def _array(self, name: str) -> FloatArray:
         return self.outcomes.column(name).reshape(self.study.plan.shape)
 
+    def at_points(self, law: str, name: str) -> tuple[FloatArray, FloatArray]:
+        """Return the mean of an outcome at each point of the parameters, and its standard error.
+
+        Parameters
+        ----------
+        law : str
+            Name of the law.
+        name : str
+            Name of a column of `OUTCOMES`.
+
+        Returns
+        -------
+        tuple of ndarray
+            Means and standard errors over the seeds, shape (points,); NaN where there is none.
+        """
+        row = [*self.study.plan.laws].index(law)
+        values = self._array(name)[row][:, np.newaxis]
+        mean, error = np.transpose([_mean_of_seeds(point) for point in values])
+        return mean, error
+
     @override
     def draw(self, style: "FigureStyle") -> "Figure":
         from stickslip_ros.show.comparison_figure import comparison_figure
 
-        second, third, *_ = _MEANS[is_positioning(self.scenario)]
-        costs = {rank.law: (rank.means[third][0], rank.means[second][0]) for rank in self.ranks}
-        held = {rank.law: self.held_at_points(rank.law) for rank in self.ranks}
-        return comparison_figure(self.study, held, costs, (third, second), style=style)
+        error, *_ = _MEANS[is_positioning(self.scenario)]
+        names = (error, "peak_force")
+        values = {
+            rank.law: {name: self.at_points(rank.law, name) for name in (*names, "held")}
+            for rank in self.ranks
+        }
+        return comparison_figure(self.study, values, names, style=style)
 
     @property
     def _columns(self) -> dict[str, Any]:
@@ -205,6 +238,7 @@ class ComparedLaws(TabularResult):
                 "at_limit": rank.at_limit,
                 "failures": rank.failures,
                 "constants": dict(plan.laws[rank.law]),
+                "gains": gains(self.scenarios[rank.law].controller.control_law),
                 "remark": getattr(self.tuned.get(rank.law), "remark", None),
             }
             for rank in self.ranks
@@ -256,8 +290,11 @@ class ComparedLaws(TabularResult):
         yield TextTable(title, headings, rows)
         yield f"disturbances: {', '.join(map(str, plan.disturbances))}"
         for law, tuned in self.tuned.items():
-            gains = (f"{name} {getattr(tuned.law, name):.4g}" for name in tuned.law.tuned)
-            yield f"{law}: {', '.join(gains)}" + (f"; {tuned.remark}" if tuned.remark else "")
+            remark = f"; {tuned.remark}" if tuned.remark else ""
+            settles = _SETTLED / max(tuned.decay_rate, 1e-9)
+            if remark and settles > plan.duration > 0.0:
+                remark += f"; these settle in {units.text(settles, 's')}, longer than a case lasts"
+            yield f"{law}: {gains_text(tuned.law, units)}{remark}"
         for rank in self.ranks:
             if rank.failures:
                 reasons = {row.reason for row in self._rows(rank.law) if row.reason}

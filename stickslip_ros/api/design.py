@@ -1,9 +1,8 @@
 """Design: gains of a control law, with their margins, and checked by simulation."""
 
-from abc import abstractmethod
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Any
 
 from typing_extensions import override
 
@@ -12,21 +11,17 @@ from stickslip_ros.api.results import Parts, Table, TabularResult, attributes, c
 from stickslip_ros.api.scenarios import ScenarioLike, as_scenario
 from stickslip_ros.errors import InvalidInputError, RunError
 from stickslip_ros.model.constants import constants_of
-from stickslip_ros.model.control import ControlLaw, Washout
+from stickslip_ros.model.control import CONTROL_LAWS, ControlLaw, Washout
 from stickslip_ros.progress import Progress
 from stickslip_ros.quantities import Quantity, number_of, quantities_of
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.show.parameter_tables import scenario_tables
 from stickslip_ros.show.quantities import Units, plain_name
 from stickslip_ros.show.study_tables import one_below_another, side_by_side
-from stickslip_ros.studies.case_outcome import OUTCOMES
 from stickslip_ros.studies.controller_trial import Rest
-from stickslip_ros.studies.design import Design, Task
-from stickslip_ros.studies.tuned_design import TunedDesign, design_by_rule
+from stickslip_ros.studies.design import Check, Design, Task
+from stickslip_ros.studies.design import design as designed
 from stickslip_ros.studies.tuning import LINEAR
-from stickslip_ros.studies.washout_design import Check, WashoutDesign, design_washout
-from stickslip_ros.studies.washout_search import Margins
-from stickslip_ros.tables import TextTable
 from stickslip_ros.text import finite, shown
 
 if TYPE_CHECKING:
@@ -34,27 +29,17 @@ if TYPE_CHECKING:
 
     from stickslip_ros.show.style import FigureStyle
 
-_Design = TypeVar("_Design", bound=Design)
-
-_CHECKS, _MARGINS = quantities_of(Check), quantities_of(Margins)
-_WASHOUT = {
-    name: Quantity(plain_name(f"washout_controller.{name}"), unit)
-    for name in Washout.constants()
-    if (unit := constants_of(Washout)[name].unit)
-}
-_OUTCOMES = ("held", "rms_velocity", "mean_force", "rms_force", "peak_force", "settling_time")
-_TUNED_CHECKS = {
-    "belt_speed": _CHECKS["belt_speed"],
-    "disturbance": Quantity("disturbance"),
-    **{name: OUTCOMES[name] for name in _OUTCOMES},
-}
+_CHECKS, _REST = quantities_of(Check), quantities_of(Rest)
+_WORST = ("predicted_settling_time", "settling_time", "predicted_peak_force", "peak_force")
+_MARGINS = {"gain_down": "gain_down", "gain_up": "gain_up", "delay": "delay_margin"}
+"""Margins in JSON, with the names that all linear values have."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Proposed(TabularResult, Generic[_Design]):
+class Proposal(TabularResult):
     """Gains for a range of belt speeds; it prints as tables."""
 
-    design: _Design
+    design: Design
     """The task, the proposal and its checks."""
 
     @property
@@ -83,29 +68,37 @@ class Proposed(TabularResult, Generic[_Design]):
         return self.design.scenario
 
     @property
-    @abstractmethod
-    def _gains(self) -> Mapping[str, Quantity]:
-        """Constants of the law that are proposed."""
+    def margins(self) -> Mapping[str, float | None]:
+        """Gain margins `gain_down` and `gain_up`, and the delay margin `delay`, s; None: none."""
+        return {name: self._linear[linear] for name, linear in _MARGINS.items()}
 
-    @abstractmethod
-    def _checks(self) -> Sequence[Mapping[str, Any]]:
-        """Return the checks as rows."""
+    @property
+    def checks(self) -> Sequence[Check]:
+        """Checks of the proposal at each belt speed, predicted and simulated."""
+        return self.design.checks
 
-    @abstractmethod
-    def _found(self) -> dict[str, Any]:
-        """Return the entries of `to_dict` that the designs of other laws do not have."""
+    @property
+    def poles(self) -> Mapping[float, Any]:
+        """Poles of the linear part of the loop per sample, by belt speed; complex arrays."""
+        return {} if self.design.tuned is None else self.design.tuned.poles
 
-    @abstractmethod
-    def _tables(self) -> Iterator[TextTable]:
-        """Yield the tables that follow the proposal."""
+    @override
+    def draw(self, style: "FigureStyle") -> "Figure":
+        from stickslip_ros.show.comparison_figure import bode_figure
+        from stickslip_ros.show.stability_figure import design_figure
+
+        if self.controller is None:
+            raise RunError(self._nothing)
+        washout = isinstance(self.controller, Washout) and self.design.vibrations
+        return (design_figure if washout else bode_figure)(self.design, style=style)
 
     @property
     def _nothing(self) -> str:
         return f"there is nothing to propose: {self.remark}"
 
     @property
-    def _subject(self) -> str:
-        return self.design.task.scenario.name
+    def _linear(self) -> dict[str, Any]:
+        return {name: getattr(self.design.tuned, name, None) for name in LINEAR}
 
     @property
     def _units(self) -> Units:
@@ -113,24 +106,37 @@ class Proposed(TabularResult, Generic[_Design]):
 
     @override
     def _entries(self) -> dict[str, Any]:
+        design, scenario = self.design, self.design.task.scenario
+        law, checks = scenario.controller.law, [asdict(check) for check in self.checks]
+        own = CONTROL_LAWS[law].constants() if law == Washout.name else ("start_after",)
+        slowest = design.slowest
         return {
-            "belt_speeds": list(self.design.task.belt_speeds),
-            **self._found(),
-            "checks": self._checks(),
-            "parameter_file": self.design.parameter_file,
+            "law": law,
+            "belt_speeds": list(design.task.belt_speeds),
+            "constants": None if self.controller is None else asdict(self.controller),
+            "gains": gains(self.controller),
+            **{name: getattr(self.controller, name, None) for name in own},
+            "force_limit": design.task.force_limit,
+            "worst_belt_speed": slowest.drive.belt_speed if slowest else None,
+            "decay_rate": min((check["decay_rate"] for check in checks), default=None),
+            **{
+                name: max((row[name] for row in checks if row[name] is not None), default=None)
+                for name in _WORST
+            },
+            "linear": self._linear,
+            "margins": dict(self.margins),
+            "checks": checks,
+            "parameter_file": design.parameter_file,
             "remark": self.remark,
-            **self.design.task.scenario.provenance(),
+            **scenario.provenance(),
         }
 
-    def _table_of(self, quantities: Mapping[str, Quantity], dimension: str | None) -> Table:
-        """Return the checks; without a dimension of its own each has its number."""
-        rows = self._checks()
-        columns = {name: column([row[name] for row in rows]) for name in quantities}
-        dimensions = (
-            {"check": range(len(rows))} if dimension is None else {dimension: columns[dimension]}
-        )
+    @override
+    def _table(self) -> Table:
+        rows = [asdict(check) for check in self.checks]
+        columns = {name: column([row[name] for row in rows]) for name in _CHECKS}
         source = attributes(self.design.task.scenario)
-        return Table(columns, quantities, self._units, dimensions, source)
+        return Table(columns, _CHECKS, self._units, {"check": range(len(rows))}, source)
 
     @override
     def _summary(self) -> Summary:
@@ -141,154 +147,66 @@ class Proposed(TabularResult, Generic[_Design]):
     def _verdict(self) -> str:
         if self.controller is None:
             return "nothing to propose"
-        return ", ".join(
-            f"{label} {self._units.text(getattr(self.controller, name), unit)}"
-            for name, (label, unit, _) in self._gains.items()
-        )
+        return gains_text(self.controller, self._units)
 
     @override
     def parts(self) -> Parts:
-        task = self.design.task
-        speeds = self._units.texts(sorted({*task.belt_speeds}), "m/s")
-        title = f"{self._subject}, belt speed {' to '.join(speeds)}"
-        if self.controller is None:
-            yield f"{title}: nothing to propose"
-        else:
-            values = {name: finite(getattr(self.controller, name)) for name in self._gains}
-            yield one_below_another(f"{title}: proposal", self._gains, values, self._units)
-            yield from self._tables()
-        if self.remark is not None:
+        task, tuned, units = self.design.task, self.design.tuned, self._units
+        speeds = units.texts(sorted({*task.belt_speeds}), "m/s")
+        subject = f"{task.scenario.name}, {task.scenario.controller.law}"
+        title = f"{subject}, belt speed {' to '.join(speeds)}"
+        law, linear = self.controller, "linear loop, at the worst of these belt speeds"
+        if law is None:
+            yield f"{title}: nothing to propose: {self.remark}"
+            title, linear = "the nearest gains", "their linear loop"
+            law = None if tuned is None else tuned.law
+        if law is not None:
+            values = {name: finite(getattr(law, name)) for name in described(law)}
+            name = title if self.controller is None else f"{title}: proposal"
+            yield one_below_another(name, described(law), values, units)
+            yield one_below_another(linear, LINEAR, self._linear, units)
+        rows = [asdict(check) for check in self.checks]
+        if rows:
+            yield side_by_side("simulated", _CHECKS, rows, units)
+        at_rest = [row | row["rest"] for row in rows if row["rest"] is not None]
+        if at_rest:
+            columns = {"belt_speed": _CHECKS["belt_speed"], **_REST}
+            yield side_by_side("at rest, by noise and rounding", columns, at_rest, units)
+        if self.controller is not None and self.remark is not None:
             yield self.remark
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class Proposal(Proposed[WashoutDesign]):
-    """Gains of the washout law for a range of belt speeds; it prints as tables."""
-
-    @property
-    def margins(self) -> Margins | None:
-        """Stability margins of gain and delay; None without control."""
-        return self.design.margins
-
-    @property
-    def checks(self) -> Sequence[Check]:
-        """Checks of the proposal at each belt speed, predicted and simulated."""
-        return self.design.checks
-
-    @override
-    def draw(self, style: "FigureStyle") -> "Figure":
-        from stickslip_ros.show.stability_figure import design_figure
-
-        if self.controller is None:
-            raise RunError(self._nothing)
-        return design_figure(self.design, style=style)
-
-    @property
-    @override
-    def _gains(self) -> Mapping[str, Quantity]:
-        return _WASHOUT
-
-    @override
-    def _checks(self) -> Sequence[Mapping[str, Any]]:
-        return [asdict(check) for check in self.checks]
-
-    @override
-    def _table(self) -> Table:
-        return self._table_of(_CHECKS, "belt_speed")
-
-    @override
-    def _found(self) -> dict[str, Any]:
-        design, checks = self.design, self._checks()
-        return {
-            **{name: getattr(design.controller, name, None) for name in _WASHOUT},
-            "force_limit": design.task.force_limit,
-            "worst_belt_speed": design.slowest.drive.belt_speed if design.slowest else None,
-            "decay_rate": min((check["decay_rate"] for check in checks), default=None),
-            **{
-                name: max((row[name] for row in checks if row[name] is not None), default=None)
-                for name in [*_CHECKS][2:]
-            },
-            "margins": asdict(design.margins) if design.margins else dict.fromkeys(_MARGINS),
-        }
-
-    @override
-    def _tables(self) -> Iterator[TextTable]:
-        units, checks = self._units, self._checks()
-        if self.margins is not None:
-            title = "margins at the worst of these belt speeds"
-            yield one_below_another(title, _MARGINS, asdict(self.margins), units)
-        yield side_by_side("verification", _CHECKS, checks, units)
-        at_rest = [check | check["rest"] for check in checks if check["rest"] is not None]
-        if at_rest:
-            columns = {"belt_speed": _CHECKS["belt_speed"], **quantities_of(Rest)}
-            yield side_by_side("at rest, by noise and rounding", columns, at_rest, units)
+def described(law: ControlLaw) -> dict[str, Quantity]:
+    """Return the constants of a law that a design chooses, as quantities, by name."""
+    bodies = law.of_motor
+    names = [*law.tuned, *("cubic_gain", "start_after") * isinstance(law, Washout), *bodies]
+    constants = constants_of(type(law))
+    node = f"{law.name}_controller"
+    return {
+        name: Quantity(
+            plain_name(f"{node}.{name}") if isinstance(law, Washout) else name,
+            constants[name].unit or "",
+        )
+        for name in [*names, "force_limit"]
+    }
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class TunedProposal(Proposed[TunedDesign]):
-    """Gains by the rule; it prints as tables, and draws the loop transfer function."""
-
-    @property
-    def poles(self) -> Mapping[float, Any]:
-        """Poles of the linear part of the loop per sample, by belt speed; complex arrays."""
-        return self.design.tuned.poles
-
-    @override
-    def draw(self, style: "FigureStyle") -> "Figure":
-        from stickslip_ros.show.comparison_figure import bode_figure
-
-        return bode_figure(self.design, style=style)
-
-    @property
-    @override
-    def _subject(self) -> str:
-        return f"{super()._subject}, {self.design.tuned.law.name}"
-
-    @property
-    @override
-    def _gains(self) -> Mapping[str, Quantity]:
-        law = self.design.tuned.law
-        described = constants_of(type(law))
-        return {name: Quantity(name, described[name].unit or "") for name in law.tuned}
-
-    @override
-    def _checks(self) -> Sequence[Mapping[str, Any]]:
-        return [
-            {
-                "belt_speed": check.belt_speed,
-                "disturbance": str(check.disturbance),
-                **{name: getattr(check.outcome, name) for name in (*_OUTCOMES, "reason")},
-            }
-            for check in self.design.checks
-        ]
-
-    @override
-    def _table(self) -> Table:
-        return self._table_of(_TUNED_CHECKS, None)
-
-    @override
-    def _found(self) -> dict[str, Any]:
-        tuned = self.design.tuned
-        linear = {name: getattr(tuned, name) for name in LINEAR}
-        return {"law": tuned.law.name, "constants": asdict(tuned.law), "linear": linear}
-
-    @override
-    def _tables(self) -> Iterator[TextTable]:
-        title = "linear loop, at the worst of these belt speeds"
-        yield one_below_another(title, LINEAR, vars(self.design.tuned), self._units)
-        yield side_by_side("simulated", _TUNED_CHECKS, self._checks(), self._units)
-
-    @override
-    def _verdict(self) -> str:
-        held = sum(bool(check.outcome.held) for check in self.design.checks)
-        return f"{held} of {len(self.design.checks)} simulated checks hold"
+def gains(law: ControlLaw | None) -> dict[str, Any] | None:
+    """Return these constants with their units and all digits; None without a law."""
+    if law is None:
+        return None
+    return {
+        name: {"value": getattr(law, name), "unit": quantity.unit}
+        for name, quantity in described(law).items()
+    }
 
 
-def proposal(task: Task, progress: Progress = lambda _: None) -> Proposal | TunedProposal:
-    """Return the gains for a task: of the washout law from its vibration, of others by the rule."""
-    if isinstance(task.scenario.control_law, Washout):
-        return Proposal(design_washout(task, progress))
-    return TunedProposal(design_by_rule(task, progress))
+def gains_text(law: ControlLaw, units: Units) -> str:
+    """Return the gains with their units, for a sentence."""
+    return ", ".join(
+        f"{described(law)[name].label} {units.text(getattr(law, name), described(law)[name].unit)}"
+        for name in law.tuned
+    )
 
 
 def design(
@@ -297,7 +215,7 @@ def design(
     *,
     force_limit: float | None = None,
     progress: Progress = lambda _: None,
-) -> Proposal | TunedProposal:
+) -> Proposal:
     """Propose gains that damp the vibration within a force limit, checked by simulation.
 
     Parameters
@@ -313,9 +231,9 @@ def design(
 
     Returns
     -------
-    Proposal or TunedProposal
-        The gains with their margins and checks, or the reason why there are none; of another law
-        than the washout by the rule of `ss.compare`.
+    Proposal
+        The gains with their margins and checks, by the rule of `ss.compare`, or the reason why
+        there are none.
 
     Raises
     ------
@@ -332,7 +250,7 @@ def design(
     chosen = as_scenario(scenario)
     if force_limit is not None:
         chosen = chosen.overridden([], {f"{chosen.controller.node}.force_limit": force_limit})
-    return proposal(Task.from_scenario(chosen, _range(belt_speed)), progress)
+    return Proposal(designed(Task.from_scenario(chosen, _range(belt_speed)), progress))
 
 
 def _range(belt_speed: Any) -> tuple[float, float] | None:

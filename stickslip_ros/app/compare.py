@@ -1,9 +1,18 @@
 """`stickslip compare`: which control law holds a drive, how well, and with what force."""
 
 import argparse
+import shlex
+from pathlib import Path
 
-from stickslip_ros.app.arguments import add_scenario, law_constants, spread, whole
-from stickslip_ros.app.output import progress_bar
+from stickslip_ros.app.arguments import (
+    add_scenario,
+    check_new,
+    law_constants,
+    spread,
+    whole,
+    writing,
+)
+from stickslip_ros.app.output import progress_bar, tell
 from stickslip_ros.app.result import add_results, check_results
 from stickslip_ros.app.study_command import add_workers, check_out, computed, finish, scenario_over
 
@@ -69,18 +78,26 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="what a law that holds may leave: share of the belt speed (default: 0.05), or of the "
         "motion of the reference (default: 0.001)",
     )
-    add_workers(parser)
-    add_results(parser, "which law holds where, and error against force")
+    add_workers(
+        parser,
+        "; FILE.yaml is a scenario with the best law and its gains, a FOLDER has one for each law",
+    )
+    add_results(parser, "error and peak force of each law over the parameters")
 
 
 def run(arguments: argparse.Namespace) -> None:
     """Run the command."""
     from stickslip_ros.api.comparison import ComparedLaws
     from stickslip_ros.studies.comparison import Outcomes, compared
+    from stickslip_ros.studies.design import gains_file
 
     proposed = law_constants("force_limit", "start_after")
     scenario, axes = scenario_over(arguments, *([] if arguments.given else proposed))
     check_results(arguments)
+    chosen: Path | None = arguments.out
+    if chosen is not None and chosen.suffix.lower() in ("", ".yaml", ".yml"):
+        check_new("--out", chosen)
+        arguments.out = None
     check_out(arguments.out)
     with progress_bar(f"gains for {scenario.name}", 1.0, lines=True) as progress:
         study, tuned = compared(
@@ -98,4 +115,15 @@ def run(arguments: argparse.Namespace) -> None:
     label = f"comparison on {scenario.name}, {study.plan.size} cases"
     outcomes = Outcomes(study.plan.size)
     with computed(arguments, study, label, outcomes) as journal:
-        finish(arguments, journal, ComparedLaws(study, outcomes, tuned))
+        result = ComparedLaws(study, outcomes, tuned)
+        finish(arguments, journal, result)
+    if chosen is not None and arguments.out is None:
+        files = {rank.law: gains_file(result.scenarios[rank.law]) for rank in result.ranks}
+        paths = {law: chosen / f"{law}.yaml" for law in files}
+        if chosen.suffix:
+            paths = {result.ranks[0].law: chosen}
+        for law, path in paths.items():
+            with writing("--out", path):
+                path.parent.mkdir(parents=True, exist_ok=True)
+                path.write_text(files[law], encoding="utf-8")
+            tell(f"{path} has {law}: `{shlex.join(['stickslip', 'run', str(path)])}` runs it")

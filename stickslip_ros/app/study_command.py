@@ -51,8 +51,8 @@ def add_running(parser: argparse.ArgumentParser, settling: SettlingOptions) -> N
     add_workers(parser)
 
 
-def add_workers(parser: argparse.ArgumentParser) -> None:
-    """Add where the points are computed, and --out."""
+def add_workers(parser: argparse.ArgumentParser, others: str = "") -> None:
+    """Add where the points are computed, and --out; `others` are files that it also writes."""
     where = parser.add_mutually_exclusive_group()
     where.add_argument(
         "--workers",
@@ -74,7 +74,7 @@ def add_workers(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help=f"write a table of all points ({', '.join(_TABLES)}); an existing file is refused. "
         "If interrupted, the finished points stay in FILE.part, without --out in ~/.cache, and the "
-        "same command continues",
+        f"same command continues{others}",
     )
 
 

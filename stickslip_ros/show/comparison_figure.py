@@ -1,6 +1,6 @@
-"""The figures of a comparison, which law holds where, and of a tuned loop, its Bode diagram."""
+"""The figures of a comparison, what laws leave and need, and of a tuned loop, its Bode diagram."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -10,7 +10,7 @@ from stickslip_ros.show.quantities import Units
 from stickslip_ros.show.style import SCREEN, FigureStyle, finish, styled
 from stickslip_ros.studies.case_outcome import OUTCOMES
 from stickslip_ros.studies.comparison import Comparison
-from stickslip_ros.studies.tuned_design import TunedDesign
+from stickslip_ros.studies.design import Design
 
 _MARKERS = "osD^vPX*<>"
 
@@ -18,63 +18,60 @@ _MARKERS = "osD^vPX*<>"
 @styled
 def comparison_figure(
     study: Comparison,
-    held: Mapping[str, FloatArray],
-    costs: Mapping[str, tuple[float, float]],
-    names: tuple[str, str],
+    values: Mapping[str, Mapping[str, tuple[FloatArray, FloatArray]]],
+    names: Sequence[str],
     *,
     style: FigureStyle = SCREEN,
 ) -> Figure:
-    """Return the figure.
+    """Return the figure: outcomes of each law over the points, with standard errors.
 
-    `held` has the share of held cases at each point by law, the best law first; `costs` the values
-    of the outcomes with these `names`.
+    `values` has mean and standard error at each point by law, the best law first, and by name of an
+    outcome: those of `names` and `held`, the share of held cases, which is shown where it is not 1
+    everywhere.
     """
-    figure = style.figure(9.6, 4.4, narrow=1.5)
-    style.set_title(figure, f"control laws compared, {study.scenario.name}")
-    panels = (2, 1) if style.narrow else (1, 2)
-    where, cost = figure.subplots(*panels)
-    units = Units.for_drive(study.scenario.plant.as_drive(), study.plan.parameters)
-    shares = np.array([*held.values()])
-    # Pale, so that the numbers are read, and not red and green, which many do not tell apart.
-    where.imshow(shares, cmap="viridis", vmin=0.0, vmax=1.0, aspect="auto", alpha=0.5)
-    where.grid(visible=False)
-    for (row, column), share in np.ndenumerate(shares):
-        where.text(column, row, f"{share:.0%}", ha="center", va="center", fontsize=7.0)
-    where.set_yticks(range(len(held)), [*held])
-    grid = study.plan.grid
-    if grid is None:
-        where.set_xticks([])
-    else:
-        values = [grid.values(point) for point in range(grid.size)]
-        axes_units = [axis.unit for axis in grid.axes]
+    shares = np.array([each["held"][0] for each in values.values()])
+    shown = [*names, *["held"] * bool((shares < 1.0).any())]
+    figure = style.figure(4.8 * len(shown), 4.4, narrow=0.9 * len(shown))
+    said = "" if "held" in shown else ": all of them hold all cases"
+    style.set_title(figure, f"control laws compared, {study.scenario.name}{said}")
+    panels = figure.subplots(*((len(shown), 1) if style.narrow else (1, len(shown))), squeeze=False)
+    units, grid = (
+        Units.for_drive(study.scenario.plant.as_drive(), study.plan.parameters),
+        study.plan.grid,
+    )
+    points, label, texts = np.zeros(1), "", [""]
+    if grid is not None:
+        rows = [grid.values(point) for point in range(grid.size)]
+        points, label = np.arange(len(rows)), ", ".join(axis.parameter for axis in grid.axes)
         texts = [
-            "\n".join(units.text(v, u) for v, u in zip(row, axes_units, strict=True))
-            for row in values
+            "\n".join(units.text(v, a.unit) for v, a in zip(row, grid.axes, strict=True))
+            for row in rows
         ]
-        where.set_xticks(range(grid.size), texts, fontsize=7.0)
-        where.set_xlabel(", ".join(axis.parameter for axis in grid.axes))
-    where.set_title("share of cases held")
-    scales = [
-        units.axis(OUTCOMES[name].label, OUTCOMES[name].unit, [costs[law][place] for law in costs])
-        for place, name in enumerate(names)
-    ]
-    for number, (law, values) in enumerate(costs.items()):
-        force, error = (value / scale for value, (scale, _) in zip(values, scales, strict=True))
-        marker = _MARKERS[number % len(_MARKERS)]
-        cost.plot(force, error, marker, color=f"C{number % 10}", ls="", label=law)
-    cost.set(xlabel=scales[0][1], ylabel=scales[1][1])
-    for axis, of_axis in zip("xy", np.transpose([*costs.values()]), strict=True):
-        if np.max(of_axis) > 10.0 * np.min(of_axis):  # else there is no power of ten to label
-            cost.set(**{f"{axis}scale": "symlog"})
-    cost.set_title("means of all cases")
+    for axes, name in zip(panels.ravel(), shown, strict=True):
+        means = [each[name][0] for each in values.values()]
+        scale, text = units.axis(OUTCOMES[name].label, OUTCOMES[name].unit, np.array(means))
+        for number, (law, each) in enumerate(values.items()):
+            mean, error = each[name]
+            # Beside each other, so that no law hides another.
+            beside = points + 0.6 * ((number + 0.5) / len(values) - 0.5)
+            axes.errorbar(
+                beside, mean / scale, np.nan_to_num(error) / scale, label=law,
+                fmt=_MARKERS[number % len(_MARKERS)], color=f"C{number % 10}", capsize=2.0, ms=5.0,
+            )  # fmt: skip
+        axes.set_xticks(points, texts)
+        axes.set(xlabel=label, ylabel="share of cases held" if name == "held" else text)
+        known = np.array(means)[np.isfinite(means) & (np.array(means) > 0.0)]
+        if known.size and name != "held" and known.max() > 10.0 * known.min():
+            axes.set_yscale("log")
     finish(figure)
-    style.legend_below(figure, cost.get_legend_handles_labels()[0])
+    style.legend_below(figure, panels[0, 0].get_legend_handles_labels()[0])
     return figure
 
 
 @styled
-def bode_figure(design: TunedDesign, *, style: FigureStyle = SCREEN) -> Figure:
+def bode_figure(design: Design, *, style: FigureStyle = SCREEN) -> Figure:
     """Return magnitude and phase of the loop transfer function, and the sensitivity, by feed."""
+    assert design.tuned is not None
     figure = style.figure(7.0, 6.0, narrow=1.3)
     style.set_title(figure, f"loop with {design.tuned.law.name}, {design.task.scenario.name}")
     size, phase, sensitivity = figure.subplots(3, 1, sharex=True)

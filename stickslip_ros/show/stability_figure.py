@@ -35,8 +35,8 @@ from stickslip_ros.show.style import (
     text_width,
     title_of,
 )
+from stickslip_ros.studies.design import Design
 from stickslip_ros.studies.stability import bifurcation_branches, stability_map
-from stickslip_ros.studies.washout_design import WashoutDesign
 from stickslip_ros.theory.bifurcation_branches import BifurcationBranches, Branch
 from stickslip_ros.theory.stability_map import CriticalGainCurves, StabilityMap
 
@@ -108,7 +108,7 @@ def stability_figure(
 
 
 @styled
-def design_figure(design: WashoutDesign, *, style: FigureStyle = SCREEN) -> Figure:
+def design_figure(design: Design, *, style: FigureStyle = SCREEN) -> Figure:
     """Return the map around a proposal, with the force limit; there must be a proposal."""
     around, scenario = design.map_around(), design.scenario
     assert around is not None
@@ -180,12 +180,15 @@ def _draw_map(figure: Figure, axes: Axes, chart: StabilityMap) -> list[Artist]:
                 *place, name, color=colour, ha="center", va="center",
                 path_effects=[withStroke(linewidth=1.5, foreground=stroke)],
             )  # fmt: skip
-    return [
-        Line2D([], [], **_LIMIT, label="limit of stability, sampled"),
-        Line2D([], [], **_CONTINUOUS, label="limit of stability, continuous"),
-        Line2D([], [], **_GAINS, ms=10, label="gains"),
-        Patch(facecolor=_UNSTABLE, edgecolor=GREY, label="unstable"),
-    ]
+    unstable = bool((rates < 0.0).any())
+    continuous = (chart.continuous >= gains[0]) & (chart.continuous <= gains[-1])
+    visible = {
+        Line2D([], [], **_LIMIT, label="limit of stability, sampled"): unstable and fastest > 0.0,
+        Line2D([], [], **_CONTINUOUS, label="limit of stability, continuous"): continuous.any(),
+        Line2D([], [], **_GAINS, ms=10, label="gains"): True,
+        Patch(facecolor=_UNSTABLE, edgecolor=GREY, label="unstable"): unstable,
+    }
+    return [handle for handle, shown in visible.items() if shown]
 
 
 def _roomiest(shown: BoolArray, chart: StabilityMap) -> tuple[float, float] | None:

@@ -100,6 +100,8 @@ class Outcome(NamedTuple):
     """Root mean square of the force beyond its mean there."""
     peak_force: Annotated[float | None, Quantity("peak force", "N")] = None
     """Largest force from the first sample on."""
+    disturbed_force: Annotated[float | None, Quantity("peak force, disturbed", "N")] = None
+    """Largest force from the disturbance on."""
     settling_time: Annotated[float | None, Quantity("settling time", "s")] = None
     """Time from the end of the disturbance, or of the reference's motion, until it is held."""
     at_limit: Annotated[float | None, Quantity("share of time at the limit")] = None
@@ -160,6 +162,7 @@ def simulate_case(
         mean_force=float(force[late].mean()),
         rms_force=float(force[late].std()),
         peak_force=float(np.abs(force).max()),
+        disturbed_force=float(np.abs(force[round(_START * len(rows)) :]).max()),
         at_limit=float((np.abs(force) >= limit).mean()),
     )
     if is_positioning(scenario):

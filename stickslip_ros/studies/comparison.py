@@ -1,7 +1,7 @@
 """Comparison of control laws: cases of law, parameters, disturbance and seed, each simulated."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -13,15 +13,15 @@ from stickslip_ros.progress import Progress
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.scenarios.parameters import known_law
 from stickslip_ros.studies.case_outcome import Disturbance, Outcome, is_positioning, simulate_case
+from stickslip_ros.studies.design import Task, design
+from stickslip_ros.studies.options import FEED_TOLERANCE, POSITION_TOLERANCE
 from stickslip_ros.studies.plan import Axis, Grid
 from stickslip_ros.studies.settling import MotionState, check_reference
 from stickslip_ros.studies.spread import Spread, check_spread, drawn
 from stickslip_ros.studies.study import PointStudy
-from stickslip_ros.studies.tuning import Goal, Tuned, tune, with_law
+from stickslip_ros.studies.tuning import Goal, Tuned, Tuning, with_law
 from stickslip_ros.text import shown
 
-FEED_TOLERANCE, POSITION_TOLERANCE = 0.05, 0.001
-"""Default tolerance, as a share: of the belt speed, or of the motion of the reference."""
 DISTURBANCES = ("step", "impulse", "sine")
 """Default disturbances."""
 
@@ -198,14 +198,12 @@ def compared(
     applied = tuple(
         Disturbance.parse(text, scenario) for text in _names("disturbances", disturbances)
     )
-    step = max((d.amplitude for d in applied if d.kind in ("step", "sine")), default=0.0)
     tuned: dict[str, Tuned] = {}
     constants: dict[str, dict[str, Any]] = {}
     for number, law in enumerate(laws):
         as_given = with_law(scenario, law, {}).controller.control_law
         if as_given.tuned and law not in fixed:
-            goal = Goal.from_scenario(scenario, feeds(scenario, axes), step, as_given.force_limit)
-            tuned[law] = tune(scenario, law, goal)
+            tuned[law] = _tuned(scenario, law, feeds(scenario, axes), applied)
             as_given = tuned[law].law
         constants[law] = {name: getattr(as_given, name) for name in as_given.constants()}
         progress((number + 1) / len(laws))
@@ -214,6 +212,20 @@ def compared(
     study = Comparison(scenario, plan)
     study.check()
     return study, tuned
+
+
+def _tuned(
+    scenario: Scenario, law: str, speeds: Sequence[float], applied: Sequence[Disturbance]
+) -> Tuned:
+    """Return the gains of a design for the range of belt speeds, or the nearest ones."""
+    with_own = with_law(scenario, law, {})
+    limit = with_own.controller.control_law.force_limit
+    ends = min(map(abs, speeds)), max(map(abs, speeds))
+    if not is_positioning(scenario):
+        found = design(Task(with_own, ends, limit), disturbances=applied)
+        if found.tuned is not None:
+            return replace(found.tuned, remark=found.remark)
+    return Tuning(with_own, law, Goal.from_scenario(with_own, ends, applied, limit)).best()
 
 
 def feeds(scenario: Scenario, axes: Sequence[Axis]) -> list[float]:

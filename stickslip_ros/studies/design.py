@@ -1,19 +1,47 @@
-"""The task of a design, and its result: gains of a control law, or why there are none."""
+"""Design of a controller: gains by the rule of `tuning`, simulated before they are proposed.
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+A proposal keeps its limits in theory, and holds the drive, sampled, held and delayed as between the
+nodes, under disturbances. The washout law also catches the vibration without control.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from math import copysign
-from typing import Any, Self
+from math import copysign, inf
+from typing import Annotated, Any, Self
 
 import numpy as np
 
+from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.model.constants import LARGEST, SMALLEST
 from stickslip_ros.model.control import ControlLaw, Washout
 from stickslip_ros.model.drive import Drive
+from stickslip_ros.progress import Progress
+from stickslip_ros.quantities import Quantity
 from stickslip_ros.scenarios.files import Scenario, parameter_file
-from stickslip_ros.studies.options import OWN_SPEED_RANGE
+from stickslip_ros.studies.case_outcome import Disturbance, simulate_case
+from stickslip_ros.studies.controller_trial import FILTER_SETTLED, Bench, Rest, Vibration
+from stickslip_ros.studies.gain_search import rounded
+from stickslip_ros.studies.options import FEED_TOLERANCE, OWN_SPEED_RANGE
+from stickslip_ros.studies.stability import number_text
+from stickslip_ros.studies.tuning import RESERVE, Goal, Tuned, Tuning
+from stickslip_ros.theory.linear_sampled_loop import (
+    LinearSampledLoop,
+    settling_time,
+    why_no_linear_loop,
+)
+from stickslip_ros.theory.stability_map import StabilityMap
+
+_KINDS = ("step", "impulse")
+"""Disturbances of a design."""
+_ATTEMPTS, _MORE_CAUTION = 6, 0.8
+"""Searches until the simulation holds, each with a smaller share of the limits."""
+_PERIODS, _SHORTEST, _WITHOUT_SPRING, _DECAYS = 100.0, 2.0, 6.0, 18.0
+"""Duration of a check: natural periods, at least so many seconds, without a period so many, and
+times in which a small deviation decays by a factor e."""
+_THROWN_SPEEDS = 3.0, 30.0, 300.0
+"""Speeds with which the slide must return to equilibrium, in the speed scale of the drive."""
 
 
 @dataclass(frozen=True)
@@ -75,17 +103,6 @@ class Task:
         """The drive at the scenario's belt speed."""
         return self.scenario.plant.as_drive()
 
-    @property
-    def speeds(self) -> list[float]:
-        """Five belt speeds across the range, m/s, or the only one."""
-        low, high = self.belt_speeds
-        return np.linspace(low, high, 5 if low < high else 1).tolist()
-
-    @property
-    def drives(self) -> list[Drive]:
-        """The drive at these speeds; the opposite direction is symmetric."""
-        return [replace(self.drive, belt_speed=speed) for speed in self.speeds]
-
     def with_law(self, law: ControlLaw) -> Scenario:
         """Return the scenario with other constants of its law.
 
@@ -105,10 +122,46 @@ class Task:
         proposed: dict[str, Any] = {
             f"{self.scenario.controller.node}.{name}": value
             for name, value in values.items()
-            if isinstance(value, float)
+            if isinstance(value, float) or value != getattr(self.scenario.control_law, name)
         }
         proposed["plant.belt_speed"] = copysign(min(max(abs(belt_speed), low), high), belt_speed)
         return self.scenario.overridden([], proposed)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Check:
+    """Predicted and simulated behaviour at one belt speed under one disturbance; SI units."""
+
+    belt_speed: Annotated[float, Quantity("belt speed", "m/s")]
+    """Belt speed, m/s."""
+    disturbance: Annotated[str, Quantity("disturbance")]
+    """A disturbance, or `vibration`: that without control, when the control is switched on."""
+    vibrates: bool | None = None
+    """Whether the drive vibrates without control; None where that is not asked."""
+    decay_rate: float
+    """Decay rate of a small deviation, 1/s."""
+    predicted_settling_time: Annotated[float, Quantity("1 % settling time, predicted", "s")]
+    """Predicted 1 % settling time of a small deviation, s."""
+    predicted_peak_force: Annotated[float, Quantity("peak force, predicted", "N")]
+    """Predicted peak force, N: from the disturbance on, or switched on at the worst phase."""
+    held: Annotated[bool | None, Quantity("held")] = None
+    """Whether the simulated drive is held; None where nothing was simulated."""
+    settling_time: Annotated[float | None, Quantity("simulated: settling time", "s")] = None
+    """Simulated settling time, s: of the vibration at the worst phase, or after a disturbance."""
+    disturbed_force: Annotated[float | None, Quantity("peak force", "N")] = None
+    """Simulated peak force from the disturbance on, N; the vibration is all of it."""
+    peak_force: Annotated[float | None, Quantity("with the start", "N")] = None
+    """Simulated peak force from the first sample on, N."""
+    rms_velocity: Annotated[float | None, Quantity("rms velocity", "m/s")] = None
+    """Simulated rms velocity after the disturbance, m/s."""
+    mean_force: Annotated[float | None, Quantity("mean force", "N")] = None
+    """Simulated mean force there, N."""
+    rms_force: Annotated[float | None, Quantity("rms force beyond the mean", "N")] = None
+    """Simulated rms force beyond it, N."""
+    reason: str | None = None
+    """How the simulated control fails; None if it does not."""
+    rest: Rest | None = None
+    """Motion and force that noise and rounding leave at rest, simulated; of a vibration only."""
 
 
 @dataclass(frozen=True)
@@ -121,8 +174,14 @@ class Design:
     """The proposed controller; None if no gains meet the task."""
     remark: str | None = None
     """Why there is no proposal, or a caution about it."""
-    checks: Sequence[Any] = ()
+    checks: Sequence[Check] = ()
     """Simulations of the proposal, in order of belt speed."""
+    tuned: Tuned | None = None
+    """The gains, or the nearest ones, and their margins; None where there is no linear loop."""
+    slowest: LinearSampledLoop | None = None
+    """The loop at the belt speed at which a small deviation decays most slowly."""
+    vibrations: Sequence[Vibration] = field(default=(), compare=False, repr=False)
+    """Vibrations without control that the washout law catches, in order of belt speed."""
 
     @cached_property
     def scenario(self) -> Scenario | None:
@@ -132,11 +191,266 @@ class Design:
     @property
     def parameter_file(self) -> str | None:
         """Text of a parameter file with the complete `scenario`; None without a proposal."""
-        if self.scenario is None:
+        return None if self.scenario is None else gains_file(self.scenario)
+
+    def map_around(self) -> StabilityMap | None:
+        """Return the stability map of the slowest loop around a washout; None without one."""
+        if self.slowest is None or not isinstance(self.controller, Washout):
             return None
-        nodes = self.scenario.as_dict()
-        del nodes["analyzer"]["bag"]
-        return parameter_file(nodes)
+        return StabilityMap.around(self.slowest, self.controller)
+
+    def peak_forces(self, around: StabilityMap) -> FloatArray:
+        """Return the largest force over the gains of a map.
+
+        It is the force of a controller with the proposed cubic gain that is activated at the worst
+        phase of the vibration without control, at the worst belt speed.
+
+        Parameters
+        ----------
+        around : StabilityMap
+            Map of m cutoff frequencies and n linear gains.
+
+        Returns
+        -------
+        ndarray
+            Force in N, shape (m, n); zero where nothing vibrates.
+        """
+        linear = around.linear_gains[:, np.newaxis]
+        forces = np.zeros((len(around.corner_frequencies), len(around.linear_gains)))
+        for row, corner_frequency in enumerate(around.corner_frequencies.tolist()):
+            for vibration in self.vibrations:
+                speeds = np.linspace(0.0, vibration.peak_speed(corner_frequency), 50)
+                gains = Washout(corner_frequency, linear, around.gains.cubic_gain)
+                force = np.abs(gains.force(speeds)).max(axis=1)
+                forces[row] = np.maximum(forces[row], force)
+        return forces
+
+
+def gains_file(scenario: Scenario) -> str:
+    """Return the text of a complete parameter file."""
+    nodes = scenario.as_dict()
+    del nodes["analyzer"]["bag"]
+    return parameter_file(nodes)
+
+
+def design(
+    task: Task,
+    progress: Progress = lambda _: None,
+    *,
+    disturbances: Sequence[Disturbance] | None = None,
+) -> Design:
+    """Find the gains with the fastest decay at the slowest belt speed of the range.
+
+    Gains that fail in simulation are not proposed: the next attempt is more cautious.
+
+    Parameters
+    ----------
+    task : Task
+        The drive, its loop, the control law, the force limit and the range of belt speeds.
+    progress : callable
+        Receives the share of the work that is done, 0 to 1.
+    disturbances : sequence of Disturbance, optional
+        What acts on the drive; by default a step and an impulse.
+
+    Returns
+    -------
+    Design
+        The proposal with its margins and checks, or the reason why there is none, with a sufficient
+        force limit if one exists.
+
+    Raises
+    ------
+    InvalidInputError
+        If the law has no gains to tune, or the theory of the sampled loop does not cover the drive.
+    """
+    scenario, plant = task.scenario, task.scenario.plant
+    reason = why_no_linear_loop(task.drive, plant.rate, plant.force_delay + plant.force_jitter / 2)
+    if reason is not None and task.drive.belt_speed:
+        return Design(task, remark=reason)
+    if disturbances is None:
+        disturbances = [Disturbance.parse(kind, scenario) for kind in _KINDS]
+    goal = Goal.from_scenario(scenario, task.belt_speeds, disturbances, task.force_limit)
+    tuning = Tuning(scenario, scenario.controller.law, goal)
+    if tuning.diverges is not None:
+        return Design(task, remark=tuning.diverges)
+    found = Designer(task, tuning, disturbances).proposed(progress)
+    progress(1.0)
+    if found.controller is None and found.tuned is not None and found.tuned.missed:
+        found = replace(
+            found, remark=joined(found.remark, _sufficient(task, found.tuned, disturbances))
+        )
+    if tuning.vibrations and plant.force_jitter:
+        no_jitter = (
+            "force_jitter is omitted where the vibration is caught: the delay is constant there"
+        )
+        found = replace(found, remark=joined(found.remark, no_jitter))
+    return found
+
+
+def _sufficient(task: Task, nearest: Tuned, disturbances: Sequence[Disturbance]) -> str | None:
+    """Return which force limit is sufficient, if nothing but the limit is in the way."""
+    if [limit.name for limit in nearest.missed] != ["the peak force"] or not nearest.peak_force:
+        return None
+    if (enough := rounded(nearest.peak_force / RESERVE, up=True)) <= task.force_limit:
+        return None
+    larger = replace(task, force_limit=enough)
+    found = design(larger, disturbances=disturbances)
+    if found.controller is None:
+        return None
+    return f"a force limit of about {number_text(task.drive, enough, 'N')} is sufficient"
+
+
+class Designer:
+    """Searches and simulates in turn."""
+
+    def __init__(self, task: Task, tuning: Tuning, disturbances: Sequence[Disturbance]) -> None:
+        self.task, self.tuning, self.disturbances = task, tuning, disturbances
+        plant = task.scenario.plant
+        self.bench = Bench(plant.rate, plant.force_delay, plant.sensor)
+        sensor, actuator = plant.sensor, task.drive.actuator
+        self.rough = bool(
+            sensor.position_resolution
+            or actuator.resolution
+            or sensor.position_noise
+            or sensor.velocity_noise
+        )
+        """Whether noise or rounding keep the loop from resting."""
+
+    def proposed(self, progress: Progress) -> Design:
+        """Return a proposal that was checked by simulation, or the reason why there is none."""
+        share, cubic, failure = RESERVE, True, None
+        tuned: Tuned | None = None
+        for attempt in range(_ATTEMPTS):
+            tuned = self.tuning.best(share, cubic=cubic)
+            if tuned.missed or tuned.decay_rate <= 0.0:
+                return Design(self.task, None, failure or tuned.remark, tuned=tuned)
+            law: Any = tuned.law
+            checks: list[Check] = []
+            if self.tuning.vibrations:
+                waits = FILTER_SETTLED / law.corner_frequency
+                law = replace(law, start_after=rounded(waits, digits=2, up=True))
+            for check, done in self.checks(law):
+                checks.append(check)
+                progress(1.0 - 0.5**attempt * (1.0 - done))
+                if (failure := check.reason) is not None:
+                    break
+            remark = None
+            if failure is None and law.start_after:
+                remark, failure = self._throw_from_high_speeds(law)
+            if failure is None:
+                slowest = self.tuning.loops.slowest(law)
+                remark, seen = joined(tuned.remark, remark), tuple(self.tuning.vibrations)
+                return Design(self.task, law, remark, checks, tuned, slowest, seen)
+            peak = max((check.disturbed_force or 0.0 for check in checks), default=0.0)
+            if peak > self.task.force_limit:
+                share *= RESERVE * self.task.force_limit / peak
+            elif getattr(law, "cubic_gain", 0.0):
+                cubic = False
+            else:
+                share *= _MORE_CAUTION
+        return Design(self.task, None, failure, tuned=tuned)
+
+    def checks(self, law: Any) -> Iterator[tuple[Check, float]]:
+        """Yield the checks of a law, and the share of them that is done."""
+        tuning, scenario = self.tuning, self.task.with_law(law)
+        vibrations = tuning.vibrations or [None] * len(tuning.plants)
+        for row, (plant, vibration) in enumerate(zip(tuning.plants, vibrations, strict=True)):
+            drive = plant.loop.drive
+            linear = tuning.judged(law, [plant], [])
+            predicted = settling_time(linear.decay_rate) or inf
+            basic = Check(
+                belt_speed=drive.belt_speed,
+                disturbance="vibration",
+                decay_rate=linear.decay_rate,
+                predicted_settling_time=predicted,
+                predicted_peak_force=linear.peak_force or 0.0,
+            )
+            done = (row + 1) / len(tuning.plants)
+            if vibration is not None:
+                yield self._caught(basic, vibration, law), done
+            for disturbance in self.disturbances:
+                yield self._disturbed(basic, disturbance, scenario), done
+
+    def _caught(self, check: Check, vibration: Vibration, law: Any) -> Check:
+        """Return the check with the vibration caught, and what is left at rest."""
+        drive, predicted = vibration.drive, check.predicted_settling_time
+        caught = rest = reason = None
+        if vibration.vibrates:
+            patience = 5.0 * predicted + 20.0 * drive.natural_period
+            caught = self.bench.catch(vibration, law, patience)
+            reason = self._failure(drive.belt_speed, caught.settling_time, caught.peak_force)
+        if self.rough:
+            settled = max(predicted, FILTER_SETTLED / law.corner_frequency)
+            rest = self.bench.rest(drive, law, settled)
+        return replace(
+            check,
+            vibrates=vibration.vibrates,
+            predicted_peak_force=vibration.peak_force(law),
+            held=None if caught is None else caught.settling_time is not None,
+            settling_time=None if caught is None else caught.settling_time,
+            disturbed_force=None if caught is None else caught.peak_force,
+            peak_force=None if caught is None else caught.peak_force,
+            reason=reason,
+            rest=rest,
+        )
+
+    def _failure(self, belt_speed: float, settles: float | None, peak: float) -> str | None:
+        """Return how a caught vibration fails; None if it does not."""
+        speed = f"at a belt speed of {number_text(self.task.drive, belt_speed, 'm/s')}"
+        if settles is None and self.rough:
+            rough = "with the noise and rounding of sensor and actuator"
+            return f"{speed} the vibration does not decay to 1 % {rough}"
+        if settles is None:
+            return f"{speed} the vibration does not decay, although a small one would"
+        if peak > self.task.force_limit:
+            both = (number_text(self.task.drive, n, "N") for n in (peak, self.task.force_limit))
+            return "{} the force reaches {}, above the limit of {}".format(speed, *both)
+        return None
+
+    def _disturbed(self, check: Check, disturbance: Disturbance, scenario: Scenario) -> Check:
+        """Return the check with a simulated disturbance."""
+        drive, duration = self.task.drive, max(_WITHOUT_SPRING, _DECAYS / check.decay_rate)
+        if drive.has_spring:
+            shortest = max(_PERIODS * drive.natural_period, _SHORTEST)
+            duration = max(shortest, _DECAYS / check.decay_rate)
+        values = {"plant.belt_speed": check.belt_speed, **disturbance.parameters(duration)}
+        outcome = simulate_case(scenario.changed(values), duration, disturbance, FEED_TOLERANCE)
+        reason = None
+        if not outcome.held:
+            speed = number_text(drive, check.belt_speed, "m/s")
+            reason = f"the simulated drive is not held at {speed}, {disturbance}"
+            if outcome.reason or outcome.sticking:
+                stuck = f"it sticks for {outcome.sticking or 0.0:.2%} of the time"
+                reason = f"{reason}: {outcome.reason or stuck}"
+            elif outcome.rms_velocity is not None:
+                both = outcome.rms_velocity, FEED_TOLERANCE * abs(check.belt_speed)
+                rms, allowed = (number_text(drive, value, "m/s") for value in both)
+                reason = f"{reason}: its rms velocity is {rms}, and must be at most {allowed}"
+        own = ("held", "settling_time", "disturbed_force", "peak_force")
+        names = (*own, "rms_velocity", "mean_force", "rms_force")
+        values = {name: getattr(outcome, name) for name in names}
+        return replace(check, disturbance=str(disturbance), reason=reason, **values)
+
+    def _throw_from_high_speeds(self, law: Any) -> tuple[str | None, str | None]:
+        """Return a remark on motions with a fast start, and how the law fails, if it does."""
+        remark: str | None = None
+        loops = self.tuning.loops
+        unlimited, slowest = replace(law, force_limit=inf), loops.slowest(law)
+        for loop in loops.all:
+            drive = loop.drive
+            for speed in (thrown * drive.speed_scale for thrown in _THROWN_SPEEDS):
+                if loop not in (loops.all[0], loops.all[-1], slowest):
+                    continue
+                if self.bench.returns(drive, law, speed):
+                    continue
+                slide = (
+                    f"started at {number_text(drive, speed, 'm/s')} on a belt at "
+                    f"{number_text(drive, drive.belt_speed, 'm/s')}, the slide"
+                )
+                if law.cubic_gain != 0.0 or not self.bench.returns(drive, unlimited, speed):
+                    return None, f"{slide} does not return to equilibrium"
+                remark = remark or f"{slide} needs more force than the limit"
+        return remark, None
 
 
 def joined(*remarks: str | None) -> str | None:

@@ -1,8 +1,10 @@
 """The search for gains of a control law: those that damp fastest at all feeds, within limits."""
 
 from collections.abc import Callable, Iterable, Sequence
+from functools import cache
+from itertools import product
 from math import ceil, floor, inf, log10
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
@@ -13,11 +15,14 @@ from stickslip_ros.model.drive_layout import SPEED
 from stickslip_ros.theory.linear_sampled_loop import LinearSampledLoop
 
 _Law = TypeVar("_Law", bound=ControlLaw)
+_Value = tuple[float, float]
 
-_VALUED, _REFINED = 60, 40
-"""Starts that are compared with the limits, and largest number of steps of a refinement."""
-_FIRST_STEP, _LAST_STEP = 1.0, 0.05
-"""Steps of a refinement, in the units of the points."""
+_SCANNED = 256, 2048, 4096
+"""Points of the first scan, with one gain, with two, and with more."""
+_VALUED, _REFINED = 60, 4
+"""Points of it that are compared with the limits, and those from which the search goes on."""
+_FIRST_STEP, _LAST_STEP, _MOVES = 1.0, 0.03, 40
+"""Steps of a refinement, as logarithms, and largest number of them."""
 
 
 class Loops:
@@ -27,16 +32,16 @@ class Loops:
         self.all = loops
         """The loop at each feed."""
         slopes = [float(loop.jacobian[SPEED, SPEED]) for loop in loops]
-        self.steepest = max(map(abs, slopes))
-        """Largest slope of the friction in magnitude, dimensionless."""
         self.ends = sorted({int(np.argmin(slopes)), int(np.argmax(slopes))})
-        """Places of the loops that decide: they differ in the slope of the friction only."""
+        """Places of the loops that decide: without a memory they differ in the slope only."""
+        if loops[0].drive.friction.states:
+            self.ends = list(range(len(loops)))
         self.deciding = [loops[place].coarsened() for place in self.ends]
         """Those loops; with a long delay similar ones."""
 
     def slowest(self, law: ControlLaw) -> LinearSampledLoop:
         """Return the loop in which a small deviation decays most slowly."""
-        return min(self.all, key=lambda loop: loop.decay_rate(law))
+        return min(self.all, key=lambda loop: loop.decay_rate(linear_part(law, loop)))
 
     def decay_rates(self, laws: Sequence[ControlLaw]) -> FloatArray:
         """Return the smallest decay rate with each law, 1/s; approximate for a long delay."""
@@ -63,65 +68,84 @@ def linear_part(law: ControlLaw, loop: LinearSampledLoop) -> LinearFeedback:
 
 def fastest(
     loops: Loops,
-    starts: FloatArray,
+    ends: tuple[FloatArray, FloatArray],
     law_at: Callable[[FloatArray], _Law],
-    excess: Callable[[_Law], Iterable[float]] = lambda _: (),
-    *,
-    ways: Sequence[Sequence[float]] | None = None,
-    kept: int = 6,
-) -> _Law | None:
+    excess: Callable[[_Law], Iterable[float]],
+) -> tuple[_Value, _Law]:
     """Return the law that first exceeds its limits least, and then damps fastest.
+
+    Points between the ends are scanned evenly; the best are refined by ever smaller steps.
 
     Parameters
     ----------
     loops : Loops
         The loops.
-    starts : ndarray
-        Points where the search starts, shape (m, n); the best `kept` of them are refined,
-        with ever smaller steps from 1 on.
+    ends : tuple of ndarray
+        Lowest and highest points, logarithms of magnitudes, shape (n,) each.
     law_at : callable
         Returns the law that a point stands for.
     excess : callable
         Returns by how much, as logarithms, a stable law exceeds limits.
-    ways : sequence
-        Directions of the first steps, n numbers each; by default both ways along each axis.
-    kept : int
-        Number of starts that are refined.
 
     Returns
     -------
-    ControlLaw or None
-        The law; None if no gains make all loops stable.
+    tuple
+        Its value and the law. A value is the excess in all, less than or equal to zero and
+        -infinity of an unstable law, and the smallest decay rate, 1/s.
     """
+    low, high = ends
+    count = len(low)
 
-    def valued(points: Iterable[FloatArray]) -> Any:
-        """Return the value of each point, what is made large first, and the point."""
-        places = [tuple(point.tolist()) for point in points]
-        laws = [law_at(np.array(place)) for place in places]
-        rates = loops.decay_rates(laws).tolist()
-        for place, law, rate in zip(places, laws, rates, strict=True):
-            yield (-sum(excess(law)) if rate > 0.0 else -inf, rate), place
+    @cache
+    def exceeded(law: _Law) -> float:
+        return -ceil(100.0 * sum(excess(law))) / 100.0  # so that less excess is not too slow
 
-    axes = np.eye(starts.shape[1])
-    steps = np.vstack([axes, -axes]) if ways is None else np.array(ways)
+    def valued(law: _Law, rate: float) -> _Value:
+        return (exceeded(law) if rate > 0.0 else -inf, rate)
 
-    def refined(top: Any) -> Any:
-        """Return the best value and point, with ever smaller steps."""
+    points = _evenly(low, high)
+    laws = [law_at(point) for point in points]
+    rates = loops.decay_rates(laws)
+    order = np.argsort(-rates)
+    stable = int((rates > 0.0).sum())
+    places = {*range(_VALUED // 3), *np.linspace(0, max(stable - 1, 0), _VALUED).astype(int)}
+    chosen = [order[place] for place in sorted(places)]
+    tops = [(valued(laws[row], float(rates[row])), tuple(points[row].tolist())) for row in chosen]
+    ways = [way for way in product((-1.0, 0.0, 1.0), repeat=count) if 0 < np.abs(way).sum() < 4]
+
+    def refined(top: _Value, point: FloatArray) -> tuple[_Value, _Law]:
         step = _FIRST_STEP
-        for _ in range(_REFINED):
-            best = max(valued(np.array(top[1]) + step * steps))
-            if best[0] > top[0]:
-                top = best
+        for _ in range(_MOVES):
+            around = np.clip(point + step * np.array(ways), low, high)
+            laws = [law_at(place) for place in around]
+            rates = loops.decay_rates(laws)
+            # Slower ones than a law within its limits are no better, within theirs or not.
+            faster = (
+                row for row in np.argsort(-rates).tolist() if top[0] < 0.0 or rates[row] > top[1]
+            )
+            values = ((valued(laws[row], float(rates[row])), row) for row in faster)
+            if top[0] < 0.0:  # some are better by little: the best
+                values = iter([max(values)])
+            better = next((found for found in values if found[0] > top), None)
+            if better is not None:
+                top, point = better[0], around[better[1]]
             elif step < _LAST_STEP:
                 break
             else:
                 step /= 2.0
-        return top
+        return top, law_at(point)
 
-    order = np.argsort(loops.decay_rates([law_at(start) for start in starts]))[::-1]
-    best = sorted(valued(starts[order[:_VALUED]]), reverse=True)[:kept]
-    (_, decay_rate), point = max(map(refined, best))
-    return law_at(np.array(point)) if decay_rate > 0.0 else None
+    best = sorted(tops, reverse=True)[:_REFINED]
+    return max((refined(top, np.array(point)) for top, point in best), key=lambda found: found[0])
+
+
+def _evenly(low: FloatArray, high: FloatArray) -> FloatArray:
+    """Return points between ends of shape (n,), spread evenly, shape (m, n)."""
+    count = len(low)
+    # Powers of the root of x^(n+1) = x + 1 spread points most evenly (Roberts, 2018).
+    root = max(np.roots([1.0, *[0.0] * (count - 1), -1.0, -1.0]).real)
+    numbers = np.arange(1, _SCANNED[min(count, len(_SCANNED)) - 1] + 1)[:, None]
+    return low + (high - low) * ((0.5 + numbers * root ** -np.arange(1.0, count + 1.0)) % 1.0)
 
 
 def rounded(value: float, digits: int = 3, *, up: bool = False) -> float:

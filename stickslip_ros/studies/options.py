@@ -72,3 +72,7 @@ class Continuation(StrEnum):
     def directions(self) -> tuple["Continuation", ...]:
         """UP, DOWN, or both."""
         return (Continuation.UP, Continuation.DOWN) if self is Continuation.BOTH else (self,)
+
+
+FEED_TOLERANCE, POSITION_TOLERANCE = 0.05, 0.001
+"""Default tolerance, as a share: of the belt speed, or of the motion of the reference."""

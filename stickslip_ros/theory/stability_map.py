@@ -32,7 +32,10 @@ class StabilityMap:
 
     @classmethod
     def around(cls, loop: LinearSampledLoop, gains: Washout, points: int = 81) -> Self:
-        """Return the map around `gains` (SI units) with this number of points along each axis."""
+        """Return the map around `gains` (SI units) with this number of points along each axis.
+
+        Its linear gains reach from zero past those gains and past the critical one.
+        """
         corners = np.geomspace(0.1 * gains.corner_frequency, 10.0 * gains.corner_frequency, points)
         continuous = np.full(points, np.nan)
         for row, corner_frequency in enumerate(corners):
@@ -40,10 +43,10 @@ class StabilityMap:
             if critical is not None:
                 continuous[row] = critical.linear
         needed = loop.critical_linear_gain(gains.corner_frequency) or 0.0
-        far = 2.0 * (
-            gains.linear_gain or needed or -loop.drive.force_scale / loop.drive.speed_scale
-        )
-        linear = np.sort(np.linspace(far, -0.25 * far, points))
+        unit = loop.drive.force_scale / loop.drive.speed_scale
+        ends = [2.0 * gain for gain in (gains.linear_gain, needed) if gain] or [-2.0 * unit]
+        far = max(ends, key=abs)
+        linear = np.linspace(min(*ends, -0.25 * far), max(*ends, -0.25 * far), points)
         decay_rates = loop.coarsened().decay_rates(corners, linear)
         return cls(loop, gains, corners, linear, decay_rates, continuous)
 

@@ -14,8 +14,7 @@ from stickslip_ros.model.friction import Exponential
 from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.show.stability_figure import branches_figure, design_figure, stability_figure
 from stickslip_ros.show.style import STYLES
-from stickslip_ros.studies.design import Task
-from stickslip_ros.studies.washout_design import WashoutDesign, design_washout
+from stickslip_ros.studies.design import Design, Task, design
 from stickslip_ros.theory.bifurcation_branches import BifurcationBranches
 from stickslip_ros.theory.linear_sampled_loop import LinearSampledLoop
 from stickslip_ros.theory.stability_map import CriticalGainCurves, StabilityMap
@@ -114,9 +113,9 @@ def test_the_map_of_a_loop_and_its_critical_gains(style: str) -> None:
 
 
 @cache
-def designed(force_limit: float) -> WashoutDesign:
+def designed(force_limit: float) -> Design:
     limit = f"washout_controller.force_limit={force_limit}"
-    return design_washout(Task.from_scenario(load_scenario("feed_drive", [limit]), (0.04, 0.04)))
+    return design(Task.from_scenario(load_scenario("feed_drive", [limit]), (0.04, 0.04)))
 
 
 @in_styles
@@ -133,7 +132,7 @@ def test_the_force_at_the_proposal_is_that_of_its_check() -> None:
     forces = found.peak_forces(around)
     row, column = 40, int(np.abs(around.linear_gains - controller.linear_gain).argmin())
     assert around.corner_frequencies[row] == pytest.approx(controller.corner_frequency)
-    (check,) = found.checks
+    check, *_ = found.checks
     assert forces[row, column] == pytest.approx(check.peak_force, rel=0.1)
     assert forces[row, column] < 200.0 < forces.max()
 

@@ -1,14 +1,22 @@
-"""The task of a design, and the scenario of its proposal."""
+"""Design: its task, and gains of any law that hold in simulation, or why there are none."""
 
-from math import inf
+import re
+from functools import cache
+from math import inf, pi
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 
+import stickslip_ros as ss
 from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.measures.cycle_measures import Regime
 from stickslip_ros.model.control import Washout
 from stickslip_ros.scenarios.files import load_scenario
-from stickslip_ros.studies.design import Design, Task
+from stickslip_ros.studies.design import Design, Task, design
+from stickslip_ros.theory.linear_sampled_loop import LinearSampledLoop
+from tests.drives import FEED_DRIVE
 from tests.scenarios.files import scenario_file
 
 WASHOUT = Washout(3.0, -2.0, 0.0)
@@ -45,3 +53,217 @@ def test_the_range_of_belt_speeds() -> None:
     for speed in (0.04, -0.04):
         about = scenario.overridden([f"plant.belt_speed={speed}"])
         assert Task.from_scenario(about).belt_speeds == pytest.approx((0.036, 0.044))
+
+
+def test_a_proposal_holds_in_simulation_and_its_file_has_the_gains() -> None:
+    drive = ss.scenario("feed_drive", "plant.force_delay=0.001", controller="velocity_feedback")
+    found = ss.design(drive, (0.03, 0.04))
+    assert found.remark is None
+    assert all(check.held for check in found.design.checks)
+    assert len(found.design.checks) == 10
+    gain = found.scenario.controller.control_law.velocity_gain
+    assert f'"velocity_gain": {gain}' in found.design.parameter_file
+    margin = found.design.tuned.phase_margin
+    assert margin is not None
+    assert 0.0 < margin < pi
+    radius = max(np.abs(poles).max() for poles in found.poles.values())
+    assert -np.log(radius) * 1000.0 == pytest.approx(found.design.tuned.decay_rate, rel=1e-6)
+    assert len(found.to_pandas()) == 10
+    assert found.plot().axes
+
+
+def test_an_axis_without_a_spring_gets_gains_for_a_feed() -> None:
+    axis = load_scenario("axis", controller="pid")
+    found = design(Task.from_scenario(axis, (0.01, 0.01)))
+    assert found.remark is None
+    assert [check.held for check in found.checks] == [True, True]
+    assert found.tuned.decay_rate > 0.0
+
+
+def task(
+    belt_speeds: tuple[float, float] = (0.036, 0.044), force_limit: float = inf, **values: Any
+) -> Task:
+    """Return a task for the feed drive with other values of the plant; "__" stands for a point."""
+    changed = {f"plant.{name.replace('__', '.')}": value for name, value in values.items()}
+    return Task(load_scenario("feed_drive").changed(changed), belt_speeds, force_limit)
+
+
+@cache
+def designed(**values: Any) -> Design:
+    """Return the design of a task; several tests look at the same one."""
+    return design(task(**values))
+
+
+AT_40 = (0.04, 0.04)
+
+
+def proposal(found: Design) -> Washout:
+    assert found.controller is not None, found.remark
+    return found.controller
+
+
+def unlimited(found: Design, **values: float) -> ss.Scenario:
+    """Return a scenario with the proposal, whose force is not limited."""
+    assert found.scenario is not None
+    return ss.scenario(found.scenario, force_limit=inf, window=5, **values)
+
+
+def check_from_its_own_limit_cycle(**values: Any) -> None:
+    """Check that the proposal brings the drive to rest, at speeds that were checked and others."""
+    found = designed(**values)
+    task = found.task
+    start = 2.0 + proposal(found).start_after
+    longest = max(check.settling_time or 0.0 for check in found.checks)
+    for speed in (*task.belt_speeds, sum(task.belt_speeds) / 2.0):
+        scenario = unlimited(found, belt_speed=speed, start_after=start)
+        run = ss.simulate(scenario, start + 5.0 * longest + 1.0)
+        assert run.measures.regime is Regime.EQUILIBRIUM
+        assert 0.0 < np.abs(run.trajectory.control_force).max() <= task.force_limit
+
+
+def test_a_proposal_brings_the_drive_to_rest_about_as_predicted() -> None:
+    found = designed(force_limit=100.0)
+    check_from_its_own_limit_cycle(force_limit=100.0)
+    for check in (each for each in found.checks if each.disturbance == "vibration"):
+        assert check.vibrates
+        # A large vibration dies out as nonlinearly as the friction is: here faster.
+        assert 0.3 < check.settling_time / check.predicted_settling_time < 1.0
+        assert check.peak_force == pytest.approx(check.predicted_peak_force, rel=0.02)
+        assert check.predicted_peak_force <= 100.0
+    assert len({check.belt_speed for check in found.checks}) == len(found.checks) // 3 > 3
+    assert "margin" not in (found.remark or "")
+
+
+def test_late_and_over_a_wide_range_too_it_brings_the_drive_to_rest() -> None:
+    check_from_its_own_limit_cycle(force_delay=0.005, force_limit=150.0)
+    check_from_its_own_limit_cycle(belt_speeds=(0.008, 0.04), force_limit=300.0)
+
+
+def test_nothing_near_a_proposal_is_much_faster() -> None:
+    gains = proposal(designed(belt_speeds=AT_40))
+    loop = LinearSampledLoop.from_drive(FEED_DRIVE, 1000.0)
+    corners = gains.corner_frequency * np.linspace(0.5, 2.0, 31)
+    linear = gains.linear_gain * np.linspace(0.5, 2.0, 31)
+    assert loop.decay_rate(gains) > 0.95 * loop.decay_rates(corners, linear).max()
+
+
+def test_a_tighter_limit_is_slower_and_in_the_end_there_is_nothing() -> None:
+    rates = []
+    for limit in (200.0, 100.0):
+        found = designed(belt_speeds=AT_40, force_limit=limit)
+        rates.append(min(check.decay_rate for check in found.checks))
+    assert rates == sorted(rates, reverse=True)
+    found = designed(belt_speeds=AT_40, force_limit=20.0)
+    assert found.controller is None
+    assert found.parameter_file is None
+    assert "N, and must be at most 20 N" in (found.remark or "")
+
+
+def test_the_cubic_gain_is_within_what_the_friction_law_bears() -> None:
+    """The law's own, (mu_s - mu_m) N / (2 v_m^3), is 6e5 N s^3/m^3."""
+    found = designed(force_limit=100.0)
+    assert 0.0 <= proposal(found).cubic_gain <= 3e5
+    # From any speed it comes back, even with a force that is not limited.
+    for speed in (0.3, -3.0, 30.0):
+        free = unlimited(found, initial_velocity=speed, start_after=0.0)
+        assert ss.simulate(free, 8.0).measures.regime is Regime.EQUILIBRIUM
+
+
+@pytest.mark.parametrize(
+    "friction",
+    [
+        {"friction__law": "coulomb"},
+        {"friction__law": "exponential", "friction__kinetic": 0.25, "friction__decay_speed": 0.1},
+    ],
+)
+def test_a_law_that_does_not_grow_with_speed_gets_no_cubic_gain(friction: dict[str, Any]) -> None:
+    found = designed(damping=100.0, force_limit=200.0, **friction)
+    assert proposal(found).cubic_gain == 0.0
+
+
+def test_on_a_slow_belt_too_the_vibration_is_seen() -> None:
+    """At 0.2 mm/s the slide sticks for dozens of natural periods in each cycle."""
+    found = designed(belt_speeds=(0.0002, 0.0002))
+    check, *_ = found.checks
+    assert check.vibrates
+    assert proposal(found).linear_gain < 0.0
+
+
+@pytest.mark.parametrize(
+    ("belt_speed", "said"),
+    [
+        (40.0, "40 m/s is 818.4 times the critical speed of 0.04888 m/s (belt speeds are in m/s)"),
+        (0.05, "(belt speeds are in m/s), with a very small margin"),
+    ],
+)
+def test_where_nothing_vibrates_it_is_told(belt_speed: float, said: str) -> None:
+    found = designed(belt_speeds=(belt_speed, belt_speed))
+    remark = found.remark or ""
+    assert remark.startswith("nothing vibrates")
+    assert said in remark
+    assert not any(check.vibrates for check in found.checks)
+
+
+def test_where_there_is_nothing_to_propose_it_says_why() -> None:
+    linear = {"friction__law": "linear", "friction__slope": 9.0}
+    tasks: list[tuple[dict[str, Any], str]] = [
+        ({"rate": 10.0, "force_limit": 1.0}, "no gains make the loop stable"),
+        ({"force_delay": 1.0}, "1000 periods late"),
+        (linear, "diverges"),
+    ]
+    for values, reason in tasks:
+        found = designed(**values)
+        assert found.controller is None
+        assert found.parameter_file is None
+        assert reason in (found.remark or "")
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("force_limit", "values"),
+    [(135.0, {"force_delay": 0.0015, "belt_speeds": (0.02, 0.04)}), (0.0, {})],
+)
+def test_the_force_that_it_says_would_do_does(force_limit: float, values: dict[str, Any]) -> None:
+    remark = designed(force_limit=force_limit, **values).remark or ""
+    hint = re.search(r"a force limit of about (\S+) N is sufficient", remark)
+    enough = float(hint[1])
+    assert enough > force_limit
+    assert designed(force_limit=enough, **values).controller is not None
+    assert designed(force_limit=0.95 * enough, **values).controller is None
+
+
+def test_what_a_limited_force_cannot_do_is_said() -> None:
+    friction = {"friction__law": "linear", "friction__slope": 4.5}
+    found = designed(force_limit=600.0, belt_speeds=AT_40, **friction)
+    assert proposal(found).cubic_gain == 0.0
+    assert "needs more force than the limit" in (found.remark or "")
+
+
+def test_it_is_the_same_every_time_and_progress_reaches_the_end() -> None:
+    shares: list[float] = []
+    first = design(task(force_limit=200.0), shares.append)
+    second = designed(force_limit=200.0)
+    assert (first.controller, first.checks) == (second.controller, second.checks)
+    assert shares == sorted(shares)
+    assert shares[-1] == 1.0
+
+
+def test_it_is_tried_with_sensor_and_actuator_and_tells_what_they_leave() -> None:
+    """It stays within the limit of the actuator, even if the controller has none."""
+    encoder = {"sensor_position_resolution": 1e-6, "sensor_velocity": "difference"}
+    scenario = ss.scenario("feed_drive", **encoder, actuator_limit=200.0)
+    check, *_ = ss.design(scenario, belt_speed=(0.03, 0.03)).checks
+    assert check.disturbance == "vibration"
+    assert 0.0 < check.rest.amplitude < 5e-6
+    assert 0.0 < check.rest.rms_force < check.rest.peak_force
+    assert check.settling_time is not None
+    assert check.peak_force < 200.0
+
+
+@pytest.mark.long
+def test_a_coarse_actuator_leaves_a_vibration() -> None:
+    coarse = ss.scenario("feed_drive", actuator_limit=200.0, actuator_resolution=20.0)
+    remark = ss.design(coarse, belt_speed=(0.04, 0.04)).remark
+    assert "does not decay to 1 % with the noise and rounding of sensor and actuator" in remark
+    check, *_ = ss.design("feed_drive", belt_speed=(0.03, 0.03)).checks
+    assert check.rest is None
