@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from typing_extensions import override
 
@@ -31,8 +31,17 @@ if TYPE_CHECKING:
 
 _CHECKS, _REST = quantities_of(Check), quantities_of(Rest)
 _WORST = ("predicted_settling_time", "settling_time", "predicted_peak_force", "peak_force")
-_MARGINS = {"gain_down": "gain_down", "gain_up": "gain_up", "delay": "delay_margin"}
-"""Margins in JSON, with the names that all linear values have."""
+
+
+class Margins(NamedTuple):
+    """Stability margins at the worst of the belt speeds; None where there is no such margin."""
+
+    gain_down: float | None
+    """Largest factor below one of the force at which a loop is unstable."""
+    gain_up: float | None
+    """Smallest factor above one."""
+    delay: float | None
+    """Smallest additional delay, s, at which a loop is unstable."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -68,9 +77,9 @@ class Proposal(TabularResult):
         return self.design.scenario
 
     @property
-    def margins(self) -> Mapping[str, float | None]:
-        """Gain margins `gain_down` and `gain_up`, and the delay margin `delay`, s; None: none."""
-        return {name: self._linear[linear] for name, linear in _MARGINS.items()}
+    def margins(self) -> Margins:
+        """Stability margins of gain and delay."""
+        return Margins(*map(self._linear.get, ("gain_down", "gain_up", "delay_margin")))
 
     @property
     def checks(self) -> Sequence[Check]:
@@ -124,7 +133,7 @@ class Proposal(TabularResult):
                 for name in _WORST
             },
             "linear": self._linear,
-            "margins": dict(self.margins),
+            "margins": self.margins._asdict(),
             "checks": checks,
             "parameter_file": design.parameter_file,
             "remark": self.remark,

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import stickslip_ros as ss
+from benchmarks.design import compare
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.measures.cycle_measures import Regime
 from stickslip_ros.model.control import Washout
@@ -70,6 +71,54 @@ def test_a_proposal_holds_in_simulation_and_its_file_has_the_gains() -> None:
     assert -np.log(radius) * 1000.0 == pytest.approx(found.design.tuned.decay_rate, rel=1e-6)
     assert len(found.to_pandas()) == 10
     assert found.plot().axes
+
+
+MACHINE = {
+    "plant.mass": 250.0, "plant.stiffness": 8e6, "plant.damping": 900.0,
+    "plant.normal_force": 2500.0,
+    "plant.friction.static": 0.18, "plant.friction.minimum": 0.11,
+    "plant.friction.minimum_speed": 0.025, "plant.rate": 2000.0, "plant.force_delay": 0.0005,
+    "plant.sensor.position_resolution": 5e-7, "plant.sensor.velocity": "difference",
+    "plant.belt_speed": 0.01,
+}  # fmt: skip
+
+
+def test_where_the_body_that_is_fed_back_has_no_gains_the_other_one_is() -> None:
+    values = MACHINE | {"plant.motor.kind": "mass", "plant.motor.mass": 200.0}
+    values |= {"plant.motor.damping": 500.0, "plant.motor.friction": 60.0}
+    values |= {
+        name.replace("plant.", "plant.motor."): value
+        for name, value in MACHINE.items()
+        if "sensor" in name
+    }
+    drive = load_scenario("feed_drive", controller="cascade").changed(values)
+    found = design(Task(drive, (0.002, 0.03), 2000.0))
+    assert found.scenario is not None
+    assert found.scenario.control_law.velocity_feedback == "motor"
+    assert all(check.held for check in found.checks)
+    assert "of the motor it has these" in (found.remark or "")
+    for check in found.checks:
+        assert 0.6 < check.disturbed_force / check.predicted_peak_force <= 1.02
+
+
+def test_gains_beyond_a_limit_are_no_proposal_and_it_is_told_by_how_much() -> None:
+    """The mean friction of 429 N is more than the limit, and the integral carries it."""
+    drive = load_scenario("feed_drive", controller="pid").changed(MACHINE)
+    found = ss.design(drive, (0.002, 0.03), force_limit=300.0)
+    assert found.controller is None
+    assert "the peak force is 4" in (found.remark or "")
+    assert "must be at most 300 N" in (found.remark or "")
+    first, *_ = found.parts()
+    assert "nothing to propose: no gains keep all limits" in str(first)
+
+
+@pytest.mark.parametrize("seed", [8, 14])
+def test_a_grid_of_gains_is_not_faster(seed: int) -> None:
+    found = compare(seed)
+    assert found.decay_rate is not None
+    assert found.found
+    assert all(found.held)
+    assert max(found.force_ratios) < 1.02
 
 
 def test_an_axis_without_a_spring_gets_gains_for_a_feed() -> None:

@@ -211,7 +211,7 @@ class ControlLaw(ABC):
     It is not inherited. Many samples are then answered in one compiled step.
     """
     tuned: ClassVar[Sequence[str]] = ()
-    """Gains that a design chooses, see `linear_part`; each has the sign of its default."""
+    """Gains that a design chooses, see `linear_part`, of either sign where bounds allow it."""
 
     force_limit: float = constant(inf, "Largest magnitude of the force.", "N", at_least=0.0)
     start_after: float = constant(
