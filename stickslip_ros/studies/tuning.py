@@ -21,7 +21,7 @@ from stickslip_ros.model.constants import constants_of
 from stickslip_ros.model.control import ControlLaw, Washout
 from stickslip_ros.model.control.base import MOTOR, TABLE
 from stickslip_ros.model.drive import Drive
-from stickslip_ros.model.drive_layout import SPEED
+from stickslip_ros.model.drive_layout import POSITION, SPEED
 from stickslip_ros.quantities import Quantity, quantities_of
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.studies.case_outcome import Disturbance
@@ -31,7 +31,6 @@ from stickslip_ros.studies.stability import hopf_distance, hopf_ratio, number_te
 from stickslip_ros.text import quantity
 from stickslip_ros.theory.linear import jacobians
 from stickslip_ros.theory.linear_sampled_loop import LinearSampledLoop, why_no_linear_loop
-from stickslip_ros.theory.linear_system import sampled_system
 from stickslip_ros.theory.loop_response import LoopResponse, PlantResponse
 from stickslip_ros.theory.requirements import AUTONOMOUS, STATIC, require
 
@@ -97,9 +96,18 @@ class Goal:
         disturbances: Sequence[Disturbance],
         force_limit: float,
     ) -> "Goal":
-        """Return the goal for a range of belt speeds (m/s): a delay margin of two sample periods.
+        """Return the goal for a scenario: a delay margin of two sample periods.
 
-        The steps of a sine are those of a step of its amplitude.
+        Parameters
+        ----------
+        scenario : Scenario
+            Drive and loop.
+        belt_speeds : tuple of float
+            Lowest and highest belt speed, m/s.
+        disturbances : sequence of Disturbance
+            What acts on the drive. A sine counts as a step of its amplitude.
+        force_limit : float
+            Largest force of the law, N.
         """
         limit = min(force_limit, scenario.plant.actuator.limit)
         feeds = speeds_across(scenario.plant.as_drive(), *belt_speeds)
@@ -340,9 +348,11 @@ class Tuning:
         below, above = (log(10.0) * decades for decades in _DECADES)
         ends = np.minimum(*scales) - below, np.maximum(*scales) + above
         deciding = [self.plants[place] for place in self.loops.ends]
+        # The sign of the default first: another one serves long delays only.
+        own = [-1.0 if each.default < 0.0 else 1.0 for each in described]
         either = [
-            (1.0, -1.0) if each.at_least < 0.0 and not each.positive else (1.0,)
-            for each in described
+            (sign, -sign) if each.at_least < 0.0 and not each.positive else (sign,)
+            for sign, each in zip(own, described, strict=True)
         ]
 
         def found(signs: Sequence[float]) -> tuple[tuple[float, float], ControlLaw]:
@@ -359,7 +369,10 @@ class Tuning:
 
             return fastest(self.loops, ends, with_gains, excess)
 
-        return max((found(signs) for signs in product(*either)), key=lambda each: each[0])
+        best = found(next(every := product(*either)))
+        for signs in every if best[0][0] < 0.0 else ():
+            best = max(best, found(signs), key=lambda each: each[0])
+        return best
 
     def judged(
         self, law: Any, plants: Sequence[PlantResponse], vibrations: Sequence[Vibration]
@@ -408,9 +421,11 @@ class Tuning:
             return abs(friction + copysign(motor.friction, speed) + motor.damping * speed)
         if not drive.has_spring:
             return abs(friction)
-        system = sampled_system(response.plant.loop, response.feedback)
-        rest = system.C @ np.linalg.solve(np.eye(len(system.A)) - system.A, system.B)
-        share = abs(1.0 - drive.stiffness * float(rest[0, 0]))
+        loop = response.plant.loop
+        matrix, pushed = loop.transition_matrix(response.feedback), loop.disturbed
+        forced = np.pad(pushed, (0, len(matrix) - len(pushed)))
+        rest = np.linalg.solve(np.eye(len(matrix)) - matrix, forced)
+        share = abs(1.0 - float(rest[POSITION]))  # dimensionless: the force of the spring
         return abs(friction) * (share if share > 1e-9 else 0.0)
 
     def limits(self, tuned: Tuned) -> list[Limit]:

@@ -158,8 +158,8 @@ class LoopResponse:
         loop = self.plant.loop
         z, total = np.exp(1j * self.plant.frequency / loop.rate), 0.0
         for body, (noise, spans) in enumerate(zip(noises, _differences(loop), strict=False)):
-            if 2 * body >= self.law.shape[1]:
-                break
+            if noise == 0.0 or 2 * body >= self.law.shape[1]:
+                continue
             by_noise = self.law[:, 2 * body].copy()
             if spans:
                 by_noise += self.law[:, 2 * body + 1] * _rate(spans, loop.rate, z)
