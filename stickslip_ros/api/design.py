@@ -168,7 +168,7 @@ class Proposal(TabularResult):
         if law is None:
             yield f"{title}: nothing to propose: {self.remark}"
             title, linear = "the nearest gains", "their linear loop"
-            law = None if tuned is None else tuned.law
+            law = tuned.law if tuned is not None and tuned.responses else None
         if law is not None:
             values = {name: finite(getattr(law, name)) for name in described(law)}
             name = title if self.controller is None else f"{title}: proposal"
