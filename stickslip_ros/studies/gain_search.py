@@ -93,8 +93,6 @@ def fastest(
         Its value and the law. A value is the excess in all, less than or equal to zero and
         -infinity of an unstable law, and the smallest decay rate, 1/s.
     """
-    low, high = ends
-    count = len(low)
 
     @cache
     def exceeded(law: _Law) -> float:
@@ -103,7 +101,7 @@ def fastest(
     def valued(law: _Law, rate: float) -> _Value:
         return (exceeded(law) if rate > 0.0 else -inf, rate)
 
-    points = _evenly(low, high)
+    points = _evenly(*ends)
     laws = [law_at(point) for point in points]
     rates = loops.decay_rates(laws)
     order = np.argsort(-rates)
@@ -111,32 +109,40 @@ def fastest(
     places = {*range(_VALUED // 3), *np.linspace(0, max(stable - 1, 0), _VALUED).astype(int)}
     chosen = [order[place] for place in sorted(places)]
     tops = [(valued(laws[row], float(rates[row])), tuple(points[row].tolist())) for row in chosen]
-    ways = [way for way in product((-1.0, 0.0, 1.0), repeat=count) if 0 < np.abs(way).sum() < 4]
-
-    def refined(top: _Value, point: FloatArray) -> tuple[_Value, _Law]:
-        step = _FIRST_STEP
-        for _ in range(_MOVES):
-            around = np.clip(point + step * np.array(ways), low, high)
-            laws = [law_at(place) for place in around]
-            rates = loops.decay_rates(laws)
-            # Slower ones than a law within its limits are no better, within theirs or not.
-            faster = (
-                row for row in np.argsort(-rates).tolist() if top[0] < 0.0 or rates[row] > top[1]
-            )
-            values = ((valued(laws[row], float(rates[row])), row) for row in faster)
-            if top[0] < 0.0:  # some are better by little: the best
-                values = iter([max(values)])
-            better = next((found for found in values if found[0] > top), None)
-            if better is not None:
-                top, point = better[0], around[better[1]]
-            elif step < _LAST_STEP:
-                break
-            else:
-                step /= 2.0
-        return top, law_at(point)
-
     best = sorted(tops, reverse=True)[:_REFINED]
-    return max((refined(top, np.array(point)) for top, point in best), key=lambda found: found[0])
+    found = (_refined(loops, ends, law_at, valued, top, np.array(place)) for top, place in best)
+    return max(found, key=lambda each: each[0])
+
+
+def _refined(
+    loops: Loops,
+    ends: tuple[FloatArray, FloatArray],
+    law_at: Callable[[FloatArray], _Law],
+    valued: Callable[[_Law, float], _Value],
+    top: _Value,
+    point: FloatArray,
+) -> tuple[_Value, _Law]:
+    """Return the best value and law near a point of some value, by ever smaller steps."""
+    ways = np.array([*product((-1.0, 0.0, 1.0), repeat=len(point))])
+    ways = ways[(np.abs(ways).sum(axis=1) > 0.0) & (np.abs(ways).sum(axis=1) < 4.0)]
+    step = _FIRST_STEP
+    for _ in range(_MOVES):
+        around = np.clip(point + step * ways, *ends)
+        laws = [law_at(place) for place in around]
+        rates = loops.decay_rates(laws)
+        # Slower ones than a law within its limits are no better, within theirs or not.
+        faster = (row for row in np.argsort(-rates).tolist() if top[0] < 0.0 or rates[row] > top[1])
+        values = ((valued(laws[row], float(rates[row])), row) for row in faster)
+        if top[0] < 0.0:  # some are better by little: the best
+            values = iter([max(values)])
+        better = next((found for found in values if found[0] > top), None)
+        if better is not None:
+            top, point = better[0], around[better[1]]
+        elif step < _LAST_STEP:
+            break
+        else:
+            step /= 2.0
+    return top, law_at(point)
 
 
 def _evenly(low: FloatArray, high: FloatArray) -> FloatArray:
