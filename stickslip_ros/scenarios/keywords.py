@@ -13,13 +13,13 @@ from stickslip_ros.scenarios import ros_yaml
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
 from stickslip_ros.text import did_you_mean
 
-_NAMED_WITH_NODE = "analyzer.belt_speed"
-"""Parameter whose keyword has its node: `belt_speed` is that of the plant."""
+_NAMED_WITH_NODE = "analyzer.belt_speed", "plant.force_type", "plant.force_number"
+"""Parameters whose keywords have their node: `belt_speed` is that of the plant."""
 
 
 def keyword_of(parameter: str) -> str:
     """Return the keyword for NODE.PARAMETER: its flat name with underscores for dots."""
-    if parameter == _NAMED_WITH_NODE:
+    if parameter in _NAMED_WITH_NODE:
         return parameter.replace(".", "_")
     return parameter.partition(".")[2].replace(".", "_")
 
@@ -92,7 +92,7 @@ def parse_override(text: str) -> tuple[str, str, Any]:
         value = ros_yaml.parse(written, f"{given}: the value")
         return node, parameter, in_own_unit(target, value)
     if not equals or not parameter:
-        usual = [keyword for keyword in known if keyword != _NAMED_WITH_NODE]
+        usual = [keyword for keyword in known if keyword not in _NAMED_WITH_NODE]
         meant = did_you_mean(target, usual, "as in plant.belt_speed=0.2")
         raise InvalidInputError(f"{given}: must be NODE.PARAMETER=VALUE; {meant}")
     if node not in NODE_PARAMETERS:

@@ -359,7 +359,7 @@ def branches_figure(
 def _look(branch: Branch, regime: Regime) -> tuple[str, dict[str, Any]]:
     """Return the name of a branch, where it has that regime, and the look of its line."""
     look: dict[str, Any] = {"color": REGIMES[regime].colour, "lw": _WIDTHS[regime]}
-    name = Regime.label(regime)
+    name = "equilibrium" if regime is Regime.EQUILIBRIUM else Regime.label(regime)
     return (f"{name}, stable", look) if branch.stable else (f"{name}, unstable", look | _DASHED)
 
 
@@ -387,7 +387,7 @@ def _settles(diagram: BifurcationBranches, belt_speed: float) -> str:
             if branch.stable and speeds[0] <= belt_speed <= speeds[-1]:
                 nearest = int(np.abs(speeds - belt_speed).argmin())
                 cycle = Regime.STICK_SLIP if branch.sticks[nearest] else Regime.PURE_SLIP
-                motions["rest" if rests else Regime.label(cycle)] = None
+                motions["steady sliding" if rests else Regime.label(cycle)] = None
     return " or ".join(motions)
 
 

@@ -123,5 +123,5 @@ def test_the_critical_feed_speed_has_an_interval_for_a_spread_of_the_constants()
     text = f"in 95 % of 100 drives with constants off by up to 50%; {without} of them have none"
     assert text in str(found)
     assert "critical_feed" not in ss.stability(drive).open_loop
-    with pytest.raises(InvalidInputError, match="must be above 0 and at most"):
+    with pytest.raises(InvalidInputError, match=r"must be from 0 to 0\.9"):
         ss.stability(drive, spread=1.5)

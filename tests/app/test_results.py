@@ -86,7 +86,7 @@ CASES: dict[str, tuple[tuple[str, ...], Callable[[], Result], str]] = {
     "report, of two": (
         (REFERENCE, LOG),
         lambda: Comparison((ss.read_bag(REFERENCE), ss.read_table(LOG))),
-        f"{REFERENCE}: stick-slip, not steady: decaying",
+        f"{REFERENCE}: at the end: stick-slip, not steady: decaying",
     ),
 }
 """The arguments of commands, the same results from Python, and what they say, of a table too."""

@@ -195,7 +195,8 @@ def test_an_external_controller_is_waited_for(
     process = start_stickslip("run", *arguments)
     waits = read_until(process, "waiting for a controller")
     assert waits.endswith(
-        "a node that reads /feed_drive/joint_states and publishes /feed_drive/control_force\n"
+        "a node that reads /feed_drive/joint_states and publishes /feed_drive/control_force "
+        "or /feed_drive/joint_commands\n"
     )
     assert read_until(process, "/other/damper reads").endswith(
         "reads /other/joint_states, the plant publishes /feed_drive/joint_states\n"

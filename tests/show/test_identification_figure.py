@@ -33,7 +33,7 @@ def test_a_band_that_is_huge_does_not_hide_the_curve() -> None:
         *("forward slip, measured", "fitted", "95 % band"),
         *("backward slip, measured", "fitted", "95 % band"),
     ]
-    assert axes["residuals over time"].get_ylabel() == "force, measured less fitted (N)"
+    assert axes["residuals over time"].get_ylabel().startswith("force, measured less fitted (")
     figure.draw_without_rendering()
 
 

@@ -331,7 +331,7 @@ def test_a_motion_that_runs_away_on_a_belt_at_rest_has_no_equilibrium() -> None:
     meter.unbounded = True
     drive = replace(PAPER, belt_speed=0.0)
     figure = figure_of(history, meter.measures(), drive)
-    assert figure.get_suptitle() == "it\nunbounded"
+    assert figure.get_suptitle() == "it\nat the end: unbounded"
     marked = [line.get_marker() for panel in (PORTRAIT, LAW) for line in figure.axes[panel].lines]
     assert "o" not in marked
     rest = np.asarray(figure.axes[POSITION].lines[0].get_ydata(), dtype=float)

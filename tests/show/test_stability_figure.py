@@ -191,7 +191,7 @@ def test_a_supercritical_diagram(supercritical: BifurcationBranches, style: str)
     (axes,) = figure.axes
     assert axes.get_xlabel() == "belt speed $v$ (mm/s)"
     assert axes.get_ylabel() == "displacement $x$ (µm)"
-    check_regions(figure, ["stick-slip", "pure slip", "rest"])
+    check_regions(figure, ["stick-slip", "pure slip", "steady sliding"])
     # A cycle has two lines, which meet at the Hopf point.
     (branch,) = supercritical.cycles
     for edge in (branch.least, branch.greatest):
@@ -215,7 +215,11 @@ def test_of_a_subcritical_diagram_the_unstable_is_dashed(
         "pure slip, unstable", "stick-slip, stable", "fold, stick-slip onset speed 1.504"
     } <= set(names)  # fmt: skip
     (axes,) = figure.axes
-    assert [text.get_text() for text in axes.texts] == ["stick-slip", "stick-slip or rest", "rest"]
+    assert [text.get_text() for text in axes.texts] == [
+        "stick-slip",
+        "stick-slip or steady sliding",
+        "steady sliding",
+    ]
     (legend,) = figure.legends
     for line, name in zip(legend.get_lines(), names, strict=True):
         if "stable" in name:
