@@ -86,7 +86,7 @@ def test_a_bifurcation_diagram_names_regimes_and_marks(style: str) -> None:
     assert above.get_ylabel() == "turning points $X$"
     assert below.get_xlabel() == "belt speed $v_0$"
     assert legend_texts(figure) == [
-        "stick-slip", "equilibrium", "stuck", "unstable equilibrium",
+        "stick-slip", "steady sliding", "stuck", "unstable equilibrium",
         "Hopf bifurcation 0.48876", "stick-slip onset 0.43947",
     ]  # fmt: skip
 

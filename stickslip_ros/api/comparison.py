@@ -31,6 +31,7 @@ from stickslip_ros.studies.runner import CountPoints, compute_columns
 from stickslip_ros.studies.spread import spread_text
 from stickslip_ros.studies.tuning import Tuned, with_law
 from stickslip_ros.tables import TextTable
+from stickslip_ros.theory.linear_sampled_loop import settling_time
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -42,9 +43,6 @@ _MEANS = {
     True: ("final_error", "rms_force", "settling_time", "peak_force", "hunting_amplitude"),
 }
 """What the table has means of, by whether the task is positioning, the second criterion first."""
-
-_SETTLED = 4.6
-"""Times in which a deviation decays by a factor e, until a hundredth of it is left."""
 
 
 class Rank(NamedTuple):
@@ -291,8 +289,8 @@ class ComparedLaws(TabularResult):
         yield f"disturbances: {', '.join(map(str, plan.disturbances))}"
         for law, tuned in self.tuned.items():
             remark = f"; {tuned.remark}" if tuned.remark else ""
-            settles = _SETTLED / max(tuned.decay_rate, 1e-9)
-            if remark and settles > plan.duration > 0.0:
+            settles = settling_time(tuned.decay_rate)
+            if remark and settles is not None and settles > plan.duration:
                 remark += f"; these settle in {units.text(settles, 's')}, longer than a case lasts"
             yield f"{law}: {gains_text(tuned.law, units)}{remark}"
         for rank in self.ranks:

@@ -436,9 +436,13 @@ def namespace_of(text: str) -> str:
     return namespace
 
 
-def spread(text: str) -> float | str:
+def spread_of(text: str) -> float | str:
     """Return a spread of constants from a text: a share, or fit."""
-    return text if text == "fit" else float(text)
+    try:
+        return text if text == "fit" else float(text)
+    except ValueError:
+        allowed = "neither a share from 0 to 0.9 nor fit"
+        raise argparse.ArgumentTypeError(f"{text!r} is {allowed}") from None
 
 
 def whole(what: str, least: int, most: int) -> Callable[[str], int]:

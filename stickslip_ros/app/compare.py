@@ -8,13 +8,14 @@ from stickslip_ros.app.arguments import (
     add_scenario,
     check_new,
     law_constants,
-    spread,
+    spread_of,
     whole,
     writing,
 )
 from stickslip_ros.app.output import progress_bar, tell
 from stickslip_ros.app.result import add_results, check_results
 from stickslip_ros.app.study_command import add_workers, check_out, computed, finish, scenario_over
+from stickslip_ros.text import printable
 
 _DESCRIPTION = """Compare control laws on one drive. The gains of each law are tuned by one rule for
 the sampled loop, or given by the scenario. With a moving belt the task is regulation: the slide is
@@ -53,6 +54,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="none, step, impulse, sine, also with an amplitude as in sine=300N@8Hz (default: "
         "%(default)s, of a tenth of the static friction)",
     )
+    _add_cases(parser)
+    add_workers(
+        parser,
+        "; FILE.yaml is a scenario with the best law and its gains, a FOLDER has one for each law",
+    )
+    add_results(parser, "error and peak force of each law over the parameters")
+
+
+def _add_cases(parser: argparse.ArgumentParser) -> None:
+    """Add what the cases of a comparison are."""
     parser.add_argument(
         "--seeds",
         type=whole("a number of seeds, from {} to {}", 1, 100_000),
@@ -62,7 +73,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--spread",
-        type=spread,
+        type=spread_of,
         default=0.0,
         metavar="SHARE",
         help="largest deviation of the constants of the drive, as in 0.2, or fit: as the fit of "
@@ -78,11 +89,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="what a law that holds may leave: share of the belt speed (default: 0.05), or of the "
         "motion of the reference (default: 0.001)",
     )
-    add_workers(
-        parser,
-        "; FILE.yaml is a scenario with the best law and its gains, a FOLDER has one for each law",
-    )
-    add_results(parser, "error and peak force of each law over the parameters")
 
 
 def run(arguments: argparse.Namespace) -> None:
@@ -126,4 +132,5 @@ def run(arguments: argparse.Namespace) -> None:
             with writing("--out", path):
                 path.parent.mkdir(parents=True, exist_ok=True)
                 path.write_text(files[law], encoding="utf-8")
-            tell(f"{path} has {law}: `{shlex.join(['stickslip', 'run', str(path)])}` runs it")
+            run_it = printable(shlex.join(["stickslip", "run", str(path)]))
+            tell(f"{law} is written to {printable(str(path))}: `{run_it}` runs it")

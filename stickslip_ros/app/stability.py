@@ -2,7 +2,7 @@
 
 import argparse
 
-from stickslip_ros.app.arguments import add_json, add_scenario, scenario_of, spread
+from stickslip_ros.app.arguments import add_json, add_scenario, scenario_of, spread_of
 from stickslip_ros.app.output import progress_bar
 from stickslip_ros.app.result import add_plot, check_results, print_result, write_results
 from stickslip_ros.errors import InvalidInputError
@@ -19,7 +19,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--spread",
-        type=spread,
+        type=spread_of,
         default=0.0,
         metavar="SHARE",
         help="deviation of the constants, as in 0.2, or fit: as for `stickslip compare`; gives the "

@@ -54,12 +54,16 @@ class AxisTask:
         coasts = not any(record.held_force.any() for record in records)
         if coasts and "mass" not in fixed:
             given = any(record.force is not None for record in records)
-            hint = "; name its column, as in --columns force=u, or of a bag its --force-topic, or "
+            hint = (
+                ""
+                if given
+                else "; if a force acts, name its column, as in --columns force=u, or of a bag its "
+                "--force-topic, or --force effort"
+            )
             raise InvalidInputError(
                 f"{'the recorded force is always 0' if given else 'no force is recorded'}: without "
                 "one only the ratio of friction and mass of an axis is identifiable: if it coasts, "
-                "give its mass, as in --fix plant.mass=95"
-                + ("" if given else f"{hint}--force effort")
+                f"give its mass, as in --fix plant.mass=95{hint}"
             )
         self.records, self.limit = records, limit
         self.left: list[str] = []

@@ -1,4 +1,7 @@
-"""The choice of a law: fits are compared by what they predict of held-out parts."""
+"""The choice of a law: fits are compared by what they predict of held-out parts.
+
+Which laws compete is `laws.COMPETING` for a drive on a spring, and `axes.AXIS_LAWS` for an axis.
+"""
 
 from collections.abc import Mapping, Sequence
 from math import copysign, inf, sqrt

@@ -22,8 +22,7 @@ _SPEEDS_OF_MACHINES = 1e-6, 20.0
 _ADDED_SHARE = 0.3
 """Share of samples with added forces from which another controller may have acted."""
 _STATIC_SHARE = 1.1
-"""Largest force at which the slide may break loose, in static friction of the law, to say nothing.
-"""
+"""Ratio of the largest force at rest to the static friction, above which a note is given."""
 _BY_DIRECTION = "it merges with friction by direction, and is taken as 0"
 
 
@@ -41,8 +40,8 @@ def notes(findings: Findings) -> Sequence[str]:
         texts.append("no force is recorded: none is taken to act beside friction")
     if doubt := findings.chosen.doubt:
         texts.append(
-            f"the law {findings.law} is not that of the recordings: {doubt}; its band has what was "
-            "measured"
+            f"the law {findings.law} does not describe the recordings: {doubt}; the band of its "
+            "curve includes the measured friction"
         )
     texts += _far_run(findings, findings.records[0])
     for name in dict.fromkeys(record.name for record in findings.records):
@@ -62,8 +61,8 @@ def notes(findings: Findings) -> Sequence[str]:
             )
     if findings.left:
         texts.append(
-            "the time was over before these laws were fitted to the end: "
-            f"{', '.join(findings.left)}; more time is --time-limit, a single law is --law"
+            f"the limit of work was reached before {', '.join(findings.left)} were fitted to the "
+            "end: raise it by --time-limit, or choose one law by --law"
         )
     if not _SPEEDS_OF_MACHINES[0] <= findings.fastest <= _SPEEDS_OF_MACHINES[1]:
         texts.append(

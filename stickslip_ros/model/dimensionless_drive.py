@@ -32,8 +32,7 @@ class DimensionlessDrive(HybridSystem):
     Drive and control are in SI units. Continuous control, eq. 19, acts without the actuator;
     without it the force is the input `force`. An actuator with states receives that input, and the
     input `disturbance` is added to its force; with a motor it is the force on the slide. Of a
-    `ScaledDrive` also mass, stiffness and bias are
-    constants.
+    `ScaledDrive` also mass, stiffness and bias are constants.
     """
 
     def __init__(self, drive: Drive, control: ContinuousControl | None = None) -> None:

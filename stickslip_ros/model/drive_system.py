@@ -36,6 +36,7 @@ class DriveSystem(DimensionlessDrive):
     In slip the slide follows eq. 5; where it reaches the speed of the belt it sticks if its law can
     hold it, -mu_forward N <= h <= mu_backward N with the reaction h. Otherwise it passes that speed
     or slips the other way. In stick it moves with the belt until the reaction leaves these limits.
+    `PlainDriveSystem`, which is that of most motions, says the same in plain numbers.
     """
 
     def __init__(self, drive: Drive, control: ContinuousControl | None = None) -> None:

@@ -15,6 +15,8 @@ _STUCK, _FORWARD, _BACKWARD = Mode(STICK, (0.0,)), Mode(SLIP, (1.0,)), Mode(SLIP
 class PlainDriveSystem(DriveSystem):
     """Drive whose law and signals have no states and no modes: a motion takes half the time.
 
+    It sticks and slips as `DriveSystem` says: a change there is one here, too.
+
     Under a held force a slide that sticks moves in a straight line, which is not integrated.
     """
 

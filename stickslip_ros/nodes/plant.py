@@ -132,7 +132,7 @@ class PlantNode(ManagedNode[PlantParameters]):
             due = parameters.last_sample - round(self.elapsed * parameters.rate)
             last = min(max(due, 0), stampable)
         self._timing = TimingMonitor()
-        self._out_of_time = False
+        self._out_of_time = ""
         self._pacer.start(last)
 
     def stop(self) -> None:
@@ -200,17 +200,17 @@ class PlantNode(ManagedNode[PlantParameters]):
             controlled=controlled,
         )
         lost = NO_FORCE if self.parameters.expects_control and not controlled else ""
-        self._log_timing(lost or timing)
+        self._log_timing("lost" if lost else "late" if timing else "", lost or timing)
         complaints = [pacer.complaint, lost, timing, self.dropped.complaint]
         complaints += self.duplicate_publishers(
             *force_topics(self.parameters.force_type), DISTURBANCE_FORCE
         )
         return diagnosis(complaints, values)
 
-    def _log_timing(self, complaint: str) -> None:
-        """Log the first complaint about forces and deadlines, and its end."""
-        if bool(complaint) != self._out_of_time:
-            self._out_of_time = bool(complaint)
+    def _log_timing(self, kind: str, complaint: str) -> None:
+        """Log the first complaint of its kind about forces and deadlines, and that they end."""
+        if kind != self._out_of_time:
+            self._out_of_time = kind
             if complaint:
                 self.get_logger().warning(complaint)
             else:
@@ -245,7 +245,10 @@ class PlantNode(ManagedNode[PlantParameters]):
                 self._dropped_force.publish(wrench)
             return
         if not self.parameters.expects_control:
-            self.dropped.add(f"control force {force} N: expects_control is false")
+            self.dropped.add(
+                f"control force {force} N is dropped: expects_control is false, and must be true "
+                "for forces to act"
+            )
             self._dropped_force.publish(wrench)
             return
         with self._lock:

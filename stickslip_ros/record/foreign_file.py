@@ -10,8 +10,8 @@ from typing import BinaryIO, NamedTuple
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.record.adapters import BY_END, BY_START
 from stickslip_ros.record.limited_process import limited, result_of
+from stickslip_ros.record.table_formats import BY_END, BY_START
 
 _START = 16
 """First bytes that tell a format."""

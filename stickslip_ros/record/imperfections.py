@@ -68,9 +68,10 @@ def ripple_note(
     """Yield a sentence on a force that ripples over the position, if several passes show it.
 
     What inertia, friction and slow changes leave of the force is transformed over the position, for
-    each pass between two reversals. A ripple is a line in the power of their sum. Residuals without
-    one show a line in a thousandth of the recordings, and passes of random phases sum up to it as
-    rarely. A vibration that starts at each reversal, and explains the residual as well, is none.
+    each pass between two reversals. A ripple is a line in the power of their sum. The threshold is
+    such that white residuals pass it in one of a thousand recordings; passes of random phases do
+    not pass it more often. No note is given if a vibration that starts at each reversal explains
+    the residual as well.
     The arrays have the shape (samples,), `units` are those of position and force.
     """
     known = np.flatnonzero(np.isfinite(time) & np.isfinite(position) & np.isfinite(force))[:_MOST]
@@ -119,7 +120,7 @@ def ripple_note(
             quantity(float(f"{value:.2g}"), unit)
             for value, unit in zip((2.0 * span / turns, amplitude), units, strict=True)
         )
-        yield f"the force ripples over the position, by {size} to either side each {length}"
+        yield f"the force has a ripple over the position: amplitude {size}, period {length}"
 
 
 def _line(cell: IntArray, values: FloatArray, bounds: Sequence[int]) -> tuple[int | None, float]:

@@ -33,12 +33,9 @@ QUANTITIES = (
 )
 """Quantities of a run that a table may have; time and position it must have."""
 
-_DRIVING = "what drives it"
-"""A position of what drives the slide, by which play is found, that is not asked for."""
 _DRIVES = re.compile(r"(?i)mot|enc|spind|screw|c?mdpos|cmd|soll|ref|set|target|consigne|vis\b")
-"""Starts of words for it in names of columns."""
+"""Starts of words in the name of a column with the position of what drives the slide."""
 _UNITS = {
-    _DRIVING: "m",
     "time": "s",
     "position": "m",
     "reference": "m",
@@ -91,8 +88,6 @@ def quantities_of(
     clock = asked["time"].places
     if not clock:
         raise InvalidInputError(f"{table.path}: time = {columns['time']} must be a column")
-    if needed == "position" and (driven := _driving_column(table, asked)):
-        asked[_DRIVING] = driven
     clocks = {name: _clocks(table, clock, each) for name, each in asked.items()}
     cells = _Cells.of(table, asked, clock, *clocks.values())
     notes = cells.notes
@@ -307,24 +302,6 @@ def _asked(
     return asked
 
 
-def _driving_column(table: Table, asked: Mapping[str, Expression]) -> Expression | None:
-    """Return the column that may be the position of what drives the slide, if there is one."""
-    used = {place for expression in asked.values() for place in expression.places}
-    if "reference" in asked or len(asked["position"].places) != 1:
-        return None
-    position = asked["position"].places[0]
-    known = units_in(table.names[position], table.units[position], "m")
-    factors = [unit.factor for unit in known]
-    for place, name in enumerate(table.names):
-        words = re.findall(r"[^\W\d_]+", name)
-        if place in used or not any(map(_DRIVES.match, words)):
-            continue
-        readings = [unit.factor for unit in units_in(name, table.units[place], "m")]
-        if asked["position"].bare and readings == factors and len(readings) <= 1:
-            return Expression.read(table.path, table.number(place), table.columns)
-    return None
-
-
 def _clocks(table: Table, clock: tuple[int, ...], asked: Expression) -> tuple[int, ...]:
     """Return the columns of the times of an expression.
 
@@ -354,9 +331,15 @@ def _clock_beside(table: Table, clock: Sequence[int], places: Sequence[int]) -> 
         names = " and ".join(map(table.name, places))
         raise InvalidInputError(f"{table.path}: {names} have clocks of their own")
     times: list[int] = []
-    for place in clock:
-        names = [SECOND + name for name, column in table.columns.items() if column == place]
-        times += [table.columns[name] for name in names if name in table.columns][-1:]
+    for place in () if ROW in clock else clock:
+        known = [name for name, column in table.columns.items() if column == place]
+        named = [name for name in known if not name.startswith("#")] or known
+        alike = [SECOND + name for name in named if SECOND + name in table.columns]
+        if not alike:
+            raise InvalidInputError(
+                f"{table.path}: the second table has no {table.name(place)}, that of the times"
+            )
+        times.append(table.columns[alike[-1]])
     return tuple(times)
 
 
@@ -377,6 +360,7 @@ def _of_another_clock(
 
 
 def _times(clock: Expression, cells: Sequence[Any]) -> Any:
+    """Return the times of an expression with all their digits."""
     counts = len(cells) > 1 or cells[0].dtype.kind == "i"
     exact = np.longdouble if counts else float  # a float has no digits for ns since 1970
     return clock.value([np.asarray(each, exact) for each in cells])
@@ -385,6 +369,7 @@ def _times(clock: Expression, cells: Sequence[Any]) -> Any:
 def _lost_cells(
     table: Table, cells: Mapping[int, Any], asked: Mapping[str, Expression]
 ) -> Iterator[str]:
+    """Yield a sentence on each column with cells that are no numbers, or too large ones."""
     for place in dict.fromkeys(place for each in asked.values() for place in each.places):
         column = cells[place]
         if column.min() >= -LARGEST and column.max() <= LARGEST:
@@ -441,6 +426,7 @@ def _factor(table: Table, kind: str, asked: Expression) -> tuple[float, dict[str
 
 
 def _units_notes(table: Table, found: Mapping[str, Unit]) -> Iterator[str]:
+    """Yield sentences on the units by column."""
     if found:
         units = [f"{name}: {each.text}" for name, each in found.items()]
         yield f"units: {'; '.join(dict.fromkeys(units))}"
@@ -474,6 +460,7 @@ def _measurable(values: FloatArray) -> FloatArray:
 
 
 def _picked(values: FloatArray, rows: range | IntArray) -> FloatArray:
+    """Return rows of values; a range stands for all."""
     return values if isinstance(rows, range) else values[rows]
 
 
@@ -483,12 +470,38 @@ def _faults(cells: _Cells, values: dict[str, FloatArray], rows: range | IntArray
     if "velocity" in values:
         yield from _without_lost_velocities(cells.table, values, rows)
     units = ("rad", "N m") if cells.table.form.rotary else ("m", "N")
-    for name in {"reference", _DRIVING} & {*values}:
-        what = f"the {name}" if name != _DRIVING else cells.table.name(cells.asked[name].places[0])
-        yield from play_note(values[name], values["position"], units[0], what)
-    values.pop(_DRIVING, None)
+    if "reference" in values:
+        yield from play_note(values["reference"], values["position"], units[0], "the reference")
+    else:
+        for name, column in _driving_columns(cells):
+            driving = _picked(column, rows)
+            if driving.shape == values["position"].shape:
+                yield from play_note(driving, values["position"], units[0], name)
     if "force" in values:
         yield from ripple_note(values["time"], values["position"], values["force"], units)
+
+
+def _driving_columns(cells: _Cells) -> Iterator[tuple[str, FloatArray]]:
+    """Yield the first column that nobody asked for, and that is named like what drives the slide.
+
+    It is complete, in the unit of the position.
+    """
+    table, position = cells.table, cells.asked["position"]
+    if not position.bare or len(position.places) != 1:
+        return
+
+    def factors(place: int) -> list[float]:
+        return [unit.factor for unit in units_in(table.names[place], table.units[place], "m")]
+
+    unit = factors(position.places[0])
+    for place, name in enumerate(table.names):
+        words = re.findall(r"[^\W\d_]+", name)
+        is_unused = place not in cells.columns and place in table.columns.values()
+        if is_unused and any(map(_DRIVES.match, words)) and factors(place) == unit:
+            (column,) = table.read([place])
+            if np.isfinite(column).all():
+                yield table.name(place), np.asarray(column, float) * cells.factors["position"]
+            return
 
 
 def _without_lost_positions(

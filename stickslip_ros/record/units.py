@@ -62,9 +62,10 @@ _ACCELERATION = re.compile(r"acc(?:el\w*)?$|beschl|accél|acel")
 _BRACKETED = re.compile(r"[\[(<{]\s*([^\[\](){}<>]*[^\[\](){}<>\s])\s*[\])>}]")
 _MARK = re.compile(r"\s*[/,]\s*|\s+(?:in|en|em)\s+")
 _START = re.compile(
-    r"(?<![^\W_])(?=[^\W_])|(?<=[^\W\d_A-Z])(?=[A-Z])|(?<=\d)(?=[^\W\d_])|(?<=[^\x00-\u03ff])(?=[a-zA-Zµμ])"
+    r"(?<![^\W_])(?=[^\W_])|(?<=[^\W\d_A-Z])(?=[A-Z])|(?<=\d)(?=[^\W\d_])"
+    r"|(?<=[^\x00-\u03ff])(?=[a-zA-Zµμ])"
 )
-"""Where a word starts: after a mark, in PosMM, after a number, and after letters of the east."""
+"""Where a word starts: after a mark, in PosMM, after a number, and after Chinese letters."""
 _DOUBTFUL, _DOUBTFUL_ALONE = ("in", "min", "h", "d"), ("cm", "dm")
 """Units that may be other words at the end of a name, or where they are all of it."""
 _LONGEST = 200
@@ -218,6 +219,7 @@ def _read(text: str, target: str) -> Iterator[Unit]:
 
 @cache
 def _factor(unit: str, target: str) -> float:
+    """Return by what numbers of a unit are multiplied for another one; a turn has 2 pi rad."""
     if unit == target:
         return 1.0
     if "turn" in unit:

@@ -31,9 +31,11 @@ class Language:
     """How a language writes statements, and the template of a file."""
 
     template: str
+    """Name of the template of a file."""
     variable: str
     """Statement that makes a variable."""
     assignment: str
+    """Statement that gives a variable a value."""
     branch: tuple[str, str, str]
     """Lines that begin a branch under a condition, the other one, and the end."""
     state: str
@@ -62,8 +64,11 @@ class Difference:
     """A velocity that the code computes as a difference of positions, as the sensor does."""
 
     velocity: str
+    """Name of the velocity."""
     position: str
+    """Name of the position, an input."""
     spans: int
+    """Number of samples that the difference spans."""
 
 
 def law_code(scenario: Scenario, language: Language) -> str:
@@ -115,7 +120,8 @@ def _head(scenario: Scenario) -> Iterator[str]:
             unit = f" {described.unit}" if described.unit else ""
             yield f"  {name} = {value}{unit}: {described.meaning}"
     if law.start_after > 0.0:
-        yield "start_after is not part of the code: call it from that time on."
+        yield "start_after is not part of the code: call it from the first sample on, and apply its"
+        yield "force from that time on."
 
 
 def _number(value: float) -> str:

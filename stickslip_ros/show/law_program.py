@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from math import isfinite
 from typing import Any, Union
 
-from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.errors import InvalidInputError, in_words
 from stickslip_ros.model.control import ControlLaw
 from stickslip_ros.samples import MotorSample, Reference, Sample
 
@@ -28,6 +28,7 @@ class Symbol:
     operands: tuple[Operand, ...] = ()
     """What is operated on; nothing for an input."""
     explorer: "_Explorer | None" = None
+    """Runs the law of which the symbol is a part."""
 
     def _with(self, operation: str, *operands: Operand) -> "Symbol":
         assert self.explorer is not None
@@ -100,7 +101,9 @@ class Symbol:
         return self._decides(">=", other)
 
     def __eq__(self, other: object) -> bool:
-        return other is self or (isinstance(other, float | Symbol) and self._decides("==", other))
+        if other is self or not isinstance(other, int | float | Symbol):
+            return other is self
+        return self._decides("==", other if isinstance(other, Symbol) else float(other))
 
     __hash__ = object.__hash__
 
@@ -119,8 +122,11 @@ class Decision:
     """What the program does if a comparison holds, and if it does not."""
 
     condition: Symbol
+    """The comparison."""
     holds: "Result | Decision"
+    """What follows if it holds."""
     fails: "Result | Decision"
+    """What follows if it does not."""
 
     @property
     def key(self) -> tuple[Any, ...]:
@@ -133,7 +139,9 @@ class Result:
     """Force, N, and state after the sample, in the order of the law."""
 
     force: Operand
+    """Force, N."""
     state: tuple[Operand, ...]
+    """State after the sample."""
 
     @property
     def values(self) -> tuple[Operand, ...]:
@@ -151,6 +159,7 @@ class LawProgram:
     """A control law at a fixed rate."""
 
     law: ControlLaw
+    """The law."""
     states: tuple[str, ...]
     """Names of the states."""
     inputs: tuple[str, ...]
@@ -191,7 +200,10 @@ class _Explorer:
     def tree(self, run: _Run, given: tuple[bool, ...] = ()) -> Result | Decision:
         """Return the decisions and results on all ways that begin with the decisions given."""
         if len(given) > _MOST_DECISIONS:
-            raise ValueError("too many decisions")
+            raise InvalidInputError(
+                f"it makes more than {_MOST_DECISIONS} comparisons in a row; at most "
+                f"{_MOST_DECISIONS} are exported"
+            )
         self._given, self._taken = given, {}
         result = run(self.symbol)
         if len(self._taken) == len(given):
@@ -222,8 +234,8 @@ def law_program(law: ControlLaw, period: float) -> LawProgram:
     Raises
     ------
     InvalidInputError
-        If the law computes with something other than sums, products, powers, exponentials and
-        comparisons, or has too many ways to answer.
+        If the law computes with something other than sums, products, quotients, powers, absolute
+        values, exponentials and comparisons, or makes too many comparisons.
     """
     states = tuple(f"self.{name}" for name in law.state_units)
 
@@ -239,10 +251,15 @@ def law_program(law: ControlLaw, period: float) -> LawProgram:
     try:
         explorer = _Explorer()
         trees = explorer.tree(first), explorer.tree(following)
-    except (TypeError, AttributeError, ValueError, OverflowError, AssertionError):
+    except Exception as error:  # the code of others: anything
+        reason = (
+            str(error)
+            if isinstance(error, InvalidInputError)
+            else "it computes with more than sums, products, quotients, powers, absolute values, "
+            f"exponentials and comparisons ({in_words(error)})"
+        )
         raise InvalidInputError(
-            f"the control law {law.name} cannot be exported: it computes with more than sums, "
-            "products, powers, exponentials and comparisons"
+            f"the control law {law.name} cannot be exported: {reason}"
         ) from None
     used = {s.operation for tree in trees for s in _symbols(tree) if not s.operands}
     if unknown := sorted(used - {*states, *_INPUTS}):

@@ -219,12 +219,13 @@ def _tuned(
 ) -> Tuned:
     """Return the gains of a design for the range of belt speeds, or the nearest ones."""
     with_own = with_law(scenario, law, {})
-    limit = with_own.controller.control_law.force_limit
-    ends = min(map(abs, speeds)), max(map(abs, speeds))
+    limit = min(with_own.controller.control_law.force_limit, scenario.plant.actuator.limit)
+    moving = [abs(speed) for speed in speeds if speed]  # at rest there is no loop to tune
+    ends = min(moving), max(moving)
     if not is_positioning(scenario):
-        found = design(Task(with_own, ends, limit), disturbances=applied)
-        if found.tuned is not None:
-            return replace(found.tuned, remark=found.remark)
+        proposal = design(Task(with_own, ends, limit), disturbances=applied)
+        if proposal.tuned is not None:
+            return replace(proposal.tuned, remark=proposal.remark)
     return Tuning(with_own, law, Goal.from_scenario(with_own, ends, applied, limit)).best()
 
 

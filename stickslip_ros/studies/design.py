@@ -31,6 +31,7 @@ from stickslip_ros.theory.linear_sampled_loop import (
     settling_time,
     why_no_linear_loop,
 )
+from stickslip_ros.theory.requirements import SPRING, require
 from stickslip_ros.theory.stability_map import StabilityMap
 
 _KINDS = ("step", "impulse")
@@ -79,6 +80,8 @@ class Task:
             raise InvalidInputError(
                 "plant.expects_control = False: without control there are no gains"
             )
+        if isinstance(law, Washout):
+            require(f"a design of the {law.name} law", plant.as_drive(), SPRING)
         if isinstance(law, Washout) and plant.motor.kind == "mass":
             raise InvalidInputError(
                 f"plant.motor.kind = mass is refused: a design of the {law.name} law needs an "
@@ -239,7 +242,7 @@ def design(
     *,
     disturbances: Sequence[Disturbance] | None = None,
 ) -> Design:
-    """Find the gains with the fastest decay at the slowest belt speed of the range.
+    """Find the gains with which the smallest decay rate over the belt speeds is largest.
 
     Gains that fail in simulation are not proposed: the next attempt is more cautious.
 
@@ -261,7 +264,7 @@ def design(
     Raises
     ------
     InvalidInputError
-        If the law has no gains to tune, or the theory of the sampled loop does not cover the drive.
+        If the law has no gains to tune, or belt or load follow a signal.
     """
     scenario, plant = task.scenario, task.scenario.plant
     reason = why_no_linear_loop(task.drive, plant.rate, plant.force_delay + plant.force_jitter / 2)

@@ -72,7 +72,9 @@ def fastest(
     law_at: Callable[[FloatArray], _Law],
     excess: Callable[[_Law], Iterable[float]],
 ) -> tuple[_Value, _Law]:
-    """Return the law that first exceeds its limits least, and then damps fastest.
+    """Return the law with the smallest total excess over its limits.
+
+    Among laws of equal excess it is that with the largest decay rate.
 
     Points between the ends are scanned evenly; the best are refined by ever smaller steps.
 
@@ -110,8 +112,8 @@ def fastest(
     chosen = [order[place] for place in sorted(places)]
     tops = [(valued(laws[row], float(rates[row])), tuple(points[row].tolist())) for row in chosen]
     best = sorted(tops, reverse=True)[:_REFINED]
-    found = (_refined(loops, ends, law_at, valued, top, np.array(place)) for top, place in best)
-    return max(found, key=lambda each: each[0])
+    refined = (_refined(loops, ends, law_at, valued, top, np.array(place)) for top, place in best)
+    return max(refined, key=lambda pair: pair[0])
 
 
 def _refined(
@@ -130,7 +132,7 @@ def _refined(
         around = np.clip(point + step * ways, *ends)
         laws = [law_at(place) for place in around]
         rates = loops.decay_rates(laws)
-        # Slower ones than a law within its limits are no better, within theirs or not.
+        # Beside a law within its limits, only faster ones can be better.
         faster = (row for row in np.argsort(-rates).tolist() if top[0] < 0.0 or rates[row] > top[1])
         values = ((valued(laws[row], float(rates[row])), row) for row in faster)
         if top[0] < 0.0:  # some are better by little: the best

@@ -228,7 +228,10 @@ class Tuning:
         """
         known = with_law(scenario, law, {}).controller.control_law
         if not known.tuned:
-            raise InvalidInputError(f"control law {law}: it names no gains to tune, so give them")
+            raise InvalidInputError(
+                f"control law {law} has no gains to tune: its constants must be given, as by "
+                f"`stickslip compare --given {law}`"
+            )
         plant = scenario.plant
         drive, sensors = plant.as_drive(), (plant.sensor, plant.motor.sensor)
         require("the theory of the sampled loop", drive, AUTONOMOUS)
@@ -268,10 +271,11 @@ class Tuning:
         return None
 
     def best(self, share: float = RESERVE, *, cubic: bool = True) -> Tuned:
-        """Return the gains, with a share of what the limits allow; `cubic` ones, too.
+        """Return the best gains.
 
-        Its `missed` are the limits that no gains keep, and its gains then the nearest ones. Where
-        those of the scenario keep none, a law feeds back another body.
+        `share` is the part of each limit that they may use; `cubic` allows a cubic gain. If no
+        gains keep all limits, the result has the nearest ones, and `missed` the limits. If the body
+        that the scenario feeds back has no gains, another one is fed back.
         """
         first, *others = self.bodies
         value, law = self._searched(first, share)
@@ -304,28 +308,34 @@ class Tuning:
         if self.vibrations and not any(each.vibrates for each in self.vibrations):
             remarks.append(self._calm())
         if missed:
-            said = " and ".join(limit.sentence(self.drive) for limit in missed)
-            remarks.append(f"no gains keep all limits: with the nearest ones {said}")
-        elif changed := [n for n in law.of_motor if getattr(first, n) != getattr(law, n)]:
-            of_motor = (
-                f"{' and '.join(changed)} of the table has no gains, of the motor it has these"
-            )
-            remarks.append(of_motor)
+            reasons = " and ".join(limit.sentence(self.drive) for limit in missed)
+            remarks.append(f"no gains keep all limits: with the nearest ones {reasons}")
+        else:
+            for name in self._body_names:
+                asked, used = getattr(first, name), getattr(law, name)
+                if asked != used:
+                    remarks.append(f"{name} is {used}: with {asked} there are no gains")
         return replace(tuned, missed=missed, remark="; ".join(remarks) or None)
+
+    @cached_property
+    def _body_names(self) -> list[str]:
+        """Names of the constants that choose a body."""
+        described = constants_of(type(self.law))
+        return [name for name in described if described[name].choices == (TABLE, MOTOR)]
 
     @cached_property
     def bodies(self) -> list[ControlLaw]:
         """The law, and where there is a motor those that feed back other bodies."""
         laws = [self.law]
         if self.drive.motor is not None:
-            described = constants_of(type(self.law))
-            names = [name for name in described if described[name].choices == (TABLE, MOTOR)]
-            every = (
+            names = self._body_names
+            variants = (
                 replace(self.law, **dict(zip(names, chosen, strict=True)))
                 for chosen in product((MOTOR, TABLE), repeat=len(names))
             )
             laws += sorted(
-                every, key=lambda law: sum(getattr(law, n) != getattr(self.law, n) for n in names)
+                variants,
+                key=lambda law: sum(getattr(law, n) != getattr(self.law, n) for n in names),
             )
         forms: dict[bytes, ControlLaw] = {}
         for law in laws:

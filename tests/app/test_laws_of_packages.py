@@ -299,4 +299,4 @@ def test_a_design_of_a_law_that_names_no_gains_is_refused(install: Install, stic
     install(respond=_raising(KeyError("x")))
     done = stickslip("design", "paper", "--controller", "hostile")
     assert done.returncode == 2
-    assert done.stderr.endswith("control law hostile: it names no gains to tune, so give them\n")
+    assert "control law hostile has no gains to tune" in done.stderr

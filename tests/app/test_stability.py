@@ -110,7 +110,7 @@ def test_coexisting_cycles_are_told_apart(stickslip: Run, monkeypatch: pytest.Mo
     overrides = ("plant.friction.law=exponential", "plant.friction.decay_speed=0.05")
     law = [text for override in overrides for text in ("-p", override)]
     theory = theory_of(load_scenario("paper", overrides))
-    monkeypatch.setattr("stickslip_ros.studies.stability.stability", lambda _: theory)
+    monkeypatch.setattr("stickslip_ros.studies.stability.stability", lambda *_: theory)
     found = stability(stickslip, "paper", *law)
     assert found["open_loop"]["stable"] is True
     unstable, stable = found["open_loop"]["limit_cycles"]

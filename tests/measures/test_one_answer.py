@@ -12,6 +12,7 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
+import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 from typing_extensions import override
@@ -94,8 +95,9 @@ def agree(known: Measures, unknown: Measures) -> bool:
     return abs(share - other) < 3.0 * errors["stick_fraction"]
 
 
+@pytest.mark.long
 @example(5, 30.0)  # comes to rest on a belt that moves
-@examples(quick=2, thorough=60, deadline=None)
+@examples(quick=2, thorough=20, deadline=None)
 @given(st.integers(0, 10_000), st.sampled_from([0.0, 30.0, 1000.0]))
 def test_live_bag_and_table_give_one_answer(seed: int, steps: float) -> None:
     """What is known of the plant may tell more, and what is not known says nothing else."""
@@ -118,4 +120,7 @@ def test_live_bag_and_table_give_one_answer(seed: int, steps: float) -> None:
         assert of_own == live
     if of_other["samples"] == of_table["samples"]:  # no dropouts, which are told otherwise
         assert measures_of(of_other) == measures_of(of_table)
-    assert agree(live, measures_of(of_table)) or (of_table["regime"] is None and of_table["notes"])
+    # The speed at which a slide with memory sticks is known with its law only.
+    if not scenario.reading.stick_speed:
+        unknown = of_table["regime"] is None and of_table["notes"]
+        assert unknown or agree(live, measures_of(of_table))

@@ -16,13 +16,13 @@ from nptdms import ChannelObject, TdmsWriter
 from scipy.io import savemat
 
 from stickslip_ros.errors import BagError
-from stickslip_ros.record import adapters, foreign_file
+from stickslip_ros.record import foreign_file, table_formats
 from stickslip_ros.record.table_file import read_table, table_of
 
 TIME = np.arange(5.0)
 
 
-def checked(vectors: adapters.Vectors) -> None:
+def checked(vectors: table_formats.Vectors) -> None:
     """Check what is found of the same variables in a file of either form."""
     found = {name: values for name, _, values in vectors}
     assert [*found] == ["t", "log.x", "log.deep.n", "data[1]", "data[2]"]
@@ -36,20 +36,20 @@ def test_fields_of_structures_and_columns_of_matrices_are_found() -> None:
     data = np.column_stack([np.full(5, 1.0), np.full(5, 4.0)])
     stream = BytesIO()
     savemat(stream, {"t": TIME[:, None], "log": log, "data": data, "cube": np.ones((2, 2, 2))})
-    checked(adapters._of_scipy(stream.getvalue()))
+    checked(table_formats._of_scipy(stream.getvalue()))
 
 
 def test_files_of_version_7_3_have_the_same_vectors() -> None:
     """Groups are structures, and matrices are stored by columns."""
     stream = BytesIO()
-    with h5py.File(stream, "w", track_order=True) as file:
+    with h5py.File(stream, "w", track_order=True, userblock_size=512) as file:
         file["t"] = TIME[None, :]
         log = file.create_group("log", track_order=True)
         log["x"] = 2.0 * TIME
         log.create_group("deep")["n"] = [[3]]
         log["name"] = np.frombuffer(b"drive", "S1")
         file["data"] = np.array([[1.0] * 5, [4.0] * 5])
-    checked(adapters._of_hdf5(stream.getvalue()))
+    checked(table_formats._of_hdf5(b"MATLAB 7.3 MAT-file".ljust(512) + stream.getvalue()[512:]))
 
 
 @pytest.mark.parametrize(
@@ -61,13 +61,13 @@ def test_files_of_version_7_3_have_the_same_vectors() -> None:
     ],
 )
 def test_json_has_rows_or_vectors(content: object, text: str) -> None:
-    assert adapters._of_json(json.dumps(content).encode()) == text
+    assert table_formats._of_json(json.dumps(content).encode()) == text
 
 
 def test_json_without_a_table_is_refused() -> None:
     for content in ({}, [], 7, {"a": [], "b": "c"}, [1.0, 2.0]):
         with pytest.raises(SystemExit, match="neither a list of rows nor vectors"):
-            adapters._of_json(json.dumps(content).encode())
+            table_formats._of_json(json.dumps(content).encode())
 
 
 def test_vectors_have_the_units_of_their_attributes() -> None:
@@ -76,13 +76,16 @@ def test_vectors_have_the_units_of_their_attributes() -> None:
         for name, unit in {"x": "mm", "t": b"ms"}.items():
             file[name] = TIME
             file[name].attrs["unit"] = unit
-    assert [found[:2] for found in adapters._of_hdf5(stream.getvalue())] == [
-        ("t", "ms"),
-        ("x", "mm"),
+        file["log"] = np.column_stack([TIME, 2.0 * TIME])  # rows as h5py and others write them
+    read = list(table_formats._of_hdf5(stream.getvalue()))
+    assert [vector[:2] for vector in read] == [
+        *(("log[1]", ""), ("log[2]", "")),
+        *(("t", "ms"), ("x", "mm")),
     ]
+    assert read[1][2].tolist() == (2.0 * TIME).tolist()
     array = BytesIO()
     np.save(array, np.column_stack([TIME, 2.0 * TIME]))
-    found = {name: each.tolist() for name, _, each in adapters._of_array(array.getvalue())}
+    found = {name: each.tolist() for name, _, each in table_formats._of_array(array.getvalue())}
     assert found == {"data[1]": TIME.tolist(), "data[2]": (2.0 * TIME).tolist()}
 
 
@@ -117,7 +120,7 @@ def test_nothing_is_read_from_another_file(
         file["t"] = TIME
         store(file.require_group(place), tmp_path / "other.h5")
     with pytest.raises(SystemExit, match=r"x is (a link|stored in another file)"):
-        list(adapters._of_hdf5(stream.getvalue()))
+        list(table_formats._of_hdf5(stream.getvalue()))
 
 
 RATE, FREQUENCY, AMPLITUDE = 500.0, 5.0, 2e-3

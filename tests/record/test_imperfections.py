@@ -29,7 +29,7 @@ def forces(seed: int) -> np.ndarray:
 
 
 @pytest.mark.parametrize(
-    ("size", "period", "said"), [(4.0, 2e-3, "4 N to either side each 2 mm"), (1.0, 5e-3, "each 5")]
+    ("size", "period", "said"), [(4.0, 2e-3, "amplitude 4 N, period 2 mm"), (1.0, 5e-3, "period 5")]
 )
 def test_a_force_that_ripples_over_the_position_is_said(
     size: float, period: float, said: str
@@ -107,14 +107,21 @@ def test_tables_have_the_sentences_and_files_two_clocks(tmp_path: Path) -> None:
     assert recording.forces.force == pytest.approx(ripple, abs=1e-9)
     notes = " ".join(recording.notes)
     assert "until the reference has moved by 200 µm" in notes
-    assert "N to either side each 2 mm" in notes, notes
+    assert "N, period 2 mm" in notes
     assert "force has times of its own, those of column 2:t" in notes
     del columns["reference"]
     unasked = read_table(first, columns, form=TableFormat(second=second, shift=-100.0))
     assert "until column motor [mm] has moved by 200 µm" in " ".join(unasked.notes)
+    first.write_text(f"t [ms],motor [mm],table [mm]\n{motion}0.0,,0.0\n".replace("0.0,,", "1e9,,"))
+    assert "motor" not in " ".join(read_table(first, {"time": "t", "position": "table"}).notes)
+    first.write_text(f"t [ms],motor [mm],table [mm]\n{motion}")
     half = read_table(first, columns, form=TableFormat(second=second, shift=-104.0))
     assert "and is not known at 67% of the others" in " ".join(half.notes)
     assert np.isnan(half.forces.force[-900:]).all()
+    second.write_text(f"s,F [N]\n{lines(TIME + 100.0, ripple)}")
+    with pytest.raises(InvalidInputError, match=r"the second table has no column t .ms., that of"):
+        read_table(first, columns, form=TableFormat(second=second))
+    second.write_text(f"t,F [N]\n{lines(TIME + 100.0, ripple)}")
     with pytest.raises(InvalidInputError, match=r"column table .mm. and column 2:F .N. have"):
         read_table(first, columns | {"position": "table-2:F"}, form=TableFormat(second=second))
     with pytest.raises(InvalidInputError, match="shift is for columns with times of their own"):

@@ -18,7 +18,7 @@ from stickslip_ros.model.control import CONTROL_LAWS, ControlLaw
 from stickslip_ros.samples import MotorSample, Reference, Sample
 from stickslip_ros.scenarios.files import Scenario, load_scenario
 from stickslip_ros.show.law_code import LANGUAGES, law_code
-from stickslip_ros.show.law_program import law_program
+from stickslip_ros.show.law_program import Decision, law_program
 from stickslip_ros.testing import ClosedLoop
 
 COUNT = 100_000
@@ -212,3 +212,17 @@ def test_no_name_ends_the_comment() -> None:
     for ending, end in ((".c", "*/"), (".st", "*)")):
         text = law_code(hostile, LANGUAGES[ending])
         assert "int x" in text.partition(end)[0]
+
+
+@dataclass(frozen=True)
+class Stepping(CONTROL_LAWS["velocity_feedback"]):  # type: ignore[misc]
+    name: ClassVar[str] = "stepping"
+
+    def respond(self, state: Any, elapsed: float, sample: Sample, reference: Reference) -> Any:
+        return (1.0 if sample.velocity == 0 else 2.0), state
+
+
+def test_a_comparison_with_a_whole_number_is_a_decision() -> None:
+    decision = law_program(Stepping(), 1e-3).next
+    assert isinstance(decision, Decision)
+    assert (decision.holds.key, decision.fails.key) == ((1.0,), (2.0,))

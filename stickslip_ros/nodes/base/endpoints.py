@@ -1,4 +1,4 @@
-"""Endpoints of topics in rclpy: message class, what matches, what waits."""
+"""Endpoints of the topics of `record.topics` in rclpy: message class, what matches, what waits."""
 
 from collections.abc import Callable, Iterator
 from functools import cache

@@ -348,6 +348,8 @@ def test_what_is_mistyped_is_refused_and_a_run_that_diverges_says_so(
     page.goto(served.url)
     control = page.get_by_role("switch", name="washout controller")
     control.click()
+    # What it sends until then would hold the slide again.
+    expect(events(page).get_by_text("washout_controller inactive")).to_be_visible()
     page.get_by_role("button", name="Reset").click()
     header = page.get_by_text(re.compile(r"^t = .* s, late forces .* %, missed deadlines .* %, "))
     expect(header).to_contain_text("recording to bag, stickslip run feed_drive --dashboard")

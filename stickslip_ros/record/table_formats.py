@@ -61,9 +61,11 @@ def _of_hdf5(content: bytes) -> Vectors:
             elif each.dtype.kind in "biuf":
                 unit = each.attrs.get("units", each.attrs.get("unit", ""))
                 unit = unit.decode() if isinstance(unit, bytes) else str(unit)
-                for key, _, values in _vectors(prefix + name, np.squeeze(each[()].T)):
-                    yield key, unit, values
+                values = each[()].T if by_columns else each[()]
+                for key, _, vector in _vectors(prefix + name, np.squeeze(values)):
+                    yield key, unit, vector
 
+    by_columns = content.startswith(b"MATLAB")  # which keeps matrices so
     with h5py.File(BytesIO(content)) as file:
         yield from of_group("", file)
 
