@@ -26,7 +26,8 @@ from stickslip_ros.model.control import ControlLaw
 from stickslip_ros.scenarios.files import Scenario, load_scenario
 from stickslip_ros.studies.case_outcome import Disturbance, simulate_case
 from stickslip_ros.studies.design import Designer, Task, design
-from stickslip_ros.studies.tuning import Goal, Tuning
+from stickslip_ros.studies.tuned_gains import Goal
+from stickslip_ros.studies.tuning import Tuning
 from stickslip_ros.versions import versions
 
 DRIVES = 60

@@ -29,7 +29,8 @@ from stickslip_ros.studies.comparison import DISTURBANCES, Comparison, Outcomes,
 from stickslip_ros.studies.plan import Axis
 from stickslip_ros.studies.runner import CountPoints, compute_columns
 from stickslip_ros.studies.spread import spread_text
-from stickslip_ros.studies.tuning import Tuned, with_law
+from stickslip_ros.studies.tuned_gains import Tuned
+from stickslip_ros.studies.tuning import with_law
 from stickslip_ros.tables import TextTable
 from stickslip_ros.theory.linear_sampled_loop import settling_time
 

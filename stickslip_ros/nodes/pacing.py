@@ -361,6 +361,15 @@ class TimingMonitor:
 
     def __init__(self) -> None:
         self._counts = deque([(0, 0, 0)], maxlen=_CHECKS + 1)
+        self._kind = ""
+
+    def turns_to(self, kind: str) -> bool:
+        """Return whether problems are of another kind than at the last call; empty: there is none.
+
+        At the first call the last kind is none.
+        """
+        before, self._kind = self._kind, kind
+        return kind != before
 
     def check(
         self, samples: int, late_forces: int, missed_deadlines: int, *, controlled: bool

@@ -132,7 +132,6 @@ class PlantNode(ManagedNode[PlantParameters]):
             due = parameters.last_sample - round(self.elapsed * parameters.rate)
             last = min(max(due, 0), stampable)
         self._timing = TimingMonitor()
-        self._out_of_time = ""
         self._pacer.start(last)
 
     def stop(self) -> None:
@@ -209,8 +208,8 @@ class PlantNode(ManagedNode[PlantParameters]):
 
     def _log_timing(self, kind: str, complaint: str) -> None:
         """Log the first complaint of its kind about forces and deadlines, and that they end."""
-        if kind != self._out_of_time:
-            self._out_of_time = kind
+        assert self._timing is not None
+        if self._timing.turns_to(kind):
             if complaint:
                 self.get_logger().warning(complaint)
             else:

@@ -57,13 +57,8 @@ class Symbol:
             return self if other else 0.0
         return self._with("*", self, other)
 
-    def __rmul__(self, other: Operand) -> Operand:
-        return self * other if isinstance(other, Symbol) else self._scaled(other)
-
-    def _scaled(self, factor: float) -> Operand:
-        if _is(factor, 0.0) or _is(factor, 1.0):
-            return self if factor else 0.0
-        return self._with("*", factor, self)
+    def __rmul__(self, other: float) -> Operand:
+        return (self if other else 0.0) if other in (0.0, 1.0) else self._with("*", other, self)
 
     def __truediv__(self, other: Operand) -> Operand:
         return self._with("/", self, other)

@@ -19,7 +19,8 @@ from stickslip_ros.studies.plan import Axis, Grid
 from stickslip_ros.studies.settling import MotionState, check_reference
 from stickslip_ros.studies.spread import Spread, check_spread, drawn
 from stickslip_ros.studies.study import PointStudy
-from stickslip_ros.studies.tuning import Goal, Tuned, Tuning, with_law
+from stickslip_ros.studies.tuned_gains import Goal, Tuned
+from stickslip_ros.studies.tuning import Tuning, with_law
 from stickslip_ros.text import shown
 
 DISTURBANCES = ("step", "impulse", "sine")

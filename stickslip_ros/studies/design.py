@@ -25,7 +25,8 @@ from stickslip_ros.studies.controller_trial import FILTER_SETTLED, Bench, Rest, 
 from stickslip_ros.studies.gain_search import rounded
 from stickslip_ros.studies.options import FEED_TOLERANCE, OWN_SPEED_RANGE
 from stickslip_ros.studies.stability import number_text
-from stickslip_ros.studies.tuning import RESERVE, Goal, Tuned, Tuning
+from stickslip_ros.studies.tuned_gains import Goal, Tuned
+from stickslip_ros.studies.tuning import RESERVE, Tuning
 from stickslip_ros.theory.linear_sampled_loop import (
     LinearSampledLoop,
     settling_time,

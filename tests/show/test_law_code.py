@@ -14,7 +14,7 @@ from rclpy.node import Node
 from sensor_msgs.msg import JointState
 
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.model.control import CONTROL_LAWS, ControlLaw
+from stickslip_ros.model.control import CONTROL_LAWS, ControlLaw, VelocityFeedback
 from stickslip_ros.samples import MotorSample, Reference, Sample
 from stickslip_ros.scenarios.files import Scenario, load_scenario
 from stickslip_ros.show.law_code import LANGUAGES, law_code
@@ -185,7 +185,7 @@ def test_structured_text_has_the_statements_of_the_c_code() -> None:
 
 
 @dataclass(frozen=True)
-class Timely(CONTROL_LAWS["velocity_feedback"]):  # type: ignore[misc]
+class Timely(VelocityFeedback):
     name: ClassVar[str] = "timely"
 
     def respond(self, state: Any, elapsed: float, sample: Sample, reference: Reference) -> Any:
@@ -193,7 +193,7 @@ class Timely(CONTROL_LAWS["velocity_feedback"]):  # type: ignore[misc]
 
 
 @dataclass(frozen=True)
-class Numeric(CONTROL_LAWS["velocity_feedback"]):  # type: ignore[misc]
+class Numeric(VelocityFeedback):
     name: ClassVar[str] = "numeric"
 
     def respond(self, state: Any, elapsed: float, sample: Sample, reference: Reference) -> Any:
@@ -215,7 +215,7 @@ def test_no_name_ends_the_comment() -> None:
 
 
 @dataclass(frozen=True)
-class Stepping(CONTROL_LAWS["velocity_feedback"]):  # type: ignore[misc]
+class Stepping(VelocityFeedback):
     name: ClassVar[str] = "stepping"
 
     def respond(self, state: Any, elapsed: float, sample: Sample, reference: Reference) -> Any:

@@ -7,7 +7,8 @@ import pytest
 
 from stickslip_ros.scenarios.files import Scenario, load_scenario
 from stickslip_ros.studies.case_outcome import Disturbance
-from stickslip_ros.studies.tuning import Goal, Tuned, Tuning
+from stickslip_ros.studies.tuned_gains import Goal, Tuned
+from stickslip_ros.studies.tuning import Tuning
 from stickslip_ros.theory.linear_sampled_loop import LinearSampledLoop
 
 FEEDS = (0.01, 0.04)
