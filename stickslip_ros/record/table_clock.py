@@ -1,5 +1,7 @@
-"""The times of a table: whether they are rounded, what they were before, and their stamps."""
+"""The times of a table: which columns they are, whether they are rounded, and their stamps."""
 
+import re
+from collections.abc import Iterator, Sequence
 from math import nan
 from pathlib import Path
 
@@ -8,7 +10,7 @@ import numpy as np
 from stickslip_ros.arrays import FloatArray, IntArray, windows
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.record.expressions import Expression
-from stickslip_ros.record.table_columns import Table
+from stickslip_ros.record.table_columns import ROW, SECOND, Table
 from stickslip_ros.stamps import NANOSECONDS
 from stickslip_ros.text import quantity
 
@@ -28,6 +30,10 @@ _TURNS = [
 _MOST_SESSIONS, _TURNING_SHARE, _SAME_STEP = 20, 0.3, 0.01
 """Most sessions of a table; share of rows with the time of the row before, from which several rows
 have the same; relative difference of the same steps."""
+_NUMBER = re.compile(r"_?\d*$")
+"""What the names of several columns of times differ by: Time_1 and Time_2."""
+_UNSEEN = 0.005
+"""Share of the times at which a quantity of another clock may be unknown without a word."""
 
 
 def in_order(
@@ -168,3 +174,63 @@ def _even(time: FloatArray, rounding: float) -> FloatArray | None:
     if np.ptp(apart) > 1.05 * rounding:
         return None
     return line + float(apart.min() + apart.max()) / 2.0
+
+
+def clock_of(table: Table, clock: tuple[int, ...], asked: Expression) -> tuple[int, ...]:
+    """Return the columns of the times of an expression.
+
+    They are those of the time or, if this is one column, the last one before a column that is named
+    like it, such as Time_2 after Time_1.
+    """
+    if beside := clock_beside(table, clock, asked.places):
+        return beside
+    stems, first = [_NUMBER.sub("", name) for name in table.names], clock[0]
+    if len(clock) > 1 or first == ROW or not stems[first]:
+        return clock
+    alike = [place for place, stem in enumerate(stems) if stem == stems[first]]
+    own = {
+        max((each for each in alike if each < place and place not in alike), default=first)
+        for place in asked.places
+    }
+    return tuple(own) if len(own) == 1 and alike[0] == first else clock
+
+
+def clock_beside(table: Table, clock: Sequence[int], places: Sequence[int]) -> tuple[int, ...]:
+    """Return the times of columns of a second table, which are named like those of the clock."""
+    first = table.second_from
+    later = [first is not None and place >= first for place in places]
+    if not any(later):
+        return ()
+    if not all(later):
+        names = " and ".join(map(table.name, places))
+        raise InvalidInputError(f"{table.path}: {names} have clocks of their own")
+    times: list[int] = []
+    for place in () if ROW in clock else clock:
+        known = [name for name, column in table.columns.items() if column == place]
+        named = [name for name in known if not name.startswith("#")] or known
+        alike = [SECOND + name for name in named if SECOND + name in table.columns]
+        if not alike:
+            raise InvalidInputError(
+                f"{table.path}: the second table has no {table.name(place)}, that of the times"
+            )
+        times.append(table.columns[alike[-1]])
+    return tuple(times)
+
+
+def notes_of_another_clock(
+    table: Table, name: str, clock: Sequence[int], time: FloatArray, own: FloatArray
+) -> Iterator[str]:
+    """Yield a sentence on a quantity with times of its own, s; refuse times apart from the others.
+
+    `clock` are the columns of its times, `time` those of the other quantities, `own` its own.
+    """
+    start, end = float(np.nanmin(own)), float(np.nanmax(own))
+    text = f"{name} has times of its own, those of {table.name(clock[0])}"
+    if not (start <= time[-1] and end >= time[0]):
+        shift = float(f"{table.form.shift + time[0] - start:.6g}")
+        raise InvalidInputError(
+            f"{table.path}: {text}, from {start:.6g} s to {end:.6g} s after the first of the "
+            f"others, which end at {time[-1]:.6g} s: --shift {shift:g} lets both start together"
+        )
+    outside = float(np.mean((time < start) | (time > end)))
+    yield text + f", and is not known at {outside:.0%} of the others" * (outside >= _UNSEEN)

@@ -14,8 +14,16 @@ from stickslip_ros.quantities import ROTARY
 from stickslip_ros.record.expressions import Expression
 from stickslip_ros.record.faults import Jumps, lost_velocities, shift_note
 from stickslip_ros.record.imperfections import play_note, ripple_note
-from stickslip_ros.record.table_clock import check_turns, even_times, in_order, unit_of_steps
-from stickslip_ros.record.table_columns import ROW, SECOND, Table, reading_file
+from stickslip_ros.record.table_clock import (
+    check_turns,
+    clock_beside,
+    clock_of,
+    even_times,
+    in_order,
+    notes_of_another_clock,
+    unit_of_steps,
+)
+from stickslip_ros.record.table_columns import ROW, Table, reading_file
 from stickslip_ros.record.units import Unit, is_acceleration, units_in
 from stickslip_ros.samples import LARGEST
 from stickslip_ros.stamps import NANOSECONDS
@@ -50,12 +58,8 @@ _MERGED_SHARE, _BETWEEN_SHARE = 0.3, 0.05
 them; fewest of its values, as a share of the positions."""
 _SMALLEST_TURN, _SAME_TURN = 256.0, 0.01
 """Least turn of a counter that wraps once; relative difference of a jump from it."""
-_NUMBER = re.compile(r"_?\d*$")
-"""What the names of several columns of times differ by: Time_1 and Time_2."""
 _LARGE = 100.0
 """Range of positions without a unit, from which it is said that they are taken as m or rad."""
-_UNSEEN = 0.005
-"""Share of the times at which a quantity of another clock may be unknown without a word."""
 
 
 class Quantities(NamedTuple):
@@ -88,7 +92,7 @@ def quantities_of(
     clock = asked["time"].places
     if not clock:
         raise InvalidInputError(f"{table.path}: time = {columns['time']} must be a column")
-    clocks = {name: _clocks(table, clock, each) for name, each in asked.items()}
+    clocks = {name: clock_of(table, clock, each) for name, each in asked.items()}
     cells = _Cells.of(table, asked, clock, *clocks.values())
     notes = cells.notes
     times, rows = cells.times(clock, clocks.values())
@@ -106,7 +110,7 @@ def quantities_of(
                 own, value = (_picked(each, part) for each in (own, value))
             values[name] = _at(time, own, value, hold=name in _FORCES)
             values[name][time > np.nanmax(own) + np.nanmedian(np.diff(own))] = nan
-            notes += _of_another_clock(table, name, clocks[name], time, own)
+            notes += notes_of_another_clock(table, name, clocks[name], time, own)
     present = np.isfinite(values[needed])
     if not present.any():
         raise InvalidInputError(
@@ -174,7 +178,7 @@ class _Cells:
         if not rows:
             raise BagError(f"{table.path}: the file cannot be read: it has no rows")
         for place, column in columns.items():
-            lead = (_clock_beside(table, leading, [place]) or leading)[0]
+            lead = (clock_beside(table, leading, [place]) or leading)[0]
             if len(column) not in (1, len(columns[lead])):
                 raise InvalidInputError(
                     f"{table.path}: {table.name(place)} has {len(column)} numbers and "
@@ -266,7 +270,7 @@ class _Cells:
             since, own = each - first if first else each, factor
             if places != clock:
                 own, units = _factor(self.table, "time", replace(asked, places=places))
-                if not (units or _clock_beside(self.table, clock, places)):
+                if not (units or clock_beside(self.table, clock, places)):
                     own = factor
                 if own != factor:
                     since, own = each * own - first * factor, 1.0
@@ -300,63 +304,6 @@ def _asked(
     if "time" in needed and "time" not in columns:
         asked["time"] = Expression.read(table.path, f"row*{period!r}", {"row": ROW})
     return asked
-
-
-def _clocks(table: Table, clock: tuple[int, ...], asked: Expression) -> tuple[int, ...]:
-    """Return the columns of the times of an expression.
-
-    They are those of the time or, if this is one column, the last one before a column that is named
-    like it, such as Time_2 after Time_1.
-    """
-    if beside := _clock_beside(table, clock, asked.places):
-        return beside
-    stems, first = [_NUMBER.sub("", name) for name in table.names], clock[0]
-    if len(clock) > 1 or first == ROW or not stems[first]:
-        return clock
-    alike = [place for place, stem in enumerate(stems) if stem == stems[first]]
-    own = {
-        max((each for each in alike if each < place and place not in alike), default=first)
-        for place in asked.places
-    }
-    return tuple(own) if len(own) == 1 and alike[0] == first else clock
-
-
-def _clock_beside(table: Table, clock: Sequence[int], places: Sequence[int]) -> tuple[int, ...]:
-    """Return the times of columns of a second table, which are named like those of the clock."""
-    first = table.second_from
-    later = [first is not None and place >= first for place in places]
-    if not any(later):
-        return ()
-    if not all(later):
-        names = " and ".join(map(table.name, places))
-        raise InvalidInputError(f"{table.path}: {names} have clocks of their own")
-    times: list[int] = []
-    for place in () if ROW in clock else clock:
-        known = [name for name, column in table.columns.items() if column == place]
-        named = [name for name in known if not name.startswith("#")] or known
-        alike = [SECOND + name for name in named if SECOND + name in table.columns]
-        if not alike:
-            raise InvalidInputError(
-                f"{table.path}: the second table has no {table.name(place)}, that of the times"
-            )
-        times.append(table.columns[alike[-1]])
-    return tuple(times)
-
-
-def _of_another_clock(
-    table: Table, name: str, clock: Sequence[int], time: FloatArray, own: FloatArray
-) -> Iterator[str]:
-    """Yield a sentence on a quantity with times of its own; refuse times apart from the others."""
-    start, end = float(np.nanmin(own)), float(np.nanmax(own))
-    text = f"{name} has times of its own, those of {table.name(clock[0])}"
-    if not (start <= time[-1] and end >= time[0]):
-        shift = float(f"{table.form.shift + time[0] - start:.6g}")
-        raise InvalidInputError(
-            f"{table.path}: {text}, from {start:.6g} s to {end:.6g} s after the first of the "
-            f"others, which end at {time[-1]:.6g} s: --shift {shift:g} lets both start together"
-        )
-    outside = float(np.mean((time < start) | (time > end)))
-    yield text + f", and is not known at {outside:.0%} of the others" * (outside >= _UNSEEN)
 
 
 def _times(clock: Expression, cells: Sequence[Any]) -> Any:
