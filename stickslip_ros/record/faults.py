@@ -46,11 +46,11 @@ class Jumps:
 
     def __init__(self, signal: FloatArray, rounding: float = 0.0) -> None:
         """Find the jumps of a signal; they are larger than a rounding and encoder steps, too."""
-        self._signal, self._unit = signal, _unit(signal)
+        self._signal = signal
         part = signal[:: 1 + len(signal) // _MOST_WINDOWS]
         low, high = np.quantile(part, [0.01, 0.99]) if len(part) else (0.0, 0.0)
-        least = max(_STEEPER * max(self._unit, rounding), _LEAST_SHARE * float(high - low))
-        least = max(least, PRECISION * float(np.abs(part).max(initial=0.0)))
+        self._unit = _unit(signal, rounding)
+        least = max(_STEEPER * self._unit, _LEAST_SHARE * float(high - low))
         found = [
             part.start + np.flatnonzero(np.abs(np.diff(signal[part])) > least)
             for part in windows(len(signal), 1)
@@ -217,10 +217,11 @@ def _integral(time: FloatArray, velocity: FloatArray, rows: IntArray, stride: in
     return total[(rows + _WINDOW) // stride] - total[rows // stride]
 
 
-def _unit(signal: FloatArray) -> float:
-    """Return the smallest step of a signal; infinite without one."""
+def _unit(signal: FloatArray, rounding: float = 0.0) -> float:
+    """Return the smallest step of a signal that is larger than a rounding; infinite without one."""
     least = np.inf
+    rounding = max(rounding, PRECISION * float(np.abs(signal).max(initial=0.0)))
     for part in windows(len(signal), 1):
         sizes = np.abs(np.diff(signal[part]))
-        least = float(np.min(sizes, where=sizes > 0.0, initial=least))
+        least = float(np.min(sizes, where=sizes > rounding, initial=least))
     return least

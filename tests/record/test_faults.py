@@ -54,6 +54,15 @@ def test_motions_have_no_faults(rate: float, step: float, noise: float) -> None:
         assert Jumps(signal).wrap() is None
 
 
+def test_an_encoder_behind_a_command_flickers_by_a_step_without_a_fault(tmp_path: Path) -> None:
+    command = np.round(70.0 * TIME, 4)
+    lag = 0.07 + 0.0008 * np.exp(-TIME) * np.sin(ANGLE)
+    path = table_of(tmp_path / "log.csv", t=TIME, cmd=command, act=np.round(command - lag, 3))
+    found = read_table(path, {"time": "t", "position": "(cmd-act)*1e-3"})
+    assert not any("jumps" in note for note in found.notes)
+    assert found.samples.is_valid.all()
+
+
 def test_jumps_by_a_turn_against_the_motion_are_a_wrap() -> None:
     wrap = Jumps((COARSE + 0.02) % 0.03).wrap()
     assert wrap is not None
