@@ -14,14 +14,18 @@ from PIL import Image
 EXAMPLES = Path(__file__).parents[1] / "examples"
 GALLERY = Path(__file__).with_name("gallery")
 LARGEST = 60_000  # bytes
-NODES = {"foresight", "velocity_feedback"}
-"""Controllers that other examples use, and that run until Ctrl-C."""
+WITHOUT_FIGURE = {"foresight", "plc_export", "velocity_feedback"}
+"""Scripts that other examples and pages use: controllers, and a machine that is recorded."""
 
 
 def scripts() -> list[Path]:
     """Return the scripts that write a figure."""
     found = sorted(EXAMPLES.glob("*.py"))
-    return [path for path in found if path.stem not in NODES and not path.stem.startswith("test_")]
+    return [
+        path
+        for path in found
+        if path.stem not in WITHOUT_FIGURE and not path.stem.startswith("test_")
+    ]
 
 
 def notebooks() -> list[Path]:

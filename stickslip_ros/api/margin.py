@@ -149,11 +149,10 @@ def margin(
     if {-1.0, 1.0} <= {float(np.sign(record.belt_velocity.mean())) for record in records}:
         raise InvalidInputError("the belt moves in both directions: friction may differ in them")
     decays: list[RingDown] = []
-    notes: list[str] = []
+    notes = [f"{path}: {note}" for path in paths for note in read[path][0].notes]
     for record in records:
         motion = record.position, record.belt_velocity, record.period
         taps = [*ring_downs(*motion)]
-        notes += record.notes
         if not taps:
             notes.append(f"{record.name}: {why_no_ring_down(*motion, units.of_unit('m'))}")
         growing = [units.text(tap.belt_speed, "m/s") for tap in taps if tap.decay_rate <= 0.0]
