@@ -460,5 +460,5 @@ def hopf_distance(drive: Drive) -> str:
 
 
 def number_text(drive: Drive, value: float, unit: str) -> str:
-    """Return a number for a sentence: in its SI unit, which a dimensionless drive has not."""
-    return f"{value:.4g}" if drive.is_dimensionless else f"{value:.4g} {unit}"
+    """Return a number for a sentence, with its unit, which a dimensionless drive has not."""
+    return f"{value:.4g}" if drive.is_dimensionless else quantity(value, unit)
