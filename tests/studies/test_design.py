@@ -245,7 +245,7 @@ def test_on_a_slow_belt_too_the_vibration_is_seen() -> None:
 @pytest.mark.parametrize(
     ("belt_speed", "said"),
     [
-        (40.0, "40 m/s is 818.4 times the critical speed of 0.04888 m/s (belt speeds are in m/s)"),
+        (40.0, "40 m/s is 818.4 times the critical speed of 48.88 mm/s (belt speeds are in m/s)"),
         (0.05, "(belt speeds are in m/s), with a very small margin"),
     ],
 )

@@ -121,7 +121,7 @@ def test_the_distance_from_the_hopf_speed() -> None:
         drive = replace(FEED_DRIVE, belt_speed=speed)
         assert hopf_ratio(drive) == pytest.approx(40.0 / 0.048876, rel=1e-4)
         assert hopf_distance(drive) == (
-            "40 m/s is 818.4 times the critical speed of 0.04888 m/s (belt speeds are in m/s)"
+            "40 m/s is 818.4 times the critical speed of 48.88 mm/s (belt speeds are in m/s)"
         )
     assert hopf_distance(PAPER) == "0.4 is 0.8184 times the critical speed of 0.4888"
     for drive in (
