@@ -44,5 +44,5 @@ def run(arguments: argparse.Namespace) -> None:
     text = law_code(scenario, LANGUAGES[path.suffix])
     with writing("--out", path), written(path) as file:
         file.write(text)
-    law, rate = scenario.controller.law, scenario.plant.rate
+    law, rate = scenario.controller.law, scenario.plant.control_rate
     print(f"{printable(str(path))} is written: {law} at {rate:g} Hz")

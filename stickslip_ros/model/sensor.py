@@ -2,7 +2,7 @@
 
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from itertools import chain, count, islice
 from typing import Any, Self
@@ -91,6 +91,23 @@ class Sensor:
         if "velocity" in known:
             known["velocity"] = MeasuredVelocity(known["velocity"])
         return cls(**known)
+
+    def every(self, samples: int) -> Self | None:
+        """Return the sensor as a controller has it that takes each n-th sample.
+
+        Parameters
+        ----------
+        samples : int
+            Samples from one that it takes to the next, n.
+
+        Returns
+        -------
+        Sensor or None
+            Sensor at the lower rate; None if a difference spans no multiple of n samples.
+        """
+        if self.spans % samples:
+            return None
+        return replace(self, difference_samples=max(self.difference_samples // samples, 1))
 
     def refusal(self) -> str | None:
         """Return why the constants do not fit together, as a sentence, or None."""

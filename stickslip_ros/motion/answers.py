@@ -17,6 +17,7 @@ class Verdict(StrEnum):
     UNKNOWN_STAMP = "stamp of no sample"
     ANSWERED = "already answered stamp"
     TOO_LATE = "answers a sample that has passed"
+    UNASKED = "answers a sample that asks for none, by answer_every"
     OVERTAKEN = "overtaken by a newer one"
     """The force was accepted, and a newer one came before it could act."""
     SUPERSEDED = "came after the command that answers the sample"
@@ -37,10 +38,14 @@ class Answers:
         hold_late: bool,
         expects_control: bool,
         overtaken: Callable[[int, float], None],
+        every: int = 1,
     ) -> None:
         """Take answers to samples with these stamps, `period` (s) apart; see `SampledLoop`."""
+        self.every = every
+        """Samples from one that asks for a force to the next."""
+        self._asked = 0
         self.late_forces = 0
-        """Number of samples whose force was missing when it was due."""
+        """Number of samples that the last force asked for did not reach in time."""
         self.silent_samples = 0
         """Number of samples that no command answered, see `hold`."""
         self.dropped: Counter[Verdict] = Counter()
@@ -58,6 +63,15 @@ class Answers:
         """Number of the newest sample that is answered, -1 for none."""
         return self._newest[0]
 
+    @property
+    def force(self) -> float:
+        """The newest force, N; 0 before the first."""
+        return self._newest[1]
+
+    def asks(self, number: int) -> bool:
+        """Return whether a sample asks for a force: otherwise the last one is held."""
+        return self.every == 1 or (number - self._asked) % self.every == 0
+
     def offer(self, stamp: int, force: float, present: int, present_stamp: int) -> Verdict:
         """Offer a force (N) as the answer to the sample of a stamp (ns); see `SampledLoop.offer`.
 
@@ -71,6 +85,10 @@ class Answers:
             return self.refuse(Verdict.NO_STAMP)
         if not (is_present or (0 <= number < present and stamps.stamp(number) == stamp)):
             return self.refuse(Verdict.UNKNOWN_STAMP)
+        if not self.asks(number):
+            if self.controller_present or number <= self._newest[0]:
+                return self.refuse(Verdict.UNASKED)
+            self._asked = number  # a controller that comes later counts from its first sample
         if number <= self._newest[0]:
             return self.refuse(Verdict.ANSWERED)
         if number < present and not self._hold_late:
@@ -105,16 +123,19 @@ class Answers:
         self._newest = (number, self._newest[1])
         self.silent_samples += 1
 
-    def due(self, number: int) -> tuple[int, float]:
+    def due(self, number: int) -> tuple[int, float] | None:
         """Return the force (N) that is due for a sample, after the sample that it answers.
 
         That is the sample itself; an earlier one if the force replaces a missing one; -1 without a
-        force.
+        force. None if the sample asks for none, and no late one has come: the last one is held.
         """
         answered, force = self._newest
-        if answered != number:
-            if self._expects_control:
-                self.late_forces += 1
+        asked = number if self.every == 1 else number - (number - self._asked) % self.every
+        if answered < asked and self._expects_control:
+            self.late_forces += 1
+        if asked != number and answered <= self._newest_sent:
+            return None
+        if answered < asked:
             age = (number - answered) * self._period
             if not (self._hold_late and age <= self._timeout):
                 self.controller_present = False

@@ -167,10 +167,12 @@ def answer(loop: SampledLoop, controller: Controller | None) -> float:
     Returns
     -------
     float
-        Control force, N; 0 without an answer.
+        Control force, N; 0 without an answer, and the last one where the sample asks for none.
     """
     if controller is None:
         return 0.0
+    if loop.answered:
+        return loop.answers.force
     sample = loop.sample
     force = controller.answer(sample)
     if force is None:

@@ -51,6 +51,10 @@ class SampledLoop:
     force n acts from n T + delay to (n + 1) T + delay. The actuator of the drive limits a force
     when it arrives.
 
+    With `answer_every` only each n-th sample asks for a force, from sample 0 on: a controller that
+    is slower than the sampling. The last force is held at the samples between, and what answers
+    them is refused. After a gap the first force to any sample counts from there.
+
     A `command` is a force that names no sample, as controllers of other machines send it.
 
     Parameters
@@ -72,6 +76,8 @@ class SampledLoop:
         Age up to which a force is held, s.
     hold_late : bool, optional
         Whether the newest force is held while a force is missing. By default the force is zero.
+    answer_every : int, optional
+        Number of samples from one that asks for a force to the next.
     expects_control : bool, optional
         Whether a controller is expected: then missing forces count as late.
     disturbance : Signal, optional
@@ -99,6 +105,7 @@ class SampledLoop:
         force_jitter_seed: int = 0,
         force_timeout: float = float("inf"),
         hold_late: bool = False,
+        answer_every: int = 1,
         expects_control: bool = True,
         disturbance: Signal = NO_SIGNAL,
         sensor: Sensor = EXACT_SENSOR,
@@ -117,6 +124,7 @@ class SampledLoop:
             hold_late=hold_late,
             expects_control=expects_control,
             overtaken=overtaken,
+            every=answer_every,
         )
         """Forces that have answered samples, with counts of those that were late or dropped."""
         self._motion = motion
@@ -145,14 +153,16 @@ class SampledLoop:
 
     @property
     def answered(self) -> bool:
-        """Whether the force for the present sample has arrived."""
-        return self.answers.newest == self.sample_number
+        """Whether the force for the present sample has arrived, or it asks for none."""
+        number = self.sample_number
+        return self.answers.newest == number or not self.answers.asks(number)
 
     @property
     def is_ideal(self) -> bool:
         """Whether exact samples are answered at once, and only the answers act on the slide."""
         return (
             self._line.immediate
+            and self.answers.every == 1
             and self._line.limiter is self._scenario_disturbance is None
             and self.disturbance == self.asked_disturbance == 0.0
             and self._sampler.is_plain
@@ -260,9 +270,8 @@ class SampledLoop:
         Raises RunError if the motion is so stiff that it would take too many steps.
         """
         present, line, left = self.sample_number, self._line, self.period
-        if not line.by_arrival:
-            answered, force = self.answers.due(present)
-            for lost in line.send(present, answered, force):
+        if not line.by_arrival and (due := self.answers.due(present)) is not None:
+            for lost in line.send(present, *due):
                 self.answers.lose(*lost)
         if not line.immediate:
             now = 0.0
@@ -295,11 +304,13 @@ class SampledLoop:
         self.sample_number += samples
         last = self.sample_number - 1
         self.answers.accept(last, force)
-        self._line.send(last, *self.answers.due(last))
+        due = self.answers.due(last)
+        assert due is not None  # an ideal loop asks for a force at each sample
+        self._line.send(last, *due)
         self.sample = self._take_sample(belt_position)
 
     def run(self, answer: Callable[[Sample], float | None]) -> Iterator[float]:
-        """Answer each sample immediately and advance to the next one, without end.
+        """Answer each sample that asks for it at once and advance to the next, without end.
 
         Parameters
         ----------
@@ -309,12 +320,15 @@ class SampledLoop:
         Yields
         ------
         float
-            Control force for the sample before the present one, N; 0 for no answer.
+            Control force for the sample before the present one, N; 0 for no answer, and the last
+            one where none is asked for.
         """
+        force: float | None = self.answers.force
         while True:
-            force = answer(self.sample)
-            if force is not None:
-                self.answers.accept(self.sample_number, force)
+            if self.answers.asks(self.sample_number):
+                force = answer(self.sample)
+                if force is not None:
+                    self.answers.accept(self.sample_number, force)
             self.advance()
             yield 0.0 if force is None else force
 

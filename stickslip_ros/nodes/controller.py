@@ -6,6 +6,7 @@ writes a file with the parameters of one, their meaning, unit and bounds.
 """
 
 import sys
+from dataclasses import replace
 from typing import Any
 
 from rclpy.exceptions import ParameterException
@@ -16,7 +17,7 @@ from stickslip_ros.motion.controller import ReferenceSource
 from stickslip_ros.nodes.base.managed import OK, Diagnosis, ManagedNode, diagnosis
 from stickslip_ros.nodes.base.parameters import first_line
 from stickslip_ros.nodes.base.process import run_node
-from stickslip_ros.record.codec import pack_reference, pack_wrench
+from stickslip_ros.record.codec import pack_reference, pack_wrench, unpack_asking_state
 from stickslip_ros.record.topics import CONTROL_FORCE, JOINT_STATES, REFERENCE
 from stickslip_ros.samples import LARGEST, NO_REFERENCE, Reference, Sample
 from stickslip_ros.scenarios.parameters import (
@@ -30,7 +31,7 @@ from stickslip_ros.scenarios.parameters import (
 
 
 class ControllerNode(ManagedNode[ControllerParameters]):
-    """Subscribes to joint_states and publishes control_force with the stamp of each sample.
+    """Subscribes to joint_states and answers each that asks with a control_force of its stamp.
 
     It publishes its reference, or subscribes to that of another node.
     """
@@ -54,7 +55,8 @@ class ControllerNode(ManagedNode[ControllerParameters]):
         self._controller = self.parameters.as_controller()
         self._controller.follows = self._followed()
         self._answered = 0
-        self._states = self.subscribe(JOINT_STATES, self._on_joint_state, depth=1)
+        asking = replace(JOINT_STATES, decode=unpack_asking_state)
+        self._states = self.subscribe(asking, self._on_joint_state, depth=1)
 
     def stop(self) -> None:
         """Listen no more, and stop once the forces sent have arrived."""
@@ -82,7 +84,9 @@ class ControllerNode(ManagedNode[ControllerParameters]):
             return lambda _: self._given
         return follows.signal(period=0.0).reference
 
-    def _on_joint_state(self, sample: Sample) -> None:
+    def _on_joint_state(self, sample: Sample | None) -> None:
+        if sample is None:
+            return
         stamp, position, velocity = sample.stamp, sample.position, sample.velocity
         if not (abs(velocity) <= LARGEST and abs(position) <= LARGEST):
             self.dropped.add(

@@ -32,6 +32,7 @@ from stickslip_ros.nodes.base.process import run_node
 from stickslip_ros.nodes.forecast import FORECAST_DURATION, Forecast
 from stickslip_ros.nodes.pacing import NO_FORCE, LockstepPacer, RealtimePacer, TimingMonitor
 from stickslip_ros.record.codec import (
+    HELD,
     MOTOR,
     force_layouts,
     joint_state_packer,
@@ -123,8 +124,11 @@ class PlantNode(ManagedNode[PlantParameters]):
             )
             long = parameters.duration > FORECAST_DURATION * parameters.real_time_factor
             if long and parameters.command_rule != "newest":
-                rate = parameters.rate * parameters.real_time_factor
-                self._forecast = Forecast(rate, self._pacer.deadline)
+                rate, every = parameters.control_rate, parameters.answer_every
+                pacer = self._pacer
+                self._forecast = Forecast(
+                    rate * parameters.real_time_factor, lambda n: pacer.deadline(n * every)
+                )
         else:
             self._pacer = LockstepPacer(self._loop, self._publish, self._end, self)
         last = stampable
@@ -256,7 +260,8 @@ class PlantNode(ManagedNode[PlantParameters]):
             else:
                 verdict = self._loop.offer(stamp, force)
         if self._forecast is not None and stamp <= self._loop.sample.stamp:
-            self._forecast.answered(self._loop.stamps.number(stamp))
+            number = self._loop.stamps.number(stamp)
+            self._forecast.answered(number // self.parameters.answer_every)
         if verdict is Verdict.SUPERSEDED:
             self._superseded += 1
         elif verdict is not Verdict.ACCEPTED:
@@ -297,8 +302,10 @@ class _SampleTopics:
         self._applied_disturbance = node.advertise(APPLIED_DISTURBANCE)
         self._clock = node.advertise(CLOCK) if parameters.publish_clock else None
         names = parameters.slide_name, parameters.belt_name
-        self._pack = joint_state_packer(*names)
-        self._pack_motor = joint_state_packer(*names, MOTOR)
+        self._pack, self._pack_motor = (
+            [joint_state_packer(*joints, frame=frame) for frame in (HELD, "")]
+            for joints in (names, (*names, MOTOR))
+        )
         self._disturbance = 0.0
 
     def start(self, loop: SampledLoop, *, effort_of_actuator: bool) -> None:
@@ -325,11 +332,12 @@ class _SampleTopics:
     def _packed(self, sample: Sample) -> bytes:
         friction = sample.friction_force
         effort = self._loop.applied_force if self._effort_of_actuator else friction
+        asks = self._loop.answers.asks(self._loop.sample_number)
         positions = sample.position, sample.belt_position
         velocities = sample.velocity, sample.belt_velocity
         if (motor := sample.motor) is None:
-            return self._pack(sample.stamp, positions, velocities, (effort, -friction))
-        return self._pack_motor(
+            return self._pack[asks](sample.stamp, positions, velocities, (effort, -friction))
+        return self._pack_motor[asks](
             sample.stamp,
             (*positions, motor.position),
             (*velocities, motor.velocity),

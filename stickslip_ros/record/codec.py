@@ -27,6 +27,8 @@ from stickslip_ros.stamps import NANOSECONDS
 SLIDE = "slide"
 BELT = "belt"
 MOTOR = "motor"
+HELD = "held"
+"""Frame of a joint state that asks for no force: the plant holds the last one."""
 
 FORCE_TYPES = (
     "geometry_msgs/msg/WrenchStamped",
@@ -47,10 +49,10 @@ def _name(name: str) -> bytes:
     return struct.pack("<I", len(name) + 1) + name.encode() + b"\x00"
 
 
-def _joint_state_structure(*names: str) -> tuple[struct.Struct, bytes]:
+def _joint_state_structure(*names: str, frame: str = "") -> tuple[struct.Struct, bytes]:
     """Return the structure of a joint state, and the bytes that name its joints."""
     joints, count = b"", len(names)
-    for part in (_name(""), struct.pack("<I", count), *map(_name, names), b""):
+    for part in (_name(frame), struct.pack("<I", count), *map(_name, names), b""):
         joints += bytes(-len(joints) % 4) + part
     padding = (4 - len(joints)) % 8
     values = f"{count}d I4x{count}d I4x{count}d"
@@ -67,6 +69,7 @@ _WRENCH_FRAME = _name(SLIDE)
 _WRENCH_CONSTANTS = (LITTLE_ENDIAN, _WRENCH_FRAME)
 _STAMP = struct.Struct("<4s iI")
 _HEADER = struct.Struct("<4s iI 5s")
+_HELD = struct.Struct("<4s iI 9s")
 
 
 def pack_joint_state(
@@ -83,9 +86,9 @@ def pack_joint_state(
     return _pack_joint_state(_JOINT_STATE, _JOINTS, stamp, position, velocity, effort)
 
 
-def joint_state_packer(*names: str) -> Callable[..., bytes]:
-    """Return `pack_joint_state` for joints of other names, or more of them."""
-    return partial(_pack_joint_state, *_joint_state_structure(*names))
+def joint_state_packer(*names: str, frame: str = "") -> Callable[..., bytes]:
+    """Return `pack_joint_state` for joints of other names, or more of them, or with a frame."""
+    return partial(_pack_joint_state, *_joint_state_structure(*names, frame=frame))
 
 
 def _pack_joint_state(
@@ -178,6 +181,14 @@ def unpack_joint_state(data: bytes) -> Sample:
     x, v, effort, belt, belt_v, *motor = values
     moved = None if isnan(motor[0]) else MotorSample(*motor)
     return Sample(stamp, x, v, effort, belt, belt_v, moved)
+
+
+def unpack_asking_state(data: bytes) -> Sample | None:
+    """Read a joint state as `unpack_joint_state` does, or return None if it asks for no force."""
+    frame = _HELD.size
+    if len(data) >= frame and _HELD.unpack_from(data)[3] == _name(HELD):
+        return None
+    return unpack_joint_state(data)
 
 
 def unpack_reference(data: bytes) -> tuple[int, Reference]:

@@ -158,6 +158,15 @@ class PlantParameters(DriveConstants, NodeParameters):
     force_timeout: float = at_rest(
         0.1, "Age up to which the last force is held (realtime).", "s", at_least=0.0
     )
+    answer_every: int = at_rest(
+        1,
+        "Samples from one that asks the controller for a force to the next; between them the last "
+        "force is held.",
+        "samples",
+        whole=True,
+        at_least=1,
+        at_most=1000,
+    )
     reply_timeout: float = at_rest(
         10.0,
         "Longest wall time to wait for a force or the recorder (lockstep).",
@@ -241,6 +250,11 @@ class PlantParameters(DriveConstants, NodeParameters):
                 f"rate = {self.rate} Hz must be at least a thousandth of the natural frequency, "
                 f"{natural:g} Hz with mass = {self.mass} kg and stiffness = {self.stiffness} N/m"
             )
+        if self.control_rate < natural / 1000.0:
+            raise ValueError(
+                f"answer_every = {self.answer_every} must leave a rate of forces of at least a "
+                f"thousandth of the natural frequency, {natural:g} Hz"
+            )
         if self.motor.kind == "mass" and self.stiffness == 0.0:
             raise ValueError(
                 "stiffness = 0.0 N/m is invalid: must be above 0 N/m with motor.kind = mass"
@@ -258,6 +272,8 @@ class PlantParameters(DriveConstants, NodeParameters):
     def not_used(self) -> Iterator[tuple[str, str]]:
         if self.pace is Pace.LOCKSTEP:
             yield "real_time_factor", "by the pace lockstep; realtime uses it"
+        elif self.command_rule == "newest":
+            yield "answer_every", "by the rule newest in real time: each command acts when it comes"
         yield from super().not_used()
         if not self.sensor.spans:
             yield "sensor.difference_samples", "by the velocity exact; difference uses it"
@@ -266,6 +282,11 @@ class PlantParameters(DriveConstants, NodeParameters):
     def period(self) -> float:
         """Sample period, s."""
         return 1.0 / self.rate
+
+    @property
+    def control_rate(self) -> float:
+        """Samples per second that ask the controller for a force, Hz."""
+        return self.rate / self.answer_every
 
     @property
     def last_sample(self) -> int | None:
@@ -304,9 +325,15 @@ class PlantParameters(DriveConstants, NodeParameters):
         return [*names, "friction.law", *(f"friction.{name}" for name in self.friction.names())]
 
     @property
-    def linear_sampling(self) -> tuple[float, float, Sensor, Sensor]:
-        """Rate, delay and sensors, the sampling of a `LinearSampledLoop`."""
-        return self.rate, self.force_delay, self.sensor, self.motor.sensor
+    def linear_sampling(self) -> tuple[float, float, Sensor, Sensor, int]:
+        """Rate, delay, sensors and `answer_every`, the sampling of a `LinearSampledLoop`."""
+        return self.rate, self.force_delay, self.sensor, self.motor.sensor, self.answer_every
+
+    @property
+    def mean_sampling(self) -> tuple[float, float, Sensor, Sensor, int]:
+        """The same with the mean delay of forces with jitter."""
+        rate, delay, sensor, motor_sensor, every = self.linear_sampling
+        return rate, delay + self.force_jitter / 2.0, sensor, motor_sensor, every
 
     def as_loop(
         self,
@@ -327,6 +354,7 @@ class PlantParameters(DriveConstants, NodeParameters):
             force_jitter_seed=self.force_jitter_seed,
             force_timeout=self.force_timeout,
             hold_late=hold_late,
+            answer_every=self.answer_every,
             expects_control=self.expects_control,
             disturbance=self.disturbance.signal(self.period),
             sensor=self.sensor,

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from inspect import getdoc
 from math import isfinite
 
+from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.model.constants import constants_of
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.show.law_program import (
@@ -72,19 +73,24 @@ class Difference:
 
 
 def law_code(scenario: Scenario, language: Language) -> str:
-    """Return the source file of the control law of a scenario, at the rate of its plant.
+    """Return the source file of the control law of a scenario, at the rate of its answers.
 
     Raises InvalidInputError if the law cannot be exported, see `law_program`.
     """
     from jinja2 import Environment, PackageLoader
 
     plant, law = scenario.plant, scenario.controller.control_law
-    program = law_program(law, plant.period)
-    differences = [
-        Difference(f"{body}velocity", f"{body}position", sensor.spans)
-        for body, sensor in (("", plant.sensor), ("motor_", plant.motor.sensor))
-        if sensor.spans and f"{body}velocity" in program.inputs
-    ]
+    program = law_program(law, 1.0 / plant.control_rate)
+    differences: list[Difference] = []
+    for body, sensor in (("", plant.sensor), ("motor_", plant.motor.sensor)):
+        if not sensor.spans or f"{body}velocity" not in program.inputs:
+            continue
+        if (seen := sensor.every(plant.answer_every)) is None:
+            raise InvalidInputError(
+                f"the velocity is a difference over {sensor.spans} samples: must be a multiple of "
+                f"plant.answer_every = {plant.answer_every}, at which the code is called"
+            )
+        differences.append(Difference(f"{body}velocity", f"{body}position", seen.spans))
     computed = [difference.velocity for difference in differences]
     names = dict.fromkeys([*(d.position for d in differences), *program.inputs])
     statements = list(_Writer(language, program).statements())
@@ -100,7 +106,7 @@ def law_code(scenario: Scenario, language: Language) -> str:
         inputs={name: _UNITS[name.rpartition("_")[2]] for name in names if name not in computed},
         states=[state.partition(".")[2] for state in program.states],
         differences=differences,
-        period=_number(plant.period),
+        period=_number(1.0 / plant.control_rate),
         statements=statements,
         variables=sorted(variables),
         limit=_number(law.force_limit) if isfinite(law.force_limit) else "",
@@ -113,7 +119,8 @@ def _head(scenario: Scenario) -> Iterator[str]:
     law = scenario.controller.control_law
     yield f"The control law {law.name} of the scenario {scenario.name}."
     yield from ("", *(getdoc(type(law)) or "").splitlines(), "")
-    yield f"Call it once each {scenario.plant.period:.17g} s. All values are in SI units:"
+    period = 1.0 / scenario.plant.control_rate
+    yield f"Call it once each {period:.17g} s. All values are in SI units:"
     for name, described in constants_of(type(law)).items():
         value = getattr(law, name)
         if isinstance(value, float | str):

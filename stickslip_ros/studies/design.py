@@ -268,7 +268,7 @@ def design(
         If the law has no gains to tune, or belt or load follow a signal.
     """
     scenario, plant = task.scenario, task.scenario.plant
-    reason = why_no_linear_loop(task.drive, plant.rate, plant.force_delay + plant.force_jitter / 2)
+    reason = why_no_linear_loop(task.drive, *plant.mean_sampling)
     if reason is not None and task.drive.belt_speed:
         return Design(task, remark=reason)
     if disturbances is None:
@@ -310,7 +310,7 @@ class Designer:
     def __init__(self, task: Task, tuning: Tuning, disturbances: Sequence[Disturbance]) -> None:
         self.task, self.tuning, self.disturbances = task, tuning, disturbances
         plant = task.scenario.plant
-        self.bench = Bench(plant.rate, plant.force_delay, plant.sensor)
+        self.bench = Bench.of_plant(plant)
         sensor, actuator = plant.sensor, task.drive.actuator
         self.rough = bool(
             sensor.position_resolution

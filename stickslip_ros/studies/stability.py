@@ -306,12 +306,11 @@ def _critical_gains(drive: Drive, law: ControlLaw) -> Section:
 
 
 def _sampled_loop(drive: Drive, law: ControlLaw | None, plant: PlantParameters) -> _Noted:
-    rate, force_delay = plant.rate, plant.force_delay
     if law is None:
         return _Noted(dict.fromkeys(_SAMPLED_LOOP), _NO_CONTROL)
     loop = LinearSampledLoop.from_drive(drive, *plant.linear_sampling)
-    if loop is None or law.linear_feedback(1.0 / rate) is None:
-        reason = why_no_linear_loop(drive, rate, force_delay)
+    if loop is None or law.linear_feedback(1.0 / plant.control_rate) is None:
+        reason = why_no_linear_loop(drive, *plant.linear_sampling)
         return _Noted(dict.fromkeys(_SAMPLED_LOOP), reason or not_linear(law.name))
     radius, lack = _covered(lambda: loop.spectral_radius(law))
     if radius is None:
@@ -333,7 +332,7 @@ def linear_systems(scenario: Scenario) -> tuple[LinearSystem | None, LinearSyste
     control = None if law is None else law.continuous
     continuous = None if control is None else continuous_system(drive, control)
     loop = LinearSampledLoop.from_drive(drive, *plant.linear_sampling)
-    if loop is None or law is None or law.linear_feedback(1.0 / plant.rate) is None:
+    if loop is None or law is None or law.linear_feedback(1.0 / plant.control_rate) is None:
         return continuous, None
     return continuous, sampled_system(loop, law)
 
@@ -400,7 +399,7 @@ def why_no_figure(scenario: Scenario) -> str | None:
     if law is None:
         return _covered(lambda: BifurcationBranches.check(plant.as_drive()))[1]
     drive = plant.as_drive()
-    no_loop = why_no_linear_loop(drive, plant.rate, plant.force_delay)
+    no_loop = why_no_linear_loop(drive, *plant.linear_sampling)
     _, no_map = _covered(lambda: require("the stability map", drive, ONE_MASS))
     return no_loop or why_no_gains(law) or no_map
 
@@ -415,10 +414,11 @@ def stability_map(scenario: Scenario) -> tuple[StabilityMap, CriticalGainCurves]
     loop = LinearSampledLoop.from_drive(drive, *plant.linear_sampling)
     assert loop is not None
     assert gains is not None
-    rates = plant.rate * np.array((0.1, 0.3, 1.0))
+    rates = plant.control_rate * np.array((0.1, 0.3, 1.0))
     latest = min(0.2 * drive.natural_period, LONGEST_DELAY / rates.max())
     delays = np.linspace(0.0, latest, 41)
-    curves = CriticalGainCurves.over(drive, gains.corner_frequency, rates, delays, plant.sensor)
+    sampling = rates, delays, plant.sensor, plant.answer_every
+    curves = CriticalGainCurves.over(drive, gains.corner_frequency, *sampling)
     return StabilityMap.around(loop, gains), curves
 
 

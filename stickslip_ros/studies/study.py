@@ -112,7 +112,7 @@ class Study(PointStudy[Plan]):
         if case.drive.has_spring:
             unused += ("plant.duration",)
         if not case.sampled:
-            unused += ("plant.rate",)
+            unused += ("plant.rate", "plant.answer_every")
         if not case.sampled and not self.continuous:  # continuous control refuses these
             unused += ("plant.force_", "plant.sensor.", "plant.actuator.")
         reasons = {

@@ -72,7 +72,7 @@ def hopf_margin(case: ControlledDrive, *, coarse: bool = False) -> float:
     loop = LinearSampledLoop.from_drive(drive, *plant.linear_sampling)
     if loop is None or plant.force_jitter > 0.0 or law.force_limit == 0.0:
         return nan
-    if law.linear_feedback(1.0 / plant.rate) is None:
+    if law.linear_feedback(1.0 / plant.control_rate) is None:
         return nan
     return 1.0 - (loop.coarsened() if coarse else loop).spectral_radius(law)
 

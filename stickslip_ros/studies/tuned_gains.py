@@ -46,7 +46,7 @@ class Goal:
     step: float
     """Step of a disturbance force, N, under which the force stays within the limit."""
     impulse: float
-    """The same of an impulse, one sample long, N."""
+    """The same of an impulse, one period of the controller long, N."""
     delay_margin: float
     """Least delay margin, s."""
 
@@ -58,7 +58,7 @@ class Goal:
         disturbances: Sequence[Disturbance],
         force_limit: float,
     ) -> "Goal":
-        """Return the goal for a scenario: a delay margin of two sample periods.
+        """Return the goal for a scenario: a delay margin of two periods of the controller.
 
         Parameters
         ----------
@@ -77,7 +77,9 @@ class Goal:
             max((d.amplitude for d in disturbances if d.kind in kinds), default=0.0)
             for kinds in (("step", "sine"), ("impulse",))
         )
-        return cls(tuple(feeds), limit, step, impulse, 2.0 / scenario.plant.rate)
+        plant = scenario.plant
+        impulse /= plant.answer_every  # as strong over a period of the controller
+        return cls(tuple(feeds), limit, step, impulse, 2.0 / plant.control_rate)
 
 
 class Limit(NamedTuple):

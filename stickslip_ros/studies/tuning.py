@@ -93,20 +93,21 @@ class Tuning:
         self.law = replace(known.for_drive(drive), force_limit=goal.force_limit)
         if isinstance(known, Washout):
             self.law = replace(self.law, cubic_gain=0.0)
-        delay = plant.force_delay + plant.force_jitter / 2.0
+        rate, (_, delay, *_) = plant.control_rate, plant.mean_sampling
         self.plants: list[PlantResponse] = []
         self.vibrations: list[Vibration] = []
         """Vibrations without control, which the washout law has to catch; of others none."""
         for feed in goal.feeds:
             at_feed = replace(drive, belt_speed=feed)
-            reason = why_no_linear_loop(at_feed, plant.rate, delay)
+            reason = why_no_linear_loop(at_feed, *plant.mean_sampling)
             if reason is not None:
                 raise InvalidInputError(f"gains of {law} by theory: {reason}")
-            spans = (sensor.spans for sensor in sensors[: 1 if drive.motor is None else 2])
-            loop = LinearSampledLoop(at_feed, plant.rate, delay, _jacobian(at_feed), *spans)
+            seen = sensors[: 1 if drive.motor is None else 2]
+            spans = (sensor.spans // plant.answer_every for sensor in seen)
+            loop = LinearSampledLoop(at_feed, rate, delay, _jacobian(at_feed), *spans)
             self.plants.append(PlantResponse.of(loop))
             if isinstance(known, Washout) and drive.has_spring and drive.motor is None:
-                bench = Bench(plant.rate, plant.force_delay, plant.sensor)
+                bench = Bench.of_plant(plant)
                 self.vibrations.append(bench.vibration(at_feed))
         self.loops = Loops([member.loop for member in self.plants])
         self.noises = [sqrt(s.position_resolution**2 / 12.0 + s.position_noise**2) for s in sensors]

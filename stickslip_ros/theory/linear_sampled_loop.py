@@ -44,14 +44,29 @@ SETTLED = 0.01
 """Share of its first size that a deviation has at the 1 % settling time."""
 
 
-def why_no_linear_loop(drive: Drive, rate: float, force_delay: float) -> str | None:
+def why_no_linear_loop(
+    drive: Drive,
+    rate: float,
+    force_delay: float = 0.0,
+    sensor: Sensor = EXACT_SENSOR,
+    motor_sensor: Sensor = EXACT_SENSOR,
+    answer_every: int = 1,
+) -> str | None:
     """Return a sentence that says why `LinearSampledLoop.from_drive` returns None, or None."""
+    rate /= answer_every
     if drive.belt_speed == 0.0:
         return "the belt rests: friction holds the slide, and the motion near it is not linear"
     if force_delay * rate > LONGEST_DELAY:
         return (
             f"the force comes {force_delay * rate:g} periods late; the theory of the sampled loop "
             f"covers at most {LONGEST_DELAY}"
+        )
+    sensors = (sensor, motor_sensor)[: 1 if drive.motor is None else 2]
+    if not all(each.every(answer_every) for each in sensors):
+        spans = " and ".join(str(each.spans) for each in sensors)
+        return (
+            f"the velocity is a difference over {spans} samples, which must be a multiple of the "
+            f"{answer_every} from answer to answer for the theory of the sampled loop"
         )
     return None
 
@@ -89,6 +104,7 @@ class LinearSampledLoop:
         force_delay: float = 0.0,
         sensor: Sensor = EXACT_SENSOR,
         motor_sensor: Sensor = EXACT_SENSOR,
+        answer_every: int = 1,
     ) -> Self | None:
         """Return the linear loop of a drive.
 
@@ -104,11 +120,14 @@ class LinearSampledLoop:
             Sensor, of which only the difference for the velocity is used.
         motor_sensor : Sensor, optional
             The same of a motor of finite mass.
+        answer_every : int, optional
+            Samples from one that is answered to the next: the loop is that of the answers.
 
         Returns
         -------
         LinearSampledLoop or None
-            Loop; None if the belt is at rest, or if the delay is longer than 300 periods.
+            Loop; None if the belt is at rest, if the delay is longer than 300 periods, or if a
+            difference spans no multiple of `answer_every`.
 
         Raises
         ------
@@ -116,11 +135,13 @@ class LinearSampledLoop:
             If belt or load follow a signal, or the drive has no spring.
         """
         require("the theory of the sampled loop", drive, SPRING, AUTONOMOUS)
-        if why_no_linear_loop(drive, rate, force_delay):
+        sampling = rate, force_delay, sensor, motor_sensor, answer_every
+        if why_no_linear_loop(drive, *sampling):
             return None
         (jacobian,) = jacobians(drive, None, np.array([drive.belt_speed / drive.speed_scale]))
-        spans = motor_sensor.spans if drive.motor is not None else 0
-        return cls(drive, rate, force_delay, jacobian, sensor.spans, spans)
+        spans = sensor.spans, motor_sensor.spans if drive.motor is not None else 0
+        differences = (span // answer_every for span in spans)
+        return cls(drive, rate / answer_every, force_delay, jacobian, *differences)
 
     def transition_matrix(self, law: ControlLaw | LinearFeedback) -> FloatArray:
         """Return the matrix from the state at one sample to the state at the next.

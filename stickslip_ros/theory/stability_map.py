@@ -72,12 +72,17 @@ class CriticalGainCurves:
         rates: FloatArray,
         force_delays: FloatArray,
         sensor: Sensor = EXACT_SENSOR,
+        answer_every: int = 1,
     ) -> Self:
-        """Return the curves of a drive for this cutoff frequency (rad/s)."""
+        """Return the curves of a drive for this cutoff frequency (rad/s).
+
+        The rates are those of the answers, to each sample of so many.
+        """
         ends = np.full((2, len(rates), len(force_delays)), np.nan)
         for row, rate in enumerate(rates.tolist()):
             for column, force_delay in enumerate(force_delays.tolist()):
-                loop = LinearSampledLoop.from_drive(drive, rate, force_delay, sensor)
+                sampling = rate * answer_every, force_delay, sensor, EXACT_SENSOR, answer_every
+                loop = LinearSampledLoop.from_drive(drive, *sampling)
                 intervals = loop.stable_linear_gains(corner_frequency) if loop else []
                 if intervals:
                     interval = nearest_to_zero(intervals)

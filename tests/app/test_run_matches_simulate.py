@@ -29,7 +29,36 @@ RUNS: Mapping[str, tuple[str, str]] = {
     "sensor and actuator, composed": (f"feed_drive {ENCODER} {DRIVE} {LATE}", "--composed"),
 }
 """Drive, and how it is run."""
+SLOW = (
+    "-p plant.rate=1kHz -p plant.answer_every=10 -p plant.force_delay=3.5ms "
+    "-p plant.initial.position=0.3mm "
+    "-p washout_controller.start_after=0 -p washout_controller.cubic_gain=0 --duration 1.2"
+)
 QUICK = {"moving belt", "sensor and actuator, composed"}
+
+
+@pytest.mark.process
+def test_a_slower_controller_acts_alike_over_topics_and_in_simulate_and_as_theory_says(
+    stickslip: Run, tmp_path: Path
+) -> None:
+    """It answers each tenth sample, after 3.5 ms; the deviation decays by the spectral radius."""
+    drive = f"feed_drive {SLOW}".split()
+    run = stickslip.json("run", *drive, "--composed", "--pace", "lockstep", "--bag", "bag")
+    assert (run["lost_samples"], run["late_forces"], run["samples"]) == (0, 0, 1201)
+    assert run["report"]["dropped_forces"] == 0
+    stickslip.json("simulate", *drive, "--out", "motion.csv")
+    table = np.genfromtxt(tmp_path / "motion.csv", delimiter=",", names=True)
+    with Recording(tmp_path / "bag") as recording:
+        states, forces = recording.joint_states, recording.control_forces
+    assert states.position.tolist() == table["position"].tolist()
+    assert forces.force.tolist() == table["control_force"][::10].tolist()
+    assert forces.stamp.tolist() == states.stamp[::10].tolist()
+    assert (table["control_force"][9::10] == table["control_force"][:-1:10]).all()
+    theory = stickslip.json("stability", *drive[:-2])
+    deviation = states.position[400::10] - theory["equilibrium_position"]
+    before = np.column_stack([deviation[1:-1], deviation[:-2]])
+    _, product = np.linalg.lstsq(before, deviation[2:])[0]
+    assert np.sqrt(-product) == pytest.approx(theory["sampled_loop"]["spectral_radius"], rel=1e-3)
 
 
 @pytest.mark.process

@@ -107,6 +107,55 @@ def test_a_late_force_that_a_newer_one_replaces_before_it_acts_is_told() -> None
     assert dict(loop.answers.dropped) == {Verdict.OVERTAKEN: 2}
 
 
+@paces
+def test_a_slower_controller_answers_each_third_sample(realtime: bool) -> None:
+    loop, hand = Loop(realtime, answer_every=3), Motion(PAPER, 0.0, 0.0)
+    for number in range(7):
+        assert loop.answered == (number % 3 > 0)
+        expected = Verdict.UNASKED if number % 3 else Verdict.ACCEPTED
+        assert loop.answer(number, 0.5 + number) is expected
+        assert loop.answered
+        assert loop.command(9.0) is Verdict.SUPERSEDED
+        hand.force = 0.5 + number - number % 3
+        hand.advance(0.01)
+        sample = loop.advance()
+        assert (sample.position, sample.velocity) == (hand.position, hand.velocity)
+    assert loop.answers.late_forces == 0
+    assert dict(loop.answers.dropped) == {Verdict.UNASKED: 4}
+
+
+@paces
+def test_without_its_force_no_sample_is_in_time_up_to_the_next_that_asks(realtime: bool) -> None:
+    loop = Loop(realtime, answer_every=3, force_timeout=1.0)
+    loop.answer(0, 0.5)
+    loop.advance_by(4)
+    assert (loop.acting, loop.answers.late_forces) == (0.5 * realtime, 1)
+    late = loop.answer(3, 1.5)
+    assert late is (Verdict.ACCEPTED if realtime else Verdict.TOO_LATE)
+    loop.advance_by(2)
+    assert (loop.acting, loop.answers.late_forces) == ((1.5, 1) if realtime else (0.0, 3))
+    loop.advance()
+    assert loop.answers.late_forces == (2 if realtime else 4)
+
+
+@paces
+def test_a_controller_that_comes_after_a_gap_counts_from_its_first_sample(realtime: bool) -> None:
+    loop = Loop(realtime, answer_every=3, force_timeout=0.0)
+    loop.advance_by(5)
+    assert loop.answer(4, 0.5) is (Verdict.ACCEPTED if realtime else Verdict.TOO_LATE)
+    assert [loop.answers.asks(number) for number in range(4, 9)] == [
+        True,
+        False,
+        False,
+        True,
+        False,
+    ]
+    loop.advance_by(2)
+    assert not loop.answered
+    assert loop.answer(7, 0.5) is Verdict.ACCEPTED
+    assert loop.answer(6, 0.5) is Verdict.UNASKED
+
+
 def test_lockstep_goes_on_without_force_and_without_hope_where_none_comes() -> None:
     loop = Loop()
     assert loop.answers.controller_present

@@ -83,7 +83,7 @@ def test_a_parameter_that_is_not_known(tmp_path: Path) -> None:
     for parameters, name, value, meant in (
         ("{friction: {statik: 0.4}}", "friction.statik", "0.4", "did you mean friction.static?"),
         ("{mass: {kg: 1}}", "mass.kg", "1", "did you mean mass?"),
-        ("{1: a}", "1", "'a'", "known are actuator.*, autostart,"),
+        ("{1: a}", "1", "'a'", "known are actuator.*, answer_every, autostart,"),
     ):
         path = scenario_file(tmp_path, section("/**/plant", parameters))
         said = refusal(path)

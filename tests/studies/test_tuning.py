@@ -63,6 +63,21 @@ def test_the_gains_meet_the_goal_and_others_near_them_damp_no_faster(law: str) -
             pytest.fail(f"{other} damps with {faster}, not {found.decay_rate}")
 
 
+def test_a_slower_controller_is_tuned_as_at_its_rate() -> None:
+    slow = {"plant.rate": 500.0}, {"plant.answer_every": 4, "plant.sensor.difference_samples": 4}
+    drives = [scenario(**values) for values in slow]
+    impulse = Disturbance("impulse", 400.0), Disturbance("impulse", 1600.0)
+    goals = [
+        Goal.from_scenario(drive, FEEDS, [push], 600.0)
+        for drive, push in zip(drives, impulse, strict=True)
+    ]
+    assert goals[0] == goals[1]
+    tunings = [Tuning(drive, "velocity_feedback", goals[0]) for drive in drives]
+    for one, other in zip(*(tuning.plants for tuning in tunings), strict=True):
+        assert np.array_equal(one.frequency, other.frequency)
+        assert np.array_equal(one.by_control, other.by_control)
+
+
 @pytest.mark.long
 def test_a_law_that_is_not_linear_gets_the_gains_of_its_linear_part() -> None:
     pid, reset = (tune(scenario(), law, goal()) for law in ("pid", "reset_integral"))

@@ -186,7 +186,8 @@ class RunState:
             self.add_event(f"{node} restarted")
         self._update(node, Health(state, status.level[0], message, figures, time.monotonic()))
         if node == self.controller:
-            rate, answered = self.parameters["plant"].get("rate"), figures.get("answered")
+            plant, answered = self.parameters["plant"], figures.get("answered")
+            rate = plant.get("rate", 0.0) / plant.get("answer_every", 1)
             self._answering_since = None
             if rate and answered:
                 self._answering_since = self.newest - number_in(answered) / rate * NANOSECONDS

@@ -111,7 +111,7 @@ def _loop(plant: Values) -> LinearSampledLoop:
     drive, sampling = parameters.as_drive(), parameters.linear_sampling
     loop = LinearSampledLoop.from_drive(drive, *sampling)
     if loop is None:
-        raise InvalidInputError(f"{why_no_linear_loop(drive, *sampling[:2])}")
+        raise InvalidInputError(f"{why_no_linear_loop(drive, *sampling)}")
     return loop
 
 
