@@ -65,6 +65,7 @@ def run(arguments: argparse.Namespace) -> None:
     """Run the command."""
     from stickslip_ros.api.recordings import Comparison, recorded_run
     from stickslip_ros.measures.slips import SlipThreshold
+    from stickslip_ros.record.bag_files import runs_of
     from stickslip_ros.record.table_file import is_table
 
     bags: list[Path] = [*dict.fromkeys(arguments.recordings)]
@@ -85,9 +86,10 @@ def run(arguments: argparse.Namespace) -> None:
             slips=slips,
             kept=False,
             drawn=is_drawn(arguments),
+            **({"continued": continued} if continued else {}),
             **reading,
         )
-        for bag in bags
+        for bag, continued in runs_of(bags).items()
     ]
     result = runs[0] if len(runs) == 1 else Comparison(tuple(runs))
     write_results(arguments, result)

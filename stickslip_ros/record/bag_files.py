@@ -7,7 +7,7 @@ import os
 import re
 import tempfile
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack, closing
 from pathlib import Path
 
@@ -20,6 +20,7 @@ from stickslip_ros.record.converted_bag import mcap_of
 from stickslip_ros.record.mcap_file import McapFile
 from stickslip_ros.record.metadata import metadata_faults
 from stickslip_ros.record.source import Block, Source
+from stickslip_ros.stamps import NANOSECONDS
 from stickslip_ros.text import printable
 
 _PACKED_SUFFIX = ".mcap.zstd"
@@ -29,18 +30,24 @@ _PACKED_SUFFIX = ".mcap.zstd"
 class BagFiles(Source):
     """The MCAP files of a bag; raises BagError if `path` is not a bag."""
 
-    def __init__(self, path: Path | str) -> None:
-        """Open the files of a bag directory, or one MCAP file."""
+    def __init__(self, path: Path | str, *continued: Path) -> None:
+        """Open the files of a bag directory, or one MCAP file, and of bags that continue it."""
         self.path = Path(path)
         self._unreadable: list[str] = []
         with ExitStack() as opened:
-            place = mcap_of(self.path, opened)
-            paths = _mcap_files(place)
+            places = [mcap_of(bag, opened) for bag in (self.path, *continued)]
+            by_place = {place: _mcap_files(place) for place in places}
+            paths = [path for paths in by_place.values() for path in paths]
             files = self._readable_files([_unpacked(path, opened) for path in paths])
             self.files = [opened.enter_context(closing(file)) for file in files]
             """The MCAP files in order, without those that cannot be read."""
             self._opened = opened.pop_all()
-        self._metadata_faults = metadata_faults(place, paths) if place.is_dir() else []
+        self._metadata_faults = [
+            fault
+            for place, paths in by_place.items()
+            if place.is_dir()
+            for fault in metadata_faults(place, paths)
+        ]
         self.topics = {
             channel.topic: file.schemas[channel.schema_id].name
             for file in self.files
@@ -106,6 +113,41 @@ class BagFiles(Source):
         if len(errors) == len(paths):
             raise errors[0]
         self._unreadable = [str(error) for error in errors]
+
+
+def runs_of(bags: Iterable[Path]) -> dict[Path, dict[Path, float]]:
+    """Return the bags that begin a run, each with those that continue it and the gaps before, s.
+
+    NAME_2 continues NAME if an analyzer that was restarted has written it, with `bag_exists: next`,
+    its messages are later, and the parameters of the plant, where both have them, are the same.
+    """
+    runs: dict[Path, dict[Path, float]] = {}
+    for bag in bags:
+        for first, continued in runs.items():
+            if re.fullmatch(re.escape(str(first)) + r"_\d+", str(bag)) and bag.is_dir():
+                gap = _gap([first, *continued][-1], bag)
+                if gap is not None:
+                    continued[bag] = gap
+                    break
+        else:
+            runs[bag] = {}
+    return runs
+
+
+def _gap(before: Path, after: Path) -> float | None:
+    """Return the time, s, from the end of a bag to the begin of one that continues it, or None."""
+    with BagFiles(before) as one, BagFiles(after) as other:
+        plants, analyzers = (
+            [bag.metadata(f"stickslip_ros/{node}") for bag in (one, other)]
+            for node in ("plant", "analyzer")
+        )
+        restarted = (analyzers[0] or {}).get("bag_exists") == '"next"'
+        if not restarted or analyzers[0] != analyzers[1]:
+            return None
+        ends = [block.log_time.max() for block in one.blocks(*one.topics)]
+        begin = next((block.log_time.min() for block in other.blocks(*other.topics)), 0)
+        gap = int(begin - max(ends, default=begin)) / NANOSECONDS
+        return gap if gap > 0.0 and (plants[0] == plants[1] or None in plants) else None
 
 
 def _mcap_files(path: Path) -> list[Path]:

@@ -76,9 +76,12 @@ class Reading(Generic[_ReadT]):
     """Sentences on messages that could not be decoded."""
 
 
-def open_bag(path: Path | str) -> Source:
-    """Return the bag at a path, open for reading: the `Source` of its format; raises BagError."""
-    return BagFiles(path)
+def open_bag(path: Path | str, *continued: Path) -> Source:
+    """Return the bag at a path, open for reading: the `Source` of its format; raises BagError.
+
+    Bags that continue the run follow it.
+    """
+    return BagFiles(path, *continued)
 
 
 def read(
@@ -111,6 +114,8 @@ class Recording:
         Belt speed, m/s, where the joint states have no belt; None: the belt counts as at rest.
     layout : BagLayout, optional
         Where a bag of another machine has motion and force; by default it is found.
+    continued : sequence of Path, optional
+        Bags that continue the run, see `runs_of`.
 
     Raises
     ------
@@ -136,8 +141,9 @@ class Recording:
         *,
         belt_speed: float | None = None,
         layout: BagLayout = ANY_LAYOUT,
+        continued: Sequence[Path] = (),
     ) -> None:
-        self.source = source = open_bag(path)
+        self.source = source = open_bag(path, *continued)
         """The bag, in which other topics are, too."""
         self.path, self.topics = source.path, source.topics
         self.messages, self.metadata = source.messages, source.metadata

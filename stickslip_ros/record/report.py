@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from contextlib import nullcontext, suppress
 from math import inf
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from stickslip_ros.errors import BagError
@@ -18,6 +19,7 @@ from stickslip_ros.record.run_feed import RunFeed, RunPart, Take
 from stickslip_ros.record.table_columns import ANY_FORM, TableFormat
 from stickslip_ros.record.table_file import TableRecording, is_table, read_table
 from stickslip_ros.record.topics import CONTROL_FORCE, JOINT_STATES
+from stickslip_ros.text import quantity
 
 _DEFAULT_WINDOW = 20
 """Cycles to average over for a recording of others."""
@@ -38,6 +40,7 @@ def report_of_recording(
     layout: BagLayout = ANY_LAYOUT,
     slips: SlipThreshold | None = None,
     length: str = "m",
+    continued: Mapping[Path, float] = MappingProxyType({}),
     observer: RunObserver | None = None,
     take: Take = lambda _: None,
 ) -> dict[str, Any]:
@@ -75,6 +78,8 @@ def report_of_recording(
         What counts as a slip; None: slips are not looked for.
     length : str, optional
         Unit of the positions in the notes, m or rad.
+    continued : mapping, optional
+        Bags that continue the run, with the gaps before them, s; see `runs_of`.
     observer : RunObserver or None
         Receives the samples and cycles of the whole part, with times as in `start` and `end`.
     take : callable, optional
@@ -99,7 +104,9 @@ def report_of_recording(
     with (
         nullcontext(read_table(path, columns, belt_speed, form))
         if (is_table(path) if table is None else table)
-        else Recording(path, namespace, belt_speed=belt_speed, layout=layout)
+        else Recording(
+            path, namespace, belt_speed=belt_speed, layout=layout, continued=[*continued]
+        )
     ) as recording:
         meter = _meter_for(recording, window, stick_speed, observer)
         if part.is_whole:
@@ -111,7 +118,12 @@ def report_of_recording(
         run.finish()
         if run.first is None:
             raise _nothing_in(recording, path, namespace)
-        return _completed(run.report(path, length), recording, has_states=run.has_states)
+        report = _completed(run.report(path, length), recording, has_states=run.has_states)
+        report["notes"] += [
+            f"{bag} continues the run {quantity(gap, 's')} after the bag before it"
+            for bag, gap in continued.items()
+        ]
+        return report
 
 
 def _meter_for(

@@ -11,7 +11,7 @@ from stickslip_ros.record.codec import pack_joint_state
 from stickslip_ros.record.recorder import Recorder
 from stickslip_ros.testing import ClosedLoop
 from tests.app.conftest import REFERENCE, Run
-from tests.record.runs import STAMPS, STATES, motion, record
+from tests.record.runs import STAMPS, STATES, motion, record, state, write_bag
 from tests.testing.controllers import WithoutArguments
 
 
@@ -41,6 +41,27 @@ def test_runs_are_set_side_by_side(stickslip: Run, tmp_path: Path) -> None:
     shown = texts(tmp_path / "runs.svg")
     assert "Runs compared, first; second" in shown
     assert shown.count("first") >= 2  # above its column, and in the legend
+
+
+def test_bags_of_an_analyzer_that_was_restarted_are_one_run(stickslip: Run, tmp_path: Path) -> None:
+    tables = {"stickslip_ros/analyzer": {"bag": '"run"', "bag_exists": '"next"'}}
+    parts = {"run": STAMPS[:400], "run_2": STAMPS[450:700], "run_3": STAMPS[700:], "run_4": STAMPS}
+    for name, stamps in parts.items():
+        messages = [(STATES, stamp, state(stamp)) for stamp in stamps]
+        write_bag(tmp_path / name, messages, tables=tables)
+    run = stickslip.json("report", "run", "run_2", "run_3")
+    assert (run["samples"], run["lost_samples"], run["duration"]) == (950, 50, 9.48)
+    assert run["amplitude"] == pytest.approx(3.0, rel=1e-3)
+    assert run["notes"] == [
+        "run_2 continues the run 510 ms after the bag before it",
+        "run_3 continues the run 10 ms after the bag before it",
+    ]
+    # From its beginning again it is another run, and so is one that others have recorded.
+    assert len(stickslip.json("report", "run_3", "run_2")["bags"]) == 2
+    assert len(stickslip.json("report", "run", "run_4")["bags"]) == 2
+    record(tmp_path / "other", STAMPS[:400])
+    record(tmp_path / "other_2", STAMPS[400:])
+    assert len(stickslip.json("report", "other", "other_2")["bags"]) == 2
 
 
 def test_late_forces_are_shown_where_they_are_counted(stickslip: Run, tmp_path: Path) -> None:
