@@ -57,11 +57,11 @@ def test_bags_of_an_analyzer_that_was_restarted_are_one_run(stickslip: Run, tmp_
         "run_3 continues the run 10 ms after the bag before it",
     ]
     # From its beginning again it is another run, and so is one that others have recorded.
-    assert len(stickslip.json("report", "run_3", "run_2")["bags"]) == 2
-    assert len(stickslip.json("report", "run", "run_4")["bags"]) == 2
+    assert len(stickslip.json("report", "run_3", "run_2")["reports"]) == 2
+    assert len(stickslip.json("report", "run", "run_4")["reports"]) == 2
     record(tmp_path / "other", STAMPS[:400])
     record(tmp_path / "other_2", STAMPS[400:])
-    assert len(stickslip.json("report", "other", "other_2")["bags"]) == 2
+    assert len(stickslip.json("report", "other", "other_2")["reports"]) == 2
 
 
 def test_late_forces_are_shown_where_they_are_counted(stickslip: Run, tmp_path: Path) -> None:
