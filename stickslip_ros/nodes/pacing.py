@@ -203,6 +203,8 @@ class LockstepPacer(Pacer):
     def recorder_came_to(self, stamp: int) -> None:
         """Continue if the recorder has caught up."""
         self._flow.recorded(stamp)
+        if self.complaint:
+            self._node.get_logger().info("the recorder is back: waiting for it again")
         self.complaint = ""
         self._proceed()
 

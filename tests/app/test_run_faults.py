@@ -11,11 +11,12 @@ from pathlib import Path
 import pytest
 
 from stickslip_ros.nodes.analyzer import AnalyzerNode
+from stickslip_ros.nodes.plant import PlantNode
 from stickslip_ros.record.reader import Recording
 from stickslip_ros.record.recorder import Recorder
 from tests.app.conftest import REFERENCE, Run, Start, ended
 from tests.app.test_run import children, command, is_complete, is_running, wait_for_samples
-from tests.nodes.graph import PATIENCE, wait_for
+from tests.nodes.graph import PATIENCE, Graph, wait_for
 from tests.record.runs import full_disk
 
 RUN = ("run", "feed_drive", "--bag", "bag", "-p", "analyzer.flush_period=0.2")
@@ -184,6 +185,21 @@ def test_a_run_that_is_interrupted_early_says_that_nothing_was_recorded(
     _, errors = ended(process, 130, signal.SIGINT)
     assert errors == "stickslip run: interrupted: nothing was recorded; the nodes have ended\n"
     assert not (tmp_path / "bag").exists()
+
+
+@pytest.mark.process
+def test_a_plant_of_others_that_has_its_name_ends_the_run_at_once(
+    start_stickslip: Start, graph: Graph
+) -> None:
+    other = graph.add(PlantNode, autostart=False)
+    other.trigger_configure()
+    process = start_stickslip("run", "feed_drive", "--namespace", "/test")
+    graph.wait_until(lambda: process.poll() is not None, "the run ends")
+    _, errors = process.communicate()
+    assert process.returncode == 1
+    assert "plant could not start: another node has its name" in errors
+    assert errors.endswith("; nothing was recorded\n")
+    assert other.lifecycle_state == "inactive"
 
 
 NEIGHBOUR = """

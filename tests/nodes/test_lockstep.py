@@ -67,7 +67,7 @@ def grid(count: int) -> list[int]:
 
 
 @pytest.mark.long
-def test_a_killed_analyzer_holds_the_plant_up_once_and_no_longer_than_the_timeout(
+def test_a_killed_analyzer_holds_the_plant_up_once_until_another_is_back(
     graph: Graph, watch: Watch, processes: Processes
 ) -> None:
     timeout = 1.5
@@ -84,6 +84,8 @@ def test_a_killed_analyzer_holds_the_plant_up_once_and_no_longer_than_the_timeou
     for level, message in watch.further_health(2):
         assert level == WARN
         assert SILENT_RECORDER in message
+    processes.node("analyzer", wait_for="[plant]")
+    graph.wait_until(lambda: watch.log_lines("the recorder is back"), "another one is waited for")
     plant.trigger_deactivate()
     figures = plant.diagnose()[2]
     graph.wait_until(lambda: len(watch.stamps) == figures["samples"], "every sample is heard")

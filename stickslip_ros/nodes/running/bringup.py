@@ -261,18 +261,30 @@ class _Supervisor:
     def _take_through(self, node: str, transition: int) -> None:
         """Take a node through a transition; repeat the request while it waits for other nodes."""
         name, refusals = full_name(self._namespace, node), self._monitor.refusals
-        ready = self._spinner.spin_until(
-            lambda: self._nodes.change_state(node, transition) or bool(refusals.get(name)),
+        configures, ready = transition == Transition.TRANSITION_CONFIGURE, False
+
+        def is_settled() -> bool:
+            nonlocal ready
+            ready = self._nodes.change_state(node, transition)
+            return ready or bool(refusals.get(name)) or (configures and self._is_named_twice(name))
+
+        self._spinner.spin_until(
+            is_settled,
             _READY_TIMEOUT,
             # Only an activation waits for others; a node logs each request that it must refuse.
-            period=0.02 if transition == Transition.TRANSITION_ACTIVATE else 0.5,
+            period=0.5 if configures else 0.02,
         )
         if refusals.get(name):
             self._fail(f"{node} could not start: {refusals[name]}")
         elif not ready and not self._is_ended():
-            named = [full_name(ns, n) for n, ns in self._node.get_node_names_and_namespaces()]
-            why = ": another node has its name" if named.count(name) > 1 else ""
-            self._fail(f"{node} did not become ready within {_READY_TIMEOUT:g} s{why}")
+            why = f"did not become ready within {_READY_TIMEOUT:g} s"
+            if self._is_named_twice(name):
+                why = "could not start: another node has its name, and answers in its place"
+            self._fail(f"{node} {why}")
+
+    def _is_named_twice(self, name: str) -> bool:
+        nodes = self._node.get_node_names_and_namespaces()
+        return [full_name(namespace, node) for node, namespace in nodes].count(name) > 1
 
     def _connect_user_controller(self, command: Sequence[str]) -> None:
         """Wait for the user's controller; our nodes are activated once connected to it.
