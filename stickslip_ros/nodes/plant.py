@@ -116,7 +116,7 @@ class PlantNode(ManagedNode[PlantParameters]):
         if realtime:
             self._pacer = RealtimePacer(
                 self._loop,
-                self._publish,
+                self._topics.publish,
                 self._end,
                 self._lock,
                 parameters.real_time_factor,
@@ -130,7 +130,7 @@ class PlantNode(ManagedNode[PlantParameters]):
                     rate * parameters.real_time_factor, lambda n: pacer.deadline(n * every)
                 )
         else:
-            self._pacer = LockstepPacer(self._loop, self._publish, self._end, self)
+            self._pacer = LockstepPacer(self._loop, self._topics.publish, self._end, self)
         last = stampable
         if parameters.last_sample is not None:
             due = parameters.last_sample - round(self.elapsed * parameters.rate)
@@ -218,9 +218,6 @@ class PlantNode(ManagedNode[PlantParameters]):
                 self.get_logger().warning(complaint)
             else:
                 self.get_logger().info("forces and samples are in time again")
-
-    def _publish(self, sample: Sample) -> None:
-        self._topics.publish(sample)
 
     def _end(self) -> None:
         """Pause: the last sample was reached, or the motion cannot continue."""
