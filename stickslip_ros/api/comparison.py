@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TextIO
 
 import numpy as np
-from scipy.special import betaincinv
 from typing_extensions import override
 
 from stickslip_ros.api.design import gains, gains_text
@@ -28,7 +27,7 @@ from stickslip_ros.studies.case_outcome import OUTCOMES, is_positioning
 from stickslip_ros.studies.comparison import DISTURBANCES, Comparison, Outcomes, compared
 from stickslip_ros.studies.plan import Axis
 from stickslip_ros.studies.runner import CountPoints, compute_columns
-from stickslip_ros.studies.spread import spread_text
+from stickslip_ros.studies.spread import held_interval, spread_text
 from stickslip_ros.studies.tuned_gains import Tuned
 from stickslip_ros.studies.tuning import with_law
 from stickslip_ros.tables import TextTable
@@ -105,9 +104,8 @@ class ComparedLaws(TabularResult):
             at_limit = float(np.nan_to_num(self._array("at_limit")[row]).mean())
             failures = int(np.isnan(self._array("rms_velocity")[row]).sum())
             won, cases = int(np.nansum(held[row])), held[row].size
-            ends = betaincinv([won, won + 1], [cases - won + 1, cases - won], [0.025, 0.975])
-            low, high = np.where(np.isnan(ends), [0.0, 1.0], ends).tolist()  # of all cases, or none
-            ranks.append(Rank(law, share, error, (low, high), means, at_limit, failures))
+            interval = held_interval(won, cases)
+            ranks.append(Rank(law, share, error, interval, means, at_limit, failures))
         second, third, *_ = _MEANS[positioning]
 
         def order(rank: Rank) -> tuple[float, ...]:

@@ -10,6 +10,7 @@ from stickslip_ros.app.arguments import (
     check_speeds,
     law_constants,
     scenario_of,
+    spread_of,
     writing,
 )
 from stickslip_ros.app.output import progress_bar, tell
@@ -38,6 +39,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         ),
     )
     parser.add_argument(
+        "--spread",
+        type=spread_of,
+        default=0.0,
+        metavar="SHARE",
+        help="deviation of the constants, as in 0.2, or fit: as for `stickslip compare`; gains "
+        "hold drives that it draws, and others judge them (default: 0)",
+    )
+    parser.add_argument(
         "--out",
         type=Path,
         metavar="FILE",
@@ -57,7 +66,7 @@ def run(arguments: argparse.Namespace) -> None:
         if text.partition("=")[0] in proposed:
             raise InvalidInputError(f"-p {text:.80}: is not used, because a design proposes it")
     scenario = scenario_of(arguments, unused=proposed)
-    task = Task.from_scenario(scenario, _belt_speeds(arguments.belt_speed))
+    task = Task.from_scenario(scenario, _belt_speeds(arguments.belt_speed), arguments.spread)
     check_speeds(arguments, scenario, *task.belt_speeds)
     if arguments.out is not None:
         check_new("--out", arguments.out)

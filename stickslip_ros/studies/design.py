@@ -4,7 +4,7 @@ A proposal keeps its limits in theory, and holds the drive, sampled, held and de
 nodes, under disturbances. The washout law also catches the vibration without control.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import copysign, inf
@@ -20,10 +20,12 @@ from stickslip_ros.model.drive import Drive
 from stickslip_ros.progress import Progress
 from stickslip_ros.quantities import Quantity
 from stickslip_ros.scenarios.files import Scenario, parameter_file
+from stickslip_ros.scenarios.sections import BASE_SECTION
 from stickslip_ros.studies.case_outcome import Disturbance, simulate_case
-from stickslip_ros.studies.controller_trial import FILTER_SETTLED, Bench, Rest, Vibration
+from stickslip_ros.studies.controller_trial import FILTER_SETTLED, Rest, Vibration
 from stickslip_ros.studies.gain_search import rounded
 from stickslip_ros.studies.options import FEED_TOLERANCE, OWN_SPEED_RANGE
+from stickslip_ros.studies.spread import Spread, check_spread, drawn, held_interval
 from stickslip_ros.studies.stability import number_text
 from stickslip_ros.studies.tuned_gains import Goal, Tuned
 from stickslip_ros.studies.tuning import RESERVE, Tuning
@@ -42,6 +44,8 @@ _ATTEMPTS, _MORE_CAUTION = 6, 0.8
 _PERIODS, _SHORTEST, _WITHOUT_SPRING, _DECAYS = 100.0, 2.0, 6.0, 18.0
 """Duration of a check: natural periods, at least so many seconds, without a period so many, and
 times in which a small deviation decays by a factor e."""
+_SEARCHED, _TRIED = 20, 40
+"""Drives that a spread draws for the search, and others on which a proposal is tried."""
 _THROWN_SPEEDS = 3.0, 30.0, 300.0
 """Speeds with which the slide must return to equilibrium, in the speed scale of the drive."""
 
@@ -56,10 +60,15 @@ class Task:
     """Lowest and highest belt speed, m/s, above zero."""
     force_limit: float
     """Largest allowed force, N: that of the controller, or the limit of a weaker actuator."""
+    spread: Spread = 0.0
+    """Largest deviation of a constant of the drive, as a share, or `FIT`."""
 
     @classmethod
     def from_scenario(
-        cls, scenario: Scenario, belt_speeds: tuple[float, float] | None = None
+        cls,
+        scenario: Scenario,
+        belt_speeds: tuple[float, float] | None = None,
+        spread: Spread = 0.0,
     ) -> Self:
         """Return the task of a scenario.
 
@@ -69,13 +78,16 @@ class Task:
             Source of drive, loop, control law and force limit.
         belt_speeds : tuple[float, float], optional
             Lowest and highest belt speed, m/s; by default 10 % below and above the scenario's.
+        spread : float or str, optional
+            Spread of the drive's constants: the gains are to hold all drives that it draws.
 
         Raises
         ------
         InvalidInputError
             If the speeds are not a range above zero, if they are omitted and the scenario's belt
-            is at rest, or if the scenario has no controller.
+            is at rest, if the scenario has no controller, or if the spread is not allowed.
         """
+        check_spread(spread)
         plant, law = scenario.plant, scenario.control_law
         if law is None:
             raise InvalidInputError(
@@ -100,7 +112,7 @@ class Task:
             ordered = SMALLEST <= high < low <= LARGEST
             must = "the lower must be first" if ordered else f"must be above 0, at most {LARGEST:g}"
             raise InvalidInputError(f"belt speeds {low:g} m/s to {high:g} m/s: {must}")
-        return cls(scenario, (low, high), min(law.force_limit, plant.actuator.limit))
+        return cls(scenario, (low, high), min(law.force_limit, plant.actuator.limit), spread)
 
     @cached_property
     def drive(self) -> Drive:
@@ -169,6 +181,33 @@ class Check:
 
 
 @dataclass(frozen=True)
+class Drawn:
+    """A proposal on drives that a spread draws, other ones than in the search."""
+
+    drives: int
+    """Number of drives."""
+    held: int
+    """Number of those that it holds, at the belt speed at which a deviation decays most slowly."""
+    held_interval: tuple[float, float]
+    """95 % interval of the share that it holds."""
+    worst: Mapping[str, float]
+    """Constants of the worst drive: of one that is not held, or else with the slowest decay."""
+    check: Check
+    """Check of the worst drive."""
+
+    def sentence(self, drive: Drive) -> str:
+        """Return what the drives came to, in words."""
+        what = self.check.reason or (
+            f"a deviation decays with {number_text(drive, self.check.decay_rate, '1/s')}, "
+            f"and the force reaches {number_text(drive, self.check.disturbed_force or 0.0, 'N')}"
+        )
+        return (
+            f"holds {self.held} of {self.drives} drawn drives (95 % interval from "
+            f"{self.held_interval[0]:.1%}); the worst: {_constants_text(self.worst)}: {what}"
+        )
+
+
+@dataclass(frozen=True)
 class Design:
     """The proposed controller of a task, or the reason why there is none."""
 
@@ -186,6 +225,8 @@ class Design:
     """The loop at the belt speed at which a small deviation decays most slowly."""
     vibrations: Sequence[Vibration] = field(default=(), compare=False, repr=False)
     """Vibrations without control that the washout law catches, in order of belt speed."""
+    drawn: Drawn | None = None
+    """The proposal on drives that the spread of the task draws; None without a spread."""
 
     @cached_property
     def scenario(self) -> Scenario | None:
@@ -231,8 +272,8 @@ class Design:
 
 
 def gains_file(scenario: Scenario) -> str:
-    """Return the text of a complete parameter file."""
-    nodes = scenario.as_dict()
+    """Return the text of a complete parameter file, with what a fit leaves open."""
+    nodes = scenario.as_dict() | ({BASE_SECTION: {"fit": scenario.fit}} if scenario.fit else {})
     del nodes["analyzer"]["bag"]
     return parameter_file(nodes)
 
@@ -273,11 +314,13 @@ def design(
         return Design(task, remark=reason)
     if disturbances is None:
         disturbances = [Disturbance.parse(kind, scenario) for kind in _KINDS]
-    goal = Goal.from_scenario(scenario, task.belt_speeds, disturbances, task.force_limit)
-    tuning = Tuning(scenario, scenario.controller.law, goal)
+    designer = Designer.of(task, disturbances)
+    tuning = designer.tuning
     if tuning.diverges is not None:
         return Design(task, remark=tuning.diverges)
-    found = Designer(task, tuning, disturbances).proposed(progress)
+    found = designer.proposed(progress)
+    if found.controller is not None and task.spread:
+        found = replace(found, drawn=designer.tried(found.controller))
     progress(1.0)
     if found.controller is None and found.tuned is not None and found.tuned.missed:
         found = replace(
@@ -293,13 +336,12 @@ def design(
 
 def _sufficient(task: Task, nearest: Tuned, disturbances: Sequence[Disturbance]) -> str | None:
     """Return which force limit is sufficient, if nothing but the limit is in the way."""
-    if [limit.name for limit in nearest.missed] != ["the peak force"] or not nearest.peak_force:
+    if [limit.name for limit in nearest.missed] != ["the peak force"]:
         return None
-    if (enough := rounded(nearest.peak_force / RESERVE, up=True)) <= task.force_limit:
+    if (enough := rounded(nearest.missed[0].value / RESERVE, up=True)) <= task.force_limit:
         return None
-    larger = replace(task, force_limit=enough)
-    found = design(larger, disturbances=disturbances)
-    if found.controller is None:
+    larger = Designer.of(replace(task, force_limit=enough), disturbances)
+    if larger.proposed().controller is None:
         return None
     return f"a force limit of about {number_text(task.drive, enough, 'N')} is sufficient"
 
@@ -309,9 +351,9 @@ class Designer:
 
     def __init__(self, task: Task, tuning: Tuning, disturbances: Sequence[Disturbance]) -> None:
         self.task, self.tuning, self.disturbances = task, tuning, disturbances
-        plant = task.scenario.plant
-        self.bench = Bench.of_plant(plant)
-        sensor, actuator = plant.sensor, task.drive.actuator
+        self.drawn: dict[str, Designer] = {}
+        """Drives that the gains have to hold, too, by what they are called."""
+        sensor, actuator = task.scenario.plant.sensor, task.drive.actuator
         self.rough = bool(
             sensor.position_resolution
             or actuator.resolution
@@ -320,12 +362,17 @@ class Designer:
         )
         """Whether noise or rounding keep the loop from resting."""
 
-    def proposed(self, progress: Progress) -> Design:
+    def proposed(self, progress: Progress = lambda _: None) -> Design:
         """Return a proposal that was checked by simulation, or the reason why there is none."""
+        for seed in range(_SEARCHED if self.task.spread else 0):
+            _, name, other = self.other(seed)
+            self.drawn[name] = other
+            if (diverges := other.tuning.diverges) is not None:
+                return Design(self.task, None, f"of {name}, {diverges}")
         share, cubic, failure = RESERVE, True, None
         tuned: Tuned | None = None
         for attempt in range(_ATTEMPTS):
-            tuned = self.tuning.best(share, cubic=cubic)
+            tuned = self._best(share, cubic=cubic)
             if tuned.missed or tuned.decay_rate <= 0.0:
                 return Design(self.task, None, failure or tuned.remark, tuned=tuned)
             law: Any = tuned.law
@@ -339,6 +386,11 @@ class Designer:
                 if (failure := check.reason) is not None:
                     break
             remark = None
+            for name, other in self.drawn.items() if failure is None else ():
+                if failure := other.worst(law).reason:
+                    self.tuning.others[name] = other.tuning
+                    failure = f"of {name}, {failure}"
+                    break
             if failure is None and law.start_after:
                 remark, failure = self._throw_from_high_speeds(law)
             if failure is None:
@@ -353,6 +405,58 @@ class Designer:
             else:
                 share *= _MORE_CAUTION
         return Design(self.task, None, failure, tuned=tuned)
+
+    @classmethod
+    def of(cls, task: Task, disturbances: Sequence[Disturbance]) -> Self:
+        """Return a designer for a task."""
+        scenario = task.scenario
+        goal = Goal.from_scenario(scenario, task.belt_speeds, disturbances, task.force_limit)
+        return cls(task, Tuning(scenario, scenario.controller.law, goal), disturbances)
+
+    def other(self, seed: int) -> tuple[dict[str, float], str, Self]:
+        """Return the constants of a drive that is drawn, what it is called, and its designer."""
+        scenario = self.task.scenario
+        constants = drawn(scenario, seed, self.task.spread)
+        task = replace(self.task, scenario=scenario.changed(constants))
+        name = f"drawn drive {seed} ({_constants_text(constants)})"
+        return constants, name, self.of(task, self.disturbances)
+
+    def _best(self, share: float, *, cubic: bool) -> Tuned:
+        """Return the best gains for the drive and, one after the other, those that miss limits."""
+        while True:
+            tuned = self.tuning.best(share, cubic=cubic)
+            if tuned.missed or tuned.decay_rate <= 0.0:
+                return tuned
+            excess = {
+                name: sum(limit.excess for limit in other.tuning.missed(tuned.law))
+                if other.tuning.decay_rates([tuned.law]) > 0.0
+                else inf
+                for name, other in self.drawn.items()
+                if name not in self.tuning.others
+            }
+            worst = max(excess, key=lambda name: excess[name], default="")
+            if not excess.get(worst):
+                return tuned
+            self.tuning.others[worst] = self.drawn[worst].tuning
+
+    def worst(self, law: ControlLaw) -> Check:
+        """Return the check of a law where a deviation decays most slowly: the first that fails."""
+        speed = self.tuning.loops.slowest(law).drive.belt_speed
+        goal = replace(self.tuning.goal, feeds=(speed,))
+        there = Tuning(self.task.scenario, law.name, goal)
+        checks = [check for check, _ in Designer(self.task, there, self.disturbances).checks(law)]
+        failing = [check for check in checks if check.reason is not None]
+        return [*failing, max(checks, key=lambda check: check.disturbed_force or 0.0)][0]
+
+    def tried(self, law: ControlLaw) -> Drawn:
+        """Return what a law comes to on drives that were not searched for."""
+        rows: list[tuple[Check, dict[str, float]]] = []
+        for seed in range(_SEARCHED, _SEARCHED + _TRIED):
+            constants, _, other = self.other(seed)
+            rows.append((other.worst(law), constants))
+        held = sum(check.reason is None for check, _ in rows)
+        check, constants = min(rows, key=lambda row: (row[0].reason is None, row[0].decay_rate))
+        return Drawn(len(rows), held, held_interval(held, len(rows)), constants, check)
 
     def checks(self, law: Any) -> Iterator[tuple[Check, float]]:
         """Yield the checks of a law, and the share of them that is done."""
@@ -381,11 +485,11 @@ class Designer:
         caught = rest = reason = None
         if vibration.vibrates:
             patience = 5.0 * predicted + 20.0 * drive.natural_period
-            caught = self.bench.catch(vibration, law, patience)
+            caught = self.tuning.bench.catch(vibration, law, patience)
             reason = self._failure(drive.belt_speed, caught.settling_time, caught.peak_force)
         if self.rough:
             settled = max(predicted, FILTER_SETTLED / law.corner_frequency)
-            rest = self.bench.rest(drive, law, settled)
+            rest = self.tuning.bench.rest(drive, law, settled)
         return replace(
             check,
             vibrates=vibration.vibrates,
@@ -445,16 +549,21 @@ class Designer:
             for speed in (thrown * drive.speed_scale for thrown in _THROWN_SPEEDS):
                 if loop not in (loops.all[0], loops.all[-1], slowest):
                     continue
-                if self.bench.returns(drive, law, speed):
+                if self.tuning.bench.returns(drive, law, speed):
                     continue
                 slide = (
                     f"started at {number_text(drive, speed, 'm/s')} on a belt at "
                     f"{number_text(drive, drive.belt_speed, 'm/s')}, the slide"
                 )
-                if law.cubic_gain != 0.0 or not self.bench.returns(drive, unlimited, speed):
+                if law.cubic_gain != 0.0 or not self.tuning.bench.returns(drive, unlimited, speed):
                     return None, f"{slide} does not return to equilibrium"
                 remark = remark or f"{slide} needs more force than the limit"
         return remark, None
+
+
+def _constants_text(constants: Mapping[str, float]) -> str:
+    """Return constants as they are given on a command line."""
+    return " ".join(f"{name}={value:.4g}" for name, value in constants.items())
 
 
 def joined(*remarks: str | None) -> str | None:

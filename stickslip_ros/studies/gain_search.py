@@ -67,7 +67,7 @@ def linear_part(law: ControlLaw, loop: LinearSampledLoop) -> LinearFeedback:
 
 
 def fastest(
-    loops: Loops,
+    decay_rates: Callable[[Sequence[_Law]], FloatArray],
     ends: tuple[FloatArray, FloatArray],
     law_at: Callable[[FloatArray], _Law],
     excess: Callable[[_Law], Iterable[float]],
@@ -80,8 +80,8 @@ def fastest(
 
     Parameters
     ----------
-    loops : Loops
-        The loops.
+    decay_rates : callable
+        Returns the smallest decay rate with each law, 1/s.
     ends : tuple of ndarray
         Lowest and highest points, logarithms of magnitudes, shape (n,) each.
     law_at : callable
@@ -105,33 +105,34 @@ def fastest(
 
     points = _evenly(*ends)
     laws = [law_at(point) for point in points]
-    rates = loops.decay_rates(laws)
+    rates = decay_rates(laws)
     order = np.argsort(-rates)
     stable = int((rates > 0.0).sum())
     places = {*range(_VALUED // 3), *np.linspace(0, max(stable - 1, 0), _VALUED).astype(int)}
     chosen = [order[place] for place in sorted(places)]
     tops = [(valued(laws[row], float(rates[row])), tuple(points[row].tolist())) for row in chosen]
     best = sorted(tops, reverse=True)[:_REFINED]
-    refined = (_refined(loops, ends, law_at, valued, top, np.array(place)) for top, place in best)
+    refined = (_refined(decay_rates, ends, law_at, valued, *top) for top in best)
     return max(refined, key=lambda pair: pair[0])
 
 
 def _refined(
-    loops: Loops,
+    decay_rates: Callable[[Sequence[_Law]], FloatArray],
     ends: tuple[FloatArray, FloatArray],
     law_at: Callable[[FloatArray], _Law],
     valued: Callable[[_Law, float], _Value],
     top: _Value,
-    point: FloatArray,
+    place: tuple[float, ...],
 ) -> tuple[_Value, _Law]:
     """Return the best value and law near a point of some value, by ever smaller steps."""
+    point = np.array(place)
     ways = np.array([*product((-1.0, 0.0, 1.0), repeat=len(point))])
     ways = ways[(np.abs(ways).sum(axis=1) > 0.0) & (np.abs(ways).sum(axis=1) < 4.0)]
     step = _FIRST_STEP
     for _ in range(_MOVES):
         around = np.clip(point + step * ways, *ends)
         laws = [law_at(place) for place in around]
-        rates = loops.decay_rates(laws)
+        rates = decay_rates(laws)
         # Beside a law within its limits, only faster ones can be better.
         faster = (row for row in np.argsort(-rates).tolist() if top[0] < 0.0 or rates[row] > top[1])
         values = ((valued(laws[row], float(rates[row])), row) for row in faster)

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from scipy.special import betaincinv
 
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.scenarios.files import Scenario
@@ -25,6 +26,16 @@ def check_spread(spread: Spread) -> None:
 def spread_text(spread: Spread) -> str:
     """Return how far constants are off, in words."""
     return "as its fit leaves them open" if spread == FIT else f"off by up to {spread:.0%}"
+
+
+def held_interval(held: int, cases: int) -> tuple[float, float]:
+    """Return the 95 % interval of a share of independent cases.
+
+    Source: Clopper and Pearson, Biometrika 26, 1934.
+    """
+    ends = betaincinv([held, held + 1], [cases - held + 1, cases - held], [0.025, 0.975])
+    low, high = np.where(np.isnan(ends), [0.0, 1.0], ends).tolist()  # of all cases, or none
+    return low, high
 
 
 def drawn(scenario: Scenario, seed: int, spread: Spread) -> dict[str, float]:

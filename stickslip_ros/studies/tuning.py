@@ -4,7 +4,7 @@ The smallest decay rate at these feeds is made as large as it gets within the li
 of force, noise, margins and decay. The washout law must also catch the vibration without control.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from itertools import product
@@ -94,9 +94,9 @@ class Tuning:
         if isinstance(known, Washout):
             self.law = replace(self.law, cubic_gain=0.0)
         rate, (_, delay, *_) = plant.control_rate, plant.mean_sampling
+        self.others: dict[str, Tuning] = {}
+        """Other drives that the gains have to hold, too, by what they are called."""
         self.plants: list[PlantResponse] = []
-        self.vibrations: list[Vibration] = []
-        """Vibrations without control, which the washout law has to catch; of others none."""
         for feed in goal.feeds:
             at_feed = replace(drive, belt_speed=feed)
             reason = why_no_linear_loop(at_feed, *plant.mean_sampling)
@@ -106,12 +106,23 @@ class Tuning:
             spans = (sensor.spans // plant.answer_every for sensor in seen)
             loop = LinearSampledLoop(at_feed, rate, delay, _jacobian(at_feed), *spans)
             self.plants.append(PlantResponse.of(loop))
-            if isinstance(known, Washout) and drive.has_spring and drive.motor is None:
-                bench = Bench.of_plant(plant)
-                self.vibrations.append(bench.vibration(at_feed))
+        self.bench = Bench.of_plant(plant)
         self.loops = Loops([member.loop for member in self.plants])
         self.noises = [sqrt(s.position_resolution**2 / 12.0 + s.position_noise**2) for s in sensors]
         self.friction = max(drive.friction.limits) * drive.normal_force
+
+    @cached_property
+    def vibrations(self) -> list[Vibration]:
+        """Vibrations without control, which the washout law has to catch; of others none."""
+        drive = self.drive
+        if not isinstance(self.law, Washout) or not drive.has_spring or drive.motor is not None:
+            return []
+        return [self.bench.vibration(replace(drive, belt_speed=feed)) for feed in self.goal.feeds]
+
+    @property
+    def drives(self) -> "dict[str, Tuning]":
+        """Return this drive and the others that the gains have to hold."""
+        return {"the drive of the scenario": self, **self.others}
 
     @property
     def diverges(self) -> str | None:
@@ -138,7 +149,8 @@ class Tuning:
             value, law = max((value, law), self._searched(other, share), key=lambda each: each[0])
         own = self._own_cubic_coefficient if cubic and self.vibrations else 0.0
         chosen: Any = law
-        forces = [vibration.peak_force(chosen) for vibration in self.vibrations if own]
+        seen = [vibration for each in self.drives.values() for vibration in each.vibrations]
+        forces = [vibration.peak_force(chosen) for vibration in seen if own]
         if max(forces, default=0.0) > _NEAR * share * self.goal.force_limit:
             for part in _CUBIC_SHARES:
                 softer = replace(first, cubic_gain=rounded(part * own))
@@ -147,23 +159,28 @@ class Tuning:
                 if other[0] > (value[0], 1.05 * value[1]):
                     value, law = other
         if value[1] <= 0.0:
-            slow = self.loops.slowest(law)
+            rates = {n: each.loops.decay_rates([law])[0] for n, each in self.drives.items()}
+            worst = min(rates, key=lambda name: rates[name])
+            slow = self.drives[worst].loops.slowest(law)
             speed, rate = (
                 number_text(self.drive, number, unit)
                 for number, unit in ((slow.drive.belt_speed, "m/s"), (-value[1], "1/s"))
             )
             remark = (
                 "no gains make the loop stable at all these belt speeds: with the nearest ones a "
-                f"deviation grows at {speed}, with {rate}"
+                f"deviation grows at {speed}, with {rate}{self._named(worst)}"
             )
             return Tuned(law, self.goal, value[1], remark=remark)
         tuned = self.judged(law, self.plants, self.vibrations)
-        missed = tuple(limit for limit in self.limits(tuned) if limit.excess > 1e-9)
+        beyond = {name: each.missed(law) for name, each in self.drives.items()}
+        worst = max(beyond, key=lambda name: sum(limit.excess for limit in beyond[name]))
+        missed = beyond[worst]
         remarks: list[str] = []
         if self.vibrations and not any(each.vibrates for each in self.vibrations):
             remarks.append(self._calm())
         if missed:
             reasons = " and ".join(limit.sentence(self.drive) for limit in missed)
+            reasons += self._named(worst)
             remarks.append(f"no gains keep all limits: with the nearest ones {reasons}")
         else:
             for name in self._body_names:
@@ -171,6 +188,10 @@ class Tuning:
                 if asked != used:
                     remarks.append(f"{name} is {used}: with {asked} there are no gains")
         return replace(tuned, missed=missed, remark="; ".join(remarks) or None)
+
+    def _named(self, drive: str) -> str:
+        """Return an end of a sentence that names a drive, if there are several."""
+        return f", of {drive}" if self.others else ""
 
     @cached_property
     def _body_names(self) -> list[str]:
@@ -212,7 +233,6 @@ class Tuning:
         ]
         below, above = (log(10.0) * decades for decades in _DECADES)
         ends = np.minimum(*scales) - below, np.maximum(*scales) + above
-        deciding = [self.plants[place] for place in self.loops.ends]
         # The sign of the default first: another one serves long delays only.
         usual = [-1.0 if each.default < 0.0 else 1.0 for each in described]
         allowed = [
@@ -225,20 +245,30 @@ class Tuning:
                 values = map(rounded, (np.exp(point) * signs).tolist())
                 return replace(law, **dict(zip(law.tuned, values, strict=True)))
 
-            def excess(law: ControlLaw) -> list[float]:
-                limits = self.limits(self.judged(law, deciding, self.vibrations))
-                # What is missing is best told as a force: the others come first.
-                weights = (_FIRST if limit.least else 1.0 for limit in limits)
-                beyond = (max(limit.excess - log(share), 0.0) for limit in limits)
-                return [w * each for w, each in zip(weights, beyond, strict=True)]
+            def excess(law: ControlLaw) -> Iterator[float]:
+                for each in self.drives.values():
+                    deciding = [each.plants[place] for place in each.loops.ends]
+                    for limit in each.limits(each.judged(law, deciding, each.vibrations)):
+                        # What is missing is best told as a force: the others come first.
+                        weight = _FIRST if limit.least else 1.0
+                        yield weight * max(limit.excess - log(share), 0.0)
 
-            return fastest(self.loops, ends, with_gains, excess)
+            return fastest(self.decay_rates, ends, with_gains, excess)
 
         first, *others = product(*allowed)
         best = best_with(first)
         for signs in others if best[0][0] < 0.0 else ():
             best = max(best, best_with(signs), key=lambda pair: pair[0])
         return best
+
+    def decay_rates(self, laws: Sequence[ControlLaw]) -> FloatArray:
+        """Return the smallest decay rate of all drives with each law, 1/s."""
+        return np.min([each.loops.decay_rates(laws) for each in self.drives.values()], axis=0)
+
+    def missed(self, law: ControlLaw) -> tuple[Limit, ...]:
+        """Return the limits that a law that makes the loops of this drive stable does not keep."""
+        limits = self.limits(self.judged(law, self.plants, self.vibrations))
+        return tuple(limit for limit in limits if limit.excess > 1e-9)
 
     def judged(
         self, law: Any, plants: Sequence[PlantResponse], vibrations: Sequence[Vibration]

@@ -67,7 +67,7 @@ CALLS = [  # tests/app/test_results.py has others
     ("design", ("design", *RIG, "0.06")),
     ("design", ("design", *RIG, "0.02:0.04", "-p", "plant.force_delay=0.02")),
     pytest.param("design", ("design", *RIG, "0.03", *ENCODER), marks=pytest.mark.long),
-    ("design", ("design", *RIG, "0.04", "--controller", "velocity_feedback")),
+    ("design", ("design", *RIG, "0.04", "--controller", "velocity_feedback", "--spread", "0.1")),
     ("repair", ("repair", REFERENCE, "sound")),
     ("list", ("list",)),
     ("show", ("show", "feed_drive", "-p", "plant.mass=2")),

@@ -15,7 +15,9 @@ from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.measures.cycle_measures import Regime
 from stickslip_ros.model.control import Washout
 from stickslip_ros.scenarios.files import load_scenario
-from stickslip_ros.studies.design import Design, Task, design
+from stickslip_ros.studies.case_outcome import Disturbance
+from stickslip_ros.studies.design import Design, Designer, Task, design
+from stickslip_ros.studies.spread import drawn
 from stickslip_ros.theory.linear_sampled_loop import LinearSampledLoop
 from tests.drives import FEED_DRIVE
 from tests.scenarios.files import scenario_file
@@ -121,6 +123,75 @@ def test_a_grid_of_gains_is_not_faster(seed: int) -> None:
     assert found.found
     assert all(found.held)
     assert max(found.force_ratios) < 1.02
+
+
+def spread_task(law: str, force_limit: float, spread: float) -> Task:
+    scenario = load_scenario("feed_drive", controller=law)
+    return Task(scenario, (0.04, 0.04), force_limit, spread)
+
+
+def test_gains_for_a_spread_keep_the_limits_of_all_drives_that_are_searched_for(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("stickslip_ros.studies.design._SEARCHED", 5)
+    monkeypatch.setattr("stickslip_ros.studies.design._TRIED", 3)
+    task = spread_task("pid", 480.0, 0.2)
+    found, alone = design(task), design(spread_task("pid", 480.0, 0.0))
+    missed: list[int] = []
+    for seed in range(5):
+        scenario = task.scenario.changed(drawn(task.scenario, seed, 0.2))
+        step = [Disturbance.parse("step", task.scenario)]
+        other = Designer.of(Task(scenario, (0.04, 0.04), 480.0), step)
+        assert other.tuning.loops.slowest(found.controller).decay_rate(found.controller) > 0.0
+        assert other.tuning.missed(found.controller) == ()
+        assert all(check.held for check, _ in other.checks(found.controller))
+        missed += [seed] * bool(other.tuning.missed(alone.controller))
+    assert missed
+    assert alone.drawn is None
+    assert (found.drawn.held, found.drawn.drives) == (3, 3)
+    assert found.drawn.held_interval == pytest.approx((0.025 ** (1 / 3), 1.0))  # all of n
+    seeds = [drawn(task.scenario, seed, 0.2) for seed in range(5, 8)]
+    assert found.drawn.worst in seeds
+    assert found.drawn.check.decay_rate < found.tuned.decay_rate
+
+
+def test_where_no_gains_hold_all_drives_it_is_told_which_one_excludes_them(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("stickslip_ros.studies.design._SEARCHED", 3)
+    monkeypatch.setattr("stickslip_ros.studies.design._TRIED", 1)
+    found = design(spread_task("pid", 320.0, 0.2))
+    assert design(spread_task("pid", 320.0, 0.0)).controller is not None
+    assert found.controller is None
+    remark = found.remark or ""
+    assert "must be at most 320 N, of drawn drive" in remark
+    (named,) = {int(number) for number in re.findall(r"drawn drive (\d)", remark)}
+    forces = [drawn(found.task.scenario, seed, 0.2)["plant.normal_force"] for seed in range(3)]
+    assert f"plant.normal_force={max(forces):.4g}" in remark
+    assert forces[named] == max(forces)
+    assert re.search(r"a force limit of about \d{3} N is sufficient", remark)
+
+
+def test_a_drawn_drive_that_is_not_held_is_counted_and_told(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("stickslip_ros.studies.design._SEARCHED", 0)
+    monkeypatch.setattr("stickslip_ros.studies.design._TRIED", 8)
+    drive = ss.scenario("feed_drive", controller="velocity_feedback")
+    found = ss.design(drive, (0.03, 0.04), force_limit=60.0, spread=0.3)
+    assert 0 < found.design.drawn.held < 8
+    assert not found.design.drawn.check.held
+    text = f"holds {found.design.drawn.held} of 8 drawn drives (95 % interval from "
+    assert text in str(found)
+    assert "the worst: plant.mass=" in str(found)
+    assert "the simulated drive is not held at 0.03 m/s" in str(found)
+    assert found.to_dict()["drawn"]["worst"] == found.design.drawn.worst
+    # With drives to search for, one of them says why there is nothing to propose.
+    monkeypatch.setattr("stickslip_ros.studies.design._SEARCHED", 8)
+    monkeypatch.setattr("stickslip_ros.studies.design._ATTEMPTS", 1)
+    nothing = ss.design(drive, (0.03, 0.04), force_limit=60.0, spread=0.3)
+    assert nothing.controller is None
+    assert re.match(r"of drawn drive \d \(plant.mass=.*the simulated drive", nothing.remark)
 
 
 def test_an_axis_without_a_spring_gets_gains_for_a_feed() -> None:

@@ -34,6 +34,23 @@ def test_a_file_keeps_what_the_fit_leaves_open(tmp_path: Path) -> None:
     assert np.corrcoef(constants.T)[0, 1] == pytest.approx(0.8, abs=0.06)
 
 
+def test_gains_are_for_what_a_fit_leaves_open(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr("stickslip_ros.studies.design._SEARCHED", 2)
+    monkeypatch.setattr("stickslip_ros.studies.design._TRIED", 2)
+    drive = replace(ss.scenario("feed_drive", controller="velocity_feedback"), fit=FIT)
+    found = ss.design(drive, 0.04, spread="fit").to_dict()
+    assert (found["spread"], found["drawn"]["held"]) == ("fit", 2)
+    assert [*found["drawn"]["worst"]] == NAMES
+    (path := tmp_path / "held.yaml").write_text(found["parameter_file"])
+    assert ss.scenario(path).fit == FIT
+    with pytest.raises(InvalidInputError, match="no intervals of friction constants"):
+        ss.design("feed_drive", 0.04, spread="fit")
+    with pytest.raises(InvalidInputError, match=r"must be from 0 to 0\.9, or fit"):
+        ss.design(drive, 0.04, spread=1.0)
+
+
 def test_what_is_refused(tmp_path: Path) -> None:
     drive = ss.scenario("feed_drive")
     with pytest.raises(InvalidInputError, match="no intervals of friction constants"):
