@@ -17,13 +17,14 @@ from stickslip_ros.api.results import Parts, Table, TabularResult, attributes, c
 from stickslip_ros.api.scenarios import ScenarioLike, as_scenario
 from stickslip_ros.api.studies import Values, axis_of
 from stickslip_ros.arrays import FloatArray
+from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.progress import Progress
 from stickslip_ros.quantities import Quantity
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.scenarios.keywords import keyword_of, parameter_of
 from stickslip_ros.show.parameter_tables import scenario_tables
 from stickslip_ros.show.quantities import Units
-from stickslip_ros.studies.case_outcome import OUTCOMES, is_positioning
+from stickslip_ros.studies.case_outcome import FOLLOWING, OUTCOMES, is_positioning
 from stickslip_ros.studies.comparison import DISTURBANCES, Comparison, Outcomes, compared
 from stickslip_ros.studies.plan import Axis
 from stickslip_ros.studies.runner import CountPoints, compute_columns
@@ -31,6 +32,7 @@ from stickslip_ros.studies.spread import held_interval, spread_text
 from stickslip_ros.studies.tuned_gains import Tuned
 from stickslip_ros.studies.tuning import with_law
 from stickslip_ros.tables import TextTable
+from stickslip_ros.text import must_be_one_of, shown
 from stickslip_ros.theory.linear_sampled_loop import settling_time
 
 if TYPE_CHECKING:
@@ -40,9 +42,13 @@ if TYPE_CHECKING:
 
 _MEANS = {
     False: ("rms_velocity", "rms_force", "settling_time", "peak_force", "mean_force", "set_point"),
-    True: ("final_error", "rms_force", "settling_time", "peak_force", "hunting_amplitude"),
+    True: (
+        *("final_error", "rms_force", "settling_time", "peak_force", "hunting_amplitude"),
+        *FOLLOWING,
+    ),
 }
-"""What the table has means of, by whether the task is positioning, the second criterion first."""
+"""What the table has means of, by whether the task is positioning, the second criterion first; of
+how the slide follows, what is known of any law."""
 
 
 class Rank(NamedTuple):
@@ -80,6 +86,8 @@ class ComparedLaws(TabularResult):
     """Outcome of each case."""
     tuned: Mapping[str, Tuned]
     """Gains that were found, by law; the others were given."""
+    rank_by: str | None = None
+    """Mean by which the laws are ranked, the smallest first; None: by the rule of `ranks`."""
 
     @property
     def scenario(self) -> Scenario:
@@ -94,7 +102,10 @@ class ComparedLaws(TabularResult):
 
     @cached_property
     def ranks(self) -> tuple[Rank, ...]:
-        """The laws, the best first: by cases held, then error, then force beyond the mean."""
+        """The laws, the best first: by cases held, then error, then force beyond the mean.
+
+        By `rank_by` instead, those first of which no case failed.
+        """
         positioning = is_positioning(self.scenario)
         held = self._array("held")
         ranks: list[Rank] = []
@@ -106,19 +117,22 @@ class ComparedLaws(TabularResult):
             won, cases = int(np.nansum(held[row])), held[row].size
             interval = held_interval(won, cases)
             ranks.append(Rank(law, share, error, interval, means, at_limit, failures))
-        second, third, *_ = _MEANS[positioning]
+        names = _MEANS[positioning][:2] if self.rank_by is None else [self.rank_by]
 
         def order(rank: Rank) -> tuple[float, ...]:
-            return -rank.held, *(
-                np.nan_to_num(rank.means[n][0], nan=np.inf) for n in (second, third)
-            )
+            first = -rank.held if self.rank_by is None else rank.failures
+            return first, *(np.nan_to_num(rank.means[n][0], nan=np.inf) for n in names)
 
         return tuple(sorted(ranks, key=order))
 
     @property
     def verdict(self) -> str:
         """The best law, and all whose intervals of the cases held overlap its."""
-        least = self.ranks[0].held_interval[0]
+        least, first = self.ranks[0].held_interval[0], self.ranks[0]
+        if self.rank_by is not None:
+            units, (label, unit, _) = self._units, OUTCOMES[self.rank_by]
+            value = _with_error(units, *first.means[self.rank_by], unit)
+            return f"{first.law} has the least {label}: {value}"
         alike = [rank for rank in self.ranks if rank.held_interval[1] >= least]
         laws = ", ".join(f"{rank.law} holds {rank.held_text}" for rank in alike)
         return f"{laws} of its cases{': not told apart' if len(alike) > 1 else ''}"
@@ -167,7 +181,9 @@ class ComparedLaws(TabularResult):
         from stickslip_ros.show.comparison_figure import comparison_figure
 
         error, *_ = _MEANS[is_positioning(self.scenario)]
-        names = (error, "peak_force")
+        names = [error, "peak_force"]
+        if self.rank_by not in (None, *names):
+            names.append(self.rank_by)
         values = {
             rank.law: {name: self.at_points(rank.law, name) for name in (*names, "held")}
             for rank in self.ranks
@@ -251,16 +267,21 @@ class ComparedLaws(TabularResult):
         }
 
     @property
+    def _units(self) -> Units:
+        return Units.for_drive(self.scenario.plant.as_drive(), self.study.plan.parameters)
+
+    @property
     def _task(self) -> str:
         return "positioning" if is_positioning(self.scenario) else "regulation"
 
     @override
     def parts(self) -> Parts:
-        plan, drive = self.study.plan, self.scenario.plant.as_drive()
-        units, names = (
-            Units.for_drive(drive, plan.parameters),
-            _MEANS[is_positioning(self.scenario)],
-        )
+        plan, units = self.study.plan, self._units
+        known = {n for rank in self.ranks for n in rank.means if np.isfinite(rank.means[n][0])}
+        left_out = {*FOLLOWING} - known
+        if "reversal_height" in known:  # the reference does not come to rest
+            left_out |= {"settling_time", "hunting_amplitude"}
+        names = [n for n in _MEANS[is_positioning(self.scenario)] if n not in left_out]
         laws, points, disturbances, seeds = plan.shape
         rows: list[list[str]] = []
         for rank in self.ranks:
@@ -321,6 +342,7 @@ def compare(
     spread: float | str = 0.0,
     duration: float = 6.0,
     tolerance: float | None = None,
+    rank_by: str | None = None,
     workers: int = 1,
     executor: Executor | None = None,
     journal: Path | None = None,
@@ -356,6 +378,10 @@ def compare(
     tolerance : float, optional
         What a law that holds may leave: share of the belt speed (0.05), or of the reference's
         motion (0.001).
+    rank_by : str, optional
+        Column of means by which the laws are ranked, the smallest first, such as `peak_force` or,
+        of positioning, `reversal_height`. By default they are ranked by the cases held, then the
+        error, then the force beyond the mean.
     workers, executor, journal, progress
         As for `sweep`.
     tuning_progress : callable
@@ -385,6 +411,7 @@ def compare(
     [('velocity_feedback', 1.0), ('washout', 1.0)]
     """
     chosen = as_scenario(scenario)
+    check_rank(rank_by, chosen)
     every = [*map(Axis.parse, axes)]
     for keyword, values in parameters.items():
         every.append(axis_of(keyword, parameter_of(keyword, chosen.nodes), values, listed=True))
@@ -408,7 +435,16 @@ def compare(
         progress=progress,
         columns=Outcomes(study.plan.size),
     )
-    return ComparedLaws(study, outcomes, tuned)
+    return ComparedLaws(study, outcomes, tuned, rank_by)
+
+
+def check_rank(name: str | None, scenario: Scenario) -> None:
+    """Refuse to rank by what the task of a scenario has no means of."""
+    allowed = _MEANS[is_positioning(scenario)]
+    if name is not None and name not in allowed:
+        raise InvalidInputError(
+            f"rank_by = {shown(name)} is invalid: {must_be_one_of(name, allowed)}"
+        )
 
 
 def _mean_of_seeds(values: FloatArray) -> tuple[float, float]:

@@ -1,7 +1,8 @@
 """Simulated runs: trajectory and measures of a scenario."""
 
+import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -11,9 +12,11 @@ from stickslip_ros.api.page import Summary
 from stickslip_ros.api.results import Parts, Table, TabularResult, attributes
 from stickslip_ros.api.scenarios import ScenarioLike, as_scenario
 from stickslip_ros.measures.cycle_measures import Measures
+from stickslip_ros.measures.following import Followed, Following, followed
+from stickslip_ros.measures.run_meter import RunAnalysis
 from stickslip_ros.measures.sample_meter import NOT_JUDGED
 from stickslip_ros.motion.trajectory import (
-    MeasuredMotorTrajectory,
+    FollowingTrajectory,
     SampleRecorder,
     Trajectory,
     TrajectoryRecorder,
@@ -50,6 +53,11 @@ class Run(TabularResult):
     """With a sensor, the measures of the motion itself; else None."""
     notes: Sequence[str]
     """Sentences that say why the measures may be wrong."""
+    following: Following | None
+    """How the slide follows its reference, of the same positions as `measures`; None without
+    one."""
+    true_following: Following | None
+    """The same of the motion itself, with a sensor."""
     _recorder: SampleRecorder | None
     """What has taken the samples."""
     _history: RunHistory
@@ -71,7 +79,7 @@ class Run(TabularResult):
     def _table(self) -> Table:
         columns = vars(self.trajectory)
         time = {"time": self.trajectory.time}
-        quantities, source = quantities_of(MeasuredMotorTrajectory), attributes(self.scenario)
+        quantities, source = quantities_of(FollowingTrajectory), attributes(self.scenario)
         return Table(columns, quantities, self._units, time, source, "time")
 
     @property
@@ -80,10 +88,16 @@ class Run(TabularResult):
 
     @override
     def _entries(self) -> dict[str, Any]:
-        truth = None if self.truth is None else self.truth.as_dict()
-        values = {**self.measures.as_dict(), "truth": truth, "duration": self.duration}
+        measured, true = self._following
+        truth = None if self.truth is None else {**self.truth.as_dict(), **true}
+        values = {**self.measures.as_dict(), **measured, "truth": truth, "duration": self.duration}
         values["notes"] = [*self.notes]
         return {**values, **self.scenario.provenance()}
+
+    @property
+    def _following(self) -> list[dict[str, Any]]:
+        both = self.following, self.true_following
+        return [{} if each is None else asdict(each) for each in both]
 
     @override
     def _summary(self) -> Summary:
@@ -95,7 +109,8 @@ class Run(TabularResult):
 
     @override
     def parts(self) -> Parts:
-        yield from simulation_tables(self.scenario, self.duration, self.measures, self.truth)
+        runs = self.measures, self.truth, self._following
+        yield from simulation_tables(self.scenario, self.duration, *runs)
         yield from self.notes
 
 
@@ -142,10 +157,7 @@ def simulate(
     chosen = as_scenario(scenario)
     given = simulation.default_duration(chosen) if duration is None else duration
     length = number_of("duration", given, "s")
-    plant = chosen.plant
-    recorder = TrajectoryRecorder(
-        plant.rate, measured=not plant.exactly_measured, motor=plant.motor.kind == "mass"
-    )
+    recorder = TrajectoryRecorder(chosen.plant.rate, **simulation.recorded_columns(chosen))
     return measured_run(chosen, length, continuous=continuous, recorder=recorder, progress=progress)
 
 
@@ -163,18 +175,43 @@ def measured_run(
     A run that is not to be `drawn` is simulated faster.
     """
     measured = simulation.sensor_meter(scenario)
-    history = RunHistory()
+    history, columns = RunHistory(), simulation.recorded_columns(scenario)
+    pursuer = recorder
+    if recorder is None and columns["reference"] is not None:
+        pursuer = TrajectoryRecorder(scenario.plant.rate, sys.maxsize, **columns)
     true = simulation.simulate(
         scenario,
         duration,
         continuous=continuous,
         progress=progress,
         observer=history if drawn else None,
-        recorder=recorder,
+        recorder=pursuer,
         measured=measured,
     )
+    told, itself = _followed(pursuer)
+    history.take_analysis(RunAnalysis(None, None, told))
+    true_measures, notes = None, [NOT_JUDGED] if scenario.reading.varies else []
     if measured is not None:
-        measures, notes, _ = measured.measured()
-        return Run(scenario, duration, continuous, measures, true, notes, recorder, history)
-    notes = [NOT_JUDGED] if scenario.reading.varies else []
-    return Run(scenario, duration, continuous, true, None, notes, recorder, history)
+        true_measures, (true, notes, _) = true, measured.measured()
+    notes = [*notes, *(told.notes if told else ())]
+    following = [None if each is None else each.values for each in (told, itself)]
+    return Run(
+        scenario,
+        duration,
+        continuous,
+        true,
+        true_measures,
+        notes,
+        following[0],
+        None if true_measures is None else following[1],
+        recorder,
+        history,
+    )
+
+
+def _followed(recorder: SampleRecorder | None) -> tuple[Followed | None, Followed | None]:
+    """Return how measured and true positions follow the reference; None without one."""
+    if recorder is None:
+        return None, None
+    time, reference, true, measured = recorder.pursuit
+    return followed(time, reference, measured), followed(time, reference, true)

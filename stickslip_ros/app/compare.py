@@ -8,6 +8,7 @@ from stickslip_ros.app.arguments import (
     add_scenario,
     check_new,
     law_constants,
+    naming,
     spread_of,
     whole,
     writing,
@@ -59,6 +60,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         parser,
         "; FILE.yaml is a scenario with the best law and its gains, a FOLDER has one for each law",
     )
+    parser.add_argument(
+        "--rank-by",
+        metavar="COLUMN",
+        help="rank the laws by a mean, the smallest first, as reversal_height of a reference that "
+        "turns back (default: by the cases held, then the error, then the force beyond the mean)",
+    )
     add_results(parser, "error and peak force of each law over the parameters")
 
 
@@ -93,13 +100,15 @@ def _add_cases(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> None:
     """Run the command."""
-    from stickslip_ros.api.comparison import ComparedLaws
+    from stickslip_ros.api.comparison import ComparedLaws, check_rank
     from stickslip_ros.studies.comparison import Outcomes, compared
     from stickslip_ros.studies.design import gains_file
 
     proposed = law_constants("force_limit", "start_after")
     scenario, axes = scenario_over(arguments, *([] if arguments.given else proposed))
     check_results(arguments)
+    with naming("--rank-by:"):
+        check_rank(arguments.rank_by, scenario)
     chosen: Path | None = arguments.out
     if chosen is not None and chosen.suffix.lower() in ("", ".yaml", ".yml"):
         check_new("--out", chosen)
@@ -121,7 +130,7 @@ def run(arguments: argparse.Namespace) -> None:
     label = f"comparison on {scenario.name}, {study.plan.size} cases"
     outcomes = Outcomes(study.plan.size)
     with computed(arguments, study, label, outcomes) as journal:
-        result = ComparedLaws(study, outcomes, tuned)
+        result = ComparedLaws(study, outcomes, tuned, arguments.rank_by)
         finish(arguments, journal, result)
     if chosen is not None and arguments.out is None:
         files = {rank.law: gains_file(result.scenarios[rank.law]) for rank in result.ranks}

@@ -55,8 +55,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=Path,
         metavar="FILE.csv",
         help="write time, position, velocity, friction force, control force, position and velocity "
-        "of the belt at the samples, and what a sensor tells (CSV, SI units); an existing file is "
-        "refused",
+        "of the belt at the samples, what a sensor tells, and the reference (CSV, SI units); an "
+        "existing file is refused",
     )
     parser.add_argument(
         "--every",
@@ -115,15 +115,13 @@ def _recorder(
         return
     rate = scenario.plant.rate
     every = _samples(arguments.every, rate)
-    plant = scenario.plant
-    measured, motor = not plant.exactly_measured, plant.motor.kind == "mass"
     if out.suffix.lower() != ".csv":
         raise InvalidInputError(f"--out {out}: must end in .csv")
     check_new("--out", out)
-    from stickslip_ros.studies.simulate import TrajectoryFile
+    from stickslip_ros.studies.simulate import TrajectoryFile, recorded_columns
 
     with writing("--out", out), written(out) as stream:
-        yield TrajectoryFile(stream, rate, every, measured=measured, motor=motor)
+        yield TrajectoryFile(stream, rate, every, **recorded_columns(scenario))
 
 
 def _samples(interval: float | None, rate: float) -> int:

@@ -9,6 +9,7 @@ import numpy as np
 
 from stickslip_ros.arrays import BoolArray, FloatArray
 from stickslip_ros.measures.control_forces import ForceMeter, ForceSettler
+from stickslip_ros.measures.following import Followed
 from stickslip_ros.measures.mean_cycle import MeanCycle
 from stickslip_ros.measures.sample_assumptions import EXACT, SampleAssumptions
 from stickslip_ros.measures.sample_meter import MotionObserver, SampleMeter
@@ -25,6 +26,8 @@ class RunAnalysis:
     """Mean cycle under noise; None for exact samples, and cycles that are not alike."""
     slips: Mapping[str, Any] | None
     """Slips as `slip_report` has them; None if they were not asked for."""
+    followed: Followed | None = None
+    """How it follows its reference; None without one."""
 
 
 class RunObserver(MotionObserver, Protocol):
@@ -79,6 +82,8 @@ class RunMeter:
         """Number of samples that were recorded and are not measured."""
         self.first_force = inf
         """Smallest stamp of a control force, ns; infinite without one."""
+        self.followed: Followed | None = None
+        """How the run follows its reference; None while it is not known, or without one."""
         self._settler = ForceSettler()
         self._observer = observer
 

@@ -37,7 +37,8 @@ class RunReport:
 def report_of(run: RunMeter, measured: MeasuredSamples | None = None) -> dict[str, Any]:
     """Return the measures of the cycles and the `RunReport` of a run by name, ready for JSON.
 
-    They are those that the samples tell, which may have been `measured`; SI units.
+    They are those that the samples tell, which may have been `measured`; SI units. Where a
+    reference is known those of `Following` are among them.
     """
     motion, timing, known = run.motion, run.timing, run.dropped_known
     measured = measured or motion.measured()
@@ -56,9 +57,10 @@ def report_of(run: RunMeter, measured: MeasuredSamples | None = None) -> dict[st
         samples=samples,
         lost_samples=None if motion.mixed else lost,
         duration=None if motion.mixed else motion.duration,
-        notes=[*_notes(run), *measured.notes],
+        notes=[*_notes(run), *measured.notes, *(run.followed.notes if run.followed else ())],
     )
-    return {**measured.measures.as_dict(), **asdict(report)}
+    following = {} if run.followed is None else asdict(run.followed.values)
+    return {**measured.measures.as_dict(), **asdict(report), **following}
 
 
 def _notes(run: RunMeter) -> list[str]:

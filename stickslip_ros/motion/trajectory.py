@@ -3,14 +3,15 @@
 from abc import ABC, abstractmethod
 from array import array
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated
+from dataclasses import dataclass, make_dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray, Table
 from stickslip_ros.quantities import Quantity, quantities_of
-from stickslip_ros.samples import Sample
+from stickslip_ros.samples import Reference, Sample
 
 if TYPE_CHECKING:
     from stickslip_ros.motion.motion import Motion, RecordedMotion
@@ -76,6 +77,17 @@ class MeasuredMotorTrajectory(MeasuredTrajectory):
     """Measured velocity of the motor, m/s."""
 
 
+@dataclass(frozen=True, eq=False)
+class _WithReference(Table):
+    reference: Annotated[FloatArray, Quantity("reference", "m")]
+    """Displacement that the controller is to follow, m."""
+
+
+@dataclass(frozen=True, eq=False)
+class FollowingTrajectory(_WithReference, MeasuredMotorTrajectory):
+    """The columns of all trajectories, and of one that follows a reference."""
+
+
 _KINDS = {
     (False, False): Trajectory,
     (True, False): MeasuredTrajectory,
@@ -89,14 +101,23 @@ class SampleRecorder(ABC):
     """Receives the samples of a run as they come, and keeps each one or every nth."""
 
     def __init__(
-        self, rate: float, every: int = 1, *, measured: bool = False, motor: bool = False
+        self,
+        rate: float,
+        every: int = 1,
+        *,
+        measured: bool = False,
+        motor: bool = False,
+        reference: Callable[[float], Reference] | None = None,
     ) -> None:
         """Keep one in `every` samples; they are taken `rate` (Hz) times per second.
 
-        With `measured` also what a sensor tells, and with `motor` also the motion of the motor.
+        With `measured` also what a sensor tells, with `motor` also the motion of the motor, and the
+        position of a `reference` over the time (s).
         """
         self._rate, self._every, self._measured = rate, every, measured
-        self._with_motor = motor
+        self._with_motor, self._reference = motor, reference
+        self._pursuit = array("d")
+        """Reference, position and measured position of all samples."""
         self._number = 0
         """Number of the next sample."""
         self._now = 0.0
@@ -111,24 +132,41 @@ class SampleRecorder(ABC):
         return quantities_of(self._kind)
 
     @property
+    def pursuit(self) -> FloatArray:
+        """Time (s), reference, position and measured position (m), shape (4, samples).
+
+        There are no samples without a reference.
+        """
+        columns = np.array(self._pursuit).reshape(-1, 3).T
+        return np.array([np.arange(columns.shape[1]) / self._rate, *columns])
+
+    @cached_property
     def _kind(self) -> type[Trajectory]:
-        return _KINDS[self._measured, self._with_motor]
+        kind = _KINDS[self._measured, self._with_motor]
+        if self._reference is None:
+            return kind
+        return make_dataclass(
+            kind.__name__, [], bases=(_WithReference, kind), frozen=True, eq=False
+        )
 
     def take(self, sample: Sample, control_force: float, measured: Sample | None = None) -> None:
         """Receive the next sample, and the control force (N) that answers it.
 
         `measured` is the sample as a sensor tells it.
         """
-        number = self._number
+        number, told = self._number, measured or sample
+        aim = 0.0
+        if self._reference is not None:
+            aim = self._reference(number / self._rate).position or 0.0
+            self._pursuit.extend((aim, sample.position, told.position))
         if number % self._every == 0:
             _, position, velocity, friction_force, belt, belt_speed, motor = sample
-            told = measured or sample
             row = number / self._rate, position, velocity, friction_force, control_force, belt
             row += belt_speed, *(told[1:3] if self._measured else ())
             if self._with_motor:
                 assert motor is not None
                 row += *motor, *((told.motor or motor) if self._measured else ())
-            self.keep(row)
+            self.keep(row if self._reference is None else (*row, aim))
         self._number = number + 1
 
     def sampling(
@@ -170,11 +208,9 @@ class SampleRecorder(ABC):
 class TrajectoryRecorder(SampleRecorder):
     """Keeps the samples of a run in memory."""
 
-    def __init__(
-        self, rate: float, every: int = 1, *, measured: bool = False, motor: bool = False
-    ) -> None:
+    def __init__(self, rate: float, every: int = 1, **options: Any) -> None:
         """Keep samples as `SampleRecorder` does."""
-        super().__init__(rate, every, measured=measured, motor=motor)
+        super().__init__(rate, every, **options)
         self._values = array("d")
 
     def keep(self, row: tuple[float, ...]) -> None:

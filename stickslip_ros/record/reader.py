@@ -287,7 +287,7 @@ class Recording:
         nothing, by_log = np.empty(0, np.int64), self._drive.layout.time == "log"
         parts: list[ColumnsT] = []
         counts: dict[str, Refused] = {}
-        for block in self.source.blocks(name):
+        for block in self.source.blocks(name) if name else ():
             part, refused = decode(*block.messages)
             if by_log:
                 whole = len(part) == len(block.log_time)

@@ -111,7 +111,7 @@ def report_of_recording(
         meter = _meter_for(recording, window, stick_speed, observer)
         if part.is_whole:
             meter.published = _kept_number(recording, "timing", "published")
-        run = RunFeed(meter, part, observer, take, slips)
+        run = RunFeed(meter, part, observer, take, slips, recording.references)
         # Measuring each chunk by itself would take twice as long.
         for block in recording.blocks(least=20_000):
             run.feed(block)

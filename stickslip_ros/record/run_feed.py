@@ -13,13 +13,14 @@ from stickslip_ros.arrays import BoolArray, IntArray
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.measures.cycle_measures import Regime
 from stickslip_ros.measures.feed import moving_part, relative_to_feed
+from stickslip_ros.measures.following import Followed, followed
 from stickslip_ros.measures.run_meter import RunAnalysis, RunMeter, RunObserver
 from stickslip_ros.measures.run_report import report_of
 from stickslip_ros.measures.sample_assumptions import SampleAssumptions
 from stickslip_ros.measures.slips import SlipThreshold, slip_report, slips_in
 from stickslip_ros.record.reader import RunBlock
 from stickslip_ros.record.table_clock import LONGEST
-from stickslip_ros.samples import ForceColumns, SampleColumns
+from stickslip_ros.samples import ForceColumns, ReferenceColumns, SampleColumns
 from stickslip_ros.stamps import NANOSECONDS
 from stickslip_ros.text import quantity
 
@@ -74,6 +75,7 @@ class RunFeed:
         observer: RunObserver | None,
         take: Take,
         slips: SlipThreshold | None,
+        references: ReferenceColumns,
     ) -> None:
         self._meter, self._part = meter, part
         self._observer, self._take = observer, take
@@ -86,6 +88,8 @@ class RunFeed:
         self._feed_speed = 0.0
         self._notes: list[str] = []
         self._measured = 0
+        self._references = references[np.argsort(references.stamp, kind="stable")]
+        self._followers: list[SampleColumns] = []
         self._early: list[tuple[ForceColumns, ForceColumns]] = []
 
     def feed(self, block: RunBlock) -> None:
@@ -115,6 +119,7 @@ class RunFeed:
         if self._measured == 0:
             raise InvalidInputError(f"{path} holds no samples {self._part}")
         measured, slips = self._meter.motion.measured(), None
+        self._meter.followed = self._followed(length)
         report = report_of(self._meter, measured)
         notes = [*self._notes, *report["notes"]]
         if self._feed_speed:
@@ -131,8 +136,20 @@ class RunFeed:
             slips, slip_notes = self._slips.report(report["position_noise"], length)
             notes += slip_notes
         if self._observer is not None:
-            self._observer.take_analysis(RunAnalysis(measured.mean_cycle, slips))
+            self._observer.take_analysis(
+                RunAnalysis(measured.mean_cycle, slips, self._meter.followed)
+            )
         return {**report, "notes": notes, "slips": slips}
+
+    def _followed(self, length: str) -> Followed | None:
+        """Return how the slide follows the newest reference at each sample; None without any."""
+        if not self._followers or self.first is None:
+            return None
+        stamp = np.concatenate([part.stamp for part in self._followers])
+        newest = np.searchsorted(self._references.stamp, stamp, "right") - 1
+        reference = np.where(newest < 0, np.nan, self._references.position[newest])
+        position = np.concatenate([part.position for part in self._followers])
+        return followed((stamp - self.first) / NANOSECONDS, reference, position, length)
 
     def _doubt(self, report: dict[str, Any], length: str) -> str | None:
         """Return why the regime of another machine is not known."""
@@ -172,6 +189,8 @@ class RunFeed:
         if self._slips is not None:
             self._slips.feed(part, first)
         self._take(part)
+        if len(self._references):
+            self._followers.append(part)
         if self._other_machine:
             part, self._feed_speed = relative_to_feed(self._moving_part(part, first))
         self._meter.motion.feed(part)

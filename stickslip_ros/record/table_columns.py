@@ -21,6 +21,7 @@ _OWN_COLUMNS = {
     "force": ("control_force",),
     "belt_velocity": ("belt_velocity",),
     "friction_force": ("friction_force",),
+    "reference": ("reference",),
 }
 """Columns of the files that `stickslip simulate --out` writes; the first one that exists."""
 

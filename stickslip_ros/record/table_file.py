@@ -20,7 +20,7 @@ from stickslip_ros.record.table_clock import stamps_of
 from stickslip_ros.record.table_columns import ANY_FORM, Table, TableFormat, reading_file
 from stickslip_ros.record.table_quantities import Quantities, quantities_of
 from stickslip_ros.record.text_table import TextTable
-from stickslip_ros.samples import ForceColumns, SampleColumns
+from stickslip_ros.samples import ForceColumns, ReferenceColumns, SampleColumns
 
 TABLE_SUFFIXES = (
     ".csv", ".mat", ".txt", ".dat", ".tsv", ".log", ".asc", ".xlsx", ".parquet", ".tdms", ".npz"
@@ -118,6 +118,8 @@ class TableRecording:
     """The motion; time zero is the stamp 0."""
     forces: ForceColumns
     """Control force at each sample; empty if the table has none."""
+    references: ReferenceColumns
+    """Reference at each sample, without velocities; empty if the table has none."""
     velocity_estimated: bool
     """Whether the velocities are estimated from the positions."""
     notes: tuple[str, ...]
@@ -202,5 +204,8 @@ def _recording(path: Path, quantities: Quantities) -> TableRecording:
     forces = ForceColumns(stamp[:0], rest[:0])
     if "force" in values:
         forces = ForceColumns(stamp, values["force"])
+    references = ReferenceColumns(stamp, values.get("reference", unknown), unknown)
     estimated = 2 * np.count_nonzero(lacking) > np.count_nonzero(present)
-    return TableRecording(samples, forces, bool(estimated), tuple(notes))
+    if "reference" not in values:
+        references = references[:0]
+    return TableRecording(samples, forces, references, bool(estimated), tuple(notes))

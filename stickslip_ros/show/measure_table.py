@@ -1,6 +1,6 @@
 """The tables of runs: measures side by side, slips, and why there is no regime."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from math import inf
 from typing import Any
 
@@ -26,6 +26,7 @@ _SAME_SCALE = {
     "midpoint": "amplitude",
     "resting_force": "peak_force",
     "resting_applied_force": "peak_applied_force",
+    "reversal_height_error": "reversal_height",
 }
 """The quantity with which a value is compared to see whether it is rounding error."""
 
@@ -38,16 +39,22 @@ _LARGEST_RATIO = 10.0
 
 
 def simulation_tables(
-    scenario: Scenario, duration: float, measures: Measures, truth: Measures | None
+    scenario: Scenario,
+    duration: float,
+    measures: Measures,
+    truth: Measures | None,
+    following: Sequence[Mapping[str, Any]] = ({}, {}),
 ) -> Iterator[TextTable | str]:
     """Yield the measures of a simulated run, and why it has no regime.
 
-    With a sensor there are also the measures of the motion itself, the `truth`.
+    With a sensor there are also the measures of the motion itself, the `truth`. `following` has for
+    both how they follow a reference.
     """
     drive = scenario.plant.as_drive()
     units = Units.for_drive(drive)
     columns = {"": measures} if truth is None else {"measured": measures, "true": truth}
-    values = {name: run.as_dict() for name, run in columns.items()}
+    runs = zip(columns.items(), following, strict=False)
+    values = {name: {**run.as_dict(), **follows} for (name, run), follows in runs}
     title = f"{scenario.name}, {duration:g} {units.of_unit('s')}".rstrip()
     yield measure_table(title, values, dict.fromkeys(values, units))
     reason = why_no_cycle((truth or measures).regime, duration, drive)

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.measures.cycle_measures import CycleMeasures, Measures
+from stickslip_ros.measures.following import Following
 from stickslip_ros.measures.run_report import RunReport
 from stickslip_ros.model.drive import Drive
 from stickslip_ros.quantities import ROTARY, Quantity, quantities_of
@@ -29,6 +30,7 @@ MEASURES = {
     "multipliers": Quantity("Floquet multipliers"),
     **{name: _OF_RUN[name] for name in _FIRST},
     "steps_per_second": Quantity("steps per second"),
+    **quantities_of(Following),
     **_OF_RUN,
     "complete": Quantity("bag complete"),
     "bag": Quantity("bag"),

@@ -144,9 +144,9 @@ def run_figure(*runs: DrawnRun, style: FigureStyle = SCREEN) -> Figure:
     is one, and its last cycles over time, shaded by the share of time in which the slide sticks;
     the phase portrait of these cycles and of the start; amplitude and stick fraction of each cycle;
     and the friction law with the range of relative speeds; with a motor of finite mass, on a
-    screen, the force of the transmission and the phase planes of slide and motor. The
-    equilibrium and the friction law need a drive, the equilibrium also a moving belt. The belt
-    speed is that at the end of the run.
+    screen, the force of the transmission and the phase planes of slide and motor; with a reference
+    the following error, also after each reversal. The equilibrium and the friction law need a
+    drive, the equilibrium also a moving belt. The belt speed is that at the end of the run.
 
     Of several runs there is a column each: displacement and force over time, with the same axes.
     Below are all runs together: the phase portrait of the last cycles, and amplitude and stick
@@ -169,6 +169,7 @@ def _single(run: DrawnRun, style: FigureStyle) -> Figure:
     analysis = history.analysis
     has_motor = drive is not None and drive.motor is not None and not style.printed
     lower_rows = (  # each with three panels
+        (_OneRun.following, analysis.followed is not None),
         (_OneRun.analysis, analysis.mean_cycle is not None or analysis.slips is not None),
         (_OneRun.behind_the_screw, has_motor and len(history.motor.columns()[0]) > 0),
     )
@@ -351,6 +352,27 @@ class _OneRun(_Panels):
     def analysis(self, figure: Figure, row: GridSpecFromSubplotSpec) -> None:
         """Draw the mean cycle with its edges, or the distributions over the slips."""
         draw_analysis(figure, row, self._history.analysis, self.units, short=self.short)
+
+    def following(self, figure: Figure, row: GridSpecFromSubplotSpec) -> None:
+        """Draw the following error over time, and what is of the reversals after each of them."""
+        found = self._history.analysis.followed
+        assert found is not None
+        whole, turns = figure.add_subplot(row[0, :2]), figure.add_subplot(row[0, 2])
+        peak = found.values.peak_following_error or 0.0
+        size, label = self.units.axis("following error", "m", peak)
+        trace = found.time, found.error
+        draw_line(whole, self._whole, trace, size, self._history.gap, **MOTION)
+        whole.set(title="following error", ylabel=label)
+        if found.turns:  # the start of the run is far larger
+            whole.set_ylim(-1.2 * peak / size, 1.2 * peak / size)
+        self._label_time(whole, self._whole)
+        errors = [turn.behind for turn in found.turns]
+        size, label = self.units.axis("error at reversals", "m", *errors)
+        for turn in found.turns:
+            turns.plot(turn.time, turn.behind / size, **MOTION)
+        turns.set(title="after each reversal", ylabel=label)
+        end = max((turn.time[-1] for turn in found.turns), default=1.0)
+        label_axis(turns.xaxis, *self.units.axis("time", "s", end))
 
     def behind_the_screw(self, figure: Figure, row: GridSpecFromSubplotSpec) -> None:
         """Draw the force of the spring, and the phase planes of slide and motor, at the end."""

@@ -8,6 +8,7 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray, rms
 from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.measures.following import Following, followed
 from stickslip_ros.motion import Motion
 from stickslip_ros.motion.controller import answer
 from stickslip_ros.quantities import Quantity, number_of, quantities_of
@@ -78,6 +79,14 @@ class Disturbance:
         return {f"plant.disturbance.{name}": value for name, value in values.items()}
 
 
+FOLLOWING = {
+    name: quantity
+    for name, quantity in quantities_of(Following).items()
+    if name not in ("reversals", "reversal_height_error")
+}
+"""What an outcome has of how the slide follows its reference."""
+
+
 class Outcome(NamedTuple):
     """What a case came to; SI units, None for what its task does not have.
 
@@ -114,6 +123,12 @@ class Outcome(NamedTuple):
     """Its mean period; of positioning."""
     reason: Annotated[str | None, Quantity("reason")] = None
     """Why the case failed, in words."""
+    rms_following_error: Annotated[float | None, FOLLOWING["rms_following_error"]] = None
+    """Those of `Following`, over the whole case; of positioning."""
+    peak_following_error: Annotated[float | None, FOLLOWING["peak_following_error"]] = None
+    reversal_height: Annotated[float | None, FOLLOWING["reversal_height"]] = None
+    reversal_duration: Annotated[float | None, FOLLOWING["reversal_duration"]] = None
+    reversal_rest: Annotated[float | None, FOLLOWING["reversal_rest"]] = None
 
 
 OUTCOMES = quantities_of(Outcome)
@@ -193,7 +208,10 @@ def _positioned(
     ends = (int(moving[-1]) + 1) / rate if len(moving) else 0.0
     amplitude, period = hunting(error[late], allowed, rate)
     final = float(np.abs(error[late]).max())
+    found = followed(np.arange(len(error)) / rate, target, target + error)
+    values = {} if found is None else vars(found.values)
     return outcome._replace(
+        **{name: values.get(name) for name in FOLLOWING},
         held=final <= allowed,
         settling_time=settling_time(np.abs(error), allowed, ends, rate),
         final_error=final,

@@ -2,7 +2,7 @@
 
 import csv
 from math import isfinite
-from typing import TextIO
+from typing import Any, TextIO
 
 from typing_extensions import override
 
@@ -40,6 +40,17 @@ def sensor_meter(scenario: Scenario) -> SampleMeter | None:
     if scenario.plant.sensor.exact:
         return None
     return SampleMeter(scenario.analyzer.window, reading=scenario.reading)
+
+
+def recorded_columns(scenario: Scenario) -> dict[str, Any]:
+    """Return the options of a `SampleRecorder` for what samples of a scenario have."""
+    plant, law, followed = scenario.plant, scenario.control_law, scenario.controller.reference
+    follows = law is not None and law.follows_reference and followed.kind not in ("none", "topic")
+    return {
+        "measured": not plant.exactly_measured,
+        "motor": plant.motor.kind == "mass",
+        "reference": followed.signal(period=0.0).reference if follows else None,
+    }
 
 
 def simulate(
@@ -92,17 +103,9 @@ class TrajectoryFile(SampleRecorder):
     The first line has the names of its `quantities`. The numbers are in SI units, with all digits.
     """
 
-    def __init__(
-        self,
-        stream: TextIO,
-        rate: float,
-        every: int = 1,
-        *,
-        measured: bool = False,
-        motor: bool = False,
-    ) -> None:
+    def __init__(self, stream: TextIO, rate: float, every: int = 1, **options: Any) -> None:
         """Write samples as `SampleRecorder` keeps them."""
-        super().__init__(rate, every, measured=measured, motor=motor)
+        super().__init__(rate, every, **options)
         self._write = csv.writer(stream, lineterminator="\n").writerow
         self._write(self.quantities)
 

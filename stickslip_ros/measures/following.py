@@ -1,0 +1,268 @@
+"""How a slide follows a reference: its following error, and the error where the reference turns."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Annotated, NamedTuple
+
+import numpy as np
+
+from stickslip_ros.arrays import FloatArray, rms
+from stickslip_ros.measures.noise import encoder_step, resolved, white_noise
+from stickslip_ros.quantities import Quantity
+from stickslip_ros.text import quantity
+
+_LEAST_WAY, _JUMP = 0.05, 0.2
+"""Least way back of a reversal, as a share of the range of the reference; share of the way between
+two reversals from which a single step of the reference is a jump, and no motion."""
+_WINDOW = 0.25
+"""Share of the time to the next reversal in which the error counts as that of a reversal."""
+_FAST, _VARIED = 0.3, 0.15
+"""Share of the largest speed from which the lag is fitted; deviation of these speeds, as a share of
+their mean, from which a lag and an error that only has a direction are told apart."""
+_STANDS, _NATURAL = 1e-3, 3.0
+"""Share of the height within which a slide that stands may move; times that a slide without error
+would seem to stand, from which it is a rest."""
+_LEAST_HEIGHT = 1e-6
+"""Least height of an error, as a share of the range of the reference."""
+_NOISE_SHARE, _NOISE_ROWS, _NOISES = 1e-7, 4096, 6.0
+"""Noise below this share of the motion is none; rows that tell it; its range, in deviations."""
+_FEWEST_ROWS = 3
+"""Fewest samples above half the height that show an error."""
+
+
+@dataclass(frozen=True)
+class Following:
+    """Following error, reference less position, and the error at reversals; None is unknown.
+
+    A reversal is where the reference starts to move against its last direction, by at least 5 % of
+    its range. The error at a reversal, known as quadrant glitch, is what circular tests (ISO 230-4)
+    show as spikes where an axis turns. It is taken in the first quarter of the time to the next
+    reversal (45 degrees of a circle), less what is constant, grows with the speed (lag) or with the
+    position (scale, and on a circle inertia).
+    The values at reversals are means over them.
+    """
+
+    rms_following_error: Annotated[float | None, Quantity("rms following error", "m")] = None
+    """Root mean square, m, from the first reversal on, or without one of the whole run."""
+    peak_following_error: Annotated[float | None, Quantity("peak following error", "m")] = None
+    """Largest magnitude in this time, m."""
+    reversals: Annotated[int | None, Quantity("reversals")] = None
+    """Number of reversals whose error is measured."""
+    reversal_height: Annotated[float | None, Quantity("error at reversals", "m")] = None
+    """How far the slide gets behind, m, or ahead of where it was at the reversal, if that is more.
+    Of a play it is half of it, as the other half is the error before the reversal."""
+    reversal_height_error: Annotated[float | None, Quantity("its standard error", "m")] = None
+    """Standard error from the scatter of the reversals, m; None of a single one."""
+    reversal_duration: Annotated[float | None, Quantity("duration of this error", "s")] = None
+    """Full width at half the height, s; None if the error stays, as that of a play."""
+    reversal_rest: Annotated[float | None, Quantity("rest at reversals", "s")] = None
+    """Time that the slide stands after the reversal, s, within a thousandth of the height or the
+    resolution; None if it is less than two samples, or than three times that without an error."""
+
+
+NOT_FOLLOWING = Following()
+"""There is no reference."""
+
+
+@dataclass(frozen=True)
+class Reversal:
+    """A reversal, and the window in which its error is; see `Following`."""
+
+    time: FloatArray
+    """Time since the reversal, s."""
+    behind: FloatArray
+    """Error against the new direction, less what is not of the reversal, m."""
+    rest: float | None
+    """Time that the slide stands, s; None if it is not known."""
+
+    def shape(self, smoothed: bool) -> tuple[float, float | None, int]:
+        """Return height (m), duration (s) and the number of samples above half the height."""
+        behind, time = self.behind, self.time
+        ahead = behind[0] - behind
+        error = behind if behind.max() >= ahead.max() else ahead
+        if smoothed:
+            from scipy.ndimage import uniform_filter1d  # it takes long to import
+
+            wide = np.count_nonzero(error > 0.5 * error.max())
+            error = uniform_filter1d(error, 1 + wide // 4, mode="nearest")
+        peak = int(np.argmax(error))
+        low = np.flatnonzero(error <= 0.5 * error[peak])
+        first, last = low[low < peak].max(initial=-1) + 1, low[low > peak].min(initial=len(error))
+        ends = last < len(error)
+        duration = float(time[last] - time[first]) if ends else None
+        return float(error[peak]), duration, int(last - first)
+
+
+class Followed(NamedTuple):
+    """How a run follows its reference; times in s, errors in m."""
+
+    values: Following
+    notes: Sequence[str]
+    """Sentences that say why a value is not known."""
+    time: FloatArray
+    error: FloatArray
+    """Following error."""
+    turns: Sequence[Reversal]
+
+
+def followed(
+    time: FloatArray, reference: FloatArray, position: FloatArray, unit: str = "m"
+) -> Followed | None:
+    """Return how positions follow a reference; None if there are not two samples of both.
+
+    Arrays have the shape (samples,), s and m; rows that are not finite, or not later than all
+    before, are left out. `unit` is that of lengths in the notes. Of positions with noise, heights
+    are those of the error smoothed over a quarter of its width. What the sensor does not tell, see
+    `resolved`, or the samples do not, is None.
+    """
+    known = np.isfinite(reference) & np.isfinite(position)
+    known &= time > np.maximum.accumulate(np.append(-np.inf, time))[:-1]
+    time, reference, position = time[known], reference[known], position[known]
+    if len(time) < 2:
+        return None
+    error, course = reference - position, _course(time, reference)
+    rows = _turning_rows(course)
+    part = error[rows[1] if len(rows) > 2 else 0 :]
+    values, notes = Following(rms(part), float(np.abs(part).max()), 0), list[str]()
+    noise, limit = _resolution(position)
+    found = (
+        [*_reversals(time, course, position, rows, np.abs(np.diff(reference)), limit)]
+        if len(rows) > 2
+        else []
+    )
+    if len(found) < len(rows) - 2:
+        notes.append(
+            "the reference jumps, or has few samples: there is no error at such a reversal"
+        )
+    values = replace(values, reversals=len(found))
+    if found:
+        shapes = [each.shape(noise > 0.0) for each in found]
+        height = float(np.mean([each[0] for each in shapes]))
+        limit = max(limit, _LEAST_HEIGHT * float(np.ptp(reference)))
+        if height <= limit:
+            text = quantity(limit, unit)
+            notes.append(f"the error at reversals is not known: positions tell none below {text}")
+        elif np.median([each[2] for each in shapes]) < _FEWEST_ROWS:
+            notes.append("the error at reversals is not known: it is shorter than three samples")
+        else:
+            values = replace(
+                values,
+                reversal_height=height,
+                reversal_height_error=_standard_error([each[0] for each in shapes]),
+                reversal_duration=_mean([each[1] for each in shapes]),
+                reversal_rest=_mean([each.rest for each in found]),
+            )
+    return Followed(values, notes, time, error, found)
+
+
+def _course(time: FloatArray, reference: FloatArray) -> FloatArray:
+    """Return a reference that is held for several samples as the line between its changes."""
+    changes = np.append(0, np.flatnonzero(np.diff(reference)) + 1)
+    if len(changes) < 2 or np.median(np.diff(changes)) < 2.0:
+        return reference
+    return np.interp(time, time[changes], reference[changes])
+
+
+def _turning_rows(reference: FloatArray) -> list[int]:
+    """Return the first row, those where the reference starts back, and the end of its last way."""
+    moves = np.diff(reference)
+    steps = np.flatnonzero(moves)
+    turns = steps[1:][np.diff(np.sign(moves[steps])) != 0.0]
+    least, way, rows = _LEAST_WAY * float(np.ptp(reference)), 0.0, [0]
+    for row in [*turns.tolist(), len(reference) - 1]:
+        move = float(reference[row] - reference[rows[-1]])
+        if move * way > 0.0 or (move == 0.0 and way):
+            rows[-1] = row
+        elif abs(move) > least:
+            way = move
+            rows.append(row)
+    return rows
+
+
+def _reversals(
+    time: FloatArray,
+    reference: FloatArray,
+    position: FloatArray,
+    rows: list[int],
+    moves: FloatArray,
+    limit: float,
+) -> Iterator[Reversal]:
+    """Yield the reversals of a reference at the inner `rows`, but for those beside a jump.
+
+    `moves` are the sizes of its steps, `limit` is what positions do not tell.
+    """
+    jumps = [
+        moves[a:b].max() >= _JUMP * abs(reference[b] - reference[a]) for a, b in pairwise(rows)
+    ]
+    behind = _without_lag(time, reference, reference - position, rows[1])
+    for number, (before, row, after) in enumerate(zip(rows, rows[1:], rows[2:], strict=False)):
+        way = np.sign(reference[after] - reference[row])
+        length = time[after] - time[row]
+        if after == rows[-1]:  # of the last way the end is not known
+            length = min(length, time[row] - time[before])
+        near = np.searchsorted(time, time[row] + [-_WINDOW * length, _WINDOW * length])
+        window = slice(row, int(near[1]))
+        if jumps[number] or jumps[number + 1] or window.stop - row < 2:
+            continue
+        error = way * behind[window]
+        least = max(limit, _STANDS * float(np.abs(error).max()))
+        around = slice(int(near[0]), window.stop)
+        since, course, ideal = (
+            time[around] - time[row],
+            way * position[around],
+            way * reference[around],
+        )
+        rest = _standing(since, course, int(np.argmin(course)), least)
+        natural = _standing(since, ideal, row - around.start, least)
+        is_told = rest > max(_NATURAL * natural, 2.0 * (time[row + 1] - time[row]))
+        yield Reversal(time[window] - time[row], error, rest if is_told else None)
+
+
+def _without_lag(
+    time: FloatArray, reference: FloatArray, error: FloatArray, start: int
+) -> FloatArray:
+    """Return an error less what is constant, or in proportion to the speed or the position.
+
+    These are fitted to the fast parts from a row on, with what has only the sign of the speed. At a
+    single speed a lag cannot be told from that, and is left in the error.
+    """
+    place = (reference - reference.mean()) / float(np.ptp(reference))
+    speed = np.gradient(reference, time)
+    speed /= np.abs(speed).max()
+    fast = np.flatnonzero(np.abs(speed[start:]) > _FAST) + start
+    sizes = np.abs(speed[fast])
+    ones, sides = np.ones(len(fast)), np.sign(speed[fast])
+    causes = np.column_stack([sides, ones, place[fast], speed[fast]])
+    if sizes.std() <= _VARIED * sizes.mean():
+        causes[:, 3] = 0.0
+    _, constant, scale, lag = np.linalg.lstsq(causes, error[fast])[0]
+    return error - constant - scale * place - lag * speed
+
+
+def _standing(since: FloatArray, course: FloatArray, turn: int, least: float) -> float:
+    """Return how long after a reversal, s, a course stays within `least` of its turning point."""
+    gone = np.flatnonzero(course > course[turn] + least)
+    first = gone[gone < turn].max(initial=-1) + 1
+    last = gone[gone > turn].min(initial=len(course)) - 1
+    return max(float(since[last] - max(since[first], 0.0)), 0.0)
+
+
+def _resolution(position: FloatArray) -> tuple[float, float]:
+    """Return the noise of positions, and the range within which they tell nothing, m."""
+    step, noise = encoder_step(position), white_noise(position[-_NOISE_ROWS:])
+    if max(step, noise) <= _NOISE_SHARE * float(np.ptp(position)):
+        return 0.0, 0.0
+    return noise, resolved(step, noise) or _NOISES * noise
+
+
+def _mean(values: Sequence[float | None]) -> float | None:
+    """Return the mean of values; None if half of them or more are not known."""
+    known = [value for value in values if value is not None]
+    return float(np.mean(known)) if 2 * len(known) > len(values) else None
+
+
+def _standard_error(values: Sequence[float]) -> float | None:
+    if len(values) < 2:
+        return None
+    return float(np.std(values, ddof=1)) / len(values) ** 0.5
