@@ -16,7 +16,6 @@ from stickslip_ros.measures.following import Followed, Following, followed
 from stickslip_ros.measures.run_meter import RunAnalysis
 from stickslip_ros.measures.sample_meter import NOT_JUDGED
 from stickslip_ros.motion.trajectory import (
-    FollowingTrajectory,
     SampleRecorder,
     Trajectory,
     TrajectoryRecorder,
@@ -79,7 +78,7 @@ class Run(TabularResult):
     def _table(self) -> Table:
         columns = vars(self.trajectory)
         time = {"time": self.trajectory.time}
-        quantities, source = quantities_of(FollowingTrajectory), attributes(self.scenario)
+        quantities, source = quantities_of(type(self.trajectory)), attributes(self.scenario)
         return Table(columns, quantities, self._units, time, source, "time")
 
     @property

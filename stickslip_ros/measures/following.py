@@ -7,7 +7,7 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from stickslip_ros.arrays import FloatArray, rms
+from stickslip_ros.arrays import BoolArray, FloatArray, rms
 from stickslip_ros.measures.noise import encoder_step, resolved, white_noise
 from stickslip_ros.quantities import Quantity
 from stickslip_ros.text import quantity
@@ -23,12 +23,11 @@ their mean, from which a lag and an error that only has a direction are told apa
 _STANDS, _NATURAL = 1e-3, 3.0
 """Share of the height within which a slide that stands may move; times that a slide without error
 would seem to stand, from which it is a rest."""
-_LEAST_HEIGHT = 1e-6
-"""Least height of an error, as a share of the range of the reference."""
+_LEAST_HEIGHT, _FEWEST_SAMPLES = 1e-6, 3
+"""Least height of an error, as a share of the range of the reference; fewest samples above half of
+it."""
 _NOISE_SHARE, _NOISE_ROWS, _NOISES = 1e-7, 4096, 6.0
 """Noise below this share of the motion is none; rows that tell it; its range, in deviations."""
-_FEWEST_ROWS = 3
-"""Fewest samples above half the height that show an error."""
 
 
 @dataclass(frozen=True)
@@ -39,8 +38,7 @@ class Following:
     its range. The error at a reversal, known as quadrant glitch, is what circular tests (ISO 230-4)
     show as spikes where an axis turns. It is taken in the first quarter of the time to the next
     reversal (45 degrees of a circle), less what is constant, grows with the speed (lag) or with the
-    position (scale, and on a circle inertia).
-    The values at reversals are means over them.
+    position (scale, and on a circle inertia). The values at reversals are means over them.
     """
 
     rms_following_error: Annotated[float | None, Quantity("rms following error", "m")] = None
@@ -61,37 +59,18 @@ class Following:
     resolution; None if it is less than two samples, or than three times that without an error."""
 
 
-NOT_FOLLOWING = Following()
-"""There is no reference."""
-
-
-@dataclass(frozen=True)
-class Reversal:
-    """A reversal, and the window in which its error is; see `Following`."""
+class Reversal(NamedTuple):
+    """A reversal, and its error in the window of `Following`; None is unknown."""
 
     time: FloatArray
-    """Time since the reversal, s."""
+    """Time since the reversal, s, shape (samples,)."""
     behind: FloatArray
     """Error against the new direction, less what is not of the reversal, m."""
+    height: float
+    duration: float | None
     rest: float | None
-    """Time that the slide stands, s; None if it is not known."""
-
-    def shape(self, smoothed: bool) -> tuple[float, float | None, int]:
-        """Return height (m), duration (s) and the number of samples above half the height."""
-        behind, time = self.behind, self.time
-        ahead = behind[0] - behind
-        error = behind if behind.max() >= ahead.max() else ahead
-        if smoothed:
-            from scipy.ndimage import uniform_filter1d  # it takes long to import
-
-            wide = np.count_nonzero(error > 0.5 * error.max())
-            error = uniform_filter1d(error, 1 + wide // 4, mode="nearest")
-        peak = int(np.argmax(error))
-        low = np.flatnonzero(error <= 0.5 * error[peak])
-        first, last = low[low < peak].max(initial=-1) + 1, low[low > peak].min(initial=len(error))
-        ends = last < len(error)
-        duration = float(time[last] - time[first]) if ends else None
-        return float(error[peak]), duration, int(last - first)
+    wide: int
+    """Number of samples above half the height."""
 
 
 class Followed(NamedTuple):
@@ -121,47 +100,39 @@ def followed(
     time, reference, position = time[known], reference[known], position[known]
     if len(time) < 2:
         return None
-    error, course = reference - position, _course(time, reference)
-    rows = _turning_rows(course)
+    error, moves = reference - position, np.abs(np.diff(reference))
+    changes = np.append(0, np.flatnonzero(moves) + 1)
+    if len(changes) > 1 and np.median(np.diff(changes)) >= 2.0:  # held for several samples
+        reference = np.interp(time, time[changes], reference[changes])
+    rows = _turning_rows(reference)
     part = error[rows[1] if len(rows) > 2 else 0 :]
-    values, notes = Following(rms(part), float(np.abs(part).max()), 0), list[str]()
-    noise, limit = _resolution(position)
-    found = (
-        [*_reversals(time, course, position, rows, np.abs(np.diff(reference)), limit)]
-        if len(rows) > 2
-        else []
-    )
-    if len(found) < len(rows) - 2:
-        notes.append(
-            "the reference jumps, or has few samples: there is no error at such a reversal"
+    step, noise = encoder_step(position), white_noise(position[-_NOISE_ROWS:])
+    if max(step, noise) <= _NOISE_SHARE * float(np.ptp(position)):
+        step = noise = 0.0
+    limit = resolved(step, noise) or _NOISES * noise
+    ways = [(a, b, moves[a:b].max(), abs(reference[b] - reference[a])) for a, b in pairwise(rows)]
+    smooth = [(a, b) for a, b, step, way in ways if step < _JUMP * way]
+    turns = [*_reversals(time, reference, position, smooth, limit)]
+    values, notes = Following(rms(part), float(np.abs(part).max()), len(turns)), list[str]()
+    if len(turns) < len(rows) - 2:
+        notes.append("the reference jumps, or has few samples: no error at such a reversal")
+    heights = [turn.height for turn in turns]
+    least = max(limit, _LEAST_HEIGHT * float(np.ptp(reference)))
+    if turns and np.mean(heights) <= least:
+        text = quantity(least, unit)
+        notes.append(f"the error at reversals is not known: positions tell none below {text}")
+    elif turns and np.median([turn.wide for turn in turns]) < _FEWEST_SAMPLES:
+        notes.append("the error at reversals is not known: it is shorter than three samples")
+    elif turns:
+        scatter = float(np.std(heights, ddof=1)) if len(turns) > 1 else None
+        values = replace(
+            values,
+            reversal_height=float(np.mean(heights)),
+            reversal_height_error=None if scatter is None else scatter / len(turns) ** 0.5,
+            reversal_duration=_usual([turn.duration for turn in turns]),
+            reversal_rest=_usual([turn.rest for turn in turns]),
         )
-    values = replace(values, reversals=len(found))
-    if found:
-        shapes = [each.shape(noise > 0.0) for each in found]
-        height = float(np.mean([each[0] for each in shapes]))
-        limit = max(limit, _LEAST_HEIGHT * float(np.ptp(reference)))
-        if height <= limit:
-            text = quantity(limit, unit)
-            notes.append(f"the error at reversals is not known: positions tell none below {text}")
-        elif np.median([each[2] for each in shapes]) < _FEWEST_ROWS:
-            notes.append("the error at reversals is not known: it is shorter than three samples")
-        else:
-            values = replace(
-                values,
-                reversal_height=height,
-                reversal_height_error=_standard_error([each[0] for each in shapes]),
-                reversal_duration=_mean([each[1] for each in shapes]),
-                reversal_rest=_mean([each.rest for each in found]),
-            )
-    return Followed(values, notes, time, error, found)
-
-
-def _course(time: FloatArray, reference: FloatArray) -> FloatArray:
-    """Return a reference that is held for several samples as the line between its changes."""
-    changes = np.append(0, np.flatnonzero(np.diff(reference)) + 1)
-    if len(changes) < 2 or np.median(np.diff(changes)) < 2.0:
-        return reference
-    return np.interp(time, time[changes], reference[changes])
+    return Followed(values, notes, time, error, turns)
 
 
 def _turning_rows(reference: FloatArray) -> list[int]:
@@ -184,39 +155,33 @@ def _reversals(
     time: FloatArray,
     reference: FloatArray,
     position: FloatArray,
-    rows: list[int],
-    moves: FloatArray,
+    ways: Sequence[tuple[int, int]],
     limit: float,
 ) -> Iterator[Reversal]:
-    """Yield the reversals of a reference at the inner `rows`, but for those beside a jump.
+    """Yield the reversals of a reference between the `ways`, of which some may be left out.
 
-    `moves` are the sizes of its steps, `limit` is what positions do not tell.
+    These have a first and a last row; `limit` is what positions do not tell, m.
     """
-    jumps = [
-        moves[a:b].max() >= _JUMP * abs(reference[b] - reference[a]) for a, b in pairwise(rows)
-    ]
-    behind = _without_lag(time, reference, reference - position, rows[1])
-    for number, (before, row, after) in enumerate(zip(rows, rows[1:], rows[2:], strict=False)):
-        way = np.sign(reference[after] - reference[row])
+    beside = [(a, b, end) for (a, b), (c, end) in pairwise(ways) if b == c]
+    behind = _without_lag(time, reference, reference - position, beside[0][1]) if beside else time
+    for before, row, after in beside:
         length = time[after] - time[row]
-        if after == rows[-1]:  # of the last way the end is not known
+        if after == ways[-1][1]:  # of the last way the end is not known
             length = min(length, time[row] - time[before])
-        near = np.searchsorted(time, time[row] + [-_WINDOW * length, _WINDOW * length])
-        window = slice(row, int(near[1]))
-        if jumps[number] or jumps[number + 1] or window.stop - row < 2:
+        ends = time[row] + np.array([-_WINDOW, _WINDOW]) * length
+        start, stop = np.searchsorted(time, ends).tolist()
+        if stop - row < 2:
             continue
-        error = way * behind[window]
-        least = max(limit, _STANDS * float(np.abs(error).max()))
-        around = slice(int(near[0]), window.stop)
-        since, course, ideal = (
-            time[around] - time[row],
-            way * position[around],
-            way * reference[around],
-        )
+        way, since = np.sign(reference[after] - reference[row]), time[start:stop] - time[row]
+        error = way * behind[row:stop]
+        height, duration, wide = _peak(since[row - start :], error, smoothed=limit > 0.0)
+        least = max(limit, _STANDS * height)
+        course, ideal = way * position[start:stop], way * reference[start:stop]
         rest = _standing(since, course, int(np.argmin(course)), least)
-        natural = _standing(since, ideal, row - around.start, least)
+        natural = _standing(since, ideal, row - start, least)
         is_told = rest > max(_NATURAL * natural, 2.0 * (time[row + 1] - time[row]))
-        yield Reversal(time[window] - time[row], error, rest if is_told else None)
+        rested = rest if is_told else None
+        yield Reversal(since[row - start :], error, height, duration, rested, wide)
 
 
 def _without_lag(
@@ -231,38 +196,45 @@ def _without_lag(
     speed = np.gradient(reference, time)
     speed /= np.abs(speed).max()
     fast = np.flatnonzero(np.abs(speed[start:]) > _FAST) + start
-    sizes = np.abs(speed[fast])
-    ones, sides = np.ones(len(fast)), np.sign(speed[fast])
-    causes = np.column_stack([sides, ones, place[fast], speed[fast]])
+    sizes, ones = np.abs(speed[fast]), np.ones(len(fast))
+    causes = np.column_stack([np.sign(speed[fast]), ones, place[fast], speed[fast]])
     if sizes.std() <= _VARIED * sizes.mean():
         causes[:, 3] = 0.0
     _, constant, scale, lag = np.linalg.lstsq(causes, error[fast])[0]
     return error - constant - scale * place - lag * speed
 
 
+def _peak(
+    time: FloatArray, behind: FloatArray, *, smoothed: bool
+) -> tuple[float, float | None, int]:
+    """Return height (m), duration (s) and the number of samples above half the height."""
+    ahead = behind[0] - behind
+    error = behind if behind.max() >= ahead.max() else ahead
+    if smoothed:
+        from scipy.ndimage import uniform_filter1d  # it takes long to import
+
+        wide = np.count_nonzero(error > 0.5 * error.max())
+        error = uniform_filter1d(error, 1 + wide // 4, mode="nearest")
+    first, last = _around(error <= 0.5 * error.max(), int(np.argmax(error)))
+    ends = last + 1 < len(error)
+    duration = float(time[last + 1] - time[first]) if ends else None
+    return float(error.max()), duration, last + 1 - first
+
+
 def _standing(since: FloatArray, course: FloatArray, turn: int, least: float) -> float:
     """Return how long after a reversal, s, a course stays within `least` of its turning point."""
-    gone = np.flatnonzero(course > course[turn] + least)
-    first = gone[gone < turn].max(initial=-1) + 1
-    last = gone[gone > turn].min(initial=len(course)) - 1
+    first, last = _around(course > course[turn] + least, turn)
     return max(float(since[last] - max(since[first], 0.0)), 0.0)
 
 
-def _resolution(position: FloatArray) -> tuple[float, float]:
-    """Return the noise of positions, and the range within which they tell nothing, m."""
-    step, noise = encoder_step(position), white_noise(position[-_NOISE_ROWS:])
-    if max(step, noise) <= _NOISE_SHARE * float(np.ptp(position)):
-        return 0.0, 0.0
-    return noise, resolved(step, noise) or _NOISES * noise
+def _around(outside: BoolArray, row: int) -> tuple[int, int]:
+    """Return the first and last of the rows around a row that are not outside."""
+    out = np.flatnonzero(outside)
+    first, last = out[out < row].max(initial=-1) + 1, out[out > row].min(initial=len(outside)) - 1
+    return int(first), int(last)
 
 
-def _mean(values: Sequence[float | None]) -> float | None:
+def _usual(values: Sequence[float | None]) -> float | None:
     """Return the mean of values; None if half of them or more are not known."""
     known = [value for value in values if value is not None]
     return float(np.mean(known)) if 2 * len(known) > len(values) else None
-
-
-def _standard_error(values: Sequence[float]) -> float | None:
-    if len(values) < 2:
-        return None
-    return float(np.std(values, ddof=1)) / len(values) ** 0.5

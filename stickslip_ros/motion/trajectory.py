@@ -83,11 +83,6 @@ class _WithReference(Table):
     """Displacement that the controller is to follow, m."""
 
 
-@dataclass(frozen=True, eq=False)
-class FollowingTrajectory(_WithReference, MeasuredMotorTrajectory):
-    """The columns of all trajectories, and of one that follows a reference."""
-
-
 _KINDS = {
     (False, False): Trajectory,
     (True, False): MeasuredTrajectory,
