@@ -1,7 +1,7 @@
 """Friction maps: a law fitted to pairs of speed and force."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -109,6 +109,8 @@ def friction_map(
     decimal: str | None = None,
     skip: int | None = None,
     encoding: str | None = None,
+    force_constant: str | None = None,
+    pitch: float | None = None,
 ) -> FrictionMap:
     r"""Fit a friction law to the pairs of speed and force of tests at constant speeds.
 
@@ -122,7 +124,7 @@ def friction_map(
         Friction law; by default that with the least information criterion.
     rotary : bool, optional
         Whether the velocities are rad/s and the forces N m: they are shown as such.
-    decimal, skip, encoding : optional
+    decimal, skip, encoding, force_constant, pitch : optional
         Form of the tables, as for `read_table`.
 
     Returns
@@ -151,6 +153,7 @@ def friction_map(
     ('coulomb', 80.0)
     """
     form, paths = TableFormat(decimal, skip, encoding, rotary), [*map(Path, tables)]
+    form = replace(form, force_constant=force_constant, pitch=pitch)
     read = [speed_and_force(table_of(path, form), columns) for path in paths]
     velocity, force = (
         np.concatenate([table.values[name] for table in read]) for name in ("velocity", "force")

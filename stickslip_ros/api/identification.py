@@ -226,6 +226,8 @@ def identify(
     session: int | None = None,
     second: Path | str | None = None,
     shift: float = 0.0,
+    force_constant: str | None = None,
+    pitch: float | None = None,
     rotary: bool = False,
     check: Sequence[Path | str] = (),
     progress: Callable[[str], None] = lambda _: None,
@@ -251,7 +253,7 @@ def identify(
         Belt speed, m/s, in place of what the recordings have.
     joint, belt_joint, states_topic, force_topic, time, force : optional
         Where bags of another machine have motion and force, as for `read_bag`.
-    decimal, skip, encoding, period, where, session, second, shift : optional
+    decimal, skip, encoding, period, where, session, second, shift, force_constant, pitch : optional
         Form of the tables, as for `read_table`.
     rotary : bool, optional
         Whether displacements are angles, rad, and forces torques, N m: they are shown as such.
@@ -299,6 +301,8 @@ def identify(
             *(decimal, skip, encoding, rotary, period, where, session),
             second=None if second is None else Path(second),
             shift=shift,
+            force_constant=force_constant,
+            pitch=pitch,
         ),
         layout=BagLayout(joint, belt_joint, states_topic, force_topic, time, force),
     )

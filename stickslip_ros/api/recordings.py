@@ -270,6 +270,8 @@ def read_table(
     session: int | None = None,
     second: Path | str | None = None,
     shift: float = 0.0,
+    force_constant: str | None = None,
+    pitch: float | None = None,
 ) -> RecordedRun:
     """Read a run from a table as text, such as a CSV file, or a MAT file, and measure it.
 
@@ -301,6 +303,9 @@ def read_table(
     second, shift : optional
         Another table of the same run, whose columns are `2:NAME`; what is added to the times of
         columns that have times of their own, s.
+    force_constant, pitch : optional
+        The force is a current: force constant of a linear motor, as `"50N/A"`, or torque constant,
+        as `"0.35Nm/A"`, of a motor that turns a screw with this pitch, m, or a rotary axis.
 
     Returns
     -------
@@ -344,6 +349,8 @@ def read_table(
         session=session,
         second=None if second is None else Path(second),
         shift=shift,
+        force_constant=force_constant,
+        pitch=pitch,
     )
 
 

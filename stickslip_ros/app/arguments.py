@@ -147,6 +147,15 @@ def _add_table_form(parser: argparse.ArgumentParser) -> None:
         "(default: 0)",
     )
     parser.add_argument(
+        "--force-constant",
+        metavar="K",
+        help="the force of a table is a current: 50N/A of a linear motor, 0.35Nm/A of a motor with "
+        "--pitch or --rotary",
+    )
+    parser.add_argument(
+        "--pitch", type=length, metavar="M", help="way of the slide in a turn of the motor, as 10mm"
+    )
+    parser.add_argument(
         "--rotary",
         action="store_true",
         help="show displacements as angles, rad, and forces as torques, N m",
@@ -190,6 +199,11 @@ def reading_of(arguments: argparse.Namespace) -> dict[str, Any]:
     names = [option.name for kind in (TableFormat, BagLayout) for option in fields(kind)]
     names += ["start", "end", "namespace", "belt_speed"]
     columns = _columns_of(arguments.columns)
+    if arguments.force_constant is not None and columns is None:
+        raise InvalidInputError(
+            f"--force-constant {arguments.force_constant}: is for the current in a table that "
+            "--columns names as its force"
+        )
     return {"columns": columns} | {name: getattr(arguments, name) for name in names}
 
 

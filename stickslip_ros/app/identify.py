@@ -107,6 +107,10 @@ def run(arguments: argparse.Namespace) -> None:
         _write(arguments.out, model.findings)
 
 
+_FORM_OF_MAP = ("rotary", "decimal", "skip", "encoding", "force_constant", "pitch")
+"""Options of tables that a map has."""
+
+
 def _fit_map(arguments: argparse.Namespace, reading: dict[str, Any]) -> None:
     """Fit friction to pairs of velocity and force; refuse what a map has not."""
     from stickslip_ros.api.friction_map import friction_map
@@ -114,7 +118,7 @@ def _fit_map(arguments: argparse.Namespace, reading: dict[str, Any]) -> None:
     for option in ("out", "fix", "check"):
         if getattr(arguments, option):
             raise InvalidInputError(f"--{option}: a map has friction only, and no drive")
-    options = {name: reading[name] for name in ("rotary", "decimal", "skip", "encoding")}
+    options = {name: reading[name] for name in _FORM_OF_MAP}
     columns = reading["columns"] or {}
     fitted = friction_map(*arguments.recordings, columns=columns, law=arguments.law, **options)
     give_result(arguments, fitted)

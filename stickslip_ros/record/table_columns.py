@@ -12,6 +12,7 @@ from typing import Any
 
 from stickslip_ros.errors import BagError, InvalidInputError
 from stickslip_ros.record.expressions import Expression, listed
+from stickslip_ros.record.units import force_per_ampere
 from stickslip_ros.text import shown
 
 _OWN_COLUMNS = {
@@ -54,6 +55,10 @@ class TableFormat:
     """Another table of the same run: its columns are `2:NAME`, and it has a clock of its own."""
     shift: float = 0.0
     """What is added to times of their own that columns have, s."""
+    force_constant: str | None = None
+    """Force or torque constant of the motor, with its unit: the force is a current."""
+    pitch: float | None = None
+    """Way of the slide in a turn of the motor, m."""
 
     def __post_init__(self) -> None:
         """Refuse what no table has."""
@@ -67,6 +72,11 @@ class TableFormat:
             raise InvalidInputError(f"session = {self.session} is invalid: must be at least 1")
         if not isfinite(self.shift):
             raise InvalidInputError(f"shift = {self.shift} is invalid: must be a finite number, s")
+        if self.pitch is not None and not 0.0 < self.pitch < inf:
+            raise InvalidInputError(f"pitch = {self.pitch} is invalid: must be above 0 m")
+        if self.pitch is not None and self.force_constant is None:
+            raise InvalidInputError(f"pitch = {self.pitch} is refused: it is for a force_constant")
+        _ = self.per_ampere
         try:
             "1".encode(self.encoding or "utf-8").decode(self.encoding or "utf-8")
         except (LookupError, ValueError):
@@ -74,6 +84,13 @@ class TableFormat:
                 f"encoding = {shown(self.encoding)} is invalid: must be one of Python's, such as "
                 "utf-8, utf-16, cp1252"
             ) from None
+
+    @property
+    def per_ampere(self) -> float | None:
+        """Force, N, of a rotary axis torque, N m, of 1 A; None where the force is no current."""
+        if self.force_constant is None:
+            return None
+        return force_per_ampere(self.force_constant, self.pitch, rotary=self.rotary)
 
 
 ANY_FORM = TableFormat()

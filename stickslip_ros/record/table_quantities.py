@@ -89,6 +89,10 @@ def quantities_of(
         columns = {**columns, "belt_velocity": repr(float(belt_speed))}
     needed = "velocity" if "position" not in columns and "velocity" in columns else "position"
     asked = _asked(table, columns, ("time", needed))
+    if table.form.force_constant and "force" not in asked:
+        raise InvalidInputError(
+            f"{table.path}: force_constant is for a current, and no column is given for force"
+        )
     clock = asked["time"].places
     if not clock:
         raise InvalidInputError(f"{table.path}: time = {columns['time']} must be a column")
@@ -199,6 +203,9 @@ class _Cells:
                 by = "--period" if table.form.period else "a line above them"
                 text = quantity(float(each.text[4:]), "s")
                 notes.append(f"the rows have no time: by {by} they are {text} apart")
+        if "force" in asked and (newtons := table.form.per_ampere):
+            text = quantity(newtons, "N m" if table.form.rotary else "N")
+            notes.append(f"the force is {asked['force'].text}, a current, times {text} for 1 A")
         notes += _units_notes(table, units)
         return cls(table, asked, columns, factors, unknown_unit, notes)
 
@@ -337,6 +344,12 @@ def _factor(table: Table, kind: str, asked: Expression) -> tuple[float, dict[str
     """
     places = [place for place in asked.places if place not in table.clocks] if asked.bare else []
     found, target = dict[str, Unit](), _UNITS.get(kind, "N")
+    per_ampere = table.form.per_ampere if kind == "force" else None
+    meant, way = kind, ""
+    if per_ampere is not None:
+        target, meant, way = "A", "a current", "; without --force-constant it counts as a force"
+    elif kind == "force":
+        way = "; --force-constant 0.35Nm/A with --pitch 10mm, or 50N/A, converts a current"
     for place in places:
         name = table.name(place).removeprefix("column ")
         which = f"{table.path}: {kind}, {table.name(place)},"
@@ -346,7 +359,10 @@ def _factor(table: Table, kind: str, asked: Expression) -> tuple[float, dict[str
                 f"{which} is an acceleration by its name, and no {kind}: if it is one, {kind}="
                 f"{column}*1 takes it"
             )
-        readings = units_in(table.names[place], table.units[place], target)
+        cells = table.names[place], table.units[place]
+        readings = units_in(*cells, target)
+        if per_ampere is not None and not readings:
+            readings = [each._replace(factor=nan) for each in units_in(*cells, "N")]
         if len(readings) > 1:
             texts = [f"{each.text or target} ({each.factor:g} {each.target})" for each in readings]
             ways = [f"{kind}={column}*{each.factor:.12g}" for each in readings]
@@ -357,9 +373,9 @@ def _factor(table: Table, kind: str, asked: Expression) -> tuple[float, dict[str
             si = ROTARY.get(target, target) if table.form.rotary else each.target
             if isnan(each.factor) or each.target != si:
                 raise InvalidInputError(
-                    f"{which} is in {each.text}, which is no unit of {kind}"
+                    f"{which} is in {each.text}, which is no unit of {meant}"
                     f"{' of a rotary axis' * (each.target != si)}: {kind}={column}*NUMBER "
-                    f"converts it, with the number of {si} in one of it"
+                    f"converts it, with the number of {si} in one of it{way}"
                 )
             found[name] = each
     units = {each.factor for each in found.values()}
@@ -369,7 +385,7 @@ def _factor(table: Table, kind: str, asked: Expression) -> tuple[float, dict[str
             f"{table.path}: {kind} = {asked.text} is of different units, {', '.join(texts)}: a "
             f"number for each converts it to {target}, as in #1*0.001-#2"
         )
-    return next(iter(units), 1.0), found
+    return next(iter(units), 1.0) * (per_ampere or 1.0), found
 
 
 def _units_notes(table: Table, found: Mapping[str, Unit]) -> Iterator[str]:

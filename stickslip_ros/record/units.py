@@ -11,7 +11,9 @@ from itertools import product
 from math import isnan, nan, tau
 from typing import NamedTuple
 
+from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.quantities import ROTARY, number_of
+from stickslip_ros.text import shown
 
 NO_UNITS = ("", "-", "1", "unit", "units", "einheit", "einheiten")
 _LONG = {"nano": "n", "micro": "u", "mikro": "u", "milli": "m", "mili": "m", "centi": "c",
@@ -47,12 +49,14 @@ _SPELLINGS = tuple(
         ("arcmin", "R", "", "arcmin(?:utes?)?"),
         ("kgf", "F", "", "kgf|kp"),
         ("lbf", "F", "", "lbf"),
-        ("", "other", "[kum]", "[avwgk]|pa|bar|lbs?|oz|degc|°c|%"),
+        ("A", "I", "[kum]", "a|amps|amperes?"),
+        ("", "other", "[kum]", "[vwgk]|pa|bar|lbs?|oz|degc|°c|%"),
     )
 )
 """Units in machines' data: what pint calls them, their dimension, prefixes, and how people write
 them. Those without a name for pint are of other quantities; turns as in U/min only in a ratio."""
-_DIMENSIONS = {"m": "L", "m/s": "L/T", "N": "F", "s": "T", "rad": "R", "rad/s": "R/T", "N m": "FL"}
+_DIMENSIONS = {"m": "L", "m/s": "L/T", "N": "F", "s": "T", "rad": "R", "rad/s": "R/T", "N m": "FL",
+               "A": "I", "N/A": "F/I", "N m/A": "FL/I"}  # fmt: skip
 _COUNTS = re.compile(
     r"counts?|cts|inc|incr(?:ements?)?|ink(?:r\w*)?|puls\w*|impuls\w*|pls|ticks?|steps|lsb|digits?|erpm"
 )
@@ -99,6 +103,32 @@ def units_in(name: str, given: str, target: str) -> list[Unit]:
     known, words = ([each for each in found if not isnan(each.factor)] for found in (stated, last))
     found = known or words or [*stated, *last][:1]
     return [*{each.factor: each for each in reversed(found)}.values()][::-1]
+
+
+def force_per_ampere(constant: str, pitch: float | None, *, rotary: bool) -> float:
+    """Return the force of 1 A, N, of a rotary axis the torque, N m.
+
+    The constant of a linear motor is in N/A. One in N m/A turns a rotary axis, or a screw with a
+    pitch, m: the work of a turn, pitch F = 2 pi K I, gives the force. Raises InvalidInputError
+    if the unit of the constant does not fit to them.
+    """
+    given = f"force_constant = {shown(constant)}"
+    found = [each for unit in ("N/A", "N m/A") for each in _read(constant, unit)]
+    if not found or not found[0].factor:
+        raise InvalidInputError(
+            f"{given} is invalid: must be a number with its unit, as 50N/A of a linear motor, or "
+            "0.35Nm/A of a motor that turns a screw or a rotary axis"
+        )
+    ((_, factor, unit), *_) = found
+    ways = {
+        "N/A": "N/A is of a linear motor, which has no pitch and turns no rotary axis",
+        "N m/A": "N m/A is of a motor that turns either a screw, whose pitch is needed, or a "
+        "rotary axis, which has none",
+    }
+    if (pitch is not None) + rotary != (unit == "N m/A"):
+        other = "N/A, a linear motor," if unit == "N m/A" else "N m/A, a motor with a screw,"
+        raise InvalidInputError(f"{given} is refused: {ways[unit]}; {other} may be meant")
+    return factor if pitch is None else tau * factor / pitch
 
 
 def are_units(cells: Sequence[str]) -> bool:

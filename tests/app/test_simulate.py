@@ -7,6 +7,8 @@ from pathlib import Path
 import pytest
 
 import stickslip_ros as ss
+from stickslip_ros.measures.following import Following
+from stickslip_ros.quantities import quantities_of
 from tests.app.conftest import Run
 
 
@@ -131,3 +133,27 @@ def test_a_law_that_is_not_passive_is_told(stickslip: Run) -> None:
     assert "friction law lugre is not passive, and may supply energy" in told.stderr
     assert "viscous = 0 s/m is 60 s/m below" in told.stderr
     assert stickslip(*call, "-p=plant.friction.viscous=61").stderr == ""
+
+
+def test_a_run_with_a_reference_tells_what_a_report_of_its_file_tells(
+    stickslip: Run, tmp_path: Path
+) -> None:
+    gains = {"position_gain": 7.6e6, "integral_gain": 5.8e8, "velocity_gain": 4.1e4}
+    reference = {"kind": "sine", "amplitude": 0.005, "frequency": 1.0}
+    values = gains | {f"reference.{name}": value for name, value in reference.items()}
+    given = [f"-ppid_controller.{name}={value}" for name, value in values.items()]
+    given += ["-pplant.disturbance.kind=none", "-ppid_controller.force_limit=351.5"]
+    call = ("simulate", "axis", "--controller", "pid", *given, "--duration", "2.6", "--json")
+    done = stickslip(*call, "--out", "run.csv", "--plot", "run.svg")
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert found["reversals"] == 5
+    # Exact sticking of each of the two reversals in a cycle.
+    assert 2.0 * found["reversal_rest"] == pytest.approx(
+        found["stick_fraction"] * found["period"], abs=2e-3
+    )
+    assert 1e-6 < found["reversal_height"] <= found["peak_following_error"] < 1e-4
+    assert "after each reversal<" in (tmp_path / "run.svg").read_text(encoding="utf-8")
+    report = json.loads(stickslip("report", "run.csv", "--json").stdout)
+    for name in quantities_of(Following):
+        assert report[name] == pytest.approx(found[name], rel=1e-6, abs=1e-12)

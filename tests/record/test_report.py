@@ -4,8 +4,10 @@ from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 
 from stickslip_ros.errors import BagError, InvalidInputError
+from stickslip_ros.record.codec import pack_reference
 from stickslip_ros.record.recorder import Recorder
 from stickslip_ros.record.report import report_of_recording
+from stickslip_ros.samples import Reference
 from tests.record.runs import (
     PERIOD,
     SECOND,
@@ -30,6 +32,31 @@ def foreign_state(stamp):
     message.header.frame_id = "machine"
     message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp, SECOND)
     return serialize_message(message)
+
+
+def _held(stamps, every):
+    """Yield each stamp, and the last one that is among one in `every`."""
+    yield from ((stamp, stamps[row // every * every]) for row, stamp in enumerate(stamps))
+
+
+def test_a_bag_with_references_tells_the_following_error_to_the_newest_one(tmp_path):
+    states = [(STATES, stamp, state(stamp)) for stamp in STAMPS]
+    behind = 0.25
+    sent = [
+        ("/feed_drive/reference", stamp, pack_reference(stamp, Reference(position + behind)))
+        for stamp, position in ((stamp, motion(stamp / SECOND)[0]) for stamp in STAMPS[300:])
+    ]
+    write_bag(tmp_path / "bag", sorted([*states, *sent], key=lambda message: message[1]))
+    report = report_of_recording(tmp_path / "bag")
+    assert report["rms_following_error"] == pytest.approx(behind)
+    assert report["peak_following_error"] == pytest.approx(behind)
+    assert (report["reversals"], report["reversal_height"]) == (7, None)
+    part = report_of_recording(tmp_path / "bag", end=3.0)
+    assert "rms_following_error" not in part
+    write_bag(tmp_path / "late", sorted([*states, *sent[::100]], key=lambda message: message[1]))
+    held = report_of_recording(tmp_path / "late")
+    ahead = [motion(a / SECOND)[0] - motion(b / SECOND)[0] for a, b in _held(STAMPS[300:], 100)]
+    assert held["peak_following_error"] == pytest.approx(max(abs(behind - x) for x in ahead))
 
 
 def test_a_run_and_its_parts_are_measured(tmp_path):

@@ -228,3 +228,54 @@ def test_a_few_samples_in_each_rest_tell_that_it_sticks(tmp_path: Path) -> None:
     assert report["regime"] == "stick_slip"
     error = report["errors"]["stick_fraction"]
     assert report["stick_fraction"] == pytest.approx(0.75, abs=2.0 * error)
+
+
+@pytest.mark.parametrize(
+    ("name", "form", "newtons"),
+    [
+        ("i [A]", {"force_constant": "0.35Nm/A", "pitch": 0.01}, 0.35 * 2.0 * np.pi / 0.01),
+        ("i [mA]", {"force_constant": "350 mNm/A", "pitch": 0.01}, 0.07 * np.pi),
+        ("i", {"force_constant": "50N/A"}, 50.0),
+        ("i", {"force_constant": "0.35 N m/A", "rotary": True}, 0.35),
+    ],
+)
+def test_a_current_is_a_force_by_the_constant_of_the_motor(
+    tmp_path: Path, name: str, form: Any, newtons: float
+) -> None:
+    path = csv_of(tmp_path / "log.csv", **lists(t=TIME, x=POSITION, **{name: TIME}))
+    columns = {"time": "t", "position": "x", "force": "#3"}
+    recording = read_table(path, columns, form=TableFormat(**form))
+    assert recording.forces.force == pytest.approx(TIME * newtons, rel=1e-12)
+    assert "the force is #3, a current, times" in "; ".join(recording.notes)
+    scaled = read_table(path, {**columns, "force": "#3*2"}, form=TableFormat(**form))
+    in_amperes = 2.0 if "mA" not in name else 2e3  # a number takes the place of the unit
+    assert scaled.forces.force == pytest.approx(TIME * newtons * in_amperes, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("form", "refusal"),
+    [
+        ({"force_constant": "0.35"}, "as 50N/A of a linear motor, or 0.35Nm/A"),
+        ({"force_constant": "0N/A"}, "is invalid: must be a number with its unit"),
+        ({"force_constant": "0.35Nm/A"}, "whose pitch is needed, .* N/A, a linear motor, may be"),
+        ({"force_constant": "50N/A", "pitch": 0.01}, "which has no pitch .* N m/A, a motor with"),
+        ({"force_constant": "50N/A", "rotary": True}, "turns no rotary axis"),
+        ({"force_constant": "1Nm/A", "rotary": True, "pitch": 0.01}, "rotary axis, which has none"),
+        ({"pitch": 0.01}, "pitch = 0.01 is refused: it is for a force_constant"),
+        ({"force_constant": "50N/A", "pitch": -1.0}, "pitch = -1.0 is invalid"),
+    ],
+)
+def test_a_force_constant_must_fit_to_the_axis(form: Any, refusal: str) -> None:
+    with pytest.raises(InvalidInputError, match=refusal):
+        TableFormat(**form)
+
+
+def test_a_current_and_a_force_are_not_confused(tmp_path: Path) -> None:
+    columns, amperes = {"time": "t", "position": "x"}, TableFormat(force_constant="50N/A")
+    path = csv_of(tmp_path / "log.csv", **lists(t=TIME, x=POSITION, **{"i [A]": TIME}, F_N=TIME))
+    with pytest.raises(InvalidInputError, match=r"is in A, .*--force-constant 0.35Nm/A with"):
+        read_table(path, {**columns, "force": "#3"})
+    with pytest.raises(InvalidInputError, match="is in N, which is no unit of a current"):
+        read_table(path, {**columns, "force": "F_N"}, form=amperes)
+    with pytest.raises(InvalidInputError, match="no column is given for force"):
+        read_table(path, columns, form=amperes)

@@ -100,6 +100,24 @@ def test_positioning_on_a_guide_at_rest_tells_the_final_error() -> None:
     assert found.held
 
 
+def test_laws_are_ranked_by_the_error_where_the_reference_turns() -> None:
+    drive = load_scenario("axis", controller="pid").changed(
+        {"plant.disturbance.kind": "none", "pid_controller.reference.kind": "sine"}
+        | {"pid_controller.reference.amplitude": 5e-3, "pid_controller.reference.frequency": 1.0}
+        | {"pid_controller.position_gain": 1e6, "pid_controller.velocity_gain": 1e4}
+    )
+    options: Any = {"disturbances": "none", "given": "pid", "duration": 1.9}
+    found = ss.compare(drive, "pid,disturbance_observer", rank_by="reversal_height", **options)
+    heights = [rank.means["reversal_height"][0] for rank in found.ranks]
+    assert 1e-6 < heights[0] < heights[1]
+    assert f"{found.ranks[0].law} has the least error at reversals" in found.verdict
+    assert "rest at reversals" in str(found)
+    found = ss.compare(drive, "pid", rank_by="peak_force", **options)
+    assert found.to_dict()["ranks"][0]["reversal_height"] in heights
+    with pytest.raises(InvalidInputError, match="rank_by = 'rms_velocity' is invalid"):
+        ss.compare(drive, "pid", rank_by="rms_velocity", **options)
+
+
 def test_all_laws_meet_the_same_drives_and_the_same_noise() -> None:
     study = comparison(seeds=3, spread=0.2)
     cases = [study.plan.case(number) for number in range(study.plan.size)]
