@@ -114,7 +114,8 @@ def run(arguments: argparse.Namespace) -> None:
         check_new("--out", chosen)
         arguments.out = None
     check_out(arguments.out)
-    with progress_bar(f"gains for {scenario.name}", 1.0, lines=True) as progress:
+    gains = f"gains for {scenario.name}"
+    with progress_bar(gains, 1.0, lines=True, even=False) as progress:  # laws differ by far
         study, tuned = compared(
             scenario,
             arguments.controllers,

@@ -71,7 +71,8 @@ def run(arguments: argparse.Namespace) -> None:
     if arguments.out is not None:
         check_new("--out", arguments.out)
     check_results(arguments)
-    with progress_bar(f"designing for {scenario.name}", 1.0, lines=True) as progress:
+    label = f"designing for {scenario.name}"
+    with progress_bar(label, 1.0, lines=True, even=False) as progress:  # of unknown attempts
         found = Proposal(design(task, progress))
     text = found.design.parameter_file
     if arguments.plot is not None and text is None:

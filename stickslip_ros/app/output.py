@@ -19,7 +19,9 @@ if TYPE_CHECKING:
 
 
 _JUDGING_TIME, _LONG_TIME = 3.0, 60.0
-"""Time after which the length of a work is judged, and the length of a long one, s."""
+"""Time after which a work may seem long, and the length of a long one, s."""
+_WARM, _KNOWN = 0.125, 0.25
+"""Shares of a work after which its pace counts, and after which the time left is known."""
 _LINE_INTERVAL = 10.0
 """Time between two lines of progress, s."""
 
@@ -81,54 +83,73 @@ def print_parts(*parts: TextTable | str) -> None:
 
 @contextmanager
 def progress_bar(
-    label: str, total: float | None, advice: str = "", *, lines: bool = False
+    label: str, total: float | None, advice: str = "", *, lines: bool = False, even: bool = True
 ) -> Generator[Progress]:
     """Show progress towards `total` on standard error, if that is a terminal, or in `lines`.
 
-    A sentence says how long it will take if that is long, with `advice` on what would be quicker.
+    Once a quarter of a work is done whose parts are alike, `even`, a sentence says how long the
+    rest will take if that is long. If it seems to be, the `advice` on what is quicker comes first.
     """
-    start: tuple[float, float] | None = None
-    judged = False
-
-    def estimate(done: float) -> None:
-        nonlocal start, judged
-        start = start or (monotonic(), done)
-        passed, since = monotonic() - start[0], done - start[1]
-        if total is None or judged or passed < _JUDGING_TIME or since <= 0.0:
-            return
-        judged, left = True, passed * (total - done) / since
-        if left > _LONG_TIME:
-            tell(f"{label}: about {left / 60.0:.0f} min more{advice}")
-
+    left = _TimeLeft(label, total, advice, even)
     if not sys.stderr.isatty():
         with _told(label) if lines else nullcontext([label]) as said:
 
             def follow(done: float, label: str | None = None) -> None:
-                estimate(done)
+                left.after(done)
                 said[0] = label or said[0]
 
             yield follow
         return
     from rich.console import Console
-    from rich.progress import (
-        BarColumn,
-        Progress,
-        TextColumn,
-        TimeElapsedColumn,
-        TimeRemainingColumn,
-    )
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-    text = TextColumn("{task.description}", markup=False)
-    columns = (text, BarColumn(), TimeElapsedColumn(), TimeRemainingColumn())
+    text, rest = (
+        TextColumn(f"{{task.{name}}}", markup=False) for name in ("description", "fields[left]")
+    )
+    columns = (text, BarColumn(), TimeElapsedColumn(), rest)
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(printable(label), total=total)
+        task = bar.add_task(printable(label), total=total, left="")
 
         def update(done: float, label: str | None = None) -> None:
-            estimate(done)
             described = None if label is None else printable(label)
-            bar.update(task, completed=done, description=described)
+            bar.update(task, completed=done, description=described, left=left.after(done))
 
         yield update
+
+
+class _TimeLeft:
+    """How long a work will take, by the time of what is done but its begin, which compiles."""
+
+    def __init__(self, label: str, total: float | None, advice: str, even: bool) -> None:
+        self._label, self._total, self._advice, self._even = label, total, advice, even
+        self._begin: tuple[float, float] | None = None
+        self._warm: tuple[float, float] | None = None
+        self._is_told = False
+
+    def after(self, done: float) -> str:
+        """Return the time left in words, "" while it is a guess; tell it once if it is long."""
+        now = monotonic()
+        start, first = self._begin = self._begin or (now, done)
+        if self._total is None or not first < done < self._total:
+            return ""
+        share, passed = (done - first) / (self._total - first), now - start
+        likely = passed * (1.0 - share) / share
+        if self._advice and passed >= _JUDGING_TIME and likely > _LONG_TIME:
+            tell(f"{self._label}{self._advice}")
+            self._advice = ""
+        if self._warm is None and share >= _WARM:
+            self._warm = now, share
+        if not self._even or self._warm is None or share < max(_KNOWN, self._warm[1] + _WARM):
+            return ""
+        since, at = self._warm
+        left = (now - since) * (1.0 - share) / (share - at)
+        if left <= _LONG_TIME:
+            return f"about {left:.0f} s more"
+        text = f"about {left / 60.0:.0f} min more"
+        if not self._is_told:
+            tell(f"{self._label}: {text}")
+            self._is_told = True
+        return text
 
 
 @contextmanager

@@ -127,7 +127,8 @@ def computed(
         if journal.count and out is None:
             tell(f"{journal.count} points are taken from {part}")
         try:
-            with progress_bar(label, study.plan.size, _advice(study)) as progress:
+            size, even = study.plan.size, study.plan.continuation is None  # else in their order
+            with progress_bar(label, size, _advice(study), even=even) as progress:
                 if arguments.dask is None:
                     run_here(journal, arguments.workers, progress)
                 else:

@@ -69,6 +69,9 @@ def run(
     size = _task_size(journal, 1 if executor is None else in_flight)
     progress(journal.count)
     chains = (_Chain(pieces_of(points, size), start) for points, start in _missing(journal))
+    if not study.plan.continuation:  # the pieces are independent
+        pieces = [piece for chain in chains for piece in chain.pieces]
+        chains = (_Chain(iter((piece,)), None) for piece in _scattered(pieces))
     if executor is None:
         for chain in chains:
             for points in chain.pieces:
@@ -81,13 +84,9 @@ def run(
         if points is not None:
             waiting[executor.submit(compute, study, points, chain.start)] = chain
 
-    if study.plan.continuation:
-        parallel = chains
-    else:  # the pieces are independent
-        parallel = (_Chain(iter((piece,)), None) for chain in chains for piece in chain.pieces)
     try:
         while True:
-            while len(waiting) < in_flight and (chain := next(parallel, None)) is not None:
+            while len(waiting) < in_flight and (chain := next(chains, None)) is not None:
                 submit(chain)
             if not waiting:
                 return
@@ -278,6 +277,15 @@ def _missing(journal: Journal) -> Iterator[tuple[range, MotionState | None]]:
                 carried = plan.continuation and first
                 start = journal.state_after(points[first - 1]) if carried else None
                 yield points[first : last + 1], start
+
+
+def _scattered(pieces: list[range]) -> Iterator[range]:
+    """Yield the pieces so that the first ones are like all: their time tells the time left.
+
+    The places are those of a Kronecker sequence by the golden section, of low discrepancy.
+    """
+    sequence = np.arange(len(pieces)) * 0.618034 % 1.0
+    return (pieces[place] for place in np.argsort(np.argsort(sequence)))
 
 
 def _record(journal: Journal, piece: Piece, progress: CountPoints) -> MotionState | None:

@@ -156,23 +156,38 @@ def test_a_long_work_writes_lines_into_a_pipe(
 
 
 @pytest.mark.parametrize("on_a_terminal", [True, False])
-def test_a_long_work_says_once_how_long_it_takes(
-    on_a_terminal: bool, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+@pytest.mark.parametrize(("first", "begin"), [(0, 30.0), (100, 0.0)], ids=["compiles", "goes on"])
+def test_the_time_left_is_told_after_a_quarter(
+    on_a_terminal: bool,
+    first: int,
+    begin: float,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    """True within a half, of points that compile at the begin; not of points that differ."""
     monkeypatch.setattr(sys.stderr, "isatty", lambda: on_a_terminal)
     monkeypatch.setattr(output, "monotonic", lambda: clock)
-    clock = 0.0
-    with progress_bar("sweep", 1000, "; this is quicker") as progress:
-        for number in range(10):  # of which 100 points were done before
-            clock = 1.2 * number
-            progress(100 + 10 * number)
-    assert capsys.readouterr().err.count("sweep: about 2 min more; this is quicker") == 1
+    told: list[tuple[float, int, str]] = []
+    monkeypatch.setattr(output, "tell", lambda text: told.append((clock, done, text)))
+    total = first + 200
+    for even in (True, False):
+        clock, done = 0.0, first
+        with progress_bar("sweep", total, "; this is quicker", even=even) as progress:
+            for done in range(first, total + 1):
+                progress(done)
+                clock += 2.0 * (0.5 + done % 2) + begin * (done == first)
+        (_, _, hint), *rest = told
+        assert hint == "sweep; this is quicker"
+        assert [text for *_, text in rest] == ["sweep: about 5 min more"] * even
+        for when, points, _ in rest:
+            assert (points - first) * 4 in range(200, 250)
+            assert 300.0 / 1.5 < clock - when < 300.0 * 1.5
+        told.clear()
     for total, step in ((100, 10), (None, 1), (1000, 0)):
         with progress_bar("short, of unknown length, or without progress", total) as progress:
-            for number in range(10):
+            for done in range(10):
                 clock += 1.2
-                progress(step * number)
-    assert "about" not in capsys.readouterr().err
+                progress(step * done)
+    assert not told
 
 
 @pytest.mark.parametrize(("cycles", "label"), [(0, "no whole cycle"), (4, "regime not known")])

@@ -132,6 +132,23 @@ def test_in_processes_the_points_are_the_same(name: str) -> None:
         assert computed(STUDIES[name], processes) == at_once(STUDIES[name])
 
 
+def test_independent_points_are_computed_in_an_order_whose_begin_is_like_all(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """So the time of the first ones tells that of the others, whose motions differ."""
+    order: list[int] = []
+
+    def noted(study: Study, points: range, start: Any) -> Piece:
+        order.extend(points)
+        return Piece([Point(number) for number in points], None)
+
+    monkeypatch.setattr(runner, "compute", noted)
+    compute_columns(speeds(96))
+    assert sorted(order) == [*range(96)]
+    for quarter in (order[:24], order[24:48]):
+        assert {point // 16 for point in quarter} == {*range(6)}
+
+
 def test_an_executor_must_be_allowed_a_task() -> None:
     with Journal(speeds(3)) as journal, ThreadPoolExecutor(1) as executor:
         with pytest.raises(InvalidInputError, match="0 tasks in flight: must be 1 or more"):
@@ -209,7 +226,6 @@ def test_what_was_finished_when_it_is_interrupted_is_kept() -> None:
         with pytest.raises(KeyboardInterrupt):
             run(journal, _Held(), in_flight=4, progress=stop_at(1))
         assert journal.count == 2  # of one point each
-        assert [point.number for point in journal.columns.points()] == [1, 2]
 
 
 @pytest.mark.process
