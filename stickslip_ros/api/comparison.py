@@ -14,6 +14,7 @@ from typing_extensions import override
 from stickslip_ros.api.design import gains, gains_text
 from stickslip_ros.api.page import Summary
 from stickslip_ros.api.results import Parts, Table, TabularResult, attributes, column
+from stickslip_ros.api.runs import limit_text
 from stickslip_ros.api.scenarios import ScenarioLike, as_scenario
 from stickslip_ros.api.studies import Values, axis_of
 from stickslip_ros.arrays import FloatArray
@@ -291,7 +292,7 @@ class ComparedLaws(TabularResult):
                 [
                     rank.law,
                     rank.held_text,
-                    *(_with_error(units, *rank.means[name], OUTCOMES[name].unit) for name in names),
+                    *(units.with_error(*rank.means[name], OUTCOMES[name].unit) for name in names),
                     margin,
                     f"{rank.at_limit:.1%}",
                 ]
@@ -327,8 +328,31 @@ class ComparedLaws(TabularResult):
 
     @override
     def _summary(self) -> Summary:
-        parameters = scenario_tables(self.scenario, used=True)
-        return Summary("Comparison of control laws", self.scenario.name, self.verdict, parameters)
+        plan, own = self.study.plan, self.scenario.controller
+        given = own.law in plan.laws and own.law not in self.tuned
+        unused = [*plan.parameters, *[own.node] * (not given)]
+        parameters = scenario_tables(self.scenario, unused=unused)
+        title = "Comparison of control laws"
+        return Summary(title, self.scenario.name, self.verdict, parameters, self._facts())
+
+    def _facts(self) -> dict[str, str]:
+        """Return what a page says first: what the best law holds, its gains and its force."""
+        plan, best, grid = self.study.plan, self.ranks[0], self.study.plan.grid
+        plant, law = self.scenario.plant, self.scenarios[best.law].controller.control_law
+        units = Units.for_drive(plant.as_drive(), plan.parameters)
+        facts, texts = {"best law": best.law}, [units.text(plant.belt_speed, "m/s")]
+        if grid is not None:
+            rows = [zip(grid.values(point), grid.axes, strict=True) for point in range(grid.size)]
+            texts = [", ".join(units.text(value, axis.unit) for value, axis in row) for row in rows]
+        held = [texts[point] for point in np.flatnonzero(self.held_at_points(best.law) == 1.0)]
+        name = "points" if {*plan.parameters} - {"plant.belt_speed"} else "feeds"
+        shown = f"{held[0]} to {held[-1]}" if 2 < len(held) == len(texts) else ", ".join(held)
+        facts[f"{name} that hold"] = (
+            f"{shown or 'none'} (in every case; {len(held)} of {len(texts)})"
+        )
+        peak = units.with_error(*best.means["peak_force"], OUTCOMES["peak_force"].unit)
+        allowed = limit_text(law, plant, units)
+        return facts | {"gains": gains_text(law, units), "mean peak force": peak + allowed}
 
 
 def compare(
@@ -457,14 +481,3 @@ def _mean_of_seeds(values: FloatArray) -> tuple[float, float]:
     of_seeds = sums[counts > 0] / counts[counts > 0]
     error = of_seeds.std(ddof=1) / np.sqrt(len(of_seeds)) if len(of_seeds) > 1 else np.nan
     return float(values[known].mean()), float(error)
-
-
-def _plus_minus(text: str, error: float) -> str:
-    return "" if np.isnan(error) else f" ± {text}"
-
-
-def _with_error(units: Units, mean: float, error: float, unit: str) -> str:
-    if np.isnan(mean):
-        return "-"
-    value, deviation = units.texts([mean, error], unit, 3)
-    return value + _plus_minus(deviation, error)

@@ -152,7 +152,8 @@ class Proposal(TabularResult):
     @override
     def _summary(self) -> Summary:
         scenario = self.design.task.scenario
-        parameters = scenario_tables(scenario, used=True)
+        chosen, node = scenario.controller.control_law.tuned, scenario.controller.node
+        parameters = scenario_tables(scenario, unused=[f"{node}.{name}" for name in chosen])
         return Summary("Controller design", scenario.name, self._verdict(), parameters)
 
     def _verdict(self) -> str:

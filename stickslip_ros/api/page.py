@@ -1,6 +1,6 @@
 """The page of a result: one file to read offline, print and hand on."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -38,6 +38,8 @@ class Summary(NamedTuple):
     """The result in one sentence."""
     parameters: Iterable[TextTable] = ()
     """The parameters that it was made with, with their units."""
+    facts: Mapping[str, str] = {}
+    """What a reader asks first, by name: feeds that hold, gains, force."""
 
 
 def write_page(
@@ -69,7 +71,7 @@ def write_page(
     environment.filters["printable"] = printable
     text = environment.get_template("page.html").render(
         **summary._asdict() | {"parameters": [*summary.parameters]},
-        results=[*parts],
+        results=[part for part in parts if part != summary.verdict],
         figures=figures,
         reason=reason,
         date=f"{datetime.now().astimezone():%Y-%m-%d %H:%M %Z}",
@@ -106,6 +108,7 @@ def _drawing(
     for size in ("width", "height"):  # the page has it fill its column
         del root.attrib[size]
     root.attrib |= {"role": "img", "aria-label": printable(label)}
+    root.attrib["preserveAspectRatio"] = "xMidYMin"  # where paper leaves it less than its width
     ElementTree.register_namespace("", _SVG)
     ElementTree.register_namespace("xlink", _XLINK)
     return Markup(ElementTree.tostring(root, encoding="unicode"))

@@ -2,7 +2,9 @@
 
 import json
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, fields
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,10 +13,12 @@ from typing_extensions import override
 
 from stickslip_ros.api.page import Summary
 from stickslip_ros.api.results import Parts, Result, Table, TabularResult
+from stickslip_ros.api.runs import loop_facts, sentence
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.measures.cycle_measures import Measures, measures_of
 from stickslip_ros.measures.slips import SlipThreshold
+from stickslip_ros.model.control import ControlLaw
 from stickslip_ros.model.drive import Drive
 from stickslip_ros.motion.trajectory import MotorTrajectory
 from stickslip_ros.quantities import Quantity, quantities_of
@@ -97,18 +101,39 @@ class RecordedRun(TabularResult):
 
         return measures_text(self.measures, self.units) + doubt(self.report)
 
+    @cached_property
+    def _recorded(self) -> dict[str, Mapping[str, str]]:
+        """The parameters and versions that were recorded, by node and name."""
+        if self._is_table:
+            return {}
+        with Recording(self.path, self._namespace) as recording:
+            names = [*NODE_PARAMETERS, "versions"]
+            settings = {name: recording.metadata(f"stickslip_ros/{name}") for name in names}
+        return {name: texts for name, texts in settings.items() if texts}
+
     def settings(self) -> Iterator[TextTable]:
         """Yield the tables of the parameters and versions that were recorded."""
-        if not self._is_table:
-            with Recording(self.path, self._namespace) as recording:
-                names = [*NODE_PARAMETERS, "versions"]
-                settings = {name: recording.metadata(f"stickslip_ros/{name}") for name in names}
-            known = {name: texts for name, texts in settings.items() if texts}
-            yield from recorded_tables(known, self.units)
+        yield from recorded_tables(self._recorded, self.units)
+
+    def _facts(self) -> dict[str, str]:
+        """Return what a page says first, as far as the drive and its law were recorded."""
+        forces = self.report["peak_force"], self.report["resting_force"]
+        plant = None if self._is_table else recorded_plant(self.path, self._namespace)
+        law: ControlLaw | None = None
+        for node in [name for name in self._recorded if name.endswith("_controller")]:
+            with suppress(ValueError, RecursionError, InvalidInputError):
+                values = {name: json.loads(text) for name, text in self._recorded[node].items()}
+                controller = NODE_PARAMETERS[node].changed(values, node)
+                law = getattr(controller, "control_law", None)
+        if plant is not None and (law is not None or not plant.expects_control):
+            return loop_facts(plant, law if plant.expects_control else None, *forces)
+        peak, last = self.units.texts(forces, "N")
+        return {} if forces[0] is None else {"control force": f"at most {peak}, {last} at the end"}
 
     @override
     def _summary(self) -> Summary:
-        return Summary("Recorded run", str(self.path), self.verdict, self.settings())
+        verdict, facts = sentence(self.verdict), self._facts()
+        return Summary("Recorded run", str(self.path), verdict, self.settings(), facts)
 
     @override
     def draw(self, style: "FigureStyle") -> "Figure":
@@ -417,7 +442,13 @@ def with_forms(options: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def recorded_drive(bag: Path, namespace: str | None = None) -> Drive | None:
-    """Return the drive whose parameters were recorded, None where they are not or not all.
+    """Return the drive of `recorded_plant`."""
+    plant = recorded_plant(bag, namespace)
+    return None if plant is None else plant.as_drive()
+
+
+def recorded_plant(bag: Path, namespace: str | None = None) -> PlantParameters | None:
+    """Return the parameters of a plant that were recorded, None where they are not or not all.
 
     A table has none.
     """
@@ -439,7 +470,7 @@ def recorded_drive(bag: Path, namespace: str | None = None) -> Drive | None:
         plant = PlantParameters().changed(values, str(bag), known)
     except (ValueError, RecursionError, InvalidInputError):
         return None
-    return plant.as_drive() if values.keys() >= set(plant.drive_names()) else None
+    return plant if values.keys() >= set(plant.drive_names()) else None
 
 
 def _answers(samples: SampleColumns, forces: ForceColumns) -> FloatArray:

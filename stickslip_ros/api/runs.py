@@ -4,10 +4,13 @@ import sys
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property
+from math import inf
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from typing_extensions import override
 
+from stickslip_ros.api.design import gains_text
 from stickslip_ros.api.page import Summary
 from stickslip_ros.api.results import Parts, Table, TabularResult, attributes
 from stickslip_ros.api.scenarios import ScenarioLike, as_scenario
@@ -15,6 +18,7 @@ from stickslip_ros.measures.cycle_measures import Measures
 from stickslip_ros.measures.following import Followed, Following, followed
 from stickslip_ros.measures.run_meter import RunAnalysis
 from stickslip_ros.measures.sample_meter import NOT_JUDGED
+from stickslip_ros.model.control import ControlLaw
 from stickslip_ros.motion.trajectory import (
     SampleRecorder,
     Trajectory,
@@ -23,6 +27,7 @@ from stickslip_ros.motion.trajectory import (
 from stickslip_ros.progress import Progress
 from stickslip_ros.quantities import number_of, quantities_of
 from stickslip_ros.scenarios.files import Scenario
+from stickslip_ros.scenarios.parameters import PlantParameters
 from stickslip_ros.show.measure_table import simulation_tables
 from stickslip_ros.show.parameter_tables import scenario_tables
 from stickslip_ros.show.quantities import Units
@@ -102,15 +107,56 @@ class Run(TabularResult):
     def _summary(self) -> Summary:
         from stickslip_ros.show.drawing import measures_text
 
-        verdict = measures_text(self.measures, self._units)
-        parameters = scenario_tables(self.scenario, used=True)
-        return Summary("Simulated run", self.scenario.name, verdict, parameters)
+        plant, law = self.scenario.plant, self.scenario.control_law
+        _, force = self._history.control.columns()
+        forces = (float(np.abs(force).max()), float(force[-1])) if len(force) else (None, None)
+        facts = loop_facts(plant, law, *forces, sampled=not self.continuous)
+        verdict = sentence(measures_text(self.measures, self._units))
+        parameters = scenario_tables(self.scenario, unused=())
+        return Summary("Simulated run", self.scenario.name, verdict, parameters, facts)
 
     @override
     def parts(self) -> Parts:
         runs = self.measures, self.truth, self._following
         yield from simulation_tables(self.scenario, self.duration, *runs)
         yield from self.notes
+
+
+def sentence(measures: str) -> str:
+    """Return `measures_text` as a sentence."""
+    return f"{measures.replace('at the end:', 'At the end the motion is', 1)}."
+
+
+def loop_facts(
+    plant: PlantParameters,
+    law: ControlLaw | None,
+    peak: float | None,
+    last: float | None,
+    *,
+    sampled: bool = True,
+) -> dict[str, str]:
+    """Return what a page says first of a loop: feeds, gains, and forces `peak` and `last`, N."""
+    from stickslip_ros.studies.stability import SEARCHED_FEEDS, stable_feeds  # it takes long
+
+    units = Units.for_drive(plant.as_drive())
+    facts = {"belt speed": units.text(plant.belt_speed, "m/s")}
+    ranges = stable_feeds(plant, law) if sampled or law is None else None
+    if ranges is not None:
+        ends = tuple(share * plant.belt_speed for share in SEARCHED_FEEDS)
+        *shown, searched = (" to ".join(units.texts(each, "m/s", 3)) for each in (*ranges, ends))
+        stable = "; ".join(shown) or "none"
+        facts["feeds that hold"] = f"{stable} (by linear theory, searched from {searched})"
+    facts["control"] = "none" if law is None else f"{law.name}: {gains_text(law, units)}"
+    if law is not None and peak is not None:
+        most, end = units.texts([peak, last], "N")
+        facts["control force"] = f"at most {most}, {end} at the end{limit_text(law, plant, units)}"
+    return facts
+
+
+def limit_text(law: ControlLaw, plant: PlantParameters, units: Units) -> str:
+    """Return the limit of a control force, for behind that force; nothing without one."""
+    limit = min(law.force_limit, plant.actuator.limit)
+    return f"; limit {units.text(limit, 'N')}" if limit < inf else ""
 
 
 def simulate(

@@ -188,7 +188,7 @@ class Sweep(Points):
             f"Sweep over {' and '.join(self.study.plan.parameters)}",
             self.scenario.name,
             f"{verdict} of {self.study.plan.size} points",
-            scenario_tables(self.scenario, used=True),
+            scenario_tables(self.scenario, unused=self.study.plan.parameters),
         )
 
     @override
@@ -231,7 +231,7 @@ class Basin(Points):
     @override
     def _summary(self) -> Summary:
         shares = [f"{attractor_name(motion)} {motion.share:.1%}" for motion in self.attractors]
-        parameters = scenario_tables(self.scenario, used=True)
+        parameters = scenario_tables(self.scenario, unused=self.study.plan.parameters)
         title = "Basins of attraction"
         return Summary(title, self.scenario.name, ", ".join(shares), parameters)
 

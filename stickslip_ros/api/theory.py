@@ -117,7 +117,7 @@ class Stability(Result):
         verdict = "; ".join(
             f"{name}: {'stable' if stable else 'unstable'}" for name, stable in known.items()
         )
-        parameters = scenario_tables(self.scenario, used=True)
+        parameters = scenario_tables(self.scenario, unused=())
         return Summary("Stability", self.scenario.name, verdict, parameters)
 
     @override

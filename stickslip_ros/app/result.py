@@ -71,9 +71,9 @@ def add_results(parser: argparse.ArgumentParser, shown: str) -> None:
         "--html",
         type=Path,
         metavar="FILE",
-        help="write a report as one page, to read offline, print and hand on: what the command "
-        "prints, its figure, parameters with units, notes and versions; an existing file is "
-        "replaced",
+        help="write a report as one page, to read offline, print and hand on: verdict, feeds that "
+        "hold, gains, force and figure, on one sheet of A4; then what the command prints, "
+        "parameters and versions; an existing file is replaced",
     )
     add_json(parser)
 

@@ -42,7 +42,10 @@ def comparison_figure(
     points, label, texts = np.zeros(1), "", [""]
     if grid is not None:
         rows = [grid.values(point) for point in range(grid.size)]
-        points, label = np.arange(len(rows)), ", ".join(axis.parameter for axis in grid.axes)
+        points, label = (
+            np.arange(len(rows)),
+            ", ".join(units.named(axis.parameter) for axis in grid.axes),
+        )
         texts = [
             "\n".join(units.text(v, a.unit) for v, a in zip(row, grid.axes, strict=True))
             for row in rows

@@ -1,8 +1,9 @@
 """The tables of parameters: those of a scenario, and those that were recorded."""
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import suppress
+from math import inf
 
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.model.constants import Parameter
@@ -15,15 +16,30 @@ from stickslip_ros.tables import TextTable
 _COMMON = set(NodeParameters().known)
 """What all nodes have: how they start, and their clock."""
 
+_MESSAGES = {
+    *("pace", "real_time_factor", "force_timeout", "reply_timeout", "command_rule", "force_type"),
+    *("force_number", "command_timeout", "effort", "slide_name", "belt_name", "flow_window"),
+    *("publish_clock", "publish_truth"),
+}
+"""How a plant exchanges messages, which has no effect on a result without nodes."""
 
-def scenario_tables(scenario: Scenario, *, used: bool = False) -> Iterator[TextTable]:
+_OFF = (0.0, inf, "", "none", "exact", "ideal")
+"""Values at which, if they are the default, a part of the model is not there."""
+
+
+def scenario_tables(
+    scenario: Scenario, *, unused: Collection[str] | None = None
+) -> Iterator[TextTable]:
     """Yield the parameters of each node: value, unit, and where the value comes from.
 
-    If only those that are `used` are asked for, what has no effect is left out.
+    With names that are `unused` in a result without nodes, NODE or NODE.PARAMETER, these and what
+    has no effect there are left out.
     """
     units = Units.for_drive(scenario.plant.as_drive())
     for node, values in scenario.as_dict().items():
-        left_out = _without_effect(getattr(scenario, node)) if used else set[str]()
+        left_out = set[str]()
+        if unused is not None:
+            left_out = _without_effect(getattr(scenario, node)) | _MESSAGES
         rows = [
             [
                 parameter.name,
@@ -33,8 +49,13 @@ def scenario_tables(scenario: Scenario, *, used: bool = False) -> Iterator[TextT
             ]
             for parameter in own_first(NODE_PARAMETERS[node])
             if parameter.name not in left_out
+            and {node, f"{node}.{parameter.name}"}.isdisjoint(unused or ())
+            and (
+                unused is None or node != "analyzer" or parameter.default != values[parameter.name]
+            )
         ]
-        yield TextTable("", [node, "value", "unit", "from"], rows)
+        if rows:
+            yield TextTable("", [node, "value", "unit", "from"], rows)
 
 
 def recorded_tables(recorded: Mapping[str, Mapping[str, str]], units: Units) -> Iterator[TextTable]:
@@ -51,9 +72,13 @@ def recorded_tables(recorded: Mapping[str, Mapping[str, str]], units: Units) -> 
 
 
 def _without_effect(parameters: NodeParameters) -> set[str]:
-    """Return the parameters that have no effect beside the others, or that say "as forward"."""
-    same = {name for name, value in parameters.flat().items() if value != value}
-    return same | {name for name, _ in parameters.not_used()} | _COMMON
+    """Return the parameters that have no effect beside the others: off, or "as forward"."""
+    off = {
+        name
+        for name, value in parameters.flat().items()
+        if value != value or (value in _OFF and value == parameters.known[name].default)
+    }
+    return off | {name for name, _ in parameters.not_used()} | _COMMON
 
 
 def _recorded_without_effect(node: str, texts: Mapping[str, str]) -> set[str]:

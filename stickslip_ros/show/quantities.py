@@ -3,7 +3,7 @@
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import isfinite, isinf
+from math import floor, isfinite, isinf, isnan, log10
 from typing import Any, Self
 
 import numpy as np
@@ -241,6 +241,21 @@ class Units:
         values = [0.0 if isinstance(v, float) and abs(v) < least else v for v in values]
         scale, prefix = _prefix_of(unit, greatest if greatest >= least else 0.0)
         return [_text(value, scale, f" {prefix}{unit}".rstrip(), digits) for value in values]
+
+    def with_error(self, value: float, error: float, unit: str) -> str:
+        """Return a value (SI) with the digits that its standard error tells: two of the error.
+
+        An unknown error, and one that is rounding, is left out; a value of NaN is "-".
+        """
+        if isnan(value):
+            return "-"
+        if not error > NOISE * abs(value):
+            return self.texts([value], unit, 3)[0]
+        unit = self.of_unit(unit)
+        scale, prefix = _prefix_of(unit, max(abs(value), error))
+        digits = max(1 - floor(log10(error / scale)), 0)
+        text = " ± ".join(f"{number / scale:.{digits}f}" for number in (value, error))
+        return f"{text} {prefix}{unit}".rstrip()
 
 
 def check_colour(colour: str, parameters: int) -> None:

@@ -7,6 +7,7 @@ from operator import attrgetter
 from typing import Any, NamedTuple, TypeVar, cast
 
 import numpy as np
+from scipy.optimize import bisect
 
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.model.actuator import IDEAL_ACTUATOR
@@ -55,6 +56,9 @@ Notes = dict[str, str]
 
 _DRIVES = 100
 """Drives that are drawn for an interval."""
+
+SEARCHED_FEEDS = (0.1, 10.0)
+"""First and last belt speed at which a loop is looked at, as shares of that of its drive."""
 
 _NO_CONTROL = "the scenario has no controller"
 
@@ -319,6 +323,43 @@ def _sampled_loop(drive: Drive, law: ControlLaw | None, plant: PlantParameters) 
     settling_time = _Noted(loop.settling_time(law), growing)
     values = radius, radius < 1.0, loop.decay_rate(law), settling_time, *_sampled_gains(loop, law)
     return _Noted(dict(zip(_SAMPLED_LOOP, values, strict=True)), _omitted(plant))
+
+
+def stable_feeds(
+    plant: PlantParameters, law: ControlLaw | None
+) -> list[tuple[float, float]] | None:
+    """Return the ranges of belt speeds, m/s, at which a small vibration decays by linear theory.
+
+    Searched are those from `SEARCHED_FEEDS[0]` to `SEARCHED_FEEDS[1]` times the belt speed; a range
+    that ends there may be wider. Without a `law` there is no control. None if the belt is at rest,
+    or if linear theory does not cover the loop.
+    """
+    drive = plant.as_drive()
+
+    def is_stable(speed: float) -> bool:
+        moved = replace(drive, belt_speed=speed)
+        if law is None:
+            expansion = expand(moved)
+            return expansion is not None and bool(expansion.stable)
+        loop = LinearSampledLoop.from_drive(moved, *plant.linear_sampling)
+        return loop is not None and loop.spectral_radius(law) < 1.0
+
+    def sign(speed: float) -> float:
+        return 1.0 if is_stable(speed) else -1.0
+
+    if not drive.belt_speed:
+        return None
+    speeds = (drive.belt_speed * np.geomspace(*SEARCHED_FEEDS, 100)).tolist()
+    try:
+        known = [is_stable(speed) for speed in speeds]
+    except InvalidInputError:
+        return None
+    ends = speeds[:1] * known[0]
+    for low, high, *states in zip(speeds, speeds[1:], known, known[1:], strict=False):
+        if states[0] != states[1]:
+            ends.append(bisect(sign, low, high, rtol=1e-4))
+    ends += speeds[-1:] * known[-1]
+    return [*zip(ends[::2], ends[1::2], strict=True)]
 
 
 def linear_systems(scenario: Scenario) -> tuple[LinearSystem | None, LinearSystem | None]:

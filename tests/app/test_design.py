@@ -82,7 +82,7 @@ def test_no_proposal_is_a_result_with_a_reason(stickslip: Run, tmp_path: Path) -
     assert "N, and must be at most 5 N" in done.stdout
     (page,) = tmp_path.iterdir()
     shown = page.read_text(encoding="utf-8")
-    assert "There is none: there is nothing to propose" in shown
+    assert "There is no figure: there is nothing to propose" in shown
     assert "<svg" not in shown
     lines = [line for line in done.stderr.splitlines() if "nothing to propose" in line]
     options = "--plot map.png: not drawn", "--out gains.yaml: not written"

@@ -167,7 +167,11 @@ def test_the_time_left_is_told_after_a_quarter(
     monkeypatch.setattr(sys.stderr, "isatty", lambda: on_a_terminal)
     monkeypatch.setattr(output, "monotonic", lambda: clock)
     told: list[tuple[float, int, str]] = []
-    monkeypatch.setattr(output, "tell", lambda text: told.append((clock, done, text)))
+
+    def tell(text: str) -> None:
+        told.append((clock, done, text))
+
+    monkeypatch.setattr(output, "tell", tell)
     total = first + 200
     for even in (True, False):
         clock, done = 0.0, first

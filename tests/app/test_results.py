@@ -13,6 +13,7 @@ from stickslip_ros.api.recordings import Comparison
 from stickslip_ros.api.results import Result
 from stickslip_ros.errors import RunError
 from stickslip_ros.scenarios.files import load_scenario
+from tests.app.browser import headless_browser
 from tests.app.conftest import REFERENCE, Run
 from tests.docs.test_json import differences
 
@@ -120,7 +121,7 @@ def test_a_command_prints_and_a_page_shows_what_python_returns(
     result.to_html(tmp_path / "page.html")
     found = Page(tmp_path / "page.html")
     assert verdict in found.text
-    assert "There is none: it takes too long" in found.text
+    assert "There is no figure: it takes too long" in found.text
     assert "table" in found.tags
 
 
@@ -169,4 +170,35 @@ def test_a_page_is_one_file_whose_identifiers_are_its_own(stickslip: Run, tmp_pa
     assert {each for each in found.references if not each.startswith("data:")} <= inside
     for text in (name, "stick-slip", "434.1 µm", "friction.static", "N s/m", "heyoka"):
         assert text in found.text
-    assert "friction.kinetic" not in found.text  # of another law
+    for text in ("feeds that hold", "27.6 mm/s to 400 mm/s", "linear gain -3 kN s/m"):
+        assert text in found.text
+    for text in ("friction.kinetic", "reply_timeout", "bias_force", "bag_exists"):  # not used
+        assert text not in found.text
+
+
+@pytest.mark.process
+@pytest.mark.long
+def test_what_is_above_the_line_of_a_page_prints_on_one_sheet(
+    stickslip: Run, tmp_path: Path
+) -> None:
+    """Of A4, with nothing cut off; what is below starts on the next."""
+    laws = "--controllers", ",".join(LAWS), "--given", "washout", "--duration", "0.6"
+    compare = ("compare", "feed_drive", *laws, "--seeds", "2", "--spread", "0.1")
+    commands = ("simulate", "feed_drive", "--duration", "1"), compare, ("report", REFERENCE)
+    with headless_browser() as browser:
+        for command in commands:
+            assert stickslip(*command, "--html", "page.html").returncode == 0
+            page = browser.new_page(viewport={"width": 680, "height": 1009})
+            page.goto((tmp_path / "page.html").as_uri())
+            count: dict[str, int] = {}
+            for hidden in ("nothing", ".details", ".first"):
+                style = page.add_style_tag(content=f"{hidden} {{ display: none !important; }}")
+                printed = page.pdf(prefer_css_page_size=True)
+                count[hidden] = len(re.findall(rb"/Type /Page\b", printed))
+                style.evaluate("style => style.remove()")
+            assert count[".details"] == 1
+            assert count["nothing"] == 1 + count[".first"]
+            page.emulate_media(media="print")
+            room = "part => [part.clientHeight - part.scrollHeight, innerWidth - part.scrollWidth]"
+            for part in (".first", ".details"):
+                assert min(page.locator(part).evaluate(room)) >= 0, (command, part)

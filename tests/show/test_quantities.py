@@ -74,3 +74,12 @@ def test_a_rotary_axis_has_angles_and_torques() -> None:
     assert units.texts([20.0], "kg") == ["20 kg m^2"]
     assert units.texts([4.0], "s") == ["4 s"]
     assert units.axis("displacement", "m", [0.0025]) == (1e-3, "displacement (mrad)")
+
+
+def test_digits_of_a_value_follow_its_error() -> None:
+    assert SI.with_error(299.96, 0.0898, "N") == "299.960 ± 0.090 N"
+    assert SI.with_error(-306.2, 19.44, "N") == "-306 ± 19 N"
+    assert SI.with_error(4.41e-5, 8.01e-8, "m/s") == "44.100 ± 0.080 µm/s"
+    for error in (0.0, 1e-14, float("nan")):  # as of what is given
+        assert SI.with_error(300.0, error, "N") == "300 N"
+    assert SI.with_error(float("nan"), 0.1, "N") == "-"

@@ -16,6 +16,7 @@ from stickslip_ros.studies.stability import (
     hopf_distance,
     hopf_ratio,
     stability,
+    stable_feeds,
     why_no_figure,
 )
 from stickslip_ros.theory.hopf import hopf_points
@@ -132,3 +133,23 @@ def test_the_distance_from_the_hopf_speed() -> None:
     ):
         assert hopf_ratio(drive) is None
         assert hopf_distance(drive) == ""
+
+
+def test_the_feeds_that_hold_end_where_a_vibration_starts() -> None:
+    (hopf,) = hopf_points(FEED_DRIVE)
+    drive = load_scenario("feed_drive")
+    ranges = stable_feeds(drive.plant, None)
+    assert ranges is not None
+    ((first, last),) = ranges
+    assert first == pytest.approx(hopf.belt_speed, rel=1e-3)
+    assert last == pytest.approx(0.4)
+    ranges = stable_feeds(drive.plant, drive.control_law)
+    assert ranges is not None
+    ((first, _),) = ranges
+    for speed, stable in ((first * 1.001, True), (first * 0.999, False)):
+        moved = replace(FEED_DRIVE, belt_speed=speed)
+        loop = LinearSampledLoop.from_drive(moved, *drive.plant.linear_sampling)
+        assert loop is not None
+        assert (loop.spectral_radius(drive.controller.control_law) < 1.0) is stable
+    for values in ("plant.belt_speed=0.0", "plant.belt.kind=sine"):
+        assert stable_feeds(load_scenario("feed_drive", [values]).plant, None) is None
