@@ -130,7 +130,7 @@ def stability_tables(scenario: Scenario, parts: Section, notes: Notes) -> Iterat
     rows: list[list[str]] = []
     for section, quantities in THEORY.items():
         values = parts[section]
-        rows.append([section.replace("_", " "), ""])
+        known: list[list[str]] = []
         for name, (label, unit, _) in quantities.items():
             value = values[name]
             if name == "decay_rate" and value is not None and value < 0.0:
@@ -139,7 +139,8 @@ def stability_tables(scenario: Scenario, parts: Section, notes: Notes) -> Iterat
             if name == "speed_ranges" and value and value[0][0] == values["searched_speeds"][0]:
                 low, _, rest = shown.partition(" to ")
                 shown = f"up to {rest} (searched from {low})"
-            rows.append([f"  {label}", shown])
+            known += [[f"  {label}", shown]] * (shown.strip("-, ") != "")
+        rows += [[section.replace("_", " "), ""], *known] if known else []
     yield TextTable(f"{scenario.name}, by theory", ["", ""], rows)
     for loop in ("open_loop", "closed_loop"):
         cycles: list[Section] = parts[loop]["limit_cycles"]
@@ -152,19 +153,31 @@ def stability_tables(scenario: Scenario, parts: Section, notes: Notes) -> Iterat
             }  # fmt: skip
             title = f"limit cycles, {loop.replace('_', ' ')}"
             yield measure_table(title, columns, dict.fromkeys(columns, units))
-    for place, reason in notes.items():
-        yield f"{place.replace('_', ' ').replace('.', ', ')}: {reason}"
+    for reason in dict.fromkeys(notes.values()):
+        places = [place for place, why in notes.items() if why == reason]
+        yield f"{'; '.join(places).replace('_', ' ').replace('.', ', ')}: {reason}"
 
 
 def _shown(name: str, value: Any, unit: str, units: Units) -> str:
     if name == "eigenvalues" and value is not None:
         return _complex(value, units.of_unit(unit))
+    if "lyapunov" in name:
+        coefficients = cast(list[float | None], value if isinstance(value, list) else [value])
+        return ", ".join(units.text(each, unit) + _starts(each) for each in coefficients)
     if not isinstance(value, list):
         return units.texts([value], unit, digits=8 if name == "spectral_radius" else 4)[0]
     items = cast(list[Any], value)
     if name in ("stable_linear_gains", "speed_ranges"):
         return "; ".join(" to ".join(units.texts(ends, unit)) for ends in items) or "-"
     return ", ".join(units.texts(items, unit)) or "-"
+
+
+def _starts(coefficient: float | None) -> str:
+    """Return what a first Lyapunov coefficient means: whether the vibration has hysteresis."""
+    if not coefficient:
+        return ""
+    start = "with a jump" if coefficient > 0.0 else "gently"
+    return f" ({'no ' * (coefficient < 0.0)}hysteresis: the vibration starts {start})"
 
 
 def _complex(values: Iterable[complex], unit: str) -> str:

@@ -117,6 +117,19 @@ def _lines(scenario: Scenario, found: Section, notes: Notes) -> list[str]:
     return [line for part in tables if not isinstance(part, str) for line in part.lines()]
 
 
+def test_the_table_has_what_there_is_and_what_a_lyapunov_coefficient_means() -> None:
+    scenario = load_scenario("feed_drive", ["plant.expects_control=false"])
+    found, notes = stability(scenario)
+    lines = _lines(scenario, found, notes)
+    assert not [line for line in lines if line.endswith("-")]
+    assert "sampled loop" not in lines
+    gentle = "-0.225 (no hysteresis: the vibration starts gently)"
+    assert [line.endswith(gentle) for line in lines if "Lyapunov" in line] == [True]
+    found["open_loop"]["first_lyapunov_coefficients"] = [0.5, None]
+    jump = "0.5 (hysteresis: the vibration starts with a jump), -"
+    assert any(line.endswith(jump) for line in _lines(scenario, found, notes))
+
+
 def test_the_distance_from_the_hopf_speed() -> None:
     for speed in (40.0, -40.0):
         drive = replace(FEED_DRIVE, belt_speed=speed)
