@@ -94,6 +94,7 @@ def figure(points: list[dict[str, Any]], path: Path) -> None:
 
     mpl.use("Agg")
     import matplotlib.pyplot as plt
+    from matplotlib.lines import Line2D
 
     shown, axes = plt.subplots(2, 3, figsize=(10, 5.4), sharex=True, sharey=True)
     for (row, place), (column, ratio) in product(enumerate(PLACES), enumerate(RATIOS)):
@@ -106,13 +107,20 @@ def figure(points: list[dict[str, Any]], path: Path) -> None:
             ax.plot(*at, "s", ms=11, color="#4c9f70" if holds else "#d9d9d9")
             if each["simulated_rate"] > 0.0:
                 ax.plot(*at, "o", ms=5, mfc="none", mec="black")
-        ax.set(xscale="log", title=f"washout on {place}, motor {ratio:g} m")
+        ax.set(xscale="log", title=rf"washout on {place}, $M = {ratio:g}\,m$")
         ax.set_yticks(range(len(GAINS)), [f"{abs(gain) / 1e3:g}" for gain in GAINS])
         if row == 1:
             ax.set_xlabel("bandwidth of the cascade, rad/s")
         if column == 0:
-            ax.set_ylabel("-k1, kN s/m")
-    shown.tight_layout()
+            ax.set_ylabel("$-k_1$, kN s/m")
+    square: dict[str, Any] = {"marker": "s", "ls": "", "ms": 11}
+    handles = [
+        Line2D([], [], **square, color="#4c9f70", label="holds, by the linear sampled loop"),
+        Line2D([], [], **square, color="#d9d9d9", label="does not"),
+        Line2D([], [], marker="o", ls="", ms=5, mfc="none", mec="black", label="simulated: holds"),
+    ]
+    shown.tight_layout(rect=(0.0, 0.07, 1.0, 1.0))
+    shown.legend(handles=handles, loc="lower center", ncols=3)
     shown.savefig(path, dpi=110)
 
 

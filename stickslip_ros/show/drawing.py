@@ -104,6 +104,29 @@ def draw_line(
     axes.plot(time, values / scale, **look)
 
 
+def with_edges(trace: Sequence[FloatArray], motion: DrawnMotion) -> list[FloatArray]:
+    """Return a friction force at samples with its values where a stick begins and ends.
+
+    There it is steepest: the nearest samples miss its extremes by another part of a period in each
+    cycle, which looks like a beat. In a stick of three samples or more on a line it is that line.
+    """
+    time, force = trace
+    stuck = np.diff(motion.stick_time) > 0.5 * np.diff(motion.time)
+    change = np.diff(np.r_[0, stuck, 0])
+    begins, ends = motion.time[np.flatnonzero(change > 0)], motion.time[np.flatnonzero(change < 0)]
+    first, last = np.searchsorted(time, begins, "right"), np.searchsorted(time, ends) - 1
+    long = last >= first + 2
+    rows: list[FloatArray] = [time, force]
+    for edges, row, step in ((begins[long], first[long], 1), (ends[long], last[long], -1)):
+        a, b, c = force[row], force[row + step], force[row + 2 * step]
+        slope = (b - a) / (time[row + step] - time[row])
+        line = np.abs(a - 2.0 * b + c) < 0.1 * np.abs(b - a)
+        added = edges[line], (a + slope * (edges - time[row]))[line]
+        place = np.searchsorted(rows[0], added[0], "left" if step < 0 else "right")
+        rows = [np.insert(column, place, more) for column, more in zip(rows, added, strict=True)]
+    return rows
+
+
 def draw_held(
     axes: Axes,
     pane: Pane,

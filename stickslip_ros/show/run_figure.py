@@ -38,6 +38,7 @@ from stickslip_ros.show.drawing import (
     say,
     shade,
     widened,
+    with_edges,
 )
 from stickslip_ros.show.quantities import SI, Units
 from stickslip_ros.show.run_history import DrawnMotion, RunHistory
@@ -277,7 +278,8 @@ class _OneRun(_Panels):
             position.set_title(title)
             self._draw_motion(position, velocity, pane)
             for force in forces:
-                draw_line(force, pane, friction, newton, history.gap, **_FRICTION)
+                with_stick = with_edges(friction, pane.rows)
+                draw_line(force, pane, with_stick, newton, history.gap, **_FRICTION)
                 gap = history.control_gap
                 draw_line(force, pane, control, newton, gap, **_CONTROL)
                 self.holds |= draw_held(force, pane, control, newton, gap, dropped[0])

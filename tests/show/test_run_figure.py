@@ -24,8 +24,9 @@ from stickslip_ros.motion import RecordedMotion
 from stickslip_ros.record.reader import Recording
 from stickslip_ros.record.report import report_of_recording
 from stickslip_ros.samples import SampleColumns
+from stickslip_ros.show.drawing import with_edges
 from stickslip_ros.show.run_figure import LAST_CYCLES, DrawnRun, run_figure
-from stickslip_ros.show.run_history import RunHistory
+from stickslip_ros.show.run_history import DrawnMotion, RunHistory
 from stickslip_ros.show.style import SCREEN, STYLES, FigureStyle
 from tests.drives import FEED_DRIVE, PAPER
 from tests.show.texts import faults, in_styles, legend_texts
@@ -481,3 +482,21 @@ def test_behind_a_motor_are_the_force_of_the_spring_and_two_phase_planes(style: 
     assert found.keys() >= {*shown}
     spring, *_ = found[shown[0]].lines
     assert float(np.asarray(spring.get_ydata())[-1]) == pytest.approx(258.4, abs=80.0)  # N
+
+
+def test_a_friction_force_reaches_its_extremes_at_the_edges_of_a_stick() -> None:
+    """Between samples: at them its least values would beat. A force that jumps is left as it is."""
+    edges = np.array([0.0, 0.31, 0.90, 1.27, 1.90, 2.23, 3.0])
+    sticks = np.array([0.0, 0.0, 0.59, 0.59, 1.22, 1.22, 1.99])
+    motion = DrawnMotion(edges, *np.zeros((3, len(edges))), sticks)
+    time = np.arange(0.0, 3.0, 0.1)
+    sticking = np.searchsorted(edges, time, "right") % 2 == 0
+    since = time - edges[np.searchsorted(edges, time, "right") - 1]
+    force = np.where(sticking, 150.0 + 400.0 * since, 380.0)
+    shown_time, shown = with_edges((time, force), motion)
+    assert np.all(np.diff(shown_time) >= 0.0)
+    for begin, end in ((0.31, 0.90), (1.27, 1.90), (2.23, 3.0)):
+        stick = shown[(shown_time >= begin - 1e-12) & (shown_time <= end + 1e-12)]
+        assert [stick.min(), stick.max()] == pytest.approx([150.0, 150.0 + 400.0 * (end - begin)])
+    jumping = force + 100.0 * (np.arange(len(time)) % 2)
+    assert np.array_equal(with_edges((time, jumping), motion)[1], jumping)
