@@ -131,8 +131,8 @@ class ComparedLaws(TabularResult):
         """The best law, and all whose intervals of the cases held overlap its."""
         least, first = self.ranks[0].held_interval[0], self.ranks[0]
         if self.rank_by is not None:
-            units, (label, unit, _) = self._units, OUTCOMES[self.rank_by]
-            value = _with_error(units, *first.means[self.rank_by], unit)
+            label, unit, _ = OUTCOMES[self.rank_by]
+            value = self._units.with_error(*first.means[self.rank_by], unit)
             return f"{first.law} has the least {label}: {value}"
         alike = [rank for rank in self.ranks if rank.held_interval[1] >= least]
         laws = ", ".join(f"{rank.law} holds {rank.held_text}" for rank in alike)
@@ -339,7 +339,7 @@ class ComparedLaws(TabularResult):
         """Return what a page says first: what the best law holds, its gains and its force."""
         plan, best, grid = self.study.plan, self.ranks[0], self.study.plan.grid
         plant, law = self.scenario.plant, self.scenarios[best.law].controller.control_law
-        units = Units.for_drive(plant.as_drive(), plan.parameters)
+        units = self._units
         facts, texts = {"best law": best.law}, [units.text(plant.belt_speed, "m/s")]
         if grid is not None:
             rows = [zip(grid.values(point), grid.axes, strict=True) for point in range(grid.size)]
