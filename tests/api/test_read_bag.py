@@ -10,6 +10,7 @@ import pytest
 import stickslip_ros as ss
 from stickslip_ros.api.recordings import recorded_drive
 from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.model.drive import Drive
 from stickslip_ros.record.reader import Recording
 from stickslip_ros.record.recorder import Recorder
 from stickslip_ros.record.report import report_of_recording
@@ -69,6 +70,15 @@ def test_a_part_is_that_of_the_report() -> None:
         ss.read_bag(REFERENCE, start=2.0, end=1.0)
 
 
+def recorded_with(folder: Path, parameters: dict[str, str]) -> Drive | None:
+    """Return the drive of a bag with the parameters of feed_drive, but for some."""
+    with Recorder(folder / "bag") as recorder:
+        everything = ss.scenario("feed_drive").plant.flat()
+        given = {name: json.dumps(value) for name, value in everything.items()}
+        recorder.add_metadata("stickslip_ros/plant", given | parameters)
+    return recorded_drive(folder / "bag")
+
+
 @pytest.mark.parametrize("group", ["friction", "disturbance"])
 def test_a_bag_does_not_have_other_files_read(group: str, tmp_path: Path) -> None:
     """Numbers in a file of the reader would end up in figures of whoever wrote the bag."""
@@ -76,8 +86,9 @@ def test_a_bag_does_not_have_other_files_read(group: str, tmp_path: Path) -> Non
     own.write_text("0,0.4\n1,0.3\n")
     kind = {"friction": "law", "disturbance": "kind"}[group]
     parameters = {f"{group}.{kind}": '"table"', f"{group}.file": f'"{own}"'}
-    with Recorder(tmp_path / "bag") as recorder:
-        everything = ss.scenario("feed_drive").plant.flat()
-        given = {name: json.dumps(value) for name, value in everything.items()}
-        recorder.add_metadata("stickslip_ros/plant", given | parameters)
-    assert recorded_drive(tmp_path / "bag") is None
+    assert recorded_with(tmp_path, parameters) is None
+
+
+@pytest.mark.parametrize("mass", ["[" * 100_000, "-1", "NaN"])
+def test_parameters_that_are_none_are_no_drive(mass: str, tmp_path: Path) -> None:
+    assert recorded_with(tmp_path, {"mass": mass}) is None

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 import stickslip_ros as ss
 from stickslip_ros.errors import InvalidInputError
@@ -142,11 +143,13 @@ def test_a_map_gives_friction_alone(stickslip: Run, tmp_path: Path) -> None:
     rows = np.column_stack([[*speed, *-speed], [*force, *-force]])
     table = written(tmp_path / "map.csv", rows, "v,f")
     arguments = ("identify", str(table), "--map", "--columns", "velocity=v,force=f*2")
-    done = stickslip(*arguments, "--plot", "map.png")
+    size = ("--style", "paper-double", "--size", "8x9", "--dpi", "100")
+    done = stickslip(*arguments, "--plot", "map.png", *size)
     assert done.returncode == 0
     assert "law exponential" in done.stdout
     assert "40 pairs" in done.stdout
-    assert (tmp_path / "map.png").stat().st_size > 1000
+    with Image.open(tmp_path / "map.png") as image:
+        assert image.size == (800, 900)
     assert "s/rad" in stickslip(*arguments, "--rotary").stdout
     model = ss.friction_map(table, columns={"velocity": "v", "force": "f*2"})
     assert stickslip.json(*arguments) == model.to_dict()

@@ -5,10 +5,7 @@ from xml.etree import ElementTree
 
 import pytest
 from geometry_msgs.msg import WrenchStamped
-from PIL import Image
 
-from stickslip_ros.record.codec import pack_joint_state
-from stickslip_ros.record.recorder import Recorder
 from stickslip_ros.testing import ClosedLoop
 from tests.app.conftest import REFERENCE, Run
 from tests.record.runs import STAMPS, STATES, motion, record, state, write_bag
@@ -105,21 +102,6 @@ def test_what_a_bag_lacks_is_said(stickslip: Run, tmp_path: Path) -> None:
     assert "it is not recorded what drive it was: no equilibrium, no friction law" in shown
 
 
-@pytest.mark.parametrize("parameters", [{"mass": "[" * 100_000}, {"mass": "-1", "rate": "NaN"}])
-def test_parameters_that_are_none_are_no_drive(
-    stickslip: Run, tmp_path: Path, parameters: dict[str, str]
-) -> None:
-    with Recorder(tmp_path / "bag") as recorder:
-        channel = recorder.add_topic(STATES, "sensor_msgs/msg/JointState", 10)
-        recorder.add_metadata("stickslip_ros/plant", parameters)
-        for stamp in STAMPS[:100]:
-            position, velocity = motion(stamp / 1e9)
-            values = (position, 0.0), (velocity, 20.0), (0.0, 0.0)
-            recorder.write(channel, pack_joint_state(stamp, *values), stamp)
-    assert stickslip("report", "bag", "--plot", "run.svg").returncode == 0
-    assert "friction law, with the range of this run" not in texts(tmp_path / "run.svg")
-
-
 def test_a_bag_whose_law_is_gone_is_reported_as_one_of_a_law_with_a_memory(
     stickslip: Run, tmp_path: Path
 ) -> None:
@@ -162,11 +144,3 @@ def test_of_forces_that_were_all_refused_none_acted(
     assert rows["peak control force sent"] == "128.6 N"
     assert rows["peak control force acting"] == rows["final control force acting"] == "0 N"
     assert ["dropped", "forces", f"{report['dropped_forces']}"] in map(str.split, text.splitlines())
-
-
-def test_a_figure_has_the_size_that_is_asked_for(stickslip: Run, tmp_path: Path) -> None:
-    options = ("--style", "paper-double", "--size", "8x9", "--dpi", "100")
-    done = stickslip("report", REFERENCE, "--to", "0.2", "--plot", "run.png", *options)
-    assert done.returncode == 0, done.stderr
-    with Image.open(tmp_path / "run.png") as image:
-        assert image.size == (800, 900)

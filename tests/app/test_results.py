@@ -65,8 +65,8 @@ CASES: dict[str, tuple[tuple[str, ...], Callable[[], Result], str]] = {
         "without control: unstable; sampled loop: stable",
     ),
     "design": (
-        ("feed_drive", "--belt-speed", "0.04"),
-        lambda: ss.design("feed_drive", belt_speed=0.04),
+        ("feed_drive", "--belt-speed", "0.06"),
+        lambda: ss.design("feed_drive", belt_speed=0.06),
         "linear gain",
     ),
     "identify": (
