@@ -107,7 +107,7 @@ def test_where_the_body_that_is_fed_back_has_no_gains_the_other_one_is() -> None
 def test_gains_beyond_a_limit_are_no_proposal_and_it_is_told_by_how_much() -> None:
     """The mean friction of 429 N is more than the limit, and the integral carries it."""
     drive = load_scenario("feed_drive", controller="pid").changed(MACHINE)
-    found = ss.design(drive, (0.002, 0.03), force_limit=300.0)
+    found = ss.design(drive, 0.002, force_limit=300.0)
     assert found.controller is None
     assert "the peak force is 4" in (found.remark or "")
     assert "must be at most 300 N" in (found.remark or "")
@@ -243,6 +243,7 @@ def check_from_its_own_limit_cycle(**values: Any) -> None:
         assert 0.0 < np.abs(run.trajectory.control_force).max() <= task.force_limit
 
 
+@pytest.mark.long
 def test_a_proposal_brings_the_drive_to_rest_about_as_predicted() -> None:
     found = designed(force_limit=100.0)
     check_from_its_own_limit_cycle(force_limit=100.0)
@@ -285,7 +286,7 @@ def test_a_tighter_limit_is_slower_and_in_the_end_there_is_nothing() -> None:
 
 def test_the_cubic_gain_is_within_what_the_friction_law_bears() -> None:
     """The law's own, (mu_s - mu_m) N / (2 v_m^3), is 6e5 N s^3/m^3."""
-    found = designed(force_limit=100.0)
+    found = designed(belt_speeds=AT_40, force_limit=100.0)
     assert 0.0 <= proposal(found).cubic_gain <= 3e5
     # From any speed it comes back, even with a force that is not limited.
     for speed in (0.3, -3.0, 30.0):
@@ -301,7 +302,7 @@ def test_the_cubic_gain_is_within_what_the_friction_law_bears() -> None:
     ],
 )
 def test_a_law_that_does_not_grow_with_speed_gets_no_cubic_gain(friction: dict[str, Any]) -> None:
-    found = designed(damping=100.0, force_limit=200.0, **friction)
+    found = designed(belt_speeds=AT_40, damping=100.0, force_limit=200.0, **friction)
     assert proposal(found).cubic_gain == 0.0
 
 
