@@ -200,13 +200,12 @@ def _pickled(path: Path) -> None:
 
 
 def _bomb(path: Path) -> None:
-    """Write an archive of a kilobyte for a gigabyte of zeros."""
+    """Write an archive of a kilobyte whose array takes two gigabytes, as it says."""
     with ZipFile(path, "w", ZIP_BZIP2) as archive, archive.open("t.npy", "w") as stream:
         np.lib.format.write_array_header_1_0(
             stream, {"descr": "<f8", "fortran_order": False, "shape": (1 << 28,)}
         )
-        for _ in range(1 << 5):
-            stream.write(bytes(1 << 24))
+        stream.write(bytes(1 << 24))
 
 
 def _aliases(path: Path) -> None:
