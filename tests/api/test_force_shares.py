@@ -17,7 +17,7 @@ ANSWERS: dict[str, Callable[[ss.Scenario, ss.Scenario], Any]] = {
         free, position=("-1 mm", "1 mm", 2), velocity=("-0.1 m/s", "0.1 m/s", 2)
     ),
     "theory": lambda _, controlled: ss.stability(controlled),
-    "design": lambda _, controlled: ss.design(controlled),
+    "design": lambda _, controlled: ss.design(controlled, belt_speed=0.04),
 }
 
 
