@@ -21,7 +21,7 @@ def test_the_deviations_of_the_committed_study_are_those_of_its_errors() -> None
     assert counts["within 3 errors"] >= 0.99
 
 
-@pytest.mark.parametrize("number", [0, 1, 6])
+@pytest.mark.parametrize("number", [0, 6, pytest.param(1, marks=pytest.mark.long)])
 def test_a_part_of_the_study_agrees_with_it(number: int) -> None:
     committed, found = COMMITTED["drives"][number], asdict(study.comparison(number))
     assert found["deviations"] == pytest.approx(committed["deviations"], abs=0.1)
