@@ -18,7 +18,7 @@ def _axes(figure: Figure) -> dict[str, Axes]:
 
 
 def test_a_band_that_is_huge_does_not_hide_the_curve() -> None:
-    found = identify([record("coulomb", 5.0)], "coulomb", {"force_delay": 0.0})
+    found = identify([record("coulomb", 2.5)], "coulomb", {"force_delay": 0.0})
     curves = found.curves
     vague = [
         replace(each, standard_error=np.where(each.speed > 0.0, 1e6, np.inf)) for each in curves

@@ -112,33 +112,33 @@ def test_the_map_of_a_loop_and_its_critical_gains(style: str) -> None:
         assert path.contains_point((3.0, gain)) == stable
 
 
-@cache
-def designed(force_limit: float) -> Design:
-    limit = f"washout_controller.force_limit={force_limit}"
+@pytest.fixture(scope="module")
+def designed() -> Design:
+    limit = "washout_controller.force_limit=200"
     return design(Task.from_scenario(load_scenario("feed_drive", [limit]), (0.04, 0.04)))
 
 
 @in_styles
-def test_a_design_shows_the_force_limit_as_a_contour(style: str) -> None:
-    figure = design_figure(designed(200.0), style=STYLES[style])
+def test_a_design_shows_the_force_limit_as_a_contour(designed: Design, style: str) -> None:
+    figure = design_figure(designed, style=STYLES[style])
     assert faults(figure) == []
     assert {"force limit 200 N", "needs a larger force"} <= set(legend_texts(figure))
     assert "Designed gains, feed_drive, washout control" in figure.get_suptitle()
 
 
-def test_the_force_at_the_proposal_is_that_of_its_check() -> None:
-    found = designed(200.0)
-    around, controller = found.map_around(), found.controller
-    forces = found.peak_forces(around)
+def test_the_force_at_the_proposal_is_that_of_its_check(designed: Design) -> None:
+    around, controller = designed.map_around(), designed.controller
+    forces = designed.peak_forces(around)
     row, column = 40, int(np.abs(around.linear_gains - controller.linear_gain).argmin())
     assert around.corner_frequencies[row] == pytest.approx(controller.corner_frequency)
-    check, *_ = found.checks
+    check, *_ = designed.checks
     assert forces[row, column] == pytest.approx(check.peak_force, rel=0.1)
     assert forces[row, column] < 200.0 < forces.max()
 
 
-def test_a_design_without_a_limit_shows_contours_of_the_force() -> None:
-    names = legend_texts(design_figure(designed(inf)))
+def test_a_design_without_a_limit_shows_contours_of_the_force(designed: Design) -> None:
+    unlimited = replace(designed, task=replace(designed.task, force_limit=inf))
+    names = legend_texts(design_figure(unlimited))
     assert "largest force at switch-on" in names
     assert "needs a larger force" not in names
 
@@ -161,7 +161,7 @@ def supercritical() -> BifurcationBranches:
 @pytest.fixture(scope="module")
 def subcritical() -> BifurcationBranches:
     drive = replace(PAPER, friction=Exponential(0.4, 0.25, 0.1, 0.0))
-    return BifurcationBranches.around(drive, points=12)
+    return BifurcationBranches.around(drive, points=8)
 
 
 def check_regions(figure: Figure, names: list[str]) -> None:

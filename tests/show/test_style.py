@@ -34,14 +34,17 @@ def small_figure(label: str = "displacement (µm)") -> Figure:
     return figure
 
 
-@pytest.mark.parametrize("ending", [".png", ".svg", ".pdf", ".PNG"])
+@pytest.mark.parametrize("ending", [".PNG", ".svg", ".pdf"])
 def test_the_suffix_gives_the_format_and_the_same_figure_the_same_file(
-    tmp_path: Path, ending: str
+    tmp_path: Path, ending: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    path, again = tmp_path / f"one{ending}", tmp_path / f"other{ending}"
-    for each in (path, again):
-        save(small_figure(), each)
+    """Whatever date the environment gives."""
+    path, again = tmp_path / f"one{ending}", tmp_path / f"other{ending.lower()}"
+    save(small_figure(), path)
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "x")
+    save(small_figure(), again)
     assert path.read_bytes() == again.read_bytes()
+    assert os.environ["SOURCE_DATE_EPOCH"] == "x"
     match ending.lower():
         case ".png":
             with Image.open(path) as image:
@@ -59,18 +62,6 @@ def test_a_users_own_settings_neither_matter_nor_change(tmp_path: Path) -> None:
         save(small_figure(), tmp_path / "other.svg")
         assert mpl.rcParams["font.size"] == 30.0
     assert (tmp_path / "one.svg").read_bytes() == (tmp_path / "other.svg").read_bytes()
-
-
-@pytest.mark.parametrize("ending", [".svg", ".pdf"])
-def test_a_date_of_the_environment_does_not_matter(
-    tmp_path: Path, ending: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    path, again = tmp_path / f"one{ending}", tmp_path / f"other{ending}"
-    save(small_figure(), path)
-    monkeypatch.setenv("SOURCE_DATE_EPOCH", "x")
-    save(small_figure(), again)
-    assert path.read_bytes() == again.read_bytes()
-    assert os.environ["SOURCE_DATE_EPOCH"] == "x"
 
 
 def test_a_title_is_shown_as_it_is_within_the_figure() -> None:
