@@ -20,7 +20,7 @@ def test_a_figure_is_of_the_motion_that_is_measured(
 ) -> None:
     call = ("simulate", "paper", control, "--duration", "100", "--json")
     plain = json.loads(stickslip(*call).stdout)
-    done = stickslip(*call, "--plot", "run.svg")
+    done = stickslip(*call, "--plot", "run.svg", "--no-title")
     assert (done.returncode, done.stderr) == (0, "")
     found = json.loads(done.stdout)
     assert found["regime"] == plain["regime"]
@@ -30,6 +30,7 @@ def test_a_figure_is_of_the_motion_that_is_measured(
     figure = (tmp_path / "run.svg").read_text(encoding="utf-8")
     for text in ("phase portrait", "control force<", "each cycle"):
         assert text in figure
+    assert "Simulated run" not in figure
 
 
 @pytest.mark.long
@@ -40,6 +41,7 @@ def test_a_figure_of_a_disturbed_run_says_so(stickslip: Run, tmp_path: Path) -> 
     assert done.returncode == 0, done.stderr
     figure = (tmp_path / "run.svg").read_text(encoding="utf-8")
     assert "control force and disturbance<" in figure
+    assert "Simulated run" in figure
     assert "control switched on" not in figure
 
 
