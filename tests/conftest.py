@@ -38,7 +38,6 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 STARTING_FIXTURES = {
     "cluster",
     "processes",
-    "recorded",
     "start",
     "start_stickslip",
     "with_packages",
@@ -63,7 +62,9 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Mark the tests whose fixtures start processes and the slow ones; deal them to the workers."""
     items[:] = dealt(items, int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1")))
     for item in items:
-        if STARTING_FIXTURES.intersection(getattr(item, "fixturenames", ())):
+        parameters = item.callspec.params if hasattr(item, "callspec") else {}
+        fixtures = set(getattr(item, "fixturenames", ())) - parameters.keys()
+        if fixtures & STARTING_FIXTURES:
             item.add_marker("process")
         if function_of(item.nodeid) in listed():
             item.add_marker("slow")
