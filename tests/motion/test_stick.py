@@ -5,12 +5,15 @@ the friction that holds the slide at x is h = x + 0.02 v - u, and 0.4 is the mos
 """
 
 from dataclasses import replace
+from typing import Any
 
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from stickslip_ros.model.friction import Coulomb
+from stickslip_ros.model.drive_system import DriveSystem
+from stickslip_ros.model.friction import Coulomb, Directional, Stribeck
+from stickslip_ros.model.plain_drive import drive_system
 from stickslip_ros.motion import Motion, RecordedMotion
 from tests.drives import FEED_DRIVE, PAPER
 
@@ -47,14 +50,24 @@ def test_it_breaks_away_where_friction_can_no_longer_hold_it(direction: float) -
     )
 
 
-@given(st.floats(0.0, 0.5), st.floats(0.05, 1.0), st.floats(-1.0, 1.0), st.integers(-3, 3))
+@pytest.mark.parametrize("system", [drive_system, DriveSystem], ids=["plain", "any"])
+@given(
+    damping=st.floats(0.0, 0.5),
+    belt=st.floats(0.05, 1.0),
+    force=st.floats(-1.0, 1.0),
+    rounding=st.integers(-3, 3),
+)
 @example(damping=0.1, belt=0.3, force=0.0, rounding=1)
 @example(damping=0.15, belt=0.4, force=0.1, rounding=0)
 def test_rounding_at_the_limit_does_not_hold_the_slide_for_ever(
-    damping: float, belt: float, force: float, rounding: int
+    system: Any, damping: float, belt: float, force: float, rounding: int
 ) -> None:
-    drive = replace(PAPER, damping=damping, belt_speed=belt)
-    motion = Motion(drive, 0.0, 0.0)
+    """However large friction is forward: it slips backward."""
+    law = Directional(Stribeck(0.6, 0.1, 0.5), PAPER.friction)
+    drive = replace(PAPER, damping=damping, belt_speed=belt, friction=law)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("stickslip_ros.motion.motion.drive_system", system)
+        motion = Motion(drive, 0.0, 0.0)
     motion.force = force
     at_limit = 0.4 - damping * belt + force
     motion.restart(at_limit * (1.0 + rounding * 2.0**-52), belt)
