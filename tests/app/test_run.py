@@ -44,7 +44,7 @@ def test_a_plant_that_is_deactivated_pauses_the_run(start_stickslip: Start, grap
         request = ChangeState.Request(transition=Transition(id=transition))
         assert graph.call(ChangeState, "/feed_drive/plant/change_state", request).success
 
-    process = start_stickslip("run", "paper", "--pace", "lockstep", "--composed", "--json")
+    process = start_stickslip("run", "paper", "--pace", "realtime", "--composed", "--json")
     graph.wait_until(lambda: "active" in states_of_plant(health), "the plant is active")
     ask_for(Transition.TRANSITION_DEACTIVATE)
     told = len(states_of_plant(health))
