@@ -243,8 +243,8 @@ def verdict(identifier: str, figure: PaperFigure | None = None) -> Finding:
     return claim.check(Evidence(lambda number: figure or no_figure(number)))
 
 
-def test_enough_stiffness_ends_the_sticking(without_figures: dict[str, Finding]) -> None:
-    finding = without_figures["fig-10-end"]
+def test_enough_stiffness_ends_the_sticking() -> None:
+    finding = verdict("fig-10-end")
     assert finding.verdict is HOLDS
     overruns, never = 43.12, 839.0
     assert f"Above stiffness {overruns:g} " in finding.remark
