@@ -16,6 +16,8 @@ from stickslip_ros.text import quantity
 
 LONGEST = 9e9
 """Longest time, s, that stamps can express."""
+_LATEST = 1e11
+"""Latest date, s since 1970."""
 _FEWEST, _MOST = 10, 100_000
 """Fewest rows of a part that is evenly spaced; rows in which a rounding is looked for."""
 _COARSE_SHARE, _COMMON_SHARE, _MULTIPLE = 0.02, 0.02, 1e-3
@@ -63,11 +65,6 @@ def in_order(
         column = table.number(clock.places[0]) if clock.bare else clock.text
         way = "" if factor == 1.0 else f"*{factor:.12g}"
         what += f", as a counter that wraps: time=unwrap({column}, {turn:.12g}){way}"
-    elif len(back) == 1 and abs(1e3 * after - before - step) < 1.5 * step:
-        what += (
-            f", from {before:g} to {after:g}: --decimal {',.'[table.decimal == ',']} reads it as "
-        )
-        what += f"{1e3 * after:g}"
     elif len(back) <= _MOST_SESSIONS:
         sizes = " and ".join(map(str, np.diff(bounds)))
         what += f", where a session of its own starts: --session 1 takes the first of {sizes} rows"
@@ -91,13 +88,15 @@ def check_turns(table: Table, time: FloatArray) -> None:
 
 
 def unit_of_steps(
-    step: float, period: tuple[float, float] | None, column: str
+    step: float, first: float, period: tuple[float, float] | None, column: str
 ) -> tuple[float, list[str]]:
-    """Return the unit of times without one, s, by their usual step, and sentences on it.
+    """Return the unit of times without one, s, by their usual step and the first, and sentences.
 
     `period` is that of the rows in s and in a unit of the table, if that is told.
     """
     lasting, own = period or (nan, nan)
+    if period and step == 1.0:  # row numbers
+        own = 1.0
     if own != lasting and abs(step - own) < _SAME_STEP * own:
         text = quantity(lasting, "s")
         return lasting / own, [
@@ -105,6 +104,11 @@ def unit_of_steps(
         ]
     if step < 1.0:
         return 1.0, []
+    if first > _LATEST:
+        raise InvalidInputError(
+            f"the time starts at {first:.6g}, which is no date in s: time={column}*NUMBER converts "
+            "it, with 0.001 from ms, 1e-06 from µs, 1e-07 from 100 ns, 1e-09 from ns"
+        )
     return 1.0, [
         f"the time has no unit and counts in s, {quantity(step, 's')} from row to row: in ms it is "
         f"time={column}*0.001"
@@ -138,8 +142,9 @@ def even_times(time: FloatArray) -> tuple[FloatArray, list[str]]:
                 f"the times are multiples of {quantity(rounding, 's')}: if they are rounded, "
                 f"velocities err by {share:.0%}"
             ]
-    if stand := np.count_nonzero(time[1:] == time[:-1]):
-        notes.append(f"{stand} of {len(time)} rows have the time of the row before")
+    if stand := int(np.count_nonzero(time[1:] == time[:-1])):
+        way = ": --period in place of it tells rows apart" * (stand > _TURNING_SHARE * len(time))
+        notes.append(f"{stand} of {len(time)} rows have the time of the row before{way}")
     return time, notes
 
 

@@ -182,7 +182,10 @@ def _of_json(content: bytes) -> str:
             for key, item in parts.items():
                 search(f"{name}.{key}".strip("."), item)
 
-    search("", json.loads(content))
+    try:
+        search("", json.loads(content))
+    except json.JSONDecodeError:
+        search("", [json.loads(line) for line in content.splitlines() if line.strip()])
     if not tables:
         sys.exit("it is JSON, and has neither a list of rows nor vectors")
     name = max(tables, key=lambda item: len(tables[item]))
@@ -227,7 +230,7 @@ _JSON = Adapter("JSON", "pandas", _of_json)
 BY_END = {
     **dict.fromkeys((".mat", ".h5", ".hdf5"), MAT),
     **dict.fromkeys((".yaml", ".yml"), _YAML),
-    ".json": _JSON,
+    **dict.fromkeys((".json", ".jsonl", ".ndjson"), _JSON),
     ".npy": Adapter("a numpy array", "numpy", _of_array),
 }
 """Adapters by the end of its name."""

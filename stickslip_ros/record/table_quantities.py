@@ -11,7 +11,7 @@ import numpy as np
 from stickslip_ros.arrays import BoolArray, FloatArray, IntArray, windows
 from stickslip_ros.errors import BagError, InvalidInputError
 from stickslip_ros.quantities import ROTARY
-from stickslip_ros.record.expressions import Expression
+from stickslip_ros.record.expressions import Expression, listed
 from stickslip_ros.record.faults import Jumps, lost_velocities, shift_note
 from stickslip_ros.record.imperfections import play_note, ripple_note
 from stickslip_ros.record.table_clock import (
@@ -24,7 +24,7 @@ from stickslip_ros.record.table_clock import (
     unit_of_steps,
 )
 from stickslip_ros.record.table_columns import ROW, Table, reading_file
-from stickslip_ros.record.units import Unit, is_acceleration, units_in
+from stickslip_ros.record.units import Unit, other_quantity, units_in
 from stickslip_ros.samples import LARGEST
 from stickslip_ros.stamps import NANOSECONDS
 from stickslip_ros.text import must_be_one_of, quantity
@@ -118,7 +118,8 @@ def quantities_of(
     present = np.isfinite(values[needed])
     if not present.any():
         raise InvalidInputError(
-            f"{table.path}: no row has a time and a {needed}, {asked[needed].text}"
+            f"{table.path}: no row has a time and a {needed}, {asked[needed].text}; the columns "
+            f"are {listed(table.columns)}"
         )
     for name in [name for name in values if name not in _MOTION and clocks[name] == clock]:
         values[name], note = _merged(name, time, values[name], present)
@@ -265,7 +266,8 @@ class _Cells:
         rows = in_order(self.table, asked, factor, found[clock], rows)
         if self.unknown_unit:
             step = float(np.median(np.diff(_picked(found[clock], rows)))) if len(rows) > 1 else 0.0
-            factor, note = unit_of_steps(step, self.table.period, self.table.number(clock[0]))
+            column, first = self.table.number(clock[0]), float(found[clock][rows[0]])
+            factor, note = unit_of_steps(step, first, self.table.period, column)
             self.notes.extend(note)
         if self.table.form.shift and len(found) == 1:
             raise InvalidInputError(
@@ -354,10 +356,11 @@ def _factor(table: Table, kind: str, asked: Expression) -> tuple[float, dict[str
         name = table.name(place).removeprefix("column ")
         which = f"{table.path}: {kind}, {table.name(place)},"
         column = table.number(place) if len(asked.places) == 1 else f"({asked.text})"
-        if kind in _MOTION and is_acceleration(table.names[place]):
+        other = other_quantity(table.names[place])
+        if other and kind in (_FORCES if other == "a current" else (*_MOTION, *_FORCES)):
+            way = "*1 takes it if it is one" if kind in _MOTION else "*NUMBER converts it"
             raise InvalidInputError(
-                f"{which} is an acceleration by its name, and no {kind}: if it is one, {kind}="
-                f"{column}*1 takes it"
+                f"{which} is {other} by its name, which tells no {kind}: {kind}={column}{way}"
             )
         cells = table.names[place], table.units[place]
         readings = units_in(*cells, target)
@@ -369,6 +372,8 @@ def _factor(table: Table, kind: str, asked: Expression) -> tuple[float, dict[str
             raise InvalidInputError(
                 f"{which} may be in {' or '.join(texts)}: {' or '.join(ways)} says which"
             )
+        if kind == "time" and len(asked.places) > len(places):
+            found["the clock"] = Unit("s", 1.0, "s")
         for each in readings:
             si = ROTARY.get(target, target) if table.form.rotary else each.target
             if isnan(each.factor) or each.target != si:
@@ -401,7 +406,7 @@ def _units_notes(table: Table, found: Mapping[str, Unit]) -> Iterator[str]:
 def _large_note(table: Table, column: Any, asked: Expression) -> Iterator[str]:
     """Yield a sentence on a position without a unit, if it may be in another one than m."""
     unit = "rad" if table.form.rotary else "m"
-    low, high = float(np.nanmin(column)), float(np.nanmax(column))
+    low, high = (float(each(column)) for each in (np.fmin.reduce, np.fmax.reduce))
     if high - low >= _LARGE and (column.dtype.kind == "i" or unit == "m"):
         yield (
             f"the position, {asked.text}, has no unit and counts in {unit}, from {low:.6g} to "

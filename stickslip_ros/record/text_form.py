@@ -20,7 +20,7 @@ from typing import BinaryIO
 from stickslip_ros.files import open_regular
 from stickslip_ros.record.expressions import listed
 from stickslip_ros.record.table_columns import TableFormat
-from stickslip_ros.record.units import are_units, joined_units, period_in, without_unit
+from stickslip_ros.record.units import NO_UNITS, are_units, joined_units, period_in, without_unit
 
 _HEAD = 1 << 20
 """Bytes from which the form is found."""
@@ -32,8 +32,11 @@ _LARGEST, _MOST_COLUMNS = 1 << 33, 10_000
 """Bytes of a file, and columns."""
 
 _SEPARATORS = {"\t": "tabs", ";": "semicolons", "|": "|", " ": "spaces", ",": "commas"}
+GROUPED = r"(?:(?<=\d)['\u2019\xa0\u202f](?=\d{3}))"
+"""Marks between thousands that are no decimal marks."""
 _NUMBER = re.compile(
-    r"[-+]?(?:\d+(?:[.,]\d+)*\.?|[.,]\d+)(?:[eE][-+]?\d+)?|[-+]?(?:nan|inf|infinity)", re.IGNORECASE
+    rf"[-+]?(?:\d+(?:{GROUPED}\d{{3}})*(?:[.,]\d+)*\.?|[.,]\d+)(?:[eE][-+]?\d+)?|[-+]?(?:nan|inf|infinity)",
+    re.IGNORECASE,
 )
 _CLOCK = r"\d{1,2}:\d\d(?::\d\d(?:[.,:]\d+)?)?"
 TIME = re.compile(
@@ -209,6 +212,7 @@ class _LastRows:
             for place, text in enumerate(self.cells[0][:-1])
             if not self.numeric[place]
             and self.numeric[place + 1]
+            and not (self.numeric[0] and are_units([text]))
             and all(row[place] == text for row in self.cells)
         }
 
@@ -239,8 +243,9 @@ def _check_rows(rows: _LastRows, fewest: int) -> None:
     """Refuse rows with fewer columns of numbers, or with too many columns."""
     if rows.width < fewest or sum(rows.numeric) < fewest:
         raise ValueError(
-            "it has no rows of two numbers or more, whatever the separator; options say its "
-            "--decimal mark, the lines to --skip and its --encoding"
+            "it has no rows of two numbers or more, whatever the separator: numbers stand alone in "
+            "their cells, not as t=0.1 or 1.2mm; options say its --decimal mark, the lines to "
+            "--skip and its --encoding"
         )
     if rows.width > _MOST_COLUMNS:
         raise ValueError(f"it has more than {_MOST_COLUMNS} columns")
@@ -251,6 +256,11 @@ def _head_in(texts: Sequence[_Line], first: int, skip: int, width: int) -> Head:
     empty = [""] * width
     if not texts:
         return Head(empty, empty, None, first, first)
+    facts = {row[0].casefold(): (place, row) for place, row in texts if _is_fact(row)}
+    if names := [fact for key, fact in facts.items() if "name" in key]:
+        place, units = next((facts[key] for key in NO_UNITS if key in facts), (None, empty))
+        line = None if place is None else place + 1
+        return Head(names[-1][1], units, line, names[-1][0], first)
     (place, lower), *above = texts
     first = max(skip, place + 1)
     for upper_place, upper in above[:1]:
@@ -280,11 +290,16 @@ def _texts_above(lines: list[str], first: int, skip: int, rows: _LastRows) -> li
                     f"{place + 1} they are #1 to #{width}"
                 )
             break
-        if (values and texts) or not (values or any(row)):
+        if (values and texts and not _is_fact(row)) or not (values or any(row)):
             break
-        if not values:
+        if not values and any(map(_is_text, row)):
             texts.append((place, row))
     return texts
+
+
+def _is_fact(row: Sequence[str]) -> bool:
+    """Return whether a line tells one fact of each channel, as in `Name, x, Name, y`."""
+    return len(row) > 2 and len({*row[::2]}) == 1 and _is_text(row[0])
 
 
 def _columns(names: Sequence[str], labels: Collection[int]) -> dict[str, int]:

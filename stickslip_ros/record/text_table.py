@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 from typing_extensions import override
 
-from stickslip_ros.arrays import IntArray
+from stickslip_ros.arrays import FloatArray, IntArray
 from stickslip_ros.record.table_columns import Table, TableFormat
-from stickslip_ros.record.text_form import TAIL, TIME, form_of, opened
-from stickslip_ros.record.units import NO_UNITS
+from stickslip_ros.record.text_form import GROUPED, TAIL, TIME, form_of, opened
+from stickslip_ros.record.units import NO_UNITS, are_units
 
 _MOST_NUMBERS, _CHUNK = 1 << 28, 1 << 18
 """Numbers in the columns that are used, and cells that are read at once."""
@@ -56,10 +56,13 @@ class TextTable(Table):
         return next(filter(None, map(self._turn, range(self._text.width))), None)
 
     def _unit(self, place: int) -> str:
-        """Return the unit of a column that is in all rows of a column `unit` behind it."""
-        behind = [name.lower() for name in self.names[place + 1 : place + 2]]
-        cells = {row[place + 1] for row in self._text.first_rows if behind}
-        return cells.pop() if behind and behind[0] in NO_UNITS[3:] and len(cells) == 1 else ""
+        """Return the unit behind a column in all rows, in a column named `unit` or not at all."""
+        behind = self.names[place + 1 : place + 2]
+        cells = [*{row[place + 1] for row in self._text.first_rows if behind}]
+        known = len(cells) == 1 and (
+            are_units(cells) if not behind[0] else behind[0].lower() in NO_UNITS[3:]
+        )
+        return cells[0] if known else ""
 
     def _turn(self, place: int) -> tuple[str, list[str]] | None:
         cells = [row[place] for row in self._text.first_rows]
@@ -163,6 +166,8 @@ class TextTable(Table):
         except TypeError:
             raise ValueError("a column has both numbers and times") from None
         if values.dtype.kind not in "mM":
+            if self.form.decimal is None and values.dtype.kind == "f":
+                _check_points(values, ",." if self.decimal == "," else ".,")
             return values
         known = ~np.isnat(values)
         since, instants = np.full(len(values), np.nan), values[known].astype(np.int64)
@@ -183,7 +188,7 @@ class TextTable(Table):
             return np.array(cells)
         if cells.dtype.kind == "b":
             return np.full(len(cells), np.nan)
-        text = cells.astype(str).str.strip(" \t'\"")
+        text = cells.astype(str).str.strip(" \t'\"").str.replace(GROUPED, "", regex=True)
         instant = next(filter(None, map(TIME.fullmatch, text.dropna()[:TAIL])), None)
         if instant is not None:
             return _instants(text, instant)
@@ -200,6 +205,23 @@ class TextTable(Table):
             text = text.str.replace(",", ".", regex=False)
         numbers: Any = pd.to_numeric(text, errors="coerce")
         return numbers.to_numpy(float, na_value=np.nan)
+
+
+def _check_points(values: FloatArray, marks: str) -> None:
+    """Refuse numbers of which some have a mark between thousands: 1.002 comes after 998."""
+    before, after = values[:-1], values[1:]
+    crossing = (before >= 500.0) & (after >= 1.0) & (after < 2.0)
+    if not crossing.any() or np.nanmax(values) >= 1000.0:
+        return
+    parts = values[(values != np.rint(values)) & np.isfinite(values)]
+    row = int(np.flatnonzero(crossing)[0])
+    near = abs(1000.0 * after[row] - before[row]) < before[row]
+    grouped = (np.abs(parts) >= 1.0) & (np.abs(1e3 * parts - np.rint(1e3 * parts)) < 1e-6)
+    if len(parts) and grouped.all() and near and before[row] == np.rint(before[row]):
+        raise ValueError(
+            f"{after[row]:.3f} comes after {before[row]:g}, as {1e3 * after[row]:g} would: "
+            f"--decimal {marks[1]} takes it as this, and --decimal {marks[0]} as it is"
+        )
 
 
 def _rows_of(frame: Any, place: int, value: str, number: float) -> Any:

@@ -10,6 +10,7 @@ from functools import cache
 from itertools import product
 from math import isnan, nan, tau
 from typing import NamedTuple
+from unicodedata import normalize
 
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.quantities import ROTARY, number_of
@@ -22,35 +23,41 @@ _ANY_LONG = "|".join(_LONG)
 _SPELLINGS = tuple(
     (name, dimension, re.compile(f"({prefixes})?(?:{words})"))
     for name, dimension, prefixes, words in (
-        ("m", "L", f"[numcdk]|{_ANY_LONG}", "m|m[eèé]t(?:ers?|res?|ros?|ri)"),
+        ("m", "L", f"[pnumcdk]|{_ANY_LONG}", "m|met(?:er[sn]?|res?|ros?|ri)"),
         ("s", "T", f"[num]|{_ANY_LONG}", r"s|se[ckg](?:s|[ou]nd\w{0,2})?"),
         ("N", "F", f"[umck]|da|{_ANY_LONG}", "n|newtons?"),
         ("N m", "FL", "[umck]", "nm"),
         ("N cm", "FL", "", "ncm"),
         ("N mm", "FL", "", "nmm"),
+        ("lbf ft", "FL", "", "lb[fs]?ft|ftlb[fs]?"),
+        ("lbf inch", "FL", "", "lb[fs]?in|inlb[fs]?"),
+        ("ozf inch", "FL", "", "ozf?in"),
         ("rad", "R", f"[um]|{_ANY_LONG}", r"rad(?:s|ian\w*)?"),
         ("turn/s", "R/T", "k", "hz|rps"),
         ("turn/min", "R/T", "", "rpm|upm"),
         ("m/s", "L/T", "m", "mps"),
+        ("mm/s", "L/T", "", "mms"),
         ("km/hour", "L/T", "", "kmh|kph"),
         ("inch/s", "L/T", "", "ips"),
-        ("inch", "L", "", "in|inch(?:es)?|zoll|pulgadas?|pouces?|pollic[ei]"),
+        ("inch/min", "L/T", "", "ipm"),
+        ("degree/s", "R/T", "", "dps"),
+        ("inch", "L", "u|micro", "in|inch(?:es)?|zoll|pulgadas?|pouces?|pollic[ei]"),
         ("ft", "L", "", "ft|foot|feet"),
         ("thou", "L", "", "thou|mils?"),
         ("micron", "L", "", "mi[ck]rons?"),
         ("min", "T", "", r"min(?:s|ut\w{1,2})?"),
         ("hour", "T", "", "h|hrs?|hours?|stunden?|horas?|heures?|or[ae]"),
         ("day", "T", "", "d|days?|tage?"),
-        ("degree", "R", "", r"deg(?:s|r\w*)?|grad(?:i|os?)?"),
-        ("gon", "R", "", "gon|grad"),
+        ("degree", "R", "m|milli", r"deg(?:s|r\w*)?|grad(?:i|os?)?"),
+        ("gon", "R", "m", "gon|grad"),
         ("turn", "turns", "", "r|u|tr"),
         ("turn", "R", "", "revs?|revolutions?|turns?|umdr(?:ehung(?:en)?)?|tours?|giri|vueltas?"),
         ("arcsec", "R", "", "arcsec(?:onds?)?"),
         ("arcmin", "R", "", "arcmin(?:utes?)?"),
         ("kgf", "F", "", "kgf|kp"),
         ("lbf", "F", "", "lbf"),
-        ("A", "I", "[kum]", "a|amps|amperes?"),
-        ("", "other", "[kum]", "[vwgk]|pa|bar|lbs?|oz|degc|°c|%"),
+        ("A", "I", "[kum]", r"a(?:mp\w*|rms|eff|pk)?"),
+        ("", "other", "[kum]", r"[vwgk]|volts?|gf|pa|bar|lbs?|oz|degc|°c|%"),
     )
 )
 """Units in machines' data: what pint calls them, their dimension, prefixes, and how people write
@@ -58,11 +65,19 @@ them. Those without a name for pint are of other quantities; turns as in U/min o
 _DIMENSIONS = {"m": "L", "m/s": "L/T", "N": "F", "s": "T", "rad": "R", "rad/s": "R/T", "N m": "FL",
                "A": "I", "N/A": "F/I", "N m/A": "FL/I"}  # fmt: skip
 _COUNTS = re.compile(
-    r"counts?|cts|inc|incr(?:ements?)?|ink(?:r\w*)?|puls\w*|impuls\w*|pls|ticks?|steps|lsb|digits?|erpm"
+    r"counts?|cts|inc|incr(?:ements?)?|ink(?:r\w*)?|puls\w*|impuls\w*|pls|ticks?|steps|lsb|digits?|erpm|cnts?|qc"
 )
 """Words for numbers of an encoder, a motor or a clock, of which only the owner knows the size."""
-_ACCELERATION = re.compile(r"acc(?:el\w*)?$|beschl|accél|acel")
-"""Words for an acceleration."""
+_SCALED = re.compile(
+    r"(?i)[x*\xd7/)\]]\s*[*/\xd7]?\s*10+\b|\b(?:tenth|hundredth|zehntel|hundertstel)s?\b"
+)
+"""What says that numbers are multiples of a unit."""
+_OTHERS = {
+    "an acceleration": re.compile(r"acc(?:el\w*)?$|beschl|accél|acel"),
+    "a current": re.compile(r"current|i[qd]$|(?:\w*motor)?strom|corrente|corriente|courant"),
+}
+_FORCE = re.compile(r"forc|fuerz|forz|torq|moment|coup|copp|effort|\w*(?:kraft|moment)")
+"""Starts of words for quantities that are often taken for others, and for forces."""
 _BRACKETED = re.compile(r"[\[(<{]\s*([^\[\](){}<>]*[^\[\](){}<>\s])\s*[\])>}]")
 _MARK = re.compile(r"\s*[/,]\s*|\s+(?:in|en|em)\s+")
 _START = re.compile(
@@ -72,6 +87,8 @@ _START = re.compile(
 """Where a word starts: after a mark, in PosMM, after a number, and after Chinese letters."""
 _DOUBTFUL, _DOUBTFUL_ALONE = ("in", "min", "h", "d"), ("cm", "dm")
 """Units that may be other words at the end of a name, or where they are all of it."""
+_INDEX = re.compile(r"(?<=[^\W\d_]{2})(?:1|(?<!s)\d)$")
+"""The number of a channel behind a unit, as in mm1; s2 is squared."""
 _LONGEST = 200
 """Characters of a name in which a unit is looked for."""
 _SAMPLING = re.compile(
@@ -97,7 +114,9 @@ def units_in(name: str, given: str, target: str) -> list[Unit]:
     `given` is its cell in a line of units, or empty; `target` the SI unit of the quantity for
     linear motion; a unit of the same quantity of rotary motion is one, too.
     """
-    name = name[:_LONGEST]
+    name = name[:_LONGEST].replace("()", "")
+    if scaled := _SCALED.search(name):
+        return [Unit(scaled[0], nan, target)]
     plain = _BRACKETED.sub(" ", name).strip()
     stated, last = [*_stated(name, plain, given, target)], [*_last(plain, target)]
     known, words = ([each for each in found if not isnan(each.factor)] for found in (stated, last))
@@ -143,9 +162,12 @@ def are_units(cells: Sequence[str]) -> bool:
     return 2 * known > len(units)
 
 
-def is_acceleration(name: str) -> bool:
-    """Return whether the name of a column is that of an acceleration."""
-    return any(map(_ACCELERATION.match, re.findall(r"[^\W\d_]+", name.casefold())))
+def other_quantity(name: str) -> str | None:
+    """Return "an acceleration" or "a current" if the name of a column is that of one."""
+    words = re.findall(r"[^\W\d_]+", name.casefold())
+    if any(map(_FORCE.match, words)):  # the current torque
+        return None
+    return next((what for what, start in _OTHERS.items() if any(map(start.match, words))), None)
 
 
 def without_unit(name: str) -> str:
@@ -159,11 +181,12 @@ def without_unit(name: str) -> str:
 
 
 def joined_units(cells: Sequence[str], width: int) -> list[str]:
-    """Return names, of which the separator has cut units off, as `x, mm`, if they are too many."""
+    """Return names, of which the separator has cut units off, as `x [mm]`, if they are too many."""
     names = [*cells]
     for place in range(len(names) - 1, 0, -1):
-        if len(names) > width and _parsed(names[place]):
-            names[place - 1 : place + 1] = [", ".join(names[place - 1 : place + 1])]
+        before, unit = names[place - 1 : place + 1]
+        if len(names) > width and _parsed(unit.strip("[]()")):
+            names[place - 1 : place + 1] = [f"{before}{', ' if unit[0].isalpha() else ' '}{unit}"]
     return names
 
 
@@ -173,7 +196,7 @@ def period_in(line: str) -> tuple[float, float] | None:
     if not _SAMPLING.search(line):
         return None
     number, unit = r"(?P<number>\d[\d.,]*(?:e-?\d+)?)", r"(?P<unit>[^\W\d_]+)"
-    for pattern in (rf"[\[(]\s*{unit}\s*[\])][\s,;:=\"]*{number}", rf"{number}\s*{unit}"):
+    for pattern in (rf"[\[(]\s*{unit}\s*[\])][\s,;:=\"]*{number}", rf"{number}[\s;,\"]*{unit}"):
         for found in re.finditer(pattern, line):
             value = float(found["number"].rstrip(",.").replace(",", "."))
             for name, dimension in _parsed(found["unit"]):
@@ -188,14 +211,14 @@ def _stated(name: str, plain: str, given: str, target: str) -> Iterator[Unit]:
     """Yield the units in the line of units, or in a name in brackets or after a mark."""
     cell, bracketed = given.strip().strip("[]()"), _BRACKETED.findall(name)
     marked = [plain[each.end() :] for each in _MARK.finditer(plain)]
-    for text in filter(None, [cell, *bracketed, *marked]):
+    for text in filter(None, [cell, *bracketed, *marked, *re.findall("%$", plain)]):
         words = [each for each in text.split() if each.strip(".").casefold() not in _DOUBTFUL]
         tried = [text, *words[:1]] if re.search(r"\d", text) else [text, *words[-1:], *words[:1]]
         if found := next(filter(None, ([*_read(each, target)] for each in tried)), []):
             yield from found
         elif text.lower() not in (*NO_UNITS, *_DOUBTFUL):
             letters = len(re.findall(r"[^\W\d_]", text))
-            unit = _parsed(text) or any(map(_parsed, words)) or _counts(text)
+            unit = _parsed(text.lstrip("0123456789.,")) or any(map(_parsed, words)) or _counts(text)
             certain = text == cell or f"[{text}]" in name.replace(" ", "")
             if (unit and (letters > 1 or text not in marked)) or (certain and letters > 1):
                 yield Unit(text, nan, target)
@@ -203,10 +226,12 @@ def _stated(name: str, plain: str, given: str, target: str) -> Iterator[Unit]:
 
 def _last(name: str, target: str) -> Iterator[Unit]:
     """Yield what the last words of a name may be, or words between, or counts."""
+    name = _INDEX.sub("", name)
     starts = [found.start() for found in _START.finditer(name)]
     for start in starts[-4:]:
         text, before = name[start:], name[:start]
-        if found := [*_read(text, target)]:
+        rest = text[3:] if re.match(r"(?i)in[\W_]", text) else ""
+        if found := [*_read(rest, target)] or [*_read(text, target)]:
             yield from found
             if text.casefold() in (_DOUBTFUL if before else _DOUBTFUL + _DOUBTFUL_ALONE):
                 yield Unit("", 1.0, target)
@@ -261,7 +286,11 @@ def _factor(unit: str, target: str) -> float:
 def _parsed(text: str) -> tuple[tuple[str, str], ...]:
     """Return the readings of a text as a unit: what pint calls it, and its dimension."""
     plain = (
-        re.sub("[µμ]", "u", re.sub('["″]', "inch", text))
+        re.sub("[\u0300-\u036f]", "", normalize("NFD", text))
+        .replace("µ", "u")
+        .replace("μ", "u")
+        .replace('"', "inch")
+        .replace("″", "inch")
         .replace("°", "deg")
         .replace("⁻¹", "-1")
         .replace("%", " % ")
@@ -313,4 +342,5 @@ def _spelled(word: str) -> list[tuple[str, str]]:
             found.append((prefix + name, dimension))
             if prefix + name == "mN" and word != "mN":
                 found.append(("MN", dimension))
-    return [each for each in found if each[0] != "gon" or word != "Grad"]
+    others = {"Grad": "gon", "Nm": "nm"}  # which the capital letter excludes
+    return [each for each in found if each[0] != others.get(word)]

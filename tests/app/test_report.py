@@ -8,7 +8,7 @@ from geometry_msgs.msg import WrenchStamped
 
 from stickslip_ros.testing import ClosedLoop
 from tests.app.conftest import REFERENCE, Run
-from tests.record.runs import STAMPS, STATES, motion, record, state, write_bag
+from tests.record.runs import STAMPS, STATES, record, state, write_bag
 from tests.testing.controllers import WithoutArguments
 
 

@@ -47,6 +47,12 @@ def read(
         (rows(), "#1", "#2"),
         ("Rate;2000\nOperator: A, B; C\n\nt;x\ns;m\n" + rows(";", comma=True), "t", "x"),
         ("Start\t13\n\nName\tPos\nUnit\tm\n\n" + rows("\t"), "#1", "Pos"),
+        ("Name,A,Name,B\nType,R,Type,R\nStep,2,Step,2\nNetID,5.1,NetID,5.1\n\n"
+         + rows(",", last=",0,0"), "Name", "A"),
+        ("t;x\n-;-\n" + rows(";"), "t", "x"),
+        ("% t [s]  x [m]\n" + rows("  "), "t", "x"),
+        ("".join(f"t {a} s x {b} m\n" for a, b in (row.split() for row in rows(" ").splitlines())),
+         "t", "x"),
         ("t [s];x [m]\n" + rows(";"), "t", "x"),
         ("cmd-x,x\n" + rows(), "cmd-x", "x"),
         (("t;µ\n" + rows(";")).encode("cp1252"), "t", "µ"),
@@ -92,6 +98,7 @@ def test_a_unit_is_used_for_a_column_by_itself_and_said(
     [
         ("x [inc]", "x [inc]", "is in inc, which is no unit of position: position=#2*NUMBER"),
         ("x_in", "#2", "in in (0.0254 m) or m (1 m): position=#2*0.0254 or position=#2*1 says"),
+        ("accel_x", "#2", "is an acceleration by its name, which tells no position: position=#2*1"),
         ("x [mm]", "#2-t [s]", "is in s, which is no unit of position: position=(#2-t [s])*NUMBER"),
     ],
 )
@@ -299,7 +306,11 @@ def test_sessions_are_read_one_by_one(tmp_path: Path) -> None:
     [
         ([(86_399_990 + n) % 86_400_000 for n in range(40)], "t [ms]", "#1, 86400000)*0.001"),
         ([(65_500 + n) % 65_536 for n in range(80)], "#1*1e-3*1", "#1*1e-3*1, 65.536)"),
-        ([f"{n:,}".replace(",", ".") for n in range(990, 1050)], "#1", "--decimal , reads it as 1"),
+        (
+            [f"{n:,}".replace(",", ".") for n in range(990, 1050)],
+            "#1",
+            "--decimal , takes it as this",
+        ),
     ],
 )
 def test_times_that_go_back_are_refused_with_a_way(
@@ -400,6 +411,8 @@ def test_what_is_left_out_is_counted_and_its_first_line_named(tmp_path: Path) ->
         ('a,b\n0,"1,000"\n1,"2,000"\n', TableFormat(decimal="."), [1000.0, 2000.0]),
         ('a,b\n0,"1,000.5"\n1,"2"\n', TableFormat(), [1000.5, 2.0]),
         ("a;b\n0;1.000,5\n1;2,0\n", TableFormat(), [1000.5, 2.0]),
+        ("a;b\n0;1'000.5\n1;2.0\n", TableFormat(), [1000.5, 2.0]),
+        ("a;b\n0;1\xa0000,5\n1;2,0\n", TableFormat(), [1000.5, 2.0]),
         ("0;0\n1;1\na;b\n0;5\n1;6\n", TableFormat(skip=2), [5.0, 6.0]),
         ("a;b\n0;5\n1;6\n".encode("cp037"), TableFormat(encoding="cp037"), [5.0, 6.0]),
     ],

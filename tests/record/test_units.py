@@ -14,7 +14,7 @@ HEADERS = {
         1e-3: "Zeit [ms]|Zeit in ms|Zeit, ms|Time (msec)|t / ms|t/ms|Time ms|time_ms|timeMs"
         "|TimeMS|TIME_MS"
         "|millis|ms|Temps (ms)|temps en ms|Tiempo / ms|Tiempo_ms|ms_today|time_ms_since_boot"
-        "|t.ms|t:ms|t-ms"
+        "|t.ms|t:ms|t-ms|millis()|t_ms1"
         "|Zeit (Millisekunden)|time [milliseconds]",
         1e-6: "timestamp_us|Time [µs]|t / us|micros|zeit_usec",
         1e-9: "timestamp [ns]|nanosec|t_ns",
@@ -28,11 +28,14 @@ HEADERS = {
         "|x-mm|x_mm|x [mm]"
         "|x (mm)|x <mm>|X_MM|Position mm (act)|pos_mm_act|déplacement en mm|Posición (mm)"
         "|spostamento [mm]"
-        "|Weg in Millimeter|位移mm|Weg (in mm)|course (millimètres)|x [1e-3 m]|mm",
+        "|Weg in Millimeter|Weg in Millimetern|x [milímetros]|pos_mm1"
+        "|位移mm|Weg (in mm)|course (millimètres)|x [1e-3 m]|mm",
         1e-6: "x [um]|x (µm)|x [micron]|vdcdt_um|Weg / µm",
         1e-4: "x [0.1 mm]|x (0,1 mm)",
         1e-2: "pos_cm",
         1e-9: "pos_nm",
+        1e-12: "IDS.pos1 [pm]",
+        2.54e-8: "x_uin|x in microinches",
         0.0254: "X [in]|X [inch]|x_inch|x / in|x [″]|Position, in|position in inches|Weg in Zoll"
         "|posición en pulgadas",
         2.54e-5: "X (thou)|x_mil",
@@ -42,7 +45,9 @@ HEADERS = {
         DOUBTFUL: "x_in|position_in|xIn|in|cm|phi [grad]|pos [inc]|Position [counts]|pos_counts"
         "|Encoder count|count"
         "|Weg [Inkremente]|Droop pulses (by 1 pls.)|Position [V]|Pos [%]|x (1/1000 mm)"
-        "|Weg / mV|x_0.1um|x (in 0.1 mm)",
+        "|Weg / mV|x_0.1um|x (in 0.1 mm)"
+        "|pos_cnt|pos (qc)|LVDT volts|Position %|tenths of mm|[mm]/10|x [mm x 1000]|Weg x10^-3 m"
+        "|Drehmoment [Nm]",
         NO_UNIT: "x|pos|x_N|phi_h|pos_d|x_min|Position (min)|Position (X)|x_max|data[2]|pos_s|A"
         "|mu|accel_x|in_position",
     },
@@ -54,17 +59,19 @@ HEADERS = {
         "|Drehzahl in U/min|tr/min"
         "|giri/min|motor rev/min",
         TURN: "n [rev/s]|f [Hz]",
-        DEGREE: "w [deg/s]|w_deg_s",
+        DEGREE: "w [deg/s]|w_deg_s|w_dps",
         DOUBTFUL: "n [1/s]|vel_counts_s|v [mm]|erpm|v_mm|speed_ms",
         NO_UNIT: "v|v_m|v_s|v_min|v_max|Servo motor speed|vel",
     },
     "N": {
         1e3: "F / kN|F [kN]|F_kN|force_kn|ForceKN|Kraft in kN|Fuerza (kN)|force, kN",
-        1.0: "force_N|Kraft in N|F [N]|M [Nm]|T [N·m]|T / Nm|torque_nm|TorqueNm|effort en N",
+        1.0: "force_N|F_in_N|Kraft in N|F [N]|M [Nm]|T [N·m]|T / Nm|torque_nm|TorqueNm|effort en N",
         1e-3: "torque_mNm|M [N mm]|F [mN]",
         10.0: "F_daN",
         9.80665: "load [kgf]",
-        DOUBTFUL: "force_mn|I [A]|load [kg]|torque [%]|force_kg|cell_mV|u_V|p_bar",
+        1.3558179483314: "torque_lbft|M [ftlb]",
+        DOUBTFUL: "F_in_N*10|I [Arms]|M [0.1%]"
+        "|force_mn|I [A]|load [kg]|torque [%]|force_kg|cell_mV|u_V|p_bar",
         NO_UNIT: "F|force|torque|u|A|current_A|x_max",
     },
 }  # fmt: skip
