@@ -13,7 +13,7 @@ _STEEPER = 10.0
 """Size of a jump, in steps before or after it and of the encoder."""
 _AROUND, _QUIET = 7, 5
 """Steps before and after a jump, and how many of them must be as small."""
-_LONGEST, _LARGEST_SHARE = 20, 0.05
+_LONGEST, LARGEST_SHARE = 20, 0.05
 """Longest dropout, in samples; share of the samples that dropouts are at most."""
 MOST_SHIFTS = 3
 """Most jumps from which a signal does not come back; more of them are motion."""
@@ -91,7 +91,7 @@ class Jumps:
             if returns and size[1:-1].max(initial=0.0) < least:
                 found += range(begin + 1, end + 1)
                 ended = end
-        return np.array(found if len(found) <= _LARGEST_SHARE * len(signal) else [], np.int64)
+        return np.array(found if len(found) <= LARGEST_SHARE * len(signal) else [], np.int64)
 
     def shifts(self) -> list[tuple[int, float]]:
         """Return the samples after jumps from which the signal does not come back, and their sizes.

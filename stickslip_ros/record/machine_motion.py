@@ -10,7 +10,14 @@ import numpy as np
 from stickslip_ros.arrays import BoolArray, FloatArray, IntArray
 from stickslip_ros.errors import BagError
 from stickslip_ros.record.bag_layout import BagLayout, NumberedTopic
-from stickslip_ros.record.faults import MOST_SHIFTS, Jumps, differences, lost_velocities, shift_note
+from stickslip_ros.record.faults import (
+    LARGEST_SHARE,
+    MOST_SHIFTS,
+    Jumps,
+    differences,
+    lost_velocities,
+    shift_note,
+)
 from stickslip_ros.samples import ForceColumns, SampleColumns
 from stickslip_ros.stamps import NANOSECONDS
 from stickslip_ros.text import printable, quantity
@@ -253,7 +260,9 @@ class _Sources:
         strange[jumps.dropouts()] = True
         first = int(stamp[0]) if self._first_stamp is None else self._first_stamp
         self._shifts += [(int(stamp[row]) - first, size) for row, size in jumps.shifts()]
-        strange[1:-1] |= returns & (sizes[1:] > _JUMP * usual) & (usual > 0.0)
+        often = returns & (sizes[1:] > _JUMP * usual) & (usual > 0.0)
+        if np.mean(often) > LARGEST_SHARE:  # too often for a sensor
+            strange[1:-1] |= often
         return strange
 
 
