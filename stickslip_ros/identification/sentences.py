@@ -67,7 +67,7 @@ def notes(findings: Findings) -> Sequence[str]:
     if not _SPEEDS_OF_MACHINES[0] <= findings.fastest <= _SPEEDS_OF_MACHINES[1]:
         texts.append(
             f"the slide is as fast as {findings.fastest:.3g} m/s: check the units of time, "
-            "position and belt velocity"
+            "position and belt velocity, unless the axis is rotary and this is in rad/s"
         )
     used = findings.chosen.used(findings.records)
     if used < _USED_SHARE:

@@ -225,6 +225,8 @@ def _by_reversals(
     if found.errors and fastest > STICKING_SHARE * float(np.abs(part.samples.belt).max()):
         error = hypot(found.errors["stick_fraction"], LEAST_STICK)
         found = replace(found, errors={**found.errors, "stick_fraction": error})
+    if found.stick_fraction and found.cycles < LEAST_CYCLES:  # nobody knows how much it errs
+        found = replace(found, stick_fraction=None)
     return found, None
 
 

@@ -132,6 +132,11 @@ class RunFeed:
         if self._other_machine and (doubt := self._doubt(report, length)):
             report = {**report, "regime": None, "stick_fraction": None}
             notes.append(doubt)
+        if report["stick_fraction"] is None and report["regime"] == Regime.STICK_SLIP:
+            notes.append(
+                f"the stick fraction is not known: {report['cycles']} whole cycles do not tell its "
+                "error, three do"
+            )
         if self._slips is not None:
             slips, slip_notes = self._slips.report(report["position_noise"], length)
             notes += slip_notes
