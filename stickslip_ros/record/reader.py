@@ -1,11 +1,12 @@
 """Read the recorded motion and forces of a drive from a bag."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property, partial
+from itertools import chain
 from math import inf
 from pathlib import Path
-from typing import Any, Generic, NamedTuple, Self, TypeVar
+from typing import Any, NamedTuple, Self, TypeVar
 
 import numpy as np
 
@@ -46,7 +47,6 @@ from stickslip_ros.stamps import NANOSECONDS
 from stickslip_ros.text import printable, quantity
 
 ColumnsT = TypeVar("ColumnsT", SampleColumns, ForceColumns, ReferenceColumns)
-_ReadT = TypeVar("_ReadT")
 _Run = tuple[SampleColumns, ForceColumns, ForceColumns]
 
 
@@ -65,35 +65,6 @@ class RunBlock(NamedTuple):
     """Whether velocities that are not recorded were estimated from the positions."""
 
 
-@dataclass(frozen=True)
-class Reading(Generic[_ReadT]):
-    """What was read of a bag."""
-
-    columns: _ReadT
-    notes: tuple[str, ...] = ()
-    """Sentences on how the motion of another machine was read, and what it lacks."""
-    missing: tuple[str, ...] = ()
-    """Sentences on messages that could not be decoded."""
-
-
-def open_bag(path: Path | str, *continued: Path) -> Source:
-    """Return the bag at a path, open for reading: the `Source` of its format; raises BagError.
-
-    Bags that continue the run follow it.
-    """
-    return BagFiles(path, *continued)
-
-
-def read(
-    source: Source,
-    layout: BagLayout = ANY_LAYOUT,
-    namespace: str | None = None,
-    belt_speed: float | None = None,
-) -> Reading[RunBlock]:
-    """Return the whole run of a drive in a bag; parameters and errors are those of `Recording`."""
-    return _run_of(DriveInBag(source, namespace, layout, belt_speed))
-
-
 class Recording:
     """A bag that is open for reading; a context manager that closes it.
 
@@ -105,8 +76,8 @@ class Recording:
 
     Parameters
     ----------
-    path : Path or str
-        A bag directory, or one MCAP file.
+    path : Path, str or Source
+        A bag directory, one MCAP file, or a bag of another format that is open.
     namespace : str or None
         ROS namespace of the drive whose columns are read, such as `/feed_drive`; None if the bag
         holds only one drive.
@@ -136,26 +107,27 @@ class Recording:
 
     def __init__(
         self,
-        path: Path | str,
+        path: Path | str | Source,
         namespace: str | None = None,
         *,
         belt_speed: float | None = None,
         layout: BagLayout = ANY_LAYOUT,
         continued: Sequence[Path] = (),
     ) -> None:
-        self.source = source = open_bag(path, *continued)
+        self.source = source = path if isinstance(path, Source) else BagFiles(path, *continued)
         """The bag, in which other topics are, too."""
         self.path, self.topics = source.path, source.topics
         self.messages, self.metadata = source.messages, source.metadata
         self.attachment, self.offered_qos = source.attachment, source.offered_qos
         self.close = source.close
         self._drive = DriveInBag(source, namespace, layout, belt_speed)
-        self._readings: dict[str, Reading[Any]] = {}
+        self._notes: dict[str, Sequence[str]] = {}
+        self._refused: dict[str, Sequence[str]] = {}
 
     @property
     def notes(self) -> list[str]:
         """Sentences on how the motion of another machine was read, and what it lacks."""
-        return [note for reading in self._readings.values() for note in reading.notes]
+        return [*chain(*self._notes.values())]
 
     @property
     def complete(self) -> bool:
@@ -168,8 +140,7 @@ class Recording:
 
         They name an incomplete end, damage, and messages that could not be decoded.
         """
-        readings = self._readings.values()
-        return [*self.source.damage, *(text for reading in readings for text in reading.missing)]
+        return [*self.source.damage, *chain(*self._refused.values())]
 
     @property
     def joint_states(self) -> SampleColumns:
@@ -210,8 +181,8 @@ class Recording:
         decode = partial(controller_references_in, joint=drive.layout.joint)
         references = self._columns(REFERENCE, decode, states)
         if np.array_equal(references.stamp, self.joint_states.stamp):
-            notes = (*play_note(references.position, self.joint_states.position, "m"),)
-            self._readings[REFERENCE.name] = replace(self._readings[REFERENCE.name], notes=notes)
+            notes = play_note(references.position, self.joint_states.position, "m")
+            self._notes[REFERENCE.name] = [*notes]
         return references
 
     @property
@@ -265,16 +236,20 @@ class Recording:
             If the bag holds several drives and no namespace was given, or if the operating system
             fails to read it.
         """
-        for reading in _RunReader(self._drive).blocks(least):
-            self._readings[JOINT_STATES.name] = replace(reading, columns=None)
-            yield reading.columns
+        yield from self._runs(least)
         if self.topics.get(self._drive.name(JOINT_STATES)) == CONTROLLER_STATE:
             _ = self.references  # of which there may be a note
 
     @cached_property
     def _run(self) -> RunBlock:
-        self._readings[JOINT_STATES.name] = reading = _run_of(self._drive)
-        return reading.columns
+        return next(self._runs(inf), RunBlock(NO_SAMPLES, NO_FORCES, NO_FORCES))
+
+    def _runs(self, least: float) -> Iterator[RunBlock]:
+        reader = _RunReader(self._drive)
+        for run in reader.blocks(least):
+            self._notes[JOINT_STATES.name] = reader.notes(run)
+            self._refused[JOINT_STATES.name] = _sentences(reader.refused)
+            yield run
 
     def _columns(
         self,
@@ -295,7 +270,7 @@ class Recording:
             parts.append(part)
             _count(counts, name, refused)
         columns = decode(b"", nothing, nothing)[0].followed_by(*parts)
-        self._readings[topic.name] = Reading(columns, missing=_sentences(counts))
+        self._refused[topic.name] = _sentences(counts)
         return columns
 
     def __enter__(self) -> Self:
@@ -303,11 +278,6 @@ class Recording:
 
     def __exit__(self, *exception: object) -> None:
         self.close()
-
-
-def _run_of(drive: DriveInBag) -> Reading[RunBlock]:
-    empty = Reading(RunBlock(NO_SAMPLES, NO_FORCES, NO_FORCES))
-    return next(_RunReader(drive).blocks(inf), empty)
 
 
 class _RunReader:
@@ -329,10 +299,11 @@ class _RunReader:
             drive.source.topics.get(self._states, JOINT_STATES.type_name),
         )
         self._force = ForceReader(drive, self._forces)
-        self._refused: dict[str, Refused] = {}
+        self.refused: dict[str, Refused] = {}
+        """What could not be decoded so far, by topic."""
 
-    def blocks(self, least: float) -> Iterator[Reading[RunBlock]]:
-        """Yield blocks of so many messages or more, with what is known of the bag up to their end.
+    def blocks(self, least: float) -> Iterator[RunBlock]:
+        """Yield blocks of so many messages or more.
 
         The last block may have fewer, and what another machine recorded is one block.
         """
@@ -343,7 +314,7 @@ class _RunReader:
             gathered.append(run)
             count += sum(map(len, run))
             if count >= least and not self._motion.of_another_machine:
-                yield self._reading(RunBlock(*_joined(gathered)))
+                yield RunBlock(*_joined(gathered))
                 gathered, count = [], 0
         self._check_clocks()
         if gathered:
@@ -351,19 +322,19 @@ class _RunReader:
             if self._motion.of_another_machine:
                 states = self._motion.without_lost_velocities(run.joint_states)
                 run = RunBlock(states, *run[1:3], True, self._motion.estimated)
-            yield self._reading(run)
+            yield run
 
     def _decoded(self, block: Block) -> _Run:
         sent = block.of_topic(self._states)
         states, forces, refused = self._motion.read(sent.messages, sent.log_time)
-        _count(self._refused, self._states, refused)
+        _count(self.refused, self._states, refused)
         if self._drive.effort_is_of_actuator:
             states = replace(states, friction_force=np.full(len(states), np.nan))
         if not self._by_effort:
             forces, refused = self._force.read(block.of_topic(self._forces))
-            _count(self._refused, self._forces, refused)
+            _count(self.refused, self._forces, refused)
         dropped, refused = wrenches_in(*block.of_topic(self._dropped).messages)
-        _count(self._refused, self._dropped, refused)
+        _count(self.refused, self._dropped, refused)
         return states, forces, dropped
 
     def _check_clocks(self) -> None:
@@ -376,14 +347,15 @@ class _RunReader:
                 "takes the log times of both"
             )
 
-    def _reading(self, run: RunBlock) -> Reading[RunBlock]:
+    def notes(self, run: RunBlock) -> list[str]:
+        """Return sentences on how the motion was read up to the end of a block."""
         notes, states = self._motion.notes, run.joint_states
         if self._by_effort:
             time = (states.stamp - states.stamp[:1]) / NANOSECONDS
             notes += ripple_note(time, states.position, run.control_forces.force, ("m", "N"))
         if self._force.unstamped:
             notes.append(f"the forces on {self._forces} have no stamps: their log times count")
-        return Reading(run, tuple(notes), _sentences(self._refused))
+        return notes
 
 
 def _count(counts: dict[str, Refused], topic: str, refused: Refused) -> None:
@@ -391,12 +363,12 @@ def _count(counts: dict[str, Refused], topic: str, refused: Refused) -> None:
         counts[topic] = counts.get(topic, Refused(0, "")).followed_by(refused)
 
 
-def _sentences(refused: Mapping[str, Refused]) -> tuple[str, ...]:
+def _sentences(refused: Mapping[str, Refused]) -> list[str]:
     """Return sentences on messages that could not be decoded, by their topics."""
-    return tuple(
+    return [
         printable(f"{number} messages on {topic} could not be read: {reason}")
         for topic, (number, reason) in refused.items()
-    )
+    ]
 
 
 def _joined(runs: Sequence[_Run]) -> _Run:

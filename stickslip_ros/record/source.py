@@ -42,7 +42,7 @@ class Block(NamedTuple):
 class Source(ABC):
     """A bag that is open for reading; a context manager that closes it.
 
-    Each format of bags is a subclass, which `open_bag` chooses. Its messages are CDR.
+    Each format of bags is a subclass, which a `Recording` takes. Its messages are CDR.
     """
 
     path: Path

@@ -20,11 +20,12 @@ from typing import BinaryIO
 from stickslip_ros.files import open_regular
 from stickslip_ros.record.expressions import listed
 from stickslip_ros.record.table_columns import TableFormat
+from stickslip_ros.record.text_cells import GROUPED, TIME
 from stickslip_ros.record.units import NO_UNITS, are_units, joined_units, period_in, without_unit
 
 _HEAD = 1 << 20
 """Bytes from which the form is found."""
-TAIL = 10
+_TAIL = 10
 """Lines at their end that are rows of the table: by them the others are known."""
 _TOP = 100
 """Lines on top that may be names or tell the period; first rows that are kept."""
@@ -32,16 +33,8 @@ _LARGEST, _MOST_COLUMNS = 1 << 33, 10_000
 """Bytes of a file, and columns."""
 
 _SEPARATORS = {"\t": "tabs", ";": "semicolons", "|": "|", " ": "spaces", ",": "commas"}
-GROUPED = r"(?:(?<=\d)['\u2019\xa0\u202f](?=\d{3}))"
-"""Marks between thousands that are no decimal marks."""
 _NUMBER = re.compile(
     rf"[-+]?(?:\d+(?:{GROUPED}\d{{3}})*(?:[.,]\d+)*\.?|[.,]\d+)(?:[eE][-+]?\d+)?|[-+]?(?:nan|inf|infinity)",
-    re.IGNORECASE,
-)
-_CLOCK = r"\d{1,2}:\d\d(?::\d\d(?:[.,:]\d+)?)?"
-TIME = re.compile(
-    rf"(?P<date>\d{{1,4}}([-./])\d{{1,2}}\2\d{{1,4}})(?:,?[T ] ?{_CLOCK})?"
-    rf"(?: ?[AP]M)?(?: ?Z|[+-]\d\d(?::?\d\d)?)?|{_CLOCK}(?: ?[AP]M)?",
     re.IGNORECASE,
 )
 _Line = tuple[int, list[str]]
@@ -96,6 +89,15 @@ class TextForm(Head):
         rows = [_cells(line, self.separator) for line in self.first_lines]
         return [row for row in rows if len(row) == self.width]
 
+    def unit_behind(self, place: int) -> str:
+        """Return the unit behind a column in all rows, in a column named `unit` or not at all."""
+        behind = self.names[place + 1 : place + 2]
+        cells = [*{row[place + 1] for row in self.first_rows if behind}]
+        if len(cells) != 1:
+            return ""
+        told = behind[0].lower() in NO_UNITS[3:] if behind[0] else are_units(cells)
+        return cells[0] if told else ""
+
     def features(self, *, decimal_commas: bool) -> list[str]:
         """Return what is not the usual, as phrases; decimal commas if they were seen."""
         skipped = f"the first {self.skipped} lines" if self.skipped > 1 else "the first line"
@@ -137,7 +139,7 @@ def form_of(stream: BinaryIO, given: TableFormat) -> TextForm:
     names = [labels.get(place - 1, name) for place, name in enumerate(head.names)]
     head = replace(head, names=names)
     blank = re.compile(f"(^|{re.escape(rows.separator)}) ", re.MULTILINE)
-    return TextForm(
+    form = TextForm(
         **vars(head),
         encoding=encoding,
         separator=rows.separator,
@@ -148,6 +150,7 @@ def form_of(stream: BinaryIO, given: TableFormat) -> TextForm:
         period=period,
         first_lines=lines[head.first : head.first + _TOP],
     )
+    return replace(form, units=[each or form.unit_behind(n) for n, each in enumerate(form.units)])
 
 
 def _lines_of(head: bytes, encoding: str | None) -> tuple[list[str], str]:
@@ -230,7 +233,7 @@ class _LastRows:
 
 def _last_rows(lines: list[str]) -> _LastRows:
     """Return the last rows, by the separator that makes most of them numbers."""
-    tail = [*islice(filter(str.strip, reversed(lines)), TAIL)][::-1]
+    tail = [*islice(filter(str.strip, reversed(lines)), _TAIL)][::-1]
     if not tail:
         raise ValueError("it is empty")
     separator = max(_SEPARATORS, key=lambda mark: _likelihood(mark, tail, lines))

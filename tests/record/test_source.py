@@ -8,7 +8,7 @@ from typing_extensions import override
 
 from stickslip_ros.record.cdr import joined
 from stickslip_ros.record.codec import pack_wrench
-from stickslip_ros.record.reader import read
+from stickslip_ros.record.reader import Recording
 from stickslip_ros.record.source import Block, Source
 from tests.record.runs import FORCES, STATES, state
 
@@ -39,9 +39,9 @@ class Listed(Source):
 def test_a_bag_of_another_format_is_read_by_its_blocks() -> None:
     messages = [(STATES, n, state(n)) for n in range(5)] + [(FORCES, 3, pack_wrench(3, -2.0))]
     bag = Listed([*messages, (FORCES, 4, b"rubbish")])
-    reading = read(bag)
-    assert reading.columns.joint_states.stamp.tolist() == [0, 1, 2, 3, 4]
-    assert reading.columns.control_forces.force.tolist() == [-2.0]
+    reading = Recording(bag)
+    assert reading.joint_states.stamp.tolist() == [0, 1, 2, 3, 4]
+    assert reading.control_forces.force.tolist() == [-2.0]
     (sentence,) = reading.missing
     assert sentence.startswith(f"1 messages on {FORCES} could not be read")
     assert [*bag.messages(STATES, FORCES)][:-1] == messages

@@ -309,7 +309,7 @@ def test_sessions_are_read_one_by_one(tmp_path: Path) -> None:
         (
             [f"{n:,}".replace(",", ".") for n in range(990, 1050)],
             "#1",
-            "--decimal , takes it as this",
+            "--decimal , takes it as that",
         ),
     ],
 )
