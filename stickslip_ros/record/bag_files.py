@@ -10,16 +10,17 @@ from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack, closing
 from pathlib import Path
+from typing import NamedTuple, Self
 
 import numpy as np
-from typing_extensions import override
 
+from stickslip_ros.arrays import IntArray
 from stickslip_ros.errors import BagError
+from stickslip_ros.record.cdr import Messages
 from stickslip_ros.record.compression import unpack_file
 from stickslip_ros.record.converted_bag import mcap_of
 from stickslip_ros.record.mcap_file import McapFile
 from stickslip_ros.record.metadata import metadata_faults
-from stickslip_ros.record.source import Block, Source
 from stickslip_ros.stamps import NANOSECONDS
 from stickslip_ros.text import printable
 
@@ -27,12 +28,46 @@ _PACKED_SUFFIX = ".mcap.zstd"
 """Suffix of the files that rosbag2 compressed as a whole."""
 
 
-class BagFiles(Source):
-    """The MCAP files of a bag; raises BagError if `path` is not a bag."""
+class Block(NamedTuple):
+    """Adjacent messages of a bag in the order of its file, such as those of one chunk.
+
+    The serialized message i is `data[begin[i] : end[i]]`; arrays have the shape (messages,).
+    """
+
+    names: Sequence[str]
+    """Full names of topics."""
+    topic: IntArray
+    """Place of the topic of each message among these names."""
+    log_time: IntArray
+    """Log times, ns."""
+    data: bytes
+    begin: IntArray
+    end: IntArray
+
+    @property
+    def messages(self) -> Messages:
+        """The serialized messages."""
+        return Messages(self.data, self.begin, self.end)
+
+    def of_topic(self, name: str) -> "Block":
+        """Return the messages on one of these topics."""
+        rows = self.topic == self.names.index(name)
+        if rows.all():
+            return self
+        columns = self.log_time[rows], self.data, self.begin[rows], self.end[rows]
+        return Block(self.names, self.topic[rows], *columns)
+
+
+class BagFiles:
+    """A bag that is open for reading; a context manager that closes it.
+
+    Raises BagError if `path` is not a bag.
+    """
 
     def __init__(self, path: Path | str, *continued: Path) -> None:
         """Open the files of a bag directory, or one MCAP file, and of bags that continue it."""
         self.path = Path(path)
+        """The bag."""
         self._unreadable: list[str] = []
         with ExitStack() as opened:
             places = [mcap_of(bag, opened) for bag in (self.path, *continued)]
@@ -54,6 +89,9 @@ class BagFiles(Source):
             for channel in file.channels.values()
             if channel.schema_id in file.schemas
         }
+        """Types by name, such as `sensor_msgs/msg/JointState` by `/feed_drive/joint_states`."""
+        self.time_span: tuple[int, int] | None = None
+        """Log times of the first and the last message, ns; None if the bag does not tell them."""
         accounts = [file.statistics for file in self.files]
         known = [account for account in accounts if account is not None and account.message_count]
         if known and None not in accounts:
@@ -61,13 +99,16 @@ class BagFiles(Source):
             self.time_span = start, max(account.message_end_time for account in known)
 
     @property
-    @override
     def damage(self) -> list[str]:
+        """Sentences on an incomplete end and damage; further reading may find more."""
         in_files = (sentence for file in self.files for sentence in file.damage)
         return [*map(printable, (*self._metadata_faults, *self._unreadable, *in_files))]
 
-    @override
     def blocks(self, *topics: str) -> Iterator[Block]:
+        """Yield the messages of these topics, given by their full names, block by block.
+
+        Raises BagError if the operating system fails to read the bag.
+        """
         for file in self.files:
             topic_of = np.full(1 << 16, -1)
             for number, channel in file.channels.items():
@@ -77,8 +118,22 @@ class BagFiles(Source):
                 topic = topic_of[block.channel]
                 yield Block(topics, topic, block.log_time, block.data, block.begin, block.end)
 
-    @override
+    def messages(self, *topics: str) -> Iterator[tuple[str, int, bytes]]:
+        """Yield topic, log time (ns) and CDR data of each message of these topics, in file order.
+
+        Topics and errors are those of `blocks`.
+        """
+        for block in self.blocks(*topics):
+            columns = (block.topic, block.log_time, block.begin, block.end)
+            name_of = dict(enumerate(block.names))
+            for topic, stamp, begin, end in zip(*(c.tolist() for c in columns), strict=True):
+                yield name_of[topic], stamp, block.data[begin:end]
+
     def offered_qos(self, topic: str) -> str:
+        """Return the QoS profiles that the recorded publishers of a topic (full name) offered.
+
+        They are rosbag2's YAML, a list with one profile for each publisher; empty if unknown.
+        """
         profiles = (
             channel.metadata.get("offered_qos_profiles", "")
             for file in self.files
@@ -87,20 +142,26 @@ class BagFiles(Source):
         )
         return next(filter(None, profiles), "")
 
-    @override
     def metadata(self, name: str) -> dict[str, str] | None:
+        """Return the last metadata table of a name, such as `stickslip_ros/analyzer`, or None."""
         last = deque((table for file in self.files for table in file.tables(name)), maxlen=1)
         return last[0].metadata if last else None
 
-    @override
     def attachment(self, name: str) -> bytes | None:
+        """Return the content of the last attached file of a name; None if there is none."""
         attachments = (content for file in self.files for content in file.attachments(name))
         last = deque(attachments, maxlen=1)
         return last[0].data if last else None
 
-    @override
     def close(self) -> None:
+        """Close the bag."""
         self._opened.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self.close()
 
     def _readable_files(self, paths: Sequence[Path]) -> Iterator[McapFile]:
         """Open the files; raise BagError if none can be read, otherwise list those that cannot."""

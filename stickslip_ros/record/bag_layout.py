@@ -8,8 +8,8 @@ from typing import Any, NamedTuple, Self, get_args
 
 from stickslip_ros.errors import BagError, InvalidInputError
 from stickslip_ros.record import ForceSource, TimeSource
+from stickslip_ros.record.bag_files import BagFiles
 from stickslip_ros.record.codec import FORCE_TYPES, STATE_TYPES
-from stickslip_ros.record.source import Source
 from stickslip_ros.record.topics import CONTROL_FORCE, JOINT_STATES, RECORDED_TOPICS, Topic
 from stickslip_ros.text import must_be_one_of, number_in, printable, shown
 
@@ -68,7 +68,7 @@ class NumberedTopic(NamedTuple):
 class DriveInBag:
     """Where a bag has one drive, and what it tells of it."""
 
-    source: Source
+    source: BagFiles
     namespace: str | None = None
     """ROS namespace of the drive; None if the bag holds only one drive."""
     given_layout: BagLayout = ANY_LAYOUT

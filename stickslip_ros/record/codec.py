@@ -10,6 +10,7 @@ import struct
 from collections.abc import Callable, Sequence
 from functools import partial
 from math import isnan
+from typing import TypeVar
 
 from stickslip_ros.arrays import IntArray
 from stickslip_ros.errors import BagError, MessageError
@@ -39,6 +40,8 @@ FORCE_TYPES = (
 """Types of messages that may hold a force."""
 UNSTAMPED = FORCE_TYPES[1:3]
 """Those that have no stamp."""
+
+_ColumnsT = TypeVar("_ColumnsT", SampleColumns, ForceColumns, ReferenceColumns)
 
 _MOST_JOINTS = 1000
 """Messages with more joints are refused: decoding might take longer than a sample."""
@@ -252,21 +255,9 @@ def joint_state_columns(messages: Sequence[bytes]) -> tuple[SampleColumns, Refus
     return joint_states_in(*joined(messages))
 
 
-def joint_states_in(data: bytes, begin: IntArray, end: IntArray) -> tuple[SampleColumns, Refused]:
-    """Decode the serialized joint states `data[begin[i] : end[i]]`, as `joint_state_columns`."""
-    _, stamp, values, refused = decode(data, begin, end, joint_state_layout, 7)
-    return SampleColumns(stamp, *values), refused
-
-
 def wrench_columns(messages: Sequence[bytes]) -> tuple[ForceColumns, Refused]:
     """Decode serialized wrenches; also return what `unpack_wrench` would refuse."""
     return wrenches_in(*joined(messages))
-
-
-def wrenches_in(data: bytes, begin: IntArray, end: IntArray) -> tuple[ForceColumns, Refused]:
-    """Decode the serialized wrenches `data[begin[i] : end[i]]`, as `wrench_columns`."""
-    _, stamp, values, refused = decode(data, begin, end, _wrench_layout, 1)
-    return ForceColumns(stamp, *values), refused
 
 
 def force_layouts(joint: str | None, number: int | None) -> dict[str, Callable[[bytes], Layout]]:
@@ -283,30 +274,6 @@ def force_layouts(joint: str | None, number: int | None) -> dict[str, Callable[[
         partial(_command_layout, joint=joint),
     )
     return dict(zip(FORCE_TYPES, layouts, strict=True))
-
-
-def references_in(data: bytes, begin: IntArray, end: IntArray) -> tuple[ReferenceColumns, Refused]:
-    """Decode the serialized references `data[begin[i] : end[i]]`; also return what is refused."""
-    _, stamp, values, refused = decode(data, begin, end, _reference_layout, 2)
-    return ReferenceColumns(stamp, *values), refused
-
-
-def controller_references_in(
-    data: bytes, begin: IntArray, end: IntArray, joint: str | None = None
-) -> tuple[ReferenceColumns, Refused]:
-    """Decode the references in states of a JointTrajectoryController, of a joint or the only one.
-
-    The messages are `data[begin[i] : end[i]]`; also return what is refused.
-    """
-
-    def layout_of(message: bytes) -> Layout:
-        joints = _ControllerJoints(message, "controller state")
-        joints.sequences = joints.reference
-        name = joints.names[0] if joint is None and joints.names else joint
-        return joints.layout_of(joints.place(0, name), joints.place(1, name))
-
-    _, stamp, values, refused = decode(data, begin, end, layout_of, 2)
-    return ReferenceColumns(stamp, *values), refused
 
 
 def _unpackable(kind: str, stamp: int, error: struct.error) -> MessageError:
@@ -492,3 +459,33 @@ def _command_layout(data: bytes, joint: str | None) -> Layout:
 def _header_layout(data: bytes) -> Layout:
     message = Decoder(data, "header")
     return Layout(message, message.header_stamp(), [])
+
+
+def _columns_in(
+    columns: type[_ColumnsT], number: int, layout_of: Callable[[bytes], Layout]
+) -> Callable[[bytes, IntArray, IntArray], tuple[_ColumnsT, Refused]]:
+    def decoded(data: bytes, begin: IntArray, end: IntArray) -> tuple[_ColumnsT, Refused]:
+        _, stamp, values, refused = decode(data, begin, end, layout_of, number)
+        return columns(stamp, *values), refused
+
+    return decoded
+
+
+joint_states_in = _columns_in(SampleColumns, 7, joint_state_layout)
+wrenches_in = _columns_in(ForceColumns, 1, _wrench_layout)
+references_in = _columns_in(ReferenceColumns, 2, _reference_layout)
+"""Each decodes serialized messages `data[begin[i] : end[i]]`, and returns what is refused, too."""
+
+
+def controller_references_in(
+    joint: str | None,
+) -> Callable[[bytes, IntArray, IntArray], tuple[ReferenceColumns, Refused]]:
+    """Return what decodes references of a JointTrajectoryController, of a joint or the only one."""
+
+    def layout_of(message: bytes) -> Layout:
+        joints = _ControllerJoints(message, "controller state")
+        joints.sequences = joints.reference
+        name = joints.names[0] if joint is None and joints.names else joint
+        return joints.layout_of(joints.place(0, name), joints.place(1, name))
+
+    return _columns_in(ReferenceColumns, 2, layout_of)

@@ -5,10 +5,10 @@ from collections.abc import Callable
 import numpy as np
 
 from stickslip_ros.arrays import IntArray
+from stickslip_ros.record.bag_files import Block
 from stickslip_ros.record.bag_layout import DriveInBag
 from stickslip_ros.record.cdr import Layout, Messages, Refused, decode
 from stickslip_ros.record.codec import force_layouts, wrenches_in
-from stickslip_ros.record.source import Block
 from stickslip_ros.record.topics import CONTROL_FORCE
 from stickslip_ros.samples import ForceColumns
 

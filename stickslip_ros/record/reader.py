@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from functools import cached_property, partial
+from functools import cached_property
 from itertools import chain
 from math import inf
 from pathlib import Path
@@ -12,7 +12,7 @@ import numpy as np
 
 from stickslip_ros.arrays import IntArray
 from stickslip_ros.errors import BagError
-from stickslip_ros.record.bag_files import BagFiles
+from stickslip_ros.record.bag_files import BagFiles, Block
 from stickslip_ros.record.bag_layout import ANY_LAYOUT, BagLayout, DriveInBag
 from stickslip_ros.record.cdr import Refused
 from stickslip_ros.record.codec import (
@@ -25,7 +25,6 @@ from stickslip_ros.record.codec import (
 from stickslip_ros.record.force_reader import ForceReader
 from stickslip_ros.record.imperfections import play_note, ripple_note
 from stickslip_ros.record.motion_reader import MotionReader
-from stickslip_ros.record.source import Block, Source
 from stickslip_ros.record.topics import (
     APPLIED_DISTURBANCE,
     APPLIED_FORCE,
@@ -76,8 +75,8 @@ class Recording:
 
     Parameters
     ----------
-    path : Path, str or Source
-        A bag directory, one MCAP file, or a bag of another format that is open.
+    path : Path or str
+        A bag directory, or one MCAP file.
     namespace : str or None
         ROS namespace of the drive whose columns are read, such as `/feed_drive`; None if the bag
         holds only one drive.
@@ -107,14 +106,14 @@ class Recording:
 
     def __init__(
         self,
-        path: Path | str | Source,
+        path: Path | str,
         namespace: str | None = None,
         *,
         belt_speed: float | None = None,
         layout: BagLayout = ANY_LAYOUT,
         continued: Sequence[Path] = (),
     ) -> None:
-        self.source = source = path if isinstance(path, Source) else BagFiles(path, *continued)
+        self.source = source = BagFiles(path, *continued)
         """The bag, in which other topics are, too."""
         self.path, self.topics = source.path, source.topics
         self.messages, self.metadata = source.messages, source.metadata
@@ -178,7 +177,7 @@ class Recording:
         states, drive = self._drive.name(JOINT_STATES), self._drive
         if self.topics.get(states) != CONTROLLER_STATE or drive.name(REFERENCE):
             return self._columns(REFERENCE, references_in)
-        decode = partial(controller_references_in, joint=drive.layout.joint)
+        decode = controller_references_in(drive.layout.joint)
         references = self._columns(REFERENCE, decode, states)
         if np.array_equal(references.stamp, self.joint_states.stamp):
             notes = play_note(references.position, self.joint_states.position, "m")

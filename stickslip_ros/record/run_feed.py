@@ -11,7 +11,7 @@ import numpy as np
 
 from stickslip_ros.arrays import BoolArray, IntArray
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.measures.cycle_measures import Regime
+from stickslip_ros.measures.cycle_measures import UNBOUNDED_BELT_SPEEDS, Regime
 from stickslip_ros.measures.feed import moving_part, relative_to_feed
 from stickslip_ros.measures.following import Followed, followed
 from stickslip_ros.measures.run_meter import RunAnalysis, RunMeter, RunObserver
@@ -132,6 +132,11 @@ class RunFeed:
         if self._other_machine and (doubt := self._doubt(report, length)):
             report = {**report, "regime": None, "stick_fraction": None}
             notes.append(doubt)
+        if self._other_machine and report["regime"] == Regime.UNBOUNDED:
+            notes.append(
+                f"the slide is {UNBOUNDED_BELT_SPEEDS:g} times as fast as the belt, or faster: it "
+                "diverges, or one of them is in another unit"
+            )
         if report["stick_fraction"] is None and report["regime"] == Regime.STICK_SLIP:
             notes.append(
                 f"the stick fraction is not known: {report['cycles']} whole cycles do not tell its "

@@ -62,6 +62,7 @@ def test_files_of_version_7_3_have_the_same_vectors() -> None:
 )
 def test_json_has_rows_or_vectors(content: object, text: str) -> None:
     assert table_formats._of_json(json.dumps(content).encode()) == text
+    assert table_formats._of_json(b'{"t": 0, "x": 1}\n{"t": 1, "x": 2}\n') == "t,x\n0,1\n1,2\n"
 
 
 def test_json_without_a_table_is_refused() -> None:

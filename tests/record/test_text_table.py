@@ -251,6 +251,45 @@ def test_times_are_in_the_unit_of_the_period_on_top(tmp_path: Path) -> None:
     assert "the time is converted: steps of 2 are 2 ms by a line above" in found.notes
     found = read(tmp_path, body, "#1", "#2")
     assert any("no unit and counts in s, 2 s from row to row" in note for note in found.notes)
+    numbered = "Sample rate;500;Hz\nrow;x\n" + "".join(f"{n};{n}\n" for n in range(50))
+    assert read(tmp_path, numbered, "row", "x").samples.stamp[1] == 2_000_000
+
+
+@pytest.mark.parametrize(
+    ("row", "time", "refusal", "way"),
+    [
+        ("{},0", "#1", "no date in s: time=#1*NUMBER converts it, with 0.001 from ms", "#1*0.001"),
+        ("10:00:00,{:.3}", "T+ms", "different units, the clock in s, ms in ms", "T+ms*0.001"),
+    ],
+)
+def test_times_in_other_units_than_seconds_are_refused_with_a_way(
+    tmp_path: Path, row: str, time: str, refusal: str, way: str
+) -> None:
+    stamps = (f"{1_770_000_000_000 + n}" for n in range(90))
+    lines = [row.format(each if "10:" not in row else each[-3:]) for each in stamps]
+    text = "T,ms,x\n" + "".join(f"{line},{n}\n" for n, line in enumerate(lines))
+    with pytest.raises(InvalidInputError, match=re.escape(refusal)):
+        read(tmp_path, text, time, "x")
+    found = read(tmp_path, text, way, "x").samples
+    assert found.stamp.tolist() == [1_000_000 * number for number in range(90)]
+
+
+def test_points_between_thousands_are_refused_with_a_way(tmp_path: Path) -> None:
+    cells = [f"{n:,}".replace(",", ".") for n in range(1050, 900, -1)]
+    text = "t;x\n" + "".join(f"{n};{each}\n" for n, each in enumerate(cells))
+    with pytest.raises(BagError, match=r"--decimal , takes it as that, and --decimal \. as it is"):
+        read(tmp_path, text, "t", "x")
+    for mark, first in ((",", 1050.0), (".", 1.05)):
+        found = read(tmp_path, text, "t", "x", TableFormat(decimal=mark)).samples
+        assert found.position[0] == first
+
+
+def test_a_current_is_no_force(tmp_path: Path) -> None:
+    (tmp_path / "log.csv").write_text("t,x,Motorstrom\n" + "".join(f"{n},0,1\n" for n in range(9)))
+    columns = {"time": "t", "position": "x", "force": "Motorstrom"}
+    with pytest.raises(InvalidInputError, match="a current by its name, which tells no force"):
+        read_table(tmp_path / "log.csv", columns)
+    read_table(tmp_path / "log.csv", {**columns, "force": "Motorstrom*0.3"})
 
 
 def test_a_position_that_is_not_recorded_is_the_integral_of_the_velocity(tmp_path: Path) -> None:

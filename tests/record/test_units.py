@@ -4,7 +4,7 @@ from math import inf, isnan, pi
 
 import pytest
 
-from stickslip_ros.record.units import are_units, period_in, units_in, without_unit
+from stickslip_ros.record.units import are_units, other_quantity, period_in, units_in, without_unit
 
 TURN, DEGREE = 2.0 * pi, pi / 180.0
 NO_UNIT, DOUBTFUL = inf, 0.0
@@ -99,6 +99,12 @@ def test_a_line_of_units_counts_for_the_names_above_or_below() -> None:
     assert [each.factor for each in units_in("x", "mm", "m")] == [1e-3]
     assert {each.factor for each in units_in("x [mm]", "m", "m")} == {1.0, 1e-3}
     assert isnan(units_in("x", "inc", "m")[0].factor)
+
+
+def test_a_name_tells_another_quantity() -> None:
+    names = {"accel_x": "an acceleration", "act_current": "a current", "iq": "a current"}
+    for name in (*names, "raw_x", "current_torque", "Strommoment", "iqr"):
+        assert other_quantity(name) == names.get(name), name
 
 
 def test_a_column_is_also_named_without_its_unit() -> None:
