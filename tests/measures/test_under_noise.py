@@ -106,6 +106,10 @@ def test_blocks_of_any_length_give_the_same_where_the_motion_comes_to_rest(
     assert whole.measures().regime is Regime.EQUILIBRIUM
 
 
+def test_one_step_from_each_sample_to_the_next_is_a_uniform_motion_and_no_noise() -> None:
+    assert not fed(columns(milliseconds(600), 4e-5 * np.arange(600)), UNKNOWN).noisy
+
+
 @pytest.mark.parametrize(("noise", "noisy"), [(0.0, False), (1e-8, True), (1e-6, True)])
 def test_noise_of_which_nothing_is_told_is_found(noise: float, noisy: bool) -> None:
     meter = fed(samples(noise=noise), UNKNOWN)
