@@ -356,8 +356,10 @@ def _factor(table: Table, kind: str, asked: Expression) -> tuple[float, dict[str
         name = table.name(place).removeprefix("column ")
         which = f"{table.path}: {kind}, {table.name(place)},"
         column = table.number(place) if len(asked.places) == 1 else f"({asked.text})"
-        other = None if per_ampere else other_quantity(table.names[place])
-        if other and kind in (_FORCES if other == "a current" else (*_MOTION, *_FORCES)):
+        other = other_quantity(table.names[place])
+        if other == meant:
+            other = None
+        if other and kind in ((*_MOTION, *_FORCES) if other == "an acceleration" else _FORCES):
             text = "*1 takes it if it is one" if kind in _MOTION else f"*NUMBER converts it{way}"
             raise InvalidInputError(
                 f"{which} is {other} by its name, which tells no {kind}: {kind}={column}{text}"

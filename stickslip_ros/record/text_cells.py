@@ -37,10 +37,11 @@ def values_of(cells: Any, decimal: str, given: str | None) -> tuple[Any, bool]:
         return np.array(cells), cells.dtype.kind == "f" and decimal == ","
     if cells.dtype.kind == "b":
         return np.full(len(cells), np.nan), False
-    text = cells.astype(str).str.strip(" \t'\"").str.replace(GROUPED, "", regex=True)
+    text = cells.astype(str).str.strip(" \t'\"")
     instant = next(filter(None, map(TIME.fullmatch, text.dropna()[:_LOOK])), None)
     if instant is not None:
         return _instants(text, instant), False
+    text = text.str.replace(GROUPED, "", regex=True)
     if given is None:
         grouped = ((".", r",\d*\."), (",", r"\.\d*,"))  # commas, or points, group digits
         marks = (mark for mark, pattern in grouped if text.str.contains(pattern).any())

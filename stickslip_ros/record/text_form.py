@@ -93,7 +93,7 @@ class TextForm(Head):
         """Return the unit behind a column in all rows, in a column named `unit` or not at all."""
         behind = self.names[place + 1 : place + 2]
         cells = [*{row[place + 1] for row in self.first_rows if behind}]
-        if len(cells) != 1:
+        if len(cells) != 1 or place + 1 not in self.columns.values():
             return ""
         told = behind[0].lower() in NO_UNITS[3:] if behind[0] else are_units(cells)
         return cells[0] if told else ""
@@ -295,7 +295,7 @@ def _texts_above(lines: list[str], first: int, skip: int, rows: _LastRows) -> li
             break
         if (values and texts and not _is_fact(row)) or not (values or any(row)):
             break
-        if not values and any(map(_is_text, row)):
+        if not values and (any(map(_is_text, row)) or are_units(row)):
             texts.append((place, row))
     return texts
 

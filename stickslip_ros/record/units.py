@@ -56,7 +56,7 @@ _SPELLINGS = tuple(
         ("arcmin", "R", "", "arcmin(?:utes?)?"),
         ("kgf", "F", "", "kgf|kp"),
         ("lbf", "F", "", "lbf"),
-        ("A", "I", "[kum]", r"a(?:mp\w*|rms|eff|pk)?"),
+        ("A", "I", "[kum]", r"a(?:mps?|mpere\w*|rms|eff|pk)?"),
         ("", "other", "[kum]", r"[vwgk]|volts?|gf|pa|bar|lbs?|oz|degc|°c|%"),
     )
 )
@@ -68,13 +68,12 @@ _COUNTS = re.compile(
     r"counts?|cts|inc|incr(?:ements?)?|ink(?:r\w*)?|puls\w*|impuls\w*|pls|ticks?|steps|lsb|digits?|erpm|cnts?|qc"
 )
 """Words for numbers of an encoder, a motor or a clock, of which only the owner knows the size."""
-_SCALED = re.compile(
-    r"(?i)[x*\xd7/)\]]\s*[*/\xd7]?\s*10+\b|\b(?:tenth|hundredth|zehntel|hundertstel)s?\b"
-)
+_SCALED = re.compile(r"(?i)(?:[*/\xd7]|\sx)\s*10+\b|\b(?:tenth|hundredth|zehntel|hundertstel)s?\b")
 """What says that numbers are multiples of a unit."""
 _OTHERS = {
     "an acceleration": re.compile(r"acc(?:el\w*)?$|beschl|accél|acel"),
     "a current": re.compile(r"current|i[qd]$|(?:\w*motor)?strom|corrente|corriente|courant"),
+    "a power": re.compile(r"power|leistung|puissance|poten[zc]"),
 }
 _FORCE = re.compile(r"forc|fuerz|forz|torq|moment|coup|copp|effort|\w*(?:kraft|moment)")
 """Starts of words for quantities that are often taken for others, and for forces."""
@@ -163,7 +162,7 @@ def are_units(cells: Sequence[str]) -> bool:
 
 
 def other_quantity(name: str) -> str | None:
-    """Return "an acceleration" or "a current" if the name of a column is that of one."""
+    """Return what a column is by its name, if it is "an acceleration", "a current" or "a power"."""
     words = re.findall(r"[^\W\d_]+", name.casefold())
     if any(map(_FORCE.match, words)):  # the current torque
         return None

@@ -50,6 +50,7 @@ def read(
         ("Name,A,Name,B\nType,R,Type,R\nStep,2,Step,2\nNetID,5.1,NetID,5.1\n\n"
          + rows(",", last=",0,0"), "Name", "A"),
         ("t;x\n-;-\n" + rows(";"), "t", "x"),
+        ("".join(f"t {row.replace(',', ' V ')}\n" for row in rows().splitlines()), "t", "V"),
         ("% t [s]  x [m]\n" + rows("  "), "t", "x"),
         ("".join(f"t {a} s x {b} m\n" for a, b in (row.split() for row in rows(" ").splitlines())),
          "t", "x"),
@@ -145,6 +146,7 @@ def test_times_of_day_have_no_unit(tmp_path: Path) -> None:
         ("Trace 1\nms;mm\nt;x\n", "t", "x", ANY_FORM, "the first line skipped, units in line 2"),
         ("t [ms];x [mm]\n", "#1", "#2", TableFormat(skip=1), "semicolons as separators"),
         ("Zeit;Weg\nms;mm ±1 µm\n", "Zeit", "Weg", ANY_FORM, "decimal commas, units in line 2"),
+        ("Zeit [ms];Weg [mm]\n-;%\n", "Zeit", "Weg [mm]*1e-3", ANY_FORM, "units in line 2"),
     ],
 )
 def test_units_above_and_below_the_names_and_of_skipped_names_are_used(

@@ -49,7 +49,7 @@ HEADERS = {
         "|pos_cnt|pos (qc)|LVDT volts|Position %|tenths of mm|[mm]/10|x [mm x 1000]|Weg x10^-3 m"
         "|Drehmoment [Nm]",
         NO_UNIT: "x|pos|x_N|phi_h|pos_d|x_min|Position (min)|Position (X)|x_max|data[2]|pos_s|A"
-        "|mu|accel_x|in_position",
+        "|mu|accel_x|in_position|x10|pos_x10|x_amplitude",
     },
     "m/s": {
         1e-3: "v [mm/s]|v / (mm/s)|v mm/s|v_mm_s|v in mm/s|v_mm_per_s|v_mmps|vMm_s|vitesse, mm/s",
@@ -102,7 +102,12 @@ def test_a_line_of_units_counts_for_the_names_above_or_below() -> None:
 
 
 def test_a_name_tells_another_quantity() -> None:
-    names = {"accel_x": "an acceleration", "act_current": "a current", "iq": "a current"}
+    names = {
+        "accel_x": "an acceleration",
+        "act_current": "a current",
+        "iq": "a current",
+        "motor_power_W": "a power",
+    }
     for name in (*names, "raw_x", "current_torque", "Strommoment", "iqr"):
         assert other_quantity(name) == names.get(name), name
 
