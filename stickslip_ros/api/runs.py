@@ -25,7 +25,7 @@ from stickslip_ros.motion.trajectory import (
     TrajectoryRecorder,
 )
 from stickslip_ros.progress import Progress
-from stickslip_ros.quantities import number_of, quantities_of
+from stickslip_ros.quantities import number_of
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.scenarios.parameters import PlantParameters
 from stickslip_ros.show.measure_table import simulation_tables
@@ -81,9 +81,12 @@ class Run(TabularResult):
         return run_figure(drawn, style=style)
 
     def _table(self) -> Table:
-        columns = vars(self.trajectory)
+        columns, recorder = vars(self.trajectory), self._recorder
         time = {"time": self.trajectory.time}
-        quantities, source = quantities_of(type(self.trajectory)), attributes(self.scenario)
+        assert recorder is not None
+        quantities, source = recorder.quantities, attributes(self.scenario)
+        if self.following is not None:
+            columns = {**columns, "reference": recorder.pursuit[1]}
         return Table(columns, quantities, self._units, time, source, "time")
 
     @property

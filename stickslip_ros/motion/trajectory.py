@@ -3,8 +3,7 @@
 from abc import ABC, abstractmethod
 from array import array
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, make_dataclass
-from functools import cached_property
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
@@ -77,12 +76,6 @@ class MeasuredMotorTrajectory(MeasuredTrajectory):
     """Measured velocity of the motor, m/s."""
 
 
-@dataclass(frozen=True, eq=False)
-class _WithReference(Table):
-    reference: Annotated[FloatArray, Quantity("reference", "m")]
-    """Displacement that the controller is to follow, m."""
-
-
 _KINDS = {
     (False, False): Trajectory,
     (True, False): MeasuredTrajectory,
@@ -123,8 +116,11 @@ class SampleRecorder(ABC):
 
     @property
     def quantities(self) -> Mapping[str, Quantity]:
-        """Label and unit of each column."""
-        return quantities_of(self._kind)
+        """Label and unit of each column: those of a trajectory, and of the reference."""
+        columns = quantities_of(self._kind)
+        if self._reference is not None:
+            columns["reference"] = Quantity("reference", "m")
+        return columns
 
     @property
     def pursuit(self) -> FloatArray:
@@ -135,14 +131,9 @@ class SampleRecorder(ABC):
         columns = np.array(self._pursuit).reshape(-1, 3).T
         return np.array([np.arange(columns.shape[1]) / self._rate, *columns])
 
-    @cached_property
+    @property
     def _kind(self) -> type[Trajectory]:
-        kind = _KINDS[self._measured, self._with_motor]
-        if self._reference is None:
-            return kind
-        return make_dataclass(
-            kind.__name__, [], bases=(_WithReference, kind), frozen=True, eq=False
-        )
+        return _KINDS[self._measured, self._with_motor]
 
     def take(self, sample: Sample, control_force: float, measured: Sample | None = None) -> None:
         """Receive the next sample, and the control force (N) that answers it.
@@ -214,4 +205,5 @@ class TrajectoryRecorder(SampleRecorder):
 
     def trajectory(self) -> Trajectory:
         """Return the samples so far."""
-        return self._kind(*np.array(self._values).reshape(-1, len(self.quantities)).T.copy())
+        columns = np.array(self._values).reshape(-1, len(self.quantities)).T.copy()
+        return self._kind(*columns[: len(quantities_of(self._kind))])
