@@ -107,3 +107,23 @@ def test_a_spike_between_two_samples_is_unknown() -> None:
     assert found.values.reversal_height is None
     assert "shorter than three samples" in found.notes[0]
     assert followed(TIME, np.full(len(TIME), np.nan), CIRCLE) is None
+
+
+def test_the_start_and_a_wrong_scale_are_no_errors_at_reversals() -> None:
+    position = 1.002 * CIRCLE + with_spikes(TIME, 0.0) - CIRCLE
+    late = np.exp(-TIME / 0.1)
+    found = followed(TIME, CIRCLE, position - 1e-2 * late)
+    assert found is not None
+    assert found.values.reversal_height == pytest.approx(SPIKE, rel=0.02)
+    peak = 2e-3 * RADIUS + SPIKE
+    assert found.values.peak_following_error == pytest.approx(peak, rel=0.15)
+
+
+def test_the_standard_error_is_that_of_the_mean_over_reversals() -> None:
+    time = TIME[TIME < 6.5]  # reversals at 1, 3 and 5 s
+    reference, whole = RADIUS * np.sin(OMEGA * time), with_spikes(time, 0.0)
+    error = (reference - whole) * np.select([time < 2.0, time < 4.0], [1.0, 2.0], 3.0)
+    found = followed(time, reference, reference - error)
+    assert found is not None
+    assert found.values.reversal_height == pytest.approx(2.0 * SPIKE, rel=0.02)
+    assert found.values.reversal_height_error == pytest.approx(SPIKE / 3.0**0.5, rel=0.05)
