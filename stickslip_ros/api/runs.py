@@ -142,7 +142,8 @@ def loop_facts(
     from stickslip_ros.studies.stability import SEARCHED_FEEDS, stable_feeds  # it takes long
 
     units = Units.for_drive(plant.as_drive())
-    facts = {"belt speed": units.text(plant.belt_speed, "m/s")}
+    varied = f", with a signal ({plant.belt.kind})" * (plant.belt.kind != "none")
+    facts = {"belt speed": units.text(plant.belt_speed, "m/s") + varied}
     ranges = stable_feeds(plant, law) if sampled or law is None else None
     if ranges is not None:
         ends = tuple(share * plant.belt_speed for share in SEARCHED_FEEDS)

@@ -33,7 +33,8 @@ def comparison_figure(
     shown = [*names, *["held"] * bool((shares < 1.0).any())]
     figure = style.figure(4.8 * len(shown), 4.4, narrow=0.9 * len(shown))
     said = "" if "held" in shown else ": all of them hold all cases"
-    style.set_title(figure, f"control laws compared, {study.scenario.name}{said}")
+    title = f"control laws compared, {study.scenario.name}{said}"
+    style.set_title(figure, title, "means of the cases, with standard errors over the seeds")
     panels = figure.subplots(*((len(shown), 1) if style.narrow else (1, len(shown))), squeeze=False)
     units, grid = (
         Units.for_drive(study.scenario.plant.as_drive(), study.plan.parameters),
