@@ -188,38 +188,43 @@ def simulated(scenario: Scenario | None, asked: Task, share: float, rate: float)
     return bool(simulate_case(scenario.changed(values), duration, step, 0.05).held)
 
 
+def figures(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """Return the figures of results, as rows of a file."""
+    proposed = [row for row in rows if row["decay_rate"] is not None]
+    ratios = [max(row["force_ratios"]) for row in proposed]
+    return {
+        "drives": len(rows),
+        "proposals": len(proposed),
+        "grid_is_faster": sum(row["of_grid"] is not None for row in rows),
+        "proposals_not_held": sum(not all(row["held"]) for row in proposed),
+        "force_ratio_median": float(np.median(ratios)),
+        "force_ratio_largest": max(ratios),
+    }
+
+
 def main() -> int:
     """Print the figures; return 1 if the grid has gains that the design has not."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--drives", type=int, default=DRIVES)
-    parser.add_argument("--write", action="store_true", help="write design.json")
+    parser.add_argument(
+        "--write", action="store_true", help="write design.json, with its results of other drives"
+    )
     arguments = parser.parse_args()
-    results: list[Result] = []
+    path, rows = Path(__file__).with_suffix(".json"), dict[int, dict[str, Any]]()
+    if arguments.write and path.exists():
+        rows = {row["seed"]: row for row in json.loads(path.read_text())["results"]}
     for seed in range(arguments.first, arguments.first + arguments.drives):
-        results.append(compare(seed))
-        print(results[-1], flush=True)
-    proposed = [each for each in results if each.decay_rate is not None]
-    ratios = [ratio for each in proposed for ratio in each.force_ratios]
-    figures = {
-        "drives": len(results),
-        "proposals": len(proposed),
-        "grid_is_faster": sum(not each.found for each in results),
-        "proposals_not_held": sum(not all(each.held) for each in proposed),
-        "force_ratio_median": float(np.median(ratios)),
-        "force_ratio_largest": max(ratios),
-    }
-    print(json.dumps(figures, indent=1))
+        row = asdict(compare(seed))
+        print(row, flush=True)
+        rows[seed] = {**row, "force_ratios": [round(max(row["force_ratios"], default=0.0), 3)]}
+    ordered = [rows[seed] for seed in sorted(rows)]
+    found = figures(ordered)
+    print(json.dumps(found, indent=1))
     if arguments.write:
-        path = Path(__file__).with_suffix(".json")
-        rows = [
-            {**asdict(each), "force_ratios": [round(max(each.force_ratios, default=0.0), 3)]}
-            for each in results
-        ]
-        path.write_text(
-            json.dumps({**figures, "results": rows, "versions": versions()}, indent=1) + "\n"
-        )
-    return int(bool(figures["grid_is_faster"] or figures["proposals_not_held"]))
+        written = {**found, "results": ordered, "versions": versions()}
+        path.write_text(json.dumps(written, indent=1) + "\n")
+    return int(bool(found["grid_is_faster"] or found["proposals_not_held"]))
 
 
 if __name__ == "__main__":

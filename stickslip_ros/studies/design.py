@@ -23,7 +23,7 @@ from stickslip_ros.scenarios.files import Scenario, parameter_file
 from stickslip_ros.scenarios.sections import BASE_SECTION
 from stickslip_ros.studies.case_outcome import Disturbance, simulate_case
 from stickslip_ros.studies.controller_trial import FILTER_SETTLED, Rest, Vibration
-from stickslip_ros.studies.gain_search import rounded
+from stickslip_ros.studies.gain_search import linear_part, rounded
 from stickslip_ros.studies.options import FEED_TOLERANCE, OWN_SPEED_RANGE
 from stickslip_ros.studies.spread import Spread, check_spread, drawn, held_interval
 from stickslip_ros.studies.stability import number_text
@@ -441,7 +441,21 @@ class Designer:
 
     def worst(self, law: ControlLaw) -> Check:
         """Return the check of a law where a deviation decays most slowly: the first that fails."""
-        speed = self.tuning.loops.slowest(law).drive.belt_speed
+        slowest = self.tuning.loops.slowest(law)
+        speed, rate = slowest.drive.belt_speed, slowest.decay_rate(linear_part(law, slowest))
+        if rate <= 0.0:
+            where = number_text(self.task.drive, speed, "m/s")
+            grows = number_text(self.task.drive, -rate, "1/s")
+            reason = f"at {where} a small deviation grows with {grows}"
+            return Check(
+                belt_speed=speed,
+                disturbance="none",
+                decay_rate=rate,
+                predicted_settling_time=inf,
+                predicted_peak_force=inf,
+                held=False,
+                reason=reason,
+            )
         goal = replace(self.tuning.goal, feeds=(speed,))
         there = Tuning(self.task.scenario, law.name, goal)
         checks = [check for check, _ in Designer(self.task, there, self.disturbances).checks(law)]

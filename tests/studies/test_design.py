@@ -186,6 +186,10 @@ def test_a_drawn_drive_that_is_not_held_is_counted_and_told(
     assert "the worst: plant.mass=" in str(found)
     assert "the simulated drive is not held at 0.03 m/s" in str(found)
     assert found.to_dict()["drawn"]["worst"] == found.design.drawn.worst
+    # What grows cannot be simulated until it has settled.
+    weak = Designer.of(task(AT_40), []).worst(Washout(11.0, -1.0, 0.0))
+    assert not weak.held
+    assert re.match(r"at 0.04 m/s a small deviation grows with [\d.]+ 1/s", weak.reason)
     # With drives to search for, one of them says why there is nothing to propose.
     monkeypatch.setattr("stickslip_ros.studies.design._SEARCHED", 8)
     monkeypatch.setattr("stickslip_ros.studies.design._ATTEMPTS", 1)
