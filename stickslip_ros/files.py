@@ -13,6 +13,15 @@ from typing import BinaryIO
 from stickslip_ros.interrupts import interrupts_wait
 
 
+def user_cache() -> Path:
+    """Return the directory of this package in the user's cache; it may not exist.
+
+    Raises RuntimeError where there is no home.
+    """
+    cache = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    return Path(cache, "stickslip_ros").absolute()
+
+
 def open_regular(path: Path | str, *, links: bool = True) -> BinaryIO:
     """Open a regular file to read its bytes.
 

@@ -10,6 +10,7 @@ import signal
 import sys
 from collections.abc import Iterator
 from multiprocessing.process import BaseProcess
+from tempfile import TemporaryDirectory
 
 import pytest
 from hypothesis import settings
@@ -34,6 +35,11 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # The workers fill the processors already: threads that wait in a loop would hold them up.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+# What is compiled is kept for the workers and for what the tests start, and not among the user's.
+if "HEYOKA_CACHE_DIR" not in os.environ:
+    _compiled = TemporaryDirectory(prefix="stickslip_ros-")
+    os.environ["HEYOKA_CACHE_DIR"] = _compiled.name
 
 STARTING_FIXTURES = {
     "cluster",

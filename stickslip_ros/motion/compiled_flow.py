@@ -19,10 +19,7 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.model.hybrid import HybridSystem, Instant, Mode, Transition
-
-# heyoka warns on standard output, which is for results, where a marker's polynomial is only
-# rounding, as in equilibrium.
-hy.set_logger_level_error()
+from stickslip_ros.motion.compilation import compiled_function, compiled_integrator
 
 _LARGEST_MAGNITUDE = 1e12
 """Largest magnitude of states and margins, which are mostly of the order of one."""
@@ -205,7 +202,7 @@ def _compile(system: HybridSystem, name: str, detail: Detail) -> Any:
     watched = Detail.MARKS in detail
     # The compiler rounds by all that it compiles together.
     marks = flow.marks if watched or system.many_steps else ()
-    return hy.taylor_adaptive(
+    return compiled_integrator(
         equations,
         [0.0] * len(system.states),
         t_events=[hy.t_event(guard.margin, direction=downward) for guard in flow.guards],
@@ -248,7 +245,8 @@ class FlowRates:
         rows = [*flow.rates, *(guard.margin for guard in flow.guards)]
         found = [*flow.rates, *(hy.diff(row, each) for row in rows for each in by)]
         self._order, self._count = len(system.states), len(by)
-        self._compiled = hy.cfunc([hy.subs(each, still) for each in found], list(system.variables))
+        values = [hy.subs(each, still) for each in found]
+        self._compiled = compiled_function(values, list(system.variables))
 
     def at(self, state: FloatArray, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the rates, as the state (n, ...), and the gradients.

@@ -16,6 +16,7 @@ from zlib import crc32
 import numpy as np
 
 from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.files import user_cache
 from stickslip_ros.studies.columns import Columns
 from stickslip_ros.studies.settling import MotionState
 from stickslip_ros.studies.study import Piece, PointStudy
@@ -170,8 +171,7 @@ def kept_journal(study: PointStudy[Any], columns: Any = None) -> Journal:
     """Return the journal of a study in the user's cache; without a file if that is not to be."""
     name = f"{study.scenario.name}-{sha256(_heading(study)).hexdigest()[:16]}.part"
     try:
-        cache = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-        path = Path(cache, "stickslip_ros", name)
+        path = user_cache() / name
         path.parent.mkdir(parents=True, exist_ok=True)
         return Journal(study, path, columns)
     except (OSError, RuntimeError, InvalidInputError):  # no home, or the same study runs elsewhere

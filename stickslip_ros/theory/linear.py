@@ -24,6 +24,7 @@ from stickslip_ros.model.drive import Drive
 from stickslip_ros.model.drive_layout import MEMORY, SPEED
 from stickslip_ros.model.drive_system import SLIP, DriveSystem
 from stickslip_ros.model.plain_drive import drive_system
+from stickslip_ros.motion.compilation import compiled_function
 from stickslip_ros.motion.compiled_flow import evaluated, flow_rates
 from stickslip_ros.theory.requirements import require_equilibrium
 
@@ -262,7 +263,7 @@ def _compiled_tensors(system: DriveSystem) -> tuple[list[tuple[int, ...]], Any]:
             axes = [axis for axis, power in enumerate(powers) for _ in range(power)]
             places.append((component, *axes))
             expressions.append(expression)
-    return places, hy.cfunc(expressions, list(system.variables))
+    return places, compiled_function(expressions, list(system.variables))
 
 
 def equilibria(system: DriveSystem, parameters: FloatArray) -> FloatArray:
