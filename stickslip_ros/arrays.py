@@ -25,6 +25,15 @@ def windows(rows: int, overlap: int = 0) -> Iterator[slice]:
         yield slice(begin, min(begin + _WINDOW, rows))
 
 
+def median(values: FloatArray) -> float:
+    """Return the median; that of numpy loads its masked arrays first, which takes 15 ms."""
+    ordered = np.sort(values)
+    if ordered[-1] != ordered[-1]:  # nan comes last
+        return np.nan
+    middle = len(ordered) // 2
+    return float(0.5 * (ordered[~middle] + ordered[middle]))
+
+
 def rms(values: FloatArray) -> float:
     """Return the root mean square."""
     return float(np.sqrt(np.mean(values * values)))

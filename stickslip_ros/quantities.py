@@ -2,7 +2,6 @@
 
 import re
 from contextlib import suppress
-from fractions import Fraction
 from functools import cache
 from sys import float_info
 from typing import Any, NamedTuple, get_type_hints
@@ -68,6 +67,8 @@ def number_of(name: str, given: Any, unit: str | None) -> float:
 
 def _converted(number: str, given: str, unit: str) -> float:
     """Return a number of one unit in another one, rounded once; ValueError if there is none."""
+    from fractions import Fraction
+
     from pint import PintError
 
     registry = _registry()
@@ -81,6 +82,8 @@ def _converted(number: str, given: str, unit: str) -> float:
 
 @cache
 def _registry() -> Any:
+    from fractions import Fraction
+
     import pint
 
     create: Any = pint.UnitRegistry

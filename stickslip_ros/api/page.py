@@ -4,7 +4,6 @@ from collections.abc import Callable, Iterable, Mapping
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
-from xml.etree import ElementTree
 
 from stickslip_ros.errors import StickslipError
 from stickslip_ros.files import written
@@ -86,6 +85,7 @@ def _drawing(
 ) -> "Markup":
     """Return a figure as SVG, its identifiers being those of no other figure on the page."""
     from dataclasses import replace
+    from xml.etree import ElementTree
 
     from markupsafe import Markup
 

@@ -13,7 +13,6 @@ from math import hypot, inf, pi, sqrt
 from typing import NamedTuple, Self
 
 import numpy as np
-from numpy.polynomial import chebyshev
 
 from stickslip_ros.arrays import FloatArray, IntArray, rms
 from stickslip_ros.measures.cycle_measures import LEAST_CYCLES, Cycle, CycleMeans
@@ -213,6 +212,8 @@ class FoldedCycles:
 
     def slip(self, stick: StickFit) -> Shape:
         """Return the cycle as a stick and a slip that starts and ends at the speed of the belt."""
+        from numpy.polynomial import chebyshev  # only where it is noisy
+
         length = self.period - stick.stick_time
 
         def rows(phase: FloatArray, degree: int) -> FloatArray:

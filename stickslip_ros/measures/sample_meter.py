@@ -8,7 +8,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from stickslip_ros.arrays import FloatArray
+from stickslip_ros.arrays import FloatArray, median
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.measures.breakpoints import (
     STICK_SHARE,
@@ -337,7 +337,7 @@ class SampleMeter:
                 breakpoints = breakpoints[1:]  # the first sample was fed with the previous block
             cycles = self._meter.feed(breakpoints, float(belt[-1]), self._speeds.belt)
             if cycles and len(time) > 1:
-                self._per_cycle = cycles[-1].period / float(np.median(np.diff(time)))
+                self._per_cycle = cycles[-1].period / median(np.diff(time))
         if given is not False or self._speeds.belt == 0.0 or self._per_cycle < FEW_SAMPLES:
             under_noise = self._window.feed(
                 time[new], samples.position[new], samples.velocity[new], belt[new]
@@ -349,7 +349,7 @@ class SampleMeter:
             observed = (stamp - self.origin) / NANOSECONDS
             # Rounding may put a breakpoint after the last sample.
             rows = np.minimum(np.searchsorted(time, breakpoints.time), len(time) - 1)
-            known = LONGEST_GAP * float(np.median(np.diff(observed))) if len(observed) > 1 else inf
+            known = LONGEST_GAP * median(np.diff(observed)) if len(observed) > 1 else inf
             self._observer.take_motion(
                 MeasuredMotion(
                     replace(breakpoints, time=np.interp(breakpoints.time, time, observed)),

@@ -31,7 +31,6 @@ from mcap.records import (
     Schema,
     Statistics,
 )
-from mcap.writer import MCAP0_MAGIC
 
 from stickslip_ros.arrays import IntArray
 from stickslip_ros.errors import BagError
@@ -60,7 +59,9 @@ _INDEX_ENTRY = 16
 """Bytes of a log time and an offset in a message index."""
 _DATA_END = HEAD.pack(Opcode.DATA_END, 4)
 _FOOTER = HEAD.pack(Opcode.FOOTER, 20)
-_TAIL_SIZE = len(_FOOTER) + 20 + len(MCAP0_MAGIC)
+_MAGIC = b"\x89MCAP0\r\n"
+"""What a file begins and ends with; mcap has it where it loads the metadata of all packages."""
+_TAIL_SIZE = len(_FOOTER) + 20 + len(_MAGIC)
 """Bytes of the footer and of what ends a file."""
 _OPCODES = frozenset((*Opcode, *range(0x80, 0x100)))
 """From 0x80 on they are private to an application."""
@@ -191,7 +192,7 @@ class McapFile:
 
     def _read_inventory(self) -> bool:
         """Find the content of the file; return whether its beginning and end are sound."""
-        begins_well = self._read(0, len(MCAP0_MAGIC)) == MCAP0_MAGIC
+        begins_well = self._read(0, len(_MAGIC)) == _MAGIC
         if not begins_well and self._next_chunk(0) == self._size:
             raise BagError(f"the file {self.path} is not an MCAP file: it does not start like one")
         ends_well = self._read_summary()
@@ -218,9 +219,9 @@ class McapFile:
         """Read the summary; return whether the end of the file is sound."""
         end = self._size - _TAIL_SIZE
         tail = self._read(max(0, end), self._size)
-        if not (tail.startswith(_FOOTER) and tail.endswith(MCAP0_MAGIC)):
+        if not (tail.startswith(_FOOTER) and tail.endswith(_MAGIC)):
             return False
-        footer = _parse(Footer.read, tail[HEAD.size : -len(MCAP0_MAGIC)])
+        footer = _parse(Footer.read, tail[HEAD.size : -len(_MAGIC)])
         start = footer.summary_start
         if start == 0:
             return True
@@ -286,7 +287,7 @@ class McapFile:
 
     def _records(self) -> Iterator[_Record]:
         """Yield the records up to the footer; after damage continue at the next chunk."""
-        position = before = searched = len(MCAP0_MAGIC)
+        position = before = searched = len(_MAGIC)
         while position < self._size:
             record = self._record(position)
             try:

@@ -4,13 +4,14 @@ Their classes are imported to describe their constants, which are parameters. On
 imported, or would be in the way of other laws, is refused where it is named.
 """
 
-from collections.abc import Callable, Collection, Iterable, Mapping
+import os
+import sys
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from importlib.metadata import Distribution, EntryPoint, distributions
 from math import isfinite, isinf
 from operator import attrgetter
 from traceback import walk_tb
-from typing import Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import numpy as np
 
@@ -20,6 +21,9 @@ from stickslip_ros.model.control import CONTROL_LAWS, ControlLaw
 from stickslip_ros.model.control.base import seen_by
 from stickslip_ros.model.friction import LAWS, Directional, FrictionLaw
 from stickslip_ros.scenarios.validation import ParameterGroup, checked
+
+if TYPE_CHECKING:
+    from importlib.metadata import Distribution, EntryPoint
 
 _Law = TypeVar("_Law", bound=FrictionLaw | ControlLaw)
 _Base = TypeVar("_Base")
@@ -47,7 +51,7 @@ class LawFamily(Generic[_Law]):
     refused: dict[str, str] = field(default_factory=dict[str, str])
     """Reason of the refusal of each law of another package that is refused, by name."""
 
-    def add(self, entry: EntryPoint, package: Distribution) -> None:
+    def add(self, entry: "EntryPoint", package: "Distribution") -> None:
         """Add the law of an entry point, or the reason against it to `refused`."""
         try:
             law = loaded(entry, self.base)
@@ -121,6 +125,8 @@ def check_friction_law(law: FrictionLaw) -> None:
     """Ask a friction law for its equations, as numbers at one speed and as symbols."""
     import heyoka as hy  # only where a package has a law
 
+    from stickslip_ros.motion.compilation import compiled_function
+
     for way in (law.forward, law.reverse) if isinstance(law, Directional) else (law,):
 
         def equations(*given: Any, law: FrictionLaw = way) -> list[Any]:
@@ -136,7 +142,7 @@ def check_friction_law(law: FrictionLaw) -> None:
         symbols = [hy.expression(name) for name in ("speed", "sign", *way.states, *way.switches)]
         count = 2 + len(way.states)
         symbolic = equations(*symbols[:2], symbols[2:count], symbols[count:])
-        hy.cfunc([hy.expression(0.0) + equation for equation in symbolic], symbols)
+        compiled_function([hy.expression(0.0) + equation for equation in symbolic], symbols)
         _check_finite("limits", way.limits)
 
 
@@ -209,18 +215,47 @@ def laws_of_all_packages(family: LawFamily[_Law]) -> Mapping[str, type[_Law]]:
     return family.laws
 
 
-def entries_of_other_packages(*groups: str) -> list[tuple[EntryPoint, Distribution]]:
+def entries_of_other_packages(*groups: str) -> "list[tuple[EntryPoint, Distribution]]":
     """Return the entry points of groups with their packages, by name."""
     entries = [
         (entry, package)
-        for package in distributions()
-        # Parsing the entry points takes longer.
-        for text in [package.read_text("entry_points.txt") or ""]
+        for package in _packages_that_name(groups)
         for group in groups
-        if group in text
         for entry in package.entry_points.select(group=group)
     ]
     return sorted(entries, key=lambda pair: (pair[0].name, pair[0].value))
+
+
+def _packages_that_name(groups: Iterable[str]) -> "Iterator[Distribution]":
+    """Yield the packages on the path whose entry points name one of the groups.
+
+    Mostly there is none: to load importlib.metadata and to ask that takes ten times as long.
+    """
+    sought = [group.encode() for group in groups]
+    for folder in sys.path:
+        for name in _names_in(folder or "."):
+            if name.endswith((".dist-info", ".egg-info", "EGG-INFO")):
+                about = os.path.join(folder, name)
+                text = _content(os.path.join(about, "entry_points.txt"))
+                if any(group in text for group in sought):
+                    from importlib.metadata import Distribution
+
+                    yield Distribution.at(about)
+
+
+def _names_in(folder: str) -> list[str]:
+    try:
+        return os.listdir(folder)
+    except OSError:  # such as a zip file on the path
+        return []
+
+
+def _content(path: str) -> bytes:
+    try:
+        with open(path, "rb") as file:
+            return file.read()
+    except OSError:  # most packages have none
+        return b""
 
 
 def failure_in_words(error: BaseException) -> str | None:
@@ -232,7 +267,7 @@ def failure_in_words(error: BaseException) -> str | None:
     return None
 
 
-def loaded(entry: EntryPoint, base: type[_Base]) -> type[_Base]:
+def loaded(entry: "EntryPoint", base: type[_Base]) -> type[_Base]:
     """Return the class of an entry point; InvalidInputError if none derives from `base`."""
     try:
         kind = entry.load()

@@ -180,8 +180,6 @@ def why_no_cycle(regime: str | None, duration: float, drive: Drive | None) -> st
     """Return why a motion over `duration` (s) has no regime; None if it has one."""
     if regime is not None:
         return None
-    from stickslip_ros.studies.stability import hopf_distance, hopf_ratio  # it takes long
-
     units = Units.for_drive(drive)
     said = f"no whole cycle was completed in {duration:g} {units.of_unit('s')}".rstrip()
     if drive is None:
@@ -190,6 +188,8 @@ def why_no_cycle(regime: str | None, duration: float, drive: Drive | None) -> st
     likely = abs(drive.belt_speed) < _LARGEST_RATIO * drive.speed_scale
     if duration < 3.0 * period < inf and likely:
         return f"{said}: the natural period is {units.text(period, 's')}, so run it for longer"
+    from stickslip_ros.studies.stability import hopf_distance, hopf_ratio  # it takes long
+
     ratio = hopf_ratio(drive)
     if ratio is not None and not 1.0 / _LARGEST_RATIO < ratio < _LARGEST_RATIO:
         return f"{said}: the slide has neither turned back nor settled; {hopf_distance(drive)}"

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip_ros.arrays import BoolArray, FloatArray, IntArray
+from stickslip_ros.arrays import BoolArray, FloatArray, IntArray, median
 from stickslip_ros.measures.run_meter import RunAnalysis
 from stickslip_ros.measures.sample_meter import MeasuredMotion
 from stickslip_ros.measures.sampling_grid import LONGEST_GAP
@@ -263,7 +263,7 @@ class RunHistory:
         """Add the next control forces, with the time from which each acts or is requested."""
         rows = self.control.later(time) & np.isfinite(force)
         if self.control_gap == float("inf") and rows.sum() > 1:
-            self.control_gap = LONGEST_GAP * float(np.median(np.diff(time[rows])))
+            self.control_gap = LONGEST_GAP * median(np.diff(time[rows]))
         acting = np.flatnonzero(rows & acted & (force != 0.0))
         if self.switched_on is None and len(acting):
             self.switched_on = float(time[acting[0]])

@@ -59,7 +59,7 @@ def drawn(scenario: Scenario, seed: int, spread: Spread) -> dict[str, float]:
 
 
 def _fitted(
-    scenario: Scenario, values: dict[str, Any], rng: np.random.Generator
+    scenario: Scenario, values: dict[str, Any], rng: "np.random.Generator"
 ) -> dict[str, float]:
     where = f"spread {FIT}: {scenario.path}"
     names: Sequence[str] = scenario.fit.get("names", ())
