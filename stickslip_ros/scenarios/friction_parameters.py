@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, make_dataclass, replace
 from functools import cached_property
 from math import nan
-from typing import Any, Self, TypeVar
+from typing import Any, Self
 
 from typing_extensions import override
 
@@ -25,16 +25,17 @@ from stickslip_ros.scenarios.foreign_laws import FRICTION_LAWS, laws_of_all_pack
 from stickslip_ros.scenarios.validation import ParameterGroup
 from stickslip_ros.text import renamed, shown
 
-_Group = TypeVar("_Group", bound=ParameterGroup)
-
 LAWS = laws_of_all_packages(FRICTION_LAWS)
 _FOLLOWERS = [name for name, law in LAWS.items() if issubclass(law, CurveFollower)]
 _CURVES = [name for name, law in LAWS.items() if not law.states and law is not Stiction]
 """The laws that a law with a memory can follow."""
 
 
-def _descriptions(*, reverse: bool) -> Iterator[Parameter]:
-    """Yield the constants of all laws that are one number, as parameters of one direction."""
+def _constants(*, reverse: bool) -> type[ParameterGroup]:
+    """Return a group with the constants of all laws that are one number, of one direction.
+
+    Its fields are made here: what laws there are is known only now.
+    """
     users: dict[str, list[str]] = {}
     constants: dict[str, Parameter] = {}
     for law in LAWS.values():
@@ -43,19 +44,14 @@ def _descriptions(*, reverse: bool) -> Iterator[Parameter]:
             if not isinstance(described.default, tuple) and (directed or not reverse):
                 constants.setdefault(name, described)
                 users.setdefault(name, []).append(law.name)
+    fields: list[tuple[str, Any, Any]] = []
     for name, described in constants.items():
         meaning = described.meaning.removesuffix(".") + (", for v_r < 0" if reverse else "")
         if name not in constants_of(FrictionLaw):
             meaning += f" ({', '.join(users[name])})"
         unset: dict[str, Any] = {"default": nan, "unset": "as forward"} if reverse else {}
-        yield replace(described, meaning=f"{meaning}.", **unset)
-
-
-def _with_constants(base: type[_Group], *, reverse: bool = False) -> type[_Group]:
-    """Return a group with a field for each constant: what laws there are is known now only."""
-    constants = _descriptions(reverse=reverse)
-    fields = [(parameter.name, Any, described_by(parameter)) for parameter in constants]
-    return make_dataclass(f"{base.__name__}WithConstants", fields, bases=(base,), frozen=True)
+        fields.append((name, Any, described_by(replace(described, meaning=f"{meaning}.", **unset))))
+    return make_dataclass("Constants", fields, bases=(ParameterGroup,), frozen=True)
 
 
 def _curve(direction: str = "") -> Any:
@@ -68,7 +64,7 @@ def _curve(direction: str = "") -> Any:
 
 
 @dataclass(frozen=True)
-class ReverseFriction(_with_constants(ParameterGroup, reverse=True)):
+class ReverseFriction(_constants(reverse=True)):
     """Coefficients of backward slip, v_r < 0, where they differ from those of forward slip."""
 
     file: str = _curve(" for v_r < 0; empty: as forward")
@@ -91,7 +87,7 @@ class ReverseFriction(_with_constants(ParameterGroup, reverse=True)):
 
 
 @dataclass(frozen=True)
-class _ChosenLaw(ParameterGroup):
+class _ChosenLaw:
     law: str = constant(
         "stribeck", "Friction law.", choices=LAWS, refused=WITHDRAWN | FRICTION_LAWS.refused
     )
@@ -112,7 +108,7 @@ class _ChosenLaw(ParameterGroup):
 
 
 @dataclass(frozen=True)
-class Friction(_with_constants(_ChosenLaw)):
+class Friction(_constants(reverse=False), _ChosenLaw):
     """Friction law and its coefficients; each law uses those of its formula."""
 
     file: str = _curve()
