@@ -421,10 +421,9 @@ class ControllerParameters(NodeParameters):
         """Name of the node and of its section."""
         return controller_node(self.law)
 
-    def as_controller(self, state: tuple[float, ...] | None = None) -> Controller:
-        """Return the controller, with the state of its law at the first sample."""
-        follows = self.reference.signal(period=0.0).reference
-        return Controller(self.control_law, follows, state)
+    def as_controller(self) -> Controller:
+        """Return the controller."""
+        return Controller(self.control_law, self.reference.signal(period=0.0).reference)
 
 
 def controller_node(law: str) -> str:

@@ -39,6 +39,8 @@ _ROUNDING = 1e-13
 _CORNER_DISTANCE = 1e-6
 """Relative distance within which the cycle that sticks is searched for."""
 
+_MOST_TURNS = 200
+
 _DISTANCE_RATIO = 1.1
 """Ratio of one distance to the previous one."""
 
@@ -49,7 +51,6 @@ def limit_cycle_of_run(
     velocity: float = 0.0,
     *,
     control: ContinuousControl | None = None,
-    turns: int = 200,
 ) -> LimitCycle | None:
     """Return the limit cycle that a motion leads to.
 
@@ -66,8 +67,6 @@ def limit_cycle_of_run(
     control : ContinuousControl, optional
         Continuous control in SI units, such as that of eq. 19, at rest at the start. By default the
         loop is open.
-    turns : int, optional
-        Largest number of upward turns to run.
 
     Returns
     -------
@@ -88,7 +87,7 @@ def limit_cycle_of_run(
     motion = ShootingMotion(drive, control)
     motion.restart(position, velocity)
     try:
-        return _cycle_ahead(motion, turns)
+        return _cycle_ahead(motion)
     except TooStiffError:
         return None
 
@@ -135,11 +134,11 @@ def limit_cycles(drive: Drive) -> list[LimitCycle]:
     return [cycle for cycle in cycles if cycle is not None]
 
 
-def _cycle_ahead(motion: ShootingMotion, turns: int) -> LimitCycle | None:
-    """Return the cycle that the motion reaches within this number of upward turns."""
+def _cycle_ahead(motion: ShootingMotion) -> LimitCycle | None:
+    """Return the cycle that the motion reaches within `_MOST_TURNS` upward turns."""
     drive = motion.drive
     state, duration = motion.state, 0.0
-    for _ in range(turns):
+    for _ in range(_MOST_TURNS):
         found = next_turn(motion, state)
         if found is None:
             return None
