@@ -1,6 +1,6 @@
 """The measures of a motion from its samples."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from math import copysign, inf
 from typing import NamedTuple, Protocol
@@ -19,6 +19,7 @@ from stickslip_ros.measures.cycle_measures import (
     UNBOUNDED_BELT_SPEEDS,
     Cycle,
     Measures,
+    Regime,
     with_drift,
     without_cycles,
 )
@@ -28,7 +29,7 @@ from stickslip_ros.measures.mean_cycle import MeanCycle
 from stickslip_ros.measures.noise import FEW_SAMPLES
 from stickslip_ros.measures.sample_assumptions import EXACT, SampleAssumptions
 from stickslip_ros.measures.sample_window import Window, WindowMeter
-from stickslip_ros.measures.sampling_grid import LONGEST_GAP, SamplingGrid, whole
+from stickslip_ros.measures.sampling_grid import LONGEST_GAP, SamplingGrid
 from stickslip_ros.measures.window_measures import (
     line,
     measure,
@@ -76,7 +77,6 @@ class MotionObserver(Protocol):
 
     def take_motion(self, motion: MeasuredMotion) -> None:
         """Receive the motion that follows."""
-        ...
 
 
 class MeasuredSamples(NamedTuple):
@@ -146,8 +146,6 @@ class SampleMeter:
         """Stamp of the first one, ns; infinite before it."""
         self.drift = Drift()
         """Trends of the run; those of the control force are for its user to feed."""
-        self._steps_back = 0  # number of samples whose stamp is not later than the previous one
-        self._strays = 0  # those, and others that are not whole periods after the previous one
         self._observer = observer
         self._grid, self._elapsed = SamplingGrid(), 0
         self._meter, self._window = CycleMeter(window), WindowMeter(window)
@@ -160,21 +158,15 @@ class SampleMeter:
 
         Samples that are not valid, see `SampleColumns.is_valid`, count as lost.
         """
-        is_valid = samples.is_valid
-        if not is_valid.all():
-            samples = samples[is_valid]
+        samples = samples[samples.is_valid]
         self.samples += len(samples)
         if self._last is not None:
             samples = self._last.followed_by(samples)
         if len(samples) == 0:
             return []
         self.first = min(self.first, float(samples.stamp[0]))
-        steps, period = np.diff(samples.stamp), self.reading.period
-        self._steps_back += np.count_nonzero(steps <= 0)
-        astray = steps <= 0 if period is None else ~whole(steps, period)
-        self._strays += int(np.count_nonzero(astray))
         cycles: list[Cycle] = []
-        starts = [0, *self._grid.cuts(samples.stamp)]
+        starts = [0, *self._grid.cuts(samples.stamp, self.reading.period)]
         for start, end in zip(starts, [*starts[1:], len(samples)], strict=True):
             segment = samples[start:end]
             # Impulses go back.
@@ -192,7 +184,7 @@ class SampleMeter:
     @property
     def mixed(self) -> bool:
         """Whether the samples are those of several plants, whose motion is not known."""
-        return self._strays > max(_FEW_STRAYS, _STRAY_SHARE * self.samples)
+        return self._grid.strays > max(_FEW_STRAYS, _STRAY_SHARE * self.samples)
 
     @property
     def lost_samples(self) -> int:
@@ -239,21 +231,23 @@ class SampleMeter:
         """
         if self.mixed:
             note = (
-                f"{self._strays} of {self.samples} samples are not whole periods after the one "
-                "before, as where several plants publish on one topic: motion, duration and lost "
-                "samples are not known"
+                f"{self._grid.strays} of {self.samples} samples are not whole periods after the "
+                "one before, as where several plants publish on one topic: motion, duration and "
+                "lost samples are not known"
             )
             return MeasuredSamples(without_cycles(None, None), [note], None)
         window, mean = self._window.window(), None
         few = not self.noisy and self._per_cycle < FEW_SAMPLES and line(window, self._known)
-        if self._unbounded or not (self.noisy or few):
-            found = self._exact_measures(window)
+        if self._unbounded:
+            measures = without_cycles(None, Regime.UNBOUNDED, steady=True)
+        elif self.noisy or few:
+            measures, mean = measure(window, self._known, quick=quick)
         else:
-            found, mean = measure(window, self._known, quick=quick)
+            measures = self._exact_measures(window)
         varies = self.reading.varies or self._speeds.belt_varies
-        self.drift.resolution, self.drift.judged = self.step, not varies
-        found = with_drift(found, self.drift)
-        return MeasuredSamples(found, self._notes(found, mean), mean)
+        measures = measures if varies else with_drift(measures, self.drift)
+        notes = [*self._notes(measures, mean), *[NOT_JUDGED] * varies]
+        return MeasuredSamples(measures, notes, mean)
 
     @property
     def _unbounded(self) -> bool:
@@ -264,34 +258,34 @@ class SampleMeter:
         return ended or self._speeds.lasting > limit > 0.0
 
     def _exact_measures(self, window: Window) -> Measures:
-        self._meter.unbounded, self._meter.within = self._unbounded, self.reading.within
-        found = self._meter.measures()
+        """Return the measures of breakpoints, or those of rests and slips that contradict them."""
+        measures = self._meter.measures()
         # The velocities of other machines are filtered, and those on a guide at rest are not those
         # of a belt.
         may_rest = self.reading.noisy is None or self._speeds.belt == 0.0
-        rests = rests_and_slips(window, self._known) if may_rest and not self._unbounded else None
-        if rests is not None and rests.rests and not rests.agrees(found):
+        rests = rests_and_slips(window, self._known) if may_rest else None
+        if rests is not None and rests.rests and not rests.agrees(measures):
             return segmented_measures(window, rests)
-        if found.errors is not None and found.stick_fraction:
-            error = max(found.errors["stick_fraction"], _EDGE_ERROR / self._per_cycle)
-            found = replace(found, errors={**found.errors, "stick_fraction": error})
-        return found
+        if measures.errors is not None and measures.stick_fraction:
+            error = max(measures.errors["stick_fraction"], _EDGE_ERROR / self._per_cycle)
+            measures = replace(measures, errors={**measures.errors, "stick_fraction": error})
+        return measures
 
-    def _notes(self, measures: Measures, mean: MeanCycle | None) -> list[str]:
-        notes: list[str] = []
-        if self._steps_back:
-            notes.append(
-                f"the stamp of {self._steps_back} of {self.samples} samples is not later than "
+    def _notes(self, measures: Measures, mean: MeanCycle | None) -> Iterator[str]:
+        """Yield sentences that say why the measures may be wrong."""
+        if self._grid.steps_back:
+            yield (
+                f"the stamp of {self._grid.steps_back} of {self.samples} samples is not later than "
                 "the one before, and the motion is cut there: the plant was restarted, or the "
                 "samples of several plants are mixed"
             )
         if self.step and measures.amplitude and measures.cycles > 2 and measures.errors is None:
-            notes.append(
+            yield (
                 f"the amplitude is only {measures.amplitude / self.step:.2g} steps of the encoder: "
                 "the standard errors are not known"
             )
         if measures.regime is None and measures.period is not None:
-            notes.append(
+            yield (
                 "the regime is not known: the positions do not tell whether the slide rests in its "
                 "cycles, or for a moment at the speed of the belt, or moves slowly"
             )
@@ -299,13 +293,12 @@ class SampleMeter:
         if mean is not None and mean.stick is not None:
             velocity, error = copysign(mean.stick.fit.belt_speed, belt), mean.stick.speed_error
             if abs(velocity - belt) > _LEAST_ERRORS * error + _LEAST_SHARE * abs(belt):
-                notes.append(
+                yield (
                     f"the slide sticks at {quantity(velocity, 'm/s')} (standard error "
                     f"{quantity(error, 'm/s')}), not at the speed of the belt, "
                     f"{quantity(belt, 'm/s')}: one of them has another scale, or the positions "
                     "drift; the stick is that at the former"
                 )
-        return notes if self.drift.judged else [*notes, NOT_JUDGED]
 
     @property
     def _known(self) -> SampleAssumptions:
@@ -316,10 +309,11 @@ class SampleMeter:
         return self.reading._replace(stick_speed=speed)
 
     def _feed_segment(self, samples: SampleColumns) -> list[Cycle]:
-        stamp = samples.stamp
+        """Feed the meters with samples that continue the motion, from the last one fed on."""
+        stamp, belt = samples.stamp, samples.belt_velocity
         time = (stamp - stamp[0] + float(self._elapsed)) * 1e-9
         self._elapsed += int(stamp[-1] - stamp[0])
-        new, belt = slice(0 if self._last is None else 1, None), samples.belt_velocity
+        new = slice(0 if self._last is None else 1, None)
         self.drift.position.feed(time[new], samples.position[new])
         self._speeds.slip = max(self._speeds.slip, float(np.abs(samples.velocity - belt).max()))
         given, breakpoints, cycles = self.reading.noisy, None, list[Cycle]()
@@ -335,6 +329,7 @@ class SampleMeter:
                 )
             if self._last is not None:
                 breakpoints = breakpoints[1:]  # the first sample was fed with the previous block
+            self._meter.within = self.reading.within
             cycles = self._meter.feed(breakpoints, float(belt[-1]), self._speeds.belt)
             if cycles and len(time) > 1:
                 self._per_cycle = cycles[-1].period / median(np.diff(time))
@@ -343,6 +338,7 @@ class SampleMeter:
                 time[new], samples.position[new], samples.velocity[new], belt[new]
             )
             cycles = under_noise if self.noisy else cycles
+            self.drift.resolution = self.step
         ends = (self._window if self.noisy else self._meter).ends
         self.drift.feed_cycles(ends, cycles)
         if self._observer is not None and breakpoints is not None:

@@ -31,6 +31,10 @@ class SamplingGrid:
     """
 
     def __init__(self) -> None:
+        self.steps_back = 0
+        """Number of stamps that are not later than the one before."""
+        self.strays = 0
+        """Number of those, and of others that are not whole periods after the one before."""
         self._lost_before = 0
         self._begin()
 
@@ -45,13 +49,16 @@ class SamplingGrid:
         """Number of instants of the grid without a sample."""
         return self._lost_before + max(self._missing, 0)
 
-    def cuts(self, stamp: IntArray) -> list[int]:
+    def cuts(self, stamp: IntArray, period: float | None) -> list[int]:
         """Follow the stamps (ns), the first of which is known; return the rows that start anew.
 
         The motion is cut where a new segment starts, which is no loss, and after a gap that is too
-        long for interpolation.
+        long for interpolation. `period` is that of the plant, ns, if it is known.
         """
         steps, rows, done = np.diff(stamp), list[int](), 0
+        back = steps <= 0
+        self.steps_back += np.count_nonzero(back)
+        self.strays += int(np.count_nonzero(back if period is None else ~_whole(steps, period)))
         while done < len(steps):
             # Up to where the period is estimated again: what is found must not depend on blocks.
             known = self._count >= _FEW_STEPS
@@ -71,7 +78,7 @@ class SamplingGrid:
 
     def on_grid(self, steps: IntArray) -> BoolArray:
         """Return which steps (ns) are a whole number of periods, within the rounding of stamps."""
-        return whole(steps, self._period)
+        return _whole(steps, self._period)
 
     def _follow(self, steps: IntArray) -> None:
         """Count some of the steps up to the next gap."""
@@ -110,13 +117,13 @@ class SamplingGrid:
 def _period_of(steps: IntArray) -> float:
     """Return the period of a few steps (ns): the shortest one if it divides all others."""
     shortest = float(steps.min())
-    if steps.max() <= _LONGEST_LOSS * shortest and whole(steps, shortest).all():
+    if steps.max() <= _LONGEST_LOSS * shortest and _whole(steps, shortest).all():
         return float(steps.sum() / np.rint(steps / shortest).sum())
     middle = np.sort(steps)[(len(steps) - 1) // 2]
     return float(np.mean(steps[np.rint(steps / middle) == 1.0]))
 
 
-def whole(steps: IntArray, period: float) -> BoolArray:
+def _whole(steps: IntArray, period: float) -> BoolArray:
     """Return which steps are one or more whole periods, ns, within the rounding of stamps."""
     periods = np.rint(steps / period)
     return (periods >= 1.0) & (np.abs(steps - periods * period) <= periods + 1.0)
