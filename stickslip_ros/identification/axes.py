@@ -14,6 +14,7 @@ from stickslip_ros.identification.identified_law import DELAY, IdentifiedLaw
 from stickslip_ros.identification.laws import (
     EXPONENTIAL,
     GAUSSIAN,
+    FollowedTable,
     SaturatingAdapter,
     TableAdapter,
 )
@@ -177,14 +178,10 @@ class AxisTask:
         assert isinstance(table, TableAdapter)
         span = max(float(np.ptp(record.position)) for record in self.records)
         near = self._delayed(self._near, static.rows.delay)
+        curve = SaturatingAdapter(speeds) if table.shaped else TableAdapter(speeds, table.knots)
 
         def fitted(deflection: float) -> Regression:
-            bristled = (
-                SaturatingAdapter(speeds, deflection)
-                if table.shaped
-                else TableAdapter(speeds, table.knots, deflection)
-            )
-            return replace(static, curve=bristled).refitted()
+            return replace(static, curve=FollowedTable(curve, deflection)).refitted()
 
         def loss(fit: Regression) -> float:
             left = replace(fit, rows=near).residual

@@ -194,11 +194,6 @@ class IdentifiedLaw:
                 constants[name] = values[name] / (1.0 if name in self.unscaled else normal_force)
         return kind(**constants)
 
-    def following(self, curve: FrictionLaw, values: Values, normal_force: float) -> FrictionLaw:
-        """Return the law whose memory follows a curve."""
-        kind: Any = LAWS[self.name]
-        return kind(curve, **{name: values[name] / normal_force for name in self.memory})
-
     def drive(self, values: Values, normal_force: float, belt_speed: float = 0.0) -> Drive:
         """Return the drive of coordinates."""
         return Drive(

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from math import exp, inf, sqrt
+from typing import Any
 
 import numpy as np
 from typing_extensions import override
@@ -14,7 +15,7 @@ from stickslip_ros.identification.identified_law import (
     Straightening,
     Values,
 )
-from stickslip_ros.model.friction import Directional, FrictionLaw, Table
+from stickslip_ros.model.friction import LAWS, Directional, FrictionLaw, Table
 
 _LEAST_FRICTION = 0.01
 """Least friction of bristles at a speed, as a share of the largest."""
@@ -77,7 +78,7 @@ class DahlAdapter(IdentifiedLaw):
 
     name = "dahl"
     least = (0.0,)
-    coordinates: Sequence[str] = ("static", "bristle_stiffness")
+    coordinates = "static", "bristle_stiffness"
     smallest = "static"
 
     @override
@@ -95,8 +96,8 @@ class StribeckAdapter(IdentifiedLaw):
     name = "stribeck"
     least = 0.0, 0.0
     shaped = True
-    coordinates: Sequence[str] = ("minimum", "rise", "minimum_speed")
-    unscaled: Sequence[str] = ("minimum_speed",)
+    coordinates = "minimum", "rise", "minimum_speed"
+    unscaled = ("minimum_speed",)
     smallest = "minimum"
 
 
@@ -131,22 +132,21 @@ def _sag(values: Values, fastest: float) -> float:
 class ExponentialAdapter(IdentifiedLaw):
     """F = F_k + D exp(-(w/v_s)^n) + F_v w; the viscous force may be negative.
 
-    A regression has the exponent n = 1. Records that hardly tell the decay speed from viscous
-    friction have a long curved valley of good fits. It is straight where friction is given by
-    forces: in the search `kinetic` is replaced by that at the fastest speed, `viscous` by that at
-    rest, and `rise` by the sag, how far the force at a third of the fastest speed is below the
-    straight line between them.
+    A regression has one exponent n. Records that hardly tell the decay speed from viscous friction
+    have a long curved valley of good fits. It is straight where friction is given by forces: in the
+    search `kinetic` is replaced by that at the fastest speed, `viscous` by that at rest, and `rise`
+    by the sag, how far the force at a third of the fastest speed is below the straight line between
+    them.
     """
 
     name = "exponential"
-    first_exponent = 1.0
     least = 0.0, 0.0, -np.inf
     shaped = True
-    coordinates: Sequence[str] = ("kinetic", "rise", "decay_speed", "viscous", "exponent")
-    unscaled: Sequence[str] = ("decay_speed", "exponent")
+    coordinates = "kinetic", "rise", "decay_speed", "viscous", "exponent"
+    unscaled = "decay_speed", "exponent"
     optional = ("exponent",)
     # An exponent that is a whole number makes other equations.
-    by_differences: Sequence[str] = ("exponent",)
+    by_differences = ("exponent",)
     smallest = "kinetic"
     straightening = Straightening(
         {"kinetic": "force_at_fastest", "rise": "sag", "viscous": "force_at_rest"},
@@ -156,9 +156,13 @@ class ExponentialAdapter(IdentifiedLaw):
         _of_forces,
     )
 
+    def __init__(self, exponent: float = 1.0) -> None:
+        """Take the exponent of a regression."""
+        self._exponent = exponent
+
     @override
     def coordinates_of(self, forces: Sequence[float], shape: float) -> dict[str, float]:
-        return {**super().coordinates_of(forces, shape), "exponent": self.first_exponent}
+        return {**super().coordinates_of(forces, shape), "exponent": self._exponent}
 
     @override
     def starts(self, values: Values, fastest: float) -> Sequence[Values]:
@@ -169,26 +173,13 @@ class ExponentialAdapter(IdentifiedLaw):
         return _EXPONENTS if name == "exponent" else super().bounds(name, values, fastest)
 
 
-class GaussianAdapter(ExponentialAdapter):
-    """The exponential law whose exponent is 2 in a regression."""
-
-    first_exponent = 2.0
-
-
 class TableAdapter(IdentifiedLaw):
-    """Friction without a law, a sum of straight lines between knots: forces at given speeds.
-
-    With a deflection d friction follows the table over a path, as bristles do: F' = |v_r|
-    (F_table - F) / d. It is the LuGre law without damping of the bristles, of one deflection at all
-    speeds.
-    """
+    """Friction without a law, a sum of straight lines between knots: forces at given speeds."""
 
     name = "table"
     smallest = "force_0"
 
-    def __init__(
-        self, speeds: FloatArray, knots: FloatArray | None = None, deflection: float = 0.0
-    ) -> None:
+    def __init__(self, speeds: FloatArray, knots: FloatArray | None = None) -> None:
         """Take the speeds of the points and of the knots, m/s, from 0; by default the same."""
         self.speeds = self._points = speeds
         self.knots = speeds if knots is None else knots
@@ -196,10 +187,6 @@ class TableAdapter(IdentifiedLaw):
         self.coordinates = [f"force_{number}" for number in range(len(speeds))]
         # The polynomials of the pieces are made from them.
         self.by_differences = self.coordinates
-        self.deflection = deflection
-        if deflection > 0.0:
-            self.name = "lugre"
-            self.coordinates = [*self.coordinates, *_BRISTLES]
 
     @override
     def terms(self, speed: FloatArray, shape: float) -> FloatArray:
@@ -210,21 +197,7 @@ class TableAdapter(IdentifiedLaw):
     @override
     def coordinates_of(self, forces: Sequence[float], shape: float) -> dict[str, float]:
         curve = self.terms(self._points, shape) @ np.array(forces)
-        return dict(zip(self.coordinates, curve.tolist(), strict=False))
-
-    @override
-    def joined(self, directions: Sequence[Values]) -> dict[str, float]:
-        if self.deflection > 0.0:
-            # A law has one contact: the mean friction of both directions is that of its stiffness.
-            mean = float(np.mean([max(0.0, *way.values()) for way in directions]))
-            bristles = dict(zip(_BRISTLES, (mean / self.deflection, 0.0), strict=True))
-            # Bristles need friction to deflect.
-            least = _LEAST_FRICTION * mean
-            directions = [
-                {name: max(force, least) for name, force in way.items()} | bristles
-                for way in directions
-            ]
-        return super().joined(directions)
+        return dict(zip(self.coordinates, curve.tolist(), strict=True))
 
     @override
     def start(self, values: Values, smallest: float) -> dict[str, float]:
@@ -233,9 +206,8 @@ class TableAdapter(IdentifiedLaw):
 
     @override
     def friction(self, values: Values, normal_force: float) -> FrictionLaw:
-        forces = zip(self._points.tolist(), self.coordinates, strict=False)
-        curve = Table(tuple((w, max(values[name], 0.0) / normal_force) for w, name in forces))
-        return self.following(curve, values, normal_force) if self.deflection else curve
+        forces = zip(self._points.tolist(), self.coordinates, strict=True)
+        return Table(tuple((w, max(values[name], 0.0) / normal_force) for w, name in forces))
 
 
 class SaturatingAdapter(TableAdapter):
@@ -244,9 +216,9 @@ class SaturatingAdapter(TableAdapter):
     shaped = True
     least_shape = 1.0  # a rise far below the slowest speed is one with the force at rest
 
-    def __init__(self, speeds: FloatArray, deflection: float = 0.0) -> None:
-        """Take the speeds of the points of its table, m/s, from 0, and the deflection, m."""
-        super().__init__(speeds, deflection=deflection)
+    def __init__(self, speeds: FloatArray) -> None:
+        """Take the speeds of the points of its table, m/s, from 0."""
+        super().__init__(speeds)
         self.least = 0.0, 0.0, 0.0
 
     @override
@@ -254,23 +226,29 @@ class SaturatingAdapter(TableAdapter):
         return np.column_stack([np.ones_like(speed), 1.0 - np.exp(-speed / shape), speed])
 
 
-class LuGreAdapter(ExponentialAdapter):
-    """A law with bristles, or elements, whose friction follows an exponential curve."""
+class FollowingAdapter(IdentifiedLaw):
+    """A law with bristles, or elements, whose friction follows that of another law: its curve."""
 
     def __init__(
         self,
+        curve: IdentifiedLaw,
         name: str = "lugre",
         bristles: Sequence[str] = _BRISTLES,
         by_differences: Sequence[str] = (),
     ) -> None:
-        """Take its name, the coordinates of its memory, and what else takes differences."""
-        self.name = name
-        self.coordinates = [*ExponentialAdapter.coordinates, *bristles]
-        self.by_differences = [*ExponentialAdapter.by_differences, *by_differences]
+        """Take the curve, its name, the coordinates of its memory, and what takes differences."""
+        vars(self).update({said: getattr(curve, said) for said in IdentifiedLaw.__annotations__})
+        self._curve, self.name = curve, name
+        self.coordinates = [*curve.coordinates, *bristles]
+        self.by_differences = [*curve.by_differences, *by_differences]
 
     @override
     def terms(self, speed: FloatArray, shape: float) -> FloatArray:
-        return EXPONENTIAL.terms(speed, shape)
+        return self._curve.terms(speed, shape)
+
+    @override
+    def coordinates_of(self, forces: Sequence[float], shape: float) -> dict[str, float]:
+        return self._curve.coordinates_of(forces, shape)
 
     @override
     def starts(self, values: Values, fastest: float) -> Sequence[Values]:
@@ -278,8 +256,40 @@ class LuGreAdapter(ExponentialAdapter):
         return _bristle_starts({**values, "rise": rise})
 
     @override
+    def bounds(self, name: str, values: Values, fastest: float) -> tuple[float, float]:
+        return self._curve.bounds(name, values, fastest)
+
+    @override
     def friction(self, values: Values, normal_force: float) -> FrictionLaw:
-        return self.following(EXPONENTIAL.friction(values, normal_force), values, normal_force)
+        kind: Any = LAWS[self.name]
+        memory = {name: values[name] / normal_force for name in self.memory}
+        return kind(self._curve.friction(values, normal_force), **memory)
+
+
+class FollowedTable(FollowingAdapter):
+    """Friction that follows a table over a path, as bristles do: F' = |v_r| (F_table - F) / d.
+
+    It is the LuGre law without damping of the bristles, of one deflection d at all speeds.
+    """
+
+    def __init__(self, table: TableAdapter, deflection: float) -> None:
+        """Take the table, and the deflection, m."""
+        super().__init__(table)
+        self.deflection = deflection
+
+    @override
+    def joined(self, directions: Sequence[Values]) -> dict[str, float]:
+        # A law has one contact: the mean friction of both directions is that of its stiffness.
+        mean = float(np.mean([max(0.0, *way.values()) for way in directions]))
+        bristles = dict(zip(_BRISTLES, (mean / self.deflection, 0.0), strict=True))
+        # Bristles need friction to deflect.
+        least = _LEAST_FRICTION * mean
+        return super().joined(
+            [
+                {name: max(force, least) for name, force in way.items()} | bristles
+                for way in directions
+            ]
+        )
 
 
 class DirectionalAdapter(IdentifiedLaw):
@@ -322,12 +332,10 @@ class DirectionalAdapter(IdentifiedLaw):
 
 def _bristle_starts(values: Values) -> Sequence[Values]:
     """Return coordinates with bristles of some stiffnesses."""
-    starts: list[Values] = []
-    for ratio in _STIFFNESS_RATIOS:
-        stiffness = ratio * values["stiffness"]
-        damping = _DAMPING_RATIO * sqrt(stiffness * values["mass"])
-        starts.append({**values, "bristle_stiffness": stiffness, "bristle_damping": damping})
-    return starts
+    stiffnesses = [ratio * values["stiffness"] for ratio in _STIFFNESS_RATIOS]
+    dampings = [_DAMPING_RATIO * sqrt(stiff * values["mass"]) for stiff in stiffnesses]
+    bristles = zip(stiffnesses, dampings, strict=True)
+    return [{**values, **dict(zip(_BRISTLES, pair, strict=True))} for pair in bristles]
 
 
 def _by_direction(values: Values) -> tuple[Values, Values]:
@@ -340,8 +348,8 @@ def _by_direction(values: Values) -> tuple[Values, Values]:
     return values, {**values, **reverse}
 
 
-EXPONENTIAL, GAUSSIAN = ExponentialAdapter(), GaussianAdapter()
-LUGRE = LuGreAdapter()
+EXPONENTIAL, GAUSSIAN = ExponentialAdapter(), ExponentialAdapter(2.0)
+LUGRE = FollowingAdapter(EXPONENTIAL)
 DAHL = DahlAdapter()
 COMPETING: Sequence[IdentifiedLaw] = (
     CoulombAdapter(),
@@ -351,8 +359,8 @@ COMPETING: Sequence[IdentifiedLaw] = (
     LUGRE,
     DAHL,
     # The elastic limit is made from the smallest friction.
-    LuGreAdapter("elasto_plastic", by_differences=["kinetic"]),
-    LuGreAdapter("maxwell_slip", ["bristle_stiffness"]),
+    FollowingAdapter(EXPONENTIAL, "elasto_plastic", by_differences=["kinetic"]),
+    FollowingAdapter(EXPONENTIAL, "maxwell_slip", ["bristle_stiffness"]),
 )
 """Laws that compete, the simpler ones first. Those after LuGre are searched from what it gives."""
 KNOWN_LAWS: Mapping[str, IdentifiedLaw] = {law.name: law for law in COMPETING}
