@@ -33,6 +33,11 @@ class BreakpointRecorder:
         self._slow = self._fastest = 0.0
         self._was_slow = False
 
+    def start(self, system: DriveSystem, mode: Mode, instant: Instant) -> None:
+        """Record a state that starts a motion; see `PhaseObserver`."""
+        self._time = max(self._time, self._clock.time)
+        self._recorded.append((self._time, instant.state[POSITION], instant.state[SPEED], False))
+
     def begin(self, mode: Mode, flow: CompiledFlow | None, now: float, end: float) -> float:
         """Let a phase last; see `PhaseObserver`."""
         return end
@@ -50,11 +55,6 @@ class BreakpointRecorder:
             latest = time if time > latest else latest  # rounding must not take the time back
             self._recorded.append((latest, x, y, sticking))
         self._time = latest
-
-    def record_state(self, instant: Instant) -> None:
-        """Record a state that starts a motion."""
-        self._time = max(self._time, self._clock.time)
-        self._recorded.append((self._time, instant.state[POSITION], instant.state[SPEED], False))
 
     def set_stick_speed(self, core: HybridMotion, drive: Drive) -> None:
         """Set the speed up to which a slide with a law that has a memory sticks to the guide."""

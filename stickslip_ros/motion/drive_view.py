@@ -115,11 +115,6 @@ class DriveView:
         memory = state[MEMORY : MEMORY + len(units)].tolist()
         return tuple(value * unit for value, unit in zip(memory, units, strict=True))
 
-    def control_state_of(self, state: "FloatArray | memoryview[float]") -> tuple[float, ...]:
-        """Return the state of the continuous controller, SI units, as that of the sampled law."""
-        scaled = state[self._system.slots.control].tolist()
-        return tuple(x * unit for x, unit in zip(scaled, self._control_units, strict=True))
-
     def scaled_state(
         self,
         x: float,
@@ -142,7 +137,7 @@ class DriveView:
     def put_control_state(
         self, state: "list[float] | memoryview[float]", control_state: Sequence[float]
     ) -> None:
-        """Set the controller's part of a dimensionless state; see `control_state_of`."""
+        """Set the controller's part of a dimensionless state, as of the sampled law, SI units."""
         values = zip(control_state, self._control_units, strict=True)
         for index, (value, unit) in enumerate(values, self._system.slots.control.start):
             state[index] = value / unit

@@ -117,6 +117,12 @@ class HybridMotion:
         self.observer = observer
         self._integrators.set_detail(detail)
         self.enter(self.mode)
+        self.note_start()
+
+    def note_start(self) -> None:
+        """Let the observer, if there is one, take note of a start."""
+        if self.observer is not None:
+            self.observer.start(self.system, self.mode, self.instant)
 
     def hold(self, number: int, value: float) -> None:
         """Hold an input at a value."""

@@ -113,6 +113,7 @@ class Motion(DriveView):
         """
         x, y = position / self._length, velocity / self._speed
         self.core.start(self.scaled_state(x, y, memory, motor), self.clock.scaled)
+        self.core.note_start()
 
     def restart_signals(self) -> None:
         """Start the signals of belt and load again, at their time zero; the slide moves on."""
@@ -145,7 +146,8 @@ class Motion(DriveView):
     @property
     def control_state(self) -> tuple[float, ...]:
         """State of the continuous controller, SI units, as that of the sampled law."""
-        return self.control_state_of(self.core.instant.state)
+        scaled = self.core.instant.state[self._system.slots.control].tolist()
+        return tuple(x * unit for x, unit in zip(scaled, self._control_units, strict=True))
 
     @control_state.setter
     def control_state(self, control_state: Sequence[float]) -> None:
@@ -325,19 +327,7 @@ class RecordedMotion(Motion):
         """Keeps the breakpoints."""
         if recording:
             self.core.observer = self.recorder
-            self.recorder.record_state(self.core.instant)
-
-    def restart(
-        self,
-        position: float,
-        velocity: float,
-        memory: Sequence[float] | None = None,
-        motor: Sequence[float] | None = None,
-    ) -> None:
-        """Set the state of the slide; see `Motion.restart`."""
-        super().restart(position, velocity, memory, motor)
-        if self.recording:
-            self.recorder.record_state(self.core.instant)
+            self.core.note_start()
 
     @property
     def recording(self) -> bool:
@@ -346,13 +336,9 @@ class RecordedMotion(Motion):
 
     @recording.setter
     def recording(self, recording: bool) -> None:
-        if recording == self.recording:
-            return
-        if recording:
-            self.core.watch(self.recorder, self._detail)
-            self.recorder.record_state(self.core.instant)
-        else:
-            self.core.watch(None, Detail.STATES)
+        if recording != self.recording:
+            watching = (self.recorder, self._detail) if recording else (None, Detail.STATES)
+            self.core.watch(*watching)
 
     def divide(self) -> None:
         """Note that the end of the last advance only divides a longer one; see `measure_block`."""

@@ -40,6 +40,10 @@ class Phase:
 class PhaseObserver(Protocol):
     """Takes note of the phases of a motion."""
 
+    def start(self, system: DriveSystem, mode: Mode, instant: Instant) -> None:
+        """Take note of an instant at which the motion starts, or starts again."""
+        ...
+
     def begin(self, mode: Mode, flow: CompiledFlow | None, now: float, end: float) -> float:
         """Take note of the start of a phase at the time `now`; return its latest end."""
         ...

@@ -56,8 +56,8 @@ class Derivatives:
         self._matrix: FloatArray = np.empty((0, 0))
         self._holder: CompiledFlow | None = None
 
-    def restart(self, system: DriveSystem, mode: Mode) -> None:
-        """Have derivatives by the state at present."""
+    def start(self, system: DriveSystem, mode: Mode, instant: Instant) -> None:
+        """Have derivatives by the state at present; see `PhaseObserver`."""
         order, count = len(system.states), len(system.free_constants)
         self._matrix, self._holder = np.eye(order, order + count), None
         # A body that sticks has the speed of the belt.
@@ -120,7 +120,8 @@ class VariationalMotion(Motion):
 
     The constants are those of a `ScaledDrive`; another drive has none. All derivatives are
     dimensionless. What a law computes from its constants apart from its equations, as the elastic
-    limit of `ElastoPlastic`, is held. Breakpoints are not recorded.
+    limit of `ElastoPlastic`, is held. Breakpoints are not recorded. After `restart` the derivatives
+    are by the state then.
     """
 
     def __init__(
@@ -132,18 +133,7 @@ class VariationalMotion(Motion):
     ) -> None:
         super().__init__(drive, position, velocity, control, Detail.DERIVATIVES)
         self._derivatives = self.core.observer = Derivatives()
-        self._derivatives.restart(self.core.system, self.core.mode)
-
-    def restart(
-        self,
-        position: float,
-        velocity: float,
-        memory: Sequence[float] | None = None,
-        motor: Sequence[float] | None = None,
-    ) -> None:
-        """Set the state of the slide; derivatives are by this state from now on."""
-        super().restart(position, velocity, memory, motor)
-        self._derivatives.restart(self.core.system, self.core.mode)
+        self.core.note_start()
 
     @property
     def derivatives(self) -> FloatArray:
@@ -167,9 +157,10 @@ class Shot(Derivatives):
         self._steps_before = 0
         self._flow: CompiledFlow | None = None
 
-    def restart(self, system: DriveSystem, mode: Mode) -> None:
+    def start(self, system: DriveSystem, mode: Mode, instant: Instant) -> None:
         """Start again."""
-        super().restart(system, mode)
+        self._recorder.start(system, mode, instant)
+        super().start(system, mode, instant)
         self.landed = False
 
     def begin(self, mode: Mode, flow: CompiledFlow | None, now: float, end: float) -> float:
@@ -250,8 +241,7 @@ class ShootingMotion(RecordedMotion):
         core.start(state.tolist(), self.clock.scaled)
         if mode is not None and mode.flow == core.mode.flow:
             core.enter(mode)
-        self.recorder.record_state(core.instant)
-        self.shot.restart(core.system, core.mode)
+        core.note_start()
 
     def advance(self, duration: float) -> None:
         """Integrate over a duration, s; raises TooStiffError."""

@@ -238,7 +238,7 @@ class Counter:
     """Counts phases, whose ends must not go back, and passes them on to a recorder."""
 
     def __init__(self, recorder: BreakpointRecorder) -> None:
-        self.begin = recorder.begin
+        self.begin, self.start = recorder.begin, recorder.start
         self._recorder, self._reached, self.phases = recorder, 0.0, 0
 
     def take(self, phase: Phase, system: DriveSystem, instant: Instant) -> None:
