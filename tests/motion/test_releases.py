@@ -19,13 +19,10 @@ def test_a_motor_that_friction_just_holds_is_released() -> None:
     assert 0.039 < motion.motor.velocity < 0.0395
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize(
+    "seed",
+    [n if n in (0, 1, 2, 20) else pytest.param(n, marks=pytest.mark.long) for n in range(50)],
+)
 def test_releases_agree_with_an_independent_solution(seed: int) -> None:
     drive = released(seed)
     assert np.all(np.abs(drive.motion() - drive.solution()) < 1e-9 * drive.ranges)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("seed", range(5, 50))
-def test_more_releases_agree_with_an_independent_solution(seed: int) -> None:
-    test_releases_agree_with_an_independent_solution(seed)
