@@ -16,8 +16,9 @@ from stickslip_ros.text import quantity
 
 LONGEST = 9e9
 """Longest time, s, that stamps can express."""
-_LATEST = 1e11
-"""Latest date, s since 1970."""
+_LATEST, _DAYS, _INSTANT = 1e11, (2e4, 1e6), 1e-5
+"""Latest date, s since 1970; days since 1900 or 0, of which spreadsheets count dates, and steps of
+them of less than a second."""
 _FEWEST, _MOST = 10, 100_000
 """Fewest rows of a part that is evenly spaced; rows in which a rounding is looked for."""
 _COARSE_SHARE, _COMMON_SHARE, _MULTIPLE = 0.02, 0.02, 1e-3
@@ -57,6 +58,8 @@ def in_order(
         return np.asarray(rows)[bounds[session - 1] : bounds[session]]
     if not len(back):
         return rows
+    if len(back) == len(picked) - 1 > 1:  # the newest first
+        return np.asarray(rows)[::-1]
     before, after = float(picked[back[0] - 1]), float(picked[back[0]])
     step = before - float(picked[max(0, back[0] - 2)])
     turn = next((each for each in _TURNS if abs(before + step - after - each) < 1.5 * step), None)
@@ -102,6 +105,11 @@ def unit_of_steps(
         return lasting / own, [
             f"the time is converted: steps of {own:g} are {text} by a line above"
         ]
+    if step < _INSTANT and _DAYS[0] < first < _DAYS[1]:
+        raise InvalidInputError(
+            f"the time starts at {first:.6g} and has steps of {step:.2g}, as days have: "
+            f"time={column}*86400 converts it, and time={column}*1 takes it as s"
+        )
     if step < 1.0:
         return 1.0, []
     if first > _LATEST:

@@ -198,8 +198,8 @@ def _recording(path: Path, quantities: Quantities) -> TableRecording:
     if not samples.is_valid.any():
         empty = [name for name, value in values.items() if not np.isfinite(value[present]).any()]
         raise InvalidInputError(
-            f"{path}: no row gives a sample: no position has a number of {' and '.join(empty)} "
-            "beside it"
+            f"{path}: no row gives a sample: no position has a number of "
+            f"{' and '.join(empty) or 'velocity, for the times stand,'} beside it"
         )
     forces = ForceColumns(stamp[:0], rest[:0])
     if "force" in values:

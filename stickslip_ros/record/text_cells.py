@@ -43,7 +43,7 @@ def values_of(cells: Any, decimal: str, given: str | None) -> tuple[Any, bool]:
         return _instants(text, instant), False
     text = text.str.replace(GROUPED, "", regex=True)
     if given is None:
-        grouped = ((".", r",\d*\."), (",", r"\.\d*,"))  # commas, or points, group digits
+        grouped = ((".", r",\d*[.,]"), (",", r"\.\d*[.,]"))  # commas, or points, group digits
         marks = (mark for mark, pattern in grouped if text.str.contains(pattern).any())
         points = decimal == "," and text.str.contains(".", regex=False).any()
         if mark := next(marks, "," * bool(points)):

@@ -276,6 +276,14 @@ def test_times_in_other_units_than_seconds_are_refused_with_a_way(
     assert found.stamp.tolist() == [1_000_000 * number for number in range(90)]
 
 
+def test_days_are_refused_with_a_way(tmp_path: Path) -> None:
+    text = "T,x\n" + "".join(f"{46_000.5 + n * 1e-3 / 86_400:.13f},{n}\n" for n in range(90))
+    with pytest.raises(InvalidInputError, match=r"as days have: time=#1\*86400 converts it"):
+        read(tmp_path, text, "T", "x")
+    stamps = read(tmp_path, text, "#1*86400", "x").samples.stamp
+    assert np.abs(stamps - 1_000_000 * np.arange(90)).max() < 2000
+
+
 def test_points_between_thousands_are_refused_with_a_way(tmp_path: Path) -> None:
     cells = [f"{n:,}".replace(",", ".") for n in range(1050, 900, -1)]
     text = "t;x\n" + "".join(f"{n};{each}\n" for n, each in enumerate(cells))
@@ -453,6 +461,8 @@ def test_what_is_left_out_is_counted_and_its_first_line_named(tmp_path: Path) ->
         ('a,b\n0,"1,000.5"\n1,"2"\n', TableFormat(), [1000.5, 2.0]),
         ("a;b\n0;1.000,5\n1;2,0\n", TableFormat(), [1000.5, 2.0]),
         ("a;b\n0;1'000.5\n1;2.0\n", TableFormat(), [1000.5, 2.0]),
+        ("a;b\n0;1.000.500\n1;2.000\n", TableFormat(), [1000500.0, 2000.0]),
+        ("a;b\n1;2\n0;1\n-1;0\n", TableFormat(), [0.0, 1.0, 2.0]),
         ("a;b\n0;1\xa0000,5\n1;2,0\n", TableFormat(), [1000.5, 2.0]),
         ("0;0\n1;1\na;b\n0;5\n1;6\n", TableFormat(skip=2), [5.0, 6.0]),
         ("a;b\n0;5\n1;6\n".encode("cp037"), TableFormat(encoding="cp037"), [5.0, 6.0]),
