@@ -51,6 +51,8 @@ _LEAST_SLIP, _APART = 12.0, 4.0
 """Samples in a slip from which it does; errors of a stick fraction within which both agree."""
 _SAME_VELOCITY, _REST_SHARE = 0.05, 0.2
 """Relative difference of two velocities of a guide that are the same; share of rests on another."""
+_OTHER_SPEED = 0.1
+"""Share of the belt speed by which that of a stick differs at most."""
 _SLIP_SHARE = 0.1
 """Share of the belt speed by which a slide at rest may seem to move."""
 _NEAR_STEPS, _LEAST_DWELL, _DWELL_GROWTH = 4.0, 4.0, 1.25
@@ -71,13 +73,13 @@ def measure(
         found, fit = _by_reversals(window, reading, quick=quick)
         if found.regime is Regime.PURE_SLIP and _rests_where_it_turns(window):
             found = _undecided(found)
-        return _as_it_passes(found, fit), fit
+        return _as_it_passes(window, found, fit), fit
     short = segmented.cycle.stick_fraction < _REFINED_SHARE
     short &= segmented.slip_samples >= _LEAST_SLIP
     if not segmented.rests or (short and not quick):
         refined, fit = _by_reversals(window, reading, quick=quick)
         if segmented.agrees(refined):
-            return _as_it_passes(_not_surer(refined, segmented), fit), fit
+            return _as_it_passes(window, _not_surer(refined, segmented), fit), fit
     found = segmented_measures(window, segmented)
     return found if segmented.rests else _undecided(found), None
 
@@ -87,10 +89,17 @@ def _undecided(found: Measures) -> Measures:
     return replace(found, regime=None, stick_fraction=None)
 
 
-def _as_it_passes(found: Measures, fit: MeanCycle | None) -> Measures:
-    """Return measures that do not deny a stick of a slide that passes the speed of the belt."""
-    passes = fit is not None and fit.overtakes and found.regime is Regime.PURE_SLIP
-    return _undecided(found) if passes else found
+def _as_it_passes(window: Window, found: Measures, fit: MeanCycle | None) -> Measures:
+    """Return measures that do not deny a stick of a slide that passes the speed of the belt.
+
+    Nor do they claim one at a speed so far from that of the belt that no calibration errs by it.
+    """
+    if fit is None:
+        return found
+    passes = fit.overtakes and found.regime is Regime.PURE_SLIP
+    belt = abs(float(window.samples.belt[-1]))
+    elsewhere = fit.stick is not None and abs(fit.stick.fit.belt_speed - belt) > _OTHER_SPEED * belt
+    return _undecided(found) if passes or elsewhere else found
 
 
 def _not_surer(refined: Measures, segmented: StickSlip) -> Measures:

@@ -189,6 +189,14 @@ def test_a_belt_speed_that_is_told_wrong_and_a_drift_leave_the_stick(
     assert (found.drift is not None) == (drift != 0.0)
 
 
+@pytest.mark.parametrize("scale", [0.85, 1.13])
+def test_no_stick_is_claimed_at_a_speed_far_from_that_of_the_belt(scale: float) -> None:
+    record = samples(noise=1e-6)
+    found = fed(replace(record, belt_velocity=scale * record.belt_velocity), NOISY).measures()
+    assert (found.regime, found.stick_fraction) == (None, None)
+    assert found.amplitude == pytest.approx(434.09e-6, rel=1e-3)
+
+
 def test_friction_with_a_memory_sticks_below_the_stick_speed_under_noise_as_without() -> None:
     """An overshoot of 2 % of the belt speed is in the band of 1 % where it passes it."""
     time = np.arange(2000) * 1e-3
