@@ -10,6 +10,7 @@ import numpy as np
 from stickslip_ros.arrays import BoolArray, FloatArray, rms
 from stickslip_ros.measures.noise import encoder_step, resolved, white_noise
 from stickslip_ros.quantities import Quantity
+from stickslip_ros.samples import LARGEST
 from stickslip_ros.text import quantity
 
 _LEAST_WAY, _JUMP = 0.05, 0.2
@@ -90,12 +91,12 @@ def followed(
 ) -> Followed | None:
     """Return how positions follow a reference; None if there are not two samples of both.
 
-    Arrays have the shape (samples,), s and m; rows that are not finite, or not later than all
-    before, are left out. `unit` is that of lengths in the notes. Of positions with noise, heights
-    are those of the error smoothed over a quarter of its width. What the sensor does not tell, see
-    `resolved`, or the samples do not, is None.
+    Arrays have the shape (samples,), s and m; rows without a number up to 1e100, or not later
+    than all before, are left out. `unit` is that of lengths in the notes. Of positions with noise,
+    heights are those of the error smoothed over a quarter of its width. What the sensor does not
+    tell, see `resolved`, or the samples do not, is None.
     """
-    known = np.isfinite(reference) & np.isfinite(position)
+    known = (np.abs(reference) <= LARGEST) & (np.abs(position) <= LARGEST)
     known &= time > np.maximum.accumulate(np.append(-np.inf, time))[:-1]
     time, reference, position = time[known], reference[known], position[known]
     if len(time) < 2:

@@ -112,7 +112,8 @@ def measure_table(
 def _tell_apart(rows: dict[str, list[str]], columns: Mapping[str, Mapping[str, Any]]) -> None:
     """Omit the force that acted if it is unknown or equals the sent one, and drops without any.
 
-    Omit late forces and missed deadlines, too, where no column knows them.
+    Omit late forces and missed deadlines, too, where no column knows them, and errors at reversals
+    without a reversal.
     """
     for sent, (applied, label) in _SENT.items():
         known = [values.get(applied) is not None for values in columns.values()]
@@ -123,6 +124,9 @@ def _tell_apart(rows: dict[str, list[str]], columns: Mapping[str, Mapping[str, A
             rows.pop(applied, None)
     if not any(values.get("dropped_forces") for values in columns.values()):
         rows.pop("dropped_forces", None)
+    if not any(values.get("reversals") for values in columns.values()):
+        for name in [name for name in rows if name.startswith("reversal_")]:
+            del rows[name]
     for name in ("late_forces", "missed_deadlines"):
         if all(values.get(name) is None for values in columns.values()):
             rows.pop(name, None)

@@ -151,5 +151,8 @@ def test_a_map_gives_friction_alone(stickslip: Run, tmp_path: Path) -> None:
     with Image.open(tmp_path / "map.png") as image:
         assert image.size == (800, 900)
     assert "s/rad" in stickslip(*arguments, "--rotary").stdout
+    in_amperes = ("--force-constant", "2N/A")
+    again = stickslip.json(*arguments[:-1], "velocity=v,force=f", *in_amperes)
+    assert again["parameters"] == stickslip.json(*arguments)["parameters"]
     model = ss.friction_map(table, columns={"velocity": "v", "force": "f*2"})
     assert stickslip.json(*arguments) == model.to_dict()

@@ -36,6 +36,26 @@ def test_our_own_table_is_measured_as_the_samples_of_a_run(stickslip: Run, log: 
     assert faster.measures.regime == "pure_slip"
 
 
+def test_a_current_is_reported_as_a_force(stickslip: Run, tmp_path: Path) -> None:
+    time = np.arange(2000) * 1e-3
+    table = np.column_stack([time, 1e-3 * np.sin(20.0 * time), 1.5 * np.cos(20.0 * time)])
+    np.savetxt(tmp_path / "log.csv", table, delimiter=",", header="t,x,i [A]", comments="")
+    given = ("report", "log.csv", "--columns", "time=t,position=x,force=#3")
+    motor = ("--force-constant", "0.35Nm/A", "--pitch", "10mm")
+    newtons = 1.5 * 0.35 * 2.0 * np.pi / 0.01
+    assert stickslip.json(*given, *motor)["peak_force"] == pytest.approx(newtons, rel=1e-9)
+    turns = stickslip.json(*given, *motor[:2], "--rotary")
+    assert turns["peak_force"] == pytest.approx(1.5 * 0.35, rel=1e-9)
+    for arguments, refusal in (
+        (given, "is in A, which is no unit of force"),
+        ((*given, *motor[:2]), "whose pitch is needed"),
+        ((*given[:2], *motor), "--force-constant 0.35Nm/A: is for the current in a table"),
+    ):
+        done = stickslip(*arguments)
+        assert done.returncode == 2
+        assert refusal in done.stderr
+
+
 def test_slips_are_told_one_by_one(stickslip: Run, tmp_path: Path) -> None:
     """A tooth each second, 1 mm high."""
     time = np.arange(8000) * 1e-3
