@@ -89,10 +89,6 @@ def quantities_of(
         columns = {**columns, "belt_velocity": repr(float(belt_speed))}
     needed = "velocity" if "position" not in columns and "velocity" in columns else "position"
     asked = _asked(table, columns, ("time", needed))
-    if table.form.force_constant and "force" not in asked:
-        raise InvalidInputError(
-            f"{table.path}: force_constant is for a current, and no column is given for force"
-        )
     clock = asked["time"].places
     if not clock:
         raise InvalidInputError(f"{table.path}: time = {columns['time']} must be a column")
@@ -295,6 +291,10 @@ def _asked(
     for name in columns:
         if name not in QUANTITIES:
             raise InvalidInputError(f"column {name} is invalid: {must_be_one_of(name, QUANTITIES)}")
+    if table.form.force_constant and "force" not in columns:
+        raise InvalidInputError(
+            f"{table.path}: force_constant is for a current, and no column is given for force"
+        )
     period = table.form.period or (table.period or (None,))[0]
     if table.form.period is not None and "time" in columns:
         raise InvalidInputError(f"{table.path}: period is for a table without times")
