@@ -249,7 +249,8 @@ class PlantParameters(DriveConstants, NodeParameters):
             name = "rate" if self.answer_every == 1 else "rate / answer_every"
             raise ValueError(
                 f"{name} = {self.control_rate} Hz must be at least a thousandth of the natural "
-                f"frequency, {natural:g} Hz with mass = {self.mass} kg and stiffness = {self.stiffness} N/m"
+                f"frequency, {natural:g} Hz with mass = {self.mass} kg and stiffness = "
+                f"{self.stiffness} N/m"
             )
         if self.motor.kind == "mass" and self.stiffness == 0.0:
             raise ValueError(
