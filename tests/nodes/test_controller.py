@@ -17,7 +17,13 @@ from stickslip_ros.model.control.base import State
 from stickslip_ros.model.signals import ramp
 from stickslip_ros.nodes.analyzer import AnalyzerNode
 from stickslip_ros.nodes.controller import ControllerNode
-from stickslip_ros.record.codec import pack_joint_state, pack_reference, unpack_wrench
+from stickslip_ros.record.codec import (
+    HELD,
+    joint_state_packer,
+    pack_joint_state,
+    pack_reference,
+    unpack_wrench,
+)
 from stickslip_ros.record.reader import Recording
 from stickslip_ros.record.topics import CONTROL_FORCE, JOINT_STATES, REFERENCE
 from stickslip_ros.samples import Reference, Sample
@@ -122,6 +128,20 @@ def test_what_is_no_later_finite_state_is_dropped_and_the_filter_goes_on(graph: 
     check(2 * SECOND, 0.4)
     assert len(loop.forces) == 4
     assert loop.force(SECOND, velocity=0.1) == 0.0  # a plant that was started again
+
+
+def test_a_state_at_which_the_force_is_held_is_not_answered(graph: Graph) -> None:
+    loop = Loop(graph, partial(ControllerNode, "washout"))
+    law = CONTROLLER_PARAMETERS["washout"].as_controller()
+    held = joint_state_packer("slide", "belt", frame=HELD)
+    for number in range(3):
+        stamp, speeds = SECOND + number * SECOND // 100, (0.1 * number, 0.0)
+        sample = Sample(stamp, 0.0, speeds[0], 0.0, 0.0, 0.0)
+        assert loop.force(stamp, velocity=speeds[0]) == law.answer(sample)
+        loop.states.publish(held(stamp + SECOND // 200, (0.0, 0.0), (5.0, 0.0), (0.0, 0.0)))
+        loop.states.wait_for_all_acked(Duration(seconds=PATIENCE))
+        graph.run_for(0.02)
+    assert len(loop.forces) == 3
 
 
 def test_a_reference_from_a_topic_holds_until_the_next(
