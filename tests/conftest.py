@@ -10,7 +10,8 @@ import signal
 import sys
 from collections.abc import Iterator
 from multiprocessing.process import BaseProcess
-from tempfile import TemporaryDirectory
+from pathlib import Path
+from shutil import rmtree
 
 import pytest
 from hypothesis import settings
@@ -36,10 +37,13 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 # The workers fill the processors already: threads that wait in a loop would hold them up.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-# What is compiled is kept for the workers and for what the tests start, and not among the user's.
+# What is compiled is kept for the workers, for what the tests start and for the next time, and not
+# among the user's. The larger it is, the longer a process takes to open it.
 if "HEYOKA_CACHE_DIR" not in os.environ:
-    _compiled = TemporaryDirectory(prefix="stickslip_ros-")
-    os.environ["HEYOKA_CACHE_DIR"] = _compiled.name
+    _compiled = Path(__file__).parents[1] / ".pytest_cache" / "compiled"
+    if sum(file.stat().st_size for file in _compiled.glob("*")) > 100 << 20:
+        rmtree(_compiled)
+    os.environ["HEYOKA_CACHE_DIR"] = str(_compiled)
 
 STARTING_FIXTURES = {
     "cluster",
