@@ -135,8 +135,13 @@ class ComparedLaws(TabularResult):
             value = self._units.with_error(*first.means[self.rank_by], unit)
             return f"{first.law} has the least {label}: {value}"
         alike = [rank for rank in self.ranks if rank.held_interval[1] >= least]
-        laws = ", ".join(f"{rank.law} holds {rank.held_text}" for rank in alike)
-        return f"{laws} of its cases{': not told apart' if len(alike) > 1 else ''}"
+        texts = dict.fromkeys(rank.held_text for rank in alike)
+        groups = {text: [r.law for r in alike if r.held_text == text] for text in texts}
+        laws = "; ".join(
+            f"{', '.join(names)} hold{'s' * (len(names) == 1)} {text}"
+            for text, names in groups.items()
+        )
+        return f"{laws} of the cases{': not told apart' if len(alike) > 1 else ''}"
 
     def held_at_points(self, law: str) -> FloatArray:
         """Return the share of the cases that a law holds, at each point of the parameters.
