@@ -94,12 +94,12 @@ def _as_it_passes(window: Window, found: Measures, fit: MeanCycle | None) -> Mea
 
     Nor do they claim one at a speed so far from that of the belt that no calibration errs by it.
     """
-    if fit is None:
-        return found
-    passes = fit.overtakes and found.regime is Regime.PURE_SLIP
-    belt = abs(float(window.samples.belt[-1]))
-    elsewhere = fit.stick is not None and abs(fit.stick.fit.belt_speed - belt) > _OTHER_SPEED * belt
-    return _undecided(found) if passes or elsewhere else found
+    passes = fit is not None and fit.overtakes and found.regime is Regime.PURE_SLIP
+    if fit is not None and fit.stick is not None:
+        part = window if len(window.samples) or window.before is None else window.before
+        belt = abs(float(part.samples.belt[-1]))
+        passes |= abs(fit.stick.fit.belt_speed - belt) > _OTHER_SPEED * belt
+    return _undecided(found) if passes else found
 
 
 def _not_surer(refined: Measures, segmented: StickSlip) -> Measures:
