@@ -13,7 +13,6 @@ from typing_extensions import override
 
 from stickslip_ros.api.page import Summary
 from stickslip_ros.api.results import Parts, Result, Table, TabularResult
-from stickslip_ros.api.runs import loop_facts, sentence
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.measures.cycle_measures import Measures, measures_of
@@ -117,6 +116,8 @@ class RecordedRun(TabularResult):
 
     def _facts(self) -> dict[str, str]:
         """Return what a page says first, as far as the drive and its law were recorded."""
+        from stickslip_ros.api.runs import loop_facts
+
         forces = self.report["peak_force"], self.report["resting_force"]
         plant = None if self._is_table else recorded_plant(self.path, self._namespace)
         law: ControlLaw | None = None
@@ -132,6 +133,8 @@ class RecordedRun(TabularResult):
 
     @override
     def _summary(self) -> Summary:
+        from stickslip_ros.api.runs import sentence
+
         verdict, facts = sentence(self.verdict), self._facts()
         return Summary("Recorded run", str(self.path), verdict, self.settings(), facts)
 

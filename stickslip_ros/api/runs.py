@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from typing_extensions import override
 
-from stickslip_ros.api.design import gains_text
 from stickslip_ros.api.page import Summary
 from stickslip_ros.api.results import Parts, Table, TabularResult, attributes
 from stickslip_ros.api.scenarios import ScenarioLike, as_scenario
@@ -139,7 +138,9 @@ def loop_facts(
     sampled: bool = True,
 ) -> dict[str, str]:
     """Return what a page says first of a loop: feeds, gains, and forces `peak` and `last`, N."""
-    from stickslip_ros.studies.stability import SEARCHED_FEEDS, stable_feeds  # it takes long
+    # These take long.
+    from stickslip_ros.api.design import gains_text
+    from stickslip_ros.studies.stability import SEARCHED_FEEDS, stable_feeds
 
     units = Units.for_drive(plant.as_drive())
     varied = f", with a signal ({plant.belt.kind})" * (plant.belt.kind != "none")
