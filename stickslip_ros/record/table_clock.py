@@ -62,7 +62,8 @@ def in_order(
         return np.asarray(rows)[::-1]
     before, after = float(picked[back[0] - 1]), float(picked[back[0]])
     step = before - float(picked[max(0, back[0] - 2)])
-    turn = next((each for each in _TURNS if abs(before + step - after - each) < 1.5 * step), None)
+    turns = (each for each in _TURNS if abs(before + step - after - each) < 1.5 * step)
+    turn = next(filter(lambda turn: turn > 10.0 * step, turns), None)
     what = f"goes back {len(back)} times, the first time at {table.line(int(rows[back[0]]))}"
     if turn:
         column = table.number(clock.places[0]) if clock.bare else clock.text

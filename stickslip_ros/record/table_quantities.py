@@ -260,6 +260,8 @@ class _Cells:
         if not len(rows):
             raise InvalidInputError(f"{self.table.path}: no time is a finite number")
         rows = in_order(self.table, asked, factor, found[clock], rows)
+        if rows[0] > rows[-1]:
+            self.notes.append("the rows are read from the last one on: the newest is the first")
         if self.unknown_unit:
             step = float(np.median(np.diff(_picked(found[clock], rows)))) if len(rows) > 1 else 0.0
             column, first = self.table.number(clock[0]), float(found[clock][rows[0]])

@@ -150,10 +150,7 @@ def test_columns_that_make_no_recording_are_refused(tmp_path: Path) -> None:
         ({"time": "3", "position": "x"}, "time = 3 must be a column"),
         ({"time": "t", "position": "x", "speed": "v"}, "column speed is invalid"),
         ({"time": "t*1e12", "position": "x"}, "differ by more than 9e+09 s"),
-        (
-            {"time": "1-t", "position": "x"},
-            "the time goes back 2000 times, the first time at line 3",
-        ),
+        ({"time": "x", "position": "t"}, ": rows must be in the order of time"),
         ({"time": "t*nan", "position": "x"}, "no time is a finite number"),
         (None, "not those of `stickslip simulate --out`"),
     ]
