@@ -25,7 +25,8 @@ from stickslip_ros.model.constants import constants_of
 from stickslip_ros.model.control import ControlLaw
 from stickslip_ros.scenarios.files import Scenario, load_scenario
 from stickslip_ros.studies.case_outcome import Disturbance, simulate_case
-from stickslip_ros.studies.design import Designer, Task, design
+from stickslip_ros.studies.design import Task, design
+from stickslip_ros.studies.design_trial import Trial
 from stickslip_ros.studies.tuned_gains import Goal
 from stickslip_ros.studies.tuning import Tuning
 from stickslip_ros.versions import versions
@@ -144,7 +145,7 @@ def best_of_grid(
         limits = tuning.limits(tuning.judged(laws[row], deciding, tuning.vibrations))
         if max(limit.excess for limit in limits) > 0.0:
             continue
-        checks = Designer(task, tuning, disturbances).checks(laws[row])
+        checks = Trial(task, tuning, disturbances).checks(laws[row])
         if all(check.reason is None for check, _ in checks):
             return float(rates[row])
     return None

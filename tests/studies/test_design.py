@@ -144,7 +144,7 @@ def test_gains_for_a_spread_keep_the_limits_of_all_drives_that_are_searched_for(
         other = Designer.of(Task(scenario, (0.04, 0.04), 480.0), step)
         assert other.tuning.loops.slowest(found.controller).decay_rate(found.controller) > 0.0
         assert other.tuning.missed(found.controller) == ()
-        assert all(check.held for check, _ in other.checks(found.controller))
+        assert all(check.held for check, _ in other.trial.checks(found.controller))
         missed += [seed] * bool(other.tuning.missed(alone.controller))
     assert missed
     assert alone.drawn is None
@@ -184,10 +184,10 @@ def test_a_drawn_drive_that_is_not_held_is_counted_and_told(
     text = f"holds {found.design.drawn.held} of 8 drawn drives (95 % interval from "
     assert text in str(found)
     assert "the worst: plant.mass=" in str(found)
-    assert "the simulated drive is not held at 0.03 m/s" in str(found)
+    assert "the simulated drive is not held at 30 mm/s" in str(found)
     assert found.to_dict()["drawn"]["worst"] == found.design.drawn.worst
     # What grows cannot be simulated until it has settled.
-    weak = Designer.of(task(AT_40), []).worst(Washout(11.0, -1.0, 0.0))
+    weak = Designer.of(task(AT_40), []).trial.worst(Washout(11.0, -1.0, 0.0))
     assert not weak.held
     assert re.match(r"at 0.04 m/s a small deviation grows with [\d.]+ 1/s", weak.reason)
     # With drives to search for, one of them says why there is nothing to propose.
