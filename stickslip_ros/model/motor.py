@@ -29,10 +29,7 @@ class Motor:
         force = self.friction  # of the equations, an expression
         return not (isinstance(force, int | float) and force == 0.0)
 
-    def reduced(self, mass: float) -> float:
-        """Return m M/(m + M), kg: what vibrates at sqrt(k/mass) as motor and slide (kg) do."""
-        return 1.0 / (1.0 / mass + 1.0 / self.mass)
-
     def natural_frequency(self, mass: float, stiffness: float) -> float:
         """Return the angular frequency, rad/s, of a free slide (kg) and motor on a spring (N/m)."""
-        return sqrt(stiffness / self.reduced(mass))
+        reduced_mass = 1.0 / (1.0 / mass + 1.0 / self.mass)
+        return sqrt(stiffness / reduced_mass)

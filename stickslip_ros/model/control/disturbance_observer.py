@@ -38,9 +38,8 @@ class DisturbanceObserver(FeedbackLaw):
 
     @override
     def initial_state(self, sample: Sample, reference: Reference) -> State:
-        momentum_flow = (
-            self.bandwidth * self.nominal_mass * sample.of(self.feedback).velocity
-        )  # no disturbance is known yet
+        # No disturbance is known yet.
+        momentum_flow = self.bandwidth * self.nominal_mass * sample.of(self.feedback).velocity
         return momentum_flow, momentum_flow
 
     @override

@@ -317,9 +317,7 @@ class FrictionLaw(FrictionMemory):
         """Smallest and largest |mu| in steady slip at any speed."""
         speeds = _SPEEDS * (1.0 if isinf(self.characteristic_speed) else self.characteristic_speed)
         signs = np.ones(speeds.shape)
-        sizes = [
-            -sign * self.coefficient(sign * speeds, sign * signs) for sign in (1.0, -1.0)
-        ]  # fmt: skip
+        sizes = [-sign * self.coefficient(sign * speeds, sign * signs) for sign in (1.0, -1.0)]
         return float(np.min(sizes)), float(np.max(sizes))
 
     def scaled(self, speed: float, length: float = 1.0) -> Self:

@@ -28,11 +28,6 @@ class Stiction(FrictionLaw):
     def coefficient(self, relative_speed: Any, sign: Any) -> Any:
         return -self.kinetic * sign - self.viscous * relative_speed
 
-    @property
-    def limits(self) -> tuple[Any, Any]:
-        """The static coefficient: friction falls where slip starts; see `SteadyFriction.limits`."""
-        return self.static, self.static
-
     def refusal(self) -> str | None:
         """Refuse a kinetic coefficient above the static one; see `SteadyFriction.refusal`."""
         return self.above_static("kinetic")
