@@ -36,17 +36,13 @@ def comparison_figure(
     title = f"control laws compared, {study.scenario.name}{said}"
     style.set_title(figure, title, "means of the cases, with standard errors over the seeds")
     panels = figure.subplots(*((len(shown), 1) if style.narrow else (1, len(shown))), squeeze=False)
-    units, grid = (
-        Units.for_drive(study.scenario.plant.as_drive(), study.plan.parameters),
-        study.plan.grid,
-    )
+    units = Units.for_drive(study.scenario.plant.as_drive(), study.plan.parameters)
+    grid = study.plan.grid
     points, label, texts = np.zeros(1), "", [""]
     if grid is not None:
         rows = [grid.values(point) for point in range(grid.size)]
-        points, label = (
-            np.arange(len(rows)),
-            ", ".join(units.named(axis.parameter) for axis in grid.axes),
-        )
+        points = np.arange(len(rows))
+        label = ", ".join(units.named(axis.parameter) for axis in grid.axes)
         texts = [
             "\n".join(units.text(v, a.unit) for v, a in zip(row, grid.axes, strict=True))
             for row in rows

@@ -153,8 +153,6 @@ class Result:
 class LawProgram:
     """A control law at a fixed rate."""
 
-    law: ControlLaw
-    """The law."""
     states: tuple[str, ...]
     """Names of the states."""
     inputs: tuple[str, ...]
@@ -262,7 +260,7 @@ def law_program(law: ControlLaw, period: float) -> LawProgram:
             f"the control law {law.name} cannot be exported: it uses {', '.join(unknown)} of the "
             "samples"
         )
-    return LawProgram(law, states, tuple(name for name in _INPUTS if name in used), *trees)
+    return LawProgram(states, tuple(name for name in _INPUTS if name in used), *trees)
 
 
 def _inputs(symbol: Callable[[str], Symbol], law: ControlLaw) -> tuple[Any, Any]:

@@ -9,11 +9,9 @@ from numpy.typing import NDArray
 from stickslip_ros.arrays import FloatArray, IntArray
 from stickslip_ros.measures.control_forces import HELD_FORCES, DroppedForces
 from stickslip_ros.measures.sampling_grid import LONGEST_GAP
-from stickslip_ros.samples import ForceColumns, SampleColumns
+from stickslip_ros.samples import NO_FORCES, ForceColumns, SampleColumns
 from stickslip_ros.show.run_history import Trace, peaks
 from stickslip_ros.stamps import NANOSECONDS
-
-_NONE = ForceColumns(np.empty(0, np.int64), np.empty(0))
 
 
 class Line(NamedTuple):
@@ -56,7 +54,7 @@ class LiveTrace:
         self._begin()
 
     def feed(
-        self, states: SampleColumns, forces: ForceColumns, dropped: ForceColumns = _NONE
+        self, states: SampleColumns, forces: ForceColumns, dropped: ForceColumns = NO_FORCES
     ) -> None:
         """Add new samples and forces, `dropped` forces in any order; blocks may be empty."""
         with self._lock:
@@ -65,11 +63,11 @@ class LiveTrace:
                 self._begin()
                 states = states[int(descents[-1]) + 1 :]
             if len(states):
-                if states.stamp[0] <= self._newest:
+                if states.stamp[0] <= self.newest:
                     self._begin()
                 if self._first is None:
                     self._first = int(states.stamp[0])
-                self._newest = int(states.stamp[-1])
+                self.newest = int(states.stamp[-1])
                 self._states.add(
                     states.stamp,
                     states.position,
@@ -80,7 +78,7 @@ class LiveTrace:
             # A restarted controller may answer old samples: the figure follows the stamps.
             later = forces.stamp > self._newest_force
             # A force stamped far in the future would hide all others.
-            later &= forces.stamp < max(self._newest, 0) + NANOSECONDS
+            later &= forces.stamp < max(self.newest, 0) + NANOSECONDS
             sent = forces[later]
             self._forces.add(sent.stamp, sent.force, np.full(len(sent), np.nan))
             self._newest_force = int(sent.stamp.max(initial=self._newest_force))
@@ -89,7 +87,7 @@ class LiveTrace:
             rows = self._dropped.among(ForceColumns(stamp, acted))
             acted[rows], lost[rows] = np.nan, acted[rows]
             longest = round(self.longest * NANOSECONDS)
-            self._states.forget(self._newest - longest)
+            self._states.forget(self.newest - longest)
             self._forces.forget(self._newest_force - longest)
 
     def frame(self, window: float, orbit: float, buckets: int) -> Frame | None:
@@ -100,7 +98,7 @@ class LiveTrace:
         with self._lock:
             if self._first is None:
                 return None
-            end = self._newest
+            end = self.newest
             begin = end - round(min(window, self.longest) * NANOSECONDS)
             # With a fixed grid of times the points of a moving figure keep their places.
             width = max((end - begin) // buckets, 1)
@@ -150,14 +148,10 @@ class LiveTrace:
             time = (stamp - self._first) / NANOSECONDS
             return [time, *(column[shown] for column in columns), force]
 
-    @property
-    def newest(self) -> int:
-        """Stamp of the newest sample, ns; -1 before the first."""
-        return self._newest
-
     def _begin(self) -> None:
         self._first: int | None = None
-        self._newest = self._newest_force = -1
+        self._newest_force = self.newest = -1
+        """Stamp of the newest sample, ns; -1 before the first."""
         self._states = Trace(4, np.int64)
         self._forces = Trace(2, np.int64)
         """Columns of forces that acted and that did not; one of the two is NaN in each row."""
@@ -177,7 +171,7 @@ def _line(
     end: int,
     width: int,
     step: float,
-    others: IntArray = _NONE.stamp,
+    others: IntArray = NO_FORCES.stamp,
 ) -> Line:
     """Return the points of a line, with NaN where samples are missing.
 
