@@ -203,21 +203,16 @@ class PlantNode(ManagedNode[PlantParameters]):
             controlled=controlled,
         )
         lost = NO_FORCE if self.parameters.expects_control and not controlled else ""
-        self._log_timing("lost" if lost else "late" if timing else "", lost or timing)
+        if self._timing.turns_to("lost" if lost else "late" if timing else ""):
+            if lost or timing:
+                self.get_logger().warning(lost or timing)
+            else:
+                self.get_logger().info("forces and samples are in time again")
         complaints = [pacer.complaint, lost, timing, self.dropped.complaint]
         complaints += self.duplicate_publishers(
             *force_topics(self.parameters.force_type), DISTURBANCE_FORCE
         )
         return diagnosis(complaints, values)
-
-    def _log_timing(self, kind: str, complaint: str) -> None:
-        """Log the first complaint of its kind about forces and deadlines, and that they end."""
-        assert self._timing is not None
-        if self._timing.turns_to(kind):
-            if complaint:
-                self.get_logger().warning(complaint)
-            else:
-                self.get_logger().info("forces and samples are in time again")
 
     def _end(self) -> None:
         """Pause: the last sample was reached, or the motion cannot continue."""

@@ -115,16 +115,11 @@ class ServiceCall:
             self._pending.add_done_callback(self._take)
         return False
 
-    def ask(self, spinner: Spinner, request: Any, timeout: float) -> Any:
-        """Send this request and return the answer, while the spinner runs its nodes.
+    def wait(self, spinner: Spinner, timeout: float) -> Any:
+        """Return the answer to the request that was started, while the spinner runs its nodes.
 
         Return None if the service does not appear, or does not answer, within `timeout` (s) each.
         """
-        self.start(request)
-        return self.wait(spinner, timeout)
-
-    def wait(self, spinner: Spinner, timeout: float) -> Any:
-        """Return the answer to the request that was started, as `ask` does."""
         if spinner.spin_until(lambda: self.pursue() or self.sent, timeout):
             spinner.spin_until(self.pursue, timeout)
         return self.answer
@@ -222,7 +217,7 @@ class LifecycleClient:
 
     def state(self) -> str:
         """Return the name of the node's state, empty if it does not answer."""
-        answer = self._get_state.ask(self._spinner, GetState.Request(), self._timeout)
+        answer = self._get_state.start(GetState.Request()).wait(self._spinner, self._timeout)
         return answer.current_state.label if answer is not None else ""
 
     def change_state(self, transition: int) -> bool:

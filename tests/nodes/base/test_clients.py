@@ -132,14 +132,14 @@ def test_a_service_is_asked_again_and_again_by_one_call(domain: int) -> None:
         node = Node("asking", context=spinner.executor.context)
         spinner.add(node)
         call = ServiceCall(node, Trigger, "ring")
-        assert call.ask(spinner, Trigger.Request(), 0.1) is None
+        assert call.start(Trigger.Request()).wait(spinner, 0.1) is None
         assert not call.sent
         service = node.create_service(Trigger, "ring", answer_once)
-        answers: list[Any] = [call.ask(spinner, Trigger.Request(), 10.0) for _ in range(2)]
+        answers: list[Any] = [call.start(Trigger.Request()).wait(spinner, 10.0) for _ in range(2)]
         assert [answer.message for answer in answers] == ["here", "here"]
         assert answers[0] is not answers[1]
         node.destroy_service(service)
-        assert call.ask(spinner, Trigger.Request(), 0.2) is None
+        assert call.start(Trigger.Request()).wait(spinner, 0.2) is None
 
 
 class _Unlucky(Node):
