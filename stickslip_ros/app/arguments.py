@@ -355,11 +355,10 @@ def scenario_of(
             unit = described(full_name).unit or ""
             defaults.append(f"{full_name} = {values[node][name]} {unit}".rstrip())
     if defaults:
-        sentence = (
+        tell(
             f"{scenario.path}: using defaults: {', '.join(defaults)}; "
             "--base SCENARIO takes omitted values from another scenario"
         )
-        tell(sentence)
     foreign = [name for name in scenario.gains_of_base if name not in unused]
     if any(not name.endswith(".start_after") for name in foreign):
         tell(

@@ -3,14 +3,7 @@
 import argparse
 from pathlib import Path
 
-from stickslip_ros.app.arguments import (
-    add_control,
-    add_law,
-    add_scenario_file,
-    check_writable,
-    scenario_of,
-    writing,
-)
+from stickslip_ros.app.arguments import add_scenario, check_writable, scenario_of, writing
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.files import written
 from stickslip_ros.text import printable
@@ -23,8 +16,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "function in C99 or a function block in IEC 61131-3 Structured Text. Its inputs are what "
         "the encoders measure, and the reference; it gives the forces that the law gives here."
     )
-    add_scenario_file(parser)
-    add_law(add_control(parser))
+    add_scenario(parser)
     parser.add_argument(
         "--out", required=True, type=Path, metavar="FILE", help="file to write, .c or .st"
     )

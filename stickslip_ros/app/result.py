@@ -44,7 +44,12 @@ def add_plot(parser: argparse.ArgumentParser, shown: str) -> None:
         metavar="WxH",
         help="width and height of the figure, inches, as in --size 6x4",
     )
-    add_style(parser)
+    parser.add_argument(
+        "--style",
+        choices=_STYLES,
+        help="what a figure is for: a screen, or a column (85 mm) or two (180 mm) of a journal, "
+        "with fonts of 8 points (default: screen)",
+    )
     parser.add_argument(
         "--dpi",
         type=whole("a whole number of dots per inch from {} to {}", 20, 600),
@@ -52,16 +57,6 @@ def add_plot(parser: argparse.ArgumentParser, shown: str) -> None:
         help="dots per inch of the figure (default: 130, in the styles for paper 300)",
     )
     parser.add_argument("--no-title", action="store_true", help="omit the title of the figure")
-
-
-def add_style(parser: argparse.ArgumentParser) -> None:
-    """Add --style, a name of `show.style.STYLES`."""
-    parser.add_argument(
-        "--style",
-        choices=_STYLES,
-        help="what a figure is for: a screen, or a column (85 mm) or two (180 mm) of a journal, "
-        "with fonts of 8 points (default: screen)",
-    )
 
 
 def add_results(parser: argparse.ArgumentParser, shown: str) -> None:

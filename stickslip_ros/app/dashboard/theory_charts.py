@@ -57,8 +57,7 @@ def bifurcation_chart(branches: BifurcationBranches, drive: Drive) -> Options:
     if branches.sticking_onset is not None:
         marks.append((branches.sticking_onset / speed, "stick-slip onset", GREY, _LEFT_OF_IT))
     series.append(_verticals([*marks, (drive.belt_speed / speed, "now", BLUE, _ABOVE_IT)]))
-    names = dict.fromkeys(s["name"] for s in series if s.get("name"))
-    return _options(speed_label, reach_label, series, legend=list(names))
+    return _options(speed_label, reach_label, series)
 
 
 def stability_chart(stability: StabilityMap, drive: Drive, gains: Washout | None) -> Options:
@@ -87,12 +86,7 @@ def stability_chart(stability: StabilityMap, drive: Drive, gains: Washout | None
                 for contour in contours.lines(level)
             ]
     series += [_region(text, *place) for text, place in _regions(stability, linear)]
-    options = _options(
-        units.label(units.plain("cutoff frequency"), "rad/s"),
-        label,
-        series,
-        legend=list(dict.fromkeys(s["name"] for s in series if s["name"])),
-    )
+    options = _options(units.label(units.plain("cutoff frequency"), "rad/s"), label, series)
     options["xAxis"] |= {"type": "log", "min": float(corners[0]), "max": float(corners[-1])}
     options["yAxis"] |= {"min": float(linear[0]), "max": float(linear[-1])}
     return options
@@ -112,8 +106,7 @@ def friction_chart(curve: FrictionCurve, drive: Drive) -> Options:
     if drive.belt_speed:
         rest = float(drive.friction.at_rest(drive.belt_speed))
         series.append(_point("steady sliding", -drive.belt_speed / speed, rest))
-    names = [s["name"] for s in series]
-    return _options(label, units.plain("friction coefficient"), series, names)
+    return _options(label, units.plain("friction coefficient"), series)
 
 
 def decay_chart(decay: Decay, drive: Drive) -> Options:
@@ -132,9 +125,8 @@ def decay_chart(decay: Decay, drive: Drive) -> Options:
         if places:
             series.append(points(name, colour, 10, symbol) | {"data": places})
     series.append(_verticals([(0.0, "limit of stability", GREY, _LEFT_OF_IT)]))
-    names = [str(s["name"]) for s in series if s["name"]]
     real, imaginary = (units.label(f"{part} part", unit) for part, unit in _PARTS)
-    return _options(real, imaginary, series, names)
+    return _options(real, imaginary, series)
 
 
 def _regions(stability: StabilityMap, linear: Any) -> Iterable[tuple[str, tuple[float, float]]]:
@@ -149,10 +141,11 @@ def _regions(stability: StabilityMap, linear: Any) -> Iterable[tuple[str, tuple[
             yield text, (float(corner), float(linear[int(np.median(columns))]))
 
 
-def _options(x: str, y: str, series: Sequence[Options], legend: Sequence[str]) -> Options:
+def _options(x: str, y: str, series: Sequence[Options]) -> Options:
+    names = dict.fromkeys(s["name"] for s in series if s["name"])
     return {
         **STILL,
-        "legend": LEGEND | {"data": list(legend)},
+        "legend": LEGEND | {"data": list(names)},
         "grid": {"left": 60, "right": 34, "top": 90, "bottom": 45},
         "toolbox": TOOLBOX | {"orient": "vertical", "top": 84},  # the legend needs the whole width
         "tooltip": {"trigger": "item", "axisPointer": {"type": "cross"}},

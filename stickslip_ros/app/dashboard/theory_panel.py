@@ -73,13 +73,10 @@ class TheoryPanel:
             self._said[name].set_text(result.refusal)
             if result.value is not None:
                 draw = partial(stability_chart, gains=gains) if name == "map" else _DRAWN[name]
-                self._draw(name, draw(result.value, drive))
+                self.charts[name].options.clear()
+                self.charts[name].options.update(draw(result.value, drive))
+                self.charts[name].update()
                 self._explain(name, result.value, Units.for_drive(drive))
-
-    def _draw(self, name: str, options: dict[str, Any]) -> None:
-        self.charts[name].options.clear()
-        self.charts[name].options.update(options)
-        self.charts[name].update()
 
     def _explain(self, name: str, value: Any, units: Units) -> None:
         if name == "friction":  # page.js draws the loop of a law with a memory
