@@ -9,7 +9,6 @@ from rcl_interfaces.msg import (
     ParameterDescriptor,
     SetParametersResult,
 )
-from rclpy.context import Context
 from rclpy.exceptions import NameValidationException, ParameterException
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.lifecycle import LifecycleNode
@@ -49,15 +48,12 @@ class ParameterNode(LifecycleNode, Generic[ParametersT]):
         name: str,
         defaults: ParametersT,
         *,
-        context: Context | None = None,
-        namespace: str | None = None,
         overrides: Mapping[str, Any] | None = None,
-        cli_args: list[str] | None = None,
-        use_global_arguments: bool = True,
+        **options: Any,
     ) -> None:
         """Declare the parameters: values of the command line, then `overrides` by flat name.
 
-        Others are at their `defaults`. The other arguments are those of `rclpy.node.Node`.
+        Others are at their `defaults`. The other options are those of `rclpy.node.Node`.
 
         Raises InvalidInputError for a parameter that is refused.
         """
@@ -65,12 +61,9 @@ class ParameterNode(LifecycleNode, Generic[ParametersT]):
         try:
             super().__init__(
                 name,
-                context=context,
-                namespace=namespace,
-                cli_args=cli_args,
-                use_global_arguments=use_global_arguments,
                 parameter_overrides=given,
                 automatically_declare_parameters_from_overrides=True,
+                **options,
             )
         except (ParameterException, ValueError) as error:  # an empty list, for one
             raise InvalidInputError(
