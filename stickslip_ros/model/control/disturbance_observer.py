@@ -58,7 +58,7 @@ class DisturbanceObserver(FeedbackLaw):
 
     @override
     def linear_feedback(self, period: float) -> LinearFeedback:
-        return superposed(replace(self, feedback=TABLE), 2, period).of(self.feedback)
+        return superposed(replace(self, feedback=TABLE), period).of(self.feedback)
 
     @override
     def for_drive(self, drive: Drive) -> Self:

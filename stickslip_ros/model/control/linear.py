@@ -9,13 +9,13 @@ from stickslip_ros.model.control.base import ControlLaw, LinearFeedback
 from stickslip_ros.samples import NO_REFERENCE, Sample
 
 
-def superposed(law: ControlLaw, states: int, period: float) -> LinearFeedback:
-    """Return the linear form, without limit and reference, of a law with a number of states.
+def superposed(law: ControlLaw, period: float) -> LinearFeedback:
+    """Return the linear form, without limit and reference, of a law.
 
     Force and next state must be linear in state, displacement and velocity while the force is not
     limited; `period` is that of the samples, s.
     """
-    free = replace(law, force_limit=inf)
+    free, states = replace(law, force_limit=inf), len(law.state_units)
     columns: list[list[float]] = []
     for unit in np.eye(states + 2).tolist():
         position, velocity = unit[states:]

@@ -87,7 +87,7 @@ class Pid(FeedbackLaw):
             Sample period, s.
         """
         gains = {name: getattr(self, name) for name in Pid.tuned}
-        return superposed(Pid(**gains), 1, period).of(self.feedback)
+        return superposed(Pid(**gains), period).of(self.feedback)
 
 
 def tracking_error(body: Sample | MotorSample, reference: Reference) -> tuple[float, float]:
