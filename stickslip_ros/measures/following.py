@@ -195,7 +195,7 @@ def _without_lag(
     """
     place = (reference - reference.mean()) / float(np.ptp(reference))
     speed = np.gradient(reference, time)
-    speed /= np.abs(speed).max()
+    speed /= np.abs(speed[start:]).max()  # what came before may be far faster
     fast = np.flatnonzero(np.abs(speed[start:]) > _FAST) + start
     sizes, ones = np.abs(speed[fast]), np.ones(len(fast))
     causes = np.column_stack([np.sign(speed[fast]), ones, place[fast], speed[fast]])

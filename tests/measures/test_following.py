@@ -119,6 +119,14 @@ def test_the_start_and_a_wrong_scale_are_no_errors_at_reversals() -> None:
     assert found.values.peak_following_error == pytest.approx(peak, rel=0.15)
 
 
+@pytest.mark.filterwarnings("error")
+def test_a_fast_way_to_the_start_does_not_hide_the_lag() -> None:
+    way = -0.2 * np.clip(1.0 - TIME / 0.1, 0.0, 1.0)
+    found = followed(TIME, CIRCLE + way, with_spikes(TIME, 1e-3) + way)
+    assert found is not None
+    assert found.values.reversal_height == pytest.approx(SPIKE, rel=0.02)
+
+
 def test_the_standard_error_is_that_of_the_mean_over_reversals() -> None:
     time = TIME[TIME < 6.5]  # reversals at 1, 3 and 5 s
     reference, whole = RADIUS * np.sin(OMEGA * time), with_spikes(time, 0.0)
