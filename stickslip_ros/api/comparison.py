@@ -133,7 +133,11 @@ class ComparedLaws(TabularResult):
         if self.rank_by is not None:
             label, unit, _ = OUTCOMES[self.rank_by]
             value = self._units.with_error(*first.means[self.rank_by], unit)
-            return f"{first.law} has the least {label}: {value}"
+            unknown = [rank.law for rank in self.ranks if np.isnan(rank.means[self.rank_by][0])]
+            if len(unknown) == len(self.ranks):
+                return f"the {label} is not known of any law"
+            others = f"; it is not known of {', '.join(unknown)}" * bool(unknown)
+            return f"{first.law} has the least {label}: {value}{others}"
         alike = [rank for rank in self.ranks if rank.held_interval[1] >= least]
         texts = dict.fromkeys(rank.held_text for rank in alike)
         groups = {text: [r.law for r in alike if r.held_text == text] for text in texts}

@@ -116,6 +116,8 @@ def test_laws_are_ranked_by_the_error_where_the_reference_turns() -> None:
     assert "rest at reversals" in str(found)
     found = ss.compare(drive, "pid", rank_by="peak_force", **options)
     assert found.to_dict()["ranks"][0]["reversal_height"] in heights
+    found = ss.compare(drive, "pid", rank_by="reversal_height", **options | {"duration": 0.2})
+    assert found.verdict == "the error at reversals is not known of any law"
     with pytest.raises(InvalidInputError, match="rank_by = 'rms_velocity' is invalid"):
         ss.compare(drive, "pid", rank_by="rms_velocity", **options)
 
