@@ -112,7 +112,8 @@ class Run(TabularResult):
         plant, law = self.scenario.plant, self.scenario.control_law
         _, force = self._history.control.columns()
         forces = (float(np.abs(force).max()), float(force[-1])) if len(force) else (None, None)
-        facts = loop_facts(plant, law, *forces, sampled=not self.continuous)
+        disturbed = plant.disturbance.kind != "none"
+        facts = loop_facts(plant, law, *forces, sampled=not self.continuous, disturbed=disturbed)
         verdict = sentence(measures_text(self.measures, self._units))
         parameters = scenario_tables(self.scenario, unused=())
         return Summary("Simulated run", self.scenario.name, verdict, parameters, facts)
@@ -126,7 +127,8 @@ class Run(TabularResult):
 
 def sentence(measures: str) -> str:
     """Return `measures_text` as a sentence."""
-    return f"{measures.replace('at the end:', 'At the end the motion is', 1)}."
+    text = measures.replace("at the end:", "at the end the motion is", 1)
+    return f"{text[:1].upper()}{text[1:]}."
 
 
 def loop_facts(
@@ -136,8 +138,12 @@ def loop_facts(
     last: float | None,
     *,
     sampled: bool = True,
+    disturbed: bool = False,
 ) -> dict[str, str]:
-    """Return what a page says first of a loop: feeds, gains, and forces `peak` and `last`, N."""
+    """Return what a page says first of a loop: feeds, gains, and forces `peak` and `last`, N.
+
+    The forces of a loop that is `disturbed` are with the disturbance.
+    """
     # These take long.
     from stickslip_ros.api.design import gains_text
     from stickslip_ros.studies.stability import SEARCHED_FEEDS, stable_feeds
@@ -154,7 +160,10 @@ def loop_facts(
     facts["control"] = "none" if law is None else f"{law.name}: {gains_text(law, units)}"
     if law is not None and peak is not None:
         most, end = units.texts([peak, last], "N")
-        facts["control force"] = f"at most {most}, {end} at the end{limit_text(law, plant, units)}"
+        name, limit = "control force", limit_text(law, plant, units)
+        if disturbed:
+            name, limit = f"{name} and disturbance", ""
+        facts[name] = f"at most {most}, {end} at the end{limit}"
     return facts
 
 

@@ -93,6 +93,10 @@ CASES: dict[str, tuple[tuple[str, ...], Callable[[], Result], str]] = {
 """The arguments of commands, the same results from Python, and what they say, of a table too."""
 
 
+def draws_nothing(*_: Any, **__: Any) -> Any:
+    raise RunError("it takes too long")
+
+
 @pytest.mark.parametrize(
     "name",
     [pytest.param(n, marks=pytest.mark.long) if n.endswith("sensor") else n for n in CASES],
@@ -113,11 +117,7 @@ def test_a_command_prints_and_a_page_shows_what_python_returns(
     assert differences(schema, printed) == []
     text = stickslip(command, *arguments).stdout
     assert all(line in text for line in repr(result).splitlines())
-
-    def draw(*_: Any, **__: Any) -> Any:
-        raise RunError("it takes too long")
-
-    monkeypatch.setattr(type(result), "draw", draw)
+    monkeypatch.setattr(type(result), "draw", draws_nothing)
     result.to_html(tmp_path / "page.html")
     found = Page(tmp_path / "page.html")
     assert verdict in found.text
@@ -153,6 +153,16 @@ class Page(HTMLParser):
         return named + [
             found for _, v in self.attributes for found in re.findall(r"url\((.*?)\)", v)
         ]
+
+
+def test_a_page_tells_the_force_of_a_disturbance_beside_that_of_the_control(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    run = ss.simulate("axis", 1.4)
+    monkeypatch.setattr(type(run), "draw", draws_nothing)
+    run.to_html(tmp_path / "page.html")
+    found = " ".join(Page(tmp_path / "page.html").text.split())
+    assert "control force and disturbance at most 18.91 N" in found
 
 
 def test_a_page_is_one_file_whose_identifiers_are_its_own(stickslip: Run, tmp_path: Path) -> None:
