@@ -247,7 +247,8 @@ def measured_run(
         recorder=pursuer,
         measured=measured,
     )
-    told, itself = _followed(pursuer)
+    unit = Units.for_drive(scenario.plant.as_drive()).of_unit("m")
+    told, itself = _followed(pursuer, unit)
     history.take_analysis(RunAnalysis(None, None, told))
     true_measures, notes = None, [NOT_JUDGED] if scenario.reading.varies else []
     if measured is not None:
@@ -268,9 +269,11 @@ def measured_run(
     )
 
 
-def _followed(recorder: SampleRecorder | None) -> tuple[Followed | None, Followed | None]:
+def _followed(
+    recorder: SampleRecorder | None, unit: str
+) -> tuple[Followed | None, Followed | None]:
     """Return how measured and true positions follow the reference; None without one."""
     if recorder is None:
         return None, None
     time, reference, true, measured = recorder.pursuit
-    return followed(time, reference, measured), followed(time, reference, true)
+    return followed(time, reference, measured, unit), followed(time, reference, true, unit)

@@ -92,7 +92,7 @@ def followed(
     """Return how positions follow a reference; None if there are not two samples of both.
 
     Arrays have the shape (samples,), s and m; rows without a number up to 1e100, or not later
-    than all before, are left out. `unit` is that of lengths in the notes. Of positions with noise,
+    than all before, are left out. `unit` is that of lengths in the notes, "" for none. With noise,
     heights are those of the error smoothed over a quarter of its width. What the sensor does not
     tell, see `resolved`, or the samples do not, is None.
     """
@@ -120,7 +120,7 @@ def followed(
     heights = [turn.height for turn in turns]
     least = max(limit, _LEAST_HEIGHT * float(np.ptp(reference)))
     if turns and np.mean(heights) <= least:
-        text = quantity(least, unit)
+        text = quantity(least, unit) if unit else f"{least:.4g}"
         notes.append(f"the error at reversals is not known: positions tell none below {text}")
     elif turns and np.median([turn.wide for turn in turns]) < _FEWEST_SAMPLES:
         notes.append("the error at reversals is not known: it is shorter than three samples")

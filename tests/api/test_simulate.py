@@ -122,6 +122,16 @@ def test_what_makes_the_measures_doubtful_is_noted() -> None:
     ]
 
 
+def test_lengths_of_a_dimensionless_drive_have_no_unit_in_notes() -> None:
+    reference = {"kind": "sine", "amplitude": 1.0, "frequency": 0.1}
+    values = {f"pid_controller.reference.{name}": value for name, value in reference.items()}
+    drive = ss.scenario("paper", controller="pid", belt_speed=0.0).changed(
+        {**values, "plant.sensor.position_resolution": 5.0}
+    )
+    note = "positions tell none below 2e-06"
+    assert ss.simulate(drive, 20).notes[-1].endswith(note)
+
+
 def test_a_run_has_the_truth_and_what_is_told() -> None:
     run = ss.simulate(
         ss.scenario("feed_drive", sensor_position_resolution=1e-4, sensor_velocity="difference"),
