@@ -42,8 +42,8 @@ def renamed(sentence: str, names: Mapping[str, str]) -> str:
 
 
 def quantity(value: float, unit: str) -> str:
-    """Return a rounded value with a suitable prefix and its unit."""
-    scale, prefix = prefix_for(value)
+    """Return a rounded value with its unit, and a suitable prefix unless this is one as 1/s."""
+    scale, prefix = (1.0, "") if unit.startswith("1") else prefix_for(value)
     return f"{value / scale:.4g} {prefix}{unit}"
 
 

@@ -1,6 +1,6 @@
 """Suggestions for unknown names; numbers as text."""
 
-from stickslip_ros.text import did_you_mean, number_in
+from stickslip_ros.text import did_you_mean, number_in, quantity
 
 KNOWN = ("plant.mass", "plant.rate", "plant.friction.static", "washout_controller.linear_gain")
 
@@ -42,3 +42,8 @@ def test_what_is_no_finite_number_counts_as_zero() -> None:
     numbers |= dict.fromkeys(["", "abc", "nan", "-inf", "1e999", "9" * 400, "9" * 5000], 0)
     for text, number in numbers.items():
         assert number_in(text) == number
+
+
+def test_a_rate_has_no_prefix() -> None:
+    found = [quantity(value, unit) for value in (0.0125, 1234.5) for unit in ("1/s", "m/s")]
+    assert found == ["0.0125 1/s", "12.5 mm/s", "1234 1/s", "1.234 km/s"]

@@ -15,7 +15,6 @@ from stickslip_ros.quantities import Quantity, quantities_of
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.studies.case_outcome import Disturbance
 from stickslip_ros.studies.stability import number_text
-from stickslip_ros.text import quantity
 from stickslip_ros.theory.linear import jacobians
 from stickslip_ros.theory.loop_response import LoopResponse
 
@@ -108,10 +107,8 @@ class Limit(NamedTuple):
         values = [self.value, self.limit]
         if self.unit == "dB":
             shown = [f"{20.0 * log10(value):.2g} dB" for value in values]
-        elif drive.is_dimensionless or self.unit == "1/s":
-            shown = [number_text(drive, value, self.unit) for value in values]
         else:
-            shown = [quantity(value, self.unit) for value in values]
+            shown = [number_text(drive, value, self.unit) for value in values]
         bound = "least" if self.least else "most"
         return f"{self.name} is {shown[0]}, and must be at {bound} {shown[1]}"
 

@@ -189,7 +189,7 @@ def test_a_drawn_drive_that_is_not_held_is_counted_and_told(
     # What grows cannot be simulated until it has settled.
     weak = Designer.of(task(AT_40), []).trial.worst(Washout(11.0, -1.0, 0.0))
     assert not weak.held
-    assert re.match(r"at 0.04 m/s a small deviation grows with [\d.]+ 1/s", weak.reason)
+    assert re.match(r"at 40 mm/s a small deviation grows with [\d.]+ 1/s", weak.reason)
     # With drives to search for, one of them says why there is nothing to propose.
     monkeypatch.setattr("stickslip_ros.studies.design._SEARCHED", 8)
     monkeypatch.setattr("stickslip_ros.studies.design._ATTEMPTS", 1)
