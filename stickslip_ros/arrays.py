@@ -64,5 +64,5 @@ class Table:
         if not others:
             return self
         table: Callable[..., Self] = type(self)
-        columns = zip(*(vars(each).values() for each in (self, *others)), strict=True)
+        columns = zip(*(vars(block).values() for block in (self, *others)), strict=True)
         return table(*map(np.concatenate, columns))

@@ -47,17 +47,17 @@ def quantities_of(kind: type) -> dict[str, Quantity]:
     """Return the quantities that the fields of a class are annotated with, by name."""
     hints = get_type_hints(kind, include_extras=True)
     annotated = {name: getattr(hint, "__metadata__", ()) for name, hint in hints.items()}
-    return {name: found[0] for name, found in annotated.items() if found}
+    return {name: metadata[0] for name, metadata in annotated.items() if metadata}
 
 
 def number_of(name: str, given: Any, unit: str | None) -> float:
     """Return a number given in `unit`, or as a text with a unit that converts to it, or refuse."""
-    found = QUANTITY.fullmatch(given) if isinstance(given, str) else None
+    match = QUANTITY.fullmatch(given) if isinstance(given, str) else None
     with suppress(OverflowError, TypeError, ValueError):
-        if found is None:
+        if match is None:
             return float(given)
         if unit:
-            return _converted(found[1], found[2], unit)
+            return _converted(match[1], match[2], unit)
     allowed = f" in {unit}, or in a unit that converts to it" if unit else " without a unit"
     if isinstance(given, str) and "," in given:
         allowed = f" with a decimal point{allowed}"
@@ -74,7 +74,7 @@ def _converted(number: str, given: str, unit: str) -> float:
     registry = _registry()
     with suppress(AssertionError, PintError, TypeError):  # ambiguous, unknown, logarithmic
         units = registry.parse_units(f"1{given}" if given[0] == "/" else given), unit
-        value, offset = (registry.convert(Fraction(each), *units) for each in (number, 0))
+        value, offset = (registry.convert(Fraction(amount), *units) for amount in (number, 0))
         if not offset and (not value or float_info.min <= abs(value) <= float_info.max):
             return float(value)
     raise ValueError

@@ -98,14 +98,14 @@ def did_you_mean(name: str, known: Iterable[str], otherwise: str | None = None) 
     """
     names, name = sorted(known), name[:_LONGEST_NAME]
     last = name.rpartition(".")[2]
-    close = [each for each in names if each.rpartition(".")[2] == last]
-    close = close or [each for each in names if _words(last) <= _words(each)]
+    close = [term for term in names if term.rpartition(".")[2] == last]
+    close = close or [term for term in names if _words(last) <= _words(term)]
     if not close:
-        ratios = {each: _likeness(name, each) for each in names}
+        ratios = {term: _likeness(name, term) for term in names}
         best = max(ratios.values(), default=0.0)
-        close = [each for each in names if ratios[each] == best >= _LEAST_SIMILARITY]
-    parts = {each: set(re.split(r"[._]", each)) for each in close}
-    close = [each for each in close if not any(parts[other] < parts[each] for other in close)]
+        close = [term for term in names if ratios[term] == best >= _LEAST_SIMILARITY]
+    parts = {term: set(re.split(r"[._]", term)) for term in close}
+    close = [term for term in close if not any(parts[other] < parts[term] for other in close)]
     if close:
         return f"did you mean {' or '.join(close[:_MOST_SUGGESTIONS])}?"
     return f"known are {', '.join(names)}" if otherwise is None else otherwise

@@ -6,10 +6,10 @@ def versions() -> dict[str, str]:
     import platform  # these two take longer to import than the start of a command should take
     from importlib import metadata
 
-    found = {"python": platform.python_version()}
+    by_package = {"python": platform.python_version()}
     for package in ("stickslip_ros", "heyoka", "numpy", "mcap", "rclpy"):
         try:
-            found[package] = metadata.version(package)
+            by_package[package] = metadata.version(package)
         except metadata.PackageNotFoundError:
             continue
-    return found
+    return by_package

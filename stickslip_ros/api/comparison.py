@@ -337,9 +337,9 @@ class ComparedLaws(TabularResult):
 
     @override
     def _summary(self) -> Summary:
-        plan, own = self.study.plan, self.scenario.controller
-        given = own.law in plan.laws and own.law not in self.tuned
-        unused = [*plan.parameters, *[own.node] * (not given)]
+        plan, controller = self.study.plan, self.scenario.controller
+        given = controller.law in plan.laws and controller.law not in self.tuned
+        unused = [*plan.parameters, *[controller.node] * (not given)]
         parameters = scenario_tables(self.scenario, unused=unused)
         title = "Comparison of control laws"
         return Summary(title, self.scenario.name, self.verdict, parameters, self._facts())

@@ -117,14 +117,14 @@ class Proposal(TabularResult):
     def _entries(self) -> dict[str, Any]:
         design, scenario = self.design, self.design.task.scenario
         law, checks = scenario.controller.law, [asdict(check) for check in self.checks]
-        own = CONTROL_LAWS[law].constants() if law == Washout.name else ("start_after",)
+        constants = CONTROL_LAWS[law].constants() if law == Washout.name else ("start_after",)
         slowest = design.slowest
         return {
             "law": law,
             "belt_speeds": list(design.task.belt_speeds),
             "constants": None if self.controller is None else asdict(self.controller),
             "gains": gains(self.controller),
-            **{name: getattr(self.controller, name, None) for name in own},
+            **{name: getattr(self.controller, name, None) for name in constants},
             "force_limit": design.task.force_limit,
             "worst_belt_speed": slowest.drive.belt_speed if slowest else None,
             "decay_rate": min((check["decay_rate"] for check in checks), default=None),

@@ -103,7 +103,7 @@ class Run(TabularResult):
     @property
     def _following(self) -> list[dict[str, Any]]:
         both = self.following, self.true_following
-        return [{} if each is None else asdict(each) for each in both]
+        return [{} if following is None else asdict(following) for following in both]
 
     @override
     def _summary(self) -> Summary:
@@ -154,7 +154,9 @@ def loop_facts(
     ranges = stable_feeds(plant, law) if sampled or law is None else None
     if ranges is not None:
         ends = tuple(share * plant.belt_speed for share in SEARCHED_FEEDS)
-        *shown, searched = (" to ".join(units.texts(each, "m/s", 3)) for each in (*ranges, ends))
+        *shown, searched = (
+            " to ".join(units.texts(interval, "m/s", 3)) for interval in (*ranges, ends)
+        )
         stable = "; ".join(shown) or "none"
         facts["feeds that hold"] = f"{stable} (by linear theory, searched from {searched})"
     facts["control"] = "none" if law is None else f"{law.name}: {gains_text(law, units)}"
@@ -248,13 +250,13 @@ def measured_run(
         measured=measured,
     )
     unit = Units.for_drive(scenario.plant.as_drive()).of_unit("m")
-    told, itself = _followed(pursuer, unit)
-    history.take_analysis(RunAnalysis(None, None, told))
+    seen, itself = _followed(pursuer, unit)
+    history.take_analysis(RunAnalysis(None, None, seen))
     true_measures, notes = None, [NOT_JUDGED] if scenario.reading.varies else []
     if measured is not None:
         true_measures, (true, notes, _) = true, measured.measured()
-    notes = [*notes, *(told.notes if told else ())]
-    following = [None if each is None else each.values for each in (told, itself)]
+    notes = [*notes, *(seen.notes if seen else ())]
+    following = [None if analysis is None else analysis.values for analysis in (seen, itself)]
     return Run(
         scenario,
         duration,

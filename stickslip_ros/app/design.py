@@ -73,12 +73,12 @@ def run(arguments: argparse.Namespace) -> None:
     check_results(arguments)
     label = f"designing for {scenario.name}"
     with progress_bar(label, 1.0, lines=True, even=False) as progress:  # of unknown attempts
-        found = Proposal(design(task, progress))
-    text = found.design.parameter_file
+        proposal = Proposal(design(task, progress))
+    text = proposal.design.parameter_file
     if arguments.plot is not None and text is None:
         _report_omitted(f"--plot {arguments.plot}: not drawn")
         arguments.plot = None
-    give_result(arguments, found)
+    give_result(arguments, proposal)
     if not arguments.json and text is not None and arguments.out is None:
         print("--out FILE writes the scenario with these gains, --json prints it: parameter_file")
     if arguments.out is not None:

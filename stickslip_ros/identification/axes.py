@@ -75,7 +75,9 @@ class AxisTask:
         self.delay: float | None = fixed.get(DELAY, 0.0 if coasts else None)
         # Where the slide never rests it is as in the published method: the force is that at the
         # instant of a sample. Otherwise it is held until the next one.
-        self.rows = self._near = Rows.of([filtered(record, decimated=True) for record in records])
+        self.rows = self._near = Rows.of_records(
+            [filtered(record, decimated=True) for record in records]
+        )
         if self.delay is not None or self.rows.resting:
             self.rows = self._delayed(self.rows, self.delay or 0.0)
         for part, record in zip(self.rows.parts, records, strict=True):
@@ -102,7 +104,7 @@ class AxisTask:
             return
         path = _SETTLED_DEFLECTIONS * memory.curve.deflection if bristles else 0.0
         parts = [filtered(record, decimated=True, path=path) for record in self.records]
-        self.rows = self._delayed(Rows.of(parts), near.rows.delay)
+        self.rows = self._delayed(Rows.of_records(parts), near.rows.delay)
         away = self._fitted(self._table, self.rows)
         if bristles or rms(away.residual) < _REVERSAL_ERROR_RATIO * rms(near.residual):
             self.rows = self._delayed(self.rows, self.delay or 0.0)

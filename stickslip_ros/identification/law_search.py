@@ -81,7 +81,9 @@ class LawSearch:
                 "identifiable; fix one, as in --fix plant.mass=100"
             )
         delay = self.fixed.get(DELAY, 0.0)
-        self.rows = Rows.of([filtered(record, decimated=False, delay=delay) for record in records])
+        self.rows = Rows.of_records(
+            [filtered(record, decimated=False, delay=delay) for record in records]
+        )
         self.predictors = [Predictor(record) for record in records]
 
     @cached_property

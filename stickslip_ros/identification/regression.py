@@ -99,7 +99,7 @@ class Regression(Fit):
     def errors(self, record: Record) -> ForceErrors:
         path = self.rows.parts[0].path
         columns = filtered(record, decimated=True, delay=self.rows.delay, path=path)
-        rows = replace(Rows.of([columns]), directions=self.directions)
+        rows = replace(Rows.of_records([columns]), directions=self.directions)
         error = replace(self, rows=rows).residual
         friction = -rows.friction_terms(self.curve, self.shapes) @ self.unknowns[len(self.free) :]
         time, position, speed, force = (

@@ -34,7 +34,7 @@ class Rows:
     """Time from a sample until its force acts, s; None if nothing is known of one."""
 
     @classmethod
-    def of(cls, parts: Sequence[Filtered]) -> "Rows":
+    def of_records(cls, parts: Sequence[Filtered]) -> "Rows":
         """Return the rows of filtered records."""
 
         def joined(values: Callable[[Filtered], FloatArray]) -> FloatArray:

@@ -168,7 +168,7 @@ def _with_interior_points(
     u = np.where(is_peak, peak[at], turn[at])
     order = np.lexsort((u, at))
     u, at, is_peak = u[order], at[order], is_peak[order]
-    step, start, slope, curvature = (each[at] for each in (step, start, slope, curvature))
+    step, start, slope, curvature = (column[at] for column in (step, start, slope, curvature))
     new = Breakpoints(
         breakpoints.time[at] + u * step,
         breakpoints.position[at] + step * u * (start + u * (slope / 2.0 + u * curvature / 3.0)),

@@ -97,7 +97,7 @@ def trend_text(values: Mapping[str, Any], show: Callable[[float, str], str] = qu
     if trend != Trend.DRIFTING or not drift:
         return trend or ""
     units = {"force": "N/s"}
-    rates = [f"{each} {show(rate, units.get(each, 'm/s'))}" for each, rate in drift.items()]
+    rates = [f"{name} {show(rate, units.get(name, 'm/s'))}" for name, rate in drift.items()]
     return ", ".join([trend, *rates])
 
 
@@ -240,7 +240,7 @@ def without_cycles(
     trend: Trend | None = None,
 ) -> Measures:
     """Return the measures of a motion that has no period."""
-    means: dict[str, Any] = dict.fromkeys(each.name for each in fields(Cycle))
+    means: dict[str, Any] = dict.fromkeys(field.name for field in fields(Cycle))
     means |= {} if motion is None else vars(motion)
     means |= {"period": None, "frequency": None}
     return Measures(**means, cycles=cycles, regime=regime, steady=steady, trend=trend)

@@ -65,11 +65,11 @@ class _Stretch(NamedTuple):
     stick_time: float
 
     @classmethod
-    def of(cls, columns: _Columns, first: int, last: int) -> Self:
+    def between(cls, columns: _Columns, first: int, last: int) -> Self:
         """Return the part from one breakpoint to another."""
         time, position, velocity, sticking = columns
         rows, stuck = slice(first, last + 1), sticking[first + 1 : last + 1]
-        sticks = [time[row] - time[row - 1] for row, each in enumerate(stuck, first + 1) if each]
+        sticks = [time[row] - time[row - 1] for row, held in enumerate(stuck, first + 1) if held]
         return cls(
             time[first],
             time[last],
@@ -191,7 +191,9 @@ class CycleMeter:
         columns = [column.data for column in vars(breakpoints).values()]
         completed, last = list[Cycle](), 0
         for edge in self._upward_crossings(breakpoints):
-            stretch = reduce(_Stretch.followed_by, [*self._parts, _Stretch.of(columns, last, edge)])
+            stretch = reduce(
+                _Stretch.followed_by, [*self._parts, _Stretch.between(columns, last, edge)]
+            )
             if self._whole and stretch.duration > 0.0:
                 completed.append(stretch.as_cycle())
                 self.ends.append(stretch.end)
@@ -315,7 +317,7 @@ class CycleMeter:
         parts are at least its last half.
         """
         if not self._parts:
-            self._parts = [_Stretch.of(columns, row, row)]
+            self._parts = [_Stretch.between(columns, row, row)]
         start = self._parts[0].start
         earliest = start + (self._cycles[-1].period if self._cycles else 0.0)
         while row < last:
@@ -324,9 +326,11 @@ class CycleMeter:
             due -= _TIME_ROUNDING * (due - start)
             find = bisect_left if due > current.start else bisect_right
             doubled = find(columns[0], due, row + 1, last + 1)
-            self._parts[-1] = current.followed_by(_Stretch.of(columns, row, min(doubled, last)))
+            self._parts[-1] = current.followed_by(
+                _Stretch.between(columns, row, min(doubled, last))
+            )
             if doubled <= last:
-                self._parts.append(_Stretch.of(columns, doubled, doubled))
+                self._parts.append(_Stretch.between(columns, doubled, doubled))
             row = doubled
 
     def _recent_motion(self) -> Cycle | None:

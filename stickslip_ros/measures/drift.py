@@ -153,9 +153,9 @@ class Drift:
         # Parts of cycles have other means than whole ones.
         position = self._midpoint if period else self.position
         least = max(self.resolution, self.rounding)
-        found = {
+        rates = {
             "position": position.rate(span, least),
             "amplitude": self._amplitude.rate(span, least) if period else None,
             "force": self.force.rate(span),
         }
-        return {name: rate for name, rate in found.items() if rate is not None}
+        return {name: rate for name, rate in rates.items() if rate is not None}

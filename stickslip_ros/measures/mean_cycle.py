@@ -47,11 +47,11 @@ _UNLIKE_NOISE, _UNLIKE_AMPLITUDE = 3.0, 0.05
 
 @dataclass(frozen=True)
 class Shape:
-    """A fitted cycle: its position as a function of the phase (s), `rows` by what was `found`."""
+    """A fitted cycle: its position as a function of the phase (s), `rows` by what was `fitted`."""
 
     rows: Callable[[FloatArray], FloatArray]
     """Derivatives of the position by the coefficients, in rows."""
-    found: FloatArray
+    fitted: FloatArray
     covariance: FloatArray
     period: float
 
@@ -73,11 +73,11 @@ class Shape:
 
     def value(self, phase: FloatArray) -> FloatArray:
         """Return positions, m, at phases, s."""
-        return self.rows(phase) @ self.found
+        return self.rows(phase) @ self.fitted
 
     def velocity(self, phase: FloatArray) -> FloatArray:
         """Return velocities, m/s, at phases, s."""
-        return self.rates(phase) @ self.found
+        return self.rates(phase) @ self.fitted
 
 
 class Stick(NamedTuple):
@@ -201,7 +201,7 @@ class FoldedCycles:
                 break
         if fold.step:  # more harmonics would follow the stairs
             most = min(most, max(int(np.ptp(fold.position) / fold.step / 2.0), 2))
-        return fold, fold._series([each for each in _HARMONICS if each <= most] or [most])
+        return fold, fold._series([size for size in _HARMONICS if size <= most] or [most])
 
     def _series(self, sizes: Sequence[int]) -> Shape:
         def rows(phase: FloatArray, harmonics: int) -> FloatArray:
@@ -227,7 +227,7 @@ class FoldedCycles:
 
         # With a whole number of samples per cycle the slip has few different ones.
         most = self.phases * length / self.period / 2.0
-        degrees = [each for each in _DEGREES if each <= most] or _DEGREES[:1]
+        degrees = [degree for degree in _DEGREES if degree <= most] or _DEGREES[:1]
         return self._linear(rows, degrees, known=1)
 
     def _linear(
@@ -239,12 +239,12 @@ class FoldedCycles:
         """
         phase = self.phase
         squares, width, size = inf, 0, sizes[0]
-        basis = residual = found = np.empty((0, 0))
+        basis = residual = coefficients = np.empty((0, 0))
         for size in sizes:
             every = rows(phase, size)
             basis, rest = every[:, known:], self.position - every[:, :known].sum(axis=1)
-            found = np.linalg.lstsq(basis, rest, rcond=None)[0]
-            residual = rest - basis @ found
+            coefficients = np.linalg.lstsq(basis, rest, rcond=None)[0]
+            residual = rest - basis @ coefficients
             left, more = float(residual @ residual), basis.shape[1] - width
             # A coefficient takes one variance of noise. The size that adds no more than noise is
             # used, not the one before it: then the bias is small against the standard error.
@@ -254,7 +254,7 @@ class FoldedCycles:
         covariance = self._covariance(basis, residual, slice(None))
         return Shape(
             lambda phase: rows(phase, size),
-            np.append(np.ones(known), found),
+            np.append(np.ones(known), coefficients),
             np.pad(covariance, ((known, 0), (known, 0))),
             self.period,
         )
@@ -307,10 +307,10 @@ class FoldedCycles:
         """
         shifts, residual = self._shifts(shape), self.position - shape.value(self.phase)
         columns = 4 if self.count >= _LEAST_DRIFTING else 3
-        found = np.linalg.lstsq(shifts[:, :columns], residual, rcond=None)[0]
-        change = float(np.clip(found[1] / self.period, -0.02, 0.02))
-        drift = shifts[:, 3:columns] @ found[3:]
-        error = rms(residual - shifts[:, :columns] @ found) / len(residual) ** 0.5
+        coefficients = np.linalg.lstsq(shifts[:, :columns], residual, rcond=None)[0]
+        change = float(np.clip(coefficients[1] / self.period, -0.02, 0.02))
+        drift = shifts[:, 3:columns] @ coefficients[3:]
+        error = rms(residual - shifts[:, :columns] @ coefficients) / len(residual) ** 0.5
         drift *= float(np.std(drift)) > _DRIFT_ERRORS * error
         return replace(self, period=self.period * (1.0 + change), position=self.position - drift)
 
@@ -363,7 +363,7 @@ def _clustered(jacobian: FloatArray, residual: FloatArray, number: IntArray) -> 
     inverse = np.linalg.pinv(jacobian.T @ jacobian)
     plain = inverse * float(residual @ residual) / freedom
     scores = np.array(
-        [jacobian[number == each].T @ residual[number == each] for each in np.unique(number)]
+        [jacobian[number == cycle].T @ residual[number == cycle] for cycle in np.unique(number)]
     )
     count = len(scores)
     if count < 2:
@@ -427,13 +427,13 @@ def _slow_share(series: Shape, belt_speed: float, stick_speed: float) -> tuple[f
     """
     grid = np.linspace(0.0, series.period, 8 * _GRID, endpoint=False)
     rates = series.rates(grid)
-    relative = rates @ series.found - belt_speed
+    relative = rates @ series.fitted - belt_speed
     error = np.sqrt(np.maximum(np.sum(rates @ series.covariance * rates, axis=1), 0.0))
     share, most, least = (
         float(np.mean(np.abs(relative) + change <= stick_speed)) for change in (0.0, -error, error)
     )
     near = float(relative.max()) >= -max(stick_speed, (1.0 - STICKING_SHARE) * belt_speed)
-    return share, hypot((most - least) / 2.0, 1.0 / (len(series.found) - 1) if near else 0.0)
+    return share, hypot((most - least) / 2.0, 1.0 / (len(series.fitted) - 1) if near else 0.0)
 
 
 def _refined(grid: FloatArray, values: FloatArray) -> float:

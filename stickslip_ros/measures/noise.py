@@ -129,19 +129,19 @@ def impulses(signal: FloatArray, noise: float) -> BoolArray:
     of a motion. `noise` is the standard deviation. The first two and the last two samples never are
     impulses.
     """
-    found = np.zeros(len(signal), np.bool_)
+    is_impulse = np.zeros(len(signal), np.bool_)
     if len(signal) < 5:
-        return found
+        return is_impulse
     bend = signal[1:-1] - (signal[:-2] + signal[2:]) / 2.0
     here, before, after = bend[1:-1], bend[:-2], bend[2:]
     size = np.abs(here)
     alternates = (here * before < 0.0) & (here * after < 0.0)
     alternates &= np.minimum(np.abs(before), np.abs(after)) > 0.25 * size
-    found[2:-2] = alternates & (size > _IMPULSE * noise)
+    is_impulse[2:-2] = alternates & (size > _IMPULSE * noise)
     # Next to an impulse the bends alternate, too, and are half as large.
     larger = np.maximum(np.abs(before), np.abs(after))
-    found[2:-2] &= size > larger
-    return found
+    is_impulse[2:-2] &= size > larger
+    return is_impulse
 
 
 def strongest_line(signal: FloatArray) -> float | None:

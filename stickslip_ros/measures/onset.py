@@ -87,17 +87,17 @@ def mean_decays(ring_downs: Sequence[RingDown]) -> list[FeedDecay]:
     errors, the rest is common to all, and no mean reduces it.
     """
     groups: list[list[RingDown]] = []
-    for each in sorted(ring_downs, key=lambda found: found.belt_speed):
-        if not groups or each.belt_speed > _SAME_SPEED * groups[-1][0].belt_speed:
+    for ring_down in sorted(ring_downs, key=lambda ring_down: ring_down.belt_speed):
+        if not groups or ring_down.belt_speed > _SAME_SPEED * groups[-1][0].belt_speed:
             groups.append([])
-        groups[-1].append(each)
-    found: list[FeedDecay] = []
+        groups[-1].append(ring_down)
+    decays: list[FeedDecay] = []
     for group in groups:
-        decay = _mean([(each.decay_rate, each.decay_error) for each in group])
-        frequency = _mean([(each.frequency, each.frequency_error) for each in group])
-        speed = float(np.mean([each.belt_speed for each in group]))
-        found.append(FeedDecay(speed, *decay, *frequency, len(group)))
-    return found
+        decay = _mean([(ring_down.decay_rate, ring_down.decay_error) for ring_down in group])
+        frequency = _mean([(ring_down.frequency, ring_down.frequency_error) for ring_down in group])
+        speed = float(np.mean([ring_down.belt_speed for ring_down in group]))
+        decays.append(FeedDecay(speed, *decay, *frequency, len(group)))
+    return decays
 
 
 def _mean(values: Sequence[tuple[float, float]]) -> tuple[float, float]:
@@ -128,7 +128,7 @@ def onset_of(ring_downs: Sequence[RingDown], length: str = "m") -> Onset:
     The ring-downs are of one machine and direction; `length` is the unit of their positions.
     """
     means = mean_decays(ring_downs)
-    grows = (each.belt_speed for each in means if each.decay_rate < -2.0 * each.decay_error)
+    grows = (decay.belt_speed for decay in means if decay.decay_rate < -2.0 * decay.decay_error)
     least_onset = max(grows, default=0.0)
     feeds = [m for m in means if m.decay_rate > 0.0 and m.belt_speed > least_onset]
     if not feeds:
@@ -137,13 +137,13 @@ def onset_of(ring_downs: Sequence[RingDown], length: str = "m") -> Onset:
     if feeds[-1].belt_speed < _LEAST_RANGE * slowest:
         run = f"a run at another feed, such as {quantity(1.1 * slowest, unit)}"
         return Onset(feeds, {}, advice=f"one feed tells no onset: {run}, would tell it")
-    values = [(each.belt_speed, each.decay_rate, each.decay_error) for each in feeds]
+    values = [(decay.belt_speed, decay.decay_rate, decay.decay_error) for decay in feeds]
     speed, rate, error = np.array(values).T
     weight = 1.0 / (error**2 + (_SYSTEMATIC * rate) ** 2)
     constant = float(weight @ (rate - weight @ rate / weight.sum()) ** 2)
     fits = {n: _fit(speed, rate, weight, least_onset, *f) for n, f in _FAMILIES.items()}
-    families = {name: found for name, (found, _) in fits.items()}
-    least = min(each.chi_square for each in families.values())
+    families = {name: family for name, (family, _) in fits.items()}
+    least = min(family.chi_square for family in families.values())
     falls = np.polyfit(speed, rate, 1, w=np.sqrt(weight))[0] < 0.0
     if falls or constant - least < _RISES:
         beyond = falls or least_onset > 0.0
@@ -151,11 +151,11 @@ def onset_of(ring_downs: Sequence[RingDown], length: str = "m") -> Onset:
         runs = f"above {quantity(feeds[-1].belt_speed, unit)}" if beyond else lowest
         advice = "the decay does not rise with the feed by more than its errors: runs"
         return Onset(feeds, {}, advice=f"{advice} {runs}, or larger taps would tell")
-    kept = [name for name, each in families.items() if not each.rejected]
+    kept = [name for name, family in families.items() if not family.rejected]
     excess = least / max(len(feeds) - 3, 1)
     if not kept and excess < _SCATTER:
         factor = 1.1 * sqrt(max(excess, 1.0))
-        wider = [replace(each, decay_error=factor * each.decay_error) for each in ring_downs]
+        wider = [replace(ring, decay_error=factor * ring.decay_error) for ring in ring_downs]
         return onset_of(wider, length)
     if not kept:
         runs = "runs at the same load, temperature and position"
@@ -174,9 +174,9 @@ def onset_of(ring_downs: Sequence[RingDown], length: str = "m") -> Onset:
         advice = f"only an upper limit of the onset is known: {run} the onset"
         return Onset(feeds, families, upper=upper, advice=advice)
     likely = [exp((least - families[n].chi_square) / 2.0 - _FAMILIES[n][1]) for n in kept]
-    found = float(np.average([families[name].onset_speed for name in kept], weights=likely))
-    advice = f"{run} it more exactly" if upper - lower > _WIDE * found else ""
-    return Onset(feeds, families, found, lower, upper, advice)
+    onset_speed = float(np.average([families[name].onset_speed for name in kept], weights=likely))
+    advice = f"{run} it more exactly" if upper - lower > _WIDE * onset_speed else ""
+    return Onset(feeds, families, onset_speed, lower, upper, advice)
 
 
 def _fit(
@@ -199,8 +199,8 @@ def _fit(
     at_onset = np.atleast_2d(_slope(family(shapes), onsets[1:]))
     total, mean_rate = float(weight.sum()), float(np.average(rate, weights=weight))
     mean = at_speed @ weight[:, np.newaxis] / total
-    own = at_speed - mean
-    squares, projected = own**2 @ weight, own @ (weight * rate)
+    centred = at_speed - mean
+    squares, projected = centred**2 @ weight, centred @ (weight * rate)
     # Without an onset: the best line over F' if it has no zero, else the nearest that has none.
     gain = np.maximum(projected / np.maximum(squares, 1e-300), 1e-9 * mean_rate)
     lowest = np.minimum(at_onset.min(axis=1), at_speed.min(axis=1))
@@ -231,5 +231,5 @@ def _fit(
 def _slope(law: FrictionLaw, speed: FloatArray) -> FloatArray:
     """Return the change of steady friction with the belt speed, s/m."""
     step = 1e-4 * speed
-    found: FloatArray = (law.at_rest(speed + step) - law.at_rest(speed - step)) / (2.0 * step)
-    return found
+    slope: FloatArray = (law.at_rest(speed + step) - law.at_rest(speed - step)) / (2.0 * step)
+    return slope

@@ -32,16 +32,16 @@ class OnsetWatch:
         """Add samples, in blocks of any length; return the ring-downs that have ended with them."""
         samples = samples[samples.is_valid]
         looks = np.append(self._looks, samples.stamp // round(self.pause * NANOSECONDS))
-        found: list[RingDown] = []
+        ended: list[RingDown] = []
         first, self._looks = 0, int(looks[-1])
         for edge in np.flatnonzero(np.diff(looks)).tolist():
             self._kept = self._kept.followed_by(samples[first:edge])
-            found, first = [*found, *self._look()], edge
+            ended, first = [*ended, *self._look()], edge
         self._kept = self._kept.followed_by(samples[first:])[-_MOST_SAMPLES:]
-        if found:
-            self.ring_downs = [*self.ring_downs, *found][-_MOST_KEPT:]
+        if ended:
+            self.ring_downs = [*self.ring_downs, *ended][-_MOST_KEPT:]
             self.onset = onset_of(self.ring_downs)
-        return found
+        return ended
 
     def _look(self) -> list[RingDown]:
         kept = self._kept
@@ -59,9 +59,9 @@ class OnsetWatch:
         seen = ring_downs(kept.position, kept.belt_velocity, period, after)
         ended = now - origin - 2.0 * period
         long = _LONG * self.pause
-        found = [each for each in seen if each.end < ended or each.end - each.start > long]
-        self._after = origin + found[-1].end if found else self._after
-        return found
+        finished = [ring for ring in seen if ring.end < ended or ring.end - ring.start > long]
+        self._after = origin + finished[-1].end if finished else self._after
+        return finished
 
     def status(self, margin: float) -> tuple[str, bool]:
         """Return decay, onset and feed as text, and whether the feed is too near the onset.
@@ -70,11 +70,11 @@ class OnsetWatch:
         """
         if not self.ring_downs:
             return "", False
-        own, feed = self.onset, float(abs(self._kept.belt_velocity[-1]))
+        onset, feed = self.onset, float(abs(self._kept.belt_velocity[-1]))
         text = f"decay {self.ring_downs[-1].decay_rate:.2g} 1/s, "
-        if own.speed and own.lower and own.upper:
-            half = 500.0 * (own.upper - own.lower)
-            text += f"onset {1e3 * own.speed:.3g} +- {half:.2g} mm/s, "
-        elif own.upper:
-            text += f"onset below {1e3 * own.upper:.3g} mm/s, "
-        return f"{text}feed {1e3 * feed:.3g} mm/s", (own.upper or 0.0) > (1.0 - margin) * feed
+        if onset.speed and onset.lower and onset.upper:
+            half = 500.0 * (onset.upper - onset.lower)
+            text += f"onset {1e3 * onset.speed:.3g} +- {half:.2g} mm/s, "
+        elif onset.upper:
+            text += f"onset below {1e3 * onset.upper:.3g} mm/s, "
+        return f"{text}feed {1e3 * feed:.3g} mm/s", (onset.upper or 0.0) > (1.0 - margin) * feed

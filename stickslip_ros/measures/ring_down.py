@@ -81,19 +81,19 @@ def ring_downs(
     ends = [*(first + length for first, _ in edges[1:]), len(position)]
     for (_, last), end in zip(edges, ends, strict=True):
         start = last + (length + 1) // 2
-        own = size[start : max(min(end - length, len(size)), start)]
-        slow = np.flatnonzero(own * omega < _LARGEST_SPEED * belt[start : start + len(own)])
-        if len(slow) == 0 or own[slow[0]] < max(_FIRST_STEPS * step, _ERRORS * error):
+        decay = size[start : max(min(end - length, len(size)), start)]
+        slow = np.flatnonzero(decay * omega < _LARGEST_SPEED * belt[start : start + len(decay)])
+        if len(slow) == 0 or decay[slow[0]] < max(_FIRST_STEPS * step, _ERRORS * error):
             continue
-        weak = np.flatnonzero(own < max(_LAST_STEPS * step, 4.0 * error))
+        weak = np.flatnonzero(decay < max(_LAST_STEPS * step, 4.0 * error))
         rows = slice(start + int(slow[0]), start + int(weak[0]) + length if len(weak) else end)
         if rows.stop - rows.start < _SHORTEST * length or rows.start * period < after:
             continue
         guess = np.array([-np.log(abs(ratio)) / (length * period), omega, 0.0])
-        found = _fit(position[rows], belt[rows], period, guess, step, noise)
-        if found is not None:
+        ring_down = _fit(position[rows], belt[rows], period, guess, step, noise)
+        if ring_down is not None:
             begin = period * rows.start
-            yield replace(found, start=begin, end=begin + found.end)
+            yield replace(ring_down, start=begin, end=begin + ring_down.end)
 
 
 def _fit(
@@ -160,8 +160,8 @@ def _design(
 ) -> FloatArray:
     """Return the derivatives of the fit by its shape, from differences, and its columns."""
     slopes = [
-        (_columns(time, shape + each) - _columns(time, shape - each)) @ linear / (2.0 * step)
-        for step, each in zip(steps, np.diag(steps), strict=True)
+        (_columns(time, shape + change) - _columns(time, shape - change)) @ linear / (2.0 * step)
+        for step, change in zip(steps, np.diag(steps), strict=True)
     ]
     return np.column_stack([*slopes, _columns(time, shape)])
 

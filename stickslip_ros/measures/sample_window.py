@@ -139,9 +139,9 @@ class WindowMeter:
         self._replace_last(0, part)
         if self.noise > 0.0:
             last = self._held[-len(part) - 2 * _UNKNOWN :]
-            found = impulses(last.position, self.noise)
-            if found.any():
-                self._replace_last(len(last), last[~found])
+            is_impulse = impulses(last.position, self.noise)
+            if is_impulse.any():
+                self._replace_last(len(last), last[~is_impulse])
 
     def _replace_last(self, rows: int, samples: NoisySamples) -> None:
         start, stop = self._rows.start, max(self._rows.stop - rows, self._rows.start)

@@ -111,14 +111,14 @@ class StickSlip(CycleMeans):
         slow = _LEAST_RIDE < abs(self.creep) < _MOST_RIDE
         return slow and abs(self.creep) > _SURE * self.creep_error
 
-    def agrees(self, found: Measures) -> bool:
+    def agrees(self, measures: Measures) -> bool:
         """Return whether measures that were found otherwise are those of the same cycles."""
-        if found.stick_fraction is None or not found.period:
+        if measures.stick_fraction is None or not measures.period:
             return False
         share, error = self.cycle.stick_fraction, self.errors.stick_fraction
-        error = hypot(error, (found.errors or {}).get("stick_fraction", 0.0))
-        same = abs(found.period / self.cycle.period - 1.0) < _SAME_PERIOD
-        return same and abs(found.stick_fraction - share) < _SURE * error
+        error = hypot(error, (measures.errors or {}).get("stick_fraction", 0.0))
+        same = abs(measures.period / self.cycle.period - 1.0) < _SAME_PERIOD
+        return same and abs(measures.stick_fraction - share) < _SURE * error
 
 
 class _Move(NamedTuple):
@@ -158,16 +158,16 @@ def stick_slip(
     while True:
         part = slice(max(len(time) - count, 0), None)
         samples = time[part], position[part]
-        found = _measured(*samples, belt_velocity, belt_velocity, most_cycles, step)
+        cycles = _measured(*samples, belt_velocity, belt_velocity, most_cycles, step)
         guide = belt_velocity
         for _ in range(_PASSES):
-            if found is None or not belt_velocity or not found.rides:
+            if cycles is None or not belt_velocity or not cycles.rides:
                 break
             # The velocity of the belt, or the scale of the positions, is a little wrong.
-            guide += found.creep * abs(belt_velocity)
-            found = _measured(*samples, belt_velocity, guide, most_cycles, step)
-        if count >= len(time) or (found is not None and len(found.amplitudes) >= most_cycles):
-            return found
+            guide += cycles.creep * abs(belt_velocity)
+            cycles = _measured(*samples, belt_velocity, guide, most_cycles, step)
+        if count >= len(time) or (cycles is not None and len(cycles.amplitudes) >= most_cycles):
+            return cycles
         count *= _GROWTH
 
 
@@ -213,7 +213,7 @@ def _measured(
         return None
     near = max(_EDGE_STEPS * step, _EDGE_NOISES * noise)
     used = [_slip(time, relative, move, near) for move in course[starts[0] : starts[-1] + 1]]
-    release = np.array([used[each - starts[0]].release for each in starts])
+    release = np.array([used[start - starts[0]].release for start in starts])
     if not np.all(np.diff(release) > 0.0):
         return None  # times that repeat
     del used[-1]
@@ -279,10 +279,10 @@ def _mean_speed(time: FloatArray, position: FloatArray, least: float) -> float:
 def moves(course: FloatArray, least: float) -> BoolArray:
     """Return where a course is by more than `least` away from where it last was that."""
     moved, held = [True], float(course[0])
-    for each in course[1:].tolist():
-        moved.append(abs(each - held) > least)
+    for position in course[1:].tolist():
+        moved.append(abs(position - held) > least)
         if moved[-1]:
-            held = each
+            held = position
     return np.array(moved)
 
 
@@ -332,29 +332,29 @@ def _moves_between_rests(
     reach = _reach(travel, noise, step)
     if len(time) < _FEWEST_REACHES * reach:
         return []
-    found = _rests(position, reach, _REST_SHARE * travel * reach)
-    if len(found) < 2:
+    rests = _rests(position, reach, _REST_SHARE * travel * reach)
+    if len(rests) < 2:
         return []
-    inner = [slice((3 * a + b) // 4, max((a + 3 * b) // 4, (3 * a + b) // 4 + 1)) for a, b in found]
-    level = [float(np.mean(position[each])) for each in inner]
+    inner = [slice((3 * a + b) // 4, max((a + 3 * b) // 4, (3 * a + b) // 4 + 1)) for a, b in rests]
+    level = [float(np.mean(position[rest])) for rest in inner]
     jumps = np.abs(np.diff(level))
     large = float(np.mean(jumps[jumps >= np.quantile(jumps, 0.9) / 2.0]))
     least = max(_LEAST_STEPS * step, _LEAST_NOISES * noise, _LEAST_SHARE * large)
     # Between its slips a slide creeps, and seems to rest more than once.
     first, last, longest = [0], [0], [0]
-    for each in range(1, len(found)):
-        if abs(level[each] - level[longest[-1]]) > least:
+    for number in range(1, len(rests)):
+        if abs(level[number] - level[longest[-1]]) > least:
             for rows in (first, last, longest):
-                rows.append(each)
+                rows.append(number)
         else:
-            last[-1] = each
-            if np.ptp(found[each]) > np.ptp(found[longest[-1]]):
-                longest[-1] = each
+            last[-1] = number
+            if np.ptp(rests[number]) > np.ptp(rests[longest[-1]]):
+                longest[-1] = number
     course: list[_Move] = []
     for before in range(len(first) - 1):
-        rows = [found[first[each]][0] + found[last[each]][1] for each in (before, before + 1)]
+        rows = [rests[first[group]][0] + rests[last[group]][1] for group in (before, before + 1)]
         levels = level[longest[before]], level[longest[before + 1]]
-        course.append(_Move(rows[0] // 2, rows[1] // 2, found[last[before]][1], levels))
+        course.append(_Move(rows[0] // 2, rows[1] // 2, rests[last[before]][1], levels))
     return course
 
 
@@ -420,13 +420,13 @@ def _cycle_starts(time: FloatArray, course: list[_Move]) -> list[int]:
     if turns > len(main) // 2:
         main = main[forward]
         forward = forward[forward]
-    release = time[[course[each].begin for each in main]]
+    release = time[[course[move].begin for move in main]]
     if len(main) <= _FEWEST_CYCLES:
         return []
     gaps = np.diff(release)
     breaks = (gaps > _LONG_GAP * np.median(gaps)) | (forward[1:] != forward[:-1])
     parts = np.split(main, np.flatnonzero(breaks) + 1)
-    return next((each.tolist() for each in parts[::-1] if len(each) > _FEWEST_CYCLES), [])
+    return next((part.tolist() for part in parts[::-1] if len(part) > _FEWEST_CYCLES), [])
 
 
 def _extremes(
@@ -449,10 +449,10 @@ def _extremes(
     with np.errstate(divide="ignore", invalid="ignore"):
         smooth -= np.where(np.abs(slope) < 2.0 * least, slope**2 / (4.0 * bend), 0.0)
     amplitudes = np.empty((3, len(rows) - 1))
-    for each, (start, end) in enumerate(pairwise(rows)):
+    for cycle, (start, end) in enumerate(pairwise(rows)):
         inside = slice(start - first, end - first + 1)
         high, low = float(smooth[inside].max()), float(smooth[inside].min())
-        amplitudes[:, each] = (high - low) / 2.0, np.ptp(speed[inside]) / 2.0, (high + low) / 2.0
+        amplitudes[:, cycle] = (high - low) / 2.0, np.ptp(speed[inside]) / 2.0, (high + low) / 2.0
     return amplitudes[0], amplitudes[1], amplitudes[2]
 
 
@@ -461,7 +461,7 @@ def _parabolas(course: FloatArray, reach: int) -> list[FloatArray]:
     lags = np.arange(-reach, reach + 1)
     powers = np.linalg.pinv(np.vander(lags, 3, increasing=True).astype(float))
     part = np.pad(course - course[0], reach, mode="edge")
-    value, slope, bend = (np.convolve(part, each[::-1], "valid") for each in powers)
+    value, slope, bend = (np.convolve(part, kernel[::-1], "valid") for kernel in powers)
     return [value + course[0], slope, bend]
 
 
@@ -478,7 +478,7 @@ def _means(
     """
     extremes = _extremes(time, position, np.searchsorted(time, release).tolist(), width)
     columns = *extremes, np.diff(release), 1.0 / np.diff(release), shares
-    return CycleMeans.over([Cycle(*each) for each in np.transpose(columns).tolist()])
+    return CycleMeans.over([Cycle(*measures) for measures in np.transpose(columns).tolist()])
 
 
 def _creep(

@@ -83,9 +83,9 @@ def slips_in(time: FloatArray, position: FloatArray, threshold: SlipThreshold) -
     take. Its duration is that from a tenth to nine tenths of the drop, the transition duration of
     IEEE Std 181. When the first stick began is not known.
     """
-    found: list[Slip] = []
+    slips: list[Slip] = []
     if len(time) <= 2 * _MEDIAN:
-        return found
+        return slips
     drop, step = threshold.drop, float(time[_MEDIAN * 2] - time[0]) / (_MEDIAN * 2)
     span = max(round(min(threshold.within / step, len(time))), 1) if step > 0.0 else 1
     smooth, highest = _smooth_and_highest(position, span)
@@ -98,14 +98,14 @@ def slips_in(time: FloatArray, position: FloatArray, threshold: SlipThreshold) -
         near = np.flatnonzero(since < np.maximum.accumulate(since) - drop)
         later = low[np.searchsorted(low, begin + span) :][:1]
         if not len(near) and not len(later):
-            return found
+            return slips
         start = begin + int(near[0]) if len(near) else int(later[0])
         bottom = _landing(smooth, start, drop, span)
         if bottom is None:
-            return found
+            return slips
         top = max(start - span, begin)
         top += int(np.argmax(smooth[top : start + 1]))
-        found.append(_slip(time, smooth, top, bottom, landing))
+        slips.append(_slip(time, smooth, top, bottom, landing))
         landing = bottom
 
 
@@ -173,11 +173,11 @@ def slip_report(slips: list[Slip], threshold: SlipThreshold, belt_speed: float) 
     }
     for name in ("stick_time", "drop", "slip_time", "stick_velocity"):
         report[name] = _distribution(np.array(columns[name]))
-    each = {
+    by_slip = {
         name: [value if isfinite(value) else None for value in values]
         for name, values in columns.items()
     }
-    return {**report, "each": each}
+    return {**report, "each": by_slip}
 
 
 def regime_of(slips: Sequence[Slip]) -> Regime | None:

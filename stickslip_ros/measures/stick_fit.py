@@ -113,9 +113,9 @@ def fit_stick(
     criterion += [0.0, _JUMP_LEVEL, 0.0, 0.0][: len(fits)]
     weight = np.exp(0.5 * (criterion.min() - criterion))
     best, weight = fits[int(np.argmax(weight))], weight / weight.sum()
-    found = np.array([fit.values for fit in fits])
-    mean = weight @ found
-    apart = (found - mean)[:, [_CENTRE, _SIZE, _BELT]]
+    parameters = np.array([fit.values for fit in fits])
+    mean = weight @ parameters
+    apart = (parameters - mean)[:, [_CENTRE, _SIZE, _BELT]]
     units = np.array([1.0 / frequency, 1.0 / frequency, belt_speed])
     scale = np.append(units, np.ones(best.jacobian.shape[1] - 3))
     return StickFit(
@@ -139,7 +139,7 @@ _CENTRE, _SIZE, _BELT, _STIFFNESS, _SLOPE, _SECOND, _THIRD, _OFFSET, _FALL, _SCA
 _EXPONENT = 10
 _SMOOTH = [_CENTRE, _SIZE, _BELT, _STIFFNESS, _SLOPE, _SECOND, _THIRD, _OFFSET]
 _STEEP = [_CENTRE, _SIZE, _BELT, _STIFFNESS, _SLOPE, _OFFSET, _FALL, _SCALE]
-_TOUCHING = [each for each in _SMOOTH if each != _SIZE]
+_TOUCHING = [parameter for parameter in _SMOOTH if parameter != _SIZE]
 _STRAIGHT = {_SLOPE: 0.0, _SECOND: 0.0, _THIRD: 0.0, _FALL: 0.5, _SCALE: 0.5}
 _FALLS = (
     ([*_SMOOTH, _FALL], {_FALL: 0.1}),
@@ -186,7 +186,7 @@ class _Motion:
             return jacobian
 
         while True:
-            found: Any = least_squares(
+            solution: Any = least_squares(
                 residual,
                 inside,
                 jac=rates,  # pyright: ignore[reportArgumentType]
@@ -196,10 +196,10 @@ class _Motion:
                 xtol=1e-6,
                 max_nfev=50,
             )
-            values[free] = inside = found.x
+            values[free] = inside = solution.x
             if noise > 0.0:
-                return _Fit(values, found.fun[: -len(_PRIOR)], found.jac[: -len(_PRIOR)])
-            noise = max(rms(found.fun), 1e-300)
+                return _Fit(values, solution.fun[: -len(_PRIOR)], solution.jac[: -len(_PRIOR)])
+            noise = max(rms(solution.fun), 1e-300)
 
     def _fitted(self, trials: FloatArray) -> FloatArray:
         """Return the fit for k sets of parameters, shape (k, n)."""
@@ -208,10 +208,10 @@ class _Motion:
         motion = self._integrate(trials)
         since_centre = self._time - trials[:, _CENTRE, None]
         fitted = trials[:, _OFFSET, None] + belt * self._time
-        for side, own in ((-1.0, motion[..., :count]), (1.0, motion[..., count:])):
+        for side, branch in ((-1.0, motion[..., :count]), (1.0, motion[..., count:])):
             since = np.clip(side * since_centre - half[:, None], 0.0, self._reach)
             step = self._reach / _STEPS
-            fitted += (1.0 + belt) * _interpolate(own[:, 0], side * own[:, 1], step, since)
+            fitted += (1.0 + belt) * _interpolate(branch[:, 0], side * branch[:, 1], step, since)
         return fitted
 
     def _integrate(self, trials: FloatArray) -> FloatArray:

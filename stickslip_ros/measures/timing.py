@@ -25,7 +25,7 @@ class Timing(NamedTuple):
 
         `which` says of which samples, as in "latest ".
         """
-        found = [
+        causes = [
             f"{percentage(count / self.samples)} of the {which}{what}"
             for count, what in (
                 (self.late_forces, "forces came late or not at all"),
@@ -33,10 +33,10 @@ class Timing(NamedTuple):
             )
             if count > NOTABLE_SHARE * self.samples
         ]
-        if not found:
+        if not causes:
             return ""
         return (
-            f"{' and '.join(found)}: lower rate or real_time_factor, close other busy programs, "
+            f"{' and '.join(causes)}: lower rate or real_time_factor, close other busy programs, "
             "set pace to lockstep, or see that the controller answers"
         )
 

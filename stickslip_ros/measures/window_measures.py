@@ -70,36 +70,36 @@ def measure(
     """
     segmented = rests_and_slips(window, reading)
     if segmented is None or segmented.passes:
-        found, fit = _by_reversals(window, reading, quick=quick)
-        if found.regime is Regime.PURE_SLIP and _rests_where_it_turns(window):
-            found = _undecided(found)
-        return _as_it_passes(window, found, fit), fit
+        measures, fit = _by_reversals(window, reading, quick=quick)
+        if measures.regime is Regime.PURE_SLIP and _rests_where_it_turns(window):
+            measures = _undecided(measures)
+        return _as_it_passes(window, measures, fit), fit
     short = segmented.cycle.stick_fraction < _REFINED_SHARE
     short &= segmented.slip_samples >= _LEAST_SLIP
     if not segmented.rests or (short and not quick):
         refined, fit = _by_reversals(window, reading, quick=quick)
         if segmented.agrees(refined):
             return _as_it_passes(window, _not_surer(refined, segmented), fit), fit
-    found = segmented_measures(window, segmented)
-    return found if segmented.rests else _undecided(found), None
+    measures = segmented_measures(window, segmented)
+    return measures if segmented.rests else _undecided(measures), None
 
 
-def _undecided(found: Measures) -> Measures:
+def _undecided(measures: Measures) -> Measures:
     """Return measures that do not say whether the slide sticks."""
-    return replace(found, regime=None, stick_fraction=None)
+    return replace(measures, regime=None, stick_fraction=None)
 
 
-def _as_it_passes(window: Window, found: Measures, fit: MeanCycle | None) -> Measures:
+def _as_it_passes(window: Window, measures: Measures, fit: MeanCycle | None) -> Measures:
     """Return measures that do not deny a stick of a slide that passes the speed of the belt.
 
     Nor do they claim one at a speed so far from that of the belt that no calibration errs by it.
     """
-    passes = fit is not None and fit.overtakes and found.regime is Regime.PURE_SLIP
+    passes = fit is not None and fit.overtakes and measures.regime is Regime.PURE_SLIP
     if fit is not None and fit.stick is not None:
         part = window if len(window.samples) or window.before is None else window.before
         belt = abs(float(part.samples.belt[-1]))
         passes |= abs(fit.stick.fit.belt_speed - belt) > _OTHER_SPEED * belt
-    return _undecided(found) if passes else found
+    return _undecided(measures) if passes else measures
 
 
 def _not_surer(refined: Measures, segmented: StickSlip) -> Measures:
@@ -122,11 +122,11 @@ def rests_and_slips(window: Window, reading: SampleAssumptions) -> StickSlip | N
     if len(samples) < FEWEST_SAMPLES or reading.stick_speed or not _even(samples.belt):
         return None
     belt = float(samples.belt[-1])
-    found = stick_slip(samples.time, samples.position, belt, window.most_cycles, window.step)
-    if found is None:
+    segmented = stick_slip(samples.time, samples.position, belt, window.most_cycles, window.step)
+    if segmented is None:
         return None
-    since = float(samples.time[-1]) - found.end
-    return found if since <= STALE_PERIODS * found.cycle.period else None
+    since = float(samples.time[-1]) - segmented.end
+    return segmented if since <= STALE_PERIODS * segmented.cycle.period else None
 
 
 def _rests_where_it_turns(window: Window) -> bool:
@@ -148,9 +148,9 @@ def _rests_where_it_turns(window: Window) -> bool:
     return dwells and far < _DWELL_GROWTH * near
 
 
-def segmented_measures(window: Window, found: StickSlip) -> Measures:
+def segmented_measures(window: Window, segmented: StickSlip) -> Measures:
     """Return the measures of rests and slips."""
-    return found.measures(False, *_trend(window, found.amplitudes))
+    return segmented.measures(False, *_trend(window, segmented.amplitudes))
 
 
 def other_guide(window: Window, reading: SampleAssumptions) -> tuple[float, float] | None:
@@ -158,8 +158,8 @@ def other_guide(window: Window, reading: SampleAssumptions) -> tuple[float, floa
 
     Also the share of the time in which it does. None where there is no other one.
     """
-    own, samples, lows = rests_and_slips(window, reading), window.samples, window.lows
-    if own is not None and own.rests:
+    segmented, samples, lows = rests_and_slips(window, reading), window.samples, window.lows
+    if segmented is not None and segmented.rests:
         return None
     samples = samples[samples.row(lows[0].time) if lows else 0 :]
     if len(samples) < FEWEST_SAMPLES:
@@ -168,8 +168,8 @@ def other_guide(window: Window, reading: SampleAssumptions) -> tuple[float, floa
     velocity = resting_velocity(samples.time, samples.position)
     if abs(velocity - belt) <= _SAME_VELOCITY * max(abs(velocity), abs(belt)):
         return None
-    found = stick_slip(samples.time, samples.position, velocity, window.most_cycles, window.step)
-    share = 0.0 if found is None or not found.rests else found.cycle.stick_fraction
+    on_guide = stick_slip(samples.time, samples.position, velocity, window.most_cycles, window.step)
+    share = 0.0 if on_guide is None or not on_guide.rests else on_guide.cycle.stick_fraction
     return (velocity, share) if share > _REST_SHARE else None
 
 
@@ -229,14 +229,14 @@ def _by_reversals(
     if fit is not None:
         return _found(window, part.samples, fit, fit.noise), fit
     # Half of the cycles: a single one may seem to stick for a moment.
-    found = _found(window, part.samples, CycleMeans.over(part.cycles, 0.5), window.noise)
+    measures = _found(window, part.samples, CycleMeans.over(part.cycles, 0.5), window.noise)
     fastest = max(cycle.velocity_amplitude for cycle in part.cycles)
-    if found.errors and fastest > STICKING_SHARE * float(np.abs(part.samples.belt).max()):
-        error = hypot(found.errors["stick_fraction"], LEAST_STICK)
-        found = replace(found, errors={**found.errors, "stick_fraction": error})
-    if found.stick_fraction and found.cycles < LEAST_CYCLES:  # nobody knows how much it errs
-        found = replace(found, stick_fraction=None)
-    return found, None
+    if measures.errors and fastest > STICKING_SHARE * float(np.abs(part.samples.belt).max()):
+        error = hypot(measures.errors["stick_fraction"], LEAST_STICK)
+        measures = replace(measures, errors={**measures.errors, "stick_fraction": error})
+    if measures.stick_fraction and measures.cycles < LEAST_CYCLES:  # nobody knows how much it errs
+        measures = replace(measures, stick_fraction=None)
+    return measures, None
 
 
 def _by_line(
@@ -335,5 +335,5 @@ def rest(
     regime = regime if belt_speed > 0.0 else Regime.STUCK
     needed = window.most_cycles * window.cycles[-1].period if window.cycles else 0.0
     steady = float(time[-1]) * 2.0 >= needed or regime is Regime.HELD or None
-    found = without_cycles(at_rest, regime, steady=steady)
-    return replace(found, velocity_amplitude=None)  # the positions do not tell it
+    measures = without_cycles(at_rest, regime, steady=steady)
+    return replace(measures, velocity_amplitude=None)  # the positions do not tell it

@@ -183,7 +183,7 @@ class Parameter:
     @property
     def _stated(self) -> dict[str, float]:
         return {
-            word: each for word, each in self._limits.items() if abs(each) not in _OMITTED_LIMITS
+            word: limit for word, limit in self._limits.items() if abs(limit) not in _OMITTED_LIMITS
         }
 
     def _in_words(self, limits: Mapping[str, float]) -> str:
@@ -283,18 +283,18 @@ def described_by(parameter: Parameter) -> Any:
 def constants_of(part: type) -> Mapping[str, Parameter]:
     """Return the constants of a part's class, a dataclass, by name, in the order of the fields."""
     return {
-        each.name: replace(each.metadata[_KEY], name=each.name)
-        for each in fields(part)
-        if _KEY in each.metadata
+        attribute.name: replace(attribute.metadata[_KEY], name=attribute.name)
+        for attribute in fields(part)
+        if _KEY in attribute.metadata
     }
 
 
 def parameters_of(part: Any, prefix: str = "") -> Iterator[Parameter]:
     """Yield the constants of a part, and of the parts in it under their flat names, in order."""
-    for each in fields(part):
-        name, value = f"{prefix}{each.name}", getattr(part, each.name)
-        if _KEY in each.metadata:
-            yield replace(each.metadata[_KEY], name=name)
+    for attribute in fields(part):
+        name, value = f"{prefix}{attribute.name}", getattr(part, attribute.name)
+        if _KEY in attribute.metadata:
+            yield replace(attribute.metadata[_KEY], name=name)
         elif is_dataclass(value):
             yield from parameters_of(value, f"{name}.")
 
@@ -329,7 +329,7 @@ def scaled(part: _Part, scales: Scales) -> _Part:
 
 
 def _times(value: Any, factor: float) -> Any:
-    return tuple(each * factor for each in value) if isinstance(value, tuple) else value * factor
+    return tuple(size * factor for size in value) if isinstance(value, tuple) else value * factor
 
 
 @cache
@@ -347,7 +347,7 @@ def unit_powers(unit: str | None) -> tuple[int, int, int]:
 def _factors(unit: str) -> Iterator[tuple[int, str, int]]:
     """Yield sign, name and power of each factor; everything after a slash is divided by."""
     numerator, *denominators = re.sub(r"/\(([^()/]+)\)", r"/\1", unit).split("/")
-    for sign, part in ((1, numerator), *((-1, each) for each in denominators)):
+    for sign, part in ((1, numerator), *((-1, denominator) for denominator in denominators)):
         for factor in part.split():
             name, _, power = factor.partition("^")
             if not re.fullmatch(r"\d*", power):

@@ -172,7 +172,7 @@ class Drive(DriveConstants):
             load=self.load.scaled(replace(scales, force=self.normal_force), "N"),
         )
 
-    def _scaled(self, **own: Any) -> Self:
+    def _scaled(self, **constants: Any) -> Self:
         """Return the drive in its scales, with these values of constants."""
         scales = self.scales
         return replace(
@@ -183,7 +183,7 @@ class Drive(DriveConstants):
             actuator=scaled(self.actuator, scales),
             motor=None if self.motor is None else scaled(self.motor, scales),
             guide_damping=self.guide_damping * scales.factor("N s/m"),
-            **own,
+            **constants,
         )
 
     @property
@@ -259,5 +259,5 @@ class ScaledDrive(Drive):
 
 def in_units_of(unit: Drive, drive: Drive) -> ScaledDrive:
     """Return a drive in the units of another one, of the same normal force."""
-    own = {name: getattr(drive, name) for name in Drive.__dataclass_fields__}
-    return ScaledDrive(**own, unit=unit)
+    parts = {name: getattr(drive, name) for name in Drive.__dataclass_fields__}
+    return ScaledDrive(**parts, unit=unit)

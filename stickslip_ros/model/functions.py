@@ -56,5 +56,5 @@ def zero_between(function: Callable[[float], float], low: float, high: float) ->
     """Return where `function` changes sign; it must have opposite signs at `low` and `high`."""
     from scipy.optimize import brentq  # importing it takes longer than numpy and heyoka together
 
-    found: Any = brentq(function, low, high, xtol=1e-300, rtol=_ROUNDING, maxiter=1000)
-    return float(found)
+    zero: Any = brentq(function, low, high, xtol=1e-300, rtol=_ROUNDING, maxiter=1000)
+    return float(zero)

@@ -112,10 +112,10 @@ class HybridSystem(ABC):
 
     def shared(self, key: Hashable, make: Callable[[], _Shared]) -> _Shared:
         """Return what all systems of this structure share under a key; it is made once."""
-        found = _shared.setdefault(self.structure, {})
-        if key not in found:
-            found[key] = make()
-        return found[key]
+        by_key = _shared.setdefault(self.structure, {})
+        if key not in by_key:
+            by_key[key] = make()
+        return by_key[key]
 
     def shared_flow(self, name: str) -> Flow:
         """Return a flow by its name; systems of one structure share it."""

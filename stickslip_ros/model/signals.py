@@ -66,7 +66,7 @@ class Signal:
     @cached_property
     def steepest(self) -> float:
         """Largest absolute derivative by time."""
-        rates = (abs(each.slope) + abs(each.swing) * each.rate for each in self._used)
+        rates = (abs(piece.slope) + abs(piece.swing) * piece.rate for piece in self._used)
         return max(rates, default=0.0)
 
     def at(self, time: float) -> float:
@@ -377,11 +377,11 @@ def _signal(*pieces: Piece) -> Signal:
 
 
 def _of_some_length(pieces: Iterable[Piece]) -> tuple[Piece, ...]:
-    found: list[Piece] = []
+    kept: list[Piece] = []
     for piece in pieces:
-        if piece.end > (found[-1].end if found else -inf):
-            found.append(piece)
-    return tuple(found)
+        if piece.end > (kept[-1].end if kept else -inf):
+            kept.append(piece)
+    return tuple(kept)
 
 
 def _on_grid(piece: Piece, period: float) -> Piece:

@@ -16,12 +16,12 @@ def numbers(part: Any, name: str) -> Iterator[tuple[str, float]]:
     if isinstance(part, float):  # first: most are
         yield name, part
     elif is_dataclass(part):
-        for own, each in _values(part).items():
-            yield from numbers(each, f"{name}.{own}")
+        for field, constant in _values(part).items():
+            yield from numbers(constant, f"{name}.{field}")
     elif isinstance(part, tuple):
         table: tuple[Any, ...] = part
-        for number, each in enumerate(table):
-            yield from numbers(each, f"{name}[{number}]")
+        for number, element in enumerate(table):
+            yield from numbers(element, f"{name}[{number}]")
     else:
         yield name, float(part)
 
@@ -30,10 +30,12 @@ def with_symbols(part: Any, name: str, symbols: Mapping[str, Any]) -> Any:
     """Return a part with the expressions of these names for its constants, see `numbers`."""
     if is_dataclass(part):
         inner = _values(part).items()
-        found = {own: with_symbols(each, f"{name}.{own}", symbols) for own, each in inner}
-        return replace(part, **found)  # type: ignore[type-var]
+        parts = {
+            field: with_symbols(constant, f"{name}.{field}", symbols) for field, constant in inner
+        }
+        return replace(part, **parts)  # type: ignore[type-var]
     if isinstance(part, tuple):
-        return tuple(symbols[each] for each, _ in numbers(part, name))
+        return tuple(symbols[constant_name] for constant_name, _ in numbers(part, name))
     return symbols[name]
 
 
@@ -44,16 +46,16 @@ def structure(part: Any) -> Any:
     kind = type(part)
     if not _fields(kind):
         return kind
-    found: list[Any] = [kind]
+    parts: list[Any] = [kind]
     for name, constant in _fields(kind):
         value = getattr(part, name)
         if constant is not None and (constant.whole or constant.simplifies):
-            found.append(value if constant.stays(value) else None)
+            parts.append(value if constant.stays(value) else None)
         elif isinstance(value, tuple):
-            found.append(len(value) if constant is not None else None)
+            parts.append(len(value) if constant is not None else None)
         elif not isinstance(value, (int, float)):
-            found.append(structure(value))
-    return tuple(found)
+            parts.append(structure(value))
+    return tuple(parts)
 
 
 def _values(part: Any) -> dict[str, Any]:
@@ -62,7 +64,7 @@ def _values(part: Any) -> dict[str, Any]:
     These are numbers, tuples of them, and parts with such fields. Tuples without a description are
     data from which switches are made.
     """
-    found: dict[str, Any] = {}
+    constants: dict[str, Any] = {}
     for name, constant in _fields(type(part)):
         value = getattr(part, name)
         if isinstance(value, (int, float)):
@@ -70,12 +72,12 @@ def _values(part: Any) -> dict[str, Any]:
         else:
             varies = is_dataclass(value) or (isinstance(value, tuple) and constant is not None)
         if varies:
-            found[name] = value
-    return found
+            constants[name] = value
+    return constants
 
 
 @cache
 def _fields(kind: type) -> tuple[tuple[str, Parameter | None], ...]:
     """Return the names of the fields of a class, each with its description if it has one."""
     constants = constants_of(kind)
-    return tuple((each.name, constants.get(each.name)) for each in fields(kind))
+    return tuple((field.name, constants.get(field.name)) for field in fields(kind))

@@ -64,7 +64,7 @@ class CompiledFlow:
         self.last_orders: memoryview[float] = taylor.tc[: len(system.states), -1].data
         """Last Taylor coefficient of each variable, of the last step."""
         # heyoka copies its callbacks with the integrator.
-        self.marks = [event.callback.found for event in taylor.nt_events]
+        self.marks = [event.callback.marks for event in taylor.nt_events]
         self.mode: Mode | None = None
         """Mode whose switches are among the parameters."""
         # heyoka keeps the parameters up to the last one that an equation uses.
@@ -112,10 +112,10 @@ class CompiledFlow:
 
     def take_marks(self) -> Marks:
         """Return the marks since the last call, in order of time."""
-        found: Marks = sorted(mark for marks in self.marks for mark in marks)
+        in_order: Marks = sorted(mark for marks in self.marks for mark in marks)
         for marks in self.marks:
             marks.clear()
-        return found
+        return in_order
 
 
 _Key = tuple[int, str, int]
@@ -226,13 +226,13 @@ class _Finder:
 
     def __init__(self, *, zero_speed: bool, keep: bool) -> None:
         """Keep zeros of a mark, or not; at one of the speed (`zero_speed`) it is exactly zero."""
-        self.found: Marks = []
+        self.marks: Marks = []
         self._zero_speed, self._keep = zero_speed, keep
 
     def __call__(self, integrator: Any, now: float, _: int) -> None:
         if self._keep:
             x, y = integrator.update_d_output(now).tolist()[:2]
-            self.found.append((now, x, 0.0 if self._zero_speed else y))
+            self.marks.append((now, x, 0.0 if self._zero_speed else y))
 
 
 class FlowRates:
@@ -243,9 +243,9 @@ class FlowRates:
         flow, still = system.shared_flow(name), {hy.time: hy.expression(0.0)}
         by = [*_variations(system), hy.par[system.index["epoch"]]]  # added to the time everywhere
         rows = [*flow.rates, *(guard.margin for guard in flow.guards)]
-        found = [*flow.rates, *(hy.diff(row, each) for row in rows for each in by)]
+        terms = [*flow.rates, *(hy.diff(row, variable) for row in rows for variable in by)]
         self._order, self._count = len(system.states), len(by)
-        values = [hy.subs(each, still) for each in found]
+        values = [hy.subs(term, still) for term in terms]
         self._compiled = compiled_function(values, list(system.variables))
 
     def at(self, state: FloatArray, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -254,9 +254,9 @@ class FlowRates:
         A row of the gradients has the derivatives by the states, the free constants and the time;
         the shape is (rates and margins; derivatives; ...).
         """
-        found = evaluated(self._compiled, state, parameters)
+        values = evaluated(self._compiled, state, parameters)
         order = self._order
-        return found[:order], found[order:].reshape(-1, self._count, *state.shape[1:])
+        return values[:order], values[order:].reshape(-1, self._count, *state.shape[1:])
 
 
 def flow_rates(system: HybridSystem, name: str) -> FlowRates:

@@ -286,8 +286,8 @@ class Motion(DriveView):
             ratio = old.force_scale / drive.force_scale
             state[system.slots.actuator] = [value * ratio for value in lagging]
         forces = [force + disturbance] if self._has_one_force else [force, disturbance]
-        scaled = (each / self._weight for each in forces)
-        inputs = [max(-_LARGEST_FORCE, min(_LARGEST_FORCE, each)) for each in scaled]
+        scaled = (acting / self._weight for acting in forces)
+        inputs = [max(-_LARGEST_FORCE, min(_LARGEST_FORCE, acting)) for acting in scaled]
         core.change(system, state, inputs, self.clock.scaled)
         if remembers and law.switches:
             core.enter(system.continued(before, core.mode, core.instant))

@@ -178,7 +178,7 @@ def simulate_sampled(
     if recorder is not None or measured is not None:
         ticks = _observed(ticks, loop, recorder, seen)
     elif samples >= LEAST_TICKS:
-        blocks = TickBlocks.of(loop, motion, controller)
+        blocks = TickBlocks.for_loop(loop, motion, controller)
     while done < samples and not motion.unbounded:
         forces = _forces(ticks, blocks, motion, min(_BLOCK, samples - done))
         measure_block(motion, meter, observer)

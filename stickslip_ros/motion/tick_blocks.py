@@ -47,14 +47,14 @@ class TickBlocks:
     """
 
     def __init__(self, loop: SampledLoop, motion: RecordedMotion, controller: Controller) -> None:
-        """Take what `of` accepts."""
+        """Take what `for_loop` accepts."""
         self._loop, self._motion, self._controller = loop, motion, controller
         self._blocks: dict[Mode, _Block] = {}
         self.left = 1
         """Number of ticks that the loop is to take after `advance`."""
 
     @classmethod
-    def of(
+    def for_loop(
         cls, loop: SampledLoop, motion: RecordedMotion, controller: Controller | None
     ) -> Self | None:
         """Return the blocks of a loop, or None if something acts or records that they lack."""
@@ -99,7 +99,7 @@ class _Block:
         system, mode, drive = motion.core.system, motion.core.mode, motion.drive
         order = _order(loop, motion)
         ticks, step = _COEFFICIENTS // order, loop.period * drive.angular_frequency
-        own = {
+        constants = {
             "elapsed": loop.stamps.period.numerator * 1e-9,
             "length": drive.length_scale,
             "speed": drive.speed_scale,
@@ -109,9 +109,9 @@ class _Block:
             "travel": system.belt_speed(mode, 0.0) * step,
             **dict(numbers(law, "law")),
         }
-        make = partial(_compiled, system, mode.flow, law, [*own], order, ticks)
+        make = partial(_compiled, system, mode.flow, law, [*constants], order, ticks)
         compiled = system.shared(("ticks", mode.flow, order, structure(law)), make)
-        values = [*parameter_values(system, mode, (0.0,)), *own.values()]
+        values = [*parameter_values(system, mode, (0.0,)), *constants.values()]
         rows, self._start = np.empty((ticks, compiled.nouts // ticks)), np.empty(compiled.nvars)
         self._compute = partial(
             compiled, self._start, rows.reshape(-1), np.array(values)[: compiled.nparams]
@@ -134,14 +134,14 @@ class _Block:
 
 
 def _compiled(
-    system: HybridSystem, flow: str, law: ControlLaw, own: list[str], order: int, ticks: int
+    system: HybridSystem, flow: str, law: ControlLaw, constants: list[str], order: int, ticks: int
 ) -> Any:
     """Return a function of the state that gives a row for each tick.
 
     It has 1, or 0 from the first tick on that may reach a guard, the force (N), and the state after
-    the tick. The parameters are those of the system, and then `own`.
+    the tick. The parameters are those of the system, and then `constants`.
     """
-    given = {name: hy.par[number] for number, name in enumerate(own, len(system.index))}
+    given = {name: hy.par[number] for number, name in enumerate(constants, len(system.index))}
     law = with_symbols(law, "law", given)
     x, y, *held = names = hy.make_vars("x", "y", *(f"law.{name}" for name in law.state_units))
     sure, state, rows = hy.expression(1.0), tuple(held), list[Any]()
@@ -164,8 +164,8 @@ def _compiled(
 
 
 def _margins(system: HybridSystem, flow: str, x: Any, y: Any, force: Any) -> list[Any]:
-    own = dict(zip((*system.variables, *system.symbols.inputs), (x, y, force), strict=True))
-    return [hy.subs(guard.margin, own) for guard in system.shared_flow(flow).guards]
+    values = dict(zip((*system.variables, *system.symbols.inputs), (x, y, force), strict=True))
+    return [hy.subs(guard.margin, values) for guard in system.shared_flow(flow).guards]
 
 
 def _slip(
@@ -179,7 +179,7 @@ def _slip(
     sizes = [_size(speed[k]) for k in orders]
     change, rest = sum(sizes[:-1]), sizes[0] + sizes[1] / 256.0  # every second one may vanish
     # No margin changes by more than the speed.
-    margins = [each - change for each in _margins(system, flow, x, y, force)]
+    margins = [margin - change for margin in _margins(system, flow, x, y, force)]
     margins.append(_size(x) + _size(y) - rest / _ROUNDING)
     return margins, sum(position[k] for k in orders), sum(speed[k] for k in orders)
 

@@ -140,18 +140,18 @@ class SampleRecorder(ABC):
 
         `measured` is the sample as a sensor tells it.
         """
-        number, told = self._number, measured or sample
+        number, seen = self._number, measured or sample
         aim = 0.0
         if self._reference is not None:
             aim = self._reference(number / self._rate).position or 0.0
-            self._pursuit.extend((aim, sample.position, told.position))
+            self._pursuit.extend((aim, sample.position, seen.position))
         if number % self._every == 0:
             _, position, velocity, friction_force, belt, belt_speed, motor = sample
             row = number / self._rate, position, velocity, friction_force, control_force, belt
-            row += belt_speed, *(told[1:3] if self._measured else ())
+            row += belt_speed, *(seen[1:3] if self._measured else ())
             if self._with_motor:
                 assert motor is not None
-                row += *motor, *((told.motor or motor) if self._measured else ())
+                row += *motor, *((seen.motor or motor) if self._measured else ())
             self.keep(row if self._reference is None else (*row, aim))
         self._number = number + 1
 

@@ -72,8 +72,8 @@ class Expression:
             return cls(text, True, (columns[name],), ast.Name("_0"))
         places: dict[int, str] = {}
 
-        def placed(found: re.Match[str]) -> str:
-            name = found[0] if found[0] in columns or found[0][0] == "#" else found[0][1:-1]
+        def placed(match: re.Match[str]) -> str:
+            name = match[0] if match[0] in columns or match[0][0] == "#" else match[0][1:-1]
             if name not in columns:
                 raise InvalidInputError(_unknown(source, name, columns))
             return places.setdefault(columns[name], f" _{len(places)} ")
@@ -87,8 +87,8 @@ class Expression:
                 if isinstance(node, ast.Name) and node.id not in {*by_name, *_NUMBERS, "unwrap"}:
                     raise InvalidInputError(_unknown(source, node.id, columns))
             bare = all(isinstance(node, _SUMS) for node in ast.walk(tree))
-            found = cls(text, bare and bool(places), tuple(places), tree)
-            found.value([np.zeros(1)] * len(places))
+            expression = cls(text, bare and bool(places), tuple(places), tree)
+            expression.value([np.zeros(1)] * len(places))
         except (MemoryError, RecursionError, SyntaxError, TypeError, ValueError) as error:
             if isinstance(error, InvalidInputError):
                 raise
@@ -96,11 +96,11 @@ class Expression:
                 f"{source}: the expression {shown(text)} is invalid: {_ALLOWED}; the columns are "
                 f"{listed(columns)}"
             ) from None
-        return found
+        return expression
 
     def value(self, values: list[FloatArray]) -> FloatArray:
         """Return the value for the `values` of the columns, in the order of `places`."""
-        named = {f"_{number}": each for number, each in enumerate(values)}
+        named = {f"_{number}": column for number, column in enumerate(values)}
         with np.errstate(all="ignore"):
             return _value(self._tree, named)
 
@@ -128,10 +128,10 @@ def _unwrapped(counter: Any, turn: Any) -> Any:
         raise ValueError("the turn must be a positive number")
     if not np.ndim(counter):
         return counter
-    found = np.array(counter, dtype=np.result_type(counter, np.float64))
-    known = np.isfinite(found)
-    found[known] = np.unwrap(found[known], period=turn)
-    return found
+    unwrapped = np.array(counter, dtype=np.result_type(counter, np.float64))
+    known = np.isfinite(unwrapped)
+    unwrapped[known] = np.unwrap(unwrapped[known], period=turn)
+    return unwrapped
 
 
 def _pattern(columns: Mapping[str, int], text: str) -> re.Pattern[str]:

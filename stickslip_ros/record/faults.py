@@ -51,11 +51,11 @@ class Jumps:
         low, high = np.quantile(part, [0.01, 0.99]) if len(part) else (0.0, 0.0)
         self._unit = _unit(signal, rounding)
         least = max(_STEEPER * self._unit, _LEAST_SHARE * float(high - low))
-        found = [
+        jumps = [
             part.start + np.flatnonzero(np.abs(np.diff(signal[part])) > least)
             for part in windows(len(signal), 1)
         ]
-        self._rows = rows = np.concatenate([np.empty(0, np.int64), *found])
+        self._rows = rows = np.concatenate([np.empty(0, np.int64), *jumps])
         size = np.abs(self._step(rows))
         quiet: list[BoolArray] = []
         for side in (-1, 1):
@@ -77,7 +77,7 @@ class Jumps:
         They are 1 to 20 samples between two jumps. None are found where they would be more than a
         twentieth of the samples: then the motion jumps.
         """
-        signal, found = self._signal, list[int]()
+        signal, dropped = self._signal, list[int]()
         first, last = self._rows[self._after_quiet], self._rows[self._before_quiet]
         place = np.searchsorted(last, first, "right")
         first, place = first[place < len(last)], place[place < len(last)]
@@ -89,9 +89,9 @@ class Jumps:
             least = min(size[0], size[-1]) / 2.0
             returns = abs(signal[end + 1] - signal[begin]) < least
             if returns and size[1:-1].max(initial=0.0) < least:
-                found += range(begin + 1, end + 1)
+                dropped += range(begin + 1, end + 1)
                 ended = end
-        return np.array(found if len(found) <= LARGEST_SHARE * len(signal) else [], np.int64)
+        return np.array(dropped if len(dropped) <= LARGEST_SHARE * len(signal) else [], np.int64)
 
     def shifts(self) -> list[tuple[int, float]]:
         """Return the samples after jumps from which the signal does not come back, and their sizes.
@@ -120,8 +120,8 @@ class Jumps:
         same = np.all(np.abs(np.abs(turns) - turn) <= _SAME_TURN * turn)
         if not (against and same) or float(np.ptp(self._signal)) > (1.0 + _SAME_TURN) * turn:
             return None
-        known = [each * scale for scale in (1.0, self._unit) for each in _TURNS]
-        nearest = min(known, key=lambda each: abs(each - turn))
+        known = [candidate * scale for scale in (1.0, self._unit) for candidate in _TURNS]
+        nearest = min(known, key=lambda candidate: abs(candidate - turn))
         if abs(nearest - turn) <= _SAME_TURN * turn:
             return Wrap(nearest, rows + 1)
         return Wrap(turn, rows + 1) if np.ptp(np.sign(turns)) else None
@@ -160,7 +160,7 @@ def differences(time: FloatArray, position: FloatArray) -> FloatArray:
             velocity[part][1:-1] = (moved[2:] - moved[:-2]) / (at[2:] - at[:-2])
         if len(time) > 1:
             for place, (before, after) in {0: (0, 1), -1: (-2, -1)}.items():
-                moved, lasting = (each[after] - each[before] for each in (position, time))
+                moved, lasting = (column[after] - column[before] for column in (position, time))
                 velocity[place] = moved / lasting
     return velocity
 

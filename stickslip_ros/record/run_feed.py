@@ -255,12 +255,12 @@ class _SlipSearch:
         """Return the slips, drops or else rises of the position, and sentences on them."""
         time, position = np.concatenate(self._times), np.concatenate(self._positions)
         notes, least = list[str](), self._threshold.drop
-        found = slips_in(time, position, self._threshold)
-        if not found and (found := slips_in(time, -position, self._threshold)):
+        slips = slips_in(time, position, self._threshold)
+        if not slips and (slips := slips_in(time, -position, self._threshold)):
             notes.append("the slips are rises of the position: drops there are none")
         if noise is not None and least < _NOISES * noise:
             notes.append(
                 f"the least drop of a slip, {quantity(least, length)}, is within the noise of "
                 f"the positions, {quantity(noise, length)}: some slips are noise"
             )
-        return slip_report(found, self._threshold, self._belt_speed), notes
+        return slip_report(slips, self._threshold, self._belt_speed), notes

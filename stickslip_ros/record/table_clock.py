@@ -62,7 +62,7 @@ def in_order(
         return np.asarray(rows)[::-1]
     before, after = float(picked[back[0] - 1]), float(picked[back[0]])
     step = before - float(picked[max(0, back[0] - 2)])
-    turns = (each for each in _TURNS if abs(before + step - after - each) < 1.5 * step)
+    turns = (turn for turn in _TURNS if abs(before + step - after - turn) < 1.5 * step)
     turn = next(filter(lambda turn: turn > 10.0 * step, turns), None)
     what = f"goes back {len(back)} times, the first time at {table.line(int(rows[back[0]]))}"
     if turn:
@@ -82,9 +82,9 @@ def in_order(
 def check_turns(table: Table, time: FloatArray) -> None:
     """Refuse rows of several joints that have the same times."""
     same = np.count_nonzero(time[1:] == time[:-1])
-    if same < _TURNING_SHARE * len(time) or table.form.where or not (found := table.turns):
+    if same < _TURNING_SHARE * len(time) or table.form.where or not (turns := table.turns):
         return
-    name, turn = found
+    name, turn = turns
     raise InvalidInputError(
         f"{table.path}: each time is that of several rows, in which {name} is "
         f"{' and '.join(turn[:_MOST_SESSIONS])}: --where '{name}={turn[0]}' takes one"
@@ -98,13 +98,13 @@ def unit_of_steps(
 
     `period` is that of the rows in s and in a unit of the table, if that is told.
     """
-    lasting, own = period or (nan, nan)
+    lasting, in_unit = period or (nan, nan)
     if period and step == 1.0:  # row numbers
-        own = 1.0
-    if own != lasting and abs(step - own) < _SAME_STEP * own:
+        in_unit = 1.0
+    if in_unit != lasting and abs(step - in_unit) < _SAME_STEP * in_unit:
         text = quantity(lasting, "s")
-        return lasting / own, [
-            f"the time is converted: steps of {own:g} are {text} by a line above"
+        return lasting / in_unit, [
+            f"the time is converted: steps of {in_unit:g} are {text} by a line above"
         ]
     if step < _INSTANT and _DAYS[0] < first < _DAYS[1]:
         raise InvalidInputError(
@@ -136,10 +136,10 @@ def even_times(time: FloatArray) -> tuple[FloatArray, list[str]]:
         steps = np.diff(time)
         gaps = np.flatnonzero(steps > np.median(steps) + 2.5 * rounding) + 1
         parts = [_even(part, rounding) for part in np.split(time, gaps)]
-        found = np.concatenate([time[:0], *(part for part in parts if part is not None)])
-        if len(found) == len(time):
-            period = quantity(float(np.median(np.diff(found))), "s")
-            return found - found[0], [
+        even = np.concatenate([time[:0], *(part for part in parts if part is not None)])
+        if len(even) == len(time):
+            period = quantity(float(np.median(np.diff(even))), "s")
+            return even - even[0], [
                 f"the times are rounded to {quantity(rounding, 's')}: the rows are taken as evenly "
                 f"spaced, {period} apart"
             ]
@@ -183,7 +183,7 @@ def _even(time: FloatArray, rounding: float) -> FloatArray | None:
     period = float(np.polyfit(rows, time - time[0], 1)[0])
     short = (float(f"{period:.{digits}g}") for digits in range(1, 10))
     near = 0.05 * rounding / len(time)
-    line = rows * next((each for each in short if abs(each - period) < near), period)
+    line = rows * next((candidate for candidate in short if abs(candidate - period) < near), period)
     apart = time - line
     if np.ptp(apart) > 1.05 * rounding:
         return None
@@ -202,11 +202,11 @@ def clock_of(table: Table, clock: tuple[int, ...], asked: Expression) -> tuple[i
     if len(clock) > 1 or first == ROW or not stems[first]:
         return clock
     alike = [place for place, stem in enumerate(stems) if stem == stems[first]]
-    own = {
-        max((each for each in alike if each < place and place not in alike), default=first)
+    clocks = {
+        max((column for column in alike if column < place and place not in alike), default=first)
         for place in asked.places
     }
-    return tuple(own) if len(own) == 1 and alike[0] == first else clock
+    return tuple(clocks) if len(clocks) == 1 and alike[0] == first else clock
 
 
 def clock_beside(table: Table, clock: Sequence[int], places: Sequence[int]) -> tuple[int, ...]:
@@ -232,13 +232,13 @@ def clock_beside(table: Table, clock: Sequence[int], places: Sequence[int]) -> t
 
 
 def notes_of_another_clock(
-    table: Table, name: str, clock: Sequence[int], time: FloatArray, own: FloatArray
+    table: Table, name: str, clock: Sequence[int], time: FloatArray, own_time: FloatArray
 ) -> Iterator[str]:
     """Yield a sentence on a quantity with times of its own, s; refuse times apart from the others.
 
-    `clock` are the columns of its times, `time` those of the other quantities, `own` its own.
+    `clock` are the columns of its times, `time` those of the other quantities, `own_time` its own.
     """
-    start, end = float(np.nanmin(own)), float(np.nanmax(own))
+    start, end = float(np.nanmin(own_time)), float(np.nanmax(own_time))
     text = f"{name} has times of its own, those of {table.name(clock[0])}"
     if not (start <= time[-1] and end >= time[0]):
         shift = float(f"{table.form.shift + time[0] - start:.6g}")

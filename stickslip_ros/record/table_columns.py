@@ -173,12 +173,12 @@ class Table(ABC):
 
     def name(self, place: int) -> str:
         """Return the name of a column for a message."""
-        known = (name for name, each in self.columns.items() if each == place)
+        known = (name for name, column in self.columns.items() if column == place)
         return f"column {next(filterfalse(_NUMBERED.match, known), self.number(place))}"
 
     def number(self, place: int) -> str:
         """Return the number of a column, as expressions have it."""
-        known = (name for name, each in self.columns.items() if each == place)
+        known = (name for name, column in self.columns.items() if column == place)
         number = next(filter(_NUMBERED.match, known), f"#{place + 1}")
         return number if number[0] == "#" else f"'{number}'"
 
@@ -188,17 +188,17 @@ class Table(ABC):
 
         Raises InvalidInputError for another one.
         """
-        own = {
+        columns = {
             quantity: next((name for name in names if name in self.columns), "")
             for quantity, names in _OWN_COLUMNS.items()
         }
-        if not own["time"] or not own["position"]:
+        if not columns["time"] or not columns["position"]:
             raise InvalidInputError(
                 f"{self.path} has the columns {listed(self.columns)}, and not those of "
                 "`stickslip simulate --out`: say what they are, as in --columns "
                 "time=t,position=x,force=u*2.5"
             )
-        return {quantity: name for quantity, name in own.items() if name}
+        return {quantity: name for quantity, name in columns.items() if name}
 
 
 @contextmanager

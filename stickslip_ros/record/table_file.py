@@ -67,9 +67,9 @@ class VectorTable(Table):
         values = self._vectors[column]
         self._rows = np.flatnonzero(values == number)
         if not len(self._rows):
-            raise self.nothing_where(column, (f"{each:g}" for each in np.unique(values)))
-        found = [self._vectors[place] for place in places]
-        return [each[self._rows] if len(each) == len(values) else each for each in found]
+            raise self.nothing_where(column, (f"{present:g}" for present in np.unique(values)))
+        vectors = [self._vectors[place] for place in places]
+        return [vector[self._rows] if len(vector) == len(values) else vector for vector in vectors]
 
     def line(self, row: int) -> str:
         """Return the number of a row, for a message."""

@@ -53,15 +53,15 @@ def _of_hdf5(content: bytes) -> Vectors:
         for name in group:
             if not isinstance(group.get(name, getlink=True), h5py.HardLink):
                 sys.exit(f"{prefix}{name} is a link: it may point to another file")
-            each = group[name]
-            if isinstance(each, h5py.Dataset) and (each.external or each.is_virtual):
+            member = group[name]
+            if isinstance(member, h5py.Dataset) and (member.external or member.is_virtual):
                 sys.exit(f"{prefix}{name} is stored in another file")
-            if isinstance(each, h5py.Group):
-                yield from of_group(f"{prefix}{name}.", each)
-            elif each.dtype.kind in "biuf":
-                unit = each.attrs.get("units", each.attrs.get("unit", ""))
+            if isinstance(member, h5py.Group):
+                yield from of_group(f"{prefix}{name}.", member)
+            elif member.dtype.kind in "biuf":
+                unit = member.attrs.get("units", member.attrs.get("unit", ""))
                 unit = unit.decode() if isinstance(unit, bytes) else str(unit)
-                values = each[()].T if by_columns else each[()]
+                values = member[()].T if by_columns else member[()]
                 for key, _, vector in _vectors(prefix + name, np.squeeze(values)):
                     yield key, unit, vector
 
@@ -153,9 +153,9 @@ def _of_yaml(content: bytes) -> str:
 
     messages: Any = yaml.load_all(content, yaml.CSafeLoader)
     rows = [
-        dict(islice(_fields("", each), _MOST_COLUMNS + 1))
-        for each in messages
-        if isinstance(each, Mapping)
+        dict(islice(_fields("", message), _MOST_COLUMNS + 1))
+        for message in messages
+        if isinstance(message, Mapping)
     ]
     if any(len(row) > _MOST_COLUMNS for row in rows):
         sys.exit(f"it has a message of more than {_MOST_COLUMNS} fields")
@@ -202,17 +202,17 @@ def _fields(name: str, value: Any) -> Iterator[tuple[str, Any]]:
             yield name, f"{value['sec']}.{value['nanosec']:09d}"
             return
         joints = value.get("name", value.get("joint_names"))
-        for key, each in value.items():
+        for key, member in value.items():
             path = f"{name}.{key}" if name else str(key)
-            if isinstance(joints, list) and isinstance(each, list) and each is not joints:
-                keys = joints if len(each) == len(joints) else range(len(each))
-                for joint, element in zip(keys, each, strict=True):
+            if isinstance(joints, list) and isinstance(member, list) and member is not joints:
+                keys = joints if len(member) == len(joints) else range(len(member))
+                for joint, element in zip(keys, member, strict=True):
                     yield f"{path}.{joint}", element
             else:
-                yield from _fields(path, each)
+                yield from _fields(path, member)
     elif isinstance(value, list):
-        for number, each in enumerate(value):
-            yield from _fields(f"{name}[{number}]", each)
+        for number, member in enumerate(value):
+            yield from _fields(f"{name}[{number}]", member)
     else:
         yield name, value
 

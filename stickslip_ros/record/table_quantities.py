@@ -92,8 +92,8 @@ def quantities_of(
     clock = asked["time"].places
     if not clock:
         raise InvalidInputError(f"{table.path}: time = {columns['time']} must be a column")
-    clocks = {name: clock_of(table, clock, each) for name, each in asked.items()}
-    cells = _Cells.of(table, asked, clock, *clocks.values())
+    clocks = {name: clock_of(table, clock, expression) for name, expression in asked.items()}
+    cells = _Cells.read(table, asked, clock, *clocks.values())
     notes = cells.notes
     times, rows = cells.times(clock, clocks.values())
     time = _picked(times[clock], rows)
@@ -101,16 +101,16 @@ def quantities_of(
     part = rows if table.form.session else range(len(times[clock]))
     values: dict[str, FloatArray] = {}
     for name in [name for name in asked if name != "time"]:
-        value, own = cells.value(name), times[clocks[name]]
-        value = value if value.shape == own.shape else np.full(own.shape, value)
-        if own is times[clock] or np.array_equal(own, times[clock], equal_nan=True):
+        value, own_time = cells.value(name), times[clocks[name]]
+        value = value if value.shape == own_time.shape else np.full(own_time.shape, value)
+        if own_time is times[clock] or np.array_equal(own_time, times[clock], equal_nan=True):
             values[name] = _picked(value, rows)
         else:
-            if own.shape == times[clock].shape:
-                own, value = (_picked(each, part) for each in (own, value))
-            values[name] = _at(time, own, value, hold=name in _FORCES)
-            values[name][time > np.nanmax(own) + np.nanmedian(np.diff(own))] = nan
-            notes += notes_of_another_clock(table, name, clocks[name], time, own)
+            if own_time.shape == times[clock].shape:
+                own_time, value = (_picked(column, part) for column in (own_time, value))
+            values[name] = _at(time, own_time, value, hold=name in _FORCES)
+            values[name][time > np.nanmax(own_time) + np.nanmedian(np.diff(own_time))] = nan
+            notes += notes_of_another_clock(table, name, clocks[name], time, own_time)
     present = np.isfinite(values[needed])
     if not present.any():
         raise InvalidInputError(
@@ -138,7 +138,7 @@ def speed_and_force(table: Table, columns: Mapping[str, str]) -> Quantities:
     `columns` has both, and errors are those of `quantities_of`.
     """
     asked = _asked(table, columns, ("velocity", "force"))
-    cells = _Cells.of(table, asked, asked["velocity"].places)
+    cells = _Cells.read(table, asked, asked["velocity"].places)
     return Quantities({name: np.atleast_1d(cells.value(name)) for name in asked}, cells.notes)
 
 
@@ -157,7 +157,7 @@ class _Cells:
     notes: list[str]
 
     @classmethod
-    def of(
+    def read(
         cls,
         table: Table,
         asked: Mapping[str, Expression],
@@ -168,8 +168,8 @@ class _Cells:
 
         The length of the table is that of the leading ones; others of another length are refused.
         """
-        places = [each.places for each in asked.values()]
-        used = sorted({place for each in (*places, *others) for place in each} - {ROW})
+        places = [expression.places for expression in asked.values()]
+        used = sorted({place for group in (*places, *others) for place in group} - {ROW})
         with reading_file(table.path):
             columns = dict(zip(used, table.read(used), strict=True))
         if ROW in leading:
@@ -189,16 +189,16 @@ class _Cells:
         factors: dict[str, float] = {}
         units: dict[str, Unit] = {}
         unknown_unit = False
-        for name, each in asked.items():
-            factors[name], found = _factor(table, name, each)
-            units |= found
-            if name == "time" and each.bare and not found:
-                unknown_unit = each.places[0] not in table.clocks
-            if name == "position" and each.bare and not found:
-                notes += _large_note(table, columns[each.places[0]], each)
-            if name == "time" and ROW in each.places:
+        for name, expression in asked.items():
+            factors[name], column_units = _factor(table, name, expression)
+            units |= column_units
+            if name == "time" and expression.bare and not column_units:
+                unknown_unit = expression.places[0] not in table.clocks
+            if name == "position" and expression.bare and not column_units:
+                notes += _large_note(table, columns[expression.places[0]], expression)
+            if name == "time" and ROW in expression.places:
                 by = "--period" if table.form.period else "a line above them"
-                text = quantity(float(each.text[4:]), "s")
+                text = quantity(float(expression.text[4:]), "s")
                 notes.append(f"the rows have no time: by {by} they are {text} apart")
         if "force" in asked and (newtons := table.form.per_ampere):
             text = quantity(newtons, "N m" if table.form.rotary else "N")
@@ -239,7 +239,7 @@ class _Cells:
         same = abs(turn - jump) <= _SAME_TURN * turn
         if turn < _SMALLEST_TURN or not same or np.any(near != np.rint(near)):
             return ""
-        names = "|".join(re.escape(each) for each in known if known[each] == place)
+        names = "|".join(re.escape(alias) for alias in known if known[alias] == place)
         text = f"unwrap({self.table.number(place)}, {turn:.0f})"
         if not asked.bare:
             column = rf"(?<![\w.])['\"]?(?:{names})(?!\w)['\"]?"
@@ -251,39 +251,39 @@ class _Cells:
     ) -> tuple[dict[tuple[int, ...], FloatArray], range | IntArray]:
         """Return times by columns, s from the first of the clock, and the rows that have one."""
         asked, factor = self.asked["time"], self.factors["time"]
-        found = {
+        times = {
             places: _times(asked, [self.columns[place] for place in places])
             for places in dict.fromkeys((clock, *others))
         }
-        known = np.isfinite(found[clock])
+        known = np.isfinite(times[clock])
         rows = range(len(known)) if known.all() else np.flatnonzero(known)
         if not len(rows):
             raise InvalidInputError(f"{self.table.path}: no time is a finite number")
-        rows = in_order(self.table, asked, factor, found[clock], rows)
+        rows = in_order(self.table, asked, factor, times[clock], rows)
         if rows[0] > rows[-1]:
             self.notes.append("the rows are read from the last one on: the newest is the first")
         if self.unknown_unit:
-            step = float(np.median(np.diff(_picked(found[clock], rows)))) if len(rows) > 1 else 0.0
-            column, first = self.table.number(clock[0]), float(found[clock][rows[0]])
+            step = float(np.median(np.diff(_picked(times[clock], rows)))) if len(rows) > 1 else 0.0
+            column, first = self.table.number(clock[0]), float(times[clock][rows[0]])
             factor, note = unit_of_steps(step, first, self.table.period, column)
             self.notes.extend(note)
-        if self.table.form.shift and len(found) == 1:
+        if self.table.form.shift and len(times) == 1:
             raise InvalidInputError(
                 f"{self.table.path}: shift is for columns with times of their own, and all have "
                 f"those of {asked.text}"
             )
-        first = found[clock][rows[0]]
-        for places, each in found.items():
-            since, own = each - first if first else each, factor
+        first = times[clock][rows[0]]
+        for places, stamps in times.items():
+            since, own_factor = stamps - first if first else stamps, factor
             if places != clock:
-                own, units = _factor(self.table, "time", replace(asked, places=places))
+                own_factor, units = _factor(self.table, "time", replace(asked, places=places))
                 if not (units or clock_beside(self.table, clock, places)):
-                    own = factor
-                if own != factor:
-                    since, own = each * own - first * factor, 1.0
-            since = np.asarray(since if own == 1.0 else since * own, float)
-            found[places] = since if places == clock else since + self.table.form.shift
-        return found, rows
+                    own_factor = factor
+                if own_factor != factor:
+                    since, own_factor = stamps * own_factor - first * factor, 1.0
+            since = np.asarray(since if own_factor == 1.0 else since * own_factor, float)
+            times[places] = since if places == clock else since + self.table.form.shift
+        return times, rows
 
 
 def _asked(
@@ -321,14 +321,14 @@ def _times(clock: Expression, cells: Sequence[Any]) -> Any:
     """Return the times of an expression with all their digits."""
     counts = len(cells) > 1 or cells[0].dtype.kind == "i"
     exact = np.longdouble if counts else float  # a float has no digits for ns since 1970
-    return clock.value([np.asarray(each, exact) for each in cells])
+    return clock.value([np.asarray(column, exact) for column in cells])
 
 
 def _lost_cells(
     table: Table, cells: Mapping[int, Any], asked: Mapping[str, Expression]
 ) -> Iterator[str]:
     """Yield a sentence on each column with cells that are no numbers, or too large ones."""
-    for place in dict.fromkeys(place for each in asked.values() for place in each.places):
+    for place in dict.fromkeys(place for formula in asked.values() for place in formula.places):
         column = cells[place]
         if column.min() >= -LARGEST and column.max() <= LARGEST:
             continue
@@ -347,7 +347,7 @@ def _factor(table: Table, kind: str, asked: Expression) -> tuple[float, dict[str
     Raises InvalidInputError if they have a unit of another quantity, several, or several readings.
     """
     places = [place for place in asked.places if place not in table.clocks] if asked.bare else []
-    found, target = dict[str, Unit](), _UNITS.get(kind, "N")
+    by_column, target = dict[str, Unit](), _UNITS.get(kind, "N")
     per_ampere = table.form.per_ampere if kind == "force" else None
     meant, way = kind, ""
     if per_ampere is not None:
@@ -369,40 +369,40 @@ def _factor(table: Table, kind: str, asked: Expression) -> tuple[float, dict[str
         cells = table.names[place], table.units[place]
         readings = units_in(*cells, target)
         if per_ampere is not None and not readings:
-            readings = [each._replace(factor=nan) for each in units_in(*cells, "N")]
+            readings = [unit._replace(factor=nan) for unit in units_in(*cells, "N")]
         if len(readings) > 1:
-            texts = [f"{each.text or target} ({each.factor:g} {each.target})" for each in readings]
-            ways = [f"{kind}={column}*{each.factor:.12g}" for each in readings]
+            texts = [f"{unit.text or target} ({unit.factor:g} {unit.target})" for unit in readings]
+            ways = [f"{kind}={column}*{unit.factor:.12g}" for unit in readings]
             raise InvalidInputError(
                 f"{which} may be in {' or '.join(texts)}: {' or '.join(ways)} says which"
             )
         if kind == "time" and len(asked.places) > len(places):
-            found["the clock"] = Unit("s", 1.0, "s")
-        for each in readings:
-            si = ROTARY.get(target, target) if table.form.rotary else each.target
-            if isnan(each.factor) or each.target != si:
+            by_column["the clock"] = Unit("s", 1.0, "s")
+        for unit in readings:
+            si = ROTARY.get(target, target) if table.form.rotary else unit.target
+            if isnan(unit.factor) or unit.target != si:
                 raise InvalidInputError(
-                    f"{which} is in {each.text}, which is no unit of {meant}"
-                    f"{' of a rotary axis' * (each.target != si)}: {kind}={column}*NUMBER "
+                    f"{which} is in {unit.text}, which is no unit of {meant}"
+                    f"{' of a rotary axis' * (unit.target != si)}: {kind}={column}*NUMBER "
                     f"converts it, with the number of {si} in one of it{way}"
                 )
-            found[name] = each
-    units = {each.factor for each in found.values()}
-    if len(units) > 1 or (found and len(found) < len(places) and units != {1.0}):
-        texts = [f"{name} in {each.text}" for name, each in found.items()]
+            by_column[name] = unit
+    units = {unit.factor for unit in by_column.values()}
+    if len(units) > 1 or (by_column and len(by_column) < len(places) and units != {1.0}):
+        texts = [f"{name} in {unit.text}" for name, unit in by_column.items()]
         raise InvalidInputError(
             f"{table.path}: {kind} = {asked.text} is of different units, {', '.join(texts)}: a "
             f"number for each converts it to {target}, as in #1*0.001-#2"
         )
-    return next(iter(units), 1.0) * (per_ampere or 1.0), found
+    return next(iter(units), 1.0) * (per_ampere or 1.0), by_column
 
 
-def _units_notes(table: Table, found: Mapping[str, Unit]) -> Iterator[str]:
+def _units_notes(table: Table, by_column: Mapping[str, Unit]) -> Iterator[str]:
     """Yield sentences on the units by column."""
-    if found:
-        units = [f"{name}: {each.text}" for name, each in found.items()]
+    if by_column:
+        units = [f"{name}: {unit.text}" for name, unit in by_column.items()]
         yield f"units: {'; '.join(dict.fromkeys(units))}"
-    angles = [each.text for each in found.values() if each.target in ROTARY.values()]
+    angles = [unit.text for unit in by_column.values() if unit.target in ROTARY.values()]
     if angles and not table.form.rotary:
         yield f"{angles[0]} is of a rotary axis: what is in m is in rad, as --rotary shows"
 
@@ -410,7 +410,7 @@ def _units_notes(table: Table, found: Mapping[str, Unit]) -> Iterator[str]:
 def _large_note(table: Table, column: Any, asked: Expression) -> Iterator[str]:
     """Yield a sentence on a position without a unit, if it may be in another one than m."""
     unit = "rad" if table.form.rotary else "m"
-    low, high = (float(each(column)) for each in (np.fmin.reduce, np.fmax.reduce))
+    low, high = (float(extreme(column)) for extreme in (np.fmin.reduce, np.fmax.reduce))
     if high - low >= _LARGE and (column.dtype.kind == "i" or unit == "m"):
         yield (
             f"the position, {asked.text}, has no unit and counts in {unit}, from {low:.6g} to "
@@ -420,15 +420,15 @@ def _large_note(table: Table, column: Any, asked: Expression) -> Iterator[str]:
 
 def _measurable(values: FloatArray) -> FloatArray:
     """Return values with NaN for those above 1e100, and zero for those below 1e-100."""
-    found = np.atleast_1d(values)
-    for part in windows(len(found)):
-        size = np.abs(found[part])
+    column = np.atleast_1d(values)
+    for part in windows(len(column)):
+        size = np.abs(column[part])
         small = (size < 1.0 / LARGEST) & (size > 0.0)
         if small.any() or not np.all(size <= LARGEST):
-            size = np.abs(found)
+            size = np.abs(column)
             small = (size < 1.0 / LARGEST) & (size > 0.0)
-            return np.where(size <= LARGEST, np.where(small, 0.0, found), nan)
-    return found
+            return np.where(size <= LARGEST, np.where(small, 0.0, column), nan)
+    return column
 
 
 def _picked(values: FloatArray, rows: range | IntArray) -> FloatArray:
@@ -486,13 +486,13 @@ def _without_lost_positions(
     table, factor = cells.table, cells.factors["position"]
     position, time = values["position"], values["time"]
     present = np.isfinite(position)
-    found: range | IntArray = range(len(position))
+    present_rows: range | IntArray = range(len(position))
     if not present.all():
-        found = np.flatnonzero(present)
-    jumps = Jumps(_picked(position, found), cells.rounding("position"))
+        present_rows = np.flatnonzero(present)
+    jumps = Jumps(_picked(position, present_rows), cells.rounding("position"))
 
     def line(row: Any) -> str:
-        return table.line(int(rows[found[row]]))
+        return table.line(int(rows[present_rows[row]]))
 
     wrap = jumps.wrap()
     if wrap is not None:
@@ -506,18 +506,18 @@ def _without_lost_positions(
     lost = jumps.dropouts()
     if len(lost):
         values["position"] = position = position.copy()
-        position[lost if isinstance(found, range) else found[lost]] = nan
+        position[lost if isinstance(present_rows, range) else present_rows[lost]] = nan
         yield (
             "the position jumps away and back, as no motion does, in "
             f"{len(lost)} rows, the first is {line(lost[0])}: they are left out"
         )
     for row, size in jumps.shifts():
-        way = cells.unwrapped("position", int(rows[found[row]]))
+        way = cells.unwrapped("position", int(rows[present_rows[row]]))
         if way:
             raise InvalidInputError(
                 f"{table.path}: the position jumps as a counter that wraps, at {line(row)}: {way}"
             )
-        place = f"at {line(row)}, {time[found[row]]:.6g} s after the first row"
+        place = f"at {line(row)}, {time[present_rows[row]]:.6g} s after the first row"
         yield shift_note(size, place, "rad" if table.form.rotary else "m")
 
 

@@ -95,8 +95,8 @@ class TextForm(Head):
         cells = [*{row[place + 1] for row in self.first_rows if behind}]
         if len(cells) != 1 or place + 1 not in self.columns.values():
             return ""
-        told = behind[0].lower() in NO_UNITS[3:] if behind[0] else are_units(cells)
-        return cells[0] if told else ""
+        is_unit = behind[0].lower() in NO_UNITS[3:] if behind[0] else are_units(cells)
+        return cells[0] if is_unit else ""
 
     def features(self, *, decimal_commas: bool) -> list[str]:
         """Return what is not the usual, as phrases; decimal commas if they were seen."""
@@ -150,7 +150,7 @@ def form_of(stream: BinaryIO, given: TableFormat) -> TextForm:
         period=period,
         first_lines=lines[head.first : head.first + _TOP],
     )
-    return replace(form, units=[each or form.unit_behind(n) for n, each in enumerate(form.units)])
+    return replace(form, units=[unit or form.unit_behind(n) for n, unit in enumerate(form.units)])
 
 
 def _lines_of(head: bytes, encoding: str | None) -> tuple[list[str], str]:

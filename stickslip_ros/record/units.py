@@ -118,9 +118,9 @@ def units_in(name: str, given: str, target: str) -> list[Unit]:
         return [Unit(scaled[0], nan, target)]
     plain = _BRACKETED.sub(" ", name).strip()
     stated, last = [*_stated(name, plain, given, target)], [*_last(plain, target)]
-    known, words = ([each for each in found if not isnan(each.factor)] for found in (stated, last))
-    found = known or words or [*stated, *last][:1]
-    return [*{each.factor: each for each in reversed(found)}.values()][::-1]
+    known, words = ([unit for unit in units if not isnan(unit.factor)] for units in (stated, last))
+    readings = known or words or [*stated, *last][:1]
+    return [*{unit.factor: unit for unit in reversed(readings)}.values()][::-1]
 
 
 def force_per_ampere(constant: str, pitch: float | None, *, rotary: bool) -> float:
@@ -131,13 +131,13 @@ def force_per_ampere(constant: str, pitch: float | None, *, rotary: bool) -> flo
     if the unit of the constant does not fit to them.
     """
     given = f"force_constant = {shown(constant)}"
-    found = [each for unit in ("N/A", "N m/A") for each in _read(constant, unit)]
-    if not found or not found[0].factor:
+    readings = [reading for unit in ("N/A", "N m/A") for reading in _read(constant, unit)]
+    if not readings or not readings[0].factor:
         raise InvalidInputError(
             f"{given} is invalid: must be a number with its unit, as 50N/A of a linear motor, or "
             "0.35Nm/A of a motor that turns a screw or a rotary axis"
         )
-    ((_, factor, unit), *_) = found
+    ((_, factor, unit), *_) = readings
     ways = {
         "N/A": "N/A is of a linear motor, which has no pitch and turns no rotary axis",
         "N m/A": "N m/A is of a motor that turns either a screw, whose pitch is needed, or a "
@@ -172,10 +172,10 @@ def other_quantity(name: str) -> str | None:
 def without_unit(name: str) -> str:
     """Return the name of a column without the unit in brackets or after a mark, or nothing."""
     name = name[:_LONGEST]
-    if found := re.fullmatch(rf"(.+?)\s*{_BRACKETED.pattern}\s*", name):
-        return found[1]
+    if match := re.fullmatch(rf"(.+?)\s*{_BRACKETED.pattern}\s*", name):
+        return match[1]
     return next(
-        (name[: each.start()] for each in _MARK.finditer(name) if _parsed(name[each.end() :])), ""
+        (name[: mark.start()] for mark in _MARK.finditer(name) if _parsed(name[mark.end() :])), ""
     )
 
 
@@ -196,9 +196,9 @@ def period_in(line: str) -> tuple[float, float] | None:
         return None
     number, unit = r"(?P<number>\d[\d.,]*(?:e-?\d+)?)", r"(?P<unit>[^\W\d_]+)"
     for pattern in (rf"[\[(]\s*{unit}\s*[\])][\s,;:=\"]*{number}", rf"{number}[\s;,\"]*{unit}"):
-        for found in re.finditer(pattern, line):
-            value = float(found["number"].rstrip(",.").replace(",", "."))
-            for name, dimension in _parsed(found["unit"]):
+        for match in re.finditer(pattern, line):
+            value = float(match["number"].rstrip(",.").replace(",", "."))
+            for name, dimension in _parsed(match["unit"]):
                 if dimension == "T" and name not in ("min", "hour", "day"):
                     return value * _factor(name, "s"), value
                 if name.endswith("turn/s") and value:
@@ -209,12 +209,12 @@ def period_in(line: str) -> tuple[float, float] | None:
 def _stated(name: str, plain: str, given: str, target: str) -> Iterator[Unit]:
     """Yield the units in the line of units, or in a name in brackets or after a mark."""
     cell, bracketed = given.strip().strip("[]()"), _BRACKETED.findall(name)
-    marked = [plain[each.end() :] for each in _MARK.finditer(plain)]
+    marked = [plain[mark.end() :] for mark in _MARK.finditer(plain)]
     for text in filter(None, [cell, *bracketed, *marked, *re.findall("%$", plain)]):
-        words = [each for each in text.split() if each.strip(".").casefold() not in _DOUBTFUL]
+        words = [word for word in text.split() if word.strip(".").casefold() not in _DOUBTFUL]
         tried = [text, *words[:1]] if re.search(r"\d", text) else [text, *words[-1:], *words[:1]]
-        if found := next(filter(None, ([*_read(each, target)] for each in tried)), []):
-            yield from found
+        if readings := next(filter(None, ([*_read(attempt, target)] for attempt in tried)), []):
+            yield from readings
         elif text.lower() not in (*NO_UNITS, *_DOUBTFUL):
             letters = len(re.findall(r"[^\W\d_]", text))
             unit = _parsed(text.lstrip("0123456789.,")) or any(map(_parsed, words)) or _counts(text)
@@ -226,12 +226,12 @@ def _stated(name: str, plain: str, given: str, target: str) -> Iterator[Unit]:
 def _last(name: str, target: str) -> Iterator[Unit]:
     """Yield what the last words of a name may be, or words between, or counts."""
     name = _INDEX.sub("", name)
-    starts = [found.start() for found in _START.finditer(name)]
+    starts = [match.start() for match in _START.finditer(name)]
     for start in starts[-4:]:
         text, before = name[start:], name[:start]
         rest = text[3:] if re.match(r"(?i)in[\W_]", text) else ""
-        if found := [*_read(rest, target)] or [*_read(text, target)]:
-            yield from found
+        if readings := [*_read(rest, target)] or [*_read(text, target)]:
+            yield from readings
             if text.casefold() in (_DOUBTFUL if before else _DOUBTFUL + _DOUBTFUL_ALONE):
                 yield Unit("", 1.0, target)
             if text[0].isdigit():  # a number of units, or of the column
@@ -244,8 +244,8 @@ def _last(name: str, target: str) -> Iterator[Unit]:
     whole = {dimension for start in starts[-3:-1] for _, dimension in _parsed(name[start:])}
     if not whole & {*_DIMENSIONS.values()}:
         for word in words[:-1]:
-            if len(word) > 1 and word.casefold() != "in" and (found := [*_read(word, target)]):
-                yield from found
+            if len(word) > 1 and word.casefold() != "in" and (readings := [*_read(word, target)]):
+                yield from readings
                 if word.casefold() in _DOUBTFUL:
                     yield Unit("", 1.0, target)
     yield from (Unit(word, nan, target) for word in words if _counts(word))
@@ -265,10 +265,10 @@ def _read(text: str, target: str) -> Iterator[Unit]:
     number = re.match(r"\d+(?:[.,]\d+)?(?:e-?\d+)?(?=\s*[^\W\d_])", text)
     unit = text[number.end() :].strip() if number else text
     scale = float(number[0].replace(",", ".")) if number else 1.0
-    for each in dict.fromkeys((target, ROTARY.get(target, target))):
+    for si_unit in dict.fromkeys((target, ROTARY.get(target, target))):
         for name, dimension in _parsed(unit):
-            if dimension == _DIMENSIONS[each]:
-                yield Unit(text, scale * _factor(name, each), each)
+            if dimension == _DIMENSIONS[si_unit]:
+                yield Unit(text, scale * _factor(name, si_unit), si_unit)
 
 
 @cache
@@ -306,22 +306,22 @@ def _parsed(text: str) -> tuple[tuple[str, str], ...]:
             sides[1].append(sides[0].pop())
         elif not (word == "1" and not number and len(words) > 1):
             sides[below].append(word)
-    over, under = ([_spelled(each) for each in side] for side in sides)
+    over, under = ([_spelled(factor) for factor in side] for side in sides)
     if not 1 <= len(over) + len(under) <= 3:
         return ()
-    found = [*_composed(over, under)]
+    readings = [*_composed(over, under)]
     if len(over) == 2 and not under:
-        found += _composed(over[:1], over[1:])
-    return tuple(found)
+        readings += _composed(over[:1], over[1:])
+    return tuple(readings)
 
 
 def _composed(
     over: Sequence[list[tuple[str, str]]], under: Sequence[list[tuple[str, str]]]
 ) -> Iterator[tuple[str, str]]:
     """Yield the ratios of products of units; of turns, where nothing is above."""
-    for each in product(product(*over), product(*under)):
-        above, below = ("".join(sorted(dimension for _, dimension in side)) for side in each)
-        unit = " ".join(name for name, _ in each[0]) + "".join(f"/{name}" for name, _ in each[1])
+    for ratio in product(product(*over), product(*under)):
+        above, below = ("".join(sorted(dimension for _, dimension in side)) for side in ratio)
+        unit = " ".join(name for name, _ in ratio[0]) + "".join(f"/{name}" for name, _ in ratio[1])
         if not under and above != "turns":
             yield unit, above
         elif under:
@@ -334,12 +334,12 @@ def _composed(
 def _spelled(word: str) -> list[tuple[str, str]]:
     """Return what a word may be among units: what pint calls it, and its dimension."""
     lower = word.casefold()
-    found: list[tuple[str, str]] = []
+    readings: list[tuple[str, str]] = []
     for name, dimension, pattern in _SPELLINGS:
         if match := pattern.fullmatch(lower):
             prefix = _LONG.get(match[1] or "", match[1] or "")
-            found.append((prefix + name, dimension))
+            readings.append((prefix + name, dimension))
             if prefix + name == "mN" and word != "mN":
-                found.append(("MN", dimension))
+                readings.append(("MN", dimension))
     others = {"Grad": "gon", "Nm": "nm"}  # which the capital letter excludes
-    return [each for each in found if each[0] != others.get(word)]
+    return [reading for reading in readings if reading[0] != others.get(word)]

@@ -29,7 +29,7 @@ def comparison_figure(
     outcome: those of `names` and `held`, the share of held cases, which is shown where it is not 1
     everywhere.
     """
-    shares = np.array([each["held"][0] for each in values.values()])
+    shares = np.array([outcomes["held"][0] for outcomes in values.values()])
     shown = [*names, *["held"] * bool((shares < 1.0).any())]
     figure = style.figure(4.8 * len(shown), 4.4, narrow=0.9 * len(shown))
     said = "" if "held" in shown else ": all of them hold all cases"
@@ -48,10 +48,10 @@ def comparison_figure(
             for row in rows
         ]
     for axes, name in zip(panels.ravel(), shown, strict=True):
-        means = [each[name][0] for each in values.values()]
+        means = [outcomes[name][0] for outcomes in values.values()]
         scale, text = units.axis(OUTCOMES[name].label, OUTCOMES[name].unit, np.array(means))
-        for number, (law, each) in enumerate(values.items()):
-            mean, error = each[name]
+        for number, (law, outcomes) in enumerate(values.items()):
+            mean, error = outcomes[name]
             # Beside each other, so that no law hides another.
             beside = points + 0.6 * ((number + 0.5) / len(values) - 0.5)
             axes.errorbar(

@@ -244,5 +244,5 @@ def _shared(
             yield value
 
     count_in(tree)
-    found = dict.fromkeys(symbol for value in values for symbol in innermost(value))
-    return [symbol for symbol in found if uses[symbol] > 1]
+    symbols = dict.fromkeys(symbol for value in values for symbol in innermost(value))
+    return [symbol for symbol in symbols if uses[symbol] > 1]

@@ -357,23 +357,23 @@ class _OneRun(_Panels):
 
     def following(self, figure: Figure, row: GridSpecFromSubplotSpec) -> None:
         """Draw the following error over time, and what is of the reversals after each of them."""
-        found = self._history.analysis.followed
-        assert found is not None
+        followed = self._history.analysis.followed
+        assert followed is not None
         whole, turns = figure.add_subplot(row[0, :2]), figure.add_subplot(row[0, 2])
-        peak = found.values.peak_following_error or 0.0
+        peak = followed.values.peak_following_error or 0.0
         size, label = self.units.axis("following error", "m", peak)
-        trace = found.time, found.error
+        trace = followed.time, followed.error
         draw_line(whole, self._whole, trace, size, self._history.gap, **MOTION)
         whole.set(title="following error", ylabel=label)
-        if found.turns:  # the start of the run is far larger
+        if followed.turns:  # the start of the run is far larger
             whole.set_ylim(-1.2 * peak / size, 1.2 * peak / size)
         self._label_time(whole, self._whole)
-        errors = [turn.behind for turn in found.turns]
+        errors = [turn.behind for turn in followed.turns]
         size, label = self.units.axis("error at reversals", "m", *errors)
-        for turn in found.turns:
+        for turn in followed.turns:
             turns.plot(turn.time, turn.behind / size, **MOTION)
         turns.set(title="after each reversal", ylabel=label)
-        end = max((turn.time[-1] for turn in found.turns), default=1.0)
+        end = max((turn.time[-1] for turn in followed.turns), default=1.0)
         label_axis(turns.xaxis, *self.units.axis("time", "s", end))
 
     def behind_the_screw(self, figure: Figure, row: GridSpecFromSubplotSpec) -> None:

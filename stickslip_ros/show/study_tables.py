@@ -163,7 +163,9 @@ def _shown(name: str, value: Any, unit: str, units: Units) -> str:
         return _complex(value, units.of_unit(unit))
     if "lyapunov" in name:
         coefficients = cast(list[float | None], value if isinstance(value, list) else [value])
-        return ", ".join(units.text(each, unit) + _starts(each) for each in coefficients)
+        return ", ".join(
+            units.text(coefficient, unit) + _starts(coefficient) for coefficient in coefficients
+        )
     if not isinstance(value, list):
         return units.texts([value], unit, digits=8 if name == "spectral_radius" else 4)[0]
     items = cast(list[Any], value)

@@ -208,8 +208,8 @@ def _positioned(
     ends = (int(moving[-1]) + 1) / rate if len(moving) else 0.0
     amplitude, period = hunting(error[late], allowed, rate)
     final = float(np.abs(error[late]).max())
-    found = followed(np.arange(len(error)) / rate, target, target + error)
-    values = {} if found is None else vars(found.values)
+    following = followed(np.arange(len(error)) / rate, target, target + error)
+    values = {} if following is None else vars(following.values)
     return outcome._replace(
         **{name: values.get(name) for name in FOLLOWING},
         held=final <= allowed,

@@ -44,7 +44,7 @@ class Columns(CycleMeasures[FloatArray]):
     """Why a point has no cycle to measure, or how it drifts, in words, or None."""
 
     @classmethod
-    def of(cls, plan: Plan) -> Self:
+    def empty(cls, plan: Plan) -> Self:
         """Return the columns of a plan of which no point is computed.
 
         Parameters

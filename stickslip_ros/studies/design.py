@@ -174,24 +174,24 @@ def design(
         return Design(task, remark=reason)
     if disturbances is None:
         disturbances = [Disturbance.parse(kind, scenario) for kind in _KINDS]
-    designer = Designer.of(task, disturbances)
+    designer = Designer.for_task(task, disturbances)
     tuning = designer.tuning
     if tuning.diverges is not None:
         return Design(task, remark=tuning.diverges)
-    found = designer.proposed(progress)
-    if found.controller is not None and task.spread:
-        found = replace(found, drawn=designer.tried(found.controller))
+    draft = designer.proposed(progress)
+    if draft.controller is not None and task.spread:
+        draft = replace(draft, drawn=designer.tried(draft.controller))
     progress(1.0)
-    if found.controller is None and found.tuned is not None and found.tuned.missed:
-        found = replace(
-            found, remark=joined(found.remark, _sufficient(task, found.tuned, disturbances))
+    if draft.controller is None and draft.tuned is not None and draft.tuned.missed:
+        draft = replace(
+            draft, remark=joined(draft.remark, _sufficient(task, draft.tuned, disturbances))
         )
     if tuning.vibrations and plant.force_jitter:
         no_jitter = (
             "force_jitter is omitted where the vibration is caught: the delay is constant there"
         )
-        found = replace(found, remark=joined(found.remark, no_jitter))
-    return found
+        draft = replace(draft, remark=joined(draft.remark, no_jitter))
+    return draft
 
 
 def _sufficient(task: Task, nearest: Tuned, disturbances: Sequence[Disturbance]) -> str | None:
@@ -200,7 +200,7 @@ def _sufficient(task: Task, nearest: Tuned, disturbances: Sequence[Disturbance])
         return None
     if (enough := rounded(nearest.missed[0].value / RESERVE, up=True)) <= task.force_limit:
         return None
-    larger = Designer.of(replace(task, force_limit=enough), disturbances)
+    larger = Designer.for_task(replace(task, force_limit=enough), disturbances)
     if larger.proposed().controller is None:
         return None
     return f"a force limit of about {number_text(task.drive, enough, 'N')} is sufficient"
@@ -260,7 +260,7 @@ class Designer:
         return Design(self.task, None, failure, tuned=tuned)
 
     @classmethod
-    def of(cls, task: Task, disturbances: Sequence[Disturbance]) -> Self:
+    def for_task(cls, task: Task, disturbances: Sequence[Disturbance]) -> Self:
         """Return a designer for a task."""
         scenario = task.scenario
         goal = Goal.from_scenario(scenario, task.belt_speeds, disturbances, task.force_limit)
@@ -272,7 +272,7 @@ class Designer:
         constants = drawn(scenario, seed, self.task.spread)
         task = replace(self.task, scenario=scenario.changed(constants))
         name = f"drawn drive {seed} ({_constants_text(constants)})"
-        return constants, name, self.of(task, self.disturbances)
+        return constants, name, self.for_task(task, self.disturbances)
 
     def _best(self, share: float, *, cubic: bool) -> Tuned:
         """Return the best gains for the drive and, one after the other, those that miss limits."""

@@ -251,8 +251,8 @@ class Trial:
                 both = outcome.rms_velocity, FEED_TOLERANCE * abs(check.belt_speed)
                 rms, allowed = (number_text(drive, value, "m/s") for value in both)
                 reason = f"{reason}: its rms velocity is {rms}, and must be at most {allowed}"
-        own = ("held", "settling_time", "disturbed_force", "peak_force")
-        names = (*own, "rms_velocity", "mean_force", "rms_force")
+        measures = ("held", "settling_time", "disturbed_force", "peak_force")
+        names = (*measures, "rms_velocity", "mean_force", "rms_force")
         values = {name: getattr(outcome, name) for name in names}
         return replace(check, disturbance=str(disturbance), reason=reason, **values)
 

@@ -138,7 +138,7 @@ def _refined(
         values = ((valued(laws[row], float(rates[row])), row) for row in faster)
         if top[0] < 0.0:  # some are better by little: the best
             values = iter([max(values)])
-        better = next((found for found in values if found[0] > top), None)
+        better = next((trial for trial in values if trial[0] > top), None)
         if better is not None:
             top, point = better[0], around[better[1]]
         elif step < _LAST_STEP:

@@ -45,7 +45,7 @@ class Journal:
         another process writes it, or it cannot be written.
         """
         self.study, self.path = study, path
-        self.columns = Columns.of(study.plan) if columns is None else columns
+        self.columns = Columns.empty(study.plan) if columns is None else columns
         self._ends: dict[int, MotionState | None] = {}
         self._file: BinaryIO | None = None
         if path is None:

@@ -113,8 +113,8 @@ def _critical_feed(scenario: Scenario, spread: Spread) -> tuple[Section, str]:
     """
     check_spread(spread)
     varied = [scenario.changed(drawn(scenario, seed, spread)) for seed in range(_DRIVES)]
-    points = [hopf_points(each.plant.as_drive()) for each in varied]
-    speeds = [max((point.belt_speed for point in found), default=0.0) for found in points]
+    points = [hopf_points(variant.plant.as_drive()) for variant in varied]
+    speeds = [max((point.belt_speed for point in hopf), default=0.0) for hopf in points]
     ends, without = np.quantile(speeds, [0.025, 0.975]).tolist(), speeds.count(0.0)
     low, high = (number_text(scenario.plant.as_drive(), end, "m/s") for end in ends)
     note = (

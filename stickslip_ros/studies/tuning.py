@@ -105,7 +105,7 @@ class Tuning:
             seen = sensors[: 1 if drive.motor is None else 2]
             spans = (sensor.spans // plant.answer_every for sensor in seen)
             loop = LinearSampledLoop(at_feed, rate, delay, _jacobian(at_feed), *spans)
-            self.plants.append(PlantResponse.of(loop))
+            self.plants.append(PlantResponse.of_loop(loop))
         self.bench = Bench.of_plant(plant)
         self.loops = Loops([member.loop for member in self.plants])
         self.noises = [sqrt(s.position_resolution**2 / 12.0 + s.position_noise**2) for s in sensors]
@@ -146,20 +146,20 @@ class Tuning:
         first, *others = self.bodies
         value, law = self._searched(first, share)
         for other in others if value[0] < 0.0 else ():
-            value, law = max((value, law), self._searched(other, share), key=lambda each: each[0])
-        own = self._own_cubic_coefficient if cubic and self.vibrations else 0.0
+            value, law = max((value, law), self._searched(other, share), key=lambda trial: trial[0])
+        coefficient = self._own_cubic_coefficient if cubic and self.vibrations else 0.0
         chosen: Any = law
-        seen = [vibration for each in self.drives.values() for vibration in each.vibrations]
-        forces = [vibration.peak_force(chosen) for vibration in seen if own]
+        seen = [vibration for tuning in self.drives.values() for vibration in tuning.vibrations]
+        forces = [vibration.peak_force(chosen) for vibration in seen if coefficient]
         if max(forces, default=0.0) > _NEAR * share * self.goal.force_limit:
             for part in _CUBIC_SHARES:
-                softer = replace(first, cubic_gain=rounded(part * own))
+                softer = replace(first, cubic_gain=rounded(part * coefficient))
                 other = self._searched(softer, share)
                 # Less is not worth a larger cubic gain.
                 if other[0] > (value[0], 1.05 * value[1]):
                     value, law = other
         if value[1] <= 0.0:
-            rates = {n: each.loops.decay_rates([law])[0] for n, each in self.drives.items()}
+            rates = {n: tuning.loops.decay_rates([law])[0] for n, tuning in self.drives.items()}
             worst = min(rates, key=lambda name: rates[name])
             slow = self.drives[worst].loops.slowest(law)
             speed, rate = (
@@ -172,11 +172,11 @@ class Tuning:
             )
             return Tuned(law, self.goal, value[1], remark=remark)
         tuned = self.judged(law, self.plants, self.vibrations)
-        beyond = {name: each.missed(law) for name, each in self.drives.items()}
+        beyond = {name: tuning.missed(law) for name, tuning in self.drives.items()}
         worst = max(beyond, key=lambda name: sum(limit.excess for limit in beyond[name]))
         missed = beyond[worst]
         remarks: list[str] = []
-        if self.vibrations and not any(each.vibrates for each in self.vibrations):
+        if self.vibrations and not any(vibration.vibrates for vibration in self.vibrations):
             remarks.append(self._calm())
         if missed:
             reasons = " and ".join(limit.sentence(self.drive) for limit in missed)
@@ -228,16 +228,16 @@ class Tuning:
         latest = loop.force_delay + (0.5 + loop.difference_samples / 2.0) / loop.rate
         stiff = replace(self.drive, mass=mass, stiffness=mass / latest**2)
         scales = [
-            np.log([1.0 / d.scales.factor(each.unit) for each in described])
+            np.log([1.0 / d.scales.factor(constant.unit) for constant in described])
             for d in (self.drive, stiff)
         ]
         below, above = (log(10.0) * decades for decades in _DECADES)
         ends = np.minimum(*scales) - below, np.maximum(*scales) + above
         # The sign of the default first: another one serves long delays only.
-        usual = [-1.0 if each.default < 0.0 else 1.0 for each in described]
+        usual = [-1.0 if constant.default < 0.0 else 1.0 for constant in described]
         allowed = [
-            (sign, -sign) if each.at_least < 0.0 and not each.positive else (sign,)
-            for sign, each in zip(usual, described, strict=True)
+            (sign, -sign) if constant.at_least < 0.0 and not constant.positive else (sign,)
+            for sign, constant in zip(usual, described, strict=True)
         ]
 
         def best_with(signs: Sequence[float]) -> tuple[tuple[float, float], ControlLaw]:
@@ -246,9 +246,9 @@ class Tuning:
                 return replace(law, **dict(zip(law.tuned, values, strict=True)))
 
             def excess(law: ControlLaw) -> Iterator[float]:
-                for each in self.drives.values():
-                    deciding = [each.plants[place] for place in each.loops.ends]
-                    for limit in each.limits(each.judged(law, deciding, each.vibrations)):
+                for tuning in self.drives.values():
+                    deciding = [tuning.plants[place] for place in tuning.loops.ends]
+                    for limit in tuning.limits(tuning.judged(law, deciding, tuning.vibrations)):
                         # What is missing is best told as a force: the others come first.
                         weight = _FIRST if limit.least else 1.0
                         yield weight * max(limit.excess - log(share), 0.0)
@@ -263,7 +263,7 @@ class Tuning:
 
     def decay_rates(self, laws: Sequence[ControlLaw]) -> FloatArray:
         """Return the smallest decay rate of all drives with each law, 1/s."""
-        return np.min([each.loops.decay_rates(laws) for each in self.drives.values()], axis=0)
+        return np.min([tuning.loops.decay_rates(laws) for tuning in self.drives.values()], axis=0)
 
     def missed(self, law: ControlLaw) -> tuple[Limit, ...]:
         """Return the limits that a law that makes the loops of this drive stable does not keep."""

@@ -380,8 +380,8 @@ class ClosedLoop:
 
         def managed() -> set[str]:
             here = full_name(self.namespace, "")
-            found = {name for name in search.managed() if name.startswith(here)}
-            return found - self._brought_up if elsewhere else set()
+            names = {name for name in search.managed() if name.startswith(here)}
+            return names - self._brought_up if elsewhere else set()
 
         self._wait(nodes, lambda: bool(search.controllers() or managed()), timeout)
         for name in managed():
@@ -389,17 +389,17 @@ class ClosedLoop:
             client.bring_up(timeout, self._check_running)
             self._brought_up.add(name)
             self._wait(nodes, lambda: bool(search.controllers()), timeout)
-        found = search.controllers()
-        if not found:
+        controllers = search.controllers()
+        if not controllers:
             reasons = "; ".join([f"no node {search.task}", *search.near_misses()])
             raise RunError(f"no controller was found within {timeout:g} s: {reasons}")
         # The middleware announces our topics to a process in the order of their creation: once the
         # process has discovered where its answer goes, it has also discovered plant and analyzer.
-        for name in found if elsewhere else []:
+        for name in controllers if elsewhere else []:
             call = parameters_call(nodes.plant, name, [], lambda _: None)
             nodes.spinner.spin_until(call.pursue, 2.0 * _ANSWER_TIMEOUT)
             call.close()
-        return found
+        return controllers
 
     def _wait(self, nodes: Composition, condition: Callable[[], bool], timeout: float) -> bool:
         """Run our nodes until the condition holds; RunError as soon as the controller ends."""

@@ -237,12 +237,12 @@ def _searched(
     ]
     inside = [speed for speed in (*near, *added) if low < speed < high]
     rows = [cycles_at(speed) for speed in np.union1d(belt_speeds, inside).tolist()]
-    found = rows[:1]
+    refined = rows[:1]
     for before, after in pairwise(rows):
         if not any(before[0] < point < after[0] for point in hopf):
-            found += _narrowed(before, after, cycles_at)
-        found.append(after)
-    return found
+            refined += _narrowed(before, after, cycles_at)
+        refined.append(after)
+    return refined
 
 
 def _narrowed(
@@ -274,7 +274,7 @@ class _Point(NamedTuple):
     sticks: bool
 
     @classmethod
-    def of(cls, drive: Drive, belt_speed: float, cycle: LimitCycle) -> Self:
+    def of_cycle(cls, drive: Drive, belt_speed: float, cycle: LimitCycle) -> Self:
         middle, half = cycle.measures.midpoint, cycle.measures.amplitude
         if middle is None or half is None:  # it is too small to be measured
             middle = cls.at_rest(drive, belt_speed).least
@@ -296,7 +296,7 @@ def _joined(drive: Drive, rows: Sequence[_AtSpeed], hopf: Sequence[float]) -> li
     previous = rows[0]
     for row in rows:
         speed, cycles = row
-        points = [_Point.of(drive, speed, cycle) for cycle in cycles]
+        points = [_Point.of_cycle(drive, speed, cycle) for cycle in cycles]
         if row is not previous:
             kept = _matches(previous[1], cycles)
             births = [point for point in hopf if previous[0] < point < speed]

@@ -60,17 +60,17 @@ def critical_gains(drive: Drive, gains: ContinuousControl) -> CriticalGains | No
         If belt or load follow a signal, or the drive has no spring.
     """
     require("the critical gain", drive, *ONE_DEGREE)
-    own, unit = gains_of(gains), drive.force_scale / drive.speed_scale
-    if own is None:
+    washout, unit = gains_of(gains), drive.force_scale / drive.speed_scale
+    if washout is None:
         return None
-    without, with_unit = (expand(drive, replace(own, linear_gain=each)) for each in (0.0, unit))
+    without, with_unit = (expand(drive, replace(washout, linear_gain=gain)) for gain in (0.0, unit))
     if without is None or with_unit is None:
         return None
     dimensionless = _critical_linear_gain(without.jacobian, with_unit.jacobian)
     if dimensionless is None:
         return None
     linear = dimensionless * unit
-    critical = replace(own, linear_gain=linear)
+    critical = replace(washout, linear_gain=linear)
     if SMOOTH.lack(drive) is not None:
         return CriticalGains(linear, nan, None)
     sigma = _sigma(drive, critical)
@@ -112,7 +112,7 @@ def _critical_linear_gain(without: FloatArray, with_unit: FloatArray) -> float |
     """
     p = np.poly(without)
     r = (np.poly(with_unit) - p)[1:-2]
-    on_axis = [of * 1j ** np.arange(len(of))[::-1] for of in (p, r)]
+    on_axis = [polynomial * 1j ** np.arange(len(polynomial))[::-1] for polynomial in (p, r)]
     squares = np.roots(np.polymul(on_axis[0], on_axis[1].conj()).imag[::2])
     squares = squares.real[
         (squares.real > _ROUNDING) & (np.abs(squares.imag) < 1e-6 * abs(squares))
@@ -164,18 +164,18 @@ def limit_cycle_from_hopf(drive: Drive, gains: ContinuousControl) -> LimitCycle 
         gain is on the other side of it, and where the cycle is lost on the way: where it ends or
         folds back.
     """
-    own, critical = gains_of(gains), critical_gains(drive, gains)
-    if own is None or critical is None:
+    washout, critical = gains_of(gains), critical_gains(drive, gains)
+    if washout is None or critical is None:
         return None
-    found: list[FloatArray] = []
+    branch: list[FloatArray] = []
     cycle = None
     for step in range(1, _STEPS + 1):
         part = (step / _STEPS) ** 2  # the amplitude grows with the root of the distance
-        linear = critical.linear + part * (own.linear_gain - critical.linear)
-        at_gain = replace(own, linear_gain=linear)
+        linear = critical.linear + part * (washout.linear_gain - critical.linear)
+        at_gain = replace(washout, linear_gain=linear)
         guess = (
-            2.0 * found[-1] - found[-2]
-            if len(found) > 1
+            2.0 * branch[-1] - branch[-2]
+            if len(branch) > 1
             else _by_normal_form(drive, at_gain, critical.first_lyapunov_coefficient)
         )
         if guess is None:
@@ -186,7 +186,7 @@ def limit_cycle_from_hopf(drive: Drive, gains: ContinuousControl) -> LimitCycle 
         )
         if cycle is None or cycle.filter_state is None:
             return None
-        found.append(np.array([cycle.position, cycle.filter_state, cycle.period, *cycle.memory]))
+        branch.append(np.array([cycle.position, cycle.filter_state, cycle.period, *cycle.memory]))
     return cycle
 
 

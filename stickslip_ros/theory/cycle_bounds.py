@@ -52,8 +52,8 @@ def longest_return(drive: Drive, control: ContinuousControl | None = None) -> fl
     Continuous control that pushes a slide at rest softens or stiffens the spring.
     """
     if control is not None:
-        own = control.scaled(drive)
-        spring, mass = _static_force(own, 0.0) - _static_force(own, 1.0), drive.mass
+        scaled = control.scaled(drive)
+        spring, mass = _static_force(scaled, 0.0) - _static_force(scaled, 1.0), drive.mass
         left = 1.0 + spring  # it is a spring beside that of the slide
         if drive.motor is not None:  # behind that of the transmission; both carry slide and motor
             left, mass = max(spring, 0.0) / (1.0 + max(spring, 0.0)), mass + drive.motor.mass
@@ -96,8 +96,8 @@ def first_found(
     motion: RecordedMotion, find: Callable[[Breakpoints], _Found | None]
 ) -> _Found | None:
     """Return what `find` first finds as the motion is followed; None if it finds nothing."""
-    found = map(find, follow(motion))
-    return next((each for each in found if each is not None), None)
+    hits = map(find, follow(motion))
+    return next((hit for hit in hits if hit is not None), None)
 
 
 def least_cycle(drive: Drive, control: ContinuousControl | None = None) -> float | None:

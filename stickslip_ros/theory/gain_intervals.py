@@ -98,12 +98,12 @@ class GainBoundary:
         self._poles = np.array([-corner_frequency, *values]) * period
         self._forces: Any = [starting[1], slide[0, 0] * ending[1] - slide[1, 0] * ending[0]]
         if difference_samples:
-            starts, ends = (_after(POSITION, slide, each) for each in (starting, ending))
+            starts, ends = (_after(POSITION, slide, column) for column in (starting, ending))
             mean = np.ones(difference_samples) / (difference_samples * period)
             self._forces = np.polymul(np.polyadd([*starts, 0.0], ends), mean)
             self._whole += difference_samples
         elif len(slide) > 2:
-            starts, ends = (_after(SPEED, slide, each) for each in (starting, ending))
+            starts, ends = (_after(SPEED, slide, column) for column in (starting, ending))
             self._forces = np.polydiv(np.polyadd([*starts, 0.0], ends), [1.0, -1.0])[0]
         """b l + c, as coefficients."""
 

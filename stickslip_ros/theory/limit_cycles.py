@@ -139,11 +139,11 @@ def _cycle_ahead(motion: ShootingMotion) -> LimitCycle | None:
     drive = motion.drive
     state, duration = motion.state, 0.0
     for _ in range(_MOST_TURNS):
-        found = next_turn(motion, state)
-        if found is None:
+        arrival = next_turn(motion, state)
+        if arrival is None:
             return None
         before = state
-        state, duration = found
+        state, duration = arrival
         if motion.rate[SPEED] < EQUILIBRIUM_SPEED * abs(drive.belt_speed) / drive.speed_scale:
             return None
         if np.abs(state - before).max() < AGREEMENT * np.abs(state).max():
@@ -167,19 +167,19 @@ class _ReturnMap:
 
     def growth(self, distance: float) -> float:
         """Return the growth of the distance; -`distance` if the slide does not turn again."""
-        found = next_turn(self._motion, self._state(distance))
-        if found is None:
+        arrival = next_turn(self._motion, self._state(distance))
+        if arrival is None:
             return UNBOUNDED_SPEED if self._motion.unbounded else -distance
-        growth = (self._equilibrium - float(found[0][0])) - distance
+        growth = (self._equilibrium - float(arrival[0][0])) - distance
         return 0.0 if abs(growth) < _ROUNDING * (distance + abs(self._equilibrium)) else growth
 
     def cycle(self, distance: float) -> LimitCycle | None:
         """Return the limit cycle at that distance."""
         state = self._state(distance)
-        found = next_turn(self._motion, state)
-        if found is None:
+        arrival = next_turn(self._motion, state)
+        if arrival is None:
             return None
-        turn, duration = found
+        turn, duration = arrival
         follows = len(self._motion.drive.friction.states) > 0
         return solve(self._motion, turn if follows else state, duration, self._motion.core.mode)
 
@@ -241,10 +241,10 @@ class _ReturnMap:
         position = release_position(drive) / drive.length_scale
         released = self._rest.copy()
         released[[POSITION, SPEED]] = position, drive.belt_speed / drive.speed_scale
-        found = next_turn(self._motion, released)
-        if found is None:
+        arrival = next_turn(self._motion, released)
+        if arrival is None:
             return []
-        distance = self._equilibrium - float(found[0][0])
+        distance = self._equilibrium - float(arrival[0][0])
         return [distance * (1.0 - _CORNER_DISTANCE), distance * (1.0 + _CORNER_DISTANCE)]
 
     def _peak(self, inner: float, outer: float, growth: float) -> float | None:

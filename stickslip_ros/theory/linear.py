@@ -50,7 +50,7 @@ class ComplexPair:
     """p with A^T p = (growth - i frequency) p, and p* q = 1."""
 
     @classmethod
-    def of(cls, jacobian: FloatArray) -> Self | None:
+    def of_matrix(cls, jacobian: FloatArray) -> Self | None:
         """Return the pair of a matrix; None if its eigenvalues are real."""
         decomposed: Any = np.linalg.eig(jacobian)
         values, right = decomposed
@@ -83,13 +83,13 @@ class Expansion:
     @cached_property
     def eigenvalues(self) -> npt.NDArray[np.complex128]:
         """Eigenvalues of A, sorted by decreasing real part, then imaginary part; shape (n,)."""
-        found = np.linalg.eigvals(self.jacobian).astype(np.complex128)
-        return np.array(sorted(found, key=lambda value: (-round(value.real, 14), -value.imag)))
+        values = np.linalg.eigvals(self.jacobian).astype(np.complex128)
+        return np.array(sorted(values, key=lambda value: (-round(value.real, 14), -value.imag)))
 
     @cached_property
     def pair(self) -> ComplexPair | None:
         """The complex pair of A that decays slowest; None if all eigenvalues are real."""
-        return ComplexPair.of(self.jacobian)
+        return ComplexPair.of_matrix(self.jacobian)
 
     @property
     def crossing_speed(self) -> float | None:
@@ -242,13 +242,13 @@ def _tensors(system: DriveSystem, states: FloatArray, parameters: FloatArray) ->
     """
     places, compiled = system.shared("tensors", lambda: _compiled_tensors(system))
     order, points = states.shape
-    found = [np.zeros((order, *[order + 1] * number, points)) for number in _ORDERS]
+    tensors = [np.zeros((order, *[order + 1] * number, points)) for number in _ORDERS]
     for (component, *axes), value in zip(
         places, evaluated(compiled, states, parameters), strict=True
     ):
         for permuted in set(permutations(axes)):
-            found[len(axes) - 1][component, *permuted] = value
-    return found
+            tensors[len(axes) - 1][component, *permuted] = value
+    return tensors
 
 
 def _compiled_tensors(system: DriveSystem) -> tuple[list[tuple[int, ...]], Any]:
@@ -282,7 +282,7 @@ def equilibria(system: DriveSystem, parameters: FloatArray) -> FloatArray:
     if law.states:
         speeds, signs = -parameters[index["belt_speed"]], parameters[index["sign"]]
         memory = [
-            law.memory_at(*each) for each in zip(speeds.tolist(), signs.tolist(), strict=True)
+            law.memory_at(*slip) for slip in zip(speeds.tolist(), signs.tolist(), strict=True)
         ]
         states[MEMORY : MEMORY + len(law.states)] = np.array(memory).T
     for _ in range(_ITERATIONS):

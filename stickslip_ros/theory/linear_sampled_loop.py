@@ -62,8 +62,8 @@ def why_no_linear_loop(
             f"covers at most {LONGEST_DELAY}"
         )
     sensors = (sensor, motor_sensor)[: 1 if drive.motor is None else 2]
-    if not all(each.every(answer_every) for each in sensors):
-        spans = " and ".join(str(each.spans) for each in sensors)
+    if not all(encoder.every(answer_every) for encoder in sensors):
+        spans = " and ".join(str(encoder.spans) for encoder in sensors)
         return (
             f"the velocity is a difference over {spans} samples, which must be a multiple of the "
             f"{answer_every} from answer to answer for the theory of the sampled loop"
@@ -390,7 +390,7 @@ class LinearSampledLoop:
         slide, starting, ending = self.held
         stacked, states = feedback.output.shape[:-1], feedback.output.shape[-1]
         order, spans, of_motor = len(slide), self.difference_samples, self.motor_difference_samples
-        own, first, past = slice(order, order + states), order + states, order + states + under_way
+        law, first, past = slice(order, order + states), order + states, order + states + under_way
         size = past + spans + of_motor
         matrix = np.zeros((*stacked, size, size))
         forces = np.zeros((*stacked, 1 + under_way, size))
@@ -408,14 +408,14 @@ class LinearSampledLoop:
                 seen[3, -1] = -seen[3, motor]
         units = np.resize([drive.length_scale, drive.speed_scale], len(seen))
         forces[..., 0, :] = (feedback.direct * units / drive.force_scale) @ seen
-        forces[..., 0, own] = feedback.output * drive.speed_scale / drive.force_scale
+        forces[..., 0, law] = feedback.output * drive.speed_scale / drive.force_scale
         forces[..., 1:, first:past] = np.eye(under_way)
         matrix[..., :order, :order] = slide
         matrix[..., :order, :] += starting[:, None] * forces[..., whole, None, :]
         if split > 0.0:
             matrix[..., :order, :] += ending[:, None] * forces[..., whole + 1, None, :]
-        matrix[..., own, :] += (feedback.input * (units / drive.speed_scale)) @ seen
-        matrix[..., own, own] += feedback.state
+        matrix[..., law, :] += (feedback.input * (units / drive.speed_scale)) @ seen
+        matrix[..., law, law] += feedback.state
         matrix[..., first:past, :] = forces[..., :-1, :]
         for place, count, start in ((POSITION, spans, past), (motor, of_motor, past + spans)):
             if count:
@@ -442,13 +442,13 @@ def _exponential(matrix: FloatArray) -> FloatArray:
     """
     squarings = max(frexp(float(np.abs(matrix).sum(axis=0).max()))[1] + 1, 0)
     part, one = matrix * 0.5**squarings, np.eye(len(matrix))
-    found = one
+    exponential = one
     # With a norm of one half the remaining terms are below rounding.
     for order in range(16, 0, -1):
-        found = one + part @ found / order
+        exponential = one + part @ exponential / order
     for _ in range(squarings):
-        found = found @ found
-    return found
+        exponential = exponential @ exponential
+    return exponential
 
 
 def _spectral_radius(matrices: FloatArray) -> Any:

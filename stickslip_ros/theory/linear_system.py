@@ -64,11 +64,11 @@ def sampled_system(loop: LinearSampledLoop, law: ControlLaw | LinearFeedback) ->
     """
     drive, matrix, disturbed = loop.drive, loop.transition_matrix(law), loop.disturbed
     earlier = loop.difference_samples, loop.motor_difference_samples
-    own = len(matrix) - len(disturbed) - loop.under_way - sum(earlier)
+    law_order = len(matrix) - len(disturbed) - loop.under_way - sum(earlier)
     names = (
         *drive_system(replace(drive, actuator=IDEAL_ACTUATOR)).states,
         *(f"actuator.{name}" for name in drive.actuator.states),
-        *(f"control.{number}" for number in range(1, own + 1)),
+        *(f"control.{number}" for number in range(1, law_order + 1)),
         *(f"force.{number}" for number in range(1, loop.under_way + 1)),
         *(f"earlier_x.{number}" for number in range(1, earlier[0] + 1)),
         *(f"earlier_motor.x.{number}" for number in range(1, earlier[1] + 1)),

@@ -35,7 +35,7 @@ class PlantResponse:
     """The same by a disturbance force on the slide."""
 
     @classmethod
-    def of(cls, loop: LinearSampledLoop) -> Self:
+    def of_loop(cls, loop: LinearSampledLoop) -> Self:
         """Return the response of a loop."""
         drive = loop.drive
         whole, rest = loop.delay
@@ -63,9 +63,9 @@ class PlantResponse:
             rows.append(states[:, place] * drive.length_scale)
             speed = states[:, place + SPEED] * drive.speed_scale
             rows.append(rows[-1] * _rate(spans, loop.rate, z)[:, None] if spans else speed)
-        found = np.stack(rows, axis=1)
-        delayed = found[..., 0] * (z**-whole)[:, None]
-        return cls(loop, 2.0 * pi * turns * loop.rate, delayed, found[..., 1])
+        stacked = np.stack(rows, axis=1)
+        delayed = stacked[..., 0] * (z**-whole)[:, None]
+        return cls(loop, 2.0 * pi * turns * loop.rate, delayed, stacked[..., 1])
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,12 +81,12 @@ class LoopResponse:
     def law(self) -> ComplexArray:
         """Force by what the law sees, N/m and N s/m; shape (n, 2) or (n, 4)."""
         form, z = self.feedback, np.exp(1j * self.plant.frequency / self.plant.loop.rate)
-        found = np.broadcast_to(form.direct.astype(complex), (len(z), len(form.direct)))
+        response = np.broadcast_to(form.direct.astype(complex), (len(z), len(form.direct)))
         if len(form.state):
             states = z[:, None, None] * np.eye(len(form.state)) - form.state
-            found = found + form.output @ np.linalg.solve(states, form.input.astype(complex))
+            response = response + form.output @ np.linalg.solve(states, form.input.astype(complex))
         count = self.plant.by_control.shape[1]  # two for each body that there is
-        padded = np.pad(found, ((0, 0), (0, max(count - found.shape[1], 0))))
+        padded = np.pad(response, ((0, 0), (0, max(count - response.shape[1], 0))))
         return padded[:, :count].astype(np.complex128)
 
     @cached_property
@@ -147,8 +147,8 @@ class LoopResponse:
         step = np.repeat([1.0, -1.0], count)  # the step of a square wave of long period
         spectrum = np.zeros(count + 1, dtype=complex)
         spectrum[1::2] = by_step * np.fft.rfft(step)[1::2]
-        found = np.fft.irfft(spectrum, 2 * count)[:count]
-        return (found + found[-1]) / 2.0
+        response = np.fft.irfft(spectrum, 2 * count)[:count]
+        return (response + response[-1]) / 2.0
 
     def noise_force(self, *noises: float) -> float:
         """Return the rms force, N, by white noise of these rms, m, of the measured positions.

@@ -62,7 +62,7 @@ def _holds_position(control: ContinuousControl) -> bool:
         seen = seen_by(control, position, 0.0, (position, 0.0))
         states = [0.0] * len(control.states)
         rates = control.state_rates(*seen, states)
-        return [float(each) for each in (control.control_force(*seen, states), *rates)]
+        return [float(output) for output in (control.control_force(*seen, states), *rates)]
 
     return response(0.0) != response(1.0)
 

@@ -173,8 +173,8 @@ class _Shot:
             return None
         residual = motion.state - start
         miss = float(np.abs(residual).max()) / max(abs(float(start[0])), distance)
-        found = motion.shot.matrix, motion.rate, motion.shot.landed, motion.core.mode
-        return cls(unknowns, residual, miss, *found)
+        outcome = motion.shot.matrix, motion.rate, motion.shot.landed, motion.core.mode
+        return cls(unknowns, residual, miss, *outcome)
 
     def newton_step(self) -> FloatArray:
         """Return the change of the unknowns after which the linearised motion would close."""
@@ -187,8 +187,8 @@ class _Shot:
         """Return the eigenvalues of the derivative of the map from one upward turn to the next."""
         by_time_of_turn = np.outer(self.rate, self.transition[SPEED]) / self.rate[SPEED]
         kept = np.delete(np.arange(len(self.rate)), SPEED)
-        found = np.linalg.eigvals((self.transition - by_time_of_turn)[np.ix_(kept, kept)])
-        multipliers = sorted(found.astype(complex).tolist(), key=abs, reverse=True)
+        eigenvalues = np.linalg.eigvals((self.transition - by_time_of_turn)[np.ix_(kept, kept)])
+        multipliers = sorted(eigenvalues.astype(complex).tolist(), key=abs, reverse=True)
         if self.landed:
             multipliers[-1] = 0j  # exactly zero: a stick forgets its landing
         return tuple(multipliers)

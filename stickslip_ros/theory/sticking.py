@@ -196,7 +196,7 @@ def release_excess(drive: Drive) -> float:
     it per unit of time, as an orbit does that touches. Raises RunError for a motion too stiff
     to follow.
     """
-    peak = first_found(_released(drive), lambda found: _highest(found, drive.belt_speed))
+    peak = first_found(_released(drive), lambda part: _highest(part, drive.belt_speed))
     if peak is None:
         return -1.0
     position, velocity = peak
@@ -219,7 +219,7 @@ def release_margin(drive: Drive) -> float:
     excess = release_excess(drive)
     if excess <= 0.0:
         return excess
-    position = first_found(_released(drive), lambda found: _entry(found, drive.belt_speed))
+    position = first_found(_released(drive), lambda part: _entry(part, drive.belt_speed))
     if position is None:
         return -1.0
     return min(excess, (release_position(drive) - position) / drive.length_scale)

@@ -208,4 +208,4 @@ def test_what_a_block_lacks_goes_tick_by_tick(name: str) -> None:
     motion = RecordedMotion(drive, 0.0, 0.0)
     motion.recording = name == "recorded"
     loop = SampledLoop(motion, options.pop("rate", RATE), 10**9, **options)
-    assert TickBlocks.of(loop, motion, None if law is None else Controller(law)) is None
+    assert TickBlocks.for_loop(loop, motion, None if law is None else Controller(law)) is None

@@ -47,7 +47,7 @@ def basins_of(scenario: Scenario, plan: Plan, *, continuous: bool = False) -> Ba
 
 
 def basins_from(points: Sequence[Point]) -> Basins:
-    columns = Columns.of(RandomSample(STARTS, max(len(points), 1)))
+    columns = Columns.empty(RandomSample(STARTS, max(len(points), 1)))
     columns.enter(point._replace(number=number) for number, point in enumerate(points))
     return Basins.from_columns(columns)
 

@@ -77,7 +77,7 @@ def test_columns_are_the_points_in_their_order(study: Study, columns: Columns) -
 
 
 def test_a_point_that_is_not_done_has_nothing() -> None:
-    columns = Columns.of(speeds(3).plan)
+    columns = Columns.empty(speeds(3).plan)
     point = Point(1, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 2, Regime.PURE_SLIP, True, (0.5,))
     columns.enter([point])
     assert bits(columns.amplitude) == bits([None, 0.1, None])
@@ -167,7 +167,7 @@ def test_whole_numbers_stay_whole_in_a_table() -> None:
 def test_any_reason_is_read_back() -> None:
     reason = 'a, "b"\n c; \u00e4'
     study = speeds(2)
-    columns = Columns.of(study.plan)
+    columns = Columns.empty(study.plan)
     columns.enter(Point(number, reason=reason) for number in (0, 1))
     read = as_json(study, columns)
     write_csv(stream := StringIO(), columns, {})

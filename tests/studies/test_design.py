@@ -141,7 +141,7 @@ def test_gains_for_a_spread_keep_the_limits_of_all_drives_that_are_searched_for(
     for seed in range(5):
         scenario = task.scenario.changed(drawn(task.scenario, seed, 0.2))
         step = [Disturbance.parse("step", task.scenario)]
-        other = Designer.of(Task(scenario, (0.04, 0.04), 480.0), step)
+        other = Designer.for_task(Task(scenario, (0.04, 0.04), 480.0), step)
         assert other.tuning.loops.slowest(found.controller).decay_rate(found.controller) > 0.0
         assert other.tuning.missed(found.controller) == ()
         assert all(check.held for check, _ in other.trial.checks(found.controller))
@@ -187,7 +187,7 @@ def test_a_drawn_drive_that_is_not_held_is_counted_and_told(
     assert "the simulated drive is not held at 30 mm/s" in str(found)
     assert found.to_dict()["drawn"]["worst"] == found.design.drawn.worst
     # What grows cannot be simulated until it has settled.
-    weak = Designer.of(task(AT_40), []).trial.worst(Washout(11.0, -1.0, 0.0))
+    weak = Designer.for_task(task(AT_40), []).trial.worst(Washout(11.0, -1.0, 0.0))
     assert not weak.held
     assert re.match(r"at 40 mm/s a small deviation grows with [\d.]+ 1/s", weak.reason)
     # With drives to search for, one of them says why there is nothing to propose.

@@ -52,7 +52,7 @@ def loop_of(
 def response_of(loop: LinearSampledLoop, law: ControlLaw) -> LoopResponse:
     feedback = law.linear_part(1.0 / loop.rate)
     assert feedback is not None
-    return LoopResponse(PlantResponse.of(loop), feedback)
+    return LoopResponse(PlantResponse.of_loop(loop), feedback)
 
 
 @laws

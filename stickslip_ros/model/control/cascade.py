@@ -69,16 +69,16 @@ class Cascade(ControlLaw, TwoBodyControl):
     def respond(
         self, state: State, elapsed: float, sample: Sample, reference: Reference
     ) -> tuple[float, State]:
-        integral, rate, *own = state
+        integral, rate, *memory = state
         position, velocity, acceleration = reference.filled
         error = self.position_gain * (position - sample.of(self.feedback).position) + velocity
         error -= sample.of(self.velocity_feedback).velocity
-        added, own = self.washout.respond((own[0], own[1]), elapsed, sample, reference)
+        added, memory = self.washout.respond((memory[0], memory[1]), elapsed, sample, reference)
         added += self.velocity_gain * error + self.feed_forward_mass * acceleration
         after = integral + rate * elapsed
         if abs(added + after) > max(self.force_limit, abs(added + integral)):
             after = integral
-        return added + after, (after, self.integral_gain * error, *own)
+        return added + after, (after, self.integral_gain * error, *memory)
 
     @override
     def linear_feedback(self, period: float) -> LinearFeedback:

@@ -63,8 +63,8 @@ class LugreObserver(FrictionFeedforward):
 
     @override
     def for_drive(self, drive: Drive) -> Self:
-        found = super().for_drive(drive)
-        own = getattr(drive.friction, "bristle_stiffness", None)
-        stiffness = found.static_force / _DEFLECTION if own is None else own * drive.normal_force
+        law = super().for_drive(drive)
+        ratio = getattr(drive.friction, "bristle_stiffness", None)
+        stiffness = law.static_force / _DEFLECTION if ratio is None else ratio * drive.normal_force
         damping = getattr(drive.friction, "bristle_damping", 0.0) * drive.normal_force
-        return replace(found, bristle_stiffness=stiffness, bristle_damping=damping)
+        return replace(law, bristle_stiffness=stiffness, bristle_damping=damping)

@@ -335,4 +335,4 @@ class FrictionLaw(FrictionMemory):
     @classmethod
     def constants(cls) -> tuple[str, ...]:
         """Return the names of the law's constants."""
-        return tuple(each.name for each in fields(cls))
+        return tuple(field.name for field in fields(cls))

@@ -22,7 +22,7 @@ def _of_direction(method: Callable[..., Any]) -> Any:
 
     @wraps(method, updated=())
     def ask(self: "Directional", *arguments: Any, **named: Any) -> Any:
-        arguments = (*arguments, *(named[each] for each in parameters[len(arguments) :]))
+        arguments = (*arguments, *(named[name] for name in parameters[len(arguments) :]))
         sign = arguments[place]
         if isinstance(sign, int | float):
             law = self.forward if sign > 0.0 else self.reverse
@@ -36,7 +36,7 @@ def _of_direction(method: Callable[..., Any]) -> Any:
 def _blended(sign: Any, ahead: Any, back: Any) -> Any:
     """Return the value of forward slip where the sign is 1, and of backward slip where it is -1."""
     if isinstance(ahead, Sequence):
-        return [_blended(sign, *each) for each in zip(ahead, back, strict=True)]
+        return [_blended(sign, *pair) for pair in zip(ahead, back, strict=True)]
     return 0.5 * ((1.0 + sign) * ahead + (1.0 - sign) * back)
 
 

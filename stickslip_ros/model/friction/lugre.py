@@ -65,8 +65,8 @@ class SteadyPart(FrictionLaw):
     @override
     def multiplied(self, factor: float) -> Self | None:
         """Return the same law, and its curve, with another size; see `FrictionLaw.multiplied`."""
-        own, curve = super().multiplied(factor), self.curve.multiplied(factor)
-        return None if own is None or curve is None else replace(own, curve=curve)
+        law, curve = super().multiplied(factor), self.curve.multiplied(factor)
+        return None if law is None or curve is None else replace(law, curve=curve)
 
     def scaled(self, speed: float, length: float = 1.0) -> Self:
         """Return the same law, and its curve, in other units; see `FrictionLaw.scaled`."""
@@ -108,8 +108,8 @@ class CurveFollower(SteadyPart):
         float or expression
             Size of the curve without its viscous part.
         """
-        own = switches[len(self.own_switches) :]
-        return -sign * self._dry.friction(relative_speed, sign, (), own)
+        curve_switches = switches[len(self.own_switches) :]
+        return -sign * self._dry.friction(relative_speed, sign, (), curve_switches)
 
     @property
     def viscous_part(self) -> Any:
@@ -118,8 +118,8 @@ class CurveFollower(SteadyPart):
 
     def margins(self, relative_speed: Any, sign: Any, memory: Values, switches: Values) -> Values:
         """Return those of the curve, with the switches of all; see `FrictionMemory.margins`."""
-        own = len(self.own_switches)
-        return self._dry.margins(relative_speed, sign, (), switches[own:])
+        count = len(self.own_switches)
+        return self._dry.margins(relative_speed, sign, (), switches[count:])
 
     def switches_at(self, relative_speed: float, sign: float, memory: Numbers) -> Numbers:
         """Return those of the curve only; see `FrictionMemory.switches_at`."""
@@ -127,8 +127,8 @@ class CurveFollower(SteadyPart):
 
     def switches_after(self, margin: int, sign: float, switches: Numbers) -> Numbers:
         """Return all switches after a margin of the curve; see `FrictionMemory.switches_after`."""
-        own = len(self.own_switches)
-        return (*switches[:own], *self.curve.switches_after(margin, sign, switches[own:]))
+        count = len(self.own_switches)
+        return (*switches[:count], *self.curve.switches_after(margin, sign, switches[count:]))
 
     def refusal(self) -> str | None:
         """Refuse a curve with a memory or stiction, or one that is not above 0 everywhere."""

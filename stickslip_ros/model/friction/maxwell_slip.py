@@ -70,18 +70,18 @@ class MaxwellSlip(CurveFollower):
     def margins(self, relative_speed: Any, sign: Any, memory: Values, switches: Values) -> Values:
         """Return those of the elements from their limits; see `FrictionMemory.margins`."""
         size = self.size(relative_speed, sign, switches)
-        own = [
+        margins = [
             slips + (1.0 - slips) * (size - sign * force)
             for force, slips in zip(self._forces(memory), switches, strict=False)
         ]
-        return (*own, *super().margins(relative_speed, sign, memory, switches))
+        return (*margins, *super().margins(relative_speed, sign, memory, switches))
 
     def switches_at(self, relative_speed: float, sign: float, memory: Numbers) -> Numbers:
         """Return which elements are at their limit; see `FrictionMemory.switches_at`."""
         of_curve = super().switches_at(relative_speed, sign, memory)
         size = float(self.size(relative_speed, sign, (*[0.0] * self.elements, *of_curve)))
-        own = [float(sign * force >= _AT_LIMIT * size) for force in self._forces(memory)]
-        return (*own, *of_curve)
+        slipping = [float(sign * force >= _AT_LIMIT * size) for force in self._forces(memory)]
+        return (*slipping, *of_curve)
 
     def switches_after(self, margin: int, sign: float, switches: Numbers) -> Numbers:
         """Return those with one more element that slips; see `FrictionMemory.switches_after`."""

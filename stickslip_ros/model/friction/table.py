@@ -39,7 +39,7 @@ class Table(FrictionLaw):
 
     @override
     def multiplied(self, factor: float) -> Self:
-        return replace(self, points=tuple((speed, factor * each) for speed, each in self.points))
+        return replace(self, points=tuple((speed, factor * mu) for speed, mu in self.points))
 
     @override
     def coefficient(self, relative_speed: Any, sign: Any) -> Any:
@@ -100,7 +100,7 @@ class Table(FrictionLaw):
 
     @override
     def scaled(self, speed: float, length: float = 1.0) -> Self:
-        return replace(self, points=tuple((each / speed, value) for each, value in self.points))
+        return replace(self, points=tuple((knot / speed, value) for knot, value in self.points))
 
     @cached_property
     def _speeds(self) -> list[float]:
