@@ -272,6 +272,7 @@ class ComparedLaws(TabularResult):
             "duration": plan.duration,
             "tolerance": plan.tolerance,
             "spread": plan.spread,
+            "rank_by": self.rank_by,
             "ranks": ranked,
             "cases": self._columns,
         }

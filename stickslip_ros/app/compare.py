@@ -8,7 +8,6 @@ from stickslip_ros.app.arguments import (
     add_scenario,
     check_new,
     law_constants,
-    naming,
     spread_of,
     whole,
     writing,
@@ -107,8 +106,7 @@ def run(arguments: argparse.Namespace) -> None:
     proposed = law_constants("force_limit", "start_after")
     scenario, axes = scenario_over(arguments, *([] if arguments.given else proposed))
     check_results(arguments)
-    with naming("--rank-by:"):
-        check_rank(arguments.rank_by, scenario)
+    check_rank(arguments.rank_by, scenario)
     chosen: Path | None = arguments.out
     if chosen is not None and chosen.suffix.lower() in ("", ".yaml", ".yml"):
         check_new("--out", chosen)

@@ -71,7 +71,10 @@ def in_order(
         what += f", as a counter that wraps: time=unwrap({column}, {turn:.12g}){way}"
     elif len(back) <= _MOST_SESSIONS:
         sizes = " and ".join(map(str, np.diff(bounds)))
-        what += f", where a session of its own starts: --session 1 takes the first of {sizes} rows"
+        what += (
+            f", where a session of its own starts: --session 1 takes the first of {sizes} rows; "
+            "of several joints, --where COLUMN=VALUE takes the rows of one"
+        )
     else:
         what += ": rows must be in the order of time"
         if table.period:

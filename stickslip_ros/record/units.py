@@ -134,8 +134,8 @@ def force_per_ampere(constant: str, pitch: float | None, *, rotary: bool) -> flo
     readings = [reading for unit in ("N/A", "N m/A") for reading in _read(constant, unit)]
     if not readings or not readings[0].factor:
         raise InvalidInputError(
-            f"{given} is invalid: must be a number with its unit, as 50N/A of a linear motor, or "
-            "0.35Nm/A of a motor that turns a screw or a rotary axis"
+            f"{given} is invalid: must be a number above 0 with its unit, as 50N/A of a linear "
+            "motor, or 0.35Nm/A of a motor that turns a screw or a rotary axis"
         )
     ((_, factor, unit), *_) = readings
     ways = {
@@ -143,6 +143,8 @@ def force_per_ampere(constant: str, pitch: float | None, *, rotary: bool) -> flo
         "N m/A": "N m/A is of a motor that turns either a screw, whose pitch is needed, or a "
         "rotary axis, which has none",
     }
+    if pitch is not None and rotary:
+        raise InvalidInputError(f"pitch = {pitch} m is refused: a rotary axis has no screw")
     if (pitch is not None) + rotary != (unit == "N m/A"):
         other = "N/A, a linear motor," if unit == "N m/A" else "N m/A, a motor with a screw,"
         raise InvalidInputError(f"{given} is refused: {ways[unit]}; {other} may be meant")

@@ -259,11 +259,11 @@ def test_a_current_is_a_force_by_the_constant_of_the_motor(
     ("form", "refusal"),
     [
         ({"force_constant": "0.35"}, "as 50N/A of a linear motor, or 0.35Nm/A"),
-        ({"force_constant": "0N/A"}, "is invalid: must be a number with its unit"),
+        ({"force_constant": "0N/A"}, "is invalid: must be a number above 0 with its unit"),
         ({"force_constant": "0.35Nm/A"}, "whose pitch is needed, .* N/A, a linear motor, may be"),
         ({"force_constant": "50N/A", "pitch": 0.01}, "which has no pitch .* N m/A, a motor with"),
         ({"force_constant": "50N/A", "rotary": True}, "turns no rotary axis"),
-        ({"force_constant": "1Nm/A", "rotary": True, "pitch": 0.01}, "rotary axis, which has none"),
+        ({"force_constant": "1Nm/A", "rotary": True, "pitch": 0.01}, "a rotary axis has no screw"),
         ({"pitch": 0.01}, "pitch = 0.01 is refused: it is for a force_constant"),
         ({"force_constant": "50N/A", "pitch": -1.0}, "pitch = -1.0 is invalid"),
     ],
