@@ -237,10 +237,13 @@ class FollowingAdapter(IdentifiedLaw):
         by_differences: Sequence[str] = (),
     ) -> None:
         """Take the curve, its name, the coordinates of its memory, and what takes differences."""
-        vars(self).update({said: getattr(curve, said) for said in IdentifiedLaw.__annotations__})
         self._curve, self.name = curve, name
         self.coordinates = [*curve.coordinates, *bristles]
         self.by_differences = [*curve.by_differences, *by_differences]
+        self.unscaled, self.smallest, self.optional = curve.unscaled, curve.smallest, curve.optional
+        self.straightening = curve.straightening
+        self.least, self.shaped, self.least_shape = curve.least, curve.shaped, curve.least_shape
+        self.speeds, self.identifiable_in_slip = curve.speeds, curve.identifiable_in_slip
 
     @override
     def terms(self, speed: FloatArray, shape: float) -> FloatArray:

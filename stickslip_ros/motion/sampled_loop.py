@@ -152,10 +152,14 @@ class SampledLoop:
         return self._sampler.true_sample(self.sample)
 
     @property
+    def asks(self) -> bool:
+        """Whether the present sample asks for a force: otherwise the last one is held."""
+        return self.answers.asks(self.sample_number)
+
+    @property
     def answered(self) -> bool:
         """Whether the force for the present sample has arrived, or it asks for none."""
-        number = self.sample_number
-        return self.answers.newest == number or not self.answers.asks(number)
+        return self.answers.newest == self.sample_number or not self.asks
 
     @property
     def is_ideal(self) -> bool:

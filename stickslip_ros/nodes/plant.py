@@ -324,7 +324,7 @@ class _SampleTopics:
     def _packed(self, sample: Sample) -> bytes:
         friction = sample.friction_force
         effort = self._loop.applied_force if self._effort_of_actuator else friction
-        asks = self._loop.answers.asks(self._loop.sample_number)
+        asks = self._loop.asks
         positions = sample.position, sample.belt_position
         velocities = sample.velocity, sample.belt_velocity
         if (motor := sample.motor) is None:

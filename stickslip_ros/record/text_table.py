@@ -122,9 +122,7 @@ class TextTable(Table):
         with (
             opened(self.path, self._content) as stream,
             TextIOWrapper(stream, encoding=text.encoding, errors="replace", newline="") as file,
-            warnings.catch_warnings(record=True) as caught,
         ):
-            warnings.simplefilter("always")
             for _ in range(text.first):
                 file.readline()
             frames: Any = pd.read_csv(
@@ -141,9 +139,16 @@ class TextTable(Table):
                 chunksize=max(1, _CHUNK // text.width),
                 **exact,
             )
-            yield from frames
-        skipped = re.findall(_SKIPPED, " ".join(str(warning.message) for warning in caught))
-        self._refused = [text.first + int(number) for number in skipped]
+            self._refused = []
+            frame: Any = ()
+            while frame is not None:
+                with warnings.catch_warnings(record=True) as caught:
+                    warnings.simplefilter("always")
+                    frame = next(frames, None)
+                skipped = re.findall(_SKIPPED, " ".join(str(warning.message) for warning in caught))
+                self._refused += [text.first + int(number) for number in skipped]
+                if frame is not None:
+                    yield frame
 
     def _joined(self, parts: Sequence[Any]) -> Any:
         """Return the parts of a column as one; instants as seconds from the first of the table."""
