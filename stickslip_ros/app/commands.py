@@ -89,7 +89,7 @@ class _Parser(argparse.ArgumentParser):
 def command_parser(name: str) -> argparse.ArgumentParser:
     """Return the parser of a command; only the module of this one is imported."""
     command = import_module(f"stickslip_ros.app.{name}")
-    example = f"example: {EXAMPLES[name]}"
+    example = f"example: {EXAMPLES[name]}" if name in EXAMPLES else None
     parser = _Parser(prog=f"stickslip {name}", description=COMMANDS[name][1], epilog=example)
     command.add_arguments(parser)
     parser.add_argument(
