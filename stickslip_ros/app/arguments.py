@@ -146,6 +146,9 @@ def _add_table_form(parser: argparse.ArgumentParser) -> None:
         help="what is added to times of their own that columns of a table have, as -20ms "
         "(default: 0)",
     )
+
+
+def _add_units(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--force-constant",
         metavar="K",
@@ -165,6 +168,7 @@ def _add_table_form(parser: argparse.ArgumentParser) -> None:
 def add_reading(parser: argparse.ArgumentParser) -> None:
     """Add the options that say how recordings are read: see `reading_of`."""
     _add_table_form(parser)
+    _add_units(parser)
     parser.add_argument(
         "--from",
         dest="start",

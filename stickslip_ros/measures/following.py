@@ -18,9 +18,10 @@ _LEAST_WAY, _JUMP = 0.05, 0.2
 two reversals from which a single step of the reference is a jump, and no motion."""
 _WINDOW = 0.25
 """Share of the time to the next reversal in which the error counts as that of a reversal."""
-_FAST, _VARIED = 0.3, 0.15
+_FAST, _VARIED, _UNCLEAR = 0.3, 0.15, 0.1
 """Share of the largest speed from which the lag is fitted; deviation of these speeds, as a share of
-their mean, from which a lag and an error that only has a direction are told apart."""
+their mean, from which a lag and an error that only has a direction are told apart; largest share of
+a height that may be lag."""
 _STANDS, _NATURAL = 1e-3, 3.0
 """Share of the height within which a slide that stands may move; times that a slide without error
 would seem to stand, from which it is a rest."""
@@ -72,6 +73,8 @@ class Reversal(NamedTuple):
     rest: float | None
     wide: int
     """Number of samples above half the height."""
+    unclear: float
+    """How much of the height may be lag, m."""
 
 
 class Followed(NamedTuple):
@@ -124,6 +127,8 @@ def followed(
         notes.append(f"the error at reversals is not known: positions tell none below {text}")
     elif turns and np.median([turn.wide for turn in turns]) < _FEWEST_SAMPLES:
         notes.append("the error at reversals is not known: it is shorter than three samples")
+    elif turns and turns[0].unclear > _UNCLEAR * np.mean(heights):
+        notes.append("the error at reversals is not known: at a single speed it may be a lag")
     elif turns:
         scatter = float(np.std(heights, ddof=1)) if len(turns) > 1 else None
         values = replace(
@@ -164,7 +169,9 @@ def _reversals(
     These have a first and a last row; `limit` is what positions do not tell, m.
     """
     beside = [(a, b, end) for (a, b), (c, end) in pairwise(ways) if b == c]
-    behind = _without_lag(time, reference, reference - position, beside[0][1]) if beside else time
+    if not beside:
+        return
+    behind, unclear = _without_lag(time, reference, reference - position, beside[0][1])
     for before, row, after in beside:
         length = time[after] - time[row]
         if after == ways[-1][1]:  # of the last way the end is not known
@@ -182,16 +189,16 @@ def _reversals(
         natural = _standing(since, ideal, row - start, least)
         is_told = rest > max(_NATURAL * natural, 2.0 * (time[row + 1] - time[row]))
         rested = rest if is_told else None
-        yield Reversal(since[row - start :], error, height, duration, rested, wide)
+        yield Reversal(since[row - start :], error, height, duration, rested, wide, unclear)
 
 
 def _without_lag(
     time: FloatArray, reference: FloatArray, error: FloatArray, start: int
-) -> FloatArray:
+) -> tuple[FloatArray, float]:
     """Return an error less what is constant, or in proportion to the speed or the position.
 
     These are fitted to the fast parts from a row on, with what has only the sign of the speed. At a
-    single speed a lag cannot be told from that, and is left in the error.
+    single speed a lag cannot be told from that, and is left in the error: the second value, m.
     """
     place = (reference - reference.mean()) / float(np.ptp(reference))
     speed = np.gradient(reference, time)
@@ -199,10 +206,11 @@ def _without_lag(
     fast = np.flatnonzero(np.abs(speed[start:]) > _FAST) + start
     sizes, ones = np.abs(speed[fast]), np.ones(len(fast))
     causes = np.column_stack([np.sign(speed[fast]), ones, place[fast], speed[fast]])
-    if sizes.std() <= _VARIED * sizes.mean():
+    single = sizes.std() <= _VARIED * sizes.mean()
+    if single:
         causes[:, 3] = 0.0
-    _, constant, scale, lag = np.linalg.lstsq(causes, error[fast])[0]
-    return error - constant - scale * place - lag * speed
+    sign, constant, scale, lag = np.linalg.lstsq(causes, error[fast])[0].tolist()
+    return error - constant - scale * place - lag * speed, abs(sign) if single else 0.0
 
 
 def _peak(

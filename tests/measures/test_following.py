@@ -127,6 +127,22 @@ def test_a_fast_way_to_the_start_does_not_hide_the_lag() -> None:
     assert found.values.reversal_height == pytest.approx(SPIKE, rel=0.02)
 
 
+@pytest.mark.parametrize(("lag", "is_known"), [(0.0, True), (1e-3, False)])
+def test_at_a_single_speed_a_lag_is_not_told_as_an_error_at_reversals(
+    lag: float, is_known: bool
+) -> None:
+    triangle = RADIUS * np.arcsin(np.sin(OMEGA * TIME))
+    behind = np.interp(TIME - lag / (RADIUS * OMEGA), TIME, triangle)
+    found = followed(TIME, triangle, behind - CIRCLE + with_spikes(TIME, 0.0))
+    assert found is not None
+    assert found.values.peak_following_error == pytest.approx(max(lag, SPIKE), rel=0.1)
+    assert (found.values.reversal_height is not None) == is_known
+    if is_known:
+        assert found.values.reversal_height == pytest.approx(SPIKE, rel=0.1)
+    else:
+        assert found.notes[-1].endswith("at a single speed it may be a lag")
+
+
 def test_the_standard_error_is_that_of_the_mean_over_reversals() -> None:
     time = TIME[TIME < 6.5]  # reversals at 1, 3 and 5 s
     reference, whole = RADIUS * np.sin(OMEGA * time), with_spikes(time, 0.0)
