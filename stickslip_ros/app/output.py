@@ -161,11 +161,13 @@ def _told(label: str) -> Generator[list[str]]:
         while not ended.wait(_LINE_INTERVAL):
             tell(f"{said[0]}, {monotonic() - begin:.0f} s")
 
-    Thread(target=follow, daemon=True).start()
+    follower = Thread(target=follow, daemon=True)
+    follower.start()
     try:
         yield said
     finally:
         ended.set()
+        follower.join()  # no line of progress behind the result
 
 
 def _print_framed(
