@@ -60,7 +60,9 @@ def run_to_the_end(
     graph.wait_until(lambda: not plant.active, "plant pauses")
     last = plant.diagnose()[2]["newest_stamp"]
     graph.wait_until(lambda: recorded and stamp_of(recorded[-1].stamp) == last, "all is recorded")
-    graph.wait_until(lambda: last in analyzer._measures.watch._kept.stamp[-1:], "all is measured")
+    graph.wait_until(
+        lambda: last in analyzer._activation.measures.watch._kept.stamp[-1:], "all is measured"
+    )
     level, message, _ = analyzer.diagnose()
     graph.deactivate("analyzer")
     return level, message
@@ -168,8 +170,8 @@ def test_it_measures_a_joint_of_another_machine(graph: Graph, tmp_path: Path, ki
         forces.publish(message)
     graph.wait_until(
         lambda: (
-            analyzer._measures.meter.motion.samples == 200
-            and (analyzer._measures.meter.force.peak_force or 0.0) == 3.0
+            analyzer._activation.measures.meter.motion.samples == 200
+            and (analyzer._activation.measures.meter.force.peak_force or 0.0) == 3.0
         ),
         "all is measured",
     )
@@ -211,13 +213,13 @@ def test_it_keeps_the_counts_of_late_forces_of_each_activation_of_the_plant(
     tell("/test/plant", "deactivating", 2, 200, 30, 5)
     tell("/test/plant", "inactive", 2, 200, 30, 5)
     tell("/test/plant", "active", 3, 50, 1, 0)
-    graph.wait_until(lambda: (analyzer._timing.total or [0])[0] == 250, "all is heard")
+    graph.wait_until(lambda: (analyzer._activation._timing.total or [0])[0] == 250, "all is heard")
     assert kept_timing(tmp_path / "bag") == {  # also if it is killed now
         "samples": "250", "late_forces": "31", "missed_deadlines": "5",
     }  # fmt: skip
     assert "12 % of the forces came late" in analyzer.diagnose()[2]["notes"]
     tell("/test/plant", "active", 3, 150, 1, 0)
-    graph.wait_until(lambda: analyzer._timing.total.samples == 350, "the last is heard")
+    graph.wait_until(lambda: analyzer._activation._timing.total.samples == 350, "the last is heard")
     graph.deactivate("analyzer")
     assert (kept_timing(tmp_path / "bag") or {})["samples"] == "350"
 
@@ -272,7 +274,7 @@ def test_no_sample_counts_as_recorded_before_the_parameters_are(
     answered: list[bool] = []
 
     def note(_: object) -> None:
-        answered.append(analyzer._parameter_calls.has_answered("plant"))
+        answered.append(analyzer._activation._parameter_calls.has_answered("plant"))
 
     graph.subscribe(RECORDED, note)
     graph.add(PlantNode, autostart=False)
@@ -290,7 +292,7 @@ def test_a_timer_that_is_due_when_it_stops_does_nothing(graph: Graph) -> None:
     analyzer = graph.add(AnalyzerNode, autostart=False)
     analyzer.trigger_configure()
     analyzer.trigger_activate()
-    due = [timer.callback for timer in analyzer._periodic]
+    due = [timer.callback for timer in analyzer._activation._periodic]
     assert len(due) == 2
     analyzer.trigger_deactivate()
     for callback in due:  # the executor had seen it, and not yet called back

@@ -182,7 +182,7 @@ def test_a_stamp_beyond_ros_time_is_dropped(graph: Graph, tmp_path: Path) -> Non
         graph.wait_until(lambda n=node: n.diagnose()[2]["dropped_messages"] == 1, "dropped")
     states.publish(pack_joint_state(SECOND, (0.0, 0.0), (0.1, 0.4), (0.0, 0.0)))
     graph.wait_until(lambda: controller._answered == 1, "the next one is answered")
-    graph.wait_until(lambda: analyzer._newest_recorded == SECOND, "and recorded")
+    graph.wait_until(lambda: analyzer._activation._newest_recorded == SECOND, "and recorded")
 
 
 @pytest.mark.parametrize("pace", ["lockstep", "realtime"])
