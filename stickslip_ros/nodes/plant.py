@@ -16,43 +16,12 @@ from stickslip_ros.errors import BagError, InvalidInputError
 from stickslip_ros.motion.answers import Verdict
 from stickslip_ros.motion.motion import Motion
 from stickslip_ros.motion.sampled_loop import LOCKSTEP_START, SampledLoop
-from stickslip_ros.nodes.base.managed import (
-    ERROR,
-    FAILURE,
-    FINISHED,
-    FIRST_STAMP,
-    FORECAST,
-    NEWEST_STAMP,
-    OK,
-    Diagnosis,
-    ManagedNode,
-    diagnosis,
-)
+from stickslip_ros.nodes.base import managed
+from stickslip_ros.nodes.base.managed import Diagnosis, ManagedNode, diagnosis
 from stickslip_ros.nodes.base.process import run_node
 from stickslip_ros.nodes.forecast import FORECAST_DURATION, Forecast
 from stickslip_ros.nodes.pacing import NO_FORCE, LockstepPacer, RealtimePacer, TimingMonitor
-from stickslip_ros.record.codec import (
-    HELD,
-    MOTOR,
-    force_layouts,
-    joint_state_packer,
-    pack_wrench,
-    unpack_command,
-    unpack_force,
-    unpack_wrench,
-)
-from stickslip_ros.record.topics import (
-    APPLIED_DISTURBANCE,
-    APPLIED_FORCE,
-    CLOCK,
-    CONTROL_FORCE,
-    DISTURBANCE_FORCE,
-    DROPPED_FORCE,
-    JOINT_STATES,
-    RECORDED,
-    TRUE_JOINT_STATES,
-    force_topics,
-)
+from stickslip_ros.record import codec, topics
 from stickslip_ros.samples import Sample
 from stickslip_ros.scenarios.parameters import Pace, PlantParameters
 from stickslip_ros.stamps import END_OF_TIME, NANOSECONDS
@@ -79,19 +48,20 @@ class PlantNode(ManagedNode[PlantParameters]):
         self._lock = threading.Lock()
         self._topics = _SampleTopics(self)
         self.read_last = self._topics.states
-        self._dropped_force = self.advertise(DROPPED_FORCE)
+        self._dropped_force = self.advertise(topics.DROPPED_FORCE)
         self._answerable = 0
         """Stamp of the sample that may still be answered while the plant pauses, ns."""
-        force, commands = force_topics(self.parameters.force_type)
-        unpack: Callable[[bytes], tuple[int, float]] = unpack_wrench
-        if force != CONTROL_FORCE:
+        force, commands = topics.force_topics(self.parameters.force_type)
+        unpack: Callable[[bytes], tuple[int, float]] = codec.unpack_wrench
+        if force != topics.CONTROL_FORCE:
             number, slide = self.parameters.force_number or None, self.parameters.slide_name
-            unpack = partial(unpack_force, force_layouts(slide, number)[force.type_name])
+            layouts = codec.force_layouts(slide, number)
+            unpack = partial(codec.unpack_force, layouts[force.type_name])
         self.subscribe_serialized(force, partial(self._on_force, unpack))
-        unpack = partial(unpack_command, joint=self.parameters.slide_name)
+        unpack = partial(codec.unpack_command, joint=self.parameters.slide_name)
         self.subscribe_serialized(commands, partial(self._on_force, unpack))
-        self.subscribe(DISTURBANCE_FORCE, self._on_disturbance, while_active=False)
-        self.subscribe(RECORDED, lambda stamp: self._pacer.recorder_came_to(stamp))
+        self.subscribe(topics.DISTURBANCE_FORCE, self._on_disturbance, while_active=False)
+        self.subscribe(topics.RECORDED, lambda stamp: self._pacer.recorder_came_to(stamp))
         self.keep(self.create_service(Trigger, "~/reset", self._on_reset))
 
     def start(self) -> None:
@@ -103,7 +73,9 @@ class PlantNode(ManagedNode[PlantParameters]):
             self._motion,
             time.time_ns() if realtime else self._next_start,
             hold_late=realtime,
-            overtaken=lambda stamp, force: self._dropped_force.publish(pack_wrench(stamp, force)),
+            overtaken=lambda stamp, force: self._dropped_force.publish(
+                codec.pack_wrench(stamp, force)
+            ),
         )
         self._topics.start(self._loop, effort_of_actuator=parameters.effort == "actuator")
         latest = END_OF_TIME - NANOSECONDS
@@ -172,13 +144,13 @@ class PlantNode(ManagedNode[PlantParameters]):
     def diagnose(self) -> Diagnosis:
         """Return counts of samples, late and dropped forces and missed deadlines."""
         if self._timing is None:
-            return OK, "", {}
+            return managed.OK, "", {}
         loop, pacer = self._loop, self._pacer
         values = {
             "samples": loop.sample_number + 1,
-            FIRST_STAMP: loop.stamps.stamp(0),
-            NEWEST_STAMP: loop.sample.stamp,
-            FINISHED: pacer.finished,
+            managed.FIRST_STAMP: loop.stamps.stamp(0),
+            managed.NEWEST_STAMP: loop.sample.stamp,
+            managed.FINISHED: pacer.finished,
             "late_forces": loop.answers.late_forces,
             "missed_deadlines": pacer.missed_deadlines,
             "largest_lateness": round(pacer.largest_lateness, 6),
@@ -190,11 +162,11 @@ class PlantNode(ManagedNode[PlantParameters]):
             **{f"dropped: {reason}": count for reason, count in loop.answers.dropped.items()},
         }
         if self._forecast is not None and self._forecast.sentence:
-            values[FORECAST] = self._forecast.sentence
+            values[managed.FORECAST] = self._forecast.sentence
         if loop.unbounded:
-            return ERROR, "the motion diverges (regime unbounded)", values
+            return managed.ERROR, "the motion diverges (regime unbounded)", values
         if pacer.failure:
-            return ERROR, pacer.failure, {**values, FAILURE: pacer.failure}
+            return managed.ERROR, pacer.failure, {**values, managed.FAILURE: pacer.failure}
         controlled = self.parameters.expects_control and loop.answers.controller_present
         timing = self._timing.check(
             loop.sample_number + 1,
@@ -210,7 +182,7 @@ class PlantNode(ManagedNode[PlantParameters]):
                 self.get_logger().info("forces and samples are in time again")
         complaints = [pacer.complaint, lost, timing, self.dropped.complaint]
         complaints += self.duplicate_publishers(
-            *force_topics(self.parameters.force_type), DISTURBANCE_FORCE
+            *topics.force_topics(self.parameters.force_type), topics.DISTURBANCE_FORCE
         )
         return diagnosis(complaints, values)
 
@@ -234,7 +206,7 @@ class PlantNode(ManagedNode[PlantParameters]):
             if self.active:
                 self.dropped.add(f"control force: {error}")
             return
-        wrench = message if unpack is unpack_wrench else pack_wrench(stamp, force)
+        wrench = message if unpack is codec.unpack_wrench else codec.pack_wrench(stamp, force)
         if not self.active:
             if stamp != self._answerable:
                 self._dropped_force.publish(wrench)
@@ -287,16 +259,17 @@ class _SampleTopics:
     def __init__(self, node: ManagedNode[PlantParameters]) -> None:
         """Advertise the topics through a node."""
         parameters = node.parameters
-        self.states = node.advertise(JOINT_STATES)
+        self.states = node.advertise(topics.JOINT_STATES)
         self._truth: tuple[Publisher, Publisher] | None = None
         if parameters.publish_truth:
-            self._truth = node.advertise(TRUE_JOINT_STATES), node.advertise(APPLIED_FORCE)
-        self._applied_disturbance = node.advertise(APPLIED_DISTURBANCE)
-        self._clock = node.advertise(CLOCK) if parameters.publish_clock else None
+            states, force = topics.TRUE_JOINT_STATES, topics.APPLIED_FORCE
+            self._truth = node.advertise(states), node.advertise(force)
+        self._applied_disturbance = node.advertise(topics.APPLIED_DISTURBANCE)
+        self._clock = node.advertise(topics.CLOCK) if parameters.publish_clock else None
         names = parameters.slide_name, parameters.belt_name
         self._pack, self._pack_motor = (
-            [joint_state_packer(*joints, frame=frame) for frame in (HELD, "")]
-            for joints in (names, (*names, MOTOR))
+            [codec.joint_state_packer(*joints, frame=frame) for frame in (codec.HELD, "")]
+            for joints in (names, (*names, codec.MOTOR))
         )
         self._disturbance = 0.0
 
@@ -312,10 +285,10 @@ class _SampleTopics:
         if self._truth is not None:
             true_states, applied_force = self._truth
             true_states.publish(self._packed(self._loop.true_sample))
-            applied_force.publish(pack_wrench(sample.stamp, self._loop.applied_force))
+            applied_force.publish(codec.pack_wrench(sample.stamp, self._loop.applied_force))
         if self._loop.disturbance != self._disturbance:
             self._disturbance = self._loop.disturbance
-            self._applied_disturbance.publish(pack_wrench(sample.stamp, self._disturbance))
+            self._applied_disturbance.publish(codec.pack_wrench(sample.stamp, self._disturbance))
         if self._clock is not None:
             clock = Clock()
             clock.clock.sec, clock.clock.nanosec = divmod(sample.stamp, NANOSECONDS)

@@ -1,4 +1,4 @@
-"""Endpoints of the topics of `record.topics` in rclpy: message class, what matches, what waits."""
+"""Endpoints in rclpy of the topics of `record.topics`, which has their quality of service."""
 
 from collections.abc import Callable, Iterator
 from functools import cache

@@ -18,22 +18,9 @@ from rclpy.utilities import remove_ros_args
 
 from stickslip_ros.errors import InvalidInputError, StickslipError
 from stickslip_ros.model.constants import Changes
+from stickslip_ros.nodes.base import machine, network
 from stickslip_ros.nodes.base.child_process import die_with_parent
-from stickslip_ros.nodes.base.machine import (
-    FIRST_PROCESS,
-    domain_of_environment,
-    is_free,
-    own_domain,
-    port,
-)
 from stickslip_ros.nodes.base.managed import ManagedNode
-from stickslip_ros.nodes.base.network import (
-    DISCOVERY_RANGE,
-    NO_PEERS,
-    environment,
-    prefer_prompt_middleware,
-    this_machine_only,
-)
 from stickslip_ros.nodes.base.parameters import first_line
 from stickslip_ros.nodes.base.spinner import Spinner, ignore_stop_signals, spin, stop_on_signals
 from stickslip_ros.scenarios.parameters import NodeParameters
@@ -63,7 +50,7 @@ def ros_session(
     Raises InvalidInputError if the environment names no domain, or ROS refuses the arguments.
     """
     if domain is None:
-        domain = domain_of_environment()
+        domain = machine.domain_of_environment()
     try:
         rclpy.init(
             args=list(arguments),
@@ -88,7 +75,7 @@ def loopback_session(domain: int, arguments: Sequence[str]) -> Generator[Spinner
     This uses rclpy's default context, so that nodes need not name it, unless it is already in use.
     """
     with ExitStack() as opened:
-        with _initialising, environment({**_this_process_only_here(), **NO_PEERS}):
+        with _initialising, network.environment({**_this_process_only_here(), **network.NO_PEERS}):
             context = Context() if rclpy.ok() else rclpy.get_default_context()
             session = ros_session([*arguments, *_NO_LOGS_ELSEWHERE], context=context, domain=domain)
             spinner = opened.enter_context(session)
@@ -114,7 +101,7 @@ def run_node(make: Callable[[], ManagedNode[Any]], parameters: NodeParameters) -
         help="ROS arguments: -p NAME:=VALUE, --params-file FILE, -r __ns:=/NAMESPACE, -r FROM:=TO",
     )
     die_with_parent()
-    prefer_prompt_middleware()
+    network.prefer_prompt_middleware()
     try:
         parser.parse_args(remove_ros_args(sys.argv)[1:])
     except Exception as error:
@@ -170,16 +157,16 @@ def _this_process_only_here() -> Mapping[str, str]:
     Fast DDS reads a profile once per process. If ROS was in use before ours could be read, it
     listens on every address; then LOCALHOST, which uses shared memory, is the best available.
     """
-    variables = this_machine_only()
+    variables = network.this_machine_only()
     context, arguments = Context(), ["--ros-args", *_NO_LOGS_ELSEWHERE]
     with (
-        own_domain() as domain,
-        environment({**variables, DISCOVERY_RANGE: "OFF"}),
+        machine.own_domain() as domain,
+        network.environment({**variables, network.DISCOVERY_RANGE: "OFF"}),
         ros_session(arguments, context=context, domain=domain) as spinner,
     ):
         spinner.add(Node("which_addresses", context=context))
-        elsewhere_free = is_free(port(domain, FIRST_PROCESS), "127.0.0.2")
-    return variables if elsewhere_free else {DISCOVERY_RANGE: "LOCALHOST"}
+        elsewhere_free = machine.is_free(machine.port(domain, machine.FIRST_PROCESS), "127.0.0.2")
+    return variables if elsewhere_free else {network.DISCOVERY_RANGE: "LOCALHOST"}
 
 
 def _parameter_help(parameters: NodeParameters) -> str:

@@ -7,16 +7,10 @@ from operator import itemgetter
 from pathlib import Path
 from typing import Any, TypeVar
 
+from rclpy import qos
 from rclpy.duration import Duration
 from rclpy.exceptions import InvalidTopicNameException
-from rclpy.qos import (
-    DurabilityPolicy,
-    HistoryPolicy,
-    LivelinessPolicy,
-    QoSPolicyEnum,
-    QoSProfile,
-    ReliabilityPolicy,
-)
+from rclpy.qos import QoSPolicyEnum, QoSProfile
 from rclpy.validate_full_topic_name import validate_full_topic_name
 
 from stickslip_ros.errors import BagError, InvalidInputError
@@ -222,17 +216,17 @@ def recorded_profile(recorded: str) -> QoSProfile:
 
 
 def _profile(values: Mapping[str, Any]) -> QoSProfile:
-    durability = _policy(DurabilityPolicy.VOLATILE, values.get("durability"))
-    latches = durability is DurabilityPolicy.TRANSIENT_LOCAL
+    durability = _policy(qos.DurabilityPolicy.VOLATILE, values.get("durability"))
+    latches = durability is qos.DurabilityPolicy.TRANSIENT_LOCAL
     depth = int(values.get("depth", 0))
     return QoSProfile(
-        history=HistoryPolicy.KEEP_LAST,
+        history=qos.HistoryPolicy.KEEP_LAST,
         depth=min(max(depth, 1 if latches else DEEP), 100_000),
-        reliability=_policy(ReliabilityPolicy.RELIABLE, values.get("reliability")),
+        reliability=_policy(qos.ReliabilityPolicy.RELIABLE, values.get("reliability")),
         durability=durability,
         deadline=_duration(values.get("deadline")),
         lifespan=_duration(values.get("lifespan")),
-        liveliness=_policy(LivelinessPolicy.AUTOMATIC, values.get("liveliness")),
+        liveliness=_policy(qos.LivelinessPolicy.AUTOMATIC, values.get("liveliness")),
         liveliness_lease_duration=_duration(values.get("liveliness_lease_duration")),
         avoid_ros_namespace_conventions=bool(values.get("avoid_ros_namespace_conventions")),
     )

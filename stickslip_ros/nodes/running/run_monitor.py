@@ -6,16 +6,9 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
 from std_msgs.msg import Header
 
+from stickslip_ros.nodes.base import managed
 from stickslip_ros.nodes.base.clients import ACTIVE, NEXT_TRANSITION
 from stickslip_ros.nodes.base.endpoints import qos_profile
-from stickslip_ros.nodes.base.managed import (
-    FAILURE,
-    FINISHED,
-    FORECAST,
-    NEWEST_STAMP,
-    REFUSAL,
-    STATE,
-)
 from stickslip_ros.record.topics import DIAGNOSTICS, RECORDED
 from stickslip_ros.scenarios import full_name
 from stickslip_ros.stamps import NANOSECONDS
@@ -68,32 +61,32 @@ class RunMonitor:
     @property
     def unrecorded(self) -> float:
         """Time from the newest sample that the analyzer has received to the plant's last, s."""
-        return (number_in(self.plant.get(NEWEST_STAMP, "")) - self.newest_recorded) * 1e-9
+        return (number_in(self.plant.get(managed.NEWEST_STAMP, "")) - self.newest_recorded) * 1e-9
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
         for status in message.status:
             values = {entry.key: entry.value for entry in status.values}
-            self.refusals[status.name] = values.get(REFUSAL, "")
+            self.refusals[status.name] = values.get(managed.REFUSAL, "")
             if status.name == full_name(self._namespace, "plant"):
                 self.plant = values
-                self._follow_plant(values.get(STATE))
+                self._follow_plant(values.get(managed.STATE))
             elif status.name == full_name(self._namespace, "analyzer"):
-                self.recording_failure = values.get(FAILURE, self.recording_failure)
-                self.recording_ended |= values.get(STATE) == "deactivating"
+                self.recording_failure = values.get(managed.FAILURE, self.recording_failure)
+                self.recording_ended |= values.get(managed.STATE) == "deactivating"
 
     def _follow_plant(self, state: str | None) -> None:
-        if FORECAST in self.plant and not self._forecast_told:
+        if managed.FORECAST in self.plant and not self._forecast_told:
             self._forecast_told = True
-            self._notify(self.plant[FORECAST])
-        if FAILURE in self.plant:
-            self._fail(f"the plant could not continue: {self.plant[FAILURE]}")
+            self._notify(self.plant[managed.FORECAST])
+        if managed.FAILURE in self.plant:
+            self._fail(f"the plant could not continue: {self.plant[managed.FAILURE]}")
         if state == ACTIVE:
             if self._paused:
                 self._notify("the plant continues")
             self._paused = self.plant_stopped = False
-        elif NEWEST_STAMP in self.plant:
+        elif managed.NEWEST_STAMP in self.plant:
             self.plant_stopped = True
-            if self.plant.get(FINISHED) == str(True) or state == "finalized":
+            if self.plant.get(managed.FINISHED) == str(True) or state == "finalized":
                 self.finished = True
             elif state in NEXT_TRANSITION and not (self._paused or self.ending):
                 self._paused = True
