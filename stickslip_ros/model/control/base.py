@@ -2,7 +2,7 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf
 from typing import Any, ClassVar, NamedTuple, Protocol, Self
 
@@ -11,7 +11,7 @@ import numpy as np
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.model.constants import constant, constants_of, scaled
 from stickslip_ros.model.drive import Drive
-from stickslip_ros.samples import Reference, Sample
+from stickslip_ros.samples import NO_REFERENCE, Reference, Sample
 
 State = tuple[float, ...]
 """State of a control law between samples."""
@@ -348,3 +348,22 @@ class FeedbackLaw(ControlLaw):
     """Control law that feeds back the motion of one body, which `feedback` names."""
 
     feedback: str = body(TABLE, "motion is fed back")
+
+
+def superposed(law: ControlLaw, period: float) -> LinearFeedback:
+    """Return the linear form, without limit and reference, of a law: its answers to each unit.
+
+    Force and next state must be linear in state, displacement and velocity while the force is not
+    limited; `period` is that of the samples, s.
+    """
+    free, states = replace(law, force_limit=inf), len(law.state_units)
+    columns: list[list[float]] = []
+    for unit in np.eye(states + 2).tolist():
+        position, velocity = unit[states:]
+        sample = Sample(0, position, velocity, 0.0, 0.0, 0.0)
+        force, state = free.respond(tuple(unit[:states]), period, sample, NO_REFERENCE)
+        columns.append([*state, force])
+    matrix = np.array(columns).T
+    return LinearFeedback(
+        matrix[:-1, :states], matrix[:-1, states:], matrix[-1, :states], matrix[-1, states:]
+    )

@@ -8,8 +8,7 @@ from typing import ClassVar, Self
 from typing_extensions import override
 
 from stickslip_ros.model.constants import constant
-from stickslip_ros.model.control.base import TABLE, FeedbackLaw, LinearFeedback, State
-from stickslip_ros.model.control.linear import superposed
+from stickslip_ros.model.control.base import TABLE, FeedbackLaw, LinearFeedback, State, superposed
 from stickslip_ros.model.control.pid import moved_mass, tracking_error
 from stickslip_ros.model.drive import Drive
 from stickslip_ros.samples import Reference, Sample

@@ -8,8 +8,7 @@ from typing import ClassVar
 from typing_extensions import override
 
 from stickslip_ros.model.constants import constant
-from stickslip_ros.model.control.base import FeedbackLaw, LinearFeedback, State
-from stickslip_ros.model.control.linear import superposed
+from stickslip_ros.model.control.base import FeedbackLaw, LinearFeedback, State, superposed
 from stickslip_ros.model.drive import Drive
 from stickslip_ros.samples import MotorSample, Reference, Sample
 
