@@ -75,7 +75,7 @@ class ReverseFriction(_constants(reverse=True)):
     def given(self) -> dict[str, Any]:
         """The coefficients and the file that are not as those of forward slip, by name."""
         values = ((name, getattr(self, name)) for name in self.known)
-        return {name: value for name, value in values if value == value and value != ""}
+        return {name: value for name, value in values if not self.known[name].is_default(value)}
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, ReverseFriction):
@@ -141,7 +141,8 @@ class Friction(_constants(reverse=False), _ChosenLaw):
         Raises ValueError, with the names of the parameters, for constants that the law refuses.
         """
         law, *curves = self._kinds()
-        forward, reverse = self._given(self), self._given(self.reverse)
+        forward = self._given(vars(self), self.points)
+        reverse = self._given(self.reverse.given, self.reverse.points)
 
         def make() -> FrictionLaw:
             made = _changed(law(*(curve() for curve in curves)), forward)
@@ -193,13 +194,10 @@ class Friction(_constants(reverse=False), _ChosenLaw):
     def _parameters(self) -> list[str]:
         return [name for law in self._kinds() for name in law_parameters(law)]
 
-    def _given(self, group: Any) -> dict[str, Any]:
-        """Return what a group gives for the constants of the law, of a table its points."""
-        names = (*self._parameters(), "points")
-        values = {
-            name: getattr(group, name, nan) for name in names if name not in ("curve", "file")
-        }
-        return {name: value for name, value in values.items() if value == value and value != ()}
+    def _given(self, values: Mapping[str, Any], points: Pairs) -> dict[str, Any]:
+        """Return the constants of the law among the values, and of a table its points."""
+        names = [n for n in self._parameters() if n in values and n not in ("curve", "file")]
+        return {n: values[n] for n in names} | ({"points": points} if points else {})
 
 
 def _changed(law: FrictionLaw, values: Mapping[str, Any]) -> FrictionLaw:
