@@ -82,10 +82,24 @@ def load_scenario(
     ('paper', 0.2)
     """
     path = _find(name_or_path)
-    top = read_file(path, namespace)
     given = [path] if base is None else [path, _find(base)]
-    files = _with_bases(top, given, namespace)
+    files = _with_bases(read_file(path, namespace), given, namespace)
     law = _law_in_use(files, namespace) if controller is None else known_law(controller)
+    scenario = _completed(files, given, law, namespace, other_nodes=other_nodes)
+    scenario = scenario if controller is None else scenario.with_force_limit()
+    return scenario.overridden(overrides) if overrides else scenario
+
+
+def _completed(
+    files: Sequence[ScenarioFile],
+    given: Sequence[Path],
+    law: str,
+    namespace: str,
+    *,
+    other_nodes: bool,
+) -> Scenario:
+    """Return what a file and its bases say together, with the controller of a law."""
+    path = files[0].path
     values: dict[str, dict[str, Any]] = {node: {} for node in NODE_PARAMETERS}
     sources: dict[str, str] = {}
     paths: dict[str, Path] = {}
@@ -104,29 +118,29 @@ def load_scenario(
         for node, parameters in values.items()
         if parameters or node in ("plant", controller_node(law), "analyzer")
     }
+    controllers = {
+        other: models[controller_node(other)]
+        for other in CONTROLLER_PARAMETERS
+        if controller_node(other) in models
+    }
     scenario = Scenario(
         name=path.stem,
         plant=models["plant"],
-        controller=models[controller_node(law)],
+        controller=controllers.pop(law),
         analyzer=models["analyzer"],
         overrides=(),
         path=path,
         other_sections=tuple(other_sections),
         sources=sources,
         files=paths,
-        other_controllers={
-            other: models[controller_node(other)]
-            for other in CONTROLLER_PARAMETERS
-            if other != law and controller_node(other) in models
-        },
+        other_controllers=controllers,
         fit=next((file.fit for file in files if file.fit), {}),
         bases=tuple(file.path for file in files[1:]),
     )
     for name, why in scenario.unused().items():
         if name.startswith("plant.") and sources.get(name) == FILE:
             raise InvalidInputError(f"{path}: {why}")
-    scenario = scenario if controller is None else scenario.with_force_limit()
-    return scenario.overridden(overrides) if overrides else scenario
+    return scenario
 
 
 def _with_bases(
