@@ -2,7 +2,7 @@
 
 import re
 from collections import Counter
-from collections.abc import Container, Iterable, Iterator, Mapping
+from collections.abc import Container, Iterator, Mapping
 from dataclasses import dataclass, field
 from inspect import getdoc
 from math import isfinite
@@ -162,8 +162,7 @@ class _Writer:
     def _block(self, tree: Result | Decision, known: dict[Symbol, str]) -> Iterator[str]:
         """Yield the statements of a tree, given the variables that are known."""
         language = self._language
-        values = (tree.condition,) if isinstance(tree, Decision) else tree.values
-        for symbol in _shared(values, tree, known):
+        for symbol in _shared(tree, known):
             value = self._expression(symbol, known)
             known[symbol] = f"t{len(known) + 1}"
             yield language.variable.format(known[symbol], value)
@@ -215,10 +214,8 @@ class _Writer:
         return f"{self._name(operation)}({arguments})"
 
 
-def _shared(
-    values: Iterable[Operand], tree: Result | Decision, known: Container[Symbol]
-) -> list[Symbol]:
-    """Return the operations in values that a tree needs more than once, the innermost first."""
+def _shared(tree: Result | Decision, known: Container[Symbol]) -> list[Symbol]:
+    """Return the operations in its first values that a tree needs repeatedly, innermost first."""
     uses = Counter[Symbol]()
 
     def count(value: Operand) -> None:
@@ -228,21 +225,13 @@ def _shared(
                 for operand in value.operands:
                     count(operand)
 
-    def count_in(part: Result | Decision) -> None:
-        if isinstance(part, Decision):
-            count(part.condition)
-            count_in(part.holds)
-            count_in(part.fails)
-        else:
-            for value in part.values:
-                count(value)
-
     def innermost(value: Operand) -> Iterator[Symbol]:
         if isinstance(value, Symbol) and value.operands and value not in known:
             for operand in value.operands:
                 yield from innermost(operand)
             yield value
 
-    count_in(tree)
-    symbols = dict.fromkeys(symbol for value in values for symbol in innermost(value))
+    for value in tree.all_values():
+        count(value)
+    symbols = dict.fromkeys(symbol for value in tree.values for symbol in innermost(value))
     return [symbol for symbol in symbols if uses[symbol] > 1]

@@ -124,9 +124,18 @@ class Decision:
     """What follows if it does not."""
 
     @property
+    def values(self) -> tuple[Operand, ...]:
+        """The comparison."""
+        return (self.condition,)
+
+    @property
     def key(self) -> tuple[Any, ...]:
         """What equal decisions of a program have in common."""
         return id(self.condition), self.holds.key, self.fails.key
+
+    def all_values(self) -> Iterator[Operand]:
+        """Yield the comparison, and those and the results of what follows."""
+        yield from (self.condition, *self.holds.all_values(), *self.fails.all_values())
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,6 +156,10 @@ class Result:
     def key(self) -> tuple[Any, ...]:
         """What equal results of a program have in common."""
         return tuple(id(value) if isinstance(value, Symbol) else value for value in self.values)
+
+    def all_values(self) -> Iterator[Operand]:
+        """Yield the new state, and then the force."""
+        yield from self.values
 
 
 @dataclass(frozen=True)
@@ -254,7 +267,8 @@ def law_program(law: ControlLaw, period: float) -> LawProgram:
         raise InvalidInputError(
             f"the control law {law.name} cannot be exported: {reason}"
         ) from None
-    used = {s.operation for tree in trees for s in _symbols(tree) if not s.operands}
+    values = (value for tree in trees for value in tree.all_values())
+    used = {s.operation for value in values for s in _symbols(value) if not s.operands}
     if unknown := sorted(used - {*states, *_INPUTS}):
         raise InvalidInputError(
             f"the control law {law.name} cannot be exported: it uses {', '.join(unknown)} of the "
@@ -270,22 +284,12 @@ def _inputs(symbol: Callable[[str], Symbol], law: ControlLaw) -> tuple[Any, Any]
     return sample, Reference(*reference)
 
 
-def _symbols(tree: Result | Decision) -> Iterator[Symbol]:
-    """Yield every symbol of a tree, those of shared operands repeatedly."""
-    if isinstance(tree, Decision):
-        yield from _within(tree.condition)
-        yield from _symbols(tree.holds)
-        yield from _symbols(tree.fails)
-        return
-    for value in tree.values:
-        yield from _within(value)
-
-
-def _within(value: Operand) -> Iterator[Symbol]:
+def _symbols(value: Operand) -> Iterator[Symbol]:
+    """Yield every symbol of a value, those of shared operands repeatedly."""
     if isinstance(value, Symbol):
         yield value
         for operand in value.operands:
-            yield from _within(operand)
+            yield from _symbols(operand)
 
 
 def _is(value: Operand, number: float) -> bool:
