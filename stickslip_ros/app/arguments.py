@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, get_args
 
 from stickslip_ros.app.output import tell
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.files import open_regular
+from stickslip_ros.files import open_regular, written
 from stickslip_ros.quantities import number_of
 from stickslip_ros.record import ForceSource, TimeSource
 from stickslip_ros.scenarios import DEFAULT_NAMESPACE, LONGEST_NAMESPACE
@@ -86,6 +86,14 @@ def add_json(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--json", action="store_true", help="print one JSON object and nothing else"
     )
+
+
+def add_out(
+    parser: argparse.ArgumentParser, what: str, *, metavar: str = "FILE", more: str = ""
+) -> None:
+    """Add --out, which writes `what` it is; `more` is said of it."""
+    meaning = f"write {what}; an existing file is refused{more}"
+    parser.add_argument("--out", type=Path, metavar=metavar, help=meaning)
 
 
 def add_recordings(parser: argparse.ArgumentParser, what: str) -> None:
@@ -323,6 +331,12 @@ def writing(option: str, path: Path) -> Generator[None]:
         raise InvalidInputError(f"{option} {path}: cannot be written: {error.strerror}") from None
 
 
+def write_new(option: str, path: Path, text: str) -> None:
+    """Write a text to `path`, given with `option`; a file that has come there is refused."""
+    with writing(option, path), written(path) as file:
+        file.write(text)
+
+
 def scenario_of(
     arguments: argparse.Namespace,
     *overrides: str,
@@ -453,7 +467,12 @@ def namespace_of(text: str) -> str:
     return namespace
 
 
-def spread_of(text: str) -> float | str:
+def add_spread(parser: argparse.ArgumentParser, meaning: str) -> None:
+    """Add --spread, of the constants of the drive."""
+    parser.add_argument("--spread", type=_spread, default=0.0, metavar="SHARE", help=meaning)
+
+
+def _spread(text: str) -> float | str:
     """Return a spread of constants from a text: a share, or fit."""
     try:
         return text if text == "fit" else float(text)

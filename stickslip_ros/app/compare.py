@@ -6,10 +6,11 @@ from pathlib import Path
 
 from stickslip_ros.app.arguments import (
     add_scenario,
+    add_spread,
     check_new,
     law_constants,
-    spread_of,
     whole,
+    write_new,
     writing,
 )
 from stickslip_ros.app.output import progress_bar, tell
@@ -77,12 +78,9 @@ def _add_cases(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help="seeds of noise and of the constants of the drive (default: %(default)d)",
     )
-    parser.add_argument(
-        "--spread",
-        type=spread_of,
-        default=0.0,
-        metavar="SHARE",
-        help="largest deviation of the constants of the drive, as in 0.2, or fit: as the fit of "
+    add_spread(
+        parser,
+        "largest deviation of the constants of the drive, as in 0.2, or fit: as the fit of "
         "`stickslip identify --out` leaves them open (default: 0)",
     )
     parser.add_argument(
@@ -139,6 +137,6 @@ def run(arguments: argparse.Namespace) -> None:
         for law, path in paths.items():
             with writing("--out", path):
                 path.parent.mkdir(parents=True, exist_ok=True)
-                path.write_text(files[law], encoding="utf-8")
+            write_new("--out", path, files[law])
             run_it = printable(shlex.join(["stickslip", "run", str(path)]))
             tell(f"{law} is written to {printable(str(path))}: `{run_it}` runs it")

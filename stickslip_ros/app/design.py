@@ -5,18 +5,18 @@ import shlex
 from pathlib import Path
 
 from stickslip_ros.app.arguments import (
+    add_out,
     add_scenario,
+    add_spread,
     check_new,
     check_speeds,
     law_constants,
     scenario_of,
-    spread_of,
-    writing,
+    write_new,
 )
 from stickslip_ros.app.output import progress_bar, tell
 from stickslip_ros.app.result import add_results, check_results, give_result
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.files import written
 from stickslip_ros.quantities import number_of
 from stickslip_ros.studies.options import OWN_SPEED_RANGE
 
@@ -38,20 +38,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
             "%", "%%"
         ),
     )
-    parser.add_argument(
-        "--spread",
-        type=spread_of,
-        default=0.0,
-        metavar="SHARE",
-        help="deviation of the constants, as in 0.2, or fit: as for `stickslip compare`; gains "
+    add_spread(
+        parser,
+        "deviation of the constants, as in 0.2, or fit: as for `stickslip compare`; gains "
         "hold drives that it draws, and others judge them (default: 0)",
     )
-    parser.add_argument(
-        "--out",
-        type=Path,
-        metavar="FILE",
-        help="write a complete scenario with the proposed gains; an existing file is refused",
-    )
+    add_out(parser, "a complete scenario with the proposed gains")
     add_results(parser, "the Bode diagram, or of a washout the decay rate over its gains")
 
 
@@ -98,8 +90,7 @@ def _write(path: Path, text: str | None) -> None:
     if text is None:
         _report_omitted(f"--out {path}: not written")
         return
-    with writing("--out", path), written(path) as file:
-        file.write(text)
+    write_new("--out", path, text)
     tell(f"{path} is written: `{shlex.join(['stickslip', 'run', str(path)])}` runs it")
 
 

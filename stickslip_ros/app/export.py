@@ -3,9 +3,8 @@
 import argparse
 from pathlib import Path
 
-from stickslip_ros.app.arguments import add_scenario, check_writable, scenario_of, writing
+from stickslip_ros.app.arguments import add_scenario, check_writable, scenario_of, write_new
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.files import written
 from stickslip_ros.text import printable
 
 
@@ -34,7 +33,6 @@ def run(arguments: argparse.Namespace) -> None:
     if not scenario.plant.expects_control:
         raise InvalidInputError("without control there is no law to export")
     text = law_code(scenario, LANGUAGES[path.suffix])
-    with writing("--out", path), written(path) as file:
-        file.write(text)
+    write_new("--out", path, text)
     law, rate = scenario.controller.law, scenario.plant.control_rate
     print(f"{printable(str(path))} is written: {law} at {rate:g} Hz")

@@ -5,7 +5,14 @@ import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from stickslip_ros.app.arguments import add_reading, add_recordings, check_new, reading_of, writing
+from stickslip_ros.app.arguments import (
+    add_out,
+    add_reading,
+    add_recordings,
+    check_new,
+    reading_of,
+    writing,
+)
 from stickslip_ros.app.output import progress_bar, tell
 from stickslip_ros.app.result import add_results, check_results, give_result
 from stickslip_ros.errors import InvalidInputError
@@ -64,12 +71,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="predict a recording that is not fitted; can be repeated",
     )
     add_reading(parser)
-    parser.add_argument(
-        "--out",
-        type=Path,
-        metavar="FILE",
-        help="write a complete scenario of the drive; an existing file is refused",
-    )
+    add_out(parser, "a complete scenario of the drive")
     add_results(parser, "the friction curve with its band, residuals, and the run without feedback")
 
 

@@ -6,9 +6,8 @@ import shlex
 from functools import partial
 from pathlib import Path
 
-from stickslip_ros.app.arguments import add_law, check_new, with_law, writing
+from stickslip_ros.app.arguments import add_law, check_new, with_law, write_new
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.files import written
 from stickslip_ros.text import printable
 
 _ENDINGS = (".yaml", ".yml")
@@ -57,8 +56,7 @@ def run(arguments: argparse.Namespace) -> None:
         named = arguments.source == scenario.name
         base = scenario.name if named else os.path.relpath(scenario.path, path.parent)
         text = short_file(scenario, heading, base)
-    with writing("FILE", path), written(path) as file:
-        file.write(text)
+    write_new("FILE", path, text)
     design = printable(shlex.join(["stickslip", "design", str(path)]))
     tuned = scenario.plant.expects_control and scenario.controller.control_law.tuned
     said = f", `{design}` finds gains for it" if tuned else ""

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from stickslip_ros.app.arguments import (
+    add_out,
     add_scenario,
     check_new,
     naming,
@@ -50,13 +51,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="let the controller act continuously, as in the paper's eq. 19 "
         "(default: the force is held from sample to sample, as between the nodes)",
     )
-    parser.add_argument(
-        "--out",
-        type=Path,
+    add_out(
+        parser,
+        "time, position, velocity, friction force, control force, position and velocity of the "
+        "belt at the samples, what a sensor tells, and the reference (CSV, SI units)",
         metavar="FILE.csv",
-        help="write time, position, velocity, friction force, control force, position and velocity "
-        "of the belt at the samples, what a sensor tells, and the reference (CSV, SI units); an "
-        "existing file is refused",
     )
     parser.add_argument(
         "--every",

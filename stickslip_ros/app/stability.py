@@ -2,7 +2,7 @@
 
 import argparse
 
-from stickslip_ros.app.arguments import add_json, add_scenario, scenario_of, spread_of
+from stickslip_ros.app.arguments import add_json, add_scenario, add_spread, scenario_of
 from stickslip_ros.app.output import progress_bar
 from stickslip_ros.app.result import add_plot, check_results, print_result, write_results
 from stickslip_ros.errors import InvalidInputError
@@ -17,12 +17,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "linear gain, and the critical gain over the delay of the force; with --no-control the "
         "bifurcation diagram over the belt speed, with stable and unstable limit cycles",
     )
-    parser.add_argument(
-        "--spread",
-        type=spread_of,
-        default=0.0,
-        metavar="SHARE",
-        help="deviation of the constants, as in 0.2, or fit: as for `stickslip compare`; gives the "
+    add_spread(
+        parser,
+        "deviation of the constants, as in 0.2, or fit: as for `stickslip compare`; gives the "
         "critical feed speed an interval",
     )
     add_json(parser)

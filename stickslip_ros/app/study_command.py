@@ -8,7 +8,15 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from stickslip_ros.app.arguments import check_new, check_speeds, naming, scenario_of, whole, writing
+from stickslip_ros.app.arguments import (
+    add_out,
+    check_new,
+    check_speeds,
+    naming,
+    scenario_of,
+    whole,
+    writing,
+)
 from stickslip_ros.app.output import progress_bar, tell
 from stickslip_ros.app.result import print_result, write_results
 from stickslip_ros.errors import InvalidInputError, RunError
@@ -68,14 +76,11 @@ def add_workers(parser: argparse.ArgumentParser, others: str = "") -> None:
         help="compute the points on the Dask cluster with this scheduler, as in "
         "--dask tcp://head:8786 (extra: stickslip_ros[dask])",
     )
-    parser.add_argument(
-        "--out",
-        type=Path,
-        metavar="FILE",
-        help=f"write a table of all points ({', '.join(_TABLES)}); an existing file is refused. "
-        "If interrupted, the finished points stay in FILE.part, without --out in ~/.cache, and the "
-        f"same command continues{others}",
+    kept = (
+        ". If interrupted, the finished points stay in FILE.part, without --out in ~/.cache, and "
+        f"the same command continues{others}"
     )
+    add_out(parser, f"a table of all points ({', '.join(_TABLES)})", more=kept)
 
 
 def scenario_over(arguments: argparse.Namespace, *unused: str) -> "tuple[Scenario, list[Axis]]":
