@@ -230,20 +230,12 @@ def _draw_forces(
     ticks = [limit] if limited else MaxNLocator(5, steps=_STEPS).tick_values(0.0, largest)
     levels = [float(level) for level in ticks if level > 0.0]
     if limited:
-        axes.contourf(
-            corners,
-            gains,
-            forces.T,
-            levels=[limit, np.inf],
-            colors="none",
-            hatches=[_BEYOND_LIMIT_HATCH],
-        )
-    for look, width in (("white", 3.0), ("black", _FORCE["lw"])):
-        drawn = axes.contour(
-            corners, gains, forces.T, levels=levels, colors=look, linewidths=width,
-            linestyles="-" if look == "white" else [_FORCE["ls"]],
-        )  # fmt: skip
-        if look == "black" and not limited:
+        look: Any = {"colors": "none", "hatches": [_BEYOND_LIMIT_HATCH]}
+        axes.contourf(corners, gains, forces.T, levels=[limit, np.inf], **look)
+    for colour, width, dashes in (("white", 3.0, "-"), ("black", _FORCE["lw"], [_FORCE["ls"]])):
+        look = {"levels": levels, "colors": colour, "linewidths": width, "linestyles": dashes}
+        drawn = axes.contour(corners, gains, forces.T, **look)
+        if colour == "black" and not limited:
             names = {level: units.text(level, "N") for level in levels}
             texts = axes.clabel(drawn, fmt=names, fontsize=7.0)
             for text in texts:
@@ -269,13 +261,8 @@ def _draw_critical_gains(axes: Axes, critical: CriticalGainCurves, chart: Stabil
         width, label = (2.8, f"{label}, this loop") if rate == chart.loop.rate else (1.2, label)
         axes.plot(delays / late, np.insert(gains, jumps, np.nan), **look, lw=width, label=label)
     axes.axhline(0.0, color=GREY, lw=0.8)
-    axes.plot(
-        chart.loop.force_delay / late,
-        chart.gains.linear_gain,
-        **_GAINS,
-        ms=14,
-        clip_on=False,
-    )
+    here = chart.loop.force_delay / late, chart.gains.linear_gain
+    axes.plot(*here, **_GAINS, ms=14, clip_on=False)
     axes.set_ylabel(units.label(units.named("critical linear gain"), "N s/m"))
     corner = chart.gains.corner_frequency
     axes.set_title(f"cutoff frequency {corner:.3g}{'' if units.dimensionless else ' rad/s'}")
@@ -307,23 +294,7 @@ def branches_figure(
     every = [edge for branch in branches for edge in (branch.least, branch.greatest)]
     length, y_label = units.axis(units.named("displacement"), "m", *every)
     speed, x_label = units.axis(units.named("belt speed"), "m/s", diagram.belt_speeds)
-    looks: dict[str, dict[str, Any]] = {}
-    for branch in diagram.equilibria:
-        name, look = _look(branch, Regime.EQUILIBRIUM)
-        looks[name] = look
-        axes.plot(branch.belt_speeds / speed, branch.least / length, **look)
-    for branch in diagram.cycles:
-        looks |= (
-            _look(branch, regime) for regime in _CYCLES if (branch.sticks == _CYCLES[regime]).any()
-        )
-        for edge in (branch.least, branch.greatest):
-            for regime in reversed(_CYCLES):
-                rows = branch.sticks == _CYCLES[regime]
-                # With the row before them, so that lines in turn leave no gap.
-                shown = np.where(rows | np.append(rows[1:], False), edge, np.nan)
-                _, look = _look(branch, regime)
-                axes.plot(branch.belt_speeds / speed, shown / length, **look)
-    handles: list[Artist] = [Line2D([], [], **look, label=name) for name, look in looks.items()]
+    handles = _draw_branches(axes, diagram, length, speed)
     speeds = np.concatenate([branch.belt_speeds for branch in diagram.equilibria])
     rests = np.concatenate([branch.least for branch in diagram.equilibria])
     for point in diagram.hopf_points:
@@ -354,6 +325,29 @@ def branches_figure(
     style.legend_below(figure, handles, most=3)
     _name_regions(figure, axes, diagram, speed)
     return figure
+
+
+def _draw_branches(
+    axes: Axes, diagram: BifurcationBranches, length: float, speed: float
+) -> list[Artist]:
+    """Draw equilibria and limit cycles; return the entries of the legend."""
+    looks: dict[str, dict[str, Any]] = {}
+    for branch in diagram.equilibria:
+        name, look = _look(branch, Regime.EQUILIBRIUM)
+        looks[name] = look
+        axes.plot(branch.belt_speeds / speed, branch.least / length, **look)
+    for branch in diagram.cycles:
+        looks |= (
+            _look(branch, regime) for regime in _CYCLES if (branch.sticks == _CYCLES[regime]).any()
+        )
+        for edge in (branch.least, branch.greatest):
+            for regime in reversed(_CYCLES):
+                rows = branch.sticks == _CYCLES[regime]
+                # With the row before them, so that lines in turn leave no gap.
+                shown = np.where(rows | np.append(rows[1:], False), edge, np.nan)
+                _, look = _look(branch, regime)
+                axes.plot(branch.belt_speeds / speed, shown / length, **look)
+    return [Line2D([], [], **look, label=name) for name, look in looks.items()]
 
 
 def _look(branch: Branch, regime: Regime) -> tuple[str, dict[str, Any]]:

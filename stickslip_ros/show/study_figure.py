@@ -161,8 +161,7 @@ def map_figure(
     shape = (count, 1) if style.narrow else (1, count)
     panels: list[Axes] = list(figure.subplots(*shape, sharex=True, sharey=True, squeeze=False).flat)
     theory = transition_map(study, (first, second))
-    mesh: Any = None
-    scale, bar = 1.0, ""
+    mesh, scale, bar = None, 1.0, ""
     if colour != "regime":
         scale, bar = units.axis(name, unit, getattr(columns, colour))
     for axes, (rows, direction) in zip(panels, _passes(grid), strict=True):
