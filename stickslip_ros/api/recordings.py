@@ -29,7 +29,7 @@ from stickslip_ros.record.table_file import is_table
 from stickslip_ros.samples import NO_FORCES, NO_SAMPLES, ForceColumns, SampleColumns
 from stickslip_ros.scenarios.curve_file import CURVES, as_pairs
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, PlantParameters
-from stickslip_ros.show.measure_table import doubt, report_tables
+from stickslip_ros.show.measure_table import doubt, measures_text, report_tables
 from stickslip_ros.show.parameter_tables import recorded_tables
 from stickslip_ros.show.quantities import Units
 from stickslip_ros.show.run_history import RunHistory
@@ -90,14 +90,13 @@ class RecordedRun(TabularResult):
         """Return what figures draw of the run."""
         from stickslip_ros.show.run_figure import DrawnRun
 
-        parts = self._history, self.report, self.drive
-        return DrawnRun.recorded(self.path, *parts, rotary=self._rotary)
+        notes, title = [*self.missing, *self.report["notes"]], f"Recorded run, {self.path}"
+        parts = self._history, self.measures, self.drive, notes, title
+        return DrawnRun(str(self.path), *parts, rotary=self._rotary)
 
     @property
     def verdict(self) -> str:
         """Regime, amplitude, frequency and stick fraction as a line of text."""
-        from stickslip_ros.show.drawing import measures_text
-
         return measures_text(self.measures, self.units) + doubt(self.report)
 
     @cached_property

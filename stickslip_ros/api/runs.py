@@ -27,7 +27,7 @@ from stickslip_ros.progress import Progress
 from stickslip_ros.quantities import number_of
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.scenarios.parameters import PlantParameters
-from stickslip_ros.show.measure_table import simulation_tables
+from stickslip_ros.show.measure_table import measures_text, simulation_tables
 from stickslip_ros.show.parameter_tables import scenario_tables
 from stickslip_ros.show.quantities import Units
 from stickslip_ros.show.run_history import RunHistory
@@ -75,8 +75,11 @@ class Run(TabularResult):
     @override
     def draw(self, style: "FigureStyle") -> "Figure":
         from stickslip_ros.show.run_figure import DrawnRun, run_figure
+        from stickslip_ros.show.style import title_of
 
-        drawn = DrawnRun.simulated(self.scenario, self._history, self.truth or self.measures)
+        title, plant = title_of("Simulated run", self.scenario), self.scenario.plant
+        parts = self._history, self.truth or self.measures, plant.as_drive(), (), title
+        drawn = DrawnRun(self.scenario.name, *parts, disturbed=plant.disturbance.kind != "none")
         return run_figure(drawn, style=style)
 
     def _table(self) -> Table:
@@ -107,8 +110,6 @@ class Run(TabularResult):
 
     @override
     def _summary(self) -> Summary:
-        from stickslip_ros.show.drawing import measures_text
-
         plant, law = self.scenario.plant, self.scenario.control_law
         _, force = self._history.control.columns()
         forces = (float(np.abs(force).max()), float(force[-1])) if len(force) else (None, None)

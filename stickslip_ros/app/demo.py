@@ -40,9 +40,8 @@ def _demonstrate() -> None:
     controller = scenario.controller.node.replace("_", " ")
     bag = default_bag(_SCENARIO)
     load_matplotlib()
-    from stickslip_ros.show.run_figure import DrawnRun, run_figure
-    from stickslip_ros.show.run_history import RunHistory
-    from stickslip_ros.show.style import save
+    from stickslip_ros.api.recordings import recorded_run
+    from stickslip_ros.show.style import SCREEN, save
 
     with loading_ros():
         from stickslip_ros.nodes.base.network import keep_on_this_machine
@@ -66,10 +65,7 @@ def _demonstrate() -> None:
     chosen = {when: {name: part[name] for name in _VALUES} for when, part in parts.items()}
     print_parts(measure_table(title, chosen))
     figure = bag.with_suffix(".png")
-    history = RunHistory()
-    report = report_of_recording(bag, observer=history)
-    drive = scenario.plant.as_drive()
-    save(run_figure(DrawnRun.recorded(bag, history, report, drive)), figure)
+    save(recorded_run(bag, kept=False).draw(SCREEN), figure)
     print(f"bag:    {bag}\nfigure: {figure}")
 
 

@@ -14,7 +14,6 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from stickslip_ros.arrays import FloatArray, IntArray
-from stickslip_ros.measures.cycle_measures import Measures, Regime, trend_text
 from stickslip_ros.measures.mean_cycle import MeanCycle
 from stickslip_ros.measures.run_meter import RunAnalysis
 from stickslip_ros.measures.slips import Slip
@@ -73,20 +72,6 @@ class Pane(NamedTuple):
             return cls(title, rows, 0.0, 1.0)
         start, end = min(float(t[0]) for t in times), max(float(t[-1]) for t in times)
         return cls(title, rows, start, end if end > start else start + 1.0)
-
-
-def measures_text(measures: Measures, units: Units) -> str:
-    """Return regime, amplitude, frequency and stick fraction at the end as a line of text."""
-    trend = trend_text(vars(measures), units.text)
-    regime = Regime.label(measures.regime, measures.cycles)
-    if measures.regime is not None:
-        regime = f"at the end: {regime}"
-    texts = [f"{regime}{trend and f', not steady: {trend}'}"]
-    for name in ("amplitude", "frequency", "stick_fraction"):
-        value, (label, unit, _) = getattr(measures, name), MEASURES[name]
-        if value is not None and measures.period is not None:
-            texts.append(f"{label} {units.text(value, unit)}")
-    return ", ".join(texts)
 
 
 def draw_line(

@@ -161,6 +161,20 @@ def _shown(name: str, values: Mapping[str, Any], units: Units) -> Any:
     return value
 
 
+def measures_text(measures: Measures, units: Units) -> str:
+    """Return regime, amplitude, frequency and stick fraction at the end as a line of text."""
+    trend = trend_text(vars(measures), units.text)
+    regime = Regime.label(measures.regime, measures.cycles)
+    if measures.regime is not None:
+        regime = f"at the end: {regime}"
+    texts = [f"{regime}{trend and f', not steady: {trend}'}"]
+    for name in ("amplitude", "frequency", "stick_fraction"):
+        value, (label, unit, _) = getattr(measures, name), MEASURES[name]
+        if value is not None and measures.period is not None:
+            texts.append(f"{label} {units.text(value, unit)}")
+    return ", ".join(texts)
+
+
 def doubt(values: Mapping[str, Any]) -> str:
     """Return what is added to a regime of a report whose forces came late."""
     return ", doubtful: late forces" if values.get("in_time") is False else ""

@@ -1,10 +1,9 @@
 """The figure of a run, and that of several runs side by side."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from math import ceil
-from pathlib import Path
-from typing import Any, NamedTuple, Self
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -15,9 +14,8 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.measures.cycle_measures import Measures, measures_of
+from stickslip_ros.measures.cycle_measures import Measures
 from stickslip_ros.model.drive import Drive
-from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.show.drawing import (
     BELT,
     HELD,
@@ -33,13 +31,13 @@ from stickslip_ros.show.drawing import (
     draw_law,
     draw_line,
     label_axis,
-    measures_text,
     panels_over_time,
     say,
     shade,
     widened,
     with_edges,
 )
+from stickslip_ros.show.measure_table import measures_text
 from stickslip_ros.show.quantities import SI, Units
 from stickslip_ros.show.run_history import DrawnMotion, RunHistory
 from stickslip_ros.show.style import (
@@ -56,7 +54,6 @@ from stickslip_ros.show.style import (
     FigureStyle,
     finish,
     styled,
-    title_of,
     wrapped,
 )
 
@@ -99,28 +96,6 @@ class DrawnRun(NamedTuple):
     """Whether a disturbance is added to the control force."""
     rotary: bool = False
     """Whether the displacement is an angle."""
-
-    @classmethod
-    def simulated(cls, scenario: Scenario, history: RunHistory, measures: Measures) -> Self:
-        """Return a simulated run of a scenario."""
-        title, drive = title_of("Simulated run", scenario), scenario.plant.as_drive()
-        disturbed = scenario.plant.disturbance.kind != "none"
-        return cls(scenario.name, history, measures, drive, (), title, disturbed)
-
-    @classmethod
-    def recorded(
-        cls,
-        bag: Path,
-        history: RunHistory,
-        report: Mapping[str, Any],
-        drive: Drive | None,
-        *,
-        rotary: bool = False,
-    ) -> Self:
-        """Return a recorded run with the `report` of its bag, and the drive that it holds."""
-        notes = [*report["missing"], *report["notes"]]
-        title, measures = f"Recorded run, {bag}", measures_of(report)
-        return cls(str(bag), history, measures, drive, notes, title, rotary=rotary)
 
     @property
     def units(self) -> Units:

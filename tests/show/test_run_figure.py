@@ -471,8 +471,7 @@ def test_there_are_no_units_where_all_drives_have_none() -> None:
 @in_styles
 def test_behind_a_motor_are_the_force_of_the_spring_and_two_phase_planes(style: str) -> None:
     run = ss.simulate("feed_drive_motor", duration=1.0)
-    drawn = DrawnRun.simulated(run.scenario, run._history, run.measures)
-    figure = run_figure(drawn, style=STYLES[style])
+    figure = run.plot(style=style)
     found = {axes.get_title(): axes for axes in figure.axes}
     shown = ["force of the transmission", "phase plane of the slide", "phase plane of the motor"]
     if style != "screen":  # there is no room
