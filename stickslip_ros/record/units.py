@@ -75,8 +75,15 @@ _OTHERS = {
     "a current": re.compile(r"current|i[qd]$|(?:\w*motor)?strom|corrente|corriente|courant"),
     "a power": re.compile(r"power|leistung|puissance|poten[zc]"),
 }
+_SQUARED = re.compile(r"(?i)(?<![^\W\d_])(?:[cdm]?m|rad|deg)[\W_]?s\W{0,2}[2²](?!\d)")
 _FORCE = re.compile(r"forc|fuerz|forz|torq|moment|coup|copp|effort|\w*(?:kraft|moment)")
-"""Starts of words for quantities that are often taken for others, and for forces."""
+"""Starts of words for quantities that are often taken for others, and for forces; m/s2."""
+_LATIN = {
+    **{"мк": "u", "см": "cm", "кгс": "kgf", "град": "deg", "об": "r"},
+    **dict(zip("мскнгдчриа", "mskngdhria", strict=True)),
+}
+_CYRILLIC = re.compile("|".join(_LATIN), re.IGNORECASE)
+"""Units in Cyrillic letters, the longer first."""
 _BRACKETED = re.compile(r"[\[(<{]\s*([^\[\](){}<>]*[^\[\](){}<>\s])\s*[\])>}]")
 _MARK = re.compile(r"\s*[/,]\s*|\s+(?:in|en|em)\s+")
 _START = re.compile(
@@ -165,6 +172,8 @@ def are_units(cells: Sequence[str]) -> bool:
 
 def other_quantity(name: str) -> str | None:
     """Return what a column is by its name, if it is "an acceleration", "a current" or "a power"."""
+    if _SQUARED.search(name):
+        return "an acceleration"
     words = re.findall(r"[^\W\d_]+", name.casefold())
     if any(map(_FORCE.match, words)):  # the current torque
         return None
@@ -221,7 +230,8 @@ def _stated(name: str, plain: str, given: str, target: str) -> Iterator[Unit]:
             letters = len(re.findall(r"[^\W\d_]", text))
             unit = _parsed(text.lstrip("0123456789.,")) or any(map(_parsed, words)) or _counts(text)
             certain = text == cell or f"[{text}]" in name.replace(" ", "")
-            if (unit and (letters > 1 or text not in marked)) or (certain and letters > 1):
+            certain &= letters > 1 or (text, target) == ("t", "N")  # tonnes
+            if certain or (unit and (letters > 1 or text not in marked)):
                 yield Unit(text, nan, target)
 
 
@@ -287,7 +297,7 @@ def _factor(unit: str, target: str) -> float:
 def _parsed(text: str) -> tuple[tuple[str, str], ...]:
     """Return the readings of a text as a unit: what pint calls it, and its dimension."""
     plain = (
-        re.sub("[\u0300-\u036f]", "", normalize("NFD", text))
+        re.sub("[\u0300-\u036f]", "", normalize("NFD", _CYRILLIC.sub(_latin, text)))
         .replace("µ", "u")
         .replace("μ", "u")
         .replace('"', "inch")
@@ -330,6 +340,12 @@ def _composed(
             yield unit if over else f"turn{unit}", f"{above.replace('turns', 'R') or 'R'}/{below}"
         if not over and unit == "/s":
             yield "rad/s", "R/T"
+
+
+def _latin(letters: re.Match[str]) -> str:
+    """Return Latin letters of a unit in place of Cyrillic ones."""
+    latin = _LATIN[letters[0].lower()]
+    return latin if letters[0].islower() else latin.upper()
 
 
 @cache

@@ -26,7 +26,7 @@ def identification_tables(
 ) -> Iterator[TextTable | str]:
     """Yield the tables of what was found.
 
-    `own` is what the model predicts of the first recording that it was fitted to, `checks` of
+    `fitted` is what the model predicts of the first recording that it was fitted to, `checks` of
     others; `notes` are sentences on both.
     """
     names = ", ".join(dict.fromkeys(record.name for record in findings.records))

@@ -13,6 +13,7 @@ HEADERS = {
     "s": {
         1e-3: "Zeit [ms]|Zeit in ms|Zeit, ms|Time (msec)|t / ms|t/ms|Time ms|time_ms|timeMs"
         "|TimeMS|TIME_MS"
+        "|Время, мс"
         "|millis|ms|Temps (ms)|temps en ms|Tiempo / ms|Tiempo_ms|ms_today|time_ms_since_boot"
         "|t.ms|t:ms|t-ms|millis()|t_ms1"
         "|Zeit (Millisekunden)|time [milliseconds]",
@@ -29,7 +30,7 @@ HEADERS = {
         "|x (mm)|x <mm>|X_MM|Position mm (act)|pos_mm_act|déplacement en mm|Posición (mm)"
         "|spostamento [mm]"
         "|Weg in Millimeter|Weg in Millimetern|x [milímetros]|pos_mm1"
-        "|位移mm|Weg (in mm)|course (millimètres)|x [1e-3 m]|mm",
+        "|Перемещение, мм|x_мм|位移mm|Weg (in mm)|course (millimètres)|x [1e-3 m]|mm",
         1e-6: "x [um]|x (µm)|x [micron]|vdcdt_um|Weg / µm",
         1e-4: "x [0.1 mm]|x (0,1 mm)",
         1e-2: "pos_cm",
@@ -52,10 +53,12 @@ HEADERS = {
         "|mu|accel_x|in_position|x10|pos_x10|x_amplitude",
     },
     "m/s": {
-        1e-3: "v [mm/s]|v / (mm/s)|v mm/s|v_mm_s|v in mm/s|v_mm_per_s|v_mmps|vMm_s|vitesse, mm/s",
+        1e-3: "Скорость, мм/с|v [mm/s]"
+        "|v / (mm/s)|v mm/s|v_mm_s|v in mm/s|v_mm_per_s|v_mmps|vMm_s|vitesse, mm/s",
         1e-3 / 60: "Speed mm/min|feed_mm_min",
         1.0: "v [m/s]|v_m_s|omega_rad_s|w [rad/s]",
-        TURN / 60: "rpm|speed_rpm|SpeedRPM|n [1/min]|n / min⁻¹|n [min-1]|n [min^-1]|n [U/min]"
+        TURN / 60: "об/мин"
+        "|rpm|speed_rpm|SpeedRPM|n [1/min]|n / min⁻¹|n [min-1]|n [min^-1]|n [U/min]"
         "|Drehzahl in U/min|tr/min"
         "|giri/min|motor rev/min",
         TURN: "n [rev/s]|f [Hz]",
@@ -64,13 +67,13 @@ HEADERS = {
         NO_UNIT: "v|v_m|v_s|v_min|v_max|Servo motor speed|vel",
     },
     "N": {
-        1e3: "F / kN|F [kN]|F_kN|force_kn|ForceKN|Kraft in kN|Fuerza (kN)|force, kN",
+        1e3: "F / kN|Усилие, кН|F [kN]|F_kN|force_kn|ForceKN|Kraft in kN|Fuerza (kN)|force, kN",
         1.0: "force_N|F_in_N|Kraft in N|F [N]|M [Nm]|T [N·m]|T / Nm|torque_nm|TorqueNm|effort en N",
         1e-3: "torque_mNm|M [N mm]|F [mN]",
         10.0: "F_daN",
         9.80665: "load [kgf]",
         1.3558179483314: "torque_lbft|M [ftlb]",
-        DOUBTFUL: "F_in_N*10|I [Arms]|M [0.1%]"
+        DOUBTFUL: "F_in_N*10|I [Arms]|M [0.1%]|F [t]"
         "|force_mn|I [A]|load [kg]|torque [%]|force_kg|cell_mV|u_V|p_bar",
         NO_UNIT: "F|force|torque|u|A|current_A|x_max",
     },
@@ -104,11 +107,13 @@ def test_a_line_of_units_counts_for_the_names_above_or_below() -> None:
 def test_a_name_tells_another_quantity() -> None:
     names = {
         "accel_x": "an acceleration",
+        "x_ms2": "an acceleration",
+        "a [m/s²]": "an acceleration",
         "act_current": "a current",
         "iq": "a current",
         "motor_power_W": "a power",
     }
-    for name in (*names, "raw_x", "current_torque", "Strommoment", "iqr"):
+    for name in (*names, "raw_x", "x_ms", "current_torque", "Strommoment", "iqr"):
         assert other_quantity(name) == names.get(name), name
 
 
