@@ -3,10 +3,10 @@
 import time
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
-from threading import TIMEOUT_MAX, Condition, Thread
+from threading import Condition, Thread
 
 from stickslip_ros.errors import MessageError, RunError, StickslipError
-from stickslip_ros.nodes.pacing import FlowWindow
+from stickslip_ros.nodes.pacing import FlowWindow, Sleeper
 from stickslip_ros.record.codec import unpack_header
 from stickslip_ros.stamps import NANOSECONDS
 
@@ -117,6 +117,7 @@ class Player:
         self._loop = loop
         self._windows = windows
         self._timeline = Timeline(rate)
+        self._sleeper = Sleeper()
         self._changed = Condition()
         self._running = True
         self._thread = Thread(target=self._run, name="player", daemon=True)
@@ -136,6 +137,7 @@ class Player:
         with self._changed:
             self._running = False
             self._changed.notify()
+        self._sleeper.wake()
         if self._thread.ident is not None:
             self._thread.join()
 
@@ -197,23 +199,28 @@ class Player:
     def _send_when_due(self, message: Message) -> None:
         topic, _, data = message
         window = self._windows.get(topic)
-        with self._changed:
-            while self._running:
-                lateness = time.monotonic() - self._timeline.deadline
+        while True:
+            self._sleeper.sleep_until(self._timeline.deadline)
+            with self._changed:
+                if not self._running:
+                    return
                 if self._timeline.paused:
                     self._changed.wait()
-                elif lateness < 0.0:
-                    self._changed.wait(min(-lateness, TIMEOUT_MAX))
-                elif window is not None and window.full:
+                    continue
+                now = time.monotonic()
+                lateness = now - self._timeline.deadline
+                if lateness < 0.0:
+                    continue
+                if window is not None and window.full:
                     self._await_recorder(window)
-                else:
-                    self._send(message, self._timeline.now)
-                    self.sent += 1
-                    self.worst_lateness = max(self.worst_lateness, lateness)
-                    if window is not None:
-                        with suppress(MessageError):  # without a stamp, the recorder cannot name it
-                            window.sent(unpack_header(data))
-                    return
+                    continue
+                self._send(message, self._timeline.now)
+                self.sent += 1
+                self.worst_lateness = max(self.worst_lateness, lateness)
+                if window is not None:
+                    with suppress(MessageError):  # without a stamp, the recorder cannot name it
+                        window.sent(unpack_header(data))
+                return
 
     def _await_recorder(self, window: FlowWindow) -> None:
         since = time.monotonic()
