@@ -5,15 +5,9 @@ import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from stickslip_ros.app.arguments import (
-    add_out,
-    add_reading,
-    add_recordings,
-    check_new,
-    reading_of,
-    writing,
-)
+from stickslip_ros.app.arguments import add_out, check_new, writing
 from stickslip_ros.app.output import progress_bar, tell
+from stickslip_ros.app.recordings import add_reading, add_recordings, reading_of
 from stickslip_ros.app.result import add_results, check_results, give_result
 from stickslip_ros.errors import InvalidInputError
 

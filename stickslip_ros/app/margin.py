@@ -2,7 +2,7 @@
 
 import argparse
 
-from stickslip_ros.app.arguments import add_reading, add_recordings, reading_of
+from stickslip_ros.app.recordings import add_reading, add_recordings, reading_of
 from stickslip_ros.app.result import add_results, check_results, give_result
 
 

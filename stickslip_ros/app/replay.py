@@ -5,9 +5,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from stickslip_ros.app import INTERRUPTED
-from stickslip_ros.app.arguments import add_bag_layout, add_network, seconds
+from stickslip_ros.app.arguments import add_network, seconds
 from stickslip_ros.app.optional_dependencies import loading_ros
 from stickslip_ros.app.output import progress_bar, tell
+from stickslip_ros.app.recordings import add_bag_layout
 
 DESCRIPTION = (
     "Publish the messages of a bag again, unchanged, under their recorded names and with their "

@@ -3,14 +3,8 @@
 import argparse
 from pathlib import Path
 
-from stickslip_ros.app.arguments import (
-    add_reading,
-    add_recordings,
-    length,
-    reading_of,
-    seconds,
-    speed,
-)
+from stickslip_ros.app.arguments import length, seconds, speed
+from stickslip_ros.app.recordings import add_reading, add_recordings, reading_of
 from stickslip_ros.app.result import (
     add_results,
     check_results,
