@@ -75,9 +75,10 @@ _OTHERS = {
     "a current": re.compile(r"current|i[qd]$|(?:\w*motor)?strom|corrente|corriente|courant"),
     "a power": re.compile(r"power|leistung|puissance|poten[zc]"),
 }
-_SQUARED = re.compile(r"(?i)(?<![^\W\d_])(?:[cdm]?m|rad|deg)[\W_]?s\W{0,2}[2²](?!\d)")
 _FORCE = re.compile(r"forc|fuerz|forz|torq|moment|coup|copp|effort|\w*(?:kraft|moment)")
-"""Starts of words for quantities that are often taken for others, and for forces; m/s2."""
+"""Starts of words for quantities that are often taken for others, and for forces."""
+_SQUARED = re.compile(r"(?i)(?<![^\W\d_])(?:[cdm]?m|rad|deg)[\W_]?s\W{0,2}[2²](?!\d)")
+"""Units of an acceleration, as ms2."""
 _LATIN = {
     **{"мк": "u", "см": "cm", "кгс": "kgf", "град": "deg", "об": "r"},
     **dict(zip("мскнгдчриа", "mskngdhria", strict=True)),
@@ -304,6 +305,7 @@ def _parsed(text: str) -> tuple[tuple[str, str], ...]:
         .replace("″", "inch")
         .replace("°", "deg")
         .replace("⁻¹", "-1")
+        .replace("ms-1", "m/s")  # as in v_ms-1, and not 1/ms
         .replace("%", " % ")
     )
     plain = re.sub(r"(?i)(?<![^\W\d_])(?:per|pro|por|par)(?![^\W\d_])", "/", plain)

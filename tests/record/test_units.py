@@ -56,7 +56,7 @@ HEADERS = {
         1e-3: "Скорость, мм/с|v [mm/s]"
         "|v / (mm/s)|v mm/s|v_mm_s|v in mm/s|v_mm_per_s|v_mmps|vMm_s|vitesse, mm/s",
         1e-3 / 60: "Speed mm/min|feed_mm_min",
-        1.0: "v [m/s]|v_m_s|omega_rad_s|w [rad/s]",
+        1.0: "v [m/s]|v_ms-1|v [ms⁻¹]|v_m_s|omega_rad_s|w [rad/s]",
         TURN / 60: "об/мин"
         "|rpm|speed_rpm|SpeedRPM|n [1/min]|n / min⁻¹|n [min-1]|n [min^-1]|n [U/min]"
         "|Drehzahl in U/min|tr/min"
