@@ -215,7 +215,7 @@ class _Writer:
 
 
 def _shared(tree: Result | Decision, known: Container[Symbol]) -> list[Symbol]:
-    """Return the operations in its first values that a tree needs repeatedly, innermost first."""
+    """Return the operations in the values of a root that its tree repeats, innermost first."""
     uses = Counter[Symbol]()
 
     def count(value: Operand) -> None:
