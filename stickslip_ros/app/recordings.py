@@ -20,10 +20,10 @@ def _add_table_form(parser: argparse.ArgumentParser) -> None:
         "--columns",
         metavar="QUANTITY=COLUMN,...",
         help="where a table has time, position, velocity, force, belt_velocity, friction_force, "
-        "disturbance and reference: columns and numbers with + - * /, brackets and unwrap(column, "
-        "turn), in SI units, as in time=t,position=(cmd-x)*1e-3,belt_velocity=0.04; 'a name' in "
-        "quotes, #2 for the second column; what has no number in it is converted, if the table has "
-        "its unit",
+        "disturbance and reference: columns and numbers with + - * /, brackets, unwrap(column, "
+        "turn) and cumsum(column), in SI units, as in time=t,position=(cmd-x)*1e-3,"
+        "belt_velocity=0.04; 'a name' in quotes, #2 for the second column; what has no number in "
+        "it is converted, if the table has its unit",
     )
     parser.add_argument(
         "--decimal", metavar="MARK", help="decimal mark of a table, . or , (default: found)"

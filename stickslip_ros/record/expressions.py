@@ -26,9 +26,10 @@ _OPERATIONS: Mapping[type[ast.AST], Callable[..., Any]] = {
 }
 _SUMS = (ast.Name, ast.Load, ast.UnaryOp, ast.BinOp, ast.Add, ast.Sub, ast.UAdd, ast.USub)
 _NUMBERS = {"nan": np.nan, "inf": np.inf}
+_KNOWN = (*_NUMBERS, "unwrap", "cumsum")
 _ALLOWED = (
-    "must be columns and numbers with + - * /, brackets and unwrap(column, turn); other names "
-    "go into quotes"
+    "must be columns and numbers with + - * /, brackets, unwrap(column, turn) and cumsum(column); "
+    "other names go into quotes"
 )
 
 
@@ -84,7 +85,7 @@ class Expression:
             tree = ast.parse(_pattern(columns, text).sub(placed, text).strip(), mode="eval").body
             by_name = {name.strip(): place for place, name in places.items()}
             for node in ast.walk(tree):
-                if isinstance(node, ast.Name) and node.id not in {*by_name, *_NUMBERS, "unwrap"}:
+                if isinstance(node, ast.Name) and node.id not in {*by_name, *_KNOWN}:
                     raise InvalidInputError(_unknown(source, node.id, columns))
             bare = all(isinstance(node, _SUMS) for node in ast.walk(tree))
             expression = cls(text, bare and bool(places), tuple(places), tree)
@@ -118,6 +119,8 @@ def _value(node: ast.AST, named: Mapping[str, Any]) -> Any:
             return _OPERATIONS[type(operator)](_value(left, named), _value(right, named))
         case ast.Call(func=ast.Name(id="unwrap"), args=[counter, turn], keywords=[]):
             return _unwrapped(_value(counter, named), _value(turn, named))
+        case ast.Call(func=ast.Name(id="cumsum"), args=[column], keywords=[]):
+            return np.nancumsum(_value(column, named))
         case _:
             raise ValueError(ast.dump(node))
 

@@ -363,6 +363,11 @@ def _factor(table: Table, kind: str, asked: Expression) -> tuple[float, dict[str
             other = None
         if other and kind in ((*_MOTION, *_FORCES) if other == "an acceleration" else _FORCES):
             text = "*1 takes it if it is one" if kind in _MOTION else f"*NUMBER converts it{way}"
+            if kind in _MOTION and other == "an acceleration":
+                text += (
+                    f"; velocity=cumsum({column})*NUMBER without a position integrates it, with "
+                    "the time from row to row, s, times the number of m/s^2 in one of it"
+                )
             raise InvalidInputError(
                 f"{which} is {other} by its name, which tells no {kind}: {kind}={column}{text}"
             )

@@ -7,7 +7,7 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray
 
-GROUPED = r"(?:(?<=\d)['\u2019\xa0\u202f](?=\d{3}))"
+GROUPED = r"(?:(?<=\d)(?<!\d{4})['\u2019\xa0\u202f ](?=\d{3}(?!\d)))"
 """Marks between thousands that are no decimal marks."""
 _CLOCK = r"\d{1,2}:\d\d(?::\d\d(?:[.,:]\d+)?)?"
 TIME = re.compile(

@@ -39,6 +39,8 @@ _NUMBER = re.compile(
 )
 _Line = tuple[int, list[str]]
 """Place of a line, and its cells."""
+_CYRILLIC = re.compile(rb"[\xe0-\xff](?:[\xe0-\xff]{2}|[\xc0-\xde\xec])|\xec\xf1")
+"""Letters in cp1251 that cp1252 would show as a row of accents, such as those of mm and ms."""
 _COMMENT = re.compile(r"^\s*(?:#|%|//)\s*")
 _NO_NUMBERS = ("", "na", "n/a", "null", "none", "#n/a", "#na", "<na>")
 
@@ -176,7 +178,7 @@ def _encoding_of(head: bytes) -> str:
     try:
         codecs.getincrementaldecoder("utf-8")().decode(head)
     except UnicodeDecodeError:
-        return "cp1252"
+        return "cp1251" if _CYRILLIC.search(head) else "cp1252"
     return "utf-8"
 
 

@@ -39,6 +39,7 @@ def value_of(text: str) -> list[float]:
         ("2.5 * x", 25.0, False),
         ("'2'*2", 180.0, False),
         ("x*-2", -20.0, False),
+        ("cumsum(x)*2", 20.0, False),
     ],
 )
 def test_an_expression_has_the_value_of_its_columns(text: str, first: float, bare: bool) -> None:

@@ -57,6 +57,10 @@ def read(
         ("t [s];x [m]\n" + rows(";"), "t", "x"),
         ("cmd-x,x\n" + rows(), "cmd-x", "x"),
         (("t;µ\n" + rows(";")).encode("cp1252"), "t", "µ"),
+        (("время, с;x\n" + rows(";")).encode("cp1251"), "время", "x"),
+        (("t;бД\n" + rows(";")).encode("cp1251"), "t", "бД"),
+        (("t;Größe\n" + rows(";")).encode("cp1252"), "t", "Größe"),
+        (("t;posição\n" + rows(";")).encode("cp1252"), "t", "posição"),
         (("t;x\n" + rows(";")).encode("utf-16"), "t", "x"),
         (("t;x\n" + rows(";")).encode("utf-16-le"), "t", "x"),
         (("t;x\r\n" + rows(";").replace("\n", "\r\n")).encode("utf-8-sig"), "t", "x"),
@@ -292,6 +296,14 @@ def test_points_between_thousands_are_refused_with_a_way(tmp_path: Path) -> None
     for mark, first in ((",", 1050.0), (".", 1.05)):
         found = read(tmp_path, text, "t", "x", TableFormat(decimal=mark)).samples
         assert found.position[0] == first
+
+
+def test_blanks_between_thousands_are_passed_by(tmp_path: Path) -> None:
+    cells = [f"{n:,},5".replace(",", " ", n >= 1000) for n in range(950, 1050)]
+    text = "t;x\n" + "".join(f"{n};{cell}\n" for n, cell in enumerate(cells))
+    assert read(tmp_path, text, "t", "x").samples.position.tolist() == [
+        n + 0.5 for n in range(950, 1050)
+    ]
 
 
 def test_a_current_is_no_force(tmp_path: Path) -> None:
