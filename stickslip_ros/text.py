@@ -42,9 +42,9 @@ def renamed(sentence: str, names: Mapping[str, str]) -> str:
 
 
 def quantity(value: float, unit: str) -> str:
-    """Return a rounded value with its unit, and a suitable prefix unless this is one as 1/s."""
-    scale, prefix = (1.0, "") if unit.startswith("1") else prefix_for(value)
-    return f"{value / scale:.4g} {prefix}{unit}"
+    """Return a rounded value with its unit, if any, and a prefix unless this is one as 1/s."""
+    scale, prefix = prefix_for(value) if unit and not unit.startswith("1") else (1.0, "")
+    return f"{value / scale:.4g} {prefix}{unit}".rstrip()
 
 
 def number_in(text: str) -> float:

@@ -21,6 +21,7 @@ from stickslip_ros.model.control import ControlLaw
 from stickslip_ros.model.drive import Drive
 from stickslip_ros.motion.trajectory import MotorTrajectory
 from stickslip_ros.quantities import Quantity, quantities_of
+from stickslip_ros.record.bag_files import runs_of
 from stickslip_ros.record.bag_layout import BagLayout
 from stickslip_ros.record.reader import Recording
 from stickslip_ros.record.report import report_of_recording
@@ -205,7 +206,7 @@ class Comparison(Result):
 
 def read_bag(
     path: Path | str,
-    *,
+    *continued: Path | str,
     start: float = 0.0,
     end: float = float("inf"),
     namespace: str | None = None,
@@ -225,6 +226,9 @@ def read_bag(
     ----------
     path : Path or str
         Bag directory or one MCAP file, also one that is being recorded, cut off or damaged.
+    *continued : Path or str
+        Bags that continue the run, `path` with _2 and so on behind it, as an analyzer writes them
+        that was restarted with `bag_exists: next`.
     start, end : float
         Part to read, s from the first sample.
     namespace : str, optional
@@ -257,7 +261,7 @@ def read_bag(
     BagError
         If `path` is not a bag, or holds neither joint states nor control forces.
     InvalidInputError
-        If the part is empty.
+        If the part is empty, or a bag does not continue the run.
 
     Examples
     --------
@@ -266,9 +270,13 @@ def read_bag(
     >>> recorded.measures.regime.value, f"{recorded.measures.amplitude:.2e}"
     ('stick_slip', '3.26e-04')
     """
+    runs = runs_of(map(Path, (path, *continued)))
+    if len(runs) > 1:
+        raise InvalidInputError(f"{[*runs][1]} does not continue the run in {path}")
     return recorded_run(
         Path(path),
         table=False,
+        continued=runs[Path(path)],
         start=start,
         end=end,
         namespace=namespace,
@@ -408,16 +416,17 @@ def recorded_run(
     taking: dict[str, Any] = {"take": take} if kept else {}
     observer = history if drawn else None
     table = is_table(path) if table is None else table
+    drive = None if table else recorded_drive(path, namespace)
+    unit = "" if Units.for_drive(drive).dimensionless else "m"
     report = report_of_recording(
         path,
         table=table,
         namespace=namespace,
-        length="rad" if rotary else "m",
+        length="rad" if rotary else unit,
         observer=observer,
         **taking,
         **with_forms({**options, "rotary": rotary}),
     )
-    drive = None if table else recorded_drive(path, namespace)
     return RecordedRun(
         path,
         NO_SAMPLES.followed_by(*samples),

@@ -123,7 +123,7 @@ def followed(
     heights = [turn.height for turn in turns]
     least = max(limit, _LEAST_HEIGHT * float(np.ptp(reference)))
     if turns and np.mean(heights) <= least:
-        text = quantity(least, unit) if unit else f"{least:.4g}"
+        text = quantity(least, unit)
         notes.append(f"the error at reversals is not known: positions tell none below {text}")
     elif turns and np.median([turn.wide for turn in turns]) < _FEWEST_SAMPLES:
         notes.append("the error at reversals is not known: it is shorter than three samples")

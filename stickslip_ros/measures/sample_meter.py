@@ -223,11 +223,12 @@ class SampleMeter:
         """Return the measures as `measured` does."""
         return self.measured(quick=quick).measures
 
-    def measured(self, *, quick: bool = False) -> MeasuredSamples:
+    def measured(self, length: str = "m", *, quick: bool = False) -> MeasuredSamples:
         """Return the means over the last whole cycles, and why they may be wrong.
 
-        With `quick`, cycles under noise are measured one by one instead of together, which takes a
-        thousandth of the time and is less accurate.
+        `length` is the unit of positions in the notes, "" for none. With `quick`,
+        cycles under noise are measured one by one instead of together, which takes a thousandth of
+        the time and is less accurate.
         """
         if self.mixed:
             note = (
@@ -246,7 +247,7 @@ class SampleMeter:
             measures = self._exact_measures(window)
         varies = self.reading.varies or self._speeds.belt_varies
         measures = measures if varies else with_drift(measures, self.drift)
-        notes = [*self._notes(measures, mean), *[NOT_JUDGED] * varies]
+        notes = [*self._notes(measures, mean, length), *[NOT_JUDGED] * varies]
         return MeasuredSamples(measures, notes, mean)
 
     @property
@@ -271,7 +272,7 @@ class SampleMeter:
             measures = replace(measures, errors={**measures.errors, "stick_fraction": error})
         return measures
 
-    def _notes(self, measures: Measures, mean: MeanCycle | None) -> Iterator[str]:
+    def _notes(self, measures: Measures, mean: MeanCycle | None, length: str) -> Iterator[str]:
         """Yield sentences that say why the measures may be wrong."""
         if self._grid.steps_back:
             yield (
@@ -293,10 +294,11 @@ class SampleMeter:
         if mean is not None and mean.stick is not None:
             velocity, error = copysign(mean.stick.fit.belt_speed, belt), mean.stick.speed_error
             if abs(velocity - belt) > _LEAST_ERRORS * error + _LEAST_SHARE * abs(belt):
+                speed = length and f"{length}/s"
                 yield (
-                    f"the slide sticks at {quantity(velocity, 'm/s')} (standard error "
-                    f"{quantity(error, 'm/s')}), not at the speed of the belt, "
-                    f"{quantity(belt, 'm/s')}: one of them has another scale, or the positions "
+                    f"the slide sticks at {quantity(velocity, speed)} (standard error "
+                    f"{quantity(error, speed)}), not at the speed of the belt, "
+                    f"{quantity(belt, speed)}: one of them has another scale, or the positions "
                     "drift; the stick is that at the former"
                 )
 

@@ -118,7 +118,7 @@ class RunFeed:
         """Return the measures and counts, and the slips if they were looked for."""
         if self._measured == 0:
             raise InvalidInputError(f"{path} holds no samples {self._part}")
-        measured, slips = self._meter.motion.measured(), None
+        measured, slips = self._meter.motion.measured(length), None
         self._meter.followed = self._followed(length)
         report = report_of(self._meter, measured)
         notes = [*self._notes, *report["notes"]]

@@ -10,10 +10,13 @@ import pytest
 import stickslip_ros as ss
 from stickslip_ros.api.recordings import recorded_drive
 from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.measures.slips import SlipThreshold
 from stickslip_ros.model.drive import Drive
+from stickslip_ros.record.codec import pack_joint_state
 from stickslip_ros.record.reader import Recording
 from stickslip_ros.record.recorder import Recorder
 from stickslip_ros.record.report import report_of_recording
+from tests.record.runs import SECOND, STAMPS, STATES, motion, record, write_bag
 
 REFERENCE = Path(__file__).parents[2] / "bags" / "reference"
 
@@ -68,6 +71,32 @@ def test_a_part_is_that_of_the_report() -> None:
     assert len(found.forces) == 1000
     with pytest.raises(InvalidInputError, match="is empty"):
         ss.read_bag(REFERENCE, start=2.0, end=1.0)
+
+
+def test_bags_that_continue_a_run_are_one(tmp_path: Path) -> None:
+    bags = [tmp_path / "run", tmp_path / "run_2"]
+    for bag, stamps in zip(bags, (STAMPS[:500], STAMPS[600:]), strict=True):
+        record(bag, stamps, stamps, tables={"stickslip_ros/analyzer": {"bag_exists": '"next"'}})
+    found = ss.read_bag(*bags)
+    assert found.samples.stamp.tolist() == STAMPS[:500] + STAMPS[600:]
+    assert any("continues the run 1.01 s after" in note for note in found.report["notes"])
+    with pytest.raises(InvalidInputError, match=r"run does not continue the run in .*run_2"):
+        ss.read_bag(*reversed(bags))
+
+
+@pytest.mark.parametrize(("name", "drop"), [("paper", "0.001"), ("feed_drive", "1 mm")])
+def test_notes_have_the_units_of_the_drive(name: str, drop: str, tmp_path: Path) -> None:
+    known = ss.scenario(name).plant.flat() | {"sensor.position_noise": 1.0}
+    tables = {"stickslip_ros/plant": {key: json.dumps(value) for key, value in known.items()}}
+    noise = np.random.default_rng(1).standard_normal(len(STAMPS))
+    positions = motion(np.array(STAMPS) / SECOND)[0] + 0.01 * noise
+    states = [
+        (STATES, stamp, pack_joint_state(stamp, (x, 0.0), (0.0, 0.04), (0.0, 0.0)))
+        for stamp, x in zip(STAMPS, positions.tolist(), strict=True)
+    ]
+    write_bag(tmp_path / "run", states, tables=tables)
+    notes = ss.read_bag(tmp_path / "run", slips=SlipThreshold(1e-3)).report["notes"]
+    assert any(note.startswith(f"the least drop of a slip, {drop}, is within") for note in notes)
 
 
 def recorded_with(folder: Path, parameters: dict[str, str]) -> Drive | None:

@@ -1,8 +1,10 @@
 """Bags with exactly known content."""
 
 import resource
+from collections.abc import Mapping
 from contextlib import contextmanager
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 from mcap.writer import Writer
@@ -40,8 +42,8 @@ def write_bag(
     messages,
     *,
     topics=(),
-    tables=MappingProxyType({}),
-    types=MappingProxyType({}),
+    tables: Mapping[str, Any] = MappingProxyType({}),
+    types: Mapping[str, str] = MappingProxyType({}),
     flush_every=0,
 ):
     """Record messages: topic, stamp (ns) and data of each. A topic of no name of ours is a number.
