@@ -29,35 +29,54 @@ _SPELLINGS = tuple(
         ("N m", "FL", "[umck]", "nm"),
         ("N cm", "FL", "", "ncm"),
         ("N mm", "FL", "", "nmm"),
+        ("kgf m", "FL", "", "kgf?m"),
+        ("kgf cm", "FL", "", "kgf?cm"),
         ("lbf ft", "FL", "", "lb[fs]?ft|ftlb[fs]?"),
         ("lbf inch", "FL", "", "lb[fs]?in|inlb[fs]?"),
         ("ozf inch", "FL", "", "ozf?in"),
         ("rad", "R", f"[um]|{_ANY_LONG}", r"rad(?:s|ian\w*)?"),
         ("turn/s", "R/T", "k", "hz|rps"),
-        ("turn/min", "R/T", "", "rpm|upm"),
+        ("turn/min", "R/T", "k", "rpm|upm|umin"),
         ("m/s", "L/T", "m", "mps"),
-        ("mm/s", "L/T", "", "mms"),
+        ("mm/s", "L/T", "", "mms(?:ec)?"),
         ("km/hour", "L/T", "", "kmh|kph"),
-        ("inch/s", "L/T", "", "ips"),
+        ("mile/hour", "L/T", "", "mph"),
+        ("knot", "L/T", "", "knots?|kts"),
+        ("m/min", "L/T", "m", "mpm|mmin"),
+        ("ft/s", "L/T", "", "fps"),
+        ("inch/s", "L/T", "", "ips|inps"),
         ("inch/min", "L/T", "", "ipm"),
-        ("degree/s", "R/T", "", "dps"),
+        ("degree/s", "R/T", "", "dps|degp?s"),
+        ("rad/s", "R/T", "m", "radp?s"),
         ("inch", "L", "u|micro", "in|inch(?:es)?|zoll|pulgadas?|pouces?|pollic[ei]"),
         ("ft", "L", "", "ft|foot|feet"),
+        ("yard", "L", "", "yds?|yards?"),
+        ("angstrom", "L", "", "angstr[oö]ms?"),
         ("thou", "L", "", "thou|mils?"),
-        ("micron", "L", "", "mi[ck]rons?"),
+        ("micron", "L", "", "mi[ck]rons?|mkm"),
         ("min", "T", "", r"min(?:s|ut\w{1,2})?"),
         ("hour", "T", "", "h|hrs?|hours?|stunden?|horas?|heures?|or[ae]"),
         ("day", "T", "", "d|days?|tage?"),
         ("degree", "R", "m|milli", r"deg(?:s|r\w*)?|grad(?:i|os?)?"),
         ("gon", "R", "m", "gon|grad"),
-        ("turn", "turns", "", "r|u|tr"),
+        ("turn", "turns", "", "r|u|tr|rot"),
         ("turn", "R", "", "revs?|revolutions?|turns?|umdr(?:ehung(?:en)?)?|tours?|giri|vueltas?"),
         ("arcsec", "R", "", "arcsec(?:onds?)?"),
         ("arcmin", "R", "", "arcmin(?:utes?)?"),
         ("kgf", "F", "", "kgf|kp"),
-        ("lbf", "F", "", "lbf"),
+        ("lbf", "F", "k", "lbf"),
+        ("kip", "F", "", "kips?"),
+        ("dyn", "F", "", "dyn(?:es?)?"),
+        ("gf", "F", "", "gf|pond"),
+        ("Mgf", "F", "", "tf"),
         ("A", "I", "[kum]", r"a(?:mps?|mpere\w*|rms|eff|pk)?"),
-        ("", "other", "[kum]", r"[vwgk]|volts?|gf|pa|bar|lbs?|oz|degc|°c|%"),
+        (
+            "",
+            "other",
+            "[kum]",
+            r"[vwgk]|volts?|grams?|kgs|kilos?|tons?|tonn(?:e[ns]?|ellat[ae])|toneladas?|pa|bar|lbs?|oz|degc|°c|%"
+            "|percent|pct|prozent",
+        ),
     )
 )
 """Units in machines' data: what pint calls them, their dimension, prefixes, and how people write
@@ -65,14 +84,16 @@ them. Those without a name for pint are of other quantities; turns as in U/min o
 _DIMENSIONS = {"m": "L", "m/s": "L/T", "N": "F", "s": "T", "rad": "R", "rad/s": "R/T", "N m": "FL",
                "A": "I", "N/A": "F/I", "N m/A": "FL/I"}  # fmt: skip
 _COUNTS = re.compile(
-    r"counts?|cts|inc|incr(?:ements?)?|ink(?:r\w*)?|puls\w*|impuls\w*|pls|ticks?|steps|lsb|digits?|erpm|cnts?|qc"
+    r"counts?|cts|[cp]ps|adc|inc|incr(?:ements?)?|ink(?:r\w*)?|puls\w*|impuls\w*|pls|ticks?|(?:micro|u)?steps|lsb|digits?|erpm|cnts?|qc"
 )
 """Words for numbers of an encoder, a motor or a clock, of which only the owner knows the size."""
-_SCALED = re.compile(r"(?i)(?:[*/\xd7]|\sx)\s*10+\b|\b(?:tenth|hundredth|zehntel|hundertstel)s?\b")
+_SCALED = re.compile(
+    r"(?i)(?:[*/\xd7]|\sx)\s*10+\b|[\s_]x10+(?=[^\W\d_])|_x100+$|\b(?:tenth|hundredth|zehntel|hundertstel)s?\b"
+)
 """What says that numbers are multiples of a unit."""
 _OTHERS = {
     "an acceleration": re.compile(r"acc(?:el\w*)?$|beschl|accél|acel"),
-    "a current": re.compile(r"current|i[qd]$|(?:\w*motor)?strom|corrente|corriente|courant"),
+    "a current": re.compile(r"current|is?[qd]$|(?:\w*motor)?strom|corrente|corriente|courant"),
     "a power": re.compile(r"power|leistung|puissance|poten[zc]"),
 }
 _FORCE = re.compile(r"forc|fuerz|forz|torq|moment|coup|copp|effort|\w*(?:kraft|moment)")
@@ -80,21 +101,25 @@ _FORCE = re.compile(r"forc|fuerz|forz|torq|moment|coup|copp|effort|\w*(?:kraft|m
 _SQUARED = re.compile(r"(?i)(?<![^\W\d_])(?:[cdm]?m|rad|deg)[\W_]?s\W{0,2}[2²](?!\d)")
 """Units of an acceleration, as ms2."""
 _LATIN = {
-    **{"мк": "u", "см": "cm", "кгс": "kgf", "град": "deg", "об": "r"},
+    **{"мк": "u", "см": "cm", "кгс": "kgf", "тс": "tf", "град": "deg", "об": "r"},
     **dict(zip("мскнгдчриа", "mskngdhria", strict=True)),
 }
 _CYRILLIC = re.compile("|".join(_LATIN), re.IGNORECASE)
 """Units in Cyrillic letters, the longer first."""
 _BRACKETED = re.compile(r"[\[(<{]\s*([^\[\](){}<>]*[^\[\](){}<>\s])\s*[\])>}]")
 _MARK = re.compile(r"\s*[/,]\s*|\s+(?:in|en|em)\s+")
+_MARKS = " _-.,;:/#"
+"""What is between words."""
 _START = re.compile(
     r"(?<![^\W_])(?=[^\W_])|(?<=[^\W\d_A-Z])(?=[A-Z])|(?<=\d)(?=[^\W\d_])"
-    r"|(?<=[^\x00-\u03ff])(?=[a-zA-Zµμ])"
+    r"|(?<=[^\x00-\u03ff])(?=[a-zA-Zµμ])|(?=°)"
 )
 """Where a word starts: after a mark, in PosMM, after a number, and after Chinese letters."""
 _DOUBTFUL, _DOUBTFUL_ALONE = ("in", "min", "h", "d"), ("cm", "dm")
 """Units that may be other words at the end of a name, or where they are all of it."""
-_INDEX = re.compile(r"(?<=[^\W\d_]{2})(?:1|(?<!s)\d)$")
+_WEIGHTS = {"g": 9.80665e-3, "t": 9806.65, "to": 9806.65, "т": 9806.65}
+"""Weights, N, of units of mass that may be other words behind a force."""
+_INDEX = re.compile(r"(?<=[^\W\d_]{2})(?:1|(?<!s)\d\d?)$")
 """The number of a channel behind a unit, as in mm1; s2 is squared."""
 _LONGEST = 200
 """Characters of a name in which a unit is looked for."""
@@ -244,28 +269,44 @@ def _last(name: str, target: str) -> Iterator[Unit]:
         text, before = name[start:], name[:start]
         rest = text[3:] if re.match(r"(?i)in[\W_]", text) else ""
         if readings := [*_read(rest, target)] or [*_read(text, target)]:
+            if re.match(r"(?i)per(?![^\W_])", text) and _counts(before):
+                break
             yield from readings
             if text.casefold() in (_DOUBTFUL if before else _DOUBTFUL + _DOUBTFUL_ALONE):
                 yield Unit("", 1.0, target)
             if text[0].isdigit():  # a number of units, or of the column
                 yield from _read(text.lstrip("0123456789."), target)
             return
-    words = [
-        name[start:end].strip(" _-.,;:/#")
-        for start, end in zip(starts, [*starts[1:], len(name)], strict=False)
-    ]
+    ends = [*starts[1:], len(name)]
+    words = [name[start:end].strip(_MARKS) for start, end in zip(starts, ends, strict=False)]
     whole = {dimension for start in starts[-3:-1] for _, dimension in _parsed(name[start:])}
-    if not whole & {*_DIMENSIONS.values()}:
-        for word in words[:-1]:
-            if len(word) > 1 and word.casefold() != "in" and (readings := [*_read(word, target)]):
-                yield from readings
-                if word.casefold() in _DOUBTFUL:
-                    yield Unit("", 1.0, target)
+    between = [] if whole & {*_DIMENSIONS.values()} else [*_between(name, starts, target)]
+    yield from between
+    if target == "N" and not between and words[1:] and words[-1] in _WEIGHTS:
+        yield from (Unit(words[-1], _WEIGHTS[words[-1]], "N"), Unit("", 1.0, "N"))
     yield from (Unit(word, nan, target) for word in words if _counts(word))
-    for word in (name[start:] for start in starts[-2:] if start):
-        long = len(word) > 1 and word.casefold() not in _DOUBTFUL and _parsed(word)
-        if long or word == "V":
+    for start in starts[-2:]:
+        word, parsed = name[start:], _parsed(name[start:])
+        long = len(word) > 1 and word.casefold() not in _DOUBTFUL and parsed
+        if (long and ("", "other") in parsed) or (start and (long or word == "V")):
             yield Unit(word, nan, target)
+
+
+def _between(name: str, starts: Sequence[int], target: str) -> Iterator[Unit]:
+    """Yield what words may be that others follow; mm_s there is no unit of length."""
+    first = 0
+    while first < len(starts) - 1:
+        for end in range(min(first + 3, len(starts) - 1), first, -1):
+            text = name[starts[first] : starts[end]].strip(_MARKS)
+            known = {dimension for _, dimension in _parsed(text)} & {*_DIMENSIONS.values()}
+            if known and len(text) > 1 and text.casefold() != "in":
+                readings = [*_read(text, target)]
+                yield from readings or [Unit(text, nan, target)] * (end > first + 1)
+                if readings and text.casefold() in _DOUBTFUL:
+                    yield Unit("", 1.0, target)
+                first = end - 1
+                break
+        first += 1
 
 
 def _counts(text: str) -> bool:
@@ -298,7 +339,11 @@ def _factor(unit: str, target: str) -> float:
 def _parsed(text: str) -> tuple[tuple[str, str], ...]:
     """Return the readings of a text as a unit: what pint calls it, and its dimension."""
     plain = (
-        re.sub("[\u0300-\u036f]", "", normalize("NFD", _CYRILLIC.sub(_latin, text)))
+        re.sub(
+            "[\u0300-\u036f]",
+            "",
+            normalize("NFD", _CYRILLIC.sub(_latin, text.replace("Å", "angstrom"))),
+        )
         .replace("µ", "u")
         .replace("μ", "u")
         .replace('"', "inch")
@@ -308,6 +353,7 @@ def _parsed(text: str) -> tuple[tuple[str, str], ...]:
         .replace("ms-1", "m/s")  # as in v_ms-1, and not 1/ms
         .replace("%", " % ")
     )
+    plain = re.sub("(?<=[a-z])Per(?=[A-Z])", "/", plain)
     plain = re.sub(r"(?i)(?<![^\W\d_])(?:per|pro|por|par)(?![^\W\d_])", "/", plain)
     if len(plain) > 40 or not re.fullmatch(r"[\w\s/.*·⋅^%²-]+", plain):
         return ()

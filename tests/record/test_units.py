@@ -29,9 +29,11 @@ HEADERS = {
         "|x-mm|x_mm|x [mm]"
         "|x (mm)|x <mm>|X_MM|Position mm (act)|pos_mm_act|déplacement en mm|Posición (mm)"
         "|spostamento [mm]"
-        "|Weg in Millimeter|Weg in Millimetern|x [milímetros]|pos_mm1"
+        "|Weg in Millimeter|Weg in Millimetern|x [milímetros]|pos_mm1|mm10|pos_mm_filt"
         "|Перемещение, мм|x_мм|位移mm|Weg (in mm)|course (millimètres)|x [1e-3 m]|mm",
-        1e-6: "x [um]|x (µm)|x [micron]|vdcdt_um|Weg / µm",
+        0.9144: "x_yd",
+        1e-10: "x_Å",
+        1e-6: "pos, mkm|x [um]|x (µm)|x [micron]|vdcdt_um|Weg / µm",
         1e-4: "x [0.1 mm]|x (0,1 mm)",
         1e-2: "pos_cm",
         1e-9: "pos_nm",
@@ -48,22 +50,25 @@ HEADERS = {
         "|Weg [Inkremente]|Droop pulses (by 1 pls.)|Position [V]|Pos [%]|x (1/1000 mm)"
         "|Weg / mV|x_0.1um|x (in 0.1 mm)"
         "|pos_cnt|pos (qc)|LVDT volts|Position %|tenths of mm|[mm]/10|x [mm x 1000]|Weg x10^-3 m"
-        "|Drehmoment [Nm]",
+        "|Drehmoment [Nm]|x_mm_s_filt|pos_x1000|usteps|adc",
         NO_UNIT: "x|pos|x_N|phi_h|pos_d|x_min|Position (min)|Position (X)|x_max|data[2]|pos_s|A"
         "|mu|accel_x|in_position|x10|pos_x10|x_amplitude",
     },
     "m/s": {
         1e-3: "Скорость, мм/с|v [mm/s]"
-        "|v / (mm/s)|v mm/s|v_mm_s|v in mm/s|v_mm_per_s|v_mmps|vMm_s|vitesse, mm/s",
-        1e-3 / 60: "Speed mm/min|feed_mm_min",
+        "|v / (mm/s)|v mm/s|v_mm_s|v in mm/s|v_mm_per_s|v_mmps|v_mmPerS|vMm_s|vitesse, mm/s",
+        1e-3 / 60: "Speed mm/min|feed_mm_min|v_mm_min_filtered",
         1.0: "v [m/s]|v_ms-1|v [ms⁻¹]|v_m_s|omega_rad_s|w [rad/s]",
         TURN / 60: "об/мин"
         "|rpm|speed_rpm|SpeedRPM|n [1/min]|n / min⁻¹|n [min-1]|n [min^-1]|n [U/min]"
         "|Drehzahl in U/min|tr/min"
         "|giri/min|motor rev/min",
         TURN: "n [rev/s]|f [Hz]",
-        DEGREE: "w [deg/s]|w_deg_s|w_dps",
-        DOUBTFUL: "n [1/s]|vel_counts_s|v [mm]|erpm|v_mm|speed_ms",
+        1e3 * TURN / 60: "krpm",
+        0.44704: "v_mph",
+        1852 / 3600: "v_knots",
+        DEGREE: "w [deg/s]|w_deg_s|w_dps|°/s|omega_degps",
+        DOUBTFUL: "n [1/s]|vel_counts_s|counts_per_s|v_cps|w_rad|v [mm]|erpm|v_mm|speed_ms",
         NO_UNIT: "v|v_m|v_s|v_min|v_max|Servo motor speed|vel",
     },
     "N": {
@@ -73,9 +78,10 @@ HEADERS = {
         10.0: "F_daN",
         9.80665: "load [kgf]",
         1.3558179483314: "torque_lbft|M [ftlb]",
-        DOUBTFUL: "F_in_N*10|I [Arms]|M [0.1%]|F [t]"
+        DOUBTFUL: "F_in_N*10|I [Arms]|M [0.1%]|F [t]|F_t|F / t|Last in t|Сила, т"
+        "|F / g|F_tons|thrust_grams|load_pct|lb|torque_counts"
         "|force_mn|I [A]|load [kg]|torque [%]|force_kg|cell_mV|u_V|p_bar",
-        NO_UNIT: "F|force|torque|u|A|current_A|x_max",
+        NO_UNIT: "F|force|torque|u|A|current_A|x_max|F (t)|Ft|F_T|force_N_filt",
     },
 }  # fmt: skip
 
@@ -111,6 +117,7 @@ def test_a_name_tells_another_quantity() -> None:
         "a [m/s²]": "an acceleration",
         "act_current": "a current",
         "iq": "a current",
+        "Isq": "a current",
         "motor_power_W": "a power",
     }
     for name in (*names, "raw_x", "x_ms", "current_torque", "Strommoment", "iqr"):
