@@ -290,11 +290,6 @@ def joint_state_layout(data: bytes) -> Layout:
     return joints.layout(SLIDE, BELT, MOTOR)
 
 
-def joint_names(data: bytes, kind: str = "sensor_msgs/msg/JointState") -> list[str]:
-    """Return the names of the joints in a message of one of `STATE_TYPES`; raises MessageError."""
-    return STATE_TYPES[kind](data, "joint state").names
-
-
 def joint_layout(
     data: bytes, joint: str, belt: str | None, kind: str = "sensor_msgs/msg/JointState"
 ) -> Layout:

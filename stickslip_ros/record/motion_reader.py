@@ -3,12 +3,13 @@
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import partial
+from itertools import chain
 
 from stickslip_ros.arrays import IntArray
-from stickslip_ros.errors import BagError, MessageError
+from stickslip_ros.errors import BagError
 from stickslip_ros.record.bag_layout import ANY_LAYOUT, BagLayout
 from stickslip_ros.record.cdr import Layout, Messages, Refused, decode
-from stickslip_ros.record.codec import BELT, SLIDE, joint_layout, joint_names, joint_state_layout
+from stickslip_ros.record.codec import BELT, SLIDE, STATE_TYPES, joint_layout, joint_state_layout
 from stickslip_ros.record.machine_motion import MachineMotion, StampCheck
 from stickslip_ros.samples import ForceColumns, SampleColumns
 from stickslip_ros.text import printable, shown
@@ -116,17 +117,19 @@ class _JointFinder:
 
         Raises BagError if it must be chosen, or what was chosen is not there.
         """
-        known: dict[str, None] = {}
-        joint, belt, ours = self.layout.joint, self.layout.belt_joint, False
-        for begin, end in zip(messages.begin[:_SEEN], messages.end[:_SEEN], strict=True):
-            try:
-                names = joint_names(messages.data[begin:end], self.kind)
-            except MessageError:
-                continue
-            ours |= SLIDE in names and BELT in names and self.kind.startswith("sensor")
-            known |= dict.fromkeys(names)
+        seen: list[list[str]] = []
+
+        def layout_of(data: bytes) -> Layout:
+            joints = STATE_TYPES[self.kind](data, "joint state")
+            seen.append(joints.names)
+            return joints.layout_of()
+
+        decode(messages.data, messages.begin[:_SEEN], messages.end[:_SEEN], layout_of, 0)
+        known = dict.fromkeys(chain(*seen))
         if not known:
             return None
+        joint, belt = self.layout.joint, self.layout.belt_joint
+        ours = self.kind.startswith("sensor") and any({SLIDE, BELT} <= {*names} for names in seen)
         if ours and joint is None and belt is None:
             if self.layout.force == "effort":
                 raise BagError(
@@ -152,7 +155,7 @@ class _JointFinder:
 
     def _only_joint(self, joint: str, data: bytes) -> Layout:
         """Return the layout of the only joint; refuse messages of others."""
-        names, belt = joint_names(data, self.kind), self.layout.belt_joint
+        names, belt = STATE_TYPES[self.kind](data, "joint state").names, self.layout.belt_joint
         if joint not in names and belt not in names:
             raise self._several([joint, *names])
         return joint_layout(data, joint, belt, self.kind)
