@@ -5,19 +5,20 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import nan
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from typing_extensions import override
 
 from stickslip_ros.arrays import FloatArray, IntArray
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.files import open_regular
 from stickslip_ros.record.converted_bag import OTHER_BAGS
 from stickslip_ros.record.faults import differences
-from stickslip_ros.record.foreign_file import format_of, read_foreign
-from stickslip_ros.record.joined_table import JoinedTable
 from stickslip_ros.record.reader import RunBlock
 from stickslip_ros.record.table_clock import stamps_of
-from stickslip_ros.record.table_columns import ANY_FORM, Table, TableFormat, reading_file
+from stickslip_ros.record.table_columns import ANY_FORM, SECOND, Table, TableFormat, reading_file
+from stickslip_ros.record.table_formats import format_of, read_foreign
 from stickslip_ros.record.table_quantities import Quantities, quantities_of
 from stickslip_ros.record.text_table import TextTable
 from stickslip_ros.samples import ForceColumns, ReferenceColumns, SampleColumns
@@ -74,6 +75,52 @@ class VectorTable(Table):
     def line(self, row: int) -> str:
         """Return the number of a row, for a message."""
         return f"row {row + 1 if self._rows is None else self._rows[row] + 1}"
+
+
+class JoinedTable(Table):
+    """A table, and a second one whose columns have `2:` before their names, as in `2:F`."""
+
+    def __init__(self, first: Table, second: Table) -> None:
+        """Take both tables."""
+        self.path, self.form, self.period = first.path, first.form, first.period
+        self.decimal = first.decimal
+        self._tables = first, second
+        self.second_from = self._width = len(first.names)
+        self.names, self.units = [*first.names, *second.names], [*first.units, *second.units]
+        later = {f"{SECOND}{name}": self._width + place for name, place in second.columns.items()}
+        self.columns = {**first.columns, **later}
+
+    @property
+    @override
+    def notes(self) -> Sequence[str]:
+        first, second = self._tables
+        return [*first.notes, *(f"{second.path.name}: {note}" for note in second.notes)]
+
+    @property
+    @override
+    def turns(self) -> tuple[str, Sequence[str]] | None:
+        return self._tables[0].turns
+
+    @override
+    def read(self, places: Sequence[int]) -> list[Any]:
+        """Return columns, which have the lengths of their tables; times of both have one zero."""
+        columns, clocks, starts = dict[int, Any](), set[int](), list[tuple[str, int] | None]()
+        for table, offset in zip(self._tables, (0, self._width), strict=True):
+            used = [place for place in places if (place < self._width) == (offset == 0)]
+            values = table.read([place - offset for place in used]) if used else []
+            columns |= dict(zip(used, values, strict=True))
+            clocks |= {place + offset for place in table.clocks}
+            starts.append(table.start)
+        first, second = starts
+        for place in clocks:
+            if place >= self._width and first and second and first[0] == second[0]:
+                columns[place] = columns[place] + (second[1] - first[1]) / 1e9
+        self.clocks = clocks
+        return [columns[place] for place in places]
+
+    @override
+    def line(self, row: int) -> str:
+        return self._tables[0].line(row)
 
 
 def is_table(path: Path) -> bool:

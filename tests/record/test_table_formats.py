@@ -16,7 +16,7 @@ from nptdms import ChannelObject, TdmsWriter
 from scipy.io import savemat
 
 from stickslip_ros.errors import BagError
-from stickslip_ros.record import foreign_file, table_formats
+from stickslip_ros.record import table_formats
 from stickslip_ros.record.table_file import read_table, table_of
 
 TIME = np.arange(5.0)
@@ -245,4 +245,4 @@ def test_a_missing_library_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr("sys.stdin", TextIOWrapper(BytesIO(b"TDSm")))
     monkeypatch.setattr("resource.setrlimit", lambda *_: None)
     with pytest.raises(SystemExit, match="a TDMS file is read by npTDMS: install it"):
-        foreign_file._main("TDSm", 10)
+        table_formats._main("TDSm", 10)
