@@ -294,7 +294,7 @@ def _last(name: str, target: str) -> Iterator[Unit]:
 
 def _between(name: str, starts: Sequence[int], target: str) -> Iterator[Unit]:
     """Yield what words may be that others follow; mm_s there is no unit of length."""
-    first = 0
+    first = int(len(starts) > 1 and len(name[starts[0] : starts[1]].strip(_MARKS)) == 1)
     while first < len(starts) - 1:
         for end in range(min(first + 3, len(starts) - 1), first, -1):
             text = name[starts[first] : starts[end]].strip(_MARKS)
