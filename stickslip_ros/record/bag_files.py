@@ -104,7 +104,7 @@ class BagFiles:
         in_files = (sentence for file in self.files for sentence in file.damage)
         return [*map(printable, (*self._metadata_faults, *self._unreadable, *in_files))]
 
-    def blocks(self, *topics: str) -> Iterator[Block]:
+    def message_blocks(self, *topics: str) -> Iterator[Block]:
         """Yield the messages of these topics, given by their full names, block by block.
 
         Raises BagError if the operating system fails to read the bag.
@@ -121,9 +121,9 @@ class BagFiles:
     def messages(self, *topics: str) -> Iterator[tuple[str, int, bytes]]:
         """Yield topic, log time (ns) and CDR data of each message of these topics, in file order.
 
-        Topics and errors are those of `blocks`.
+        Topics and errors are those of `message_blocks`.
         """
-        for block in self.blocks(*topics):
+        for block in self.message_blocks(*topics):
             columns = (block.topic, block.log_time, block.begin, block.end)
             name_of = dict(enumerate(block.names))
             for topic, stamp, begin, end in zip(*(c.tolist() for c in columns), strict=True):
@@ -205,8 +205,8 @@ def _gap(before: Path, after: Path) -> float | None:
         restarted = (analyzers[0] or {}).get("bag_exists") == '"next"'
         if not restarted or analyzers[0] != analyzers[1]:
             return None
-        ends = [block.log_time.max() for block in one.blocks(*one.topics)]
-        begin = next((block.log_time.min() for block in other.blocks(*other.topics)), 0)
+        ends = [block.log_time.max() for block in one.message_blocks(*one.topics)]
+        begin = next((block.log_time.min() for block in other.message_blocks(*other.topics)), 0)
         gap = int(begin - max(ends, default=begin)) / NANOSECONDS
         return gap if gap > 0.0 and (plants[0] == plants[1] or None in plants) else None
 

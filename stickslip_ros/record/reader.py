@@ -6,7 +6,7 @@ from functools import cached_property
 from itertools import chain
 from math import inf
 from pathlib import Path
-from typing import Any, NamedTuple, Self, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -14,15 +14,15 @@ from stickslip_ros.arrays import IntArray
 from stickslip_ros.errors import BagError
 from stickslip_ros.record.bag_files import BagFiles, Block
 from stickslip_ros.record.bag_layout import ANY_LAYOUT, BagLayout, DriveInBag
-from stickslip_ros.record.cdr import Refused
+from stickslip_ros.record.cdr import Layout, Messages, Refused, decode
 from stickslip_ros.record.codec import (
     CONTROLLER_STATE,
     controller_references_in,
+    force_layouts,
     joint_states_in,
     references_in,
     wrenches_in,
 )
-from stickslip_ros.record.force_reader import ForceReader
 from stickslip_ros.record.imperfections import play_note, ripple_note
 from stickslip_ros.record.motion_reader import MotionReader
 from stickslip_ros.record.topics import (
@@ -64,7 +64,7 @@ class RunBlock(NamedTuple):
     """Whether velocities that are not recorded were estimated from the positions."""
 
 
-class Recording:
+class Recording(BagFiles):
     """A bag that is open for reading; a context manager that closes it.
 
     Columns are read on first access. `blocks` yields them chunk by chunk, in the memory of one
@@ -113,13 +113,8 @@ class Recording:
         layout: BagLayout = ANY_LAYOUT,
         continued: Sequence[Path] = (),
     ) -> None:
-        self.source = source = BagFiles(path, *continued)
-        """The bag, in which other topics are, too."""
-        self.path, self.topics = source.path, source.topics
-        self.messages, self.metadata = source.messages, source.metadata
-        self.attachment, self.offered_qos = source.attachment, source.offered_qos
-        self.close = source.close
-        self._drive = DriveInBag(source, namespace, layout, belt_speed)
+        super().__init__(path, *continued)
+        self._drive = DriveInBag(self, namespace, layout, belt_speed)
         self._notes: dict[str, Sequence[str]] = {}
         self._refused: dict[str, Sequence[str]] = {}
 
@@ -139,7 +134,7 @@ class Recording:
 
         They name an incomplete end, damage, and messages that could not be decoded.
         """
-        return [*self.source.damage, *chain(*self._refused.values())]
+        return [*self.damage, *chain(*self._refused.values())]
 
     @property
     def joint_states(self) -> SampleColumns:
@@ -261,7 +256,7 @@ class Recording:
         nothing, by_log = np.empty(0, np.int64), self._drive.layout.time == "log"
         parts: list[ColumnsT] = []
         counts: dict[str, Refused] = {}
-        for block in self.source.blocks(name) if name else ():
+        for block in self.message_blocks(name) if name else ():
             part, refused = decode(*block.messages)
             if by_log:
                 whole = len(part) == len(block.log_time)
@@ -271,12 +266,6 @@ class Recording:
         columns = decode(b"", nothing, nothing)[0].followed_by(*parts)
         self._refused[topic.name] = _sentences(counts)
         return columns
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *exception: object) -> None:
-        self.close()
 
 
 class _RunReader:
@@ -297,7 +286,7 @@ class _RunReader:
             str(drive.source.path),
             drive.source.topics.get(self._states, JOINT_STATES.type_name),
         )
-        self._force = ForceReader(drive, self._forces)
+        self._force = _ForceReader(drive, self._forces)
         self.refused: dict[str, Refused] = {}
         """What could not be decoded so far, by topic."""
 
@@ -308,7 +297,7 @@ class _RunReader:
         """
         gathered: list[_Run] = []
         count = 0
-        for block in self._drive.source.blocks(self._states, self._forces, self._dropped):
+        for block in self._drive.source.message_blocks(self._states, self._forces, self._dropped):
             run = self._decoded(block)
             gathered.append(run)
             count += sum(map(len, run))
@@ -374,3 +363,45 @@ def _joined(runs: Sequence[_Run]) -> _Run:
     parts: Any = zip(*runs, strict=True)
     states, forces, dropped = (first.followed_by(*others) for first, *others in parts)
     return states, forces, dropped
+
+
+class _ForceReader:
+    """Reads the control forces of a drive in a bag, block by block."""
+
+    def __init__(self, drive: DriveInBag, topic: str) -> None:
+        """Take the name of the topic, which may be empty."""
+        layout, kind = drive.layout, drive.source.topics.get(topic, CONTROL_FORCE.type_name)
+        self._by_log = layout.time == "log"
+        self._as_sent = kind == CONTROL_FORCE.type_name and not (layout.force_topic or self._by_log)
+        self._layout_of = force_layouts(layout.joint, drive.force_number)[kind]
+        self.unstamped = False
+        """Whether a force had no stamp, and has its log time."""
+
+    def read(self, block: Block) -> tuple[ForceColumns, Refused]:
+        """Return forces, and what was refused."""
+        if self._as_sent:
+            return wrenches_in(*block.messages)
+        forces, unstamped, refused = read_forces(
+            self._layout_of, block.messages, block.log_time, by_log=self._by_log
+        )
+        self.unstamped |= unstamped
+        return forces, refused
+
+
+def read_forces(
+    layout_of: Callable[[bytes], Layout],
+    messages: Messages,
+    log_time: IntArray,
+    *,
+    by_log: bool = False,
+) -> tuple[ForceColumns, bool, Refused]:
+    """Return forces, whether one has no stamp, and what was refused.
+
+    Without a stamp a force has its log time; `by_log` all have.
+    """
+    rows, stamp, values, refused = decode(*messages, layout_of, 1)
+    known = np.isfinite(values[0])  # commands of other joints tell nothing
+    stamp, log_time = stamp[known], log_time[rows][known]
+    unstamped = (stamp == 0) | by_log
+    forces = ForceColumns(np.where(unstamped, log_time, stamp), values[0, known])
+    return forces, bool(unstamped.any()) and not by_log, refused

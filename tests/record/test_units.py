@@ -72,7 +72,8 @@ HEADERS = {
         NO_UNIT: "v|v_m|v_s|v_min|v_max|Servo motor speed|vel",
     },
     "N": {
-        1e3: "F / kN|F_act_kN_act|Усилие, кН|F [kN]|F_kN|force_kn|ForceKN|Kraft in kN|Fuerza (kN)|force, kN",
+        1e3: "F / kN|F_act_kN_act|Усилие, кН|F [kN]|F_kN|force_kn|ForceKN|Kraft in kN|Fuerza (kN)"
+        "|force, kN",
         1.0: "force_N|F_in_N|Kraft in N|F [N]|M [Nm]|T [N·m]|T / Nm|torque_nm|TorqueNm|effort en N",
         1e-3: "torque_mNm|torque_mNm_act|n mN filtered|M [N mm]|F [mN]",
         10.0: "F_daN",

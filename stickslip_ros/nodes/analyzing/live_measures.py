@@ -27,8 +27,8 @@ from stickslip_ros.nodes.base.managed import FIRST_STAMP, STATE, DroppedMessages
 from stickslip_ros.record.bag_layout import BagLayout
 from stickslip_ros.record.cdr import Messages, Refused, joined
 from stickslip_ros.record.codec import force_layouts, wrenches_in
-from stickslip_ros.record.force_reader import read_forces
 from stickslip_ros.record.motion_reader import MotionReader
+from stickslip_ros.record.reader import read_forces
 from stickslip_ros.record.topics import CONTROL_FORCE, DROPPED_FORCE, JOINT_STATES, Topic
 from stickslip_ros.samples import NO_FORCES, NO_SAMPLES, ForceColumns
 from stickslip_ros.scenarios.parameters import AnalyzerParameters

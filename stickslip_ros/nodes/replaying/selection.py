@@ -176,7 +176,7 @@ class Selection:
     def _known_length(self, recording: Recording) -> float:
         if self._converted:  # its time is that of the stamps
             return self._parameters.duration
-        span, rest = recording.source.time_span, inf
+        span, rest = recording.time_span, inf
         if span is not None and span[0] >= self.first - JITTER:
             rest = (span[1] - self.first) * 1e-9 - self._parameters.start
         return min(rest if rest >= 0.0 else inf, self._parameters.duration)
