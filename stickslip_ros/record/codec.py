@@ -102,22 +102,8 @@ def _pack_joint_state(
     velocity: tuple[float, ...],
     effort: tuple[float, ...],
 ) -> bytes:
-    count = len(position)
-    try:
-        return layout.pack(
-            LITTLE_ENDIAN,
-            stamp // NANOSECONDS,
-            stamp % NANOSECONDS,
-            joints,
-            count,
-            *position,
-            count,
-            *velocity,
-            count,
-            *effort,
-        )
-    except struct.error as error:
-        raise _unpackable("joint state", stamp, error) from error
+    n = len(position)
+    return _packed("joint state", layout, stamp, joints, n, *position, n, *velocity, n, *effort)
 
 
 def pack_reference(stamp: int, reference: Reference) -> bytes:
@@ -126,10 +112,7 @@ def pack_reference(stamp: int, reference: Reference) -> bytes:
     What the reference does not give is empty; there is no field for the acceleration. Raises
     MessageError for a stamp outside ROS time (32-bit seconds).
     """
-    try:
-        message = _STAMP.pack(LITTLE_ENDIAN, *divmod(stamp, NANOSECONDS)) + _REFERENCE_JOINT
-    except struct.error as error:
-        raise _unpackable("reference", stamp, error) from error
+    message = _packed("reference", _STAMP, stamp) + _REFERENCE_JOINT
     for value in (reference.position, reference.velocity):
         message += struct.pack("<I", value is not None)
         if value is not None:  # aligned to 8 bytes from the end of the encapsulation
@@ -142,12 +125,7 @@ def pack_wrench(stamp: int, force_x: float) -> bytes:
 
     Stamp in ns. Raises MessageError for a stamp outside ROS time (32-bit seconds).
     """
-    try:
-        return _WRENCH.pack(
-            LITTLE_ENDIAN, stamp // NANOSECONDS, stamp % NANOSECONDS, _WRENCH_FRAME, force_x
-        )
-    except struct.error as error:
-        raise _unpackable("wrench", stamp, error) from error
+    return _packed("wrench", _WRENCH, stamp, _WRENCH_FRAME, force_x)
 
 
 def pack_header(stamp: int) -> bytes:
@@ -155,10 +133,7 @@ def pack_header(stamp: int) -> bytes:
 
     Raises MessageError for a stamp outside ROS time (32-bit seconds).
     """
-    try:
-        return _HEADER.pack(LITTLE_ENDIAN, *divmod(stamp, NANOSECONDS), _name(""))
-    except struct.error as error:
-        raise _unpackable("header", stamp, error) from error
+    return _packed("header", _HEADER, stamp, _name(""))
 
 
 def unpack_joint_state(data: bytes) -> Sample:
@@ -276,11 +251,15 @@ def force_layouts(joint: str | None, number: int | None) -> dict[str, Callable[[
     return dict(zip(FORCE_TYPES, layouts, strict=True))
 
 
-def _unpackable(kind: str, stamp: int, error: struct.error) -> MessageError:
-    return MessageError(
-        f"a {kind} with the stamp {stamp} ns cannot be serialized ({error}); "
-        "stamps must be within 32-bit seconds, values must be numbers"
-    )
+def _packed(kind: str, layout: struct.Struct, stamp: int, *values: float | bytes) -> bytes:
+    """Pack the encapsulation, a stamp in ns, and values."""
+    try:
+        return layout.pack(LITTLE_ENDIAN, stamp // NANOSECONDS, stamp % NANOSECONDS, *values)
+    except struct.error as error:
+        raise MessageError(
+            f"a {kind} with the stamp {stamp} ns cannot be serialized ({error}); "
+            "stamps must be within 32-bit seconds, values must be numbers"
+        ) from error
 
 
 def joint_state_layout(data: bytes) -> Layout:
