@@ -147,8 +147,9 @@ def units_in(name: str, given: str, target: str) -> list[Unit]:
     linear motion; a unit of the same quantity of rotary motion is one, too.
     """
     name = name[:_LONGEST].replace("()", "")
-    if scaled := _SCALED.search(name):
-        return [Unit(scaled[0], nan, target)]
+    scaled, tens = _SCALED.search(name), name.removesuffix("_x10")
+    if scaled or (tens != name and any(_last(tens, target))):  # rpm_x10, but not pos_x10
+        return [Unit(scaled[0] if scaled else name, nan, target)]
     plain = _BRACKETED.sub(" ", name).strip()
     stated, last = [*_stated(name, plain, given, target)], [*_last(plain, target)]
     known, words = ([unit for unit in units if not isnan(unit.factor)] for units in (stated, last))

@@ -298,14 +298,6 @@ def test_points_between_thousands_are_refused_with_a_way(tmp_path: Path) -> None
         assert found.position[0] == first
 
 
-def test_blanks_between_thousands_are_passed_by(tmp_path: Path) -> None:
-    cells = [f"{n:,},5".replace(",", " ", n >= 1000) for n in range(950, 1050)]
-    text = "t;x\n" + "".join(f"{n};{cell}\n" for n, cell in enumerate(cells))
-    assert read(tmp_path, text, "t", "x").samples.position.tolist() == [
-        n + 0.5 for n in range(950, 1050)
-    ]
-
-
 def test_a_current_is_no_force(tmp_path: Path) -> None:
     (tmp_path / "log.csv").write_text("t,x,Motorstrom\n" + "".join(f"{n},0,1\n" for n in range(9)))
     columns = {"time": "t", "position": "x", "force": "Motorstrom"}
@@ -476,6 +468,7 @@ def test_what_is_left_out_is_counted_and_its_first_line_named(tmp_path: Path) ->
         ("a;b\n0;1.000.500\n1;2.000\n", TableFormat(), [1000500.0, 2000.0]),
         ("a;b\n1;2\n0;1\n-1;0\n", TableFormat(), [0.0, 1.0, 2.0]),
         ("a;b\n0;1\xa0000,5\n1;2,0\n", TableFormat(), [1000.5, 2.0]),
+        ("a;b\n0;1 000,5\n1;2,0\n", TableFormat(), [1000.5, 2.0]),
         ("0;0\n1;1\na;b\n0;5\n1;6\n", TableFormat(skip=2), [5.0, 6.0]),
         ("a;b\n0;5\n1;6\n".encode("cp037"), TableFormat(encoding="cp037"), [5.0, 6.0]),
     ],

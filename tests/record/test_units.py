@@ -68,7 +68,7 @@ HEADERS = {
         0.44704: "v_mph",
         1852 / 3600: "v_knots",
         DEGREE: "w [deg/s]|w_deg_s|w_dps|°/s|omega_degps",
-        DOUBTFUL: "n [1/s]|vel_counts_s|counts_per_s|v_cps|w_rad|v [mm]|erpm|v_mm|speed_ms",
+        DOUBTFUL: "n [1/s]|vel_counts_s|counts_per_s|v_cps|w_rad|rpm_x10|v [mm]|erpm|v_mm|speed_ms",
         NO_UNIT: "v|v_m|v_s|v_min|v_max|Servo motor speed|vel",
     },
     "N": {
