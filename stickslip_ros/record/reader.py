@@ -275,7 +275,8 @@ class _RunReader:
         self._drive, self._by_effort = drive, drive.layout.force == "effort"
         topics = map(drive.name, (JOINT_STATES, CONTROL_FORCE, DROPPED_FORCE))
         self._states, self._forces, self._dropped = topics
-        if drive.layout.time == "log":
+        self._by_log = drive.layout.time == "log"
+        if self._by_log:
             self._dropped = ""
         if self._by_effort:
             self._forces = ""
@@ -286,7 +287,11 @@ class _RunReader:
             str(drive.source.path),
             drive.source.topics.get(self._states, JOINT_STATES.type_name),
         )
-        self._force = _ForceReader(drive, self._forces)
+        kind = drive.source.topics.get(self._forces, CONTROL_FORCE.type_name)
+        by_layout = self._by_log or drive.layout.force_topic or kind != CONTROL_FORCE.type_name
+        layouts = force_layouts(drive.layout.joint, drive.force_number)
+        self._force_layout = layouts[kind] if by_layout else None
+        self._unstamped = False
         self.refused: dict[str, Refused] = {}
         """What could not be decoded so far, by topic."""
 
@@ -319,7 +324,14 @@ class _RunReader:
         if self._drive.effort_is_of_actuator:
             states = replace(states, friction_force=np.full(len(states), np.nan))
         if not self._by_effort:
-            forces, refused = self._force.read(block.of_topic(self._forces))
+            sent = block.of_topic(self._forces)
+            if self._force_layout is None:
+                forces, refused = wrenches_in(*sent.messages)
+            else:
+                forces, unstamped, refused = read_forces(
+                    self._force_layout, sent.messages, sent.log_time, by_log=self._by_log
+                )
+                self._unstamped |= unstamped
             _count(self.refused, self._forces, refused)
         dropped, refused = wrenches_in(*block.of_topic(self._dropped).messages)
         _count(self.refused, self._dropped, refused)
@@ -328,7 +340,7 @@ class _RunReader:
     def _check_clocks(self) -> None:
         """Refuse log times of forces beside stamps of another clock."""
         apart = self._motion.clock_offset
-        if self._force.unstamped and apart and abs(apart) > NANOSECONDS:
+        if self._unstamped and apart and abs(apart) > NANOSECONDS:
             raise BagError(
                 f"the forces on {self._forces} have no stamps, and those of the joint states "
                 f"are {quantity(abs(apart) / NANOSECONDS, 's')} from their log times: --time log "
@@ -341,7 +353,7 @@ class _RunReader:
         if self._by_effort:
             time = (states.stamp - states.stamp[:1]) / NANOSECONDS
             notes += ripple_note(time, states.position, run.control_forces.force, ("m", "N"))
-        if self._force.unstamped:
+        if self._unstamped:
             notes.append(f"the forces on {self._forces} have no stamps: their log times count")
         return notes
 
@@ -363,29 +375,6 @@ def _joined(runs: Sequence[_Run]) -> _Run:
     parts: Any = zip(*runs, strict=True)
     states, forces, dropped = (first.followed_by(*others) for first, *others in parts)
     return states, forces, dropped
-
-
-class _ForceReader:
-    """Reads the control forces of a drive in a bag, block by block."""
-
-    def __init__(self, drive: DriveInBag, topic: str) -> None:
-        """Take the name of the topic, which may be empty."""
-        layout, kind = drive.layout, drive.source.topics.get(topic, CONTROL_FORCE.type_name)
-        self._by_log = layout.time == "log"
-        self._as_sent = kind == CONTROL_FORCE.type_name and not (layout.force_topic or self._by_log)
-        self._layout_of = force_layouts(layout.joint, drive.force_number)[kind]
-        self.unstamped = False
-        """Whether a force had no stamp, and has its log time."""
-
-    def read(self, block: Block) -> tuple[ForceColumns, Refused]:
-        """Return forces, and what was refused."""
-        if self._as_sent:
-            return wrenches_in(*block.messages)
-        forces, unstamped, refused = read_forces(
-            self._layout_of, block.messages, block.log_time, by_log=self._by_log
-        )
-        self.unstamped |= unstamped
-        return forces, refused
 
 
 def read_forces(

@@ -77,17 +77,6 @@ def test_slips_are_told_one_by_one(stickslip: Run, tmp_path: Path) -> None:
     assert report["position_noise"] == pytest.approx(1e-6, rel=0.1)
 
 
-def test_slips_within_the_noise_are_doubted(stickslip: Run, tmp_path: Path) -> None:
-    noise = 1e-5 * np.random.default_rng(1).standard_normal(3000)
-    table = np.column_stack([np.arange(3000) * 1e-3, noise])
-    np.savetxt(tmp_path / "noise.csv", table, delimiter=",", header="t,x", comments="")
-    done = stickslip(
-        "report", "noise.csv", "--columns", "time=t,position=x,belt_velocity=1", "--slips", "1e-5"
-    )
-    assert done.returncode == 0, done.stderr
-    assert "is within the noise of the positions" in done.stdout
-
-
 def test_a_slip_time_of_any_size_is_taken(stickslip: Run, log: Path) -> None:
     for slip_time in ("1e-320", "1e7", "1e308"):
         done = stickslip("report", str(log), "--slips", "1e-5", "--slip-time", slip_time)
