@@ -1,9 +1,12 @@
-"""examples/ and docs/gallery.md: each example runs, and has its figure on the page."""
+"""examples/, docs/gallery.md and docs/controllers.md: figures and values are those of today."""
 
 import json
 import runpy
 import sys
+from collections.abc import Iterator
+from importlib import import_module
 from pathlib import Path
+from types import ModuleType
 
 import nbformat
 import pytest
@@ -79,3 +82,27 @@ def test_scripts_say_what_they_show_and_are_short() -> None:
         lines = (EXAMPLES / f"{script}.py").read_text(encoding="utf-8").splitlines()
         assert lines[0].startswith('"""')
         assert len(lines) <= 80, script
+
+
+KEPT = json.loads((CHECKOUT / "docs/gallery/comparison.json").read_text(encoding="utf-8"))
+
+
+@pytest.fixture
+def compare(monkeypatch: pytest.MonkeyPatch) -> Iterator[ModuleType]:
+    monkeypatch.syspath_prepend(CHECKOUT / "examples")
+    yield import_module("compare_controllers")
+    for module in ("compare_controllers", "velocity_feedback"):
+        del sys.modules[module]
+
+
+@pytest.mark.long
+def test_the_kept_values_are_those_of_today(compare: ModuleType, tmp_path: Path) -> None:
+    compare.main(tmp_path)
+    assert (tmp_path / "compare_controllers.png").stat().st_size > 0
+    today = json.loads((tmp_path / "comparison.json").read_text(encoding="utf-8"))
+    assert len(today) == len(KEPT) == len(compare.BELT_SPEEDS) * len(compare.CONTROLLERS)
+    for found, row in zip(today, KEPT, strict=True):
+        assert found.keys() == row.keys()
+        for name, value in row.items():
+            close = pytest.approx(value, rel=1e-6, abs=1e-8) if isinstance(value, float) else value
+            assert found[name] == close, (row["belt_speed"], row["controller"], name)

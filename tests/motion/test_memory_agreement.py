@@ -1,6 +1,6 @@
-"""Motions of laws with a memory against scipy: stored references, and what the study has found.
+"""Motions against scipy: stored references of laws with a memory, and what the studies have found.
 
-`python -m benchmarks.memory_agreement` makes both files.
+`python -m benchmarks.memory_agreement` and `benchmarks.agreement` make the files.
 """
 
 import json
@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from benchmarks import memory_agreement
+from benchmarks import agreement, memory_agreement, random_drives
 from benchmarks.memory_agreement import REQUIRED
 from benchmarks.random_memory_drives import LAWS, STORED_EVERY, random_memory_drive
 from stickslip_ros.model.friction import Directional
@@ -66,3 +66,22 @@ def test_thirty_drives_of_each_law_agree(law: str) -> None:
     assert row["worst_error"] < row["required"] == REQUIRED[law]
     assert row["median_time_ratio"] > row["least_time_ratio"] > 1.0
     assert FOUND["differing"] == []
+
+
+COMPARED: dict[str, Any] = json.loads(
+    (Path(agreement.__file__).parent / "agreement.json").read_text(encoding="utf-8")
+)
+
+
+def test_thirty_drives_of_each_law_and_each_course_agree() -> None:
+    assert set(COMPARED["by_law_and_kind"]) == {
+        f"{law}, {kind}" for law in random_drives.LAWS for kind in random_drives.KINDS
+    }
+    assert set(COMPARED["by_place"]) == set(random_drives.PLACES)
+    for row in [*COMPARED["by_law_and_kind"].values(), *COMPARED["by_place"].values()]:
+        assert row["drives"] >= 30
+        assert row["agree"] == row["compared"]
+        assert max(row["worst_error"], row["worst_event_error"]) < COMPARED["required"] == 1e-7
+    assert COMPARED["differing"] == []
+    uncompared = COMPARED["all"]["drives"] - COMPARED["all"]["compared"]
+    assert len(COMPARED["reference_not_accurate"]) == uncompared < 0.01 * COMPARED["all"]["drives"]

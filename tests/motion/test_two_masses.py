@@ -3,12 +3,14 @@
 import numpy as np
 import pytest
 
-from benchmarks.random_releases import Released
+import stickslip_ros as ss
+from benchmarks.random_releases import Released, released
 from benchmarks.two_masses import Bristles, Curve, Piece, TwoMasses
 from stickslip_ros.model.drive import Drive
 from stickslip_ros.model.friction import Coulomb, Dahl, Exponential, FrictionLaw, LuGre
 from stickslip_ros.model.motor import Motor
 from stickslip_ros.model.signals import NO_SIGNAL, step
+from stickslip_ros.motion import Motion
 
 PIECES, SAMPLES = 10, 8
 LAWS = ("coulomb", "exponential", "lugre", "dahl")
@@ -70,3 +72,23 @@ def test_a_random_drive_moves_as_the_independent_solution(seed: int, law: str) -
     found, expected = case.motion(), case.solution()
     ranges = np.maximum(np.ptp(expected, axis=0), 1e-6 * case.drive.length_scale)
     assert (np.abs(found - expected) / ranges).max() < 1e-8
+
+
+def test_a_motor_that_friction_just_holds_is_released() -> None:
+    """Rounding put the friction that it needs below the limit, at the instant of the release."""
+    drive = ss.scenario("feed_drive_motor", "plant.motor.mass=40", "plant.damping=2000").plant
+    motion = Motion(drive.as_drive(), 0.0, 0.0)
+    motion.restart(0.0003717063578472491, 0.03237567876097893, motor=(0.0, 0.04))
+    motion.set_forces(-364.86471500329105, 0.0)
+    motion.advance(0.015)
+    assert motion.motor is not None
+    assert 0.039 < motion.motor.velocity < 0.0395
+
+
+@pytest.mark.parametrize(
+    "seed",
+    [n if n in (0, 1, 2, 20) else pytest.param(n, marks=pytest.mark.long) for n in range(50)],
+)
+def test_releases_agree_with_an_independent_solution(seed: int) -> None:
+    drive = released(seed)
+    assert np.all(np.abs(drive.motion() - drive.solution()) < 1e-9 * drive.ranges)

@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 from itertools import pairwise
 from math import cos, sin
 from pathlib import Path
@@ -18,9 +19,11 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, Float64MultiArray
 
 from stickslip_ros.api.recordings import recorded_drive
+from stickslip_ros.measures.cycle_measures import Cycle, Regime, without_cycles
 from stickslip_ros.nodes.analyzer import AnalyzerNode
+from stickslip_ros.nodes.analyzing.live_measures import LiveMeasures
 from stickslip_ros.nodes.base.endpoints import qos_profile
-from stickslip_ros.nodes.base.managed import ERROR, WARN
+from stickslip_ros.nodes.base.managed import ERROR, WARN, DroppedMessages
 from stickslip_ros.nodes.plant import PlantNode
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
 from stickslip_ros.record.codec import joint_state_columns, pack_joint_state, pack_wrench
@@ -37,6 +40,7 @@ from stickslip_ros.record.topics import (
     RECORDED,
     STICK_FRACTION,
 )
+from stickslip_ros.scenarios.parameters import AnalyzerParameters
 from stickslip_ros.stamps import NANOSECONDS
 from tests.nodes.graph import PATIENCE, Graph
 from tests.record.runs import full_disk
@@ -463,3 +467,19 @@ def test_it_imports_what_only_noise_needs_as_soon_as_the_plant_has_some(
     )
     run_to_the_end(graph, tmp_path / "bag", duration=1.0, **{"sensor.position_noise": noise})
     assert len(imported) == (noise > 0.0)
+
+
+@pytest.mark.parametrize(
+    ("regime", "share", "end"),
+    [(Regime.STICK_SLIP, 0.25, "stick fraction 0.25"), (None, None, "stick fraction not known")],
+)
+def test_the_text_has_what_is_known(
+    regime: Regime | None, share: float | None, end: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    cycle = without_cycles(Cycle(1e-3, 0.1, 0.0, 0.0, 0.0, 0.0), regime, 4)
+    found = replace(cycle, period=0.5, frequency=2.0, stick_fraction=share)
+    live = LiveMeasures(AnalyzerParameters(), DroppedMessages.__new__(DroppedMessages))
+    monkeypatch.setattr(live.meter.motion, "measures", lambda *, quick: found)
+    live.cycles = 4
+    name = "stick_slip" if regime else "regime not known"
+    assert live.text() == f"{name}: amplitude 1 mm, frequency 2 Hz, {end}"

@@ -1,4 +1,7 @@
-"""Nodes that were started one by one are killed, stopped, continued and restarted."""
+"""Nodes that were started one by one are killed, stopped, continued and restarted.
+
+`python -m benchmarks.restarts` restarts each node.
+"""
 
 import signal
 import subprocess
@@ -10,8 +13,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from benchmarks.restarts import restarts
 from stickslip_ros.arrays import IntArray
 from stickslip_ros.errors import BagError
+from stickslip_ros.record.bag_files import runs_of
 from stickslip_ros.record.codec import unpack_header
 from stickslip_ros.record.reader import Recording
 from stickslip_ros.record.report import report_of_recording
@@ -191,3 +196,24 @@ def test_in_real_time_what_a_stop_costs_is_counted(trio: Trio) -> None:
     assert (steps > 0).all()
     assert (steps % PERIOD == 0).all()
     assert report_of_recording(trio.bags[0])["lost_samples"] == gaps(stamp)
+
+
+@pytest.mark.long
+@pytest.mark.process
+def test_bags_of_an_analyzer_that_is_restarted_are_sound_and_one_run(tmp_path: Path) -> None:
+    first, *lines = restarts("analyzer", "realtime", 2, tmp_path)
+    assert "2 restarts, 3 bags" in first
+    assert any("plant: active" in line for line in lines)
+    bag, *others = (tmp_path / name for name in ("bag", "bag_2", "bag_3"))
+    runs = runs_of([bag, *others])
+    assert list(runs) == [bag]
+    assert list(runs[bag]) == others
+    assert all(gap > 0.0 for gap in runs[bag].values())
+    stamps: list[int] = []
+    for path in (bag, *others):
+        with Recording(path) as recording:
+            stamps += recording.joint_states.stamp.tolist()
+    report = report_of_recording(bag, continued=runs[bag])
+    assert report["samples"] == len(stamps)
+    periods = (stamps[-1] - stamps[0]) / 1e6
+    assert report["lost_samples"] == round(periods) + 1 - len(stamps)

@@ -1,4 +1,7 @@
-"""Real time when the plant or a subscriber is stopped or killed."""
+"""Real time when the plant, the analyzer or a reader is stopped, falls behind or lasts.
+
+`python -m benchmarks.soak` runs for longer.
+"""
 
 import os
 import signal
@@ -11,11 +14,19 @@ from threading import Lock
 import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
 
+from benchmarks.soak import lines, soak
+from stickslip_ros.arrays import IntArray
 from stickslip_ros.motion.motion import Motion
 from stickslip_ros.motion.sampled_loop import SampledLoop
+from stickslip_ros.nodes.analyzer import AnalyzerNode
+from stickslip_ros.nodes.base.managed import STATE
 from stickslip_ros.nodes.pacing import RealtimePacer
+from stickslip_ros.nodes.plant import PlantNode
+from stickslip_ros.record.reader import Recording
+from stickslip_ros.record.report import report_of_recording
+from stickslip_ros.record.topics import DEEP, JOINT_STATES, RECORDER_DEPTH
 from stickslip_ros.scenarios.parameters import PlantParameters
-from tests.nodes.graph import Graph
+from tests.nodes.graph import Graph, wait_for
 from tests.nodes.processes import Processes
 from tests.nodes.samples import Samples
 
@@ -118,3 +129,76 @@ def test_a_reader_that_is_stopped_or_killed_costs_the_plant_nothing(
     assert any(relative_cost(1000) < 1.6 * usual for _ in range(5))
     assert samples.longest_gap(first) < 0.9
     assert samples.stamps == [samples.stamps[0] + n * 2_000_000 for n in range(len(samples.stamps))]
+
+
+RATE = 5000.0
+
+
+def stamps_of(bag: Path) -> IntArray:
+    with Recording(bag) as recording:
+        assert recording.complete
+        return recording.joint_states.stamp
+
+
+def counts_of_analyzer(bag: Path) -> tuple[str, str]:
+    with Recording(bag) as recording:
+        stored = recording.metadata("stickslip_ros/report") or {}
+    return stored["samples"], stored["lost_samples"]
+
+
+@pytest.mark.parametrize(
+    "samples", [DEEP, pytest.param(RECORDER_DEPTH + 2 * DEEP, marks=pytest.mark.long)]
+)
+def test_what_waits_up_to_the_bound_is_recorded_and_beyond_it_is_counted(
+    graph: Graph, tmp_path: Path, samples: int
+) -> None:
+    """Only the plant's own thread runs until it has published all samples."""
+    bag = tmp_path / "bag"
+    health = graph.health("plant")
+    graph.add(AnalyzerNode, bag=str(bag))
+    parameters = {"rate": RATE, "expects_control": False, "duration": (samples - 1) / RATE}
+    plant = graph.add(PlantNode, pace="realtime", wait_for=["analyzer"], **parameters)
+    graph.wait_until(lambda: plant.active, "the plant starts")
+    wait_for(lambda: plant.diagnose()[2]["samples"] == samples, "all samples are published")
+    graph.wait_until(lambda: is_paused(health), "the plant tells its counts")
+    graph.deactivate("analyzer")
+
+    stamps, report = stamps_of(bag), report_of_recording(bag)
+    assert report["samples"] == len(stamps)
+    assert report["samples"] + report["lost_samples"] == samples
+    assert counts_of_analyzer(bag) == (str(report["samples"]), str(report["lost_samples"]))
+    # Up to its history the plant keeps what a reader without processor has not taken.
+    assert bool(report["lost_samples"]) == (samples > DEEP)
+
+
+def is_paused(health: list[DiagnosticStatus]) -> bool:
+    return bool(health) and {v.key: v.value for v in health[-1].values}[STATE] == "inactive"
+
+
+SECONDS, WARM_UP = 20.0, 10.0
+GROWTH = 2e6
+SAMPLE = 2e3
+"""Bytes, at most, that a state and its force take which wait for a reader."""
+
+
+@pytest.mark.long
+@pytest.mark.timeout(900)
+def test_a_run_in_real_time_lasts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("benchmarks.soak.WARM_UP", WARM_UP)
+    outcome = soak(SECONDS, composed=False, burners=1, directory=tmp_path)
+    print(*lines(outcome), sep="\n")
+    run, missing = outcome.run, outcome.missing_stamps
+    assert run["samples"] + missing == 1000 * SECONDS + 1
+    assert run["lost_samples"] == missing
+    # History ends on a machine that does not let the analyzer run for seconds.
+    assert missing == 0 or outcome.largest_backlog >= JOINT_STATES.depth
+    assert run["missed_deadlines"] >= outcome.missed_deadlines
+    # The first force is zero, and so is none: whether it was late does not show in the motion.
+    hidden = 1 + missing + outcome.hidden_steps
+    assert 0 <= run["late_forces"] - outcome.late_forces <= hidden
+    assert outcome.unexplained_steps == 0
+    if outcome.furthest_behind < 500 * (SECONDS - WARM_UP):  # all are warm before the end
+        assert set(outcome.memory) == {"main", "plant", "controller", "analyzer"}
+    for process, sizes in outcome.memory.items():
+        room = GROWTH + SAMPLE * outcome.furthest_behind
+        assert max(sizes) - sizes[0] < room, process

@@ -1,6 +1,7 @@
-"""Run, record, report, replay into a second analyzer, record again: no differences."""
+"""Run, record, report, replay into a second analyzer, record again; also under other names."""
 
 import json
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -8,9 +9,10 @@ import pytest
 
 from stickslip_ros.nodes.analyzer import AnalyzerNode
 from stickslip_ros.nodes.replay import ReplayNode
+from stickslip_ros.record.reader import Recording
 from stickslip_ros.record.report import report_of_recording
 from tests.nodes.graph import Graph
-from tests.nodes.runs import messages_of, record_run
+from tests.nodes.runs import close_the_loop, messages_of, record_run
 
 REFERENCE = Path(__file__).parents[2] / "bags" / "reference"
 
@@ -70,3 +72,15 @@ def test_the_reference_bag_is_reported_as_ever_also_when_it_is_replayed(
     analyzer.trigger_deactivate()
     assert messages_of(tmp_path / "again") == messages_of(REFERENCE)
     check_against_the_reference(report_of_recording(tmp_path / "again"))
+
+
+REMAPPED = ("-r", "joint_states:=/x/y", "-r", "control_force:=/force", "-r", "recorded:=/held")
+
+
+def test_the_loop_is_closed_and_recorded_under_other_names(domain: int, tmp_path: Path) -> None:
+    with closing(Graph(domain, *REMAPPED)) as graph:
+        close_the_loop(graph, tmp_path / "bag", flow_window=200, duration=10.0)
+    with Recording(tmp_path / "bag") as recording:
+        names = [name for name, _, _ in recording.messages("/x/y", "/force")]
+        assert recording.complete
+    assert (names.count("/x/y"), names.count("/force")) == (1001, 1001)

@@ -1,10 +1,10 @@
-"""The ROS node of the dashboard: data received from a loop, and requests to it."""
+"""The ROS node of the dashboard: what is known of a run by its data, and requests to it."""
 
 from functools import partial
 
 import numpy as np
 import pytest
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rcl_interfaces.msg import Parameter as ParameterMessage
 from rcl_interfaces.msg import ParameterEvent, ParameterValue
 from rclpy.parameter import Parameter
@@ -277,3 +277,41 @@ def test_a_node_that_falls_silent_and_comes_back_is_shown_as_that(
     graph.wait_until(lambda: observer.run.health["plant"].state == "active", "the plant again")
     events = [each.text for each in observer.run.events]
     assert events.index("plant silent") < events.index("plant is back, active")
+
+
+CONTROLLER = "washout_controller"
+
+
+def status(**figures: str) -> DiagnosticStatus:
+    """Return the diagnostics of a node, with a level that ROS does not have."""
+    values = [KeyValue(key=key, value=value) for key, value in figures.items()]
+    return DiagnosticStatus(values=values, level=b"\xff")
+
+
+def test_any_number_in_diagnostics_is_accepted() -> None:
+    run = RunState("/test")
+    run.parameters = {**run.parameters, "plant": {"rate": 1e-6}}
+    for number in ("٣", "²", "abc", "nan", "-1", "9" * 400, "9" * 5000, ""):
+        for node in ("plant", CONTROLLER, "plant", CONTROLLER):
+            run.take_status(node, status(answered=number, samples=number, late_forces=number))
+        assert run.acts_in == 0.0
+        assert run.health["plant"].figures["samples"] == number
+
+
+def test_a_controller_that_is_switched_leaves_a_mark_and_may_have_other_parameters() -> None:
+    run = RunState("/test")
+    assert run.take_status(CONTROLLER, status(state="inactive"))  # heard for the first time
+    assert not run.take_status(CONTROLLER, status(state="inactive"))
+    assert not run.control_on
+    assert run.take_status(CONTROLLER, status(state="active"))
+    assert run.control_on
+    assert run.take_status(CONTROLLER, status(state="inactive"))
+    assert [event.mark for event in run.events] == ["", "control on", "control off"]
+
+
+def test_a_counter_that_starts_again_is_that_of_another_node() -> None:
+    run = RunState("/test")
+    run.take_status("plant", status(state="active", samples="150"))
+    assert not run.take_status("plant", status(state="active", samples="160"))
+    assert run.take_status("plant", status(state="active", samples="3"))
+    assert [event.text for event in run.events] == ["plant active", "plant restarted"]
