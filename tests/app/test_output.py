@@ -8,6 +8,7 @@ import struct
 import subprocess
 import sys
 import termios
+import threading
 from pathlib import Path
 
 import pytest
@@ -151,6 +152,17 @@ def test_a_long_work_writes_lines_into_a_pipe(
         wait_for(lambda: told and re.fullmatch(r"identifying, \d+ s", told[-1]), "a line")
         progress(0.0, "identifying: stribeck")
         wait_for(lambda: re.fullmatch(r"identifying: stribeck, \d+ s", told[-1]), "the next law")
+
+
+@pytest.mark.timeout(60)
+def test_the_end_of_a_work_waits_for_no_line_and_none_follows(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(output, "_LINE_INTERVAL", 1e6)
+    before = threading.active_count()
+    with progress_bar("identifying", None, lines=True):
+        assert threading.active_count() == before + 1
+    assert threading.active_count() == before
 
 
 @pytest.mark.parametrize("on_a_terminal", [True, False])
