@@ -44,6 +44,13 @@ PAYLOADS = [
     "\x1b[2J\x1b]0;title\x07 \u202e\u200b",
     f"&lt;img src=x onerror={RUN}&gt; &#60;script&#62;{RUN}",
 ]
+PARSED = [
+    "<img src=x onerror='window.ran=1'>",
+    "<iframe srcdoc='<script>parent.ran=1</script>'></iframe>",
+    "<img src='http://evil.invalid/i.png'>",
+    "<style>@import 'http://evil.invalid/c.css'</style>",
+    "<form action='http://evil.invalid/'><button id=go></button></form>",
+]
 
 
 @pytest.fixture
@@ -72,6 +79,15 @@ def test_nothing_that_a_node_publishes_runs(
     page, noted = guarded
     served = Served(start_stickslip("dashboard", "--namespace", "/test"))
     page.goto(served.url)
+    expect(page.get_by_text("No drive is running in /test")).to_be_visible()
+    assert noted == []
+    for html in PARSED:  # the policy alone stops it
+        with page.expect_console_message(lambda line: "Security Policy" in line.text):
+            page.evaluate("html => document.body.insertAdjacentHTML('beforeend', html)", html)
+            page.evaluate("document.querySelector('#go')?.click()")
+    assert page.evaluate("window.ran") is None
+    page.reload()
+    noted.clear()
     node = graph.observer
     diagnostics = node.create_publisher(DiagnosticArray, DIAGNOSTICS.name, 100)
     changes = node.create_publisher(ParameterEvent, "/parameter_events", 100)
@@ -116,32 +132,6 @@ def test_nothing_that_a_node_publishes_runs(
     assert noted == []
     assert served.end() == 130
     assert "Traceback" not in "".join(served.said)
-
-
-PARSED = [
-    "<img src=x onerror='window.ran=1'>",
-    "<iframe srcdoc='<script>parent.ran=1</script>'></iframe>",
-    "<img src='http://evil.invalid/i.png'>",
-    "<style>@import 'http://evil.invalid/c.css'</style>",
-    "<form action='http://evil.invalid/'><button id=go></button></form>",
-]
-
-
-@pytest.mark.long
-def test_the_policy_alone_stops_what_is_parsed(
-    start_stickslip: Start, guarded: tuple[Page, list[str]]
-) -> None:
-    page, noted = guarded
-    served = Served(start_stickslip("dashboard", "--namespace", "/test"))
-    page.goto(served.url)
-    expect(page.get_by_text("No drive is running in /test")).to_be_visible()
-    assert noted == []
-    for html in PARSED:
-        with page.expect_console_message(lambda line: "Security Policy" in line.text):
-            page.evaluate("html => document.body.insertAdjacentHTML('beforeend', html)", html)
-            page.evaluate("document.querySelector('#go')?.click()")
-    assert page.evaluate("window.ran") is None
-    assert served.end() == 130
 
 
 MODULES = sorted((Path(__file__).parents[3] / "stickslip_ros/app/dashboard").glob("*.py"))
