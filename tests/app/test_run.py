@@ -1,4 +1,4 @@
-"""`stickslip run` and `set`: the closed loop through the middleware, as a user starts it."""
+"""`stickslip run`, `set` and `replay`: through the middleware, as a user starts them."""
 
 import json
 import os
@@ -14,9 +14,10 @@ from lifecycle_msgs.srv import ChangeState
 
 from stickslip_ros.nodes.base.managed import STATE
 from stickslip_ros.record.reader import Recording
-from stickslip_ros.record.topics import DIAGNOSTICS
+from stickslip_ros.record.topics import CONTROL_FORCE, DIAGNOSTICS, JOINT_STATES
 from tests.app.conftest import Run, Start, ended
 from tests.nodes.graph import PATIENCE, Graph, wait_for
+from tests.nodes.runs import FORCES, STATES, messages_of, record_states
 
 
 @pytest.mark.long
@@ -155,3 +156,30 @@ def test_without_a_node_it_says_how_to_start_one(stickslip: Run) -> None:
     done = stickslip("set", "plant.belt_speed=0.2")
     assert (done.returncode, done.stdout) == (1, "")
     assert "no node /feed_drive/plant is running: `stickslip run` starts the nodes" in done.stderr
+
+
+def test_it_says_what_it_waits_for_plays_to_the_end_and_is_done(
+    start_stickslip: Start,
+    graph: Graph,
+    tmp_path: Path,
+) -> None:
+    gone = {"stickslip_ros/plant": {"friction.law": '"rate_state"'}}  # no law of today
+    record_states(tmp_path / "bag", 200, tables=gone)
+    process = start_stickslip("replay", "bag", "--rate", "20", "--start", "0.5")
+    offered = process.stderr.readline()
+    assert f"bag: {FORCES}, {STATES}, loopback only" in offered
+    assert "waiting until a node reads them" in offered
+    assert "no node reads" in process.stderr.readline()
+    forces, states = graph.listen(CONTROL_FORCE, raw=True), graph.listen(JOINT_STATES, raw=True)
+    graph.wait_until(lambda: len(states) == len(forces) == 150, "all is heard")
+    ended(process, 0)
+    heard = {FORCES: forces, STATES: states}
+    for topic, messages in messages_of(tmp_path / "bag").items():
+        assert heard[topic] == [message for _, message in messages[50:]]
+
+
+def test_ctrl_c_ends_the_wait_for_a_reader(start_stickslip: Start, tmp_path: Path) -> None:
+    record_states(tmp_path / "bag", 20)
+    process = start_stickslip("replay", "bag")
+    assert "waiting" in process.stderr.readline()
+    ended(process, 130, signal.SIGINT)

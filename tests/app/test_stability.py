@@ -120,11 +120,3 @@ def test_coexisting_cycles_are_told_apart(stickslip: Run, monkeypatch: pytest.Mo
     done = stickslip("stability", "paper", *law)
     assert "1, unstable" in done.stdout
     assert "2, stable" in done.stdout
-
-
-def test_what_cannot_be_drawn_is_refused_before_anything_is_computed(
-    stickslip: Run, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("stickslip_ros.studies.stability.stability", None)
-    for arguments in (("--plot", "map.txt"), ("--plot", "map.png", "-p", "plant.belt_speed=0.0")):
-        assert stickslip("stability", "paper", *arguments).returncode == 2

@@ -9,9 +9,6 @@ from typing import Any, ClassVar
 
 import numpy as np
 import pytest
-from geometry_msgs.msg import WrenchStamped
-from rclpy.node import Node
-from sensor_msgs.msg import JointState
 
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.model.control import CONTROL_LAWS, ControlLaw, VelocityFeedback
@@ -19,7 +16,6 @@ from stickslip_ros.samples import MotorSample, Reference, Sample
 from stickslip_ros.scenarios.files import Scenario, load_scenario
 from stickslip_ros.show.law_code import LANGUAGES, law_code
 from stickslip_ros.show.law_program import Decision, law_program
-from stickslip_ros.testing import ClosedLoop
 
 COUNT = 100_000
 GAINS = {
@@ -134,29 +130,6 @@ def test_velocities_are_differences_as_the_sensor_takes_them(spans: int, tmp_pat
         force, state = law.respond(state, elapsed, sample, Reference())
         elapsed = scenario.plant.period
         assert compiled.force(position=position) == pytest.approx(law.limited(force), rel=1e-12)
-
-
-@pytest.mark.process
-def test_over_topics_the_compiled_law_moves_the_drive_as_the_law_does(tmp_path: Path) -> None:
-    gains = ["washout_controller.start_after=0.0", "washout_controller.cubic_gain=-2e4"]
-    compiled = Compiled(load_scenario("feed_drive", gains, controller="washout"), tmp_path)
-
-    class OnADrive(Node):
-        def __init__(self, **options: Any) -> None:
-            super().__init__("on_a_drive", **options)
-            self.forces = self.create_publisher(WrenchStamped, "control_force", 1000)
-            self.create_subscription(JointState, "joint_states", self.answer, 10)
-
-        def answer(self, state: JointState) -> None:
-            force = WrenchStamped(header=state.header)
-            force.wrench.force.x = compiled.force(velocity=state.velocity[0])
-            self.forces.publish(force)
-
-    with ClosedLoop("feed_drive", *gains, controller="washout") as loop:
-        expected = loop.run(1.0).states.position
-    with ClosedLoop("feed_drive", controller=OnADrive) as loop:
-        given = loop.run(1.0).states.position
-    assert np.abs(given - expected).max() <= 1e-9 * np.abs(expected).max()
 
 
 def test_structured_text_has_the_statements_of_the_c_code() -> None:
