@@ -80,7 +80,7 @@ def cases(draw: st.DrawFn) -> Case:
 
 
 @given(cases(), st.floats(0.0, 12.0))
-@examples(quick=100, thorough=1000)
+@examples(quick=100, thorough=500)
 def test_values_are_those_of_the_definition(case: Case, time: float) -> None:
     assume(all(abs(time - corner) > 1e-9 for corner in case.corners))
     assert case.signal.at(time) == pytest.approx(case.defined(time), abs=1e-9)
@@ -115,7 +115,7 @@ def test_velocity_and_acceleration_are_derivatives(case: Case, time: float) -> N
 
 
 @given(cases())
-@examples(quick=15, thorough=150)
+@examples(quick=15, thorough=40)
 def test_bounds_and_steepest_are_the_extremes(case: Case) -> None:
     ends, signal = case.corners, case.signal
     times = [*np.linspace(0.0, 30.0, 30_001).tolist(), *ends, *(end - 1e-12 for end in ends)]

@@ -153,7 +153,7 @@ def test_cutting_a_motion_anywhere_changes_nothing(case: Case, cuts: list[float]
 
 
 @given(cases())
-@examples(quick=15, thorough=75)
+@examples(quick=15, thorough=40)
 def test_recording_changes_nothing(case: Case) -> None:
     recorded, bare = case.motion(RecordedMotion), case.motion()
     for motion in (recorded, bare):
@@ -162,7 +162,7 @@ def test_recording_changes_nothing(case: Case) -> None:
 
 
 @given(cases())
-@examples(quick=15, thorough=75)
+@examples(quick=15, thorough=40)
 def test_a_plain_drive_moves_as_any_other(case: Case) -> None:
     """The quick system of a plain drive and the general one describe the same motion."""
     quick = case.motion()
@@ -192,7 +192,7 @@ def test_units_do_not_matter(scales: tuple[float, float, float]) -> None:
 
 
 @given(cases(), cases())
-@examples(quick=15, thorough=75)
+@examples(quick=15, thorough=40)
 def test_motions_do_not_disturb_each_other(case: Case, other: Case) -> None:
     def run(one: Case, between: Callable[[], object] = lambda: None) -> tuple[float, float]:
         motion = one.motion()
@@ -300,7 +300,7 @@ NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)
 
 
 @given(cases())
-@examples(quick=10, thorough=100)
+@examples(quick=10, thorough=50)
 def test_the_energy_gained_is_the_work_done(case: Case) -> None:
     drive, duration = case.drive, 5.0 / case.drive.angular_frequency
     recorded = case.motion(RecordedMotion)
