@@ -47,32 +47,41 @@ class MaxwellSlip(CurveFollower):
     @property
     def stiffnesses(self) -> Values:
         """S_i of each element, 1/m."""
+        return [self.bristle_stiffness * share for share in self._shares]
+
+    @property
+    def _shares(self) -> Sequence[float]:
+        """Share of each element in the stiffness."""
         numbers = range(1, self.elements + 1)
         total = sum(1.0 / number for number in numbers)
-        return [self.bristle_stiffness * (1.0 / (number * total)) for number in numbers]
+        return [1.0 / (number * total) for number in numbers]
 
+    # In a flow a constant times a variable costs little: the order of the factors matters.
     def friction(self, relative_speed: Any, sign: Any, memory: Values, switches: Values) -> Any:
         """Return -(sum S_i z_i + mu_v v_r); see `FrictionMemory.friction`."""
-        forces = [s * z for s, z in zip(self.stiffnesses, memory, strict=True)]
-        return -(sum(forces[1:], forces[0]) + self.viscous_part * relative_speed)
+        stretches = [share * z for share, z in zip(self._shares, memory, strict=True)]
+        force = self.bristle_stiffness * sum(stretches[1:], stretches[0])
+        return -(force + self.viscous_part * relative_speed)
 
     def memory_rates(
         self, relative_speed: Any, sign: Any, memory: Values, switches: Values
     ) -> Values:
         """Return z_i'; see `FrictionMemory.memory_rates`."""
-        size, weight = self.size(relative_speed, sign, switches), 1.0 / self.elements
-        return [
-            (1.0 - slips) * relative_speed
-            + slips * (self.attraction * (sign * weight - stiffness * z / size) / stiffness)
-            for stiffness, z, slips in zip(self.stiffnesses, memory, switches, strict=False)
-        ]
+        inverse = 1.0 / self.size(relative_speed, sign, switches)
+        limit = sign * (1.0 / self.bristle_stiffness)
+        rates: list[Any] = []
+        for share, z, slips in zip(self._shares, memory, switches, strict=False):
+            slipping = self.attraction * (limit * (1.0 / (self.elements * share)) - z * inverse)
+            rates.append(relative_speed + slips * (slipping - relative_speed))
+        return rates
 
     def margins(self, relative_speed: Any, sign: Any, memory: Values, switches: Values) -> Values:
         """Return those of the elements from their limits; see `FrictionMemory.margins`."""
         size = self.size(relative_speed, sign, switches)
+        from_limits = [size - sign * force for force in self._forces(memory)]
         margins = [
-            slips + (1.0 - slips) * (size - sign * force)
-            for force, slips in zip(self._forces(memory), switches, strict=False)
+            margin + slips * (1.0 - margin)
+            for margin, slips in zip(from_limits, switches, strict=False)
         ]
         return (*margins, *super().margins(relative_speed, sign, memory, switches))
 
@@ -122,6 +131,6 @@ class MaxwellSlip(CurveFollower):
     def _forces(self, memory: Values) -> Values:
         """Return the force of each element in shares of its weight."""
         return [
-            self.elements * stiffness * z
-            for stiffness, z in zip(self.stiffnesses, memory, strict=True)
+            self.bristle_stiffness * (self.elements * share * z)
+            for share, z in zip(self._shares, memory, strict=True)
         ]
