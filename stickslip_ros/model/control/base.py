@@ -282,8 +282,9 @@ class ControlLaw(ABC):
 
     @property
     def continuous(self) -> ContinuousControl | None:
-        """The law as equations, eq. 19; None for a law that is defined for samples only."""
-        return None
+        """The law as equations, eq. 19: itself if it has them; None if it is for samples only."""
+        itself: Any = self
+        return itself if ContinuousControl in type(self).__mro__ else None
 
     def linear_feedback(self, period: float) -> LinearFeedback | None:
         """Return the sampled law near the equilibrium.

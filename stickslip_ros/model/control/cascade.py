@@ -93,11 +93,6 @@ class Cascade(ControlLaw, TwoBodyControl):
         inputs[2:, : len(added.direct)] += added.input[0], added.direct
         return LinearFeedback(matrix[np.ix_(kept, kept)], inputs[kept], output[kept], inputs[3])
 
-    @property
-    @override
-    def continuous(self) -> Self:
-        return self
-
     @override
     def silenced(self) -> Self:
         gains = ["position_gain", "velocity_gain", "integral_gain", "linear_gain", "cubic_gain"]

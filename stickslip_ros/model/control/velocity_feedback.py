@@ -52,11 +52,6 @@ class VelocityFeedback(FeedbackLaw, ContinuousControl):
         feedback = LinearFeedback(np.empty((0, 0)), np.empty((0, 2)), np.empty(0), direct)
         return feedback.of(self.feedback)
 
-    @property
-    @override
-    def continuous(self) -> Self:
-        return self
-
     @override
     def silenced(self) -> Self:
         return replace(self, position_gain=0.0, velocity_gain=0.0)

@@ -81,11 +81,6 @@ class Washout(FeedbackLaw, ContinuousControl):
             np.array([0.0, gain]),
         ).of(self.feedback)
 
-    @property
-    @override
-    def continuous(self) -> Self:
-        return self
-
     def silenced(self) -> Self:
         """Return the filter alone, which gives no force."""
         return replace(self, linear_gain=0.0, cubic_gain=0.0)
