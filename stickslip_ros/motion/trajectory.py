@@ -63,13 +63,9 @@ class MotorTrajectory(Trajectory):
 
 
 @dataclass(frozen=True, eq=False)
-class MeasuredMotorTrajectory(MeasuredTrajectory):
+class MeasuredMotorTrajectory(MotorTrajectory, MeasuredTrajectory):
     """The same with what the sensors of slide and motor tell of it."""
 
-    motor_position: Annotated[FloatArray, Quantity("motor displacement", "m")]
-    """Displacement of the motor, m."""
-    motor_velocity: Annotated[FloatArray, Quantity("motor velocity", "m/s")]
-    """Velocity of the motor, m/s."""
     measured_motor_position: Annotated[FloatArray, Quantity("measured motor displacement", "m")]
     """Measured displacement of the motor, m."""
     measured_motor_velocity: Annotated[FloatArray, Quantity("measured motor velocity", "m/s")]
