@@ -420,11 +420,8 @@ def axis_of(name: str, parameter: str, given: Any, *, listed: bool = False) -> A
 def _settling(
     settling: SettlingOptions, transient: float | None, cycles: int | None
 ) -> SettlingOptions:
-    return replace(
-        settling,
-        transient=settling.transient if transient is None else transient,
-        cycles=settling.cycles if cycles is None else cycles,
-    )
+    given = {"transient": transient, "cycles": cycles}
+    return replace(settling, **{name: n for name, n in given.items() if n is not None})
 
 
 def _of_parameter(parameter: str) -> Quantity:

@@ -185,16 +185,11 @@ def _law_in_use(files: Sequence[ScenarioFile], namespace: str) -> str:
     return DEFAULT_LAW
 
 
-def config_directories() -> list[Path]:
-    """Return the existing directories that contain the scenarios known by name."""
-    installed = [prefix / "share/stickslip_ros/config" for prefix in prefixes()]
-    source_tree = Path(__file__).parents[2] / "config"
-    return [directory for directory in [source_tree, *installed] if directory.is_dir()]
-
-
 def shipped_scenarios() -> dict[str, Path]:
     """Return the files of the scenarios that are found by name, by that name."""
-    shipped = {path.stem: path for d in config_directories()[::-1] for path in d.glob("*.yaml")}
+    installed = [prefix / "share/stickslip_ros/config" for prefix in prefixes()]
+    folders = [Path(__file__).parents[2] / "config", *installed]
+    shipped = {path.stem: path for folder in folders[::-1] for path in folder.glob("*.yaml")}
     return dict(sorted(shipped.items()))
 
 

@@ -6,7 +6,7 @@ imported, or would be in the way of other laws, is refused where it is named.
 
 import os
 import sys
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator
 from dataclasses import dataclass, field
 from math import isfinite, isinf
 from operator import attrgetter
@@ -207,12 +207,6 @@ def add_laws_of_other_packages() -> None:
     families = {family.group: family for family in (FRICTION_LAWS, CONTROLLERS)}
     for entry, package in entries_of_other_packages(*families):
         families[entry.group].add(entry, package)
-
-
-def laws_of_all_packages(family: LawFamily[_Law]) -> Mapping[str, type[_Law]]:
-    """Return the laws of a family by name, after those of other packages have been added."""
-    add_laws_of_other_packages()
-    return family.laws
 
 
 def entries_of_other_packages(*groups: str) -> "list[tuple[EntryPoint, Distribution]]":

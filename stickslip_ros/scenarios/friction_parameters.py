@@ -21,11 +21,12 @@ from stickslip_ros.model.friction import (
     Table,
 )
 from stickslip_ros.scenarios.curve_file import Pairs, read_curve
-from stickslip_ros.scenarios.foreign_laws import FRICTION_LAWS, laws_of_all_packages
+from stickslip_ros.scenarios.foreign_laws import FRICTION_LAWS, add_laws_of_other_packages
 from stickslip_ros.scenarios.validation import ParameterGroup
 from stickslip_ros.text import renamed, shown
 
-LAWS = laws_of_all_packages(FRICTION_LAWS)
+add_laws_of_other_packages()
+LAWS = FRICTION_LAWS.laws
 _FOLLOWERS = [name for name, law in LAWS.items() if issubclass(law, CurveFollower)]
 _CURVES = [name for name, law in LAWS.items() if not law.states and law is not Stiction]
 """The laws that a law with a memory can follow."""

@@ -248,17 +248,9 @@ class Scenario:
             return self
         others = {**self.other_controllers, self.controller.law: self.controller}
         controller = others.pop(law, None) or CONTROLLER_PARAMETERS[law]
-        overrides = [
-            override
-            for override in self.overrides
-            if not override.startswith(f"{self.controller.node}.")
-        ]
-        return replace(
-            self,
-            controller=controller,
-            other_controllers=others,
-            overrides=tuple(overrides),
-        ).with_force_limit()
+        kept = tuple(o for o in self.overrides if not o.startswith(f"{self.controller.node}."))
+        new = replace(self, controller=controller, other_controllers=others, overrides=kept)
+        return new.with_force_limit()
 
     def with_force_limit(self) -> Self:
         """Return the scenario with the force limit of another controller, unless it has its own."""
