@@ -154,12 +154,9 @@ class Proposal(TabularResult):
         scenario = self.design.task.scenario
         chosen, node = scenario.controller.control_law.tuned, scenario.controller.node
         parameters = scenario_tables(scenario, unused=[f"{node}.{name}" for name in chosen])
-        return Summary("Controller design", scenario.name, self._verdict(), parameters)
-
-    def _verdict(self) -> str:
-        if self.controller is None:
-            return "nothing to propose"
-        return gains_text(self.controller, self._units)
+        law, verdict = self.controller, "nothing to propose"
+        verdict = verdict if law is None else gains_text(law, self._units)
+        return Summary("Controller design", scenario.name, verdict, parameters)
 
     @override
     def parts(self) -> Parts:
