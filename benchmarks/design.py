@@ -27,7 +27,7 @@ from stickslip_ros.scenarios.files import Scenario, load_scenario
 from stickslip_ros.studies.case_outcome import Disturbance, simulate_case
 from stickslip_ros.studies.design import Task, design
 from stickslip_ros.studies.design_trial import Trial
-from stickslip_ros.studies.tuned_gains import Goal
+from stickslip_ros.studies.drive_loops import DriveLoops
 from stickslip_ros.studies.tuning import Tuning
 from stickslip_ros.versions import versions
 
@@ -104,10 +104,10 @@ def task(seed: int) -> Task:
     return Task.from_scenario(scenario.changed(changed), belt_speeds)
 
 
-def grid(tuning: Tuning, bodies: Sequence[ControlLaw]) -> Iterator[list[ControlLaw]]:
+def grid(loops: DriveLoops, bodies: Sequence[ControlLaw]) -> Iterator[list[ControlLaw]]:
     """Yield parts of the grid: laws with gains over decades, for each body to feed back."""
-    law, drive = tuning.law, tuning.drive
-    mass, rate = drive.mass, tuning.plants[0].loop.rate
+    law, drive = loops.law, loops.drive
+    mass, rate = drive.mass, loops.plants[0].loop.rate
     omega, count = drive.angular_frequency, len(law.tuned)
     ranges = {
         "1/s": (omega / 300.0, 3.0 * rate),
@@ -129,24 +129,20 @@ def grid(tuning: Tuning, bodies: Sequence[ControlLaw]) -> Iterator[list[ControlL
         yield from (laws[start : start + 4096] for start in range(0, len(laws), 4096))
 
 
-def best_of_grid(
-    task: Task, tuning: Tuning, bodies: Sequence[ControlLaw], disturbances: Any, least: float
-) -> float | None:
+def best_of_grid(trial: Trial, bodies: Sequence[ControlLaw], least: float) -> float | None:
     """Return the decay rate of the fastest point that counts, if it is above `least`."""
-    parts = [*grid(tuning, bodies)]
+    loops, parts = trial.loops, [*grid(trial.loops, bodies)]
     laws = [law for part in parts for law in part]
-    rates = np.concatenate([tuning.loops.decay_rates(part) for part in parts])
+    rates = np.concatenate([loops.decay_rates(part) for part in parts])
     order = np.argsort(-rates)
     stable = order[: int((rates > least).sum())]
     if len(stable) > _JUDGED:
         stable = stable[np.unique(np.linspace(0, len(stable) - 1, _JUDGED).astype(int))]
-    deciding = [tuning.plants[place] for place in tuning.loops.ends]
     for row in stable.tolist():
-        limits = tuning.limits(tuning.judged(laws[row], deciding, tuning.vibrations))
+        limits = loops.limits(laws[row], loops.deciding)
         if max(limit.excess for limit in limits) > 0.0:
             continue
-        checks = Trial(task, tuning, disturbances).checks(laws[row])
-        if all(check.reason is None for check, _ in checks):
+        if all(check.reason is None for check, _ in trial.checks(laws[row])):
             return float(rates[row])
     return None
 
@@ -168,14 +164,13 @@ def compare(seed: int) -> Result:
             for check in found.checks
             if check.disturbed_force and check.predicted_peak_force
         ]
-    goal = Goal.from_scenario(scenario, asked.belt_speeds, disturbances, asked.force_limit)
-    tuning = Tuning(scenario, law, goal)
-    of_grid = None
-    if tuning.diverges is None:
+    trial, of_grid = Trial(asked, disturbances), None
+    if trial.loops.diverges is None:
         # Where the body that the scenario names has gains, a design feeds back no other one.
-        keeps = found.controller is not None and found.controller.of_motor == tuning.law.of_motor
-        bodies = tuning.bodies[: 1 if keeps else None]
-        of_grid = best_of_grid(asked, tuning, bodies, disturbances, least)
+        bodies = Tuning(trial.loops).bodies
+        if found.controller is not None and found.controller.of_motor == bodies[0].of_motor:
+            bodies = bodies[:1]
+        of_grid = best_of_grid(trial, bodies, least)
     return Result(seed, law, bool(seed % 2), rate, of_grid, held, ratios, found.remark)
 
 

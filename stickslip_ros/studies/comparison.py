@@ -14,13 +14,14 @@ from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.scenarios.parameters import known_law
 from stickslip_ros.studies.case_outcome import Disturbance, Outcome, is_positioning, simulate_case
 from stickslip_ros.studies.design import Task, design
+from stickslip_ros.studies.drive_loops import DriveLoops, with_law
 from stickslip_ros.studies.options import FEED_TOLERANCE, POSITION_TOLERANCE
 from stickslip_ros.studies.plan import Axis, Grid
 from stickslip_ros.studies.settling import MotionState, check_reference
 from stickslip_ros.studies.spread import Spread, check_spread, drawn
 from stickslip_ros.studies.study import PointStudy
 from stickslip_ros.studies.tuned_gains import Goal, Tuned
-from stickslip_ros.studies.tuning import Tuning, with_law
+from stickslip_ros.studies.tuning import Tuning
 from stickslip_ros.text import shown
 
 DISTURBANCES = ("step", "impulse", "sine")
@@ -227,7 +228,8 @@ def _tuned(
         proposal = design(Task(with_own, ends, limit), disturbances=applied)
         if proposal.tuned is not None:
             return replace(proposal.tuned, remark=proposal.remark)
-    return Tuning(with_own, law, Goal.from_scenario(with_own, ends, applied, limit)).best()
+    goal = Goal.from_scenario(with_own, ends, applied, limit)
+    return Tuning(DriveLoops(with_own, law, goal)).best()
 
 
 def feeds(scenario: Scenario, axes: Sequence[Axis]) -> list[float]:

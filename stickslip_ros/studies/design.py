@@ -7,8 +7,8 @@ nodes, under disturbances. The washout law also catches the vibration without co
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from math import inf
-from typing import Any, Self
+from math import inf, sqrt
+from typing import Any
 
 import numpy as np
 
@@ -24,8 +24,8 @@ from stickslip_ros.studies.design_trial import Check, Task, Trial
 from stickslip_ros.studies.gain_search import rounded
 from stickslip_ros.studies.spread import drawn, held_interval
 from stickslip_ros.studies.stability import number_text
-from stickslip_ros.studies.tuned_gains import Goal, Tuned
-from stickslip_ros.studies.tuning import RESERVE, Tuning
+from stickslip_ros.studies.tuned_gains import Tuned
+from stickslip_ros.studies.tuning import NEAR, RESERVE, Tuning
 from stickslip_ros.theory.linear_sampled_loop import (
     LinearSampledLoop,
     why_no_linear_loop,
@@ -34,8 +34,10 @@ from stickslip_ros.theory.stability_map import StabilityMap
 
 _KINDS = ("step", "impulse")
 """Disturbances of a design."""
-_ATTEMPTS, _MORE_CAUTION = 6, 0.8
-"""Searches until the simulation holds, each with a smaller share of the limits."""
+_ATTEMPTS, _MORE_CAUTION = 6, 0.95
+"""Searches until the simulation holds, with smaller shares of the limits in ever larger steps."""
+_ENOUGH = 0.8
+"""Share of a larger decay rate, of gains that fail or without a reserve, that is enough."""
 _SEARCHED, _TRIED = 20, 40
 """Drives that a spread draws for the search, and others on which a proposal is tried."""
 
@@ -174,10 +176,10 @@ def design(
         return Design(task, remark=reason)
     if disturbances is None:
         disturbances = [Disturbance.parse(kind, scenario) for kind in _KINDS]
-    designer = Designer.for_task(task, disturbances)
-    tuning = designer.tuning
-    if tuning.diverges is not None:
-        return Design(task, remark=tuning.diverges)
+    designer = Designer(task, disturbances)
+    loops = designer.trial.loops
+    if loops.diverges is not None:
+        return Design(task, remark=loops.diverges)
     draft = designer.proposed(progress)
     if draft.controller is not None and task.spread:
         draft = replace(draft, drawn=designer.tried(draft.controller))
@@ -186,7 +188,7 @@ def design(
         draft = replace(
             draft, remark=joined(draft.remark, _sufficient(task, draft.tuned, disturbances))
         )
-    if tuning.vibrations and plant.force_jitter:
+    if loops.vibrations and plant.force_jitter:
         no_jitter = (
             "force_jitter is omitted where the vibration is caught: the delay is constant there"
         )
@@ -200,7 +202,7 @@ def _sufficient(task: Task, nearest: Tuned, disturbances: Sequence[Disturbance])
         return None
     if (enough := rounded(nearest.missed[0].value / RESERVE, up=True)) <= task.force_limit:
         return None
-    larger = Designer.for_task(replace(task, force_limit=enough), disturbances)
+    larger = Designer(replace(task, force_limit=enough), disturbances)
     if larger.proposed().controller is None:
         return None
     return f"a force limit of about {number_text(task.drive, enough, 'N')} is sufficient"
@@ -209,80 +211,105 @@ def _sufficient(task: Task, nearest: Tuned, disturbances: Sequence[Disturbance])
 class Designer:
     """Searches and simulates in turn."""
 
-    def __init__(self, task: Task, tuning: Tuning, disturbances: Sequence[Disturbance]) -> None:
-        self.task, self.tuning, self.disturbances = task, tuning, disturbances
-        self.drawn: dict[str, Designer] = {}
+    def __init__(self, task: Task, disturbances: Sequence[Disturbance]) -> None:
+        self.task, self.trial = task, Trial(task, disturbances)
+        self.tuning = Tuning(self.trial.loops)
+        self.drawn: dict[str, Trial] = {}
         """Drives that the gains have to hold, too, by what they are called."""
-        self.trial = Trial(task, tuning, disturbances)
 
     def proposed(self, progress: Progress = lambda _: None) -> Design:
         """Return a proposal that was checked by simulation, or the reason why there is none."""
         for seed in range(_SEARCHED if self.task.spread else 0):
             _, name, other = self.other(seed)
             self.drawn[name] = other
-            if (diverges := other.tuning.diverges) is not None:
+            if (diverges := other.loops.diverges) is not None:
                 return Design(self.task, None, f"of {name}, {diverges}")
-        share, cubic, failure = RESERVE, True, None
-        tuned: Tuned | None = None
+        tuned, share, cubic = *self._first(), True
+        low, high, enough = 0.0, 1.0, 0.0
+        held: Design | None = None
+        failed = Design(self.task)
         for attempt in range(_ATTEMPTS):
-            tuned = self._best(share, cubic=cubic)
+            if attempt:
+                tuned = self._best(share, cubic=cubic)
             if tuned.missed or tuned.decay_rate <= 0.0:
-                return Design(self.task, None, failure or tuned.remark, tuned=tuned)
-            law: Any = tuned.law
-            checks: list[Check] = []
-            if self.tuning.vibrations:
-                waits = FILTER_SETTLED / law.corner_frequency
-                law = replace(law, start_after=rounded(waits, digits=2, up=True))
-            for check, done in self.trial.checks(law):
-                checks.append(check)
-                progress(1.0 - 0.5**attempt * (1.0 - done))
-                if (failure := check.reason) is not None:
+                return held or replace(failed, remark=failed.remark or tuned.remark, tuned=tuned)
+            draft = self._attempt(tuned, progress, 0.5**attempt)
+            peak = max((check.disturbed_force or 0.0 for check in draft.checks), default=0.0)
+            if draft.controller is not None:
+                held, low = draft, share
+                if tuned.decay_rate >= enough:
                     break
-            remark = None
-            for name, other in self.drawn.items() if failure is None else ():
-                if failure := other.trial.worst(law).reason:
-                    self.tuning.others[name] = other.tuning
-                    failure = f"of {name}, {failure}"
-                    break
-            if failure is None and law.start_after:
-                remark, failure = self.trial.throw_from_high_speeds(law)
-            if failure is None:
-                slowest = self.tuning.loops.slowest(law)
-                remark, seen = joined(tuned.remark, remark), tuple(self.tuning.vibrations)
-                return Design(self.task, law, remark, checks, tuned, slowest, seen)
-            peak = max((check.disturbed_force or 0.0 for check in checks), default=0.0)
-            if peak > self.task.force_limit:
-                share *= RESERVE * self.task.force_limit / peak
-            elif getattr(law, "cubic_gain", 0.0):
-                cubic = False
             else:
-                share *= _MORE_CAUTION
-        return Design(self.task, None, failure, tuned=tuned)
+                failed = replace(draft, checks=())
+                if held is None and peak > self.task.force_limit:
+                    share *= RESERVE * self.task.force_limit / peak
+                    continue
+                if held is None and getattr(tuned.law, "cubic_gain", 0.0):
+                    cubic = False
+                    continue
+                high, enough = min(share, self.tuning.used(tuned.law)), _ENOUGH * tuned.decay_rate
+            share = high * _MORE_CAUTION**2**attempt if held is None else sqrt(low * high)
+        return held or failed
 
-    @classmethod
-    def for_task(cls, task: Task, disturbances: Sequence[Disturbance]) -> Self:
-        """Return a designer for a task."""
-        scenario = task.scenario
-        goal = Goal.from_scenario(scenario, task.belt_speeds, disturbances, task.force_limit)
-        return cls(task, Tuning(scenario, scenario.controller.law, goal), disturbances)
+    def _first(self) -> tuple[Tuned, float]:
+        """Return gains with a reserve, or without one where it is costly, and their share."""
+        tuned = self._best(RESERVE)
+        if tuned.decay_rate > 0.0 and NEAR < self.tuning.used(tuned.law) <= 1.0:
+            whole = self._best(1.0)
+            if not whole.missed and tuned.decay_rate < _ENOUGH * whole.decay_rate:
+                return whole, 1.0
+        return tuned, RESERVE
 
-    def other(self, seed: int) -> tuple[dict[str, float], str, Self]:
-        """Return the constants of a drive that is drawn, what it is called, and its designer."""
+    def _attempt(self, tuned: Tuned, progress: Progress, left: float) -> Design:
+        """Return a design with these gains, without a controller if they fail in simulation.
+
+        `progress` receives all but the share of the work that is left.
+        """
+        law: Any = tuned.law
+        if self.tuning.loops.vibrations:
+            waits = FILTER_SETTLED / law.corner_frequency
+            law = replace(law, start_after=rounded(waits, digits=2, up=True))
+        checks: list[Check] = []
+        failed = Design(self.task, checks=checks, tuned=tuned)
+        for check, done in self.trial.checks(law):
+            checks.append(check)
+            progress(1.0 - left * (1.0 - done))
+            if check.reason is not None:
+                return replace(failed, remark=check.reason)
+        for name, other in self.drawn.items():
+            if failure := other.worst(law).reason:
+                self.tuning.others[name] = other.loops
+                return replace(failed, remark=f"of {name}, {failure}")
+        remark = failure = None
+        if law.start_after:
+            remark, failure = self.trial.throw_from_high_speeds(law)
+        if failure is not None:
+            return replace(failed, remark=failure)
+        return replace(
+            failed,
+            controller=law,
+            remark=joined(tuned.remark, remark),
+            slowest=self.tuning.loops.slowest(law),
+            vibrations=tuple(self.tuning.loops.vibrations),
+        )
+
+    def other(self, seed: int) -> tuple[dict[str, float], str, Trial]:
+        """Return the constants of a drive that is drawn, what it is called, and its trial."""
         scenario = self.task.scenario
         constants = drawn(scenario, seed, self.task.spread)
         task = replace(self.task, scenario=scenario.changed(constants))
         name = f"drawn drive {seed} ({_constants_text(constants)})"
-        return constants, name, self.for_task(task, self.disturbances)
+        return constants, name, Trial(task, self.trial.disturbances)
 
-    def _best(self, share: float, *, cubic: bool) -> Tuned:
+    def _best(self, share: float, *, cubic: bool = True) -> Tuned:
         """Return the best gains for the drive and, one after the other, those that miss limits."""
         while True:
             tuned = self.tuning.best(share, cubic=cubic)
             if tuned.missed or tuned.decay_rate <= 0.0:
                 return tuned
             excess = {
-                name: sum(limit.excess for limit in other.tuning.missed(tuned.law))
-                if other.tuning.decay_rates([tuned.law]) > 0.0
+                name: sum(limit.excess for limit in other.loops.missed(tuned.law))
+                if other.loops.decay_rates([tuned.law]) > 0.0
                 else inf
                 for name, other in self.drawn.items()
                 if name not in self.tuning.others
@@ -290,14 +317,14 @@ class Designer:
             worst = max(excess, key=lambda name: excess[name], default="")
             if not excess.get(worst):
                 return tuned
-            self.tuning.others[worst] = self.drawn[worst].tuning
+            self.tuning.others[worst] = self.drawn[worst].loops
 
     def tried(self, law: ControlLaw) -> Drawn:
         """Return what a law comes to on drives that were not searched for."""
         rows: list[tuple[Check, dict[str, float]]] = []
         for seed in range(_SEARCHED, _SEARCHED + _TRIED):
             constants, _, other = self.other(seed)
-            rows.append((other.trial.worst(law), constants))
+            rows.append((other.worst(law), constants))
         held = sum(check.reason is None for check, _ in rows)
         check, constants = min(rows, key=lambda row: (row[0].reason is None, row[0].decay_rate))
         return Drawn(len(rows), held, held_interval(held, len(rows)), constants, check)

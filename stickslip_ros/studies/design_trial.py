@@ -14,11 +14,11 @@ from stickslip_ros.quantities import Quantity
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.studies.case_outcome import Disturbance, simulate_case
 from stickslip_ros.studies.controller_trial import FILTER_SETTLED, Rest, Vibration
-from stickslip_ros.studies.gain_search import linear_part
+from stickslip_ros.studies.drive_loops import DriveLoops, linear_part
 from stickslip_ros.studies.options import FEED_TOLERANCE, OWN_SPEED_RANGE
 from stickslip_ros.studies.spread import Spread, check_spread
 from stickslip_ros.studies.stability import number_text
-from stickslip_ros.studies.tuning import Tuning
+from stickslip_ros.studies.tuned_gains import Goal
 from stickslip_ros.theory.linear_sampled_loop import (
     settling_time,
 )
@@ -164,9 +164,12 @@ class Check:
 class Trial:
     """Checks of control laws under disturbances, and with the vibration to catch."""
 
-    def __init__(self, task: Task, tuning: Tuning, disturbances: Sequence[Disturbance]) -> None:
-        self.task, self.tuning, self.disturbances = task, tuning, disturbances
-        sensor, actuator = task.scenario.plant.sensor, task.drive.actuator
+    def __init__(self, task: Task, disturbances: Sequence[Disturbance]) -> None:
+        self.task, self.disturbances, scenario = task, disturbances, task.scenario
+        goal = Goal.from_scenario(scenario, task.belt_speeds, disturbances, task.force_limit)
+        self.loops = DriveLoops(scenario, scenario.controller.law, goal)
+        """The linear loops at the belt speeds that are checked."""
+        sensor, actuator = scenario.plant.sensor, task.drive.actuator
         self.rough = bool(
             sensor.position_resolution
             or actuator.resolution
@@ -177,11 +180,11 @@ class Trial:
 
     def checks(self, law: Any) -> Iterator[tuple[Check, float]]:
         """Yield the checks of a law, and the share of them that is done."""
-        tuning, scenario = self.tuning, self.task.with_law(law)
-        vibrations = tuning.vibrations or [None] * len(tuning.plants)
-        for row, (plant, vibration) in enumerate(zip(tuning.plants, vibrations, strict=True)):
+        loops, scenario = self.loops, self.task.with_law(law)
+        vibrations = loops.vibrations or [None] * len(loops.plants)
+        for row, (plant, vibration) in enumerate(zip(loops.plants, vibrations, strict=True)):
             drive = plant.loop.drive
-            linear = tuning.judged(law, [plant], [])
+            linear = loops.judged(law, [plant], [])
             predicted = settling_time(linear.decay_rate) or inf
             basic = Check(
                 belt_speed=drive.belt_speed,
@@ -190,7 +193,7 @@ class Trial:
                 predicted_settling_time=predicted,
                 predicted_peak_force=linear.peak_force or 0.0,
             )
-            done = (row + 1) / len(tuning.plants)
+            done = (row + 1) / len(loops.plants)
             if vibration is not None:
                 yield self._caught(basic, vibration, law), done
             for disturbance in self.disturbances:
@@ -202,11 +205,11 @@ class Trial:
         caught = rest = reason = None
         if vibration.vibrates:
             patience = 5.0 * predicted + 20.0 * drive.natural_period
-            caught = self.tuning.bench.catch(vibration, law, patience)
+            caught = self.loops.bench.catch(vibration, law, patience)
             reason = self._failure(drive.belt_speed, caught.settling_time, caught.peak_force)
         if self.rough:
             settled = max(predicted, FILTER_SETTLED / law.corner_frequency)
-            rest = self.tuning.bench.rest(drive, law, settled)
+            rest = self.loops.bench.rest(drive, law, settled)
         return replace(
             check,
             vibrates=vibration.vibrates,
@@ -259,27 +262,27 @@ class Trial:
     def throw_from_high_speeds(self, law: Any) -> tuple[str | None, str | None]:
         """Return a remark on motions with a fast start, and how the law fails, if it does."""
         remark: str | None = None
-        loops = self.tuning.loops
-        unlimited, slowest = replace(law, force_limit=inf), loops.slowest(law)
-        for loop in loops.all:
+        loops = [plant.loop for plant in self.loops.plants]
+        unlimited, slowest = replace(law, force_limit=inf), self.loops.slowest(law)
+        for loop in loops:
             drive = loop.drive
             for speed in (thrown * drive.speed_scale for thrown in _THROWN_SPEEDS):
-                if loop not in (loops.all[0], loops.all[-1], slowest):
+                if loop not in (loops[0], loops[-1], slowest):
                     continue
-                if self.tuning.bench.returns(drive, law, speed):
+                if self.loops.bench.returns(drive, law, speed):
                     continue
                 slide = (
                     f"started at {number_text(drive, speed, 'm/s')} on a belt at "
                     f"{number_text(drive, drive.belt_speed, 'm/s')}, the slide"
                 )
-                if law.cubic_gain != 0.0 or not self.tuning.bench.returns(drive, unlimited, speed):
+                if law.cubic_gain != 0.0 or not self.loops.bench.returns(drive, unlimited, speed):
                     return None, f"{slide} does not return to equilibrium"
                 remark = remark or f"{slide} needs more force than the limit"
         return remark, None
 
     def worst(self, law: ControlLaw) -> Check:
         """Return the check of a law where a deviation decays most slowly: the first that fails."""
-        slowest = self.tuning.loops.slowest(law)
+        slowest = self.loops.slowest(law)
         speed, rate = slowest.drive.belt_speed, slowest.decay_rate(linear_part(law, slowest))
         if rate <= 0.0:
             where = number_text(self.task.drive, speed, "m/s")
@@ -294,8 +297,7 @@ class Trial:
                 held=False,
                 reason=reason,
             )
-        goal = replace(self.tuning.goal, feeds=(speed,))
-        there = Tuning(self.task.scenario, law.name, goal)
-        checks = [check for check, _ in Trial(self.task, there, self.disturbances).checks(law)]
+        there = Trial(replace(self.task, belt_speeds=(abs(speed),) * 2), self.disturbances)
+        checks = [check for check, _ in there.checks(law)]
         failing = [check for check in checks if check.reason is not None]
         return [*failing, max(checks, key=lambda check: check.disturbed_force or 0.0)][0]

@@ -9,10 +9,7 @@ from typing import TypeVar
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.model.control import ControlLaw, LinearFeedback
-from stickslip_ros.model.drive_layout import SPEED
-from stickslip_ros.theory.linear_sampled_loop import LinearSampledLoop
+from stickslip_ros.model.control import ControlLaw
 
 _Law = TypeVar("_Law", bound=ControlLaw)
 _Value = tuple[float, float]
@@ -23,47 +20,6 @@ _VALUED, _REFINED = 60, 4
 """Points of it that are compared with the limits, and those from which the search goes on."""
 _FIRST_STEP, _LAST_STEP, _MOVES = 1.0, 0.03, 40
 """Steps of a refinement, as logarithms, and largest number of them."""
-
-
-class Loops:
-    """The sampled loops of a drive at several feeds."""
-
-    def __init__(self, loops: Sequence[LinearSampledLoop]) -> None:
-        self.all = loops
-        """The loop at each feed."""
-        slopes = [float(loop.jacobian[SPEED, SPEED]) for loop in loops]
-        self.ends = sorted({int(np.argmin(slopes)), int(np.argmax(slopes))})
-        """Places of the loops that decide: without a memory they differ in the slope only."""
-        if loops[0].drive.friction.states:
-            self.ends = list(range(len(loops)))
-        self.deciding = [loops[place].coarsened() for place in self.ends]
-        """Those loops; with a long delay similar ones."""
-
-    def slowest(self, law: ControlLaw) -> LinearSampledLoop:
-        """Return the loop in which a small deviation decays most slowly."""
-        return min(self.all, key=lambda loop: loop.decay_rate(linear_part(law, loop)))
-
-    def decay_rates(self, laws: Sequence[ControlLaw]) -> FloatArray:
-        """Return the smallest decay rate with each law, 1/s; approximate for a long delay."""
-        rates = np.full(len(laws), inf)
-        for loop in self.deciding:
-            forms = (linear_part(law, loop) for law in laws)
-            stacked = LinearFeedback(*map(np.array, zip(*forms, strict=True)))
-            radii = np.abs(np.linalg.eigvals(loop.transition_matrix(stacked))).max(axis=-1)
-            with np.errstate(divide="ignore"):
-                rates = np.minimum(rates, -np.log(radii) * loop.rate)
-        return rates
-
-
-def linear_part(law: ControlLaw, loop: LinearSampledLoop) -> LinearFeedback:
-    """Return the linear part of a law at the rate of a loop.
-
-    Raises InvalidInputError if the law has none.
-    """
-    part = law.linear_part(1.0 / loop.rate)
-    if part is None:
-        raise InvalidInputError(f"control law {law.name}: it has no linear part to tune")
-    return part
 
 
 def fastest(

@@ -48,6 +48,8 @@ class Goal:
     """The same of an impulse, one period of the controller long, N."""
     delay_margin: float
     """Least delay margin, s."""
+    gain_margin: float = 10.0**0.1
+    """Least factor, 2 dB, between the force of the law and an unstable one."""
 
     @classmethod
     def from_scenario(

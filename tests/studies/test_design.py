@@ -16,7 +16,8 @@ from stickslip_ros.measures.cycle_measures import Regime
 from stickslip_ros.model.control import Washout
 from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.studies.case_outcome import Disturbance
-from stickslip_ros.studies.design import Design, Designer, Task, design
+from stickslip_ros.studies.design import Design, Task, design
+from stickslip_ros.studies.design_trial import Trial
 from stickslip_ros.studies.spread import drawn
 from stickslip_ros.theory.linear_sampled_loop import LinearSampledLoop
 from tests.drives import FEED_DRIVE
@@ -116,7 +117,7 @@ def test_gains_beyond_a_limit_are_no_proposal_and_it_is_told_by_how_much() -> No
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("seed", [8, 14])
+@pytest.mark.parametrize("seed", [8, 14, 58])  # of 58 a reserve would cost most of the rate
 def test_a_grid_of_gains_is_not_faster(seed: int) -> None:
     found = compare(seed)
     assert found.decay_rate is not None
@@ -141,11 +142,11 @@ def test_gains_for_a_spread_keep_the_limits_of_all_drives_that_are_searched_for(
     for seed in range(5):
         scenario = task.scenario.changed(drawn(task.scenario, seed, 0.2))
         step = [Disturbance.parse("step", task.scenario)]
-        other = Designer.for_task(Task(scenario, (0.04, 0.04), 480.0), step)
-        assert other.tuning.loops.slowest(found.controller).decay_rate(found.controller) > 0.0
-        assert other.tuning.missed(found.controller) == ()
-        assert all(check.held for check, _ in other.trial.checks(found.controller))
-        missed += [seed] * bool(other.tuning.missed(alone.controller))
+        other = Trial(Task(scenario, (0.04, 0.04), 480.0), step)
+        assert other.loops.slowest(found.controller).decay_rate(found.controller) > 0.0
+        assert other.loops.missed(found.controller) == ()
+        assert all(check.held for check, _ in other.checks(found.controller))
+        missed += [seed] * bool(other.loops.missed(alone.controller))
     assert missed
     assert alone.drawn is None
     assert (found.drawn.held, found.drawn.drives) == (3, 3)
@@ -187,7 +188,7 @@ def test_a_drawn_drive_that_is_not_held_is_counted_and_told(
     assert "the simulated drive is not held at 30 mm/s" in str(found)
     assert found.to_dict()["drawn"]["worst"] == found.design.drawn.worst
     # What grows cannot be simulated until it has settled.
-    weak = Designer.for_task(task(AT_40), []).trial.worst(Washout(11.0, -1.0, 0.0))
+    weak = Trial(task(AT_40), []).worst(Washout(11.0, -1.0, 0.0))
     assert not weak.held
     assert re.match(r"at 40 mm/s a small deviation grows with [\d.]+ 1/s", weak.reason)
     # With drives to search for, one of them says why there is nothing to propose.

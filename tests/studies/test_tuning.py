@@ -7,6 +7,7 @@ import pytest
 
 from stickslip_ros.scenarios.files import Scenario, load_scenario
 from stickslip_ros.studies.case_outcome import Disturbance
+from stickslip_ros.studies.drive_loops import DriveLoops
 from stickslip_ros.studies.tuned_gains import Goal, Tuned
 from stickslip_ros.studies.tuning import Tuning
 from stickslip_ros.theory.linear_sampled_loop import LinearSampledLoop
@@ -25,7 +26,7 @@ def goal(force_limit: float = 600.0) -> Goal:
 
 
 def tune(drive: Scenario, law: str, goal: Goal) -> Tuned:
-    return Tuning(drive, law, goal).best()
+    return Tuning(DriveLoops(drive, law, goal)).best()
 
 
 @pytest.mark.parametrize(
@@ -72,7 +73,7 @@ def test_a_slower_controller_is_tuned_as_at_its_rate() -> None:
         for drive, push in zip(drives, impulse, strict=True)
     ]
     assert goals[0] == goals[1]
-    tunings = [Tuning(drive, "velocity_feedback", goals[0]) for drive in drives]
+    tunings = [DriveLoops(drive, "velocity_feedback", goals[0]) for drive in drives]
     for one, other in zip(*(tuning.plants for tuning in tunings), strict=True):
         assert np.array_equal(one.frequency, other.frequency)
         assert np.array_equal(one.by_control, other.by_control)
