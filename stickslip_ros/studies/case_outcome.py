@@ -9,11 +9,11 @@ import numpy as np
 from stickslip_ros.arrays import FloatArray, rms
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.measures.following import Following, followed
+from stickslip_ros.measures.noise import rises
 from stickslip_ros.motion import Motion
 from stickslip_ros.motion.controller import answer
 from stickslip_ros.quantities import Quantity, number_of, quantities_of
 from stickslip_ros.scenarios.files import Scenario
-from stickslip_ros.studies.holding import hunting, settling_time
 
 KINDS = ("none", "step", "impulse", "sine")
 """Kinds of disturbances."""
@@ -218,3 +218,32 @@ def _positioned(
         hunting_amplitude=amplitude,
         hunting_period=period,
     )
+
+
+def settling_time(distance: FloatArray, allowed: float, start: float, rate: float) -> float | None:
+    """Return the time from `start` on, s, until a distance stays at most `allowed`.
+
+    `distance` is that from the rest, shape (samples,), at `rate` samples per second. None if its
+    last value is larger.
+    """
+    beyond = np.flatnonzero(distance > allowed)
+    if len(beyond) and beyond[-1] == len(distance) - 1:
+        return None
+    last = (int(beyond[-1]) + 1) / rate if len(beyond) else 0.0
+    return max(last - start, 0.0)
+
+
+def hunting(error: FloatArray, least: float, rate: float) -> tuple[float, float | None]:
+    """Return amplitude (m) and mean period (s) of a vibration about the reference.
+
+    `error` is the displacement from the reference, m, shape (samples,), at `rate` samples per
+    second. A swing counts where it passes a third of the amplitude on either side of the middle.
+    The amplitude, half the range, is 0 and the period None if it is not above `least` (m), or if
+    there are not two whole periods.
+    """
+    amplitude = float(np.ptp(error)) / 2.0
+    middle = error - (error.max() + error.min()) / 2.0
+    rows = rises(middle, amplitude / 3.0)
+    if amplitude <= least or len(rows) < 3:
+        return 0.0, None
+    return amplitude, float(rows[-1] - rows[0]) / (len(rows) - 1) / rate

@@ -33,6 +33,7 @@ from stickslip_ros.theory.linear_sampled_loop import (
     LONGEST_DELAY,
     LinearSampledLoop,
     not_linear,
+    settling_time,
     why_no_linear_loop,
 )
 from stickslip_ros.theory.linear_system import LinearSystem, continuous_system, sampled_system
@@ -320,8 +321,9 @@ def _sampled_loop(drive: Drive, law: ControlLaw | None, plant: PlantParameters) 
     if radius is None:
         return _Noted(dict.fromkeys(_SAMPLED_LOOP), lack)
     growing = "a deviation from the equilibrium does not decay" if radius >= 1.0 else None
-    settling_time = _Noted(loop.settling_time(law), growing)
-    values = radius, radius < 1.0, loop.decay_rate(law), settling_time, *_sampled_gains(loop, law)
+    rate = loop.decay_rate(law)
+    settling = _Noted(settling_time(rate), growing)
+    values = radius, radius < 1.0, rate, settling, *_sampled_gains(loop, law)
     return _Noted(dict(zip(_SAMPLED_LOOP, values, strict=True)), _omitted(plant))
 
 

@@ -64,7 +64,7 @@ def feedback_family(
 
 def nearest_to_zero(intervals: list[GainInterval]) -> GainInterval:
     """Return the interval nearest to a gain of zero."""
-    return min(intervals, key=_distance)
+    return min(intervals, key=lambda interval: max(interval.low, -interval.high, 0.0))
 
 
 class GainBoundary:
@@ -218,8 +218,3 @@ def _after(state: int, slide: FloatArray, force: FloatArray) -> Any:
     seen[state] = 1.0
     difference = np.poly(slide - np.outer(force, seen)) - np.poly(slide)
     return difference[1:]
-
-
-def _distance(interval: GainInterval) -> float:
-    """Return how far the interval is from zero."""
-    return max(interval.low, -interval.high, 0.0)

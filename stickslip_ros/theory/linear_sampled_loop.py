@@ -227,21 +227,6 @@ class LinearSampledLoop:
         with np.errstate(divide="ignore"):
             return -np.log(radii) * self.rate
 
-    def settling_time(self, law: ControlLaw) -> float | None:
-        """Return the 1 % settling time of a small deviation.
-
-        Parameters
-        ----------
-        law : ControlLaw
-            Control law in SI units, linear near the equilibrium.
-
-        Returns
-        -------
-        float or None
-            Time in which a deviation decays to a hundredth, s; None if it grows.
-        """
-        return settling_time(self.decay_rate(law))
-
     def stable_linear_gains(self, corner_frequency: float) -> list[GainInterval]:
         """Return all linear gains of eq. 18 with which the loop is stable.
 

@@ -19,7 +19,7 @@ from stickslip_ros.model.signals import step
 from stickslip_ros.motion import Motion
 from stickslip_ros.motion.controller import Controller, answer
 from stickslip_ros.motion.sampled_loop import SampledLoop
-from stickslip_ros.studies.holding import hunting
+from stickslip_ros.studies.case_outcome import hunting
 
 STIFFNESS, DAMPING, VISCOUS = 1e5, np.sqrt(1e5), 0.4
 CURVE = Exponential(1.5, kinetic=1.0, decay_speed=1e-3, viscous=VISCOUS, exponent=2.0)

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from stickslip_ros.studies.holding import hunting, settling_time
+from stickslip_ros.studies.case_outcome import hunting, settling_time
 
 RATE = 1000.0
 TIME = np.arange(5000) / RATE
