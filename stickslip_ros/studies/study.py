@@ -10,19 +10,15 @@ from typing import Any, Generic, NamedTuple, TypeVar
 from typing_extensions import override
 
 from stickslip_ros.errors import InvalidInputError, StickslipError
-from stickslip_ros.measures.cycle_measures import EQUILIBRIUM_SPEED, Measures, Regime, trend_text
-from stickslip_ros.quantities import quantities_of
+from stickslip_ros.measures.cycle_measures import EQUILIBRIUM_SPEED, Regime, trend_text
 from stickslip_ros.scenarios.files import Scenario
-from stickslip_ros.studies.columns import Point
+from stickslip_ros.studies.columns import COLUMNS, Point
 from stickslip_ros.studies.plan import Axis, Continuation, Grid, Plan
 from stickslip_ros.studies.settling import ControlledDrive, MotionState, SettlingOptions, settle
 
 _NUDGE = EQUILIBRIUM_SPEED / 2.0
 """Share of the belt speed by which a slide at rest is pushed before the next point: rounding alone
 would leave an unstable equilibrium very late or never."""
-
-MEASURES = (*quantities_of(Measures),)
-"""Columns of a table that are measures of the motion."""
 
 
 class Piece(NamedTuple):
@@ -148,7 +144,7 @@ class Study(PointStudy[Plan]):
                 reason = "no whole cycle in the measured time"
             case _:
                 pass
-        columns = {name: getattr(measures, name) for name in MEASURES}
+        columns = {name: getattr(measures, name) for name in COLUMNS if hasattr(measures, name)}
         columns |= {"steady": settled.steady, "reason": reason}
         columns["turning_points"] = tuple(settled.turning_points.tolist())
         return Point(index, **columns), end
