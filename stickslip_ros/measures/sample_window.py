@@ -21,7 +21,7 @@ from stickslip_ros.measures.single_cycles import (
     NoisySamples,
     Point,
     cycle_between,
-    fit_reach,
+    reach_beside,
     reversals,
     vertex,
 )
@@ -192,7 +192,7 @@ class WindowMeter:
         least = max(REVERSAL * self.noise, _REVERSAL_SHARE * size)
         for rows in reversals(held.position[first:-1], least):
             high, low = (first + row for row in rows)
-            reach = fit_reach(samples, low, high, self.noise)
+            reach = reach_beside(low, high)
             if low + reach >= len(samples):
                 break  # samples for the fit are missing
             end = vertex(samples, low, reach)

@@ -19,6 +19,7 @@ import numpy as np
 from stickslip_ros.arrays import BoolArray, FloatArray
 from stickslip_ros.measures.cycle_measures import Cycle, CycleMeans, Measures
 from stickslip_ros.measures.noise import FEWEST_SAMPLES, ROUNDING, encoder_step, white_noise
+from stickslip_ros.measures.single_cycles import parabolas
 
 _TAIL, _GROWTH = 2048, 4
 """Number of last samples in which cycles are looked for first, and its growth while they are few.
@@ -441,8 +442,8 @@ def _extremes(
     first, last = max(rows[0] - wide, 0), rows[-1] + wide + 1
     period = float(time[-1] - time[0]) / (len(time) - 1)
     part = position[first:last]
-    smooth, slope, bend = _parabolas(part, narrow)
-    speed = _parabolas(part, wide)[1] / period
+    smooth, slope, bend = parabolas(part, narrow)
+    speed = parabolas(part, wide)[1] / period
     # At a corner, as of a flat top, the rows beside it do not bend so, and there is no vertex.
     bends = np.pad(np.abs(bend), 1, mode="edge")
     least = np.minimum(np.minimum(bends[:-2], bends[2:]), bends[1:-1])
@@ -454,15 +455,6 @@ def _extremes(
         high, low = float(smooth[inside].max()), float(smooth[inside].min())
         amplitudes[:, cycle] = (high - low) / 2.0, np.ptp(speed[inside]) / 2.0, (high + low) / 2.0
     return amplitudes[0], amplitudes[1], amplitudes[2]
-
-
-def _parabolas(course: FloatArray, reach: int) -> list[FloatArray]:
-    """Return value, slope and half of the second derivative, in rows, of a parabola at each row."""
-    lags = np.arange(-reach, reach + 1)
-    powers = np.linalg.pinv(np.vander(lags, 3, increasing=True).astype(float))
-    part = np.pad(course - course[0], reach, mode="edge")
-    value, slope, bend = (np.convolve(part, kernel[::-1], "valid") for kernel in powers)
-    return [value + course[0], slope, bend]
 
 
 def _means(

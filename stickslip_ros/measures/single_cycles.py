@@ -1,11 +1,11 @@
 """Single cycles of positions with noise: reversals, and what is measured between them.
 
 Extremes and velocities are those of parabolas through the samples beside them, by least squares
-(A. Savitzky and M. J. E. Golay, Analytical Chemistry 36, 1964) at times that need not be even.
+(A. Savitzky and M. J. E. Golay, Analytical Chemistry 36, 1964).
 """
 
 from dataclasses import dataclass
-from math import isfinite, nan, pi, sqrt
+from math import copysign, isfinite, nan, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -59,15 +59,21 @@ def reversals(position: FloatArray, least: float) -> list[tuple[int, int]]:
         course = -course
 
 
-def fit_reach(samples: NoisySamples, low: int, high: int, noise: float) -> int:
-    """Return the number of samples on each side of an extreme to which a parabola is fitted.
+def parabolas(course: FloatArray, reach: int) -> list[FloatArray]:
+    """Return value, slope and half of the second derivative, in rows, of a parabola at each row.
 
-    The rows are those of a lowest and of a highest point. The reach grows with the fifth root of
-    the noise, where the curve's departure from a parabola and the noise err alike.
+    It is that of least squares through the rows up to `reach` beside it.
     """
-    size = abs(float(samples.position[high] - samples.position[low]))
-    share = np.clip(1.2 * (2.0 * noise / size) ** 0.2, 0.1, 0.6) if size > 0.0 else 0.1
-    return max(int(share * abs(high - low) / pi), 2)
+    lags = np.arange(-reach, reach + 1)
+    powers = np.linalg.pinv(np.vander(lags, 3, increasing=True).astype(float))
+    part = np.pad(course - course[0], reach, mode="edge")
+    value, slope, bend = (np.convolve(part, kernel[::-1], "valid") for kernel in powers)
+    return [value + course[0], slope, bend]
+
+
+def reach_beside(low: int, high: int) -> int:
+    """Return the number of rows on each side of an extreme in a parabola; `low` to `high` apart."""
+    return max(abs(high - low) // 10, 2)
 
 
 def vertex(samples: NoisySamples, at: int, reach: int) -> Point:
@@ -76,20 +82,14 @@ def vertex(samples: NoisySamples, at: int, reach: int) -> Point:
     It is the vertex of the parabola through the samples up to `reach` rows beside it. Where there
     are too few samples, or no bend, it is the sample.
     """
-    rows = slice(max(at - reach, 0), at + reach + 1)
-    time, position = samples.time[rows], samples.position[rows]
-    centre, scale = float(samples.time[at]), float(time[-1] - time[0])
-    if len(time) < 5 or scale <= 0.0:
-        return Point(centre, float(samples.position[at]))
-    u = (time - centre) / scale
-    base = float(position[0])
-    powers = np.array([u * u, u, np.ones(len(u))]).T  # np.polyfit takes three times as long
-    bend, slope, level = np.linalg.lstsq(powers, position - base, rcond=None)[0].tolist()
-    if bend == 0.0:
-        return Point(centre, float(samples.position[at]))
-    at_vertex = float(np.clip(-slope / (2.0 * bend), u[0], u[-1]))
-    height = float(level + at_vertex * (slope + at_vertex * bend))
-    return Point(centre + at_vertex * scale, base + height)
+    reach = min(reach, at, len(samples) - 1 - at)
+    if reach < 2:
+        return Point(float(samples.time[at]), float(samples.position[at]))
+    rows = np.arange(at - reach, at + reach + 1)
+    value, slope, bend = (float(each[reach]) for each in parabolas(samples.position[rows], reach))
+    lag = float(np.clip(-slope / (2.0 * bend), -reach, reach)) if bend else 0.0
+    time = float(np.interp(at + lag, rows, samples.time[rows]))
+    return Point(time, value + lag * (slope + lag * bend))
 
 
 def cycle_between(
@@ -105,34 +105,25 @@ def cycle_between(
         return None
     first, last = samples.row(start.time), samples.row(end.time)
     lowest = (start.position + end.position) / 2.0
-    reach = fit_reach(samples, first, high, noise)
+    reach = reach_beside(first, high)
     highest = vertex(samples, high, reach).position
     around = samples[max(first - reach, 0) : last + reach]
-    slowest, fastest, stick_time = _velocities(around, reach, noise)
+    reach = max(min(reach, (len(around) - 3) // 2), 1)
+    inner = slice(reach, len(around) - reach)
+    step = float(around.time[-1] - around.time[0]) / (len(around) - 1)
+    slopes = parabolas(around.position, reach)[1][inner] / step
+    belt = float(np.median(around.belt))
+    error = noise / (step * sqrt(reach * (reach + 1) * (2 * reach + 1) / 3.0))
+    direction = copysign(1.0, belt)
+    stick_time = _stick_time(around.time[inner], direction * slopes, abs(belt), error)
     return Cycle(
         amplitude=(highest - lowest) / 2.0,
-        velocity_amplitude=(fastest - slowest) / 2.0,
+        velocity_amplitude=float(np.ptp(slopes)) / 2.0,
         midpoint=(highest + lowest) / 2.0,
         period=period,
         frequency=1.0 / period,
         stick_fraction=stick_time / period if stick_time > LEAST_STICK * period else 0.0,
     )
-
-
-def _velocities(samples: NoisySamples, reach: int, noise: float) -> tuple[float, float, float]:
-    """Return lowest and highest velocity, m/s, of one cycle, and its stick time, s."""
-    time, position = samples.time, samples.position
-    reach = max(min(reach, (len(time) - 3) // 2), 1)
-    # The slope of the parabola through the samples within reach.
-    lags = np.arange(-reach, reach + 1)
-    step = float(time[-1] - time[0]) / (len(time) - 1)
-    slopes = np.convolve(position, -lags / (lags @ lags), "valid") / step
-    at = time[reach : len(time) - reach]
-    belt = float(np.median(samples.belt))
-    sign = -1.0 if belt < 0.0 else 1.0
-    error = noise / (step * sqrt(lags @ lags))
-    stick_time = _stick_time(at, sign * slopes, abs(belt), error)
-    return float(slopes.min()), float(slopes.max()), stick_time
 
 
 def _stick_time(time: FloatArray, velocity: FloatArray, belt_speed: float, error: float) -> float:
