@@ -44,6 +44,8 @@ _LEAST_STEPS, _LEAST_NOISES, _LEAST_SHARE = 3.5, 5.0, 0.1
 """Travel between two rests, in steps, standard deviations and large slips, that is a slip."""
 _MAIN_SHARE = 0.35
 """Travel of a slip, in large ones, from which it is a main slip, from which a cycle may begin."""
+_CUT = 0.25
+"""Part of a slip within which positions that begin after its release look like a rest."""
 _LONG_GAP = 3.0
 """Time between two releases, in periods, after which cycles begin again."""
 _FEWEST_CYCLES = 3
@@ -210,10 +212,14 @@ def _measured(
     speed = abs(belt_velocity) or _mean_speed(time, relative, max(step, 6.0 * noise))
     course = _moves_between_rests(time, relative, speed, noise, step)
     starts = _cycle_starts(time, course)[-most_cycles - 1 :]
-    if len(starts) <= _FEWEST_CYCLES:
+    if not starts:
         return None
     near = max(_EDGE_STEPS * step, _EDGE_NOISES * noise)
     used = [_slip(time, relative, move, near) for move in course[starts[0] : starts[-1] + 1]]
+    if used[0].release - float(time[0]) < _CUT * used[0].duration:  # they begin after it
+        used, starts = used[starts[1] - starts[0] :], starts[1:]
+    if len(starts) <= _FEWEST_CYCLES:
+        return None
     release = np.array([used[start - starts[0]].release for start in starts])
     if not np.all(np.diff(release) > 0.0):
         return None  # times that repeat

@@ -5,6 +5,7 @@ import pytest
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.measures.feed import mean_feed, relative_to_feed
+from stickslip_ros.measures.segmentation import stick_slip
 from stickslip_ros.samples import SampleColumns
 
 TIME = 1e-3 * np.arange(8000, dtype=np.float64)
@@ -57,3 +58,9 @@ def test_samples_relative_to_the_feed_stick_to_the_guide() -> None:
     assert np.ptp(moved.position) == pytest.approx(5.2e-3, rel=1e-3)
     on_belt = SampleColumns(stamp, position, velocity, unknown, unknown, rest + 0.02)
     assert relative_to_feed(on_belt) == (on_belt, 0.0)
+
+
+def test_a_release_just_before_the_first_position_begins_no_cycle() -> None:
+    found = stick_slip(TIME, stairs(TIME + 0.335), 0.0, 20, 0.0)
+    assert found is not None
+    assert found.cycle.period == pytest.approx(PERIOD, rel=1e-4)
