@@ -235,7 +235,9 @@ def _measured(
         position = position - feed * (time - time[0])
     width = float(np.median([slip.duration for slip in used]))
     width = max(width * (len(time) - 1) / float(time[-1] - time[0]), 1.0)
-    means = _means(time, position, width, release, shares)
+    extremes = _extremes(time, position, np.searchsorted(time, release).tolist(), width)
+    columns = [*extremes, np.diff(release), 1.0 / np.diff(release), shares]
+    means = CycleMeans.over([Cycle(*measures) for measures in np.transpose(columns).tolist()])
     errors = _errors(means, used, width, max(step, noise))
     creep, creep_error = _creep(time, relative, used, noise, step)
     if creep_error == inf:
@@ -436,10 +438,8 @@ def _cycle_starts(time: FloatArray, course: list[_Move]) -> list[int]:
     return next((part.tolist() for part in parts[::-1] if len(part) > _FEWEST_CYCLES), [])
 
 
-def _extremes(
-    time: FloatArray, position: FloatArray, rows: list[int], width: float
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return amplitude, velocity amplitude and midpoint of each cycle between two of the rows.
+def _extremes(time: FloatArray, position: FloatArray, rows: list[int], width: float) -> FloatArray:
+    """Return amplitudes, velocity amplitudes and midpoints of the cycles from row to row.
 
     Of parabolas through the samples around each (Savitzky and Golay, Analytical Chemistry 36,
     1964): displacements are extreme at a vertex, within shares of the `width` of a slip, in rows.
@@ -455,28 +455,11 @@ def _extremes(
     least = np.minimum(np.minimum(bends[:-2], bends[2:]), bends[1:-1])
     with np.errstate(divide="ignore", invalid="ignore"):
         smooth -= np.where(np.abs(slope) < 2.0 * least, slope**2 / (4.0 * bend), 0.0)
-    amplitudes = np.empty((3, len(rows) - 1))
-    for cycle, (start, end) in enumerate(pairwise(rows)):
-        inside = slice(start - first, end - first + 1)
-        high, low = float(smooth[inside].max()), float(smooth[inside].min())
-        amplitudes[:, cycle] = (high - low) / 2.0, np.ptp(speed[inside]) / 2.0, (high + low) / 2.0
-    return amplitudes[0], amplitudes[1], amplitudes[2]
-
-
-def _means(
-    time: FloatArray,
-    position: FloatArray,
-    width: float,
-    release: FloatArray,
-    shares: FloatArray,
-) -> CycleMeans:
-    """Return the means over the cycles from release to release that rest for these shares.
-
-    `width` is the number of rows in a slip.
-    """
-    extremes = _extremes(time, position, np.searchsorted(time, release).tolist(), width)
-    columns = *extremes, np.diff(release), 1.0 / np.diff(release), shares
-    return CycleMeans.over([Cycle(*measures) for measures in np.transpose(columns).tolist()])
+    cycles = [slice(start - first, end - first + 1) for start, end in pairwise(rows)]
+    high, low = (
+        np.array([extreme(smooth[cycle]) for cycle in cycles]) for extreme in (np.max, np.min)
+    )
+    return np.array([high - low, [np.ptp(speed[cycle]) for cycle in cycles], high + low]) / 2.0
 
 
 def _creep(
