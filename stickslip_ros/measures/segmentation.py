@@ -227,10 +227,7 @@ def _measured(
     period = float(release[-1] - release[0]) / (len(release) - 1)
     durations = np.add.reduceat([slip.duration for slip in used], np.array(starts[:-1]) - starts[0])
     shares = 1.0 - durations / np.diff(release)
-    travel = float(np.sum([slip.travel for slip in used]))
-    feed = travel / float(release[-1] - release[0])
-    if abs(travel) < _NO_FEED * float(np.sum([abs(slip.travel) for slip in used])):
-        feed = 0.0
+    feed = _advance(used) / float(release[-1] - release[0])
     if not belt_velocity:
         position = position - feed * (time - time[0])
     width = float(np.median([slip.duration for slip in used]))
@@ -258,6 +255,13 @@ def _measured(
         creep_error=creep_error / unit,
         slip_samples=width,
     )
+
+
+def _advance(slips: list[_Slip]) -> float:
+    """Return the travel of slips on the whole, m; 0 where they only go to and fro."""
+    travel = np.array([slip.travel for slip in slips])
+    advance = float(np.sum(travel))
+    return advance if abs(advance) >= _NO_FEED * float(np.sum(np.abs(travel))) else 0.0
 
 
 def _errors(means: CycleMeans, slips: list[_Slip], width: float, resolution: float) -> Cycle:
