@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.measures.following import followed
+from stickslip_ros.measures.following import Followed, followed
 
 RADIUS, LAG = 0.05, 40e-6
 OMEGA = 2.0 * pi * 0.25
@@ -15,6 +15,12 @@ CIRCLE = RADIUS * np.sin(OMEGA * TIME)
 SPIKE, DECAY = 15e-6, 0.02
 WIDTH = 2.4464 * DECAY
 """Between the roots of x exp(1 - x) = 1/2, 0.2320 and 2.6784."""
+
+
+def told(time: FloatArray, reference: FloatArray, position: FloatArray) -> Followed:
+    found = followed(time, reference, position)
+    assert found is not None
+    return found
 
 
 def with_play() -> FloatArray:
@@ -35,8 +41,7 @@ def with_spikes(time: FloatArray, lag: float, sign: float = 1.0) -> FloatArray:
 
 
 def test_a_play_stays_behind_and_rests_until_the_reference_is_through_it() -> None:
-    found = followed(TIME, CIRCLE, with_play())
-    assert found is not None
+    found = told(TIME, CIRCLE, with_play())
     assert found.notes == []
     values = found.values
     assert values.peak_following_error == pytest.approx(LAG)
@@ -56,8 +61,7 @@ def test_a_spike_is_told_beside_a_lag_and_by_an_encoder(
     position = with_spikes(TIME, lag, sign)
     position += noise * np.random.default_rng(7).standard_normal(len(TIME))
     position = np.round(position / step) * step if step else position
-    found = followed(TIME, CIRCLE, position)
-    assert found is not None
+    found = told(TIME, CIRCLE, position)
     assert found.values.reversal_height == pytest.approx(SPIKE, rel=0.05)
     assert found.values.reversal_duration == pytest.approx(WIDTH, rel=0.05)
     assert found.values.reversal_rest is None
@@ -69,8 +73,7 @@ def test_a_spike_is_told_beside_a_lag_and_by_an_encoder(
 
 def test_a_held_reference_is_the_line_between_its_changes() -> None:
     held = CIRCLE[np.arange(len(TIME)) // 5 * 5]
-    found = followed(TIME, held, with_spikes(TIME, 0.0))
-    assert found is not None
+    found = told(TIME, held, with_spikes(TIME, 0.0))
     assert found.values.reversal_height == pytest.approx(SPIKE, rel=0.3)
 
 
@@ -88,8 +91,7 @@ def test_a_held_reference_is_the_line_between_its_changes() -> None:
 def test_what_cannot_be_told_is_unknown(
     reference: FloatArray, position: FloatArray, reversals: int, note: str
 ) -> None:
-    found = followed(TIME, reference, position)
-    assert found is not None
+    found = told(TIME, reference, position)
     values = found.values
     assert (values.reversals, values.reversal_height, values.reversal_rest) == (
         reversals,
@@ -102,8 +104,7 @@ def test_what_cannot_be_told_is_unknown(
 
 def test_a_spike_between_two_samples_is_unknown() -> None:
     slow = TIME[::40]
-    found = followed(slow, RADIUS * np.sin(OMEGA * slow), with_spikes(slow, 0.0))
-    assert found is not None
+    found = told(slow, RADIUS * np.sin(OMEGA * slow), with_spikes(slow, 0.0))
     assert found.values.reversal_height is None
     assert "shorter than three samples" in found.notes[0]
     assert followed(TIME, np.full(len(TIME), np.nan), CIRCLE) is None
@@ -112,8 +113,7 @@ def test_a_spike_between_two_samples_is_unknown() -> None:
 def test_the_start_and_a_wrong_scale_are_no_errors_at_reversals() -> None:
     position = 1.002 * CIRCLE + with_spikes(TIME, 0.0) - CIRCLE
     late = np.exp(-TIME / 0.1)
-    found = followed(TIME, CIRCLE, position - 1e-2 * late)
-    assert found is not None
+    found = told(TIME, CIRCLE, position - 1e-2 * late)
     assert found.values.reversal_height == pytest.approx(SPIKE, rel=0.02)
     peak = 2e-3 * RADIUS + SPIKE
     assert found.values.peak_following_error == pytest.approx(peak, rel=0.15)
@@ -122,8 +122,7 @@ def test_the_start_and_a_wrong_scale_are_no_errors_at_reversals() -> None:
 @pytest.mark.filterwarnings("error")
 def test_a_fast_way_to_the_start_does_not_hide_the_lag() -> None:
     way = -0.2 * np.clip(1.0 - TIME / 0.1, 0.0, 1.0)
-    found = followed(TIME, CIRCLE + way, with_spikes(TIME, 1e-3) + way)
-    assert found is not None
+    found = told(TIME, CIRCLE + way, with_spikes(TIME, 1e-3) + way)
     assert found.values.reversal_height == pytest.approx(SPIKE, rel=0.02)
 
 
@@ -133,8 +132,7 @@ def test_at_a_single_speed_a_lag_is_not_told_as_an_error_at_reversals(
 ) -> None:
     triangle = RADIUS * np.arcsin(np.sin(OMEGA * TIME))
     behind = np.interp(TIME - lag / (RADIUS * OMEGA), TIME, triangle)
-    found = followed(TIME, triangle, behind - CIRCLE + with_spikes(TIME, 0.0))
-    assert found is not None
+    found = told(TIME, triangle, behind - CIRCLE + with_spikes(TIME, 0.0))
     assert found.values.peak_following_error == pytest.approx(max(lag, SPIKE), rel=0.1)
     assert (found.values.reversal_height is not None) == is_known
     if is_known:
@@ -147,7 +145,6 @@ def test_the_standard_error_is_that_of_the_mean_over_reversals() -> None:
     time = TIME[TIME < 6.5]  # reversals at 1, 3 and 5 s
     reference, whole = RADIUS * np.sin(OMEGA * time), with_spikes(time, 0.0)
     error = (reference - whole) * np.select([time < 2.0, time < 4.0], [1.0, 2.0], 3.0)
-    found = followed(time, reference, reference - error)
-    assert found is not None
+    found = told(time, reference, reference - error)
     assert found.values.reversal_height == pytest.approx(2.0 * SPIKE, rel=0.02)
     assert found.values.reversal_height_error == pytest.approx(SPIKE / 3.0**0.5, rel=0.05)

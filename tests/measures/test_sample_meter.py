@@ -11,13 +11,13 @@ from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.measures.cycle_measures import Regime
 from stickslip_ros.measures.run_meter import RunMeter
 from stickslip_ros.measures.run_report import report_of
-from stickslip_ros.measures.sample_assumptions import EXACT, UNKNOWN, SampleAssumptions, reading_of
+from stickslip_ros.measures.sample_assumptions import EXACT, SampleAssumptions, reading_of
 from stickslip_ros.measures.sample_meter import SampleMeter
 from stickslip_ros.motion.motion import Motion
 from stickslip_ros.samples import SampleColumns
 from tests.drives import LIMIT_CYCLES, PAPER
 from tests.examples import examples
-from tests.measures.records import columns, fed, feed, milliseconds
+from tests.measures.records import columns, fed, feed
 
 SECOND = 10**9
 
@@ -98,20 +98,40 @@ def test_what_is_lost_is_counted_exactly(rate: int, lost: set[int], starts: list
     assert meter.lost_samples == len(lost)
 
 
-def test_a_loss_at_the_start_is_counted_once_the_period_is_known() -> None:
-    meter = fed(still(stamps(1000, 10))[np.array([0, 2])])
-    meter.feed(still(stamps(1000, 10))[np.array([3, 4, 5])])
-    assert meter.lost_samples == 1
+def pause(seconds: float, rate: int = 1000, before: int = 1000) -> list[npt.NDArray[np.int64]]:
+    """Return the stamps of two parts of a run at two rates, with a pause between."""
+    first = stamps(before, 500)
+    return [first, stamps(rate, 500, start=int(first[-1]) + round(seconds * SECOND))]
 
 
-def test_the_time_after_a_single_sample_is_no_loss_unless_it_is_on_the_grid() -> None:
-    samples = still(np.array([0, *(4_162_345_678 + 1_000_000 * np.arange(100))]))
-    assert fed(samples).lost_samples == 0
-    meter = fed(samples[:1])
-    for row in range(1, 101):
-        meter.feed(samples[row : row + 1])
-    assert meter.lost_samples == 0
-    assert fed(still(stamps(1000, 200))[np.array([0, *range(100, 200)])]).lost_samples == 99
+SLOW = stamps(100, 100)
+RISES = stamps(1000, 1100, start=int(SLOW[-1]) + 1_000_000)
+LATE = 4_162_345_678 + 1_000_000 * np.arange(100)
+
+
+@pytest.mark.parametrize(
+    ("blocks", "lost"),
+    [
+        ([stamps(1000, 10)[[0, 2]], stamps(1000, 10)[3:6]], 1),
+        ([np.append(0, LATE)], 0),
+        ([np.zeros(1, np.int64), *LATE[:, np.newaxis]], 0),
+        ([np.append(stamps(1000, 1), stamps(1000, 200)[100:])], 99),
+        ([np.concatenate([SLOW, RISES[:1000]]), RISES[1005:]], 5),
+        ([np.concatenate(pause(1.2345678, 1000, 100))], 0),
+        (pause(1.2345678, 100, 1000), 0),
+        (pause(1.2345678, 150, 100), 0),
+        *((pause(1e-3 + gap), 0) for gap in (1.2345678, 60.00004, 700.0005, 86400.0003)),
+    ],
+)
+def test_what_is_lost_is_what_is_missing_on_the_grid(
+    blocks: list[npt.NDArray[np.int64]], lost: int
+) -> None:
+    """A pause in real time is no whole number of periods, and no loss."""
+    meter = SampleMeter(window=20)
+    for block in blocks:
+        meter.feed(still(block))
+    assert meter.samples == sum(map(len, blocks))
+    assert meter.lost_samples == lost
 
 
 def test_measures_bridge_what_was_lost() -> None:
@@ -138,34 +158,6 @@ def test_no_cycle_spans_a_long_gap(late: float, lost: int) -> None:
     assert [cycle.period for cycle in cycles] == pytest.approx(
         [7.06772953] * len(cycles), rel=1e-3 if late else 1e-6
     )
-
-
-@pytest.mark.parametrize("gap", [1.2345678, 60.00004, 700.0005, 86400.0003])
-def test_a_new_segment_is_no_loss(gap: float) -> None:
-    """The gap is no whole number of periods of 1 ms, as after a pause in real time."""
-    first = still(stamps(1000, 5000))
-    meter = fed(first)
-    meter.feed(later(first, 4_999_000_000 + round(gap * SECOND)))
-    assert meter.samples == 10_000
-    assert meter.lost_samples == 0
-    assert meter.duration == pytest.approx(2 * 4.999, rel=1e-15)
-
-
-@pytest.mark.parametrize(("rates", "blocks"), [((100, 1000), 1), ((1000, 100), 2), ((100, 150), 1)])
-def test_a_new_segment_may_have_another_rate(rates: tuple[int, int], blocks: int) -> None:
-    first = still(stamps(rates[0], 100))
-    second = still(stamps(rates[1], 100, start=int(first.stamp[-1]) + 1_234_567_800))
-    meter = fed(first.followed_by(second), starts=[100] if blocks == 2 else [])
-    assert meter.samples == 200
-    assert meter.lost_samples == 0
-
-
-def test_a_rate_that_rises_without_a_gap_is_found() -> None:
-    slow = stamps(100, 100)
-    meter = fed(still(np.append(slow, stamps(1000, 1000, start=int(slow[-1]) + 1_000_000))))
-    assert meter.lost_samples == 0
-    meter.feed(still(stamps(1000, 100, start=int(slow[-1]) + 1_006_000_000)))
-    assert meter.lost_samples == 5
 
 
 @pytest.mark.parametrize("blocks", [1, 2])
@@ -248,19 +240,6 @@ def test_even_and_jittered_stamps_are_measured(latest: float, seed: int, starts:
     assert in_blocks.samples == whole.samples
     assert in_blocks.lost_samples == whole.lost_samples
     assert in_blocks.duration == whole.duration
-
-
-def test_states_that_were_really_taken_at_jittered_stamps_are_measured() -> None:
-    samples = read_late(still(stamps(100, 7001)), 0.5)
-    time = samples.stamp * 1e-9
-    samples = replace(samples, position=np.sin(time), velocity=np.cos(time))
-    meter = fed(samples)
-    measures = meter.measures()
-    assert meter.lost_samples == 0
-    assert measures.cycles == 10
-    assert measures.amplitude == pytest.approx(1.0, rel=1e-4)
-    assert measures.velocity_amplitude == pytest.approx(1.0, rel=1e-4)
-    assert measures.period == pytest.approx(2.0 * np.pi, rel=1e-6)
 
 
 def test_a_short_gap_off_the_grid_is_bridged() -> None:
@@ -384,47 +363,7 @@ def test_a_plant_that_is_restarted_nine_times_is_measured() -> None:
     assert not meter.mixed
 
 
-def noisy(samples: SampleColumns, error: float) -> SampleColumns:
-    """With velocities that are wrong by `error` at most."""
-    errors = np.random.default_rng(1).uniform(-error, error, len(samples))
-    return replace(samples, velocity=samples.velocity + errors)
-
-
-@examples(quick=10, thorough=100)
-@given(st.lists(st.integers(1, 7000), max_size=5).map(sorted))
-def test_noisy_samples_stick_near_the_velocity_of_the_belt(starts: list[int]) -> None:
-    """However they are cut into blocks."""
-    samples = noisy(limit_cycle(), 3e-4)
-    assert fed(samples).measures().regime is Regime.PURE_SLIP
-    near = SampleAssumptions(1e-3)
-    measures = fed(samples, near, starts).measures()
-    (expected,) = (cycle for cycle in LIMIT_CYCLES if cycle.belt_speed == 0.2)
-    assert measures.cycles == 9
-    assert measures.regime is Regime.STICK_SLIP
-    assert measures.amplitude == pytest.approx(expected.amplitude, rel=1e-4)
-    assert measures.period == pytest.approx(expected.period, rel=1e-3)
-    # The slide leaves the belt slowly and is near its velocity for some time.
-    stick_fraction = fed(limit_cycle(), near).measures().stick_fraction
-    assert expected.stick_fraction < stick_fraction < expected.stick_fraction + 0.02
-    assert measures.stick_fraction == pytest.approx(stick_fraction, abs=1e-3)
-
-
 @pytest.mark.parametrize("stick_speed", [-1e-9, np.inf, np.nan])
 def test_a_stick_speed_that_is_none_is_refused(stick_speed: float) -> None:
     with pytest.raises(InvalidInputError, match=r"stick_speed = .* must be finite"):
         SampleMeter(20, reading=SampleAssumptions(stick_speed))
-
-
-def test_exact_samples_of_a_slide_that_sticks_are_no_steps_of_an_encoder() -> None:
-    """All positions of the first look are as far apart: the slide moves with the belt."""
-    stick, slip, amplitude = 0.4, 0.2, 2e-3
-    time = 1e-3 * np.arange(3000)
-    phase = (time + 0.1) % (stick + slip)
-    sticks = phase < stick
-    turned = np.pi * (phase - stick) / slip
-    position = np.where(sticks, 0.01 * (phase - 0.2), amplitude * np.cos(turned))
-    velocity = np.where(sticks, 0.01, -amplitude * np.pi / slip * np.sin(turned))
-    meter = RunMeter(20, reading=UNKNOWN)
-    meter.motion.feed(columns(milliseconds(3000), position, velocity, 0.01))
-    assert not meter.motion.noisy
-    assert meter.motion.measures().stick_fraction == pytest.approx(stick / (stick + slip), abs=2e-3)
