@@ -5,6 +5,7 @@ Extremes and velocities are those of parabolas through the samples beside them, 
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 from math import copysign, isfinite, nan, sqrt
 from typing import NamedTuple
 
@@ -59,15 +60,20 @@ def reversals(position: FloatArray, least: float) -> list[tuple[int, int]]:
         course = -course
 
 
+@lru_cache(64)
+def _least_squares(reach: int) -> FloatArray:
+    """Return the rows that give value, slope and half of the bend at the middle of a parabola."""
+    lags = np.arange(-reach, reach + 1.0)
+    return np.linalg.pinv(np.vander(lags, 3, increasing=True))
+
+
 def parabolas(course: FloatArray, reach: int) -> list[FloatArray]:
     """Return value, slope and half of the second derivative, in rows, of a parabola at each row.
 
     It is that of least squares through the rows up to `reach` beside it.
     """
-    lags = np.arange(-reach, reach + 1)
-    powers = np.linalg.pinv(np.vander(lags, 3, increasing=True).astype(float))
     part = np.pad(course - course[0], reach, mode="edge")
-    value, slope, bend = (np.convolve(part, kernel[::-1], "valid") for kernel in powers)
+    value, slope, bend = (np.convolve(part, row[::-1], "valid") for row in _least_squares(reach))
     return [value + course[0], slope, bend]
 
 
@@ -85,11 +91,12 @@ def vertex(samples: NoisySamples, at: int, reach: int) -> Point:
     reach = min(reach, at, len(samples) - 1 - at)
     if reach < 2:
         return Point(float(samples.time[at]), float(samples.position[at]))
-    rows = np.arange(at - reach, at + reach + 1)
-    value, slope, bend = (float(each[reach]) for each in parabolas(samples.position[rows], reach))
+    rows = slice(at - reach, at + reach + 1)
+    base = float(samples.position[at])
+    value, slope, bend = (_least_squares(reach) @ (samples.position[rows] - base)).tolist()
     lag = float(np.clip(-slope / (2.0 * bend), -reach, reach)) if bend else 0.0
-    time = float(np.interp(at + lag, rows, samples.time[rows]))
-    return Point(time, value + lag * (slope + lag * bend))
+    time = float(np.interp(lag, np.arange(-reach, reach + 1), samples.time[rows]))
+    return Point(time, base + value + lag * (slope + lag * bend))
 
 
 def cycle_between(
@@ -111,7 +118,8 @@ def cycle_between(
     reach = max(min(reach, (len(around) - 3) // 2), 1)
     inner = slice(reach, len(around) - reach)
     step = float(around.time[-1] - around.time[0]) / (len(around) - 1)
-    slopes = parabolas(around.position, reach)[1][inner] / step
+    kernel = _least_squares(reach)[1, ::-1]
+    slopes = np.convolve(around.position, kernel, "valid") / step
     belt = float(np.median(around.belt))
     error = noise / (step * sqrt(reach * (reach + 1) * (2 * reach + 1) / 3.0))
     direction = copysign(1.0, belt)
