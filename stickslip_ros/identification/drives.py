@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from itertools import chain
-from math import sqrt
+from math import inf, sqrt
 
 from stickslip_ros.identification.choice import AUTO
 from stickslip_ros.identification.identified_law import IdentifiedLaw, label_of
@@ -57,15 +57,15 @@ class DriveTask:
         def compete(competitors: Sequence[IdentifiedLaw], like: Refinement | None = None) -> None:
             """Search laws one by one, then extend what was found of them."""
             near: list[Sequence[Refinement]] = []
-            for competitor in competitors:
+            for competitor in search.by_regression(competitors):
                 self._limit.begin_part(_LAW_TIME if len(competitors) > 1 else 1.0)
                 name = label_of(competitor)
                 if (models or near) and self._limit.is_over:
                     self.left.append(name)
                     continue
                 progress(name)
-                thorough = not any(map(is_white, chain(*near)))
-                near.append(search.searched(competitor, thorough=thorough, like=like))
+                noise = min(map(loss_of, filter(is_white, chain(*near))), default=inf)
+                near.append(search.searched(competitor, noise=noise, like=like))
             self._limit.begin_part(1.0)
             for fits in sorted(near, key=lambda fits: min(map(loss_of, fits))):
                 least = min(map(loss_of, chain(models, *near)))

@@ -40,8 +40,8 @@ _NEAR_SHARE = 1e-3
 _SHAPES = (0.1, 0.3, 0.8)
 """Shapes from which the search starts, besides that of the regression: shares of the speeds."""
 _GIVEN_UP_LOSS_RATIO = 100.0
-"""A law whose squared error is larger by this factor is given up: than LuGre's after the first
-steps, or than that of the best law so far before constants are added that the records ask for."""
+"""A law whose squared error is larger by this factor is given up: than noise, or than LuGre's after
+the first steps, or than the best law's before constants are added that the records ask for."""
 OUT_OF_TIME = "the time was over before it was fitted to the end"
 _OPTIONAL_GAIN, _OPTIONAL_ERRORS = 0.05, 4.0
 """Share of the squared error, and standard errors, for which one more constant is searched."""
@@ -101,22 +101,31 @@ class LawSearch:
         longest = max(record.duration for record in self.records) / _LONG_SEGMENT
         return max(min(natural, longest), shortest)
 
+    def by_regression(self, laws: Sequence[IdentifiedLaw]) -> Sequence[IdentifiedLaw]:
+        """Return laws in the order of the errors of their regressions, the best one first."""
+        return sorted(laws, key=lambda law: rms(self._regression(law.one_way).residual))
+
     def searched(
-        self, law: IdentifiedLaw, *, thorough: bool = True, like: Refinement | None = None
+        self, law: IdentifiedLaw, *, noise: float = inf, like: Refinement | None = None
     ) -> Sequence[Refinement]:
-        """Return the best fits to short segments, from several starts, or from a LuGre model."""
+        """Return the best fits to short segments, from several starts, or from a LuGre model.
+
+        `noise` is the squared error of a law whose errors are noise: one that is much worse after
+        the first steps is not searched further.
+        """
         if like is not None:
             # The static friction of Dahl's law is the kinetic one.
             values = {**like.values, "static": like.values["kinetic"]}
             return self._nearest(law, [values], _GIVEN_UP_LOSS_RATIO * like.loss)
         fastest = float(self.rows.speeds[-1])
-        shapes = [share * fastest for share in _SHAPES] if law.one_way.shaped and thorough else []
+        thorough = law.one_way.shaped and noise == inf
+        shapes = [share * fastest for share in _SHAPES] if thorough else []
         starts = [
             start
             for shape in (None, *shapes)
             for start in self._starts(law, self._regression(law.one_way, shape), fastest)
         ]
-        return self._nearest(law, starts)
+        return self._nearest(law, starts, _GIVEN_UP_LOSS_RATIO * noise)
 
     def extended(self, near: Sequence[Refinement], least: float) -> Refinement:
         """Return the best fit of a law with the constants that the records ask for.

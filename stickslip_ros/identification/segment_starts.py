@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 
@@ -78,8 +78,7 @@ class Errors:
     def has_outliers(self) -> bool:
         """Whether much of the error is that of a few segments: their starts may be wrong."""
         losses = self.losses
-        worse = losses > _OUTLIER_LOSS_RATIO * np.median(losses)
-        return float(losses[worse].sum()) > _OUTLIER_SHARE * float(losses.sum())
+        return float(losses[self._doubted].sum()) > _OUTLIER_SHARE * float(losses.sum())
 
     def without_starts(self, columns: FloatArray) -> FloatArray:
         """Return the part of columns, shape (rows, columns), that no change of starts explains."""
@@ -103,13 +102,15 @@ class Errors:
         The start of a segment has no part in the others: each takes steps of its own length.
         """
         settled, share = self, np.ones(len(self.starts))
+        least = tolerance / len(self.starts)
         for _ in range(_START_STEPS):
             left = settled.without_starts(settled.residual[:, None])[:, 0]
             gains = settled._sums(settled.residual) - settled._sums(left)
-            if float(np.sum(gains * (share >= _SHORTEST_STEP))) <= tolerance * settled.loss:
+            gain = (gains > least * settled.loss) & (share >= _SHORTEST_STEP)
+            if not gain.any():
                 break
-            other = settled.moved(settled.starts - share[:, None] * settled.steps(settled.residual))
-            settled, better = settled._better(other)
+            starts = settled.starts - share[:, None] * settled.steps(settled.residual)
+            settled, better = settled._better(settled._part(starts, gain), gain)
             share = np.where(better, np.minimum(2.0 * share, 1.0), 0.25 * share)
         return settled
 
@@ -124,23 +125,42 @@ class Errors:
         """
         if not self.has_outliers:
             return self
-        restarted = self
+        restarted, doubted = self, self._doubted
         rough = np.sqrt(np.median(restarted.losses)) / self.task.records[0].period
         for kick in _KICKS:
-            other = self.moved(self.task.starts + np.array([0.0, kick * rough])).settled()
-            restarted, _ = restarted._better(other)
+            other = self._part(self.task.starts + np.array([0.0, kick * rough]), doubted).settled()
+            restarted, _ = restarted._better(other, doubted)
         return restarted
 
-    def _better(self, other: Self) -> tuple[Self, BoolArray]:
-        """Return the better one of two fits of each segment, and for which it is the other one."""
-        better = self._sums(other.residual) < self._sums(self.residual)
-        rows = better[self.task.block]
+    @property
+    def _doubted(self) -> BoolArray:
+        """Which segments fit much worse than the others."""
+        losses = self.losses
+        return losses > _OUTLIER_LOSS_RATIO * np.median(losses)
+
+    def _part(self, starts: FloatArray, chosen: BoolArray) -> Self:
+        """Return the errors in some segments, from other states of all."""
+        pairs = zip(self.task.segments, chosen, strict=True)
+        task = replace(self.task, segments=[segment for segment, one in pairs if one])
+        return self.at(task, self.names, self.values, starts[chosen])
+
+    def _better(self, part: Self, chosen: BoolArray) -> tuple[Self, BoolArray]:
+        """Return the better one of two fits of some segments, and for which it is the other one."""
+        better = np.zeros_like(chosen)
+        better[chosen] = part._sums(part.residual) < self._sums(self.residual)[chosen]
+
+        def merged(these: FloatArray, others: FloatArray, which: BoolArray, by: BoolArray) -> Any:
+            merged = these.copy()
+            merged[which] = others[by]
+            return merged
+
+        rows, by = better[self.task.block], better[chosen][part.task.block]
         return replace(
             self,
-            starts=np.where(better[:, None], other.starts, self.starts),
-            outputs=np.where(rows, other.outputs, self.outputs),
-            by_names=np.where(rows[:, None], other.by_names, self.by_names),
-            by_start=np.where(rows[:, None], other.by_start, self.by_start),
+            starts=merged(self.starts, part.starts, better, better[chosen]),
+            outputs=merged(self.outputs, part.outputs, rows, by),
+            by_names=merged(self.by_names, part.by_names, rows, by),
+            by_start=merged(self.by_start, part.by_start, rows, by),
         ), better
 
     def _sums(self, column: FloatArray) -> FloatArray:
