@@ -1,6 +1,6 @@
 """Identification of drives on a spring: friction laws compete for the records."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import chain
 from math import inf, sqrt
 
@@ -47,9 +47,10 @@ class DriveTask:
     ) -> list[Refinement]:
         """Return the fits of the laws that compete, or of the one that is asked for, fitted first.
 
-        Laws without a memory are searched first. Those with a memory follow if the errors of the
-        best one are more than noise, and friction without a law if theirs are, too. What predicts
-        much worse in the search is not fitted further.
+        First each law without a memory takes some steps, and LuGre's law if the errors of all are
+        more than noise. Laws without a memory are searched further then. Those with a memory follow
+        if the errors of the best one are more than noise, and friction without a law if theirs are,
+        too. What predicts much worse in the search is not fitted further.
         """
         search = self._search
         models: list[Refinement] = []
@@ -57,36 +58,50 @@ class DriveTask:
         def compete(competitors: Sequence[IdentifiedLaw], like: Refinement | None = None) -> None:
             """Search laws one by one, then extend what was found of them."""
             near: list[Sequence[Refinement]] = []
-            for competitor in search.by_regression(competitors):
+            for competitor in competitors:
                 self._limit.begin_part(_LAW_TIME if len(competitors) > 1 else 1.0)
                 name = label_of(competitor)
                 if (models or near) and self._limit.is_over:
                     self.left.append(name)
                     continue
                 progress(name)
-                noise = min(map(loss_of, filter(is_white, chain(*near))), default=inf)
-                near.append(search.searched(competitor, noise=noise, like=like))
+                if like is not None:
+                    near.append(search.searched_near(competitor, like))
+                    continue
+                near.append(search.searched(competitor, noise_of(chain(search.begun, *near))))
             self._limit.begin_part(1.0)
             for fits in sorted(near, key=lambda fits: min(map(loss_of, fits))):
                 least = min(map(loss_of, chain(models, *near)))
                 models.append(search.extended(fits, least))
 
-        def explained() -> bool:
-            return any(map(is_white, models))
+        def noise_of(fits: Iterable[Refinement]) -> float:
+            return min(map(loss_of, filter(is_white, fits)), default=inf)
+
+        def describe(fits: Sequence[Refinement]) -> bool:
+            """Return whether a memory may explain the errors: it is no input that is missing."""
+            return not fits or (law == AUTO and min(map(_share, fits)) < _MISSING_INPUT_ERROR)
 
         self._limit.begin_stage(_SEARCH_TIME)
         tables = [search.table] if law == search.table.name else []
-        compete([*(competitor for competitor in laws if not competitor.memory), *tables])
-        if len(search.rows.directions) > 1 and models and not explained():
+        plain = [*(competitor for competitor in laws if not competitor.memory), *tables]
+        plain = search.by_regression(plain)
+        for competitor in plain:
+            progress(label_of(competitor))
+            if is_white(search.first(competitor)):
+                break
+        if law == AUTO and describe(search.begun) and noise_of(search.begun) == inf:
+            progress(label_of(LUGRE))
+            search.first(LUGRE)
+        compete(plain)
+        several = len(search.rows.directions) > 1
+        if several and models and noise_of(chain(search.begun, models)) == inf:
             compete([DirectionalAdapter(min(models, key=loss_of).law)])
-        # A memory changes the motion near sticking: it does not explain an input that is missing.
-        described = not models or (law == AUTO and min(map(_share, models)) < _MISSING_INPUT_ERROR)
         bristles: Refinement | None = None
-        for rival in laws if described and not explained() else ():
-            if rival.memory and (rival is DAHL or not explained()):
+        for rival in laws if describe(models) and noise_of(models) == inf else ():
+            if rival.memory and (rival is DAHL or noise_of(models) == inf):
                 compete([rival], bristles)
                 bristles = models[-1] if models[-1].law is LUGRE else bristles
-        if law == AUTO and not explained():
+        if law == AUTO and noise_of(models) == inf:
             compete([search.table])
         return self._finished(models)
 

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
+from itertools import islice
 from math import inf, pi, sqrt
 
 import numpy as np
@@ -14,7 +15,7 @@ from stickslip_ros.identification.identified_law import DELAY, LAG, IdentifiedLa
 from stickslip_ros.identification.laws import EXPONENTIAL, TableAdapter
 from stickslip_ros.identification.predictor import Predictor
 from stickslip_ros.identification.record import Record
-from stickslip_ros.identification.refinement import Refinement
+from stickslip_ros.identification.refinement import OPTIONAL, Refinement
 from stickslip_ros.identification.regression import Regression, regress
 from stickslip_ros.identification.rests import static_force
 from stickslip_ros.identification.rows import LINEAR, Rows
@@ -56,8 +57,6 @@ _POINTS = 8
 """Number of points of friction without a law."""
 _LEAST_SHARE = 1e-9
 """Smallest friction from which a search starts, as a share of the other forces."""
-OPTIONAL = ("damping", "bias_force", DELAY, LAG)
-"""Constants that are fitted only if the record asks for them."""
 
 
 class LawSearch:
@@ -85,6 +84,7 @@ class LawSearch:
             [filtered(record, decimated=False, delay=delay) for record in records]
         )
         self.predictors = [Predictor(record) for record in records]
+        self._first: dict[IdentifiedLaw, Refinement] = {}
 
     @cached_property
     def constants(self) -> Mapping[str, float]:
@@ -105,27 +105,54 @@ class LawSearch:
         """Return laws in the order of the errors of their regressions, the best one first."""
         return sorted(laws, key=lambda law: rms(self._regression(law.one_way).residual))
 
-    def searched(
-        self, law: IdentifiedLaw, *, noise: float = inf, like: Refinement | None = None
-    ) -> Sequence[Refinement]:
-        """Return the best fits to short segments, from several starts, or from a LuGre model.
+    @property
+    def begun(self) -> Sequence[Refinement]:
+        """Fits after the first steps from the first start, of the laws that have some."""
+        return [*self._first.values()]
+
+    def first(self, law: IdentifiedLaw) -> Refinement:
+        """Return the fit after the first steps from the first start."""
+        if law not in self._first:
+            values = self._starts(law, self._regression(law.one_way))[0]
+            self._first[law] = self._begun(law, values)
+        return self._first[law]
+
+    def searched(self, law: IdentifiedLaw, noise: float = inf) -> Sequence[Refinement]:
+        """Return the best fits to short segments, from several starts.
 
         `noise` is the squared error of a law whose errors are noise: one that is much worse after
         the first steps is not searched further.
         """
-        if like is not None:
-            # The static friction of Dahl's law is the kinetic one.
-            values = {**like.values, "static": like.values["kinetic"]}
-            return self._nearest(law, [values], _GIVEN_UP_LOSS_RATIO * like.loss)
+        tried = [self.first(law)]
+        if is_white(tried[0]) or tried[0].loss > _GIVEN_UP_LOSS_RATIO * noise:
+            return tried
         fastest = float(self.rows.speeds[-1])
         thorough = law.one_way.shaped and noise == inf
         shapes = [share * fastest for share in _SHAPES] if thorough else []
-        starts = [
+        starts = (
             start
             for shape in (None, *shapes)
-            for start in self._starts(law, self._regression(law.one_way, shape), fastest)
-        ]
-        return self._nearest(law, starts, _GIVEN_UP_LOSS_RATIO * noise)
+            for start in self._starts(law, self._regression(law.one_way, shape))
+        )
+        for values in islice(starts, 1, None):
+            if self.limit.is_over or rms(tried[-1].residual) < _NEAR_SHARE * tried[-1].scale:
+                break
+            tried.append(self._begun(law, values))
+            if is_white(tried[-1]):
+                return tried[-1:]
+        settled: list[Refinement] = []
+        for near in sorted(tried, key=loss_of)[:_FINALISTS]:
+            settled.append(self._settled(near))
+            if is_white(settled[-1]) or _is_rounding(settled[-1]) or self.limit.is_over:
+                break
+        return settled
+
+    def searched_near(self, law: IdentifiedLaw, like: Refinement) -> Sequence[Refinement]:
+        """Return the best fit of a law with a memory to short segments, from a LuGre model."""
+        # The static friction of Dahl's law is the kinetic one.
+        begun = self._begun(law, {**like.values, "static": like.values["kinetic"]})
+        given_up = is_white(begun) or begun.loss > _GIVEN_UP_LOSS_RATIO * like.loss
+        return [begun if given_up else self._settled(begun)]
 
     def extended(self, near: Sequence[Refinement], least: float) -> Refinement:
         """Return the best fit of a law with the constants that the records ask for.
@@ -143,12 +170,10 @@ class LawSearch:
                 break
         return min(extended, key=loss_of)
 
-    def _starts(
-        self, law: IdentifiedLaw, fit: Regression, fastest: float
-    ) -> Sequence[Mapping[str, float]]:
+    def _starts(self, law: IdentifiedLaw, fit: Regression) -> Sequence[Mapping[str, float]]:
         """Return the coordinates from which a law is searched: first those that rests tell."""
         values = self._start(law, fit)
-        starts = law.starts(values, fastest)
+        starts = law.starts(values, float(self.rows.speeds[-1]))
         if law.identifiable_in_slip or len(self.rows.directions) > 1:
             return starts
         (sign,), static = self.rows.directions, -inf
@@ -179,28 +204,12 @@ class LawSearch:
         speeds[0] = 0.0
         return TableAdapter(speeds)
 
-    def _nearest(
-        self, law: IdentifiedLaw, starts: Sequence[Mapping[str, float]], most: float = inf
-    ) -> Sequence[Refinement]:
-        """Return the best searches; errors that are noise, or a larger loss than `most`, end it."""
+    def _begun(self, law: IdentifiedLaw, values: Mapping[str, float]) -> Refinement:
+        """Return the fit to short segments after the first steps from a start."""
         short = self._trajectories(law, _SHORT_SEGMENT * self.period, _SEARCH_SAMPLES)
         names = [*self.free, *law.coordinates]
         names = [name for name in names if name not in (*self.friction, *law.optional)]
-        tried: list[Refinement] = []
-        for values in starts:
-            if tried and self.limit.is_over:
-                break
-            tried.append(refine(short, names, self._known(law, values), most=_FIRST_STEPS))
-            if is_white(tried[-1]) or tried[-1].loss > most:
-                return tried[-1:]
-            if rms(tried[-1].residual) < _NEAR_SHARE * tried[-1].scale:
-                break
-        settled: list[Refinement] = []
-        for near in sorted(tried, key=loss_of)[:_FINALISTS]:
-            settled.append(self._settled(near))
-            if is_white(settled[-1]) or _is_rounding(settled[-1]) or self.limit.is_over:
-                break
-        return settled
+        return refine(short, names, self._known(law, values), most=_FIRST_STEPS)
 
     def _settled(self, near: Errors) -> Refinement:
         """Return the best fit near other values: segments with wrong starts try others."""
@@ -251,7 +260,7 @@ class LawSearch:
         """Return a fit to long segments, with the constants that the records ask for."""
         task = self._trajectories(near.law, _LONG_SEGMENT * self.period, _MOST_SAMPLES)
         # Measured starts are too rough for motions that grow over a segment.
-        begun = best_starts(task, near.values)
+        begun = best_starts(task, near.values).restarted()
         fit = self._settled(replace(begun, names=near.names))
         fit = self._with_optional(fit, least_share=0.0)
         validated = replace(fit, held_out=_held_out(fit))

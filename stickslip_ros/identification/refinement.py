@@ -11,7 +11,7 @@ from stickslip_ros.arrays import FloatArray
 from stickslip_ros.identification.covariance import block_covariance
 from stickslip_ros.identification.filtered import filtered
 from stickslip_ros.identification.fit import Fit, ForceErrors, Residuals
-from stickslip_ros.identification.identified_law import LAG, IdentifiedLaw
+from stickslip_ros.identification.identified_law import DELAY, LAG, IdentifiedLaw
 from stickslip_ros.identification.predictor import Predictor
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.segment_starts import Errors, best_starts
@@ -23,6 +23,8 @@ _SHORTEST_CYCLE, _REPEATED_CORRELATION = 20, 0.65
 """Samples of a cycle at least, and correlation of errors from which cycles are alike."""
 _UNLIKE_CORRELATION = 0.3
 """Correlation below which errors have become unlike before they repeat."""
+OPTIONAL = ("damping", "bias_force", DELAY, LAG)
+"""Constants that are fitted only if the record asks for them, besides those of the law."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,14 +119,20 @@ class Refinement(Errors, Fit):
         """Derivatives of the errors, at starts that follow them; shape (rows, numbers)."""
         return self.without_starts(self.by_names)
 
-    def gain(self, name: str) -> tuple[float, float]:
-        """Return what fitting one more coordinate would bring, to first order.
+    @cached_property
+    def _more(self) -> Errors:
+        """The same errors, with the derivatives by the constants that could be fitted besides."""
+        names = [name for name in (*OPTIONAL, *self.law.optional) if name not in self.names]
+        return Errors.at(self.task, names, self.values, self.starts)
 
-        It is the number of standard errors by which the coordinate would move, and the share of the
-        square of the residual that would go; 0 for what the record cannot tell.
+    def gain(self, name: str) -> tuple[float, float]:
+        """Return what fitting one more of `OPTIONAL`, or of those of the law, would bring.
+
+        It is, to first order, the number of standard errors by which it would move, and the share
+        of the square of the residual that would go; 0 for what the record cannot tell.
         """
-        others = self._derivatives
-        column = Errors.at(self.task, [name], self.values, self.starts).by_names
+        others, more = self._derivatives, self._more
+        column = more.by_names[:, [[*more.names].index(name)]]
         norms = np.linalg.norm(others, axis=0)
         basis = np.linalg.qr(others / np.where(norms > 0.0, norms, 1.0))[0]
         alone = self.without_starts(column)[:, 0]
