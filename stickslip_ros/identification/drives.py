@@ -89,6 +89,8 @@ class DriveTask:
             progress(label_of(competitor))
             if is_white(search.first(competitor)):
                 break
+        else:
+            search.extend_best()
         if law == AUTO and describe(search.begun) and noise_of(search.begun) == inf:
             progress(label_of(LUGRE))
             search.first(LUGRE)

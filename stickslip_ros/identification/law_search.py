@@ -28,6 +28,8 @@ _SHORT_SEGMENT, _LONG_SEGMENT = 1.25, 5.0
 """Length of the segments in natural periods: of the search, and of the fit."""
 _FIRST_STEPS, _STEPS, _FINALISTS = 5, 100, 2
 """Steps of the search from each start, steps from the best ones, and their number."""
+_RIVAL_STEPS = 20
+"""Steps from the best start while the errors of another law are noise."""
 _RESTART_LOSS_RATIO = 0.8
 """Other starts of segments must lower the squared error to this share, or the search ends."""
 _ROUNDING = 1.4
@@ -117,6 +119,11 @@ class LawSearch:
             self._first[law] = self._begun(law, values)
         return self._first[law]
 
+    def extend_best(self) -> None:
+        """Give the best fit so far the constants that the records ask for: others may need none."""
+        best = min(self.begun, key=loss_of)
+        self._first[best.law] = self.extended([best], inf)
+
     def searched(self, law: IdentifiedLaw, noise: float = inf) -> Sequence[Refinement]:
         """Return the best fits to short segments, from several starts.
 
@@ -140,9 +147,10 @@ class LawSearch:
             tried.append(self._begun(law, values))
             if is_white(tried[-1]):
                 return tried[-1:]
+        finalists, most = (_FINALISTS, _STEPS) if noise == inf else (1, _RIVAL_STEPS)
         settled: list[Refinement] = []
-        for near in sorted(tried, key=loss_of)[:_FINALISTS]:
-            settled.append(self._settled(near))
+        for near in sorted(tried, key=loss_of)[:finalists]:
+            settled.append(self._settled(near, most))
             if is_white(settled[-1]) or _is_rounding(settled[-1]) or self.limit.is_over:
                 break
         return settled
@@ -211,12 +219,12 @@ class LawSearch:
         names = [name for name in names if name not in (*self.friction, *law.optional)]
         return refine(short, names, self._known(law, values), most=_FIRST_STEPS)
 
-    def _settled(self, near: Errors) -> Refinement:
+    def _settled(self, near: Errors, most: int = _STEPS) -> Refinement:
         """Return the best fit near other values: segments with wrong starts try others."""
-        fit = refine(near.task, near.names, near.values, near.starts, most=_STEPS)
+        fit = refine(near.task, near.names, near.values, near.starts, most=most)
         while fit.has_outliers and not self.limit.is_over:
             starts = fit.restarted().starts
-            other = refine(near.task, near.names, fit.values, starts, most=_STEPS)
+            other = refine(near.task, near.names, fit.values, starts, most=most)
             if other.loss > _RESTART_LOSS_RATIO * fit.loss:
                 break
             fit = other
