@@ -68,7 +68,9 @@ class DriveTask:
                 if like is not None:
                     near.append(search.searched_near(competitor, like))
                     continue
-                near.append(search.searched(competitor, noise_of(chain(search.begun, *near))))
+                near.append(
+                    search.searched(competitor, noise_of(chain(search.begun, models, *near)))
+                )
             self._limit.begin_part(1.0)
             for fits in sorted(near, key=lambda fits: min(map(loss_of, fits))):
                 least = min(map(loss_of, chain(models, *near)))
@@ -91,16 +93,23 @@ class DriveTask:
                 break
         else:
             search.extend_best()
+        bristles: Refinement | None = None
         if law == AUTO and describe(search.begun) and noise_of(search.begun) == inf:
             progress(label_of(LUGRE))
-            search.first(LUGRE)
+            least = min(map(loss_of, search.begun))
+            if _HOPELESS_LOSS_RATIO * search.first(LUGRE).loss < least:
+                compete([LUGRE])
+                (bristles,) = models
         compete(plain)
         several = len(search.rows.directions) > 1
         if several and models and noise_of(chain(search.begun, models)) == inf:
             compete([DirectionalAdapter(min(models, key=loss_of).law)])
-        bristles: Refinement | None = None
-        for rival in laws if describe(models) and noise_of(models) == inf else ():
-            if rival.memory and (rival is DAHL or noise_of(models) == inf):
+        searched = {model.law for model in models}
+        rivals = [rival for rival in laws if rival.memory and rival not in searched]
+        if not describe(models) or (bristles is None and noise_of(models) < inf):
+            rivals = []
+        for rival in rivals:
+            if rival is DAHL or noise_of(models) == inf:
                 compete([rival], bristles)
                 bristles = models[-1] if models[-1].law is LUGRE else bristles
         if law == AUTO and noise_of(models) == inf:

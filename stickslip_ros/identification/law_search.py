@@ -30,7 +30,7 @@ _FIRST_STEPS, _STEPS, _FINALISTS = 5, 100, 2
 """Steps of the search from each start, steps from the best ones, and their number."""
 _RIVAL_STEPS = 20
 """Steps from the best start while the errors of another law are noise."""
-_RESTART_LOSS_RATIO = 0.8
+_RESTART_LOSS_RATIO = 0.95
 """Other starts of segments must lower the squared error to this share, or the search ends."""
 _ROUNDING = 1.4
 """Errors, in rounding errors of the encoder, up to which no other start is tried."""
@@ -223,11 +223,10 @@ class LawSearch:
         """Return the best fit near other values: segments with wrong starts try others."""
         fit = refine(near.task, near.names, near.values, near.starts, most=most)
         while fit.has_outliers and not self.limit.is_over:
-            starts = fit.restarted().starts
-            other = refine(near.task, near.names, fit.values, starts, most=most)
+            other = fit.restarted()
             if other.loss > _RESTART_LOSS_RATIO * fit.loss:
                 break
-            fit = other
+            fit = refine(near.task, near.names, other.values, other.starts, most=most)
         return fit
 
     def _with_optional(self, fit: Refinement, *, least_share: float) -> Refinement:

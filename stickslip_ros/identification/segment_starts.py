@@ -19,10 +19,10 @@ _SHORTEST_STEP = 1e-3
 """A start whose steps are shortened below this share of a full one is not changed further."""
 _START_STEPS = 8
 """Largest number of steps of the starts for one set of constants."""
-_OUTLIER_LOSS_RATIO = 9.0
+_OUTLIER_LOSS_RATIO = 3.0
 """The start of a segment is doubted if its squared error is larger than that of the median one by
 this factor."""
-_OUTLIER_SHARE = 0.3
+_OUTLIER_SHARE = 0.1
 """Share of the squared error from which segments with such starts spoil the fit of the others."""
 _KICKS = (0.0, 0.5, -0.5, 2.0, -2.0)
 """Changes of the velocity at such a start, in errors of position per period."""
