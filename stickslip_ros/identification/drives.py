@@ -5,9 +5,9 @@ from itertools import chain
 from math import inf, sqrt
 
 from stickslip_ros.identification.choice import AUTO
+from stickslip_ros.identification.fit import OUT_OF_TIME
 from stickslip_ros.identification.identified_law import IdentifiedLaw, label_of
 from stickslip_ros.identification.law_search import (
-    OUT_OF_TIME,
     LawSearch,
     is_white,
     loss_of,

@@ -22,6 +22,8 @@ _NEAR_ZERO = 1e-6
 QUANTILE = 2.07
 """Half of a 95 % interval, in standard errors: Student's t with BLOCKS - 1 = 23 degrees of
 freedom."""
+OUT_OF_TIME = "the time was over before it was fitted to the end"
+"""Remark of a fit whose constants are on their way: nothing is known of their errors."""
 CURVE_POINTS = 40
 """Points that stand for a curve."""
 
@@ -189,6 +191,8 @@ class Fit(ABC):
     @cached_property
     def covariance(self) -> FloatArray:
         """Covariance of the point, from the scatter over blocks of time."""
+        if self.remark == OUT_OF_TIME:
+            return np.diag(np.full(len(self.point), inf))
         return block_covariance(*self.linearized())
 
     def drive(self, normal_force: float, belt_speed: float = 0.0) -> Drive:

@@ -11,6 +11,7 @@ import numpy as np
 from stickslip_ros.arrays import FloatArray, rms
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.identification.filtered import filtered
+from stickslip_ros.identification.fit import OUT_OF_TIME
 from stickslip_ros.identification.identified_law import DELAY, LAG, IdentifiedLaw
 from stickslip_ros.identification.laws import EXPONENTIAL, TableAdapter
 from stickslip_ros.identification.predictor import Predictor
@@ -45,7 +46,6 @@ _SHAPES = (0.1, 0.3, 0.8)
 _GIVEN_UP_LOSS_RATIO = 100.0
 """A law whose squared error is larger by this factor is given up: than noise, or than LuGre's after
 the first steps, or than the best law's before constants are added that the records ask for."""
-OUT_OF_TIME = "the time was over before it was fitted to the end"
 _OPTIONAL_GAIN, _OPTIONAL_ERRORS = 0.05, 4.0
 """Share of the squared error, and standard errors, for which one more constant is searched."""
 _CLEAR_GAIN = 0.5

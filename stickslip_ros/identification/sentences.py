@@ -7,6 +7,7 @@ import numpy as np
 
 from stickslip_ros.identification.drives import POOR_ERROR
 from stickslip_ros.identification.findings import Findings
+from stickslip_ros.identification.fit import OUT_OF_TIME
 from stickslip_ros.identification.record import FEWEST, Record
 
 _VAGUE_ERROR = 0.5
@@ -157,6 +158,9 @@ def unidentified(findings: Findings) -> Mapping[str, str]:
         sure = f"{estimate.value:.4g} has a standard error of {estimate.standard_error:.2g}"
         if isinf(estimate.standard_error):
             sure = f"{estimate.value:.4g} is one of many values that fit alike"
+        if findings.chosen.remark == OUT_OF_TIME:
+            why[name] = f"the limit of work was reached at {estimate.value:.4g}; see the note on it"
+            continue
         why[name] = f"{sure}; a run with other speeds and forces may identify it"
     return why
 

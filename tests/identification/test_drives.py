@@ -6,6 +6,7 @@ docs/identification.md has a table of more seeds.
 import json
 from collections.abc import Mapping
 from dataclasses import replace
+from math import inf
 from pathlib import Path
 
 import numpy as np
@@ -18,9 +19,10 @@ from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.identification.even_clock import evenly_spaced
 from stickslip_ros.identification.filtered import filtered
 from stickslip_ros.identification.findings import Findings
+from stickslip_ros.identification.fit import OUT_OF_TIME
 from stickslip_ros.identification.identified_law import DELAY, LAG
 from stickslip_ros.identification.identify import identify
-from stickslip_ros.identification.law_search import OUT_OF_TIME, LawSearch
+from stickslip_ros.identification.law_search import LawSearch
 from stickslip_ros.identification.laws import KNOWN_LAWS
 from stickslip_ros.identification.predictor import Predictor
 from stickslip_ros.identification.record import Record
@@ -76,6 +78,8 @@ def test_a_search_ends_with_the_best_so_far() -> None:
     assert found.law == "stribeck"
     assert {"stribeck", "exponential", "stiction", "table", "coulomb"} <= {*found.left}
     assert found.candidates[0].remark == OUT_OF_TIME
+    assert {estimate.standard_error for estimate in found.fitted.values()} == {inf}
+    assert "limit of work" in unidentified(found)["stiffness"]
 
 
 def test_time_passes_with_work_alone() -> None:
