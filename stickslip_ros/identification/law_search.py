@@ -120,9 +120,9 @@ class LawSearch:
         return self._first[law]
 
     def extend_best(self) -> None:
-        """Give the best fit so far the constants that the records ask for: others may need none."""
+        """Give the best fit so far the constants of any law that the records ask for."""
         best = min(self.begun, key=loss_of)
-        self._first[best.law] = self.extended([best], inf)
+        self._first[best.law] = self._with(OPTIONAL, best, least_share=_OPTIONAL_GAIN)
 
     def searched(self, law: IdentifiedLaw, noise: float = inf) -> Sequence[Refinement]:
         """Return the best fits to short segments, from several starts.
@@ -172,7 +172,8 @@ class LawSearch:
             return min(near, key=loss_of)
         extended: list[Refinement] = []
         for fit in near:
-            more = fit if is_white(fit) else self._with_optional(fit, least_share=_OPTIONAL_GAIN)
+            names = () if is_white(fit) else (*OPTIONAL, *fit.law.optional)
+            more = self._with(names, fit, least_share=_OPTIONAL_GAIN)
             extended.append(more)
             if is_white(more) or _is_rounding(more):
                 break
@@ -229,13 +230,13 @@ class LawSearch:
             fit = refine(near.task, near.names, other.values, other.starts, most=most)
         return fit
 
-    def _with_optional(self, fit: Refinement, *, least_share: float) -> Refinement:
-        """Return the fit with the constants that the records ask for.
+    def _with(self, more: Sequence[str], fit: Refinement, *, least_share: float) -> Refinement:
+        """Return the fit with those of some more constants that the records ask for.
 
         They must take away a share of the squared error, and differ clearly from zero.
         """
         task = fit.task
-        for name in (*OPTIONAL, *fit.law.optional):
+        for name in more:
             values = fit.values
             if name in self.fixed or name in self.friction or name in fit.names:
                 continue
@@ -247,15 +248,15 @@ class LawSearch:
                 unclear = abs(errors) < _OPTIONAL_ERRORS and share < _CLEAR_GAIN
                 if unclear or share < least_share:
                     continue
-            more = refine(task, [*fit.names, name], values, fit.starts, most=_STEPS)
-            if more.loss >= fit.loss:
+            other = refine(task, [*fit.names, name], values, fit.starts, most=_STEPS)
+            if other.loss >= fit.loss:
                 continue
-            if _errors_from_zero(more, name) > _ZERO_ERRORS:
-                fit = more
+            if _errors_from_zero(other, name) > _ZERO_ERRORS:
+                fit = other
                 continue
             # It was not needed, but may have led the others out of a local minimum.
-            without = {**more.values, name: fit.values[name]}
-            other = refine(task, fit.names, without, more.starts, most=_STEPS)
+            without = {**other.values, name: fit.values[name]}
+            other = refine(task, fit.names, without, other.starts, most=_STEPS)
             fit = min(fit, other, key=loss_of)
         if {DELAY, LAG} <= {*fit.names} and _errors_from_zero(fit, DELAY) < _ZERO_ERRORS:
             # It stood for the lag.
@@ -269,7 +270,7 @@ class LawSearch:
         # Measured starts are too rough for motions that grow over a segment.
         begun = best_starts(task, near.values).restarted()
         fit = self._settled(replace(begun, names=near.names))
-        fit = self._with_optional(fit, least_share=0.0)
+        fit = self._with((*OPTIONAL, *fit.law.optional), fit, least_share=0.0)
         validated = replace(fit, held_out=_held_out(fit))
         return remarked(fit, OUT_OF_TIME) if self.limit.is_over else validated
 
