@@ -64,7 +64,7 @@ def reversals(position: FloatArray, least: float) -> list[tuple[int, int]]:
 def _least_squares(reach: int) -> FloatArray:
     """Return the rows that give value, slope and half of the bend at the middle of a parabola."""
     lags = np.arange(-reach, reach + 1.0)
-    return np.linalg.pinv(np.vander(lags, 3, increasing=True))
+    return np.linalg.pinv(np.vander(lags, 3, increasing=True)).astype(float)
 
 
 def parabolas(course: FloatArray, reach: int) -> list[FloatArray]:
