@@ -1,6 +1,6 @@
 """Identification of drives on a spring: friction laws compete for the records."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from itertools import chain
 from math import inf, sqrt
 
@@ -11,6 +11,7 @@ from stickslip_ros.identification.law_search import (
     LawSearch,
     is_white,
     loss_of,
+    noise_of,
     remarked,
 )
 from stickslip_ros.identification.laws import DAHL, LUGRE, DirectionalAdapter
@@ -41,6 +42,7 @@ class DriveTask:
         self._search, self._limit = LawSearch(records, fixed, limit), limit
         self.left: list[str] = []
         """Laws that were not fitted to the end, because the time was over."""
+        self._models: list[Refinement] = []
 
     def candidates(
         self, law: str, laws: Sequence[IdentifiedLaw], progress: Callable[[str], None]
@@ -52,69 +54,63 @@ class DriveTask:
         if the errors of the best one are more than noise, and friction without a law if theirs are,
         too. What predicts much worse in the search is not fitted further.
         """
-        search = self._search
-        models: list[Refinement] = []
-
-        def compete(competitors: Sequence[IdentifiedLaw], like: Refinement | None = None) -> None:
-            """Search laws one by one, then extend what was found of them."""
-            near: list[Sequence[Refinement]] = []
-            for competitor in competitors:
-                self._limit.begin_part(_LAW_TIME if len(competitors) > 1 else 1.0)
-                name = label_of(competitor)
-                if (models or near) and self._limit.is_over:
-                    self.left.append(name)
-                    continue
-                progress(name)
-                if like is not None:
-                    near.append(search.searched_near(competitor, like))
-                    continue
-                near.append(
-                    search.searched(competitor, noise_of(chain(search.begun, models, *near)))
-                )
-            self._limit.begin_part(1.0)
-            for fits in sorted(near, key=lambda fits: min(map(loss_of, fits))):
-                least = min(map(loss_of, chain(models, *near)))
-                models.append(search.extended(fits, least))
-
-        def noise_of(fits: Iterable[Refinement]) -> float:
-            return min(map(loss_of, filter(is_white, fits)), default=inf)
-
-        def describe(fits: Sequence[Refinement]) -> bool:
-            """Return whether a memory may explain the errors: it is no input that is missing."""
-            return not fits or (law == AUTO and min(map(_share, fits)) < _MISSING_INPUT_ERROR)
-
+        search, models = self._search, self._models
         self._limit.begin_stage(_SEARCH_TIME)
         tables = [search.table] if law == search.table.name else []
         plain = [*(competitor for competitor in laws if not competitor.memory), *tables]
         plain = search.by_regression(plain)
-        for competitor in plain:
-            progress(label_of(competitor))
-            if is_white(search.first(competitor)):
-                break
-        else:
-            search.extend_best()
-        bristles: Refinement | None = None
-        if law == AUTO and describe(search.begun) and noise_of(search.begun) == inf:
+        self._begin(plain, progress)
+        if law == AUTO and _may_have_memory(search.begun):
             progress(label_of(LUGRE))
             least = min(map(loss_of, search.begun))
             if _HOPELESS_LOSS_RATIO * search.first(LUGRE).loss < least:
-                compete([LUGRE])
-                (bristles,) = models
-        compete(plain)
+                self._compete([LUGRE], progress)
+        bristles = models[0] if models else None
+        self._compete(plain, progress)
         several = len(search.rows.directions) > 1
         if several and models and noise_of(chain(search.begun, models)) == inf:
-            compete([DirectionalAdapter(min(models, key=loss_of).law)])
-        searched = {model.law for model in models}
-        rivals = [rival for rival in laws if rival.memory and rival not in searched]
-        if not describe(models) or (bristles is None and noise_of(models) < inf):
+            self._compete([DirectionalAdapter(min(models, key=loss_of).law)], progress)
+        rivals = [rival for rival in laws if rival.memory and (bristles is None or rival != LUGRE)]
+        if law == AUTO and bristles is None and not _may_have_memory(models):
             rivals = []
         for rival in rivals:
             if rival is DAHL or noise_of(models) == inf:
-                compete([rival], bristles)
+                self._compete([rival], progress, bristles)
                 bristles = models[-1] if models[-1].law is LUGRE else bristles
         if law == AUTO and noise_of(models) == inf:
-            compete([search.table])
+            self._compete([search.table], progress)
         return self._finished(models)
+
+    def _begin(self, laws: Sequence[IdentifiedLaw], progress: Callable[[str], None]) -> None:
+        """Take the first steps of laws, up to one whose errors are noise."""
+        for law in laws:
+            progress(label_of(law))
+            if is_white(self._search.first(law)):
+                return
+        if laws:
+            self._search.extend_best()
+
+    def _compete(
+        self,
+        laws: Sequence[IdentifiedLaw],
+        progress: Callable[[str], None],
+        like: Refinement | None = None,
+    ) -> None:
+        """Search laws one by one, near a LuGre model if there is one, then extend the fits."""
+        search, models = self._search, self._models
+        near: list[Sequence[Refinement]] = []
+        for law in laws:
+            self._limit.begin_part(_LAW_TIME if len(laws) > 1 else 1.0)
+            if (models or near) and self._limit.is_over:
+                self.left.append(label_of(law))
+                continue
+            progress(label_of(law))
+            noise = noise_of(chain(search.begun, models, *near))
+            near.append(search.searched_near(law, like) if like else search.searched(law, noise))
+        self._limit.begin_part(1.0)
+        for fits in sorted(near, key=lambda fits: min(map(loss_of, fits))):
+            least = min(map(loss_of, chain(models, *near)))
+            models.append(search.extended(fits, least))
 
     def _finished(self, fits: Sequence[Refinement]) -> list[Refinement]:
         """Return searched models fitted further, the better ones first, as far as time allows."""
@@ -132,3 +128,8 @@ class DriveTask:
 def _share(fit: Refinement) -> float:
     """Return the rms error as a share of the rms motion."""
     return sqrt(fit.loss / len(fit.residual)) / fit.scale
+
+
+def _may_have_memory(fits: Sequence[Refinement]) -> bool:
+    """Return whether a memory may explain the errors: no noise, and no input that is missing."""
+    return noise_of(fits) == inf and min(map(_share, fits)) < _MISSING_INPUT_ERROR

@@ -1,6 +1,6 @@
 """The search of one friction law: the motion of a drive on a spring is simulated and fitted."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from itertools import islice
@@ -320,6 +320,11 @@ def _errors_from_zero(fit: Refinement, name: str) -> float:
 def loss_of(fit: Refinement) -> float:
     """Return the squared error of a fit."""
     return fit.loss
+
+
+def noise_of(fits: Iterable[Refinement]) -> float:
+    """Return the least squared error of fits whose errors are noise; infinite if there is none."""
+    return min(map(loss_of, filter(is_white, fits)), default=inf)
 
 
 def remarked(fit: Refinement, remark: str) -> Refinement:
