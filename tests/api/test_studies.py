@@ -9,10 +9,10 @@ from matplotlib.figure import Figure
 
 import stickslip_ros as ss
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.measures.cycle_measures import Regime
+from stickslip_ros.measures.cycle_measures import Measures, Regime
+from stickslip_ros.quantities import quantities_of
 from stickslip_ros.studies.basin import Basins
 from stickslip_ros.studies.columns import COLUMNS
-from stickslip_ros.studies.study import MEASURES
 
 FREE = ss.scenario("paper", expects_control=False)
 SHORT: dict[str, Any] = {"transient": 20.0, "cycles": 2}
@@ -65,7 +65,7 @@ def test_the_tables_have_what_the_columns_have(carry: str | None) -> None:
     columns = found.columns
     frame, data = found.to_pandas(), found.to_xarray()
     directions = {None: [], "both": ["up", "down"]}.get(carry, [carry])
-    for name in MEASURES:
+    for name in quantities_of(Measures):
         if name != "regime":
             assert np.array_equal(frame[name], getattr(columns, name), equal_nan=True)
             assert np.array_equal(
