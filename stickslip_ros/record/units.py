@@ -117,6 +117,8 @@ _START = re.compile(
 """Where a word starts: after a mark, in PosMM, after a number, and after Chinese letters."""
 _DOUBTFUL, _DOUBTFUL_ALONE = ("in", "min", "h", "d"), ("cm", "dm")
 """Units that may be other words at the end of a name, or where they are all of it."""
+_DOUBTFUL_LAST = (*_DOUBTFUL, "yd", "dyn")
+"""Those at the end, and others: the desired y, a dynamic force."""
 _WEIGHTS = {"g": 9.80665e-3, "t": 9806.65, "to": 9806.65, "т": 9806.65}
 """Weights, N, of units of mass that may be other words behind a force."""
 _INDEX = re.compile(r"(?<=[^\W\d_]{2})(?:1|(?<!s)\d\d?)$")
@@ -273,7 +275,7 @@ def _last(name: str, target: str) -> Iterator[Unit]:
             if re.match(r"(?i)per(?![^\W_])", text) and _counts(before):
                 break
             yield from readings
-            if text.casefold() in (_DOUBTFUL if before else _DOUBTFUL + _DOUBTFUL_ALONE):
+            if text.casefold() in (_DOUBTFUL_LAST if before else _DOUBTFUL_LAST + _DOUBTFUL_ALONE):
                 yield Unit("", 1.0, target)
             if text[0].isdigit():  # a number of units, or of the column
                 yield from _read(text.lstrip("0123456789."), target)
@@ -303,7 +305,7 @@ def _between(name: str, starts: Sequence[int], target: str) -> Iterator[Unit]:
             if known and len(text) > 1 and text.casefold() != "in":
                 readings = [*_read(text, target)]
                 yield from readings or [Unit(text, nan, target)] * (end > first + 1)
-                if readings and text.casefold() in _DOUBTFUL:
+                if readings and text.casefold() in _DOUBTFUL_LAST:
                     yield Unit("", 1.0, target)
                 first = end - 1
                 break

@@ -31,7 +31,7 @@ HEADERS = {
         "|spostamento [mm]"
         "|Weg in Millimeter|Weg in Millimetern|x [milímetros]|pos_mm1|mm10|pos_mm_filt"
         "|Перемещение, мм|x_мм|位移mm|Weg (in mm)|course (millimètres)|x [1e-3 m]|mm",
-        0.9144: "x_yd",
+        0.9144: "x_yards|x [yd]|x in yd",
         1e-10: "x_Å",
         1e-6: "pos, mkm|x [um]|x (µm)|x [micron]|vdcdt_um|Weg / µm",
         1e-4: "x [0.1 mm]|x (0,1 mm)",
@@ -46,7 +46,7 @@ HEADERS = {
         TURN: "phi_rev|pos [turns]|Winkel in Umdrehungen",
         DEGREE: "phi [Grad]|phi [°]|phi_deg|Winkel in Grad|angle (degrés)|angulo en grados",
         DOUBTFUL: "x_in|position_in|xIn|in|cm|phi [grad]|pos [inc]|Position [counts]|pos_counts"
-        "|Encoder count|count"
+        "|Encoder count|count|yd|x_yd"
         "|Weg [Inkremente]|Droop pulses (by 1 pls.)|Position [V]|Pos [%]|x (1/1000 mm)"
         "|Weg / mV|x_0.1um|x (in 0.1 mm)"
         "|pos_cnt|pos (qc)|LVDT volts|Position %|tenths of mm|[mm]/10|x [mm x 1000]|Weg x10^-3 m"
@@ -79,7 +79,7 @@ HEADERS = {
         10.0: "F_daN",
         9.80665: "load [kgf]",
         1.3558179483314: "torque_lbft|M [ftlb]",
-        DOUBTFUL: "F_in_N*10|I [Arms]|M [0.1%]|F [t]|F_t|F / t|Last in t|Сила, т"
+        DOUBTFUL: "F_in_N*10|I [Arms]|M [0.1%]|F [t]|F_t|F_dyn|F_dyn_filt|F / t|Last in t|Сила, т"
         "|F / g|F_tons|thrust_grams|load_pct|lb|torque_counts"
         "|force_mn|I [A]|load [kg]|torque [%]|force_kg|cell_mV|u_V|p_bar",
         NO_UNIT: "F|force|torque|u|A|current_A|x_max|F (t)|Ft|F_T|force_N_filt",
