@@ -255,7 +255,7 @@ def measured_run(
     history.take_analysis(RunAnalysis(None, None, seen))
     true_measures, notes = None, [NOT_JUDGED] if scenario.reading.varies else []
     if measured is not None:
-        true_measures, (true, notes, _) = true, measured.measured()
+        true_measures, (true, notes, _) = true, measured.measured(unit)
     notes = [*notes, *(seen.notes if seen else ())]
     following = [None if analysis is None else analysis.values for analysis in (seen, itself)]
     return Run(

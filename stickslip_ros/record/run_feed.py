@@ -123,7 +123,7 @@ class RunFeed:
         report = report_of(self._meter, measured)
         notes = [*self._notes, *report["notes"]]
         if self._feed_speed:
-            feed = quantity(self._feed_speed, f"{length}/s")
+            feed = quantity(self._feed_speed, length and f"{length}/s")
             advance = quantity(abs(self._feed_speed) * (report["period"] or 0.0), length)
             notes.append(
                 f"the slide advances at {feed} on a guide at rest: the measures "
@@ -167,7 +167,8 @@ class RunFeed:
         guide = motion.other_guide
         if guide is not None and report["regime"] in (None, Regime.PURE_SLIP, Regime.STICK_SLIP):
             velocity, share = guide
-            speed = f"a velocity of {quantity(velocity, f'{length}/s')}" if velocity else "rest"
+            unit = length and f"{length}/s"
+            speed = f"a velocity of {quantity(velocity, unit)}" if velocity else "rest"
             return (
                 f"relative to a guide at {speed} the slide rests {share:.0%} of the time, and "
                 "relative to the belt it does not: with this belt velocity the regime is known"
