@@ -184,15 +184,15 @@ def test_a_limit_cycle_is_seen_stopped_and_changed_until_the_motion_diverges(
         field.hover()
         field.focus()
         page.mouse.wheel(0, 500)
-    # What was refused, or scrolled over, has changed nothing.
-    expect(events(page).get_by_text(CHANGED)).to_have_count(0)
 
     # A page that loses its connection for seconds, on a busy machine, keeps what was typed.
     speed.fill("20mm/s")
     page.evaluate(DISCONNECTED)
     page.wait_for_function("socket.connected")
     speed.press("Enter")
-    expect(events(page).get_by_text("plant.belt_speed: 40 mm/s to 20 mm/s")).to_be_visible()
+    # What was refused, or scrolled over, has changed nothing: this is the only change.
+    only = re.compile("plant.belt_speed: 40 mm/s to 20 mm/s$")
+    expect(events(page).get_by_text(CHANGED)).to_have_text([only])
     expect(page.get_by_role("button", name="10 periods")).to_have_attribute("aria-pressed", "true")
 
     # All that is shown stays as it is when the system changes to dark.
