@@ -39,7 +39,7 @@ from stickslip_ros.record.codec import unpack_header
 from stickslip_ros.record.reader import Recording
 from stickslip_ros.record.topics import JOINT_STATES, RECORDED, Topic
 from stickslip_ros.scenarios.files import DEFAULT_NAMESPACE, load_scenario
-from stickslip_ros.scenarios.parameters import PlantParameters
+from stickslip_ros.scenarios.plant_parameters import PlantParameters
 from stickslip_ros.stamps import NANOSECONDS
 
 SCENARIO = "feed_drive"

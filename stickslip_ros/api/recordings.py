@@ -29,7 +29,8 @@ from stickslip_ros.record.table_columns import TableFormat
 from stickslip_ros.record.table_file import is_table
 from stickslip_ros.samples import NO_FORCES, NO_SAMPLES, ForceColumns, SampleColumns
 from stickslip_ros.scenarios.curve_file import CURVES, as_pairs
-from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, PlantParameters
+from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
+from stickslip_ros.scenarios.plant_parameters import PlantParameters
 from stickslip_ros.show.measure_table import doubt, measures_text, report_tables
 from stickslip_ros.show.parameter_tables import recorded_tables
 from stickslip_ros.show.quantities import Units

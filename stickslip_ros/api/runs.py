@@ -26,7 +26,7 @@ from stickslip_ros.motion.trajectory import (
 from stickslip_ros.progress import Progress
 from stickslip_ros.quantities import number_of
 from stickslip_ros.scenarios.files import Scenario
-from stickslip_ros.scenarios.parameters import PlantParameters
+from stickslip_ros.scenarios.plant_parameters import PlantParameters
 from stickslip_ros.show.measure_table import measures_text, simulation_tables
 from stickslip_ros.show.parameter_tables import scenario_tables
 from stickslip_ros.show.quantities import Units

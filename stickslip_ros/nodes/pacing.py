@@ -17,7 +17,7 @@ from stickslip_ros.motion.sampled_loop import SampledLoop
 from stickslip_ros.nodes.base.managed import ManagedNode
 from stickslip_ros.record.topics import RECORDED, force_topics
 from stickslip_ros.samples import Sample
-from stickslip_ros.scenarios.parameters import PlantParameters
+from stickslip_ros.scenarios.plant_parameters import PlantParameters
 
 Publish = Callable[[Sample], None]
 

@@ -23,7 +23,8 @@ from stickslip_ros.nodes.forecast import FORECAST_DURATION, Forecast
 from stickslip_ros.nodes.pacing import NO_FORCE, LockstepPacer, RealtimePacer, TimingMonitor
 from stickslip_ros.record import codec, topics
 from stickslip_ros.samples import Sample
-from stickslip_ros.scenarios.parameters import Pace, PlantParameters
+from stickslip_ros.scenarios import Pace
+from stickslip_ros.scenarios.plant_parameters import PlantParameters
 from stickslip_ros.stamps import END_OF_TIME, NANOSECONDS
 
 

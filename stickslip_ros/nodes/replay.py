@@ -26,7 +26,8 @@ from stickslip_ros.nodes.pacing import FlowWindow
 from stickslip_ros.nodes.replaying.player import Message, Player
 from stickslip_ros.nodes.replaying.selection import Selection
 from stickslip_ros.record.topics import CLOCK, JOINT_STATES, RECORDED
-from stickslip_ros.scenarios.parameters import PlantParameters, ReplayParameters
+from stickslip_ros.scenarios.parameters import ReplayParameters
+from stickslip_ros.scenarios.plant_parameters import PlantParameters
 from stickslip_ros.stamps import NANOSECONDS
 
 _FLOW_WINDOW = PlantParameters().flow_window

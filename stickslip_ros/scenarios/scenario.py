@@ -17,9 +17,9 @@ from stickslip_ros.scenarios.parameters import (
     NODE_PARAMETERS,
     AnalyzerParameters,
     ControllerParameters,
-    PlantParameters,
     known_law,
 )
+from stickslip_ros.scenarios.plant_parameters import PlantParameters
 from stickslip_ros.tables import TextTable
 
 FILE, BASE, OVERRIDE, DEFAULT = "file", "base", "override", "default"

@@ -9,7 +9,7 @@ import numpy as np
 from stickslip_ros.identification.findings import Findings
 from stickslip_ros.identification.fit import QUANTILE, Estimate, Fit
 from stickslip_ros.identification.sentences import unidentified
-from stickslip_ros.scenarios.parameters import PlantParameters
+from stickslip_ros.scenarios.plant_parameters import PlantParameters
 from stickslip_ros.show.quantities import PREDICTIONS, SI, Units
 from stickslip_ros.tables import TextTable
 

@@ -20,7 +20,7 @@ from stickslip_ros.motion.controller import Controller, answer
 from stickslip_ros.motion.sampled_loop import LOCKSTEP_START, SampledLoop
 from stickslip_ros.quantities import Quantity
 from stickslip_ros.samples import Sample
-from stickslip_ros.scenarios.parameters import PlantParameters
+from stickslip_ros.scenarios.plant_parameters import PlantParameters
 from stickslip_ros.stamps import NANOSECONDS
 from stickslip_ros.theory.cycle_bounds import loading_time, release_position
 from stickslip_ros.theory.linear_sampled_loop import SETTLED

@@ -20,7 +20,7 @@ from stickslip_ros.motion import RecordedMotion
 from stickslip_ros.motion.controller import Controller, ReferenceSource, answer, no_reference
 from stickslip_ros.motion.simulation import measure_block, simulate_sampled
 from stickslip_ros.scenarios.files import Scenario
-from stickslip_ros.scenarios.parameters import PlantParameters
+from stickslip_ros.scenarios.plant_parameters import PlantParameters
 from stickslip_ros.studies.options import DEFAULT_PERIODS, LONGEST, SettlingOptions
 from stickslip_ros.theory.cycle_bounds import loading_time, release_position
 

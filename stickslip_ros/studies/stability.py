@@ -16,7 +16,7 @@ from stickslip_ros.model.drive import Drive
 from stickslip_ros.model.drive_layout import POSITION, SPEED
 from stickslip_ros.model.friction import Stribeck
 from stickslip_ros.scenarios.files import Scenario
-from stickslip_ros.scenarios.parameters import PlantParameters
+from stickslip_ros.scenarios.plant_parameters import PlantParameters
 from stickslip_ros.studies.spread import Spread, check_spread, drawn, spread_text
 from stickslip_ros.text import quantity
 from stickslip_ros.theory.bifurcation_branches import BifurcationBranches

@@ -16,7 +16,7 @@ from stickslip_ros.nodes.pacing import RealtimePacer, TimingMonitor
 from stickslip_ros.nodes.plant import PlantNode
 from stickslip_ros.record.report import report_of_recording
 from stickslip_ros.samples import Sample
-from stickslip_ros.scenarios.parameters import PlantParameters
+from stickslip_ros.scenarios.plant_parameters import PlantParameters
 from tests.nodes.graph import PATIENCE, Graph
 
 MILLISECOND = 1e-3

@@ -22,7 +22,8 @@ from stickslip_ros.record.topics import (
     JOINT_STATES,
     RECORDED,
 )
-from stickslip_ros.scenarios.parameters import CONTROLLER_PARAMETERS, PlantParameters
+from stickslip_ros.scenarios.parameters import CONTROLLER_PARAMETERS
+from stickslip_ros.scenarios.plant_parameters import PlantParameters
 from tests.nodes.graph import Graph
 
 SECOND = 1_000_000_000

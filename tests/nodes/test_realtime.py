@@ -25,7 +25,7 @@ from stickslip_ros.nodes.plant import PlantNode
 from stickslip_ros.record.reader import Recording
 from stickslip_ros.record.report import report_of_recording
 from stickslip_ros.record.topics import DEEP, JOINT_STATES, RECORDER_DEPTH
-from stickslip_ros.scenarios.parameters import PlantParameters
+from stickslip_ros.scenarios.plant_parameters import PlantParameters
 from tests.nodes.graph import Graph, wait_for
 from tests.nodes.processes import Processes
 from tests.nodes.samples import Samples

@@ -17,7 +17,7 @@ from stickslip_ros.record.codec import joint_state_columns
 from stickslip_ros.record.topics import CLOCK, JOINT_COMMANDS, JOINT_STATES, force_topics
 from stickslip_ros.samples import SampleColumns
 from stickslip_ros.scenarios.files import load_scenario
-from stickslip_ros.scenarios.parameters import PlantParameters
+from stickslip_ros.scenarios.plant_parameters import PlantParameters
 from tests.nodes.graph import PATIENCE, Graph
 from tests.nodes.ros2_control import HardwareInterface
 

@@ -7,7 +7,7 @@ import pytest
 
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.scenarios.files import load_scenario
-from stickslip_ros.scenarios.parameters import PlantParameters
+from stickslip_ros.scenarios.plant_parameters import PlantParameters
 
 
 def scenario_file(folder: Path, text: str) -> str:

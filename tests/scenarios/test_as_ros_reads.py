@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.scenarios.files import load_scenario, parameter_file
-from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, PlantParameters
+from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
+from stickslip_ros.scenarios.plant_parameters import PlantParameters
 from stickslip_ros.scenarios.sections import read_file
 from tests.examples import examples
 from tests.scenarios.conftest import OWN, ReadByRos

@@ -17,7 +17,7 @@ from stickslip_ros.model.control import CONTROL_LAWS
 from stickslip_ros.model.drive import Drive
 from stickslip_ros.model.friction import LAWS, Directional, Linear, Table
 from stickslip_ros.motion import Motion
-from stickslip_ros.scenarios import friction_parameters, parameters
+from stickslip_ros.scenarios import friction_parameters, parameters, plant_parameters
 from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.scenarios.foreign_laws import (
     CONTROLLERS,
@@ -27,7 +27,7 @@ from stickslip_ros.scenarios.foreign_laws import (
     check_control_law,
     check_friction_law,
 )
-from stickslip_ros.scenarios.parameters import NodeParameters
+from stickslip_ros.scenarios.node_parameters import NodeParameters
 from tests.scenarios.foreign_laws import BRAKE, FALLING, write_package
 
 Install = Callable[..., None]
@@ -69,11 +69,12 @@ def parameters_anew() -> ModuleType:
     spec = importlib.util.spec_from_file_location("parameters_anew", parameters.__file__)
     module = importlib.util.module_from_spec(spec)
     sys.modules[spec.name] = module
-    present = sys.modules.pop(friction_parameters.__name__)
+    present = [sys.modules.pop(made.__name__) for made in (friction_parameters, plant_parameters)]
     try:
         spec.loader.exec_module(module)
     finally:
-        sys.modules[present.__name__] = scenarios.friction_parameters = present
+        sys.modules |= {made.__name__: made for made in present}
+        scenarios.friction_parameters, scenarios.plant_parameters = present
     return module
 
 

@@ -10,7 +10,7 @@ from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.model.constants import constants_of
 from stickslip_ros.model.friction import LAWS, Directional, Exponential, Stribeck, Table
 from stickslip_ros.scenarios.files import load_scenario, parameter_file
-from stickslip_ros.scenarios.parameters import PlantParameters
+from stickslip_ros.scenarios.plant_parameters import PlantParameters
 from stickslip_ros.scenarios.template import commented_file, scenario_schema
 from tests.scenarios.files import plant, refusal, scenario_file, section
 

@@ -15,12 +15,9 @@ from stickslip_ros.model.friction import LAWS
 from stickslip_ros.model.sensor import EXACT_SENSOR, MeasuredVelocity, Sensor
 from stickslip_ros.motion import Motion
 from stickslip_ros.scenarios.files import load_scenario
-from stickslip_ros.scenarios.parameters import (
-    NODE_PARAMETERS,
-    ControllerParameters,
-    NodeParameters,
-    PlantParameters,
-)
+from stickslip_ros.scenarios.node_parameters import NodeParameters
+from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, ControllerParameters
+from stickslip_ros.scenarios.plant_parameters import PlantParameters
 from tests.examples import examples
 
 # Only while a node is not active; every physical parameter and gain can be set at any time.

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from stickslip_ros.scenarios.files import load_scenario, shipped_scenarios
-from stickslip_ros.scenarios.parameters import PlantParameters
+from stickslip_ros.scenarios.plant_parameters import PlantParameters
 from stickslip_ros.scenarios.signal_parameters import ReferenceParameters
 from stickslip_ros.scenarios.template import commented_file
 from tests.scenarios.files import refusal, scenario_file, section

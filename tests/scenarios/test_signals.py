@@ -8,7 +8,7 @@ import pytest
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.model.signals import NO_SIGNAL, impulse, ramp, sine, step, table, trapezoid
 from stickslip_ros.scenarios.files import load_scenario
-from stickslip_ros.scenarios.parameters import PlantParameters
+from stickslip_ros.scenarios.plant_parameters import PlantParameters
 from tests.scenarios.files import plant, refusal, scenario_file, section
 
 POINTS = table([(0.0, 0.0), (1.0, 0.5), (3.0, -0.25)])

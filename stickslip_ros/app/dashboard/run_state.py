@@ -18,9 +18,9 @@ from stickslip_ros.scenarios.parameters import (
     CONTROLLER_PARAMETERS,
     DEFAULT_LAW,
     NODE_PARAMETERS,
-    PlantParameters,
     controller_node,
 )
+from stickslip_ros.scenarios.plant_parameters import PlantParameters
 from stickslip_ros.show.quantities import Units
 from stickslip_ros.stamps import NANOSECONDS
 from stickslip_ros.text import number_in

@@ -18,7 +18,8 @@ from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import InvalidInputError, StickslipError
 from stickslip_ros.model.drive import Drive
 from stickslip_ros.nodes.base.child_process import end_with
-from stickslip_ros.scenarios.parameters import CONTROLLER_PARAMETERS, PlantParameters
+from stickslip_ros.scenarios.parameters import CONTROLLER_PARAMETERS
+from stickslip_ros.scenarios.plant_parameters import PlantParameters
 from stickslip_ros.theory.bifurcation_branches import BifurcationBranches
 from stickslip_ros.theory.gain_intervals import gains_of, why_no_gains
 from stickslip_ros.theory.linear_sampled_loop import LinearSampledLoop, why_no_linear_loop
