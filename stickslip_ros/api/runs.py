@@ -147,12 +147,14 @@ def loop_facts(
     """
     # These take long.
     from stickslip_ros.api.design import gains_text
-    from stickslip_ros.studies.stability import SEARCHED_FEEDS, stable_feeds
+    from stickslip_ros.theory.stability_map import SEARCHED_FEEDS, stable_feeds
 
     units = Units.for_drive(plant.as_drive())
     varied = f", with a signal ({plant.belt.kind})" * (plant.belt.kind != "none")
     facts = {"belt speed": units.text(plant.belt_speed, "m/s") + varied}
-    ranges = stable_feeds(plant, law) if sampled or law is None else None
+    ranges = None
+    if sampled or law is None:
+        ranges = stable_feeds(plant.as_drive(), law, plant.linear_sampling)
     if ranges is not None:
         ends = tuple(share * plant.belt_speed for share in SEARCHED_FEEDS)
         *shown, searched = (

@@ -14,7 +14,8 @@ from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.show.parameter_tables import scenario_tables
 from stickslip_ros.show.study_tables import stability_tables
 from stickslip_ros.studies import stability as stabilities
-from stickslip_ros.theory.linear_system import LinearSystem
+from stickslip_ros.theory.linear_sampled_loop import LinearSampledLoop
+from stickslip_ros.theory.linear_system import LinearSystem, continuous_system, sampled_system
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -49,12 +50,18 @@ class Stability(Result):
     @property
     def continuous_system(self) -> LinearSystem | None:
         """Matrices of the linear loop with continuous control; None if there is none."""
-        return stabilities.linear_systems(self.scenario)[0]
+        law = self.scenario.control_law
+        control = None if law is None else law.continuous
+        return control and continuous_system(self.scenario.plant.as_drive(), control)
 
     @property
     def sampled_system(self) -> LinearSystem | None:
         """Matrices of the linear loop as the nodes run it; None if there is none."""
-        return stabilities.linear_systems(self.scenario)[1]
+        plant, law = self.scenario.plant, self.scenario.control_law
+        loop = LinearSampledLoop.from_drive(plant.as_drive(), *plant.linear_sampling)
+        if loop is None or law is None or law.linear_feedback(1.0 / plant.control_rate) is None:
+            return None
+        return sampled_system(loop, law)
 
     def to_control(self) -> Any:
         """Return the sampled linear loop as a system of python-control.
@@ -98,11 +105,11 @@ class Stability(Result):
 
     @override
     def draw(self, style: "FigureStyle") -> "Figure":
-        reason = stabilities.why_no_figure(self.scenario)
+        from stickslip_ros.show.stability_figure import scenario_stability_figure, why_no_figure
+
+        reason = why_no_figure(self.scenario)
         if reason is not None:
             raise InvalidInputError(f"there is nothing to draw: {reason}")
-        from stickslip_ros.show.stability_figure import scenario_stability_figure
-
         return scenario_stability_figure(self.scenario, style=style)
 
     @override

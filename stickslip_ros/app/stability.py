@@ -28,11 +28,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> None:
     """Run the command."""
     from stickslip_ros.api.theory import stability
-    from stickslip_ros.studies.stability import why_no_figure
 
     scenario = scenario_of(arguments)
     check_results(arguments)
     if arguments.plot is not None:
+        from stickslip_ros.show.stability_figure import why_no_figure
+
         reason = why_no_figure(scenario)
         if reason is not None:
             raise InvalidInputError(f"--plot {arguments.plot}: there is nothing to draw: {reason}")

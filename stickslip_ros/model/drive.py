@@ -13,6 +13,7 @@ from stickslip_ros.model.constants import Scales, constant, scaled
 from stickslip_ros.model.friction import FrictionLaw, Stribeck
 from stickslip_ros.model.motor import Motor
 from stickslip_ros.model.signals import NO_SIGNAL, Signal
+from stickslip_ros.text import quantity
 
 UNBOUNDED_SPEED = 1e3
 """Dimensionless speed of the slide above which the motion counts as unbounded, and ends."""
@@ -261,3 +262,8 @@ def in_units_of(unit: Drive, drive: Drive) -> ScaledDrive:
     """Return a drive in the units of another one, of the same normal force."""
     parts = {name: getattr(drive, name) for name in Drive.__dataclass_fields__}
     return ScaledDrive(**parts, unit=unit)
+
+
+def number_text(drive: Drive, value: float, unit: str) -> str:
+    """Return a number for a sentence, with its unit, which a dimensionless drive has not."""
+    return f"{value:.4g}" if drive.is_dimensionless else quantity(value, unit)

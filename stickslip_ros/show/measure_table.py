@@ -206,7 +206,7 @@ def why_no_cycle(regime: str | None, duration: float, drive: Drive | None) -> st
     likely = abs(drive.belt_speed) < _LARGEST_RATIO * drive.speed_scale
     if duration < 3.0 * period < inf and likely:
         return f"{said}: the natural period is {units.text(period, 's')}, so run it for longer"
-    from stickslip_ros.studies.stability import hopf_distance, hopf_ratio  # it takes long
+    from stickslip_ros.theory.hopf import hopf_distance, hopf_ratio  # it takes long
 
     ratio = hopf_ratio(drive)
     if ratio is not None and not 1.0 / _LARGEST_RATIO < ratio < _LARGEST_RATIO:

@@ -36,8 +36,14 @@ from stickslip_ros.show.style import (
     title_of,
 )
 from stickslip_ros.studies.design import Design
-from stickslip_ros.studies.stability import bifurcation_branches, stability_map
 from stickslip_ros.theory.bifurcation_branches import BifurcationBranches, Branch
+from stickslip_ros.theory.gain_intervals import gains_of, why_no_gains
+from stickslip_ros.theory.linear_sampled_loop import (
+    LONGEST_DELAY,
+    LinearSampledLoop,
+    why_no_linear_loop,
+)
+from stickslip_ros.theory.requirements import ONE_MASS, covered, require
 from stickslip_ros.theory.stability_map import CriticalGainCurves, StabilityMap
 
 _UNSTABLE = "#E4E4E4"
@@ -73,16 +79,47 @@ _SAME_MARK_DISTANCE = 1e-3
 """Relative distance of two belt speeds below which one mark serves for both."""
 
 
+def why_no_figure(scenario: Scenario) -> str | None:
+    """Return why there is no figure; None if there is one.
+
+    A map needs a linear sampled loop, the bifurcation diagram without control a drive that the
+    search for limit cycles covers.
+    """
+    plant, law = scenario.plant, scenario.control_law
+    if law is None:
+        return covered(lambda: BifurcationBranches.check(plant.as_drive()))[1]
+    drive = plant.as_drive()
+    no_loop = why_no_linear_loop(drive, *plant.linear_sampling)
+    _, no_map = covered(lambda: require("the stability map", drive, ONE_MASS))
+    return no_loop or why_no_gains(law) or no_map
+
+
 def scenario_stability_figure(scenario: Scenario, *, style: FigureStyle = SCREEN) -> Figure:
     """Return the map of a scenario with control, the bifurcation diagram of one without.
 
     Call it only if `why_no_figure` returns None.
     """
     if scenario.control_law is None:
+        branches = BifurcationBranches.around(scenario.plant.as_drive())
         title = title_of("Bifurcation diagram", scenario, ["plant.belt_speed"])
-        return branches_figure(bifurcation_branches(scenario), title=title, style=style)
+        return branches_figure(branches, title=title, style=style)
     title = title_of("Stability of the sampled loop", scenario)
-    return stability_figure(*stability_map(scenario), title=title, style=style)
+    return stability_figure(*_stability_map(scenario), title=title, style=style)
+
+
+def _stability_map(scenario: Scenario) -> tuple[StabilityMap, CriticalGainCurves]:
+    """Return the map of decay rates of the sampled loop, and the critical gains over the delay."""
+    plant = scenario.plant
+    drive, gains = plant.as_drive(), gains_of(scenario.control_law)
+    loop = LinearSampledLoop.from_drive(drive, *plant.linear_sampling)
+    assert loop is not None
+    assert gains is not None
+    rates = plant.control_rate * np.array((0.1, 0.3, 1.0))
+    latest = min(0.2 * drive.natural_period, LONGEST_DELAY / rates.max())
+    delays = np.linspace(0.0, latest, 41)
+    sampling = rates, delays, plant.sensor, plant.answer_every
+    curves = CriticalGainCurves.over(drive, gains.corner_frequency, *sampling)
+    return StabilityMap.around(loop, gains), curves
 
 
 @styled

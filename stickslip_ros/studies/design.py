@@ -14,7 +14,7 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.model.control import ControlLaw, Washout
-from stickslip_ros.model.drive import Drive
+from stickslip_ros.model.drive import Drive, number_text
 from stickslip_ros.progress import Progress
 from stickslip_ros.scenarios.files import Scenario, parameter_file
 from stickslip_ros.scenarios.sections import BASE_SECTION
@@ -23,7 +23,6 @@ from stickslip_ros.studies.controller_trial import FILTER_SETTLED, Vibration
 from stickslip_ros.studies.design_trial import Check, Task, Trial
 from stickslip_ros.studies.gain_search import rounded
 from stickslip_ros.studies.spread import drawn, held_interval
-from stickslip_ros.studies.stability import number_text
 from stickslip_ros.studies.tuned_gains import Tuned
 from stickslip_ros.studies.tuning import NEAR, RESERVE, Tuning
 from stickslip_ros.theory.linear_sampled_loop import (

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Self
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.model.constants import LARGEST, SMALLEST
 from stickslip_ros.model.control import ControlLaw, Washout
-from stickslip_ros.model.drive import Drive
+from stickslip_ros.model.drive import Drive, number_text
 from stickslip_ros.quantities import Quantity
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.studies.case_outcome import Disturbance, simulate_case
@@ -17,7 +17,6 @@ from stickslip_ros.studies.controller_trial import FILTER_SETTLED, Rest, Vibrati
 from stickslip_ros.studies.drive_loops import DriveLoops, linear_part
 from stickslip_ros.studies.options import FEED_TOLERANCE, OWN_SPEED_RANGE
 from stickslip_ros.studies.spread import Spread, check_spread
-from stickslip_ros.studies.stability import number_text
 from stickslip_ros.studies.tuned_gains import Goal
 from stickslip_ros.theory.linear_sampled_loop import (
     settling_time,

@@ -12,12 +12,12 @@ from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.measures.cycle_measures import Regime
 from stickslip_ros.model.control import ControlLaw, LinearFeedback, Washout
-from stickslip_ros.model.drive import Drive
+from stickslip_ros.model.drive import Drive, number_text
 from stickslip_ros.model.drive_layout import POSITION, SPEED
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.studies.controller_trial import Bench, Vibration
-from stickslip_ros.studies.stability import hopf_distance, hopf_ratio, number_text
 from stickslip_ros.studies.tuned_gains import Goal, Limit, Tuned
+from stickslip_ros.theory.hopf import hopf_distance, hopf_ratio
 from stickslip_ros.theory.linear import jacobians
 from stickslip_ros.theory.linear_sampled_loop import LinearSampledLoop, why_no_linear_loop
 from stickslip_ros.theory.loop_response import LoopResponse, PlantResponse

@@ -1,25 +1,20 @@
 """Stability of a scenario by theory, without a simulation of it."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from math import inf, isclose, isnan
 from operator import attrgetter
-from typing import Any, NamedTuple, TypeVar, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
-from scipy.optimize import bisect
 
-from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.model.actuator import IDEAL_ACTUATOR
 from stickslip_ros.model.control import ControlLaw
-from stickslip_ros.model.drive import Drive
+from stickslip_ros.model.drive import Drive, number_text
 from stickslip_ros.model.drive_layout import POSITION, SPEED
 from stickslip_ros.model.friction import Stribeck
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.scenarios.plant_parameters import PlantParameters
 from stickslip_ros.studies.spread import Spread, check_spread, drawn, spread_text
-from stickslip_ros.text import quantity
-from stickslip_ros.theory.bifurcation_branches import BifurcationBranches
 from stickslip_ros.theory.critical_gains import (
     critical_gains,
     limit_cycle_from_hopf,
@@ -30,26 +25,20 @@ from stickslip_ros.theory.hopf import HopfPoint, hopf_points
 from stickslip_ros.theory.limit_cycles import limit_cycle_of_run, limit_cycles
 from stickslip_ros.theory.linear import Expansion, expand
 from stickslip_ros.theory.linear_sampled_loop import (
-    LONGEST_DELAY,
     LinearSampledLoop,
     not_linear,
     settling_time,
     why_no_linear_loop,
 )
-from stickslip_ros.theory.linear_system import LinearSystem, continuous_system, sampled_system
 from stickslip_ros.theory.requirements import (
     AUTONOMOUS,
     ONE_DEGREE,
-    ONE_MASS,
     SMOOTH,
-    NotCoveredError,
+    covered,
     require,
 )
 from stickslip_ros.theory.shooting import LimitCycle
-from stickslip_ros.theory.stability_map import CriticalGainCurves, StabilityMap
 from stickslip_ros.theory.sticking import sticking_onset
-
-_Found = TypeVar("_Found")
 
 Section = dict[str, Any]
 Notes = dict[str, str]
@@ -57,9 +46,6 @@ Notes = dict[str, str]
 
 _DRIVES = 100
 """Drives that are drawn for an interval."""
-
-SEARCHED_FEEDS = (0.1, 10.0)
-"""First and last belt speed at which a loop is looked at, as shares of that of its drive."""
 
 _NO_CONTROL = "the scenario has no controller"
 
@@ -89,7 +75,7 @@ def stability(scenario: Scenario, spread: Spread = 0.0) -> tuple[Section, Notes]
     plant = scenario.plant
     drive = plant.as_drive()
     require("the theory of stability", drive, AUTONOMOUS)
-    law, (expansion, lack) = scenario.control_law, _covered(lambda: expand(drive))
+    law, (expansion, lack) = scenario.control_law, covered(lambda: expand(drive))
     position = drive.equilibrium_position if expansion else None
     section, notes = _separated(
         {
@@ -145,10 +131,10 @@ def _held(drive: Drive) -> str | None:
     if drive.belt_speed:
         return None
     reach = float(max(drive.friction.limits)) * (drive.normal_force / drive.stiffness)
-    shown = f"{reach:.4g}" if drive.is_dimensionless else quantity(reach, "m")
     return (
         "the belt is at rest, and friction holds the slide anywhere within mu_s N / k = "
-        f"{shown}" + (" of bias_force / k" if drive.bias_force else "")
+        + number_text(drive, reach, "m")
+        + (" of bias_force / k" if drive.bias_force else "")
     )
 
 
@@ -173,14 +159,6 @@ def _omitted(plant: PlantParameters) -> str | None:
     return "; ".join(sentences) or None
 
 
-def _covered(function: Callable[[], _Found]) -> tuple[_Found | None, str | None]:
-    """Return what a function returns, or else why it refuses the drive."""
-    try:
-        return function(), None
-    except NotCoveredError as error:
-        return None, str(error)
-
-
 def _eigenvalues(drive: Drive, expansion: Expansion | None, reason: str | None) -> Section:
     if expansion is None:
         names = ("equilibrium_position", "eigenvalues", "stable")
@@ -199,7 +177,7 @@ def _open_loop(drive: Drive, expansion: Expansion | None, lack: str | None) -> S
         nothing = _eigenvalues(drive, None, None) | _hopf_points([])
         return _Noted({**nothing, "limit_cycles": []}, lack)
     points = hopf_points(drive)
-    cycles, reason = _covered(lambda: limit_cycles(drive))
+    cycles, reason = covered(lambda: limit_cycles(drive))
     if not cycles and reason is None:
         reason = "no periodic motion was found, or the drive is too stiff to integrate"
     return {
@@ -238,7 +216,7 @@ def _known(value: float) -> float | None:
 
 
 def _sticking(drive: Drive) -> Section | _Noted:
-    onset, reason = _covered(lambda: sticking_onset(drive))
+    onset, reason = covered(lambda: sticking_onset(drive))
     if onset is None:
         return _Noted(dict.fromkeys(_STICKING), reason)
     lowest, highest = onset.followed
@@ -265,14 +243,14 @@ def _closed_loop(drive: Drive, law: ControlLaw | None, plant: PlantParameters) -
         lack = f"the control law {law.name} has no equations for continuous control"
     points: list[HopfPoint] | None = None
     if control is not None:
-        points, lack = _covered(lambda: hopf_points(drive, control))
+        points, lack = covered(lambda: hopf_points(drive, control))
     if law is None or control is None or points is None:
         nothing = _eigenvalues(drive, None, None) | dict.fromkeys(_GAINS) | _hopf_points([])
         return _Noted({**nothing, "limit_cycles": []}, lack)
     no_hopf_speed = (
         "with these gains no pair of eigenvalues crosses the imaginary axis at any belt speed"
     )
-    possible, reason = _covered(
+    possible, reason = covered(
         lambda: (
             limit_cycle_from_hopf(drive, control) if drive.motor is None else None,
             limit_cycle_of_run(drive, 0.0, control=control),
@@ -317,7 +295,7 @@ def _sampled_loop(drive: Drive, law: ControlLaw | None, plant: PlantParameters) 
     if loop is None or law.linear_feedback(1.0 / plant.control_rate) is None:
         reason = why_no_linear_loop(drive, *plant.linear_sampling)
         return _Noted(dict.fromkeys(_SAMPLED_LOOP), reason or not_linear(law.name))
-    radius, lack = _covered(lambda: loop.spectral_radius(law))
+    radius, lack = covered(lambda: loop.spectral_radius(law))
     if radius is None:
         return _Noted(dict.fromkeys(_SAMPLED_LOOP), lack)
     growing = "a deviation from the equilibrium does not decay" if radius >= 1.0 else None
@@ -325,59 +303,6 @@ def _sampled_loop(drive: Drive, law: ControlLaw | None, plant: PlantParameters) 
     settling = _Noted(settling_time(rate), growing)
     values = radius, radius < 1.0, rate, settling, *_sampled_gains(loop, law)
     return _Noted(dict(zip(_SAMPLED_LOOP, values, strict=True)), _omitted(plant))
-
-
-def stable_feeds(
-    plant: PlantParameters, law: ControlLaw | None
-) -> list[tuple[float, float]] | None:
-    """Return the ranges of belt speeds, m/s, at which a small vibration decays by linear theory.
-
-    Searched are those from `SEARCHED_FEEDS[0]` to `SEARCHED_FEEDS[1]` times the belt speed; a range
-    that ends there may be wider. Without a `law` there is no control. None if the belt is at rest,
-    or if linear theory does not cover the loop.
-    """
-    drive = plant.as_drive()
-
-    def is_stable(speed: float) -> bool:
-        moved = replace(drive, belt_speed=speed)
-        if law is None:
-            expansion = expand(moved)
-            return expansion is not None and bool(expansion.stable)
-        loop = LinearSampledLoop.from_drive(moved, *plant.linear_sampling)
-        return loop is not None and loop.spectral_radius(law) < 1.0
-
-    def sign(speed: float) -> float:
-        return 1.0 if is_stable(speed) else -1.0
-
-    if not drive.belt_speed:
-        return None
-    speeds = (drive.belt_speed * np.geomspace(*SEARCHED_FEEDS, 100)).tolist()
-    try:
-        known = [is_stable(speed) for speed in speeds]
-    except InvalidInputError:
-        return None
-    ends = speeds[:1] * known[0]
-    for low, high, *states in zip(speeds, speeds[1:], known, known[1:], strict=False):
-        if states[0] != states[1]:
-            ends.append(bisect(sign, low, high, rtol=1e-4))
-    ends += speeds[-1:] * known[-1]
-    return [*zip(ends[::2], ends[1::2], strict=True)]
-
-
-def linear_systems(scenario: Scenario) -> tuple[LinearSystem | None, LinearSystem | None]:
-    """Return the linear loop with continuous control, and the sampled one.
-
-    None where `stability` has no eigenvalues and no spectral radius. Raises as `stability` does.
-    """
-    plant, law = scenario.plant, scenario.control_law
-    drive = plant.as_drive()
-    require("the theory of stability", drive, AUTONOMOUS)
-    control = None if law is None else law.continuous
-    continuous = None if control is None else continuous_system(drive, control)
-    loop = LinearSampledLoop.from_drive(drive, *plant.linear_sampling)
-    if loop is None or law is None or law.linear_feedback(1.0 / plant.control_rate) is None:
-        return continuous, None
-    return continuous, sampled_system(loop, law)
 
 
 def _sampled_gains(loop: LinearSampledLoop, law: ControlLaw) -> tuple[_Noted, _Noted]:
@@ -400,7 +325,7 @@ def _sampled_gains(loop: LinearSampledLoop, law: ControlLaw) -> tuple[_Noted, _N
 
 def _closed_forms(drive: Drive, section: Section) -> Section | _Noted:
     """Return the quantities with a closed form under the cubic Stribeck law, of those found."""
-    _, lack = _covered(lambda: require("the closed form", drive, *ONE_DEGREE))
+    _, lack = covered(lambda: require("the closed form", drive, *ONE_DEGREE))
     lack = lack or _held(drive)
     if lack is None and not isinstance(drive.friction, Stribeck):
         lack = "closed forms exist for the cubic Stribeck law only"
@@ -430,78 +355,3 @@ def _cycle(cycle: LimitCycle) -> Section:
         "period": cycle.period,  # the measures of the smallest cycles have none
         "frequency": 1.0 / cycle.period,
     }
-
-
-def why_no_figure(scenario: Scenario) -> str | None:
-    """Return why there is no figure; None if there is one.
-
-    A map needs a linear sampled loop, the bifurcation diagram without control a drive that the
-    search for limit cycles covers.
-    """
-    plant, law = scenario.plant, scenario.control_law
-    if law is None:
-        return _covered(lambda: BifurcationBranches.check(plant.as_drive()))[1]
-    drive = plant.as_drive()
-    no_loop = why_no_linear_loop(drive, *plant.linear_sampling)
-    _, no_map = _covered(lambda: require("the stability map", drive, ONE_MASS))
-    return no_loop or why_no_gains(law) or no_map
-
-
-def stability_map(scenario: Scenario) -> tuple[StabilityMap, CriticalGainCurves]:
-    """Return the map of decay rates of the sampled loop, and the critical gains over the delay.
-
-    Call it only with control, and if `why_no_figure` returns None.
-    """
-    plant = scenario.plant
-    drive, gains = plant.as_drive(), gains_of(scenario.control_law)
-    loop = LinearSampledLoop.from_drive(drive, *plant.linear_sampling)
-    assert loop is not None
-    assert gains is not None
-    rates = plant.control_rate * np.array((0.1, 0.3, 1.0))
-    latest = min(0.2 * drive.natural_period, LONGEST_DELAY / rates.max())
-    delays = np.linspace(0.0, latest, 41)
-    sampling = rates, delays, plant.sensor, plant.answer_every
-    curves = CriticalGainCurves.over(drive, gains.corner_frequency, *sampling)
-    return StabilityMap.around(loop, gains), curves
-
-
-def bifurcation_branches(scenario: Scenario) -> BifurcationBranches:
-    """Return equilibria and limit cycles without control over the belt speed.
-
-    Call it only if `why_no_figure` returns None.
-    """
-    return BifurcationBranches.around(scenario.plant.as_drive())
-
-
-def hopf_ratio(drive: Drive) -> float | None:
-    """Return the belt speed over the nearest critical speed; None without one or at zero speed.
-
-    A drive that the theory does not cover has none.
-    """
-    try:
-        speeds = [point.belt_speed for point in hopf_points(drive)]
-    except InvalidInputError:
-        return None
-    speed = abs(drive.belt_speed)
-    if not speeds or speed == 0.0:
-        return None
-    return min((speed / hopf for hopf in speeds), key=lambda ratio: max(ratio, 1.0 / ratio))
-
-
-def hopf_distance(drive: Drive) -> str:
-    """Return a clause on the belt speed and the nearest critical speed, which reveals a wrong unit.
-
-    It is empty without a critical speed.
-    """
-    ratio = hopf_ratio(drive)
-    if ratio is None:
-        return ""
-    speed = abs(drive.belt_speed)
-    here, nearest = (number_text(drive, value, "m/s") for value in (speed, speed / ratio))
-    clause = f"{here} is {ratio:.4g} times the critical speed of {nearest}"
-    return clause if drive.is_dimensionless else f"{clause} (belt speeds are in m/s)"
-
-
-def number_text(drive: Drive, value: float, unit: str) -> str:
-    """Return a number for a sentence, with its unit, which a dimensionless drive has not."""
-    return f"{value:.4g}" if drive.is_dimensionless else quantity(value, unit)

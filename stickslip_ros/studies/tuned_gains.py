@@ -9,12 +9,11 @@ import numpy as np
 import numpy.typing as npt
 
 from stickslip_ros.model.control import ControlLaw
-from stickslip_ros.model.drive import Drive
+from stickslip_ros.model.drive import Drive, number_text
 from stickslip_ros.model.drive_layout import SPEED
 from stickslip_ros.quantities import Quantity, quantities_of
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.studies.case_outcome import Disturbance
-from stickslip_ros.studies.stability import number_text
 from stickslip_ros.theory.linear import jacobians
 from stickslip_ros.theory.loop_response import LoopResponse
 

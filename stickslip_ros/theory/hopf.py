@@ -6,8 +6,9 @@ from math import nan
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray
+from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.model.control import ContinuousControl
-from stickslip_ros.model.drive import Drive
+from stickslip_ros.model.drive import Drive, number_text
 from stickslip_ros.model.functions import zero_between
 from stickslip_ros.theory.linear import Expansion, expand, hurwitz_determinants, jacobians
 from stickslip_ros.theory.requirements import SMOOTH, SYMMETRIC, require_equilibrium
@@ -97,6 +98,35 @@ def hopf_points(drive: Drive, control: ContinuousControl | None = None) -> list[
             )
         )
     return points
+
+
+def hopf_ratio(drive: Drive) -> float | None:
+    """Return the belt speed over the nearest critical speed; None without one or at zero speed.
+
+    A drive that the theory does not cover has none.
+    """
+    try:
+        speeds = [point.belt_speed for point in hopf_points(drive)]
+    except InvalidInputError:
+        return None
+    speed = abs(drive.belt_speed)
+    if not speeds or speed == 0.0:
+        return None
+    return min((speed / hopf for hopf in speeds), key=lambda ratio: max(ratio, 1.0 / ratio))
+
+
+def hopf_distance(drive: Drive) -> str:
+    """Return a clause on the belt speed and the nearest critical speed, which reveals a wrong unit.
+
+    It is empty without a critical speed.
+    """
+    ratio = hopf_ratio(drive)
+    if ratio is None:
+        return ""
+    speed = abs(drive.belt_speed)
+    here, nearest = (number_text(drive, value, "m/s") for value in (speed, speed / ratio))
+    clause = f"{here} is {ratio:.4g} times the critical speed of {nearest}"
+    return clause if drive.is_dimensionless else f"{clause} (belt speeds are in m/s)"
 
 
 def _crosses(expansion: Expansion) -> bool:

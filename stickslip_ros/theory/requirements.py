@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
@@ -9,6 +10,8 @@ from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.model.control import ContinuousControl
 from stickslip_ros.model.control.base import seen_by
 from stickslip_ros.model.drive import Drive
+
+_Result = TypeVar("_Result")
 
 
 class NotCoveredError(InvalidInputError):
@@ -31,6 +34,14 @@ def require(function: str, drive: Drive, *requirements: Requirement) -> None:
         lack = requirement.lack(drive)
         if lack is not None:
             raise NotCoveredError(f"{function} needs {requirement.need}: {lack}")
+
+
+def covered(function: Callable[[], _Result]) -> tuple[_Result | None, str | None]:
+    """Return what a function returns, or else why it refuses the drive."""
+    try:
+        return function(), None
+    except NotCoveredError as error:
+        return None, str(error)
 
 
 def require_equilibrium(

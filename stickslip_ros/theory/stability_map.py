@@ -1,17 +1,23 @@
-"""Stability of the sampled loop over its gains, and over rate and delay."""
+"""Stability of the sampled loop over its gains, over rate and delay, and over the belt speed."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
+from scipy.optimize import bisect
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.model.control import Washout
+from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.model.control import ControlLaw, Washout
 from stickslip_ros.model.drive import Drive
 from stickslip_ros.model.sensor import EXACT_SENSOR, Sensor
 from stickslip_ros.theory.critical_gains import critical_gains
 from stickslip_ros.theory.gain_intervals import nearest_to_zero
+from stickslip_ros.theory.linear import expand
 from stickslip_ros.theory.linear_sampled_loop import LinearSampledLoop
+
+SEARCHED_FEEDS = (0.1, 10.0)
+"""First and last belt speed at which a loop is looked at, as shares of that of its drive."""
 
 
 @dataclass(frozen=True)
@@ -89,3 +95,37 @@ class CriticalGainCurves:
                     order = 1 if interval[0] == interval.critical else -1
                     ends[:, row, column] = interval[::order]
         return cls(rates, force_delays, *ends)
+
+
+def stable_feeds(
+    drive: Drive, law: ControlLaw | None, sampling: tuple[float, float, Sensor, Sensor, int]
+) -> list[tuple[float, float]] | None:
+    """Return the ranges of belt speeds, m/s, at which a small vibration decays by linear theory.
+
+    Searched are those from `SEARCHED_FEEDS[0]` to `SEARCHED_FEEDS[1]` times the belt speed; a range
+    that ends there may be wider. Without a `law` there is no control; `sampling` is what
+    `LinearSampledLoop.from_drive` takes. None if the belt is at rest, or if linear theory does not
+    cover the loop.
+    """
+
+    def is_stable(speed: float) -> bool:
+        moved = replace(drive, belt_speed=speed)
+        if law is None:
+            expansion = expand(moved)
+            return expansion is not None and bool(expansion.stable)
+        loop = LinearSampledLoop.from_drive(moved, *sampling)
+        return loop is not None and loop.spectral_radius(law) < 1.0
+
+    if not drive.belt_speed:
+        return None
+    speeds = (drive.belt_speed * np.geomspace(*SEARCHED_FEEDS, 100)).tolist()
+    try:
+        known = [is_stable(speed) for speed in speeds]
+    except InvalidInputError:
+        return None
+    ends = speeds[:1] * known[0]
+    for low, high, *states in zip(speeds, speeds[1:], known, known[1:], strict=False):
+        if states[0] != states[1]:
+            ends.append(bisect(lambda speed: is_stable(speed) - 0.5, low, high, rtol=1e-4))
+    ends += speeds[-1:] * known[-1]
+    return [*zip(ends[::2], ends[1::2], strict=True)]

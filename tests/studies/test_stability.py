@@ -5,24 +5,15 @@ from dataclasses import replace
 import pytest
 
 from stickslip_ros.model.control import CONTROL_LAWS
-from stickslip_ros.model.friction import Coulomb
-from stickslip_ros.model.signals import sine
 from stickslip_ros.scenarios.files import Scenario, load_scenario
 from stickslip_ros.scenarios.parameters import ControllerParameters
+from stickslip_ros.show.stability_figure import why_no_figure
 from stickslip_ros.show.study_tables import stability_tables
-from stickslip_ros.studies.stability import (
-    Notes,
-    Section,
-    hopf_distance,
-    hopf_ratio,
-    stability,
-    stable_feeds,
-    why_no_figure,
-)
+from stickslip_ros.studies.stability import Notes, Section, stability
 from stickslip_ros.theory.hopf import hopf_points
 from stickslip_ros.theory.linear import expand
 from stickslip_ros.theory.linear_sampled_loop import LinearSampledLoop
-from tests.drives import FEED_DRIVE, PAPER
+from tests.drives import FEED_DRIVE
 from tests.parts import Switching
 
 ONLY = "this exists for the washout law only, and the control law is velocity_feedback"
@@ -128,41 +119,3 @@ def test_the_table_has_what_there_is_and_what_a_lyapunov_coefficient_means() -> 
     found["open_loop"]["first_lyapunov_coefficients"] = [0.5, None]
     jump = "0.5 (hysteresis: the vibration starts with a jump), -"
     assert any(line.endswith(jump) for line in _lines(scenario, found, notes))
-
-
-def test_the_distance_from_the_hopf_speed() -> None:
-    for speed in (40.0, -40.0):
-        drive = replace(FEED_DRIVE, belt_speed=speed)
-        assert hopf_ratio(drive) == pytest.approx(40.0 / 0.048876, rel=1e-4)
-        assert hopf_distance(drive) == (
-            "40 m/s is 818.4 times the critical speed of 48.88 mm/s (belt speeds are in m/s)"
-        )
-    assert hopf_distance(PAPER) == "0.4 is 0.8184 times the critical speed of 0.4888"
-    for drive in (
-        replace(FEED_DRIVE, friction=Coulomb(0.4)),
-        replace(FEED_DRIVE, belt_speed=0.0),
-        replace(FEED_DRIVE, stiffness=0.0),  # not covered by the theory, like the next one
-        replace(FEED_DRIVE, load=sine(amplitude=100.0)),
-    ):
-        assert hopf_ratio(drive) is None
-        assert hopf_distance(drive) == ""
-
-
-def test_the_feeds_that_hold_end_where_a_vibration_starts() -> None:
-    (hopf,) = hopf_points(FEED_DRIVE)
-    drive = load_scenario("feed_drive")
-    ranges = stable_feeds(drive.plant, None)
-    assert ranges is not None
-    ((first, last),) = ranges
-    assert first == pytest.approx(hopf.belt_speed, rel=1e-3)
-    assert last == pytest.approx(0.4)
-    ranges = stable_feeds(drive.plant, drive.control_law)
-    assert ranges is not None
-    ((first, _),) = ranges
-    for speed, stable in ((first * 1.001, True), (first * 0.999, False)):
-        moved = replace(FEED_DRIVE, belt_speed=speed)
-        loop = LinearSampledLoop.from_drive(moved, *drive.plant.linear_sampling)
-        assert loop is not None
-        assert (loop.spectral_radius(drive.controller.control_law) < 1.0) is stable
-    for values in ("plant.belt_speed=0.0", "plant.belt.kind=sine"):
-        assert stable_feeds(load_scenario("feed_drive", [values]).plant, None) is None

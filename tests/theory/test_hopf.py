@@ -9,11 +9,12 @@ import pytest
 from stickslip_ros.model.control import Washout
 from stickslip_ros.model.drive import Drive
 from stickslip_ros.model.friction import Coulomb, Exponential, Linear, Stribeck
+from stickslip_ros.model.signals import sine
 from stickslip_ros.motion import RecordedMotion
 from stickslip_ros.theory.critical_gains import critical_gains
-from stickslip_ros.theory.hopf import hopf_points
+from stickslip_ros.theory.hopf import hopf_distance, hopf_points, hopf_ratio
 from stickslip_ros.theory.linear import expand, hurwitz_determinants, jacobians
-from tests.drives import PAPER, settled
+from tests.drives import FEED_DRIVE, PAPER, settled
 
 
 @pytest.mark.parametrize(("damping", "speed"), [(0.01, sqrt(0.44 / 1.8)), (0.02, 0.48876261)])
@@ -85,3 +86,21 @@ def test_the_coefficient_is_that_of_the_motion_in_the_closed_loop(
     alpha = float(expansion.eigenvalues[0].real)
     amplitude = speed_amplitude(PAPER, above, 12000)
     assert amplitude**2 == pytest.approx(-alpha / critical.first_lyapunov_coefficient, rel=0.01)
+
+
+def test_the_distance_from_the_hopf_speed() -> None:
+    for speed in (40.0, -40.0):
+        drive = replace(FEED_DRIVE, belt_speed=speed)
+        assert hopf_ratio(drive) == pytest.approx(40.0 / 0.048876, rel=1e-4)
+        assert hopf_distance(drive) == (
+            "40 m/s is 818.4 times the critical speed of 48.88 mm/s (belt speeds are in m/s)"
+        )
+    assert hopf_distance(PAPER) == "0.4 is 0.8184 times the critical speed of 0.4888"
+    for drive in (
+        replace(FEED_DRIVE, friction=Coulomb(0.4)),
+        replace(FEED_DRIVE, belt_speed=0.0),
+        replace(FEED_DRIVE, stiffness=0.0),  # not covered by the theory, like the next one
+        replace(FEED_DRIVE, load=sine(amplitude=100.0)),
+    ):
+        assert hopf_ratio(drive) is None
+        assert hopf_distance(drive) == ""
