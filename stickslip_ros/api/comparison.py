@@ -27,11 +27,10 @@ from stickslip_ros.show.parameter_tables import scenario_tables
 from stickslip_ros.show.quantities import Units
 from stickslip_ros.studies.case_outcome import FOLLOWING, OUTCOMES, is_positioning
 from stickslip_ros.studies.comparison import DISTURBANCES, Comparison, Outcomes, compared
-from stickslip_ros.studies.drive_loops import with_law
+from stickslip_ros.studies.drive_loops import Tuned, with_law
 from stickslip_ros.studies.plan import Axis
 from stickslip_ros.studies.runner import CountPoints, compute_columns
 from stickslip_ros.studies.spread import held_interval, spread_text
-from stickslip_ros.studies.tuned_gains import Tuned
 from stickslip_ros.tables import TextTable
 from stickslip_ros.text import must_be_one_of, shown
 from stickslip_ros.theory.linear_sampled_loop import settling_time

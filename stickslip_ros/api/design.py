@@ -21,7 +21,7 @@ from stickslip_ros.show.study_tables import one_below_another, side_by_side
 from stickslip_ros.studies.controller_trial import Rest
 from stickslip_ros.studies.design import Check, Design, Task
 from stickslip_ros.studies.design import design as designed
-from stickslip_ros.studies.tuned_gains import LINEAR
+from stickslip_ros.studies.drive_loops import LINEAR
 from stickslip_ros.text import finite, shown
 
 if TYPE_CHECKING:

@@ -14,13 +14,13 @@ from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.scenarios.parameters import known_law
 from stickslip_ros.studies.case_outcome import Disturbance, Outcome, is_positioning, simulate_case
 from stickslip_ros.studies.design import Task, design
-from stickslip_ros.studies.drive_loops import DriveLoops, with_law
+from stickslip_ros.studies.drive_loops import DriveLoops, Tuned, with_law
+from stickslip_ros.studies.goal import Goal
 from stickslip_ros.studies.options import FEED_TOLERANCE, POSITION_TOLERANCE
 from stickslip_ros.studies.plan import Axis, Grid
 from stickslip_ros.studies.settling import MotionState, check_reference
 from stickslip_ros.studies.spread import Spread, check_spread, drawn
 from stickslip_ros.studies.study import PointStudy
-from stickslip_ros.studies.tuned_gains import Goal, Tuned
 from stickslip_ros.studies.tuning import Tuning
 from stickslip_ros.text import shown
 

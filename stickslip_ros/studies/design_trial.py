@@ -15,12 +15,10 @@ from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.studies.case_outcome import Disturbance, simulate_case
 from stickslip_ros.studies.controller_trial import FILTER_SETTLED, Rest, Vibration
 from stickslip_ros.studies.drive_loops import DriveLoops, linear_part
+from stickslip_ros.studies.goal import Goal
 from stickslip_ros.studies.options import FEED_TOLERANCE, OWN_SPEED_RANGE
 from stickslip_ros.studies.spread import Spread, check_spread
-from stickslip_ros.studies.tuned_gains import Goal
-from stickslip_ros.theory.linear_sampled_loop import (
-    settling_time,
-)
+from stickslip_ros.theory.linear_sampled_loop import settling_time
 from stickslip_ros.theory.requirements import SPRING, require
 
 _PERIODS, _SHORTEST, _WITHOUT_SPRING, _DECAYS = 100.0, 2.0, 6.0, 18.0

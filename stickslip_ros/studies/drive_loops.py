@@ -1,12 +1,13 @@
-"""The sampled loops of a drive at its feeds under a control law, and the limits of its gains."""
+"""The sampled loops of a drive at its feeds under a control law, and what they say of its gains."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import copysign, inf, log10, sqrt
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+import numpy.typing as npt
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import InvalidInputError
@@ -14,21 +15,64 @@ from stickslip_ros.measures.cycle_measures import Regime
 from stickslip_ros.model.control import ControlLaw, LinearFeedback, Washout
 from stickslip_ros.model.drive import Drive, number_text
 from stickslip_ros.model.drive_layout import POSITION, SPEED
+from stickslip_ros.quantities import Quantity, quantities_of
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.studies.controller_trial import Bench, Vibration
-from stickslip_ros.studies.tuned_gains import Goal, Limit, Tuned
+from stickslip_ros.studies.goal import Goal, Limit
 from stickslip_ros.theory.hopf import hopf_distance, hopf_ratio
 from stickslip_ros.theory.linear import jacobians
 from stickslip_ros.theory.linear_sampled_loop import LinearSampledLoop, why_no_linear_loop
 from stickslip_ros.theory.loop_response import LoopResponse, PlantResponse
 from stickslip_ros.theory.requirements import AUTONOMOUS, STATIC, require
 
-_NOISE_SHARE = 0.05
-"""Largest rms force by noise, as a share of the limit, or of the static friction if it is less."""
-_SLOWEST = 0.05
-"""Least decay rate, per natural period or per `_WITHOUT_PERIOD`."""
-_WITHOUT_PERIOD = 0.2
-"""Period, s, of a drive without a spring."""
+
+@dataclass(frozen=True)
+class Tuned:
+    """The gains that were found for a law, and what the linear loops say of them."""
+
+    law: ControlLaw
+    """The law with its gains: the nearest ones if a limit is missed."""
+    goal: Goal
+    """The goal."""
+    decay_rate: Annotated[float, Quantity("smallest decay rate", "1/s")]
+    """Smallest decay rate at the feeds, 1/s."""
+    delay_margin: Annotated[float | None, Quantity("delay margin", "s")] = None
+    """Smallest delay margin, s; None if no delay turns the loop unstable."""
+    phase_margin: Annotated[float | None, Quantity("phase margin", "rad")] = None
+    """Smallest phase margin, rad; None without any."""
+    gain_down: Annotated[float | None, Quantity("lower gain margin")] = None
+    """Largest factor below one of the force at which a loop is unstable; None without any."""
+    gain_up: Annotated[float | None, Quantity("upper gain margin")] = None
+    """Smallest factor above one of the force at which a loop is unstable; None without any."""
+    sensitivity_peak: Annotated[float | None, Quantity("peak of the sensitivity")] = None
+    """Largest magnitude of the sensitivity."""
+    peak_force: Annotated[float | None, Quantity("peak force, predicted", "N")] = None
+    """Largest force, N, by disturbance, mean friction and noise, and of the washout law by the
+    vibration that it catches."""
+    mean_force: Annotated[float | None, Quantity("mean friction that the law carries", "N")] = None
+    """Largest part of it that is constant, N."""
+    noise_force: Annotated[float | None, Quantity("rms force by noise", "N")] = None
+    """Largest rms force by noise and rounding of the encoder, N."""
+    missed: tuple[Limit, ...] = ()
+    """Limits that the gains miss."""
+    remark: str | None = None
+    """Which limits are missed, and by how much, or a caution; or None."""
+    responses: tuple[LoopResponse, ...] = field(default=(), repr=False)
+    """The linear loops at the feeds; empty of unstable ones."""
+
+    @property
+    def poles(self) -> dict[float, npt.NDArray[np.complex128]]:
+        """Poles of the linear loop per sample, by belt speed, m/s."""
+        poles: dict[float, npt.NDArray[np.complex128]] = {}
+        for response in self.responses:
+            loop = response.plant.loop
+            matrix = loop.transition_matrix(response.feedback)
+            poles[loop.drive.belt_speed] = np.linalg.eigvals(matrix).astype(np.complex128)
+        return poles
+
+
+LINEAR = quantities_of(Tuned)
+"""What the linear loops say, by name."""
 
 
 def with_law(scenario: Scenario, law: str, constants: Mapping[str, float]) -> Scenario:
@@ -90,7 +134,6 @@ class DriveLoops:
             self.deciding = [self.plants[place] for place in ends]
         self._coarse = [plant.loop.coarsened() for plant in self.deciding]
         self.noises = [sqrt(s.position_resolution**2 / 12.0 + s.position_noise**2) for s in sensors]
-        self.friction = max(drive.friction.limits) * drive.normal_force
 
     @cached_property
     def vibrations(self) -> list[Vibration]:
@@ -184,21 +227,18 @@ class DriveLoops:
 
     def limits(self, law: ControlLaw, plants: Sequence[PlantResponse] | None = None) -> list[Limit]:
         """Return the limits of the goal with what a stable law has, by default at all feeds."""
-        goal, drive = self.goal, self.drive
-        tuned = self.judged(law, plants or self.plants, self.vibrations)
+        goal, tuned = self.goal, self.judged(law, plants or self.plants, self.vibrations)
         assert tuned.peak_force is not None
         assert tuned.noise_force is not None
         margin = min(1.0 / (tuned.gain_down or 1e-9), tuned.gain_up or inf)
-        period = drive.natural_period if drive.has_spring else _WITHOUT_PERIOD
-        noise = _NOISE_SHARE * min(goal.force_limit, self.friction)
         return [
             Limit(
                 "the delay margin", tuned.delay_margin or inf, goal.delay_margin, "s", least=True
             ),
             Limit("the gain margin", margin, goal.gain_margin, "dB", least=True),
             Limit("the peak force", tuned.peak_force, goal.force_limit, "N"),
-            Limit("the rms force by noise", tuned.noise_force, noise, "N"),
-            Limit("the decay rate", tuned.decay_rate, _SLOWEST / period, "1/s", least=True),
+            Limit("the rms force by noise", tuned.noise_force, goal.noise_force, "N"),
+            Limit("the decay rate", tuned.decay_rate, goal.decay_rate, "1/s", least=True),
         ]
 
     def missed(self, law: ControlLaw) -> tuple[Limit, ...]:

@@ -18,9 +18,8 @@ from stickslip_ros.model.constants import constants_of
 from stickslip_ros.model.control import ControlLaw
 from stickslip_ros.model.control.base import MOTOR, TABLE
 from stickslip_ros.model.drive import number_text
-from stickslip_ros.studies.drive_loops import DriveLoops, linear_part
+from stickslip_ros.studies.drive_loops import DriveLoops, Tuned, linear_part
 from stickslip_ros.studies.gain_search import fastest, rounded
-from stickslip_ros.studies.tuned_gains import Tuned
 
 _DECADES = 2.5, 1.0
 """Gains are searched from so many decades below the softest scale to so many above the stiffest."""

@@ -7,8 +7,8 @@ import pytest
 
 from stickslip_ros.scenarios.files import Scenario, load_scenario
 from stickslip_ros.studies.case_outcome import Disturbance
-from stickslip_ros.studies.drive_loops import DriveLoops
-from stickslip_ros.studies.tuned_gains import Goal, Tuned
+from stickslip_ros.studies.drive_loops import DriveLoops, Tuned
+from stickslip_ros.studies.goal import Goal
 from stickslip_ros.studies.tuning import Tuning
 from stickslip_ros.theory.linear_sampled_loop import LinearSampledLoop
 

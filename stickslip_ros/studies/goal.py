@@ -1,21 +1,28 @@
-"""What gains are to achieve, and what the linear loops say of those that were found."""
+"""The goal of a design: the limits that gains are to keep, and the belt speeds at which."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import copysign, inf, log, log10
-from typing import Annotated, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from stickslip_ros.model.control import ControlLaw
 from stickslip_ros.model.drive import Drive, number_text
 from stickslip_ros.model.drive_layout import SPEED
-from stickslip_ros.quantities import Quantity, quantities_of
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.studies.case_outcome import Disturbance
 from stickslip_ros.theory.linear import jacobians
-from stickslip_ros.theory.loop_response import LoopResponse
+
+_GAIN_MARGIN = 10.0**0.1
+"""Least gain margin, a factor: 2 dB."""
+_DELAY_MARGIN = 2.0
+"""Least delay margin, in periods of the controller."""
+_NOISE_SHARE = 0.05
+"""Largest rms force by noise, as a share of the limit, or of the static friction if it is less."""
+_SLOWEST = 0.05
+"""Least decay rate, per natural period or per `_WITHOUT_PERIOD`."""
+_WITHOUT_PERIOD = 0.2
+"""Period, s, of a drive without a spring."""
 
 
 def speeds_across(drive: Drive, low: float, high: float) -> list[float]:
@@ -47,8 +54,12 @@ class Goal:
     """The same of an impulse, one period of the controller long, N."""
     delay_margin: float
     """Least delay margin, s."""
-    gain_margin: float = 10.0**0.1
-    """Least factor, 2 dB, between the force of the law and an unstable one."""
+    noise_force: float
+    """Largest rms force by noise and rounding, N."""
+    decay_rate: float
+    """Least decay rate, 1/s."""
+    gain_margin: float = _GAIN_MARGIN
+    """Least factor between the force of the law and an unstable one."""
 
     @classmethod
     def from_scenario(
@@ -71,15 +82,23 @@ class Goal:
         force_limit : float
             Largest force of the law, N.
         """
-        limit = min(force_limit, scenario.plant.actuator.limit)
-        feeds = speeds_across(scenario.plant.as_drive(), *belt_speeds)
+        plant = scenario.plant
+        drive, limit = plant.as_drive(), min(force_limit, plant.actuator.limit)
         step, impulse = (
             max((d.amplitude for d in disturbances if d.kind in kinds), default=0.0)
             for kinds in (("step", "sine"), ("impulse",))
         )
-        plant = scenario.plant
         impulse /= plant.answer_every  # as strong over a period of the controller
-        return cls(tuple(feeds), limit, step, impulse, 2.0 / plant.control_rate)
+        friction = max(drive.friction.limits) * drive.normal_force
+        return cls(
+            feeds=tuple(speeds_across(drive, *belt_speeds)),
+            force_limit=limit,
+            step=step,
+            impulse=impulse,
+            delay_margin=_DELAY_MARGIN / plant.control_rate,
+            noise_force=_NOISE_SHARE * min(limit, friction),
+            decay_rate=_SLOWEST / (drive.natural_period if drive.has_spring else _WITHOUT_PERIOD),
+        )
 
 
 class Limit(NamedTuple):
@@ -112,52 +131,3 @@ class Limit(NamedTuple):
             shown = [number_text(drive, value, self.unit) for value in values]
         bound = "least" if self.least else "most"
         return f"{self.name} is {shown[0]}, and must be at {bound} {shown[1]}"
-
-
-@dataclass(frozen=True)
-class Tuned:
-    """The gains that were found for a law, and what the linear loops say of them."""
-
-    law: ControlLaw
-    """The law with its gains: the nearest ones if a limit is missed."""
-    goal: Goal
-    """The goal."""
-    decay_rate: Annotated[float, Quantity("smallest decay rate", "1/s")]
-    """Smallest decay rate at the feeds, 1/s."""
-    delay_margin: Annotated[float | None, Quantity("delay margin", "s")] = None
-    """Smallest delay margin, s; None if no delay turns the loop unstable."""
-    phase_margin: Annotated[float | None, Quantity("phase margin", "rad")] = None
-    """Smallest phase margin, rad; None without any."""
-    gain_down: Annotated[float | None, Quantity("lower gain margin")] = None
-    """Largest factor below one of the force at which a loop is unstable; None without any."""
-    gain_up: Annotated[float | None, Quantity("upper gain margin")] = None
-    """Smallest factor above one of the force at which a loop is unstable; None without any."""
-    sensitivity_peak: Annotated[float | None, Quantity("peak of the sensitivity")] = None
-    """Largest magnitude of the sensitivity."""
-    peak_force: Annotated[float | None, Quantity("peak force, predicted", "N")] = None
-    """Largest force, N, by disturbance, mean friction and noise, and of the washout law by the
-    vibration that it catches."""
-    mean_force: Annotated[float | None, Quantity("mean friction that the law carries", "N")] = None
-    """Largest part of it that is constant, N."""
-    noise_force: Annotated[float | None, Quantity("rms force by noise", "N")] = None
-    """Largest rms force by noise and rounding of the encoder, N."""
-    missed: tuple[Limit, ...] = ()
-    """Limits that the gains miss."""
-    remark: str | None = None
-    """Which limits are missed, and by how much, or a caution; or None."""
-    responses: tuple[LoopResponse, ...] = field(default=(), repr=False)
-    """The linear loops at the feeds; empty of unstable ones."""
-
-    @property
-    def poles(self) -> dict[float, npt.NDArray[np.complex128]]:
-        """Poles of the linear loop per sample, by belt speed, m/s."""
-        poles: dict[float, npt.NDArray[np.complex128]] = {}
-        for response in self.responses:
-            loop = response.plant.loop
-            matrix = loop.transition_matrix(response.feedback)
-            poles[loop.drive.belt_speed] = np.linalg.eigvals(matrix).astype(np.complex128)
-        return poles
-
-
-LINEAR = quantities_of(Tuned)
-"""What the linear loops say, by name."""
