@@ -18,11 +18,7 @@ from stickslip_ros.measures.following import Followed, Following, followed
 from stickslip_ros.measures.run_meter import RunAnalysis
 from stickslip_ros.measures.sample_meter import NOT_JUDGED
 from stickslip_ros.model.control import ControlLaw
-from stickslip_ros.motion.trajectory import (
-    SampleRecorder,
-    Trajectory,
-    TrajectoryRecorder,
-)
+from stickslip_ros.motion.trajectory import SampleRecorder, Trajectory, TrajectoryRecorder
 from stickslip_ros.progress import Progress
 from stickslip_ros.quantities import number_of
 from stickslip_ros.scenarios.files import Scenario

@@ -30,13 +30,7 @@ from stickslip_ros.theory.linear_sampled_loop import (
     settling_time,
     why_no_linear_loop,
 )
-from stickslip_ros.theory.requirements import (
-    AUTONOMOUS,
-    ONE_DEGREE,
-    SMOOTH,
-    covered,
-    require,
-)
+from stickslip_ros.theory.requirements import AUTONOMOUS, ONE_DEGREE, SMOOTH, covered, require
 from stickslip_ros.theory.shooting import LimitCycle
 from stickslip_ros.theory.sticking import sticking_onset
 

@@ -10,11 +10,7 @@ from stickslip_ros.arrays import FloatArray
 from stickslip_ros.model.control import ContinuousControl, Washout
 from stickslip_ros.model.drive import Drive
 from stickslip_ros.model.drive_layout import MEMORY, POSITION, SPEED
-from stickslip_ros.theory.gain_intervals import (
-    GainInterval,
-    gains_of,
-    nearest_to_zero,
-)
+from stickslip_ros.theory.gain_intervals import GainInterval, gains_of, nearest_to_zero
 from stickslip_ros.theory.linear import expand
 from stickslip_ros.theory.requirements import ONE_DEGREE, SMOOTH, STATIC, require
 from stickslip_ros.theory.shooting import LimitCycle, shoot

@@ -8,12 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.model.control import (
-    ContinuousControl,
-    ControlLaw,
-    LinearFeedback,
-    Washout,
-)
+from stickslip_ros.model.control import ContinuousControl, ControlLaw, LinearFeedback, Washout
 from stickslip_ros.model.drive_layout import POSITION, SPEED
 
 _ROUNDING = 1e-14

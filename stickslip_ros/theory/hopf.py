@@ -15,8 +15,6 @@ from stickslip_ros.theory.requirements import SMOOTH, SYMMETRIC, require_equilib
 
 _BELT_SPEEDS = np.geomspace(1e-6, 1e3, 4001)
 """Dimensionless belt speeds, half a percent apart, between which sign changes are searched for."""
-
-
 _ON_AXIS = 1e-6
 """Share of its frequency up to which the growth of a pair is rounding."""
 

@@ -78,10 +78,6 @@ def _holds_position(control: ContinuousControl) -> bool:
     return response(0.0) != response(1.0)
 
 
-def _no_spring(drive: Drive) -> str | None:
-    return None if drive.has_spring else "the drive has stiffness = 0 N/m"
-
-
 def _signals(drive: Drive) -> str | None:
     moving = [f"its {name}" for name in ("belt", "load") if getattr(drive, name).pieces]
     return f"the drive has a signal of {' and '.join(moving)}" if moving else None
@@ -116,7 +112,9 @@ def _motor(drive: Drive) -> str | None:
 ONE_MASS = Requirement("an ideal motor", _motor)
 """The far end of the spring moves exactly at the feed, and the control force acts on the slide."""
 
-SPRING = Requirement("a spring", _no_spring)
+SPRING = Requirement(
+    "a spring", lambda drive: None if drive.has_spring else "the drive has stiffness = 0 N/m"
+)
 """The stiffness is above zero: the drive has a natural frequency."""
 
 AUTONOMOUS = Requirement("a constant belt speed and a constant normal force", _signals)

@@ -17,12 +17,7 @@ from rclpy.timer import Timer
 from std_srvs.srv import Trigger
 
 from stickslip_ros.app.dashboard.run_state import Health, RunState
-from stickslip_ros.nodes.base.clients import (
-    OnAnswer,
-    ServiceCall,
-    setting_call,
-    transition_request,
-)
+from stickslip_ros.nodes.base.clients import OnAnswer, ServiceCall, setting_call, transition_request
 from stickslip_ros.nodes.base.endpoints import qos_profile
 from stickslip_ros.record.codec import pack_wrench
 from stickslip_ros.record.topics import DISTURBANCE_FORCE

@@ -6,15 +6,7 @@ from typing import Any
 import numpy as np
 from contourpy import contour_generator
 
-from stickslip_ros.app.dashboard.charts import (
-    AXIS,
-    CENTRED,
-    LEGEND,
-    STILL,
-    TOOLBOX,
-    line,
-    points,
-)
+from stickslip_ros.app.dashboard.charts import AXIS, CENTRED, LEGEND, STILL, TOOLBOX, line, points
 from stickslip_ros.app.dashboard.theory import Decay, FrictionCurve
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.model.control import Washout
