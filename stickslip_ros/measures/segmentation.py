@@ -4,15 +4,13 @@ Relative to the guide a slide rests or moves. It rests where two means beside ea
 less than half of what the slide travels on average in their distance (the Haar wavelet: S. Mallat
 and W. L. Hwang, Singularity detection and processing with wavelets, IEEE Transactions on
 Information Theory 38, 1992). The means are so long that step and noise of the sensor do not hide
-this travel. Cycles are what repeats from release to release. At an edge the distance from the rest
-grows with a power of time; the edge is where that power extrapolates to zero, and what the powers
-that fit differ by is part of its error.
+this travel. Cycles are what repeats from release to release, at the edges of the slips
+(`slip_edges`).
 """
 
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import ceil, hypot, inf, sqrt
-from typing import NamedTuple
 
 import numpy as np
 
@@ -20,63 +18,75 @@ from stickslip_ros.arrays import BoolArray, FloatArray
 from stickslip_ros.measures.cycle_measures import Cycle, CycleMeans, Measures
 from stickslip_ros.measures.noise import FEWEST_SAMPLES, ROUNDING, encoder_step, white_noise
 from stickslip_ros.measures.single_cycles import parabolas
+from stickslip_ros.measures.slip_edges import Rest, SlipEdges, slip_edges
 
-_TAIL, _GROWTH = 2048, 4
-"""Number of last samples in which cycles are looked for first, and its growth while they are few.
-"""
-_BLOCKS = 4096
-"""Number of means of positions from which the mean speed is taken."""
 _LOOK = 4096
 """Number of last samples from which noise and step are estimated."""
 _REST_SHARE = 0.5
-"""Share of the mean speed up to which a slide may rest."""
-_STEPS, _DEVIATIONS = 1.3, 3.5
-"""Travel between two means, in steps of the encoder, and the change of them that is no rest, in
-their standard deviations, at least."""
-_MOST = 1e9
-"""Largest number of positions in a mean."""
-_SHORTH, _NEGLIGIBLE = 0.2, 0.05
-"""Share of the velocities that are alike while a slide rests; speed, in mean speeds, that is none.
-"""
+"""Speed up to which a slide may rest, in mean speeds."""
 _FEWEST_REACHES = 16
 """Number of samples, in lengths of a mean, from which rests are looked for."""
-_LEAST_STEPS, _LEAST_NOISES, _LEAST_SHARE = 3.5, 5.0, 0.1
-"""Travel between two rests, in steps, standard deviations and large slips, that is a slip."""
-_MAIN_SHARE = 0.35
-"""Travel of a slip, in large ones, from which it is a main slip, from which a cycle may begin."""
-_CUT = 0.25
-"""Part of a slip within which positions that begin after its release look like a rest."""
-_LONG_GAP = 3.0
-"""Time between two releases, in periods, after which cycles begin again."""
 _FEWEST_CYCLES = 3
 """Number of cycles that repeat."""
-_EDGE_STEPS, _EDGE_NOISES, _EDGE_FLOOR, _EDGE_SHARE, _EDGE_REACH = 0.6, 4.0, 1e-3, 0.25, 40.0
-"""Distance from a rest, in steps, standard deviations and slips, that is none; share of a slip, and
-number of such distances, to which its edges are fitted."""
-_RELEASE_POWERS, _LANDING_POWERS = (2.0, 3.0, 4.0, 6.0), (1.5, 2.0, 2.5)
-"""Powers of time with which the distance from a rest may grow: a friction that falls at once leaves
-a constant force, one that falls with the speed lets the motion grow slowly."""
-_EDGE_ERROR, _SLIP_ERROR = 0.3, 0.03
-"""Least standard error of an edge, in sample periods and slip times."""
-_CORE = 0.15
-"""Share of a rest at its edges that does not count for its speed."""
-_LEAST_CREEP, _CREEP, _CREEP_ERROR, _PASSING = 0.01, 0.03, 0.02, 4.0
-"""Speed in the rests, in mean speeds, up to which they are rests, and up to which they are if it is
-within its error; largest standard error of it; errors from which the slide passes."""
-_SAME_PERIOD, _SURE = 0.01, 3.0
-"""Relative difference of the periods, and of the stick fractions in standard errors, of the same
-cycles."""
-_LEAST_RIDE, _MOST_RIDE, _PASSES = 1e-3, 0.06, 3
-"""Velocity in the rests, in belt speeds, that may be an error of that of the belt; passes in which
-it is corrected."""
+_SURE = 3.0
+"""Standard errors by which a difference is no error."""
+_LEAST_CREEP = 0.01
+"""Speed in the rests, in mean speeds, up to which they are rests whatever its error."""
+_CREEP = 0.03
+"""Speed in the rests, in mean speeds, up to which they are rests if it is within its error."""
+_CREEP_ERROR = 0.02
+"""Largest standard error of the speed in the rests, in mean speeds, with which they are known."""
+_PASSING = 4.0
+"""Speed in the rests, in its standard errors, from which the slide passes."""
+_LEAST_RIDE = 1e-3
+"""Speed in the rests, in belt speeds, from which the velocity of the belt may be wrong."""
+_MOST_RIDE = 0.06
+"""Speed in the rests, in belt speeds, by which the velocity of the belt may be wrong at most."""
+_SAME_PERIOD = 0.01
+"""Relative difference of the periods of the same cycles."""
+_TAIL = 2048
+"""Number of last samples in which cycles are looked for first."""
+_GROWTH = 4
+"""Growth of this number while cycles are few."""
+_PASSES = 3
+"""Passes in which the velocity of the belt is corrected."""
+_SHORTH = 0.2
+"""Share of the velocities that are alike while a slide rests."""
+_NEGLIGIBLE = 0.05
+"""Velocity of a rest, in mean speeds, that is none."""
+_CUT = 0.25
+"""Time from the first sample to a release, in slip times, below which they begin with its slip."""
 _NO_FEED = 0.02
 """Travel on, as a share of that to and fro, that is none."""
-_SMOOTH_SHARES, _WIDEST = (0.05, 0.1), 40
-"""Half of the width of the parabola for displacement and velocity, in slip times, and in samples at
-most."""
-_BETWEEN, _EXTREME_ERROR = 0.7, 0.15
-"""What an extreme between two of the samples of a slip, and noise or a step, leave of an amplitude:
-shares of the amplitude over the square of their number, and of the noise."""
+_BETWEEN = 0.7
+"""Error of an amplitude by an extreme between two samples of a slip, in amplitudes over the square
+of their number."""
+_EXTREME_ERROR = 0.15
+"""Error of an amplitude by the noise or the step of the sensor, in the larger of them."""
+_BLOCKS = 4096
+"""Number of means of positions from which the mean speed is taken."""
+_STEPS = 1.3
+"""Least travel between two means, in steps of the encoder."""
+_DEVIATIONS = 3.5
+"""Least change of the travel between two means that is no rest, in its standard deviations."""
+_MOST = 1e9
+"""Largest number of positions in a mean."""
+_LEAST_STEPS = 3.5
+"""Travel between two rests that is a slip, in steps of the encoder, at least."""
+_LEAST_NOISES = 5.0
+"""Travel between two rests that is a slip, in standard deviations of the noise, at least."""
+_LEAST_SHARE = 0.1
+"""Travel between two rests that is a slip, in large slips, at least."""
+_MAIN_SHARE = 0.35
+"""Travel of a slip, in large ones, from which a cycle may begin with it."""
+_LONG_GAP = 3.0
+"""Time between two releases, in periods, after which cycles begin again."""
+_SMOOTH_SHARES = 0.05, 0.1
+"""Half of the width of the parabola for displacement and velocity, in slip times."""
+_WIDEST = 40
+"""Half of the width of a parabola, in samples, at most."""
+_CORE = 0.15
+"""Share of a rest at its edges that does not count for its speed."""
 
 
 @dataclass(frozen=True)
@@ -122,30 +132,6 @@ class StickSlip(CycleMeans):
         error = hypot(error, (measures.errors or {}).get("stick_fraction", 0.0))
         same = abs(measures.period / self.cycle.period - 1.0) < _SAME_PERIOD
         return same and abs(measures.stick_fraction - share) < _SURE * error
-
-
-class _Move(NamedTuple):
-    """A move between two rests: their middle rows, the last row of the first, and levels, m."""
-
-    first: int
-    last: int
-    begin: int
-    levels: tuple[float, float]
-
-    @property
-    def travel(self) -> float:
-        return self.levels[1] - self.levels[0]
-
-
-class _Slip(NamedTuple):
-    release: float
-    landing: float
-    errors: tuple[float, float]
-    travel: float
-
-    @property
-    def duration(self) -> float:
-        return self.landing - self.release
 
 
 def stick_slip(
@@ -210,19 +196,18 @@ def _measured(
     step = max(step, encoder_step(relative[-_LOOK:], ROUNDING))
     noise = white_noise(relative[-_LOOK:])
     speed = abs(belt_velocity) or _mean_speed(time, relative, max(step, 6.0 * noise))
-    course = _moves_between_rests(time, relative, speed, noise, step)
-    starts = _cycle_starts(time, course)[-most_cycles - 1 :]
+    travel = speed * (float(time[-1] - time[0]) / (len(time) - 1))
+    rests = _rests_apart(relative, travel, noise, step)
+    starts = _cycle_starts(time, rests)[-most_cycles - 1 :]
     if not starts:
         return None
-    near = max(_EDGE_STEPS * step, _EDGE_NOISES * noise)
-    used = [_slip(time, relative, move, near) for move in course[starts[0] : starts[-1] + 1]]
+    between = pairwise(rests[starts[0] : starts[-1] + 2])
+    used = [slip_edges(time, relative, before, after, noise, step) for before, after in between]
     if used[0].release - float(time[0]) < _CUT * used[0].duration:  # they begin after it
         used, starts = used[starts[1] - starts[0] :], starts[1:]
-    if len(starts) <= _FEWEST_CYCLES:
-        return None
     release = np.array([used[start - starts[0]].release for start in starts])
-    if not np.all(np.diff(release) > 0.0):
-        return None  # times that repeat
+    if len(starts) <= _FEWEST_CYCLES or not np.all(np.diff(release) > 0.0):  # times that repeat
+        return None
     del used[-1]
     period = float(release[-1] - release[0]) / (len(release) - 1)
     durations = np.add.reduceat([slip.duration for slip in used], np.array(starts[:-1]) - starts[0])
@@ -235,7 +220,6 @@ def _measured(
     extremes = _extremes(time, position, np.searchsorted(time, release).tolist(), width)
     columns = [*extremes, np.diff(release), 1.0 / np.diff(release), shares]
     means = CycleMeans.over([Cycle(*measures) for measures in np.transpose(columns).tolist()])
-    errors = _errors(means, used, width, max(step, noise))
     creep, creep_error = _creep(time, relative, used, noise, step)
     if creep_error == inf:
         return None
@@ -246,7 +230,7 @@ def _measured(
             frequency=1.0 / period,
             stick_fraction=1.0 - float(np.sum(durations)) / float(release[-1] - release[0]),
         ),
-        errors=errors,
+        errors=_errors(means, used, width, max(step, noise)),
         sticks=True,
         amplitudes=means.amplitudes,
         end=float(release[-1]),
@@ -257,14 +241,14 @@ def _measured(
     )
 
 
-def _advance(slips: list[_Slip]) -> float:
+def _advance(slips: list[SlipEdges]) -> float:
     """Return the travel of slips on the whole, m; 0 where they only go to and fro."""
     travel = np.array([slip.travel for slip in slips])
     advance = float(np.sum(travel))
     return advance if abs(advance) >= _NO_FEED * float(np.sum(np.abs(travel))) else 0.0
 
 
-def _errors(means: CycleMeans, slips: list[_Slip], width: float, resolution: float) -> Cycle:
+def _errors(means: CycleMeans, slips: list[SlipEdges], width: float, resolution: float) -> Cycle:
     """Return the standard errors of means, with those of the edges and the extremes.
 
     A slip has `width` rows, and the sensor a step or noise of `resolution`, m.
@@ -316,8 +300,8 @@ def _changes(position: FloatArray, reach: int) -> FloatArray:
     return total[2 * reach :] - 2.0 * total[reach:-reach] + total[: -2 * reach]
 
 
-def _rests(position: FloatArray, reach: int, most: float) -> list[tuple[int, int]]:
-    """Return the first and last rows of the rests among positions.
+def _rests(position: FloatArray, reach: int, most: float) -> list[Rest]:
+    """Return the rests among positions.
 
     The means over `reach` positions before and after a row of a rest differ by at most `most`.
     """
@@ -331,109 +315,53 @@ def _rests(position: FloatArray, reach: int, most: float) -> list[tuple[int, int
             first = middle + 1
         if last > first:
             apart.append((first, last))
-    return apart
+    inner = [slice((3 * a + b) // 4, max((a + 3 * b) // 4, (3 * a + b) // 4 + 1)) for a, b in apart]
+    levels = [float(np.mean(position[rows])) for rows in inner]
+    return [Rest(*rows, level) for rows, level in zip(apart, levels, strict=True)]
 
 
-def _moves_between_rests(
-    time: FloatArray, position: FloatArray, speed: float, noise: float, step: float
-) -> list[_Move]:
-    """Return the moves between two rests."""
-    period = float(time[-1] - time[0]) / (len(time) - 1)
-    travel = speed * period
-    if travel <= 0.0:
-        return []
+def _rests_apart(position: FloatArray, travel: float, noise: float, step: float) -> list[Rest]:
+    """Return the rests between slips; `travel` is the mean between two samples, m."""
     reach = _reach(travel, noise, step)
-    if len(time) < _FEWEST_REACHES * reach:
+    if travel <= 0.0 or len(position) < _FEWEST_REACHES * reach:
         return []
     rests = _rests(position, reach, _REST_SHARE * travel * reach)
     if len(rests) < 2:
         return []
-    inner = [slice((3 * a + b) // 4, max((a + 3 * b) // 4, (3 * a + b) // 4 + 1)) for a, b in rests]
-    level = [float(np.mean(position[rest])) for rest in inner]
-    jumps = np.abs(np.diff(level))
-    large = float(np.mean(jumps[jumps >= np.quantile(jumps, 0.9) / 2.0]))
-    least = max(_LEAST_STEPS * step, _LEAST_NOISES * noise, _LEAST_SHARE * large)
+    least = _LEAST_SHARE * _large(np.abs(np.diff([rest.level for rest in rests])))
+    least = max(_LEAST_STEPS * step, _LEAST_NOISES * noise, least)
     # Between its slips a slide creeps, and seems to rest more than once.
-    first, last, longest = [0], [0], [0]
-    for number in range(1, len(rests)):
-        if abs(level[number] - level[longest[-1]]) > least:
-            for rows in (first, last, longest):
-                rows.append(number)
+    apart, longest = rests[:1], rests[0]
+    for rest in rests[1:]:
+        if abs(rest.level - longest.level) > least:
+            apart.append(rest)
+            longest = rest
         else:
-            last[-1] = number
-            if np.ptp(rests[number]) > np.ptp(rests[longest[-1]]):
-                longest[-1] = number
-    course: list[_Move] = []
-    for before in range(len(first) - 1):
-        rows = [rests[first[group]][0] + rests[last[group]][1] for group in (before, before + 1)]
-        levels = level[longest[before]], level[longest[before + 1]]
-        course.append(_Move(rows[0] // 2, rows[1] // 2, rests[last[before]][1], levels))
-    return course
+            longest = max(longest, rest, key=lambda rest: rest.last - rest.first)
+            apart[-1] = Rest(apart[-1].first, rest.last, longest.level)
+    return apart
 
 
-def _slip(time: FloatArray, position: FloatArray, move: _Move, near: float) -> _Slip:
-    """Return the slip of a move, with its edges."""
-    first, last, _, levels = move
-    travel = move.travel
-    size = abs(travel)
-    course = (position[first : last + 1] - levels[0]) * (1.0 if travel > 0.0 else -1.0)
-    middle = int(np.argmax(course > size / 2.0))
-    near = max(near, _EDGE_FLOOR * size)
-    start, start_error = _edge(course[: middle + 1], near, size, _RELEASE_POWERS)
-    end, end_error = _edge(size - course[middle:][::-1], near, size, _LANDING_POWERS)
-    rows = np.arange(last - first + 1)
-    release, landing = np.interp([start, len(rows) - 1 - end], rows, time[first : last + 1])
-    least = _SLIP_ERROR * float(landing - release)
-    period = float(time[last] - time[first]) / max(last - first, 1)
-    errors = hypot(start_error * period, least), hypot(end_error * period, least)
-    return _Slip(float(release), float(landing), errors, travel)
+def _large(sizes: FloatArray) -> float:
+    """Return the mean of large sizes: from half of the one that a tenth exceeds."""
+    return float(np.mean(sizes[sizes >= np.quantile(sizes, 0.9) / 2.0]))
 
 
-def _edge(
-    course: FloatArray, near: float, size: float, powers: tuple[float, ...]
-) -> tuple[float, float]:
-    """Return the row at which a course leaves zero on its way to a slip of this size; its error."""
-    inside = np.flatnonzero(course <= near)
-    last = int(inside[-1]) if len(inside) else 0
-    far = near + min(_EDGE_SHARE * size, _EDGE_REACH * near)
-    beyond = np.flatnonzero(course[last + 1 :] > far)
-    end = last + 2 + int(beyond[0]) if len(beyond) else len(course)
-    rows = np.arange(last + 1, min(end, len(course)))
-    if len(rows) < 3:
-        return last + 0.5, hypot(_EDGE_ERROR, 0.3)
-    values, middle = np.maximum(course[rows], 0.0), (rows[0] + rows[-1]) / 2.0
-    lag, exponents = rows - middle, np.array(powers)[:, np.newaxis]
-    roots = values ** (1.0 / exponents)
-    offset, slope = roots.mean(axis=1), roots @ lag / (lag @ lag)
-    edges = np.full(len(powers), float(last))
-    np.divide(-offset, slope, out=edges, where=slope > 0.0)
-    edges[slope > 0.0] += middle
-    fitted = np.maximum(offset[:, np.newaxis] + slope[:, np.newaxis] * lag, 0.0) ** exponents
-    squares = np.sum((fitted - values) ** 2, axis=1) + (near / 3.0) ** 2
-    edges = np.clip(edges, 0.0, last + 1.0)
-    weight = (squares.min() / squares) ** 2
-    weight /= weight.sum()
-    mean = float(weight @ edges)
-    return mean, hypot(_EDGE_ERROR, sqrt(float(weight @ (edges - mean) ** 2)))
+def _cycle_starts(time: FloatArray, rests: list[Rest]) -> list[int]:
+    """Return the numbers of the rests after which the last cycles begin, and after which they end.
 
-
-def _cycle_starts(time: FloatArray, course: list[_Move]) -> list[int]:
-    """Return the moves with which the last cycles begin, and the one with which they end.
-
-    Where main moves to and fro take turns, two of them are a cycle.
+    Where main slips to and fro take turns, two of them are a cycle.
     """
-    if not course:
+    if len(rests) < 2:
         return []
-    travel = np.array([move.travel for move in course])
-    sizes = np.abs(travel)
-    large = float(np.mean(sizes[sizes >= np.quantile(sizes, 0.9) / 2.0]))
-    main = np.flatnonzero(sizes >= _MAIN_SHARE * large)
+    travel = np.diff([rest.level for rest in rests])
+    main = np.flatnonzero(np.abs(travel) >= _MAIN_SHARE * _large(np.abs(travel)))
     forward = travel[main] > 0.0
     turns = np.count_nonzero(forward[1:] != forward[:-1])
     if turns > len(main) // 2:
         main = main[forward]
         forward = forward[forward]
-    release = time[[course[move].begin for move in main]]
+    release = time[[rests[number].last for number in main]]
     if len(main) <= _FEWEST_CYCLES:
         return []
     gaps = np.diff(release)
@@ -467,7 +395,7 @@ def _extremes(time: FloatArray, position: FloatArray, rows: list[int], width: fl
 
 
 def _creep(
-    time: FloatArray, position: FloatArray, slips: list[_Slip], noise: float, step: float
+    time: FloatArray, position: FloatArray, slips: list[SlipEdges], noise: float, step: float
 ) -> tuple[float, float]:
     """Return the mean velocity in the rests between slips, m/s, and its standard error."""
     products = squares = lasting = 0.0

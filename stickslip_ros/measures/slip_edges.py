@@ -1,0 +1,107 @@
+"""Edges of a slip: when it leaves one rest and when it lands in the next.
+
+At an edge the distance from the rest grows with a power of time; the edge is where that power
+extrapolates to zero, and what the powers that fit differ by is part of its error.
+"""
+
+from math import hypot, sqrt
+from typing import NamedTuple
+
+import numpy as np
+
+from stickslip_ros.arrays import FloatArray
+
+_NEAR_STEPS = 0.6
+"""Distance from a rest that is none, in steps of the encoder."""
+_NEAR_NOISES = 4.0
+"""Distance from a rest that is none, in standard deviations of the noise."""
+_NEAR_SHARE = 1e-3
+"""Distance from a rest that is none, as a share of the slip."""
+_FAR_SHARE = 0.25
+"""Distance from a rest up to which an edge is fitted, as a share of the slip, at most."""
+_FAR_NEARS = 40.0
+"""Distance from a rest up to which an edge is fitted, in distances that are none, at most."""
+_RELEASE_POWERS = (2.0, 3.0, 4.0, 6.0)
+"""Powers of time with which the distance may grow after a release: a friction that falls at once
+leaves a constant force, one that falls with the speed lets the motion grow slowly."""
+_LANDING_POWERS = (1.5, 2.0, 2.5)
+"""Powers of the time to a landing with which the distance may fall."""
+_ROW_ERROR = 0.3
+"""Least standard error of an edge, in sample periods."""
+_SLIP_ERROR = 0.03
+"""Least standard error of an edge, in durations of the slip."""
+
+
+class Rest(NamedTuple):
+    """A rest: its first and last rows, and where it is, m."""
+
+    first: int
+    last: int
+    level: float
+
+    @property
+    def middle(self) -> int:
+        """Row in its middle."""
+        return (self.first + self.last) // 2
+
+
+class SlipEdges(NamedTuple):
+    """When a slip begins and ends, s, with the standard errors, and how far it travels, m."""
+
+    release: float
+    landing: float
+    errors: tuple[float, float]
+    travel: float
+
+    @property
+    def duration(self) -> float:
+        """Time of the slip, s."""
+        return self.landing - self.release
+
+
+def slip_edges(
+    time: FloatArray, position: FloatArray, before: Rest, after: Rest, noise: float, step: float
+) -> SlipEdges:
+    """Return the edges of the slip between two rests; SI units."""
+    first, last = before.middle, after.middle
+    travel = after.level - before.level
+    size = abs(travel)
+    course = (position[first : last + 1] - before.level) * (1.0 if travel > 0.0 else -1.0)
+    middle = int(np.argmax(course > size / 2.0))
+    near = max(_NEAR_STEPS * step, _NEAR_NOISES * noise, _NEAR_SHARE * size)
+    start, start_error = _edge(course[: middle + 1], near, size, _RELEASE_POWERS)
+    end, end_error = _edge(size - course[middle:][::-1], near, size, _LANDING_POWERS)
+    rows = np.arange(last - first + 1)
+    release, landing = np.interp([start, len(rows) - 1 - end], rows, time[first : last + 1])
+    least = _SLIP_ERROR * float(landing - release)
+    period = float(time[last] - time[first]) / max(last - first, 1)
+    errors = hypot(start_error * period, least), hypot(end_error * period, least)
+    return SlipEdges(float(release), float(landing), errors, travel)
+
+
+def _edge(
+    course: FloatArray, near: float, size: float, powers: tuple[float, ...]
+) -> tuple[float, float]:
+    """Return the row at which a course leaves zero on its way to a slip of this size; its error."""
+    inside = np.flatnonzero(course <= near)
+    last = int(inside[-1]) if len(inside) else 0
+    far = near + min(_FAR_SHARE * size, _FAR_NEARS * near)
+    beyond = np.flatnonzero(course[last + 1 :] > far)
+    end = last + 2 + int(beyond[0]) if len(beyond) else len(course)
+    rows = np.arange(last + 1, min(end, len(course)))
+    if len(rows) < 3:
+        return last + 0.5, hypot(_ROW_ERROR, 0.3)
+    values, middle = np.maximum(course[rows], 0.0), (rows[0] + rows[-1]) / 2.0
+    lag, exponents = rows - middle, np.array(powers)[:, np.newaxis]
+    roots = values ** (1.0 / exponents)
+    offset, slope = roots.mean(axis=1), roots @ lag / (lag @ lag)
+    edges = np.full(len(powers), float(last))
+    np.divide(-offset, slope, out=edges, where=slope > 0.0)
+    edges[slope > 0.0] += middle
+    fitted = np.maximum(offset[:, np.newaxis] + slope[:, np.newaxis] * lag, 0.0) ** exponents
+    squares = np.sum((fitted - values) ** 2, axis=1) + (near / 3.0) ** 2
+    edges = np.clip(edges, 0.0, last + 1.0)
+    weight = (squares.min() / squares) ** 2
+    weight /= weight.sum()
+    mean = float(weight @ edges)
+    return mean, hypot(_ROW_ERROR, sqrt(float(weight @ (edges - mean) ** 2)))
