@@ -135,7 +135,7 @@ def fit_mean_cycle(
         return None
     stick, hidden, overtakes = None, 0.0, False
     if belt_speed > 0.0 and stick_speed == 0.0:
-        stick, hidden = fold.stick(shape, belt_speed, noise)
+        stick, hidden = _find_stick(fold, shape, belt_speed, noise)
         overtakes = shape.overtakes(_PASSING_SHARE * belt_speed)
     if stick is not None:
         fold = fold.adjusted(fold.slip(stick.fit))
@@ -251,54 +251,13 @@ class FoldedCycles:
             if squares - left <= 3.0 * more * left / max(len(phase) - basis.shape[1], 1):
                 break
             squares, width = left, basis.shape[1]
-        covariance = self._covariance(basis, residual, slice(None))
+        covariance = self.covariance(basis, residual, slice(None))
         return Shape(
             lambda phase: rows(phase, size),
             np.append(np.ones(known), coefficients),
             np.pad(covariance, ((known, 0), (known, 0))),
             self.period,
         )
-
-    def stick(self, shape: Shape, belt_speed: float, noise: float) -> tuple[Stick | None, float]:
-        """Return the stick of the cycles, if they show one, and the stick time that would not."""
-        velocity = shape.velocity(shape.grid)
-        if not STICKING_SHARE * belt_speed < velocity.max() < _PASSING_SHARE * belt_speed:
-            return None, 0.0
-        near = velocity > np.minimum(0.93 * belt_speed, 0.98 * velocity.max())
-        frequency = 2.0 * pi / self.period
-        centre = float(np.angle(np.sum(np.exp(1j * frequency * shape.grid[near])))) / frequency
-        guess = max(np.count_nonzero(near) * self.period / _GRID - 0.05 * self.period, 0.0)
-        reach = guess / 2.0 + _reach(noise * frequency / belt_speed) / frequency
-        around = self.phase - centre
-        around -= np.rint(around / self.period) * self.period
-        used = np.flatnonzero(np.abs(around) < min(reach, 0.49 * self.period))
-        gap = self.period / self.phases
-        if len(used) < 12:
-            return None, max(guess, gap)
-        time, position = around[used], self.position[used]
-        # The stairs of a few steps look like falls of the friction.
-        may_fall = noise >= self.step / 2.0 or np.ptp(self.position) > _FEW_STEPS * self.step
-        fit = fit_stick(time, position, belt_speed, frequency, guess, may_fall=bool(may_fall))
-        covariance = self._covariance(fit.jacobian, fit.residual, used)
-        covariance[:3, :3] += fit.spread
-        middle, length, speed = np.eye(3, len(covariance))
-        landing, departure, time_error, speed_error = (
-            float(np.sqrt(g @ covariance @ g))
-            for g in (middle - length / 2.0, middle + length / 2.0, length, speed)
-        )
-        hidden = fit.stick_time < self.period / len(self.time)  # no sample need be in it
-        if not hidden and fit.stick_time < _UNTESTED_ERRORS * time_error:
-            without = fit_stick(time, position, fit.belt_speed, frequency, 0.0)
-            variance = fit.squares / max(len(time) - fit.jacobian.shape[1], 1)
-            hidden = without.squares - fit.squares <= _STICK_LEVEL * variance
-        if hidden:
-            # A short stick changes the positions by its square, by s = 2 t dt with a time t.
-            unseen = (2.0 * fit.stick_time * time_error) ** 0.5
-            return None, max(fit.stick_time, unseen, gap)
-        moved = replace(
-            fit, centre=fit.centre + centre, offset=fit.offset - fit.belt_speed * centre
-        )
-        return Stick(moved, time_error, speed_error, (landing, departure)), 0.0
 
     def adjusted(self, shape: Shape) -> Self:
         """Return the cycles with the period, and without the drift, that fit what a shape leaves.
@@ -316,7 +275,7 @@ class FoldedCycles:
 
     def period_error(self, shape: Shape, residual: FloatArray) -> float:
         """Return the standard error of the period, s."""
-        covariance = self._covariance(self._shifts(shape)[:, :3], residual, slice(None))
+        covariance = self.covariance(self._shifts(shape)[:, :3], residual, slice(None))
         return float(np.sqrt(covariance[1, 1]))
 
     def relative_amplitudes(self, shape: Shape, residual: FloatArray) -> FloatArray:
@@ -336,7 +295,7 @@ class FoldedCycles:
         rate, turns = -shape.velocity(self.phase), self.time / self.period
         return np.column_stack([rate, rate * turns, np.ones(len(rate)), turns - self.count / 2.0])
 
-    def _covariance(
+    def covariance(
         self, jacobian: FloatArray, residual: FloatArray, rows: IntArray | slice
     ) -> FloatArray:
         """Return the covariance of a fit to these rows, see `_clustered`, and that by rounding.
@@ -372,6 +331,65 @@ def _clustered(jacobian: FloatArray, residual: FloatArray, number: IntArray) -> 
     scale = np.sqrt(np.maximum(np.diag(scatter), 1e-300) / np.maximum(np.diag(plain), 1e-300))
     # The scatter of twenty cycles is itself uncertain by a sixth.
     return scatter if float(np.median(scale)) > 1.0 + 2.0 / np.sqrt(2.0 * count) else plain
+
+
+def _find_stick(
+    fold: FoldedCycles, shape: Shape, belt_speed: float, noise: float
+) -> tuple[Stick | None, float]:
+    """Return the stick of the cycles, if they show one, and the stick time that would not."""
+    part = _fast_part(shape, belt_speed)
+    if part is None:
+        return None, 0.0
+    (centre, guess), gap = part, fold.period / fold.phases
+    frequency = 2.0 * pi / fold.period
+    reach = guess / 2.0 + _reach(noise * frequency / belt_speed) / frequency
+    around = fold.phase - centre
+    around -= np.rint(around / fold.period) * fold.period
+    used = np.flatnonzero(np.abs(around) < min(reach, 0.49 * fold.period))
+    if len(used) < 12:
+        return None, max(guess, gap)
+    samples = around[used], fold.position[used]
+    # The stairs of a few steps look like falls of the friction.
+    may_fall = bool(noise >= fold.step / 2.0 or np.ptp(fold.position) > _FEW_STEPS * fold.step)
+    fit = fit_stick(*samples, belt_speed, frequency, guess, may_fall=may_fall)
+    stick = _with_errors(fit, fold.covariance(fit.jacobian, fit.residual, used), centre)
+    # In a short one no sample need be.
+    hidden = fit.stick_time < fold.period / len(fold.time)
+    if not hidden and fit.stick_time < _UNTESTED_ERRORS * stick.time_error:
+        without = fit_stick(*samples, fit.belt_speed, frequency, 0.0)
+        variance = fit.squares / max(len(used) - fit.jacobian.shape[1], 1)
+        hidden = without.squares - fit.squares <= _STICK_LEVEL * variance
+    if not hidden:
+        return stick, 0.0
+    # A short stick changes the positions by its square, by s = 2 t dt with a time t.
+    return None, max(fit.stick_time, (2.0 * fit.stick_time * stick.time_error) ** 0.5, gap)
+
+
+def _fast_part(shape: Shape, belt_speed: float) -> tuple[float, float] | None:
+    """Return the middle of what is about as fast as the belt, and the stick time in it, s.
+
+    None where the motion does not come near the speed of the belt, or passes it.
+    """
+    velocity, frequency = shape.velocity(shape.grid), 2.0 * pi / shape.period
+    if not STICKING_SHARE * belt_speed < velocity.max() < _PASSING_SHARE * belt_speed:
+        return None
+    near = velocity > np.minimum(0.93 * belt_speed, 0.98 * velocity.max())
+    middle = float(np.angle(np.sum(np.exp(1j * frequency * shape.grid[near])))) / frequency
+    duration = np.count_nonzero(near) * shape.period / _GRID - 0.05 * shape.period
+    return middle, max(duration, 0.0)
+
+
+def _with_errors(fit: StickFit, covariance: FloatArray, centre: float) -> Stick:
+    """Return the stick of a fit at times since a phase, `centre`, with its standard errors."""
+    covariance[:3, :3] += fit.spread
+    middle, length, speed = np.eye(3, len(covariance))
+    time_error, speed_error, landing, departure = (
+        float(np.sqrt(g @ covariance @ g))
+        for g in (length, speed, middle - length / 2.0, middle + length / 2.0)
+    )
+    offset = fit.offset - fit.belt_speed * centre
+    moved = replace(fit, centre=fit.centre + centre, offset=offset)
+    return Stick(moved, time_error, speed_error, (landing, departure))
 
 
 def _reach(noise: float) -> float:
