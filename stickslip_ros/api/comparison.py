@@ -6,7 +6,7 @@ from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 
 import numpy as np
 from typing_extensions import override
@@ -18,7 +18,6 @@ from stickslip_ros.api.runs import limit_text
 from stickslip_ros.api.scenarios import ScenarioLike, as_scenario
 from stickslip_ros.api.studies import Values, axis_of
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.progress import Progress
 from stickslip_ros.quantities import Quantity
 from stickslip_ros.scenarios.files import Scenario
@@ -26,54 +25,27 @@ from stickslip_ros.scenarios.keywords import keyword_of, parameter_of
 from stickslip_ros.show.parameter_tables import scenario_tables
 from stickslip_ros.show.quantities import Units
 from stickslip_ros.studies.case_outcome import FOLLOWING, OUTCOMES, is_positioning
-from stickslip_ros.studies.comparison import DISTURBANCES, Comparison, Outcomes, compared
+from stickslip_ros.studies.comparison import (
+    DISTURBANCES,
+    Comparison,
+    Outcomes,
+    Rank,
+    check_rank,
+    compared,
+    mean_of_seeds,
+    ranked,
+)
 from stickslip_ros.studies.drive_loops import Tuned, with_law
 from stickslip_ros.studies.plan import Axis
 from stickslip_ros.studies.runner import CountPoints, compute_columns
-from stickslip_ros.studies.spread import held_interval, spread_text
+from stickslip_ros.studies.spread import spread_text
 from stickslip_ros.tables import TextTable
-from stickslip_ros.text import must_be_one_of, shown
 from stickslip_ros.theory.linear_sampled_loop import settling_time
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from stickslip_ros.show.style import FigureStyle
-
-_MEANS = {
-    False: ("rms_velocity", "rms_force", "settling_time", "peak_force", "mean_force", "set_point"),
-    True: (
-        *("final_error", "rms_force", "settling_time", "peak_force", "hunting_amplitude"),
-        *FOLLOWING,
-    ),
-}
-"""What the table has means of, by whether the task is positioning, the second criterion first; of
-how the slide follows, what is known of any law."""
-
-
-class Rank(NamedTuple):
-    """A law in the ranked table; means over its cases, with standard errors over the seeds."""
-
-    law: str
-    """Name of the law."""
-    held: float
-    """Share of the cases that it holds."""
-    held_error: float
-    """Its standard error; NaN with one seed."""
-    held_interval: tuple[float, float]
-    """Its 95 % interval as of independent cases (Clopper, Pearson, Biometrika 26, 1934)."""
-    means: Mapping[str, tuple[float, float]]
-    """Mean and standard error of columns of `OUTCOMES`, over the cases where they exist."""
-    at_limit: float
-    """Mean share of samples at the force limit."""
-    failures: int
-    """Number of cases that diverged or failed."""
-
-    @property
-    def held_text(self) -> str:
-        """Share of the cases that it holds, with its interval."""
-        low, high = self.held_interval
-        return f"{self.held:.1%} ({low:.1%} to {high:.1%})"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -106,24 +78,7 @@ class ComparedLaws(TabularResult):
 
         By `rank_by` instead, those first of which no case failed.
         """
-        positioning = is_positioning(self.scenario)
-        held = self._array("held")
-        ranks: list[Rank] = []
-        for row, law in enumerate(self.study.plan.laws):
-            share, error = _mean_of_seeds(held[row])
-            means = {name: _mean_of_seeds(self._array(name)[row]) for name in _MEANS[positioning]}
-            at_limit = float(np.nan_to_num(self._array("at_limit")[row]).mean())
-            failures = int(np.isnan(self._array("rms_velocity")[row]).sum())
-            won, cases = int(np.nansum(held[row])), held[row].size
-            interval = held_interval(won, cases)
-            ranks.append(Rank(law, share, error, interval, means, at_limit, failures))
-        names = _MEANS[positioning][:2] if self.rank_by is None else [self.rank_by]
-
-        def order(rank: Rank) -> tuple[float, ...]:
-            first = -rank.held if self.rank_by is None else rank.failures
-            return first, *(np.nan_to_num(rank.means[n][0], nan=np.inf) for n in names)
-
-        return tuple(sorted(ranks, key=order))
+        return ranked(self.study, self.outcomes, self.rank_by)
 
     @property
     def verdict(self) -> str:
@@ -159,11 +114,8 @@ class ComparedLaws(TabularResult):
         ndarray
             Shares, 0 to 1, shape (points,).
         """
-        row = [*self.study.plan.laws].index(law)
-        return np.nan_to_num(self._array("held")[row]).mean(axis=(1, 2))
-
-    def _array(self, name: str) -> FloatArray:
-        return self.outcomes.column(name).reshape(self.study.plan.shape)
+        held = self.outcomes.of_law(self.study.plan, law, "held")
+        return np.nan_to_num(held).mean(axis=(1, 2))
 
     def at_points(self, law: str, name: str) -> tuple[FloatArray, FloatArray]:
         """Return the mean of an outcome at each point of the parameters, and its standard error.
@@ -180,16 +132,15 @@ class ComparedLaws(TabularResult):
         tuple of ndarray
             Means and standard errors over the seeds, shape (points,); NaN where there is none.
         """
-        row = [*self.study.plan.laws].index(law)
-        values = self._array(name)[row][:, np.newaxis]
-        mean, error = np.transpose([_mean_of_seeds(point) for point in values])
+        values = self.outcomes.of_law(self.study.plan, law, name)[:, np.newaxis]
+        mean, error = np.transpose([mean_of_seeds(point) for point in values])
         return mean, error
 
     @override
     def draw(self, style: "FigureStyle") -> "Figure":
         from stickslip_ros.show.comparison_figure import comparison_figure
 
-        error, *_ = _MEANS[is_positioning(self.scenario)]
+        error, *_ = self.ranks[0].means
         names = [error, "peak_force"]
         if self.rank_by not in (None, *names):
             names.append(self.rank_by)
@@ -254,9 +205,7 @@ class ComparedLaws(TabularResult):
                 "held_interval": [*rank.held_interval],
                 **{name: mean for name, (mean, _) in rank.means.items()},
                 **{f"{name}_error": error for name, (_, error) in rank.means.items()},
-                "delay_margin": self.tuned[rank.law].delay_margin
-                if rank.law in self.tuned
-                else None,
+                "delay_margin": getattr(self.tuned.get(rank.law), "delay_margin", None),
                 "at_limit": rank.at_limit,
                 "failures": rank.failures,
                 "constants": dict(plan.laws[rank.law]),
@@ -286,26 +235,19 @@ class ComparedLaws(TabularResult):
 
     @override
     def parts(self) -> Parts:
-        plan, units = self.study.plan, self._units
-        known = {n for rank in self.ranks for n in rank.means if np.isfinite(rank.means[n][0])}
+        plan, units, means = self.study.plan, self._units, self.ranks[0].means
+        known = {n for n in means for rank in self.ranks if np.isfinite(rank.means[n][0])}
         left_out = {*FOLLOWING} - known
         if "reversal_height" in known:  # the reference does not come to rest
             left_out |= {"settling_time", "hunting_amplitude"}
-        names = [n for n in _MEANS[is_positioning(self.scenario)] if n not in left_out]
+        names = [n for n in means if n not in left_out]
         laws, points, disturbances, seeds = plan.shape
         rows: list[list[str]] = []
         for rank in self.ranks:
             tuned = self.tuned.get(rank.law)
             margin = "given" if tuned is None else units.text(tuned.delay_margin, "s")
-            rows.append(
-                [
-                    rank.law,
-                    rank.held_text,
-                    *(units.with_error(*rank.means[name], OUTCOMES[name].unit) for name in names),
-                    margin,
-                    f"{rank.at_limit:.1%}",
-                ]
-            )
+            texts = [units.with_error(*rank.means[name], OUTCOMES[name].unit) for name in names]
+            rows.append([rank.law, rank.held_text, *texts, margin, f"{rank.at_limit:.1%}"])
         where = "of the belt speed" if self._task == "regulation" else "of the reference's motion"
         yield self.verdict
         title = (
@@ -325,15 +267,8 @@ class ComparedLaws(TabularResult):
             yield f"{law}: {gains_text(tuned.law, units)}{remark}"
         for rank in self.ranks:
             if rank.failures:
-                reasons = {row.reason for row in self._rows(rank.law) if row.reason}
-                yield f"{rank.law}: {rank.failures} of {plan.size // laws} cases failed: " + (
-                    "; ".join(sorted(reasons)[:3])
-                )
-
-    def _rows(self, law: str) -> Sequence[Any]:
-        size = self.study.plan.size // len(self.study.plan.laws)
-        first = [*self.study.plan.laws].index(law) * size
-        return self.outcomes.rows[first : first + size]
+                failed = f"{rank.failures} of {plan.size // laws} cases failed"
+                yield f"{rank.law}: {failed}: {'; '.join(rank.reasons[:3])}"
 
     @override
     def _summary(self) -> Summary:
@@ -356,9 +291,8 @@ class ComparedLaws(TabularResult):
         held = [texts[point] for point in np.flatnonzero(self.held_at_points(best.law) == 1.0)]
         name = "points" if {*plan.parameters} - {"plant.belt_speed"} else "feeds"
         shown = f"{held[0]} to {held[-1]}" if 2 < len(held) == len(texts) else ", ".join(held)
-        facts[f"{name} that hold"] = (
-            f"{shown or 'none'} (in every case; {len(held)} of {len(texts)})"
-        )
+        count = f"in every case; {len(held)} of {len(texts)}"
+        facts[f"{name} that hold"] = f"{shown or 'none'} ({count})"
         peak = units.with_error(*best.means["peak_force"], OUTCOMES["peak_force"].unit)
         allowed = limit_text(law, plant, units)
         return facts | {"gains": gains_text(law, units), "mean peak force": peak + allowed}
@@ -469,24 +403,3 @@ def compare(
         columns=Outcomes(study.plan.size),
     )
     return ComparedLaws(study, outcomes, tuned, rank_by)
-
-
-def check_rank(name: str | None, scenario: Scenario) -> None:
-    """Refuse to rank by what the task of a scenario has no means of."""
-    allowed = _MEANS[is_positioning(scenario)]
-    if name is not None and name not in allowed:
-        raise InvalidInputError(
-            f"rank_by = {shown(name)} is invalid: {must_be_one_of(name, allowed)}"
-        )
-
-
-def _mean_of_seeds(values: FloatArray) -> tuple[float, float]:
-    """Return the mean over all cases that have a value, and its standard error over the seeds."""
-    known = ~np.isnan(values)
-    if not known.any():
-        return np.nan, np.nan
-    counts = known.sum(axis=(0, 1))
-    sums = np.where(known, values, 0.0).sum(axis=(0, 1))
-    of_seeds = sums[counts > 0] / counts[counts > 0]
-    error = of_seeds.std(ddof=1) / np.sqrt(len(of_seeds)) if len(of_seeds) > 1 else np.nan
-    return float(values[known].mean()), float(error)

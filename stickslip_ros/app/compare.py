@@ -97,8 +97,8 @@ def _add_cases(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> None:
     """Run the command."""
-    from stickslip_ros.api.comparison import ComparedLaws, check_rank
-    from stickslip_ros.studies.comparison import Outcomes, compared
+    from stickslip_ros.api.comparison import ComparedLaws
+    from stickslip_ros.studies.comparison import Outcomes, check_rank, compared
     from stickslip_ros.studies.design import gains_file
 
     proposed = law_constants("force_limit", "start_after")

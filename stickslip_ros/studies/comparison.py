@@ -1,4 +1,4 @@
-"""Comparison of control laws: cases of law, parameters, disturbance and seed, each simulated."""
+"""Comparison of control laws: cases of law, parameters, disturbance and seed, and the ranking."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -12,20 +12,35 @@ from stickslip_ros.errors import InvalidInputError, StickslipError
 from stickslip_ros.progress import Progress
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.scenarios.parameters import known_law
-from stickslip_ros.studies.case_outcome import Disturbance, Outcome, is_positioning, simulate_case
+from stickslip_ros.studies.case_outcome import (
+    FOLLOWING,
+    Disturbance,
+    Outcome,
+    is_positioning,
+    simulate_case,
+)
 from stickslip_ros.studies.design import Task, design
 from stickslip_ros.studies.drive_loops import DriveLoops, Tuned, with_law
 from stickslip_ros.studies.goal import Goal
 from stickslip_ros.studies.options import FEED_TOLERANCE, POSITION_TOLERANCE
 from stickslip_ros.studies.plan import Axis, Grid
 from stickslip_ros.studies.settling import MotionState, check_reference
-from stickslip_ros.studies.spread import Spread, check_spread, drawn
+from stickslip_ros.studies.spread import Spread, check_spread, drawn, held_interval
 from stickslip_ros.studies.study import PointStudy
 from stickslip_ros.studies.tuning import Tuning
-from stickslip_ros.text import shown
+from stickslip_ros.text import must_be_one_of, shown
 
 DISTURBANCES = ("step", "impulse", "sine")
 """Default disturbances."""
+_MEANS = {
+    False: ("rms_velocity", "rms_force", "settling_time", "peak_force", "mean_force", "set_point"),
+    True: (
+        *("final_error", "rms_force", "settling_time", "peak_force", "hunting_amplitude"),
+        *FOLLOWING,
+    ),
+}
+"""What the table has means of, by whether the task is positioning, the second criterion first; of
+how the slide follows, what is known of any law."""
 
 
 class Outcomes:
@@ -47,6 +62,10 @@ class Outcomes:
         """Return a column of numbers; NaN for what does not exist."""
         values = [getattr(row, name) for row in self.rows]
         return np.array([np.nan if value is None else float(value) for value in values])
+
+    def of_law(self, plan: "Cases", law: str, name: str) -> FloatArray:
+        """Return a column of the cases of a law, shape (points, disturbances, seeds)."""
+        return self.column(name).reshape(plan.shape)[[*plan.laws].index(law)]
 
 
 class Case(NamedTuple):
@@ -245,6 +264,80 @@ def feeds(scenario: Scenario, axes: Sequence[Axis]) -> list[float]:
         return [scenario.plant.belt_speed]
     fastest = scenario.controller.reference.signal(period=1.0 / scenario.plant.rate).steepest
     return [0.1 * (fastest or 0.01), fastest or 0.01]
+
+
+class Rank(NamedTuple):
+    """A law in the ranked table; means over its cases, with standard errors over the seeds."""
+
+    law: str
+    """Name of the law."""
+    held: float
+    """Share of the cases that it holds."""
+    held_error: float
+    """Its standard error; NaN with one seed."""
+    held_interval: tuple[float, float]
+    """Its 95 % interval as of independent cases (Clopper, Pearson, Biometrika 26, 1934)."""
+    means: Mapping[str, tuple[float, float]]
+    """Mean and standard error of columns of `OUTCOMES`, over the cases where they exist."""
+    at_limit: float
+    """Mean share of samples at the force limit."""
+    failures: int
+    """Number of cases that diverged or failed."""
+    reasons: Sequence[str]
+    """Why they failed, in words."""
+
+    @property
+    def held_text(self) -> str:
+        """Share of the cases that it holds, with its interval."""
+        low, high = self.held_interval
+        return f"{self.held:.1%} ({low:.1%} to {high:.1%})"
+
+
+def ranked(study: Comparison, outcomes: Outcomes, rank_by: str | None) -> tuple[Rank, ...]:
+    """Return the laws, the best first: by cases held, then error, then force beyond the mean.
+
+    By the mean `rank_by` instead, those first of which no case failed.
+    """
+    names, plan = _MEANS[is_positioning(study.scenario)], study.plan
+    ranks: list[Rank] = []
+    for place, law in enumerate(plan.laws):
+        columns = {n: outcomes.of_law(plan, law, n) for n in ("held", "at_limit", *names)}
+        held, velocity = columns["held"], outcomes.of_law(plan, law, "rms_velocity")
+        interval = held_interval(int(np.nansum(held)), held.size)
+        means = {name: mean_of_seeds(columns[name]) for name in names}
+        at_limit = float(np.nan_to_num(columns["at_limit"]).mean())
+        failures, rows = int(np.isnan(velocity).sum()), outcomes.rows[place * held.size :]
+        reasons = sorted({row.reason for row in rows[: held.size] if row.reason})
+        rank = Rank(law, *mean_of_seeds(held), interval, means, at_limit, failures, reasons)
+        ranks.append(rank)
+    by = names[:2] if rank_by is None else [rank_by]
+
+    def order(rank: Rank) -> tuple[float, ...]:
+        first = -rank.held if rank_by is None else rank.failures
+        return first, *(np.nan_to_num(rank.means[name][0], nan=np.inf) for name in by)
+
+    return tuple(sorted(ranks, key=order))
+
+
+def check_rank(name: str | None, scenario: Scenario) -> None:
+    """Refuse to rank by what the task of a scenario has no means of."""
+    allowed = _MEANS[is_positioning(scenario)]
+    if name is not None and name not in allowed:
+        raise InvalidInputError(
+            f"rank_by = {shown(name)} is invalid: {must_be_one_of(name, allowed)}"
+        )
+
+
+def mean_of_seeds(values: FloatArray) -> tuple[float, float]:
+    """Return the mean over all cases that have a value, and its standard error over the seeds."""
+    known = ~np.isnan(values)
+    if not known.any():
+        return np.nan, np.nan
+    counts = known.sum(axis=(0, 1))
+    sums = np.where(known, values, 0.0).sum(axis=(0, 1))
+    of_seeds = sums[counts > 0] / counts[counts > 0]
+    error = of_seeds.std(ddof=1) / np.sqrt(len(of_seeds)) if len(of_seeds) > 1 else np.nan
+    return float(values[known].mean()), float(error)
 
 
 def _names(what: str, text: str | Sequence[str]) -> list[str]:
