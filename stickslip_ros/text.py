@@ -1,7 +1,7 @@
 """Format text for messages, tables and figures."""
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from contextlib import suppress
 from difflib import SequenceMatcher
 from math import isfinite
@@ -111,7 +111,7 @@ def did_you_mean(name: str, known: Iterable[str], otherwise: str | None = None) 
     return f"known are {', '.join(names)}" if otherwise is None else otherwise
 
 
-def must_be_one_of(name: str, allowed: Sequence[str]) -> str:
+def must_be_one_of(name: str, allowed: Collection[str]) -> str:
     """Return the end of a message that refuses a name: those that are close, and all allowed."""
     hint = did_you_mean(name, allowed, "")
     return f"{hint} must be one of {', '.join(allowed)}".lstrip()

@@ -1,19 +1,26 @@
 """The times of a table: which columns they are, whether they are rounded, and their stamps."""
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from math import nan
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray, IntArray, windows
-from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.errors import BagError, InvalidInputError
 from stickslip_ros.record.expressions import Expression
-from stickslip_ros.record.table_columns import ROW, SECOND, Table
+from stickslip_ros.record.table_columns import ROW, SECOND, Table, reading_file
+from stickslip_ros.record.table_units import Cells, conversion
 from stickslip_ros.stamps import NANOSECONDS
 from stickslip_ros.text import quantity
 
+Clock = tuple[int, ...]
+"""Places of the columns that tell times."""
+Rows = range | IntArray
+"""Rows of a table; a range stands for all."""
 LONGEST = 9e9
 """Longest time, s, that stamps can express."""
 _LATEST, _DAYS, _INSTANT = 1e11, (2e4, 1e6), 1e-5
@@ -39,17 +46,97 @@ _UNSEEN = 0.005
 """Share of the times at which a quantity of another clock may be unknown without a word."""
 
 
-def in_order(
-    table: Table, clock: Expression, factor: float, time: FloatArray, rows: range | IntArray
-) -> range | IntArray:
+def finite_rows(values: FloatArray) -> Rows:
+    """Return the rows with a number."""
+    known = np.isfinite(values)
+    return range(len(known)) if known.all() else np.flatnonzero(known)
+
+
+def picked(values: FloatArray, rows: Rows) -> FloatArray:
+    """Return rows of values."""
+    return values if isinstance(rows, range) else values[rows]
+
+
+def columns_of(
+    table: Table, asked: Mapping[str, Expression], leading: Clock, *others: Clock
+) -> dict[int, Any]:
+    """Return the columns of expressions, and other ones, by place.
+
+    The length of the table is that of the leading ones; others of another length are refused.
+    """
+    places = [*others, *(expression.places for expression in asked.values())]
+    used = sorted({place for group in places for place in group} - {ROW})
+    with reading_file(table.path):
+        columns = dict(zip(used, table.read(used), strict=True))
+    if ROW in leading:
+        rows = max((len(column) for column in columns.values()), default=0)
+        columns[ROW] = np.arange(rows, dtype=np.float64)
+    if not max((len(columns[place]) for place in leading), default=0):
+        raise BagError(f"{table.path}: the file cannot be read: it has no rows")
+    for place, column in columns.items():
+        lead = (clock_beside(table, leading, [place]) or leading)[0]
+        if len(column) not in (1, len(columns[lead])):
+            raise InvalidInputError(
+                f"{table.path}: {table.name(place)} has {len(column)} numbers and "
+                f"{table.name(lead)} {len(columns[lead])}: columns must have the same length"
+            )
+    return columns
+
+
+def times_of(
+    cells: Cells, clock: Clock, others: Iterable[Clock]
+) -> tuple[dict[Clock, FloatArray], Rows]:
+    """Return times by columns, s from the first of the clock, and the rows that have one."""
+    table, asked, (factor, units) = cells.table, cells.asked["time"], cells.conversions["time"]
+    times = {
+        places: _exact(asked, [cells.columns[place] for place in places])
+        for places in dict.fromkeys((clock, *others))
+    }
+    rows = finite_rows(times[clock])
+    if not len(rows):
+        raise InvalidInputError(f"{table.path}: no time is a finite number")
+    rows = in_order(table, asked, factor, times[clock], rows)
+    if rows[0] > rows[-1]:
+        cells.notes.append("the rows are read from the last one on: the newest is the first")
+    if asked.bare and not units and asked.places[0] not in table.clocks:
+        step = float(np.median(np.diff(picked(times[clock], rows)))) if len(rows) > 1 else 0.0
+        column, first = table.number(clock[0]), float(times[clock][rows[0]])
+        factor, notes = unit_of_steps(step, first, table.period, column)
+        cells.notes.extend(notes)
+    if table.form.shift and len(times) == 1:
+        raise InvalidInputError(
+            f"{table.path}: shift is for columns with times of their own, and all have "
+            f"those of {asked.text}"
+        )
+    first = times[clock][rows[0]]
+    for places, stamps in times.items():
+        since = stamps - first if first else stamps
+        since = since if factor == 1.0 else since * factor
+        if places != clock:
+            other, units = conversion(table, "time", replace(asked, places=places))
+            if other != factor and (units or clock_beside(table, clock, places)):
+                since = stamps * other - first * factor
+        since = np.asarray(since, float)
+        times[places] = since if places == clock else since + table.form.shift
+    return times, rows
+
+
+def _exact(clock: Expression, cells: Sequence[Any]) -> Any:
+    """Return the times of an expression with all their digits."""
+    counts = len(cells) > 1 or cells[0].dtype.kind == "i"
+    exact = np.longdouble if counts else float  # a float has no digits for ns since 1970
+    return clock.value([np.asarray(column, exact) for column in cells])
+
+
+def in_order(table: Table, clock: Expression, factor: float, time: FloatArray, rows: Rows) -> Rows:
     """Return the rows of the session that was chosen, or all.
 
     `time` is in the unit of the table, s times `factor`. Raises InvalidInputError with a way where
     it goes back.
     """
-    picked = time if isinstance(rows, range) else time[rows]
-    back = np.flatnonzero(picked[1:] < picked[:-1]) + 1
-    bounds, session = [0, *back.tolist(), len(picked)], table.form.session
+    time = picked(time, rows)
+    back = np.flatnonzero(time[1:] < time[:-1]) + 1
+    bounds, session = [0, *back.tolist(), len(time)], table.form.session
     if session is not None:
         if session >= len(bounds):
             raise InvalidInputError(
@@ -58,10 +145,10 @@ def in_order(
         return np.asarray(rows)[bounds[session - 1] : bounds[session]]
     if not len(back):
         return rows
-    if len(back) == len(picked) - 1 > 1:  # the newest first
+    if len(back) == len(time) - 1 > 1:  # the newest first
         return np.asarray(rows)[::-1]
-    before, after = float(picked[back[0] - 1]), float(picked[back[0]])
-    step = before - float(picked[max(0, back[0] - 2)])
+    before, after = float(time[back[0] - 1]), float(time[back[0]])
+    step = before - float(time[max(0, back[0] - 2)])
     turns = (turn for turn in _TURNS if abs(before + step - after - turn) < 1.5 * step)
     turn = next(filter(lambda turn: turn > 10.0 * step, turns), None)
     what = f"goes back {len(back)} times, the first time at {table.line(int(rows[back[0]]))}"
@@ -193,7 +280,7 @@ def _even(time: FloatArray, rounding: float) -> FloatArray | None:
     return line + float(apart.min() + apart.max()) / 2.0
 
 
-def clock_of(table: Table, clock: tuple[int, ...], asked: Expression) -> tuple[int, ...]:
+def clock_of(table: Table, clock: Clock, asked: Expression) -> Clock:
     """Return the columns of the times of an expression.
 
     They are those of the time or, if this is one column, the last one before a column that is named
@@ -212,7 +299,7 @@ def clock_of(table: Table, clock: tuple[int, ...], asked: Expression) -> tuple[i
     return tuple(clocks) if len(clocks) == 1 and alike[0] == first else clock
 
 
-def clock_beside(table: Table, clock: Sequence[int], places: Sequence[int]) -> tuple[int, ...]:
+def clock_beside(table: Table, clock: Clock, places: Sequence[int]) -> Clock:
     """Return the times of columns of a second table, which are named like those of the clock."""
     first = table.second_from
     later = [first is not None and place >= first for place in places]
@@ -235,7 +322,7 @@ def clock_beside(table: Table, clock: Sequence[int], places: Sequence[int]) -> t
 
 
 def notes_of_another_clock(
-    table: Table, name: str, clock: Sequence[int], time: FloatArray, own_time: FloatArray
+    table: Table, name: str, clock: Clock, time: FloatArray, own_time: FloatArray
 ) -> Iterator[str]:
     """Yield a sentence on a quantity with times of its own, s; refuse times apart from the others.
 

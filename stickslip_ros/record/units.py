@@ -104,6 +104,7 @@ _LATIN = {
     **{"мк": "u", "см": "cm", "кгс": "kgf", "тс": "tf", "град": "deg", "об": "r"},
     **dict(zip("мскнгдчриа", "mskngdhria", strict=True)),
 }
+_SIGNS = str.maketrans({"µ": "u", "μ": "u", '"': "inch", "″": "inch", "°": "deg", "%": " % "})
 _CYRILLIC = re.compile("|".join(_LATIN), re.IGNORECASE)
 """Units in Cyrillic letters, the longer first."""
 _BRACKETED = re.compile(r"[\[(<{]\s*([^\[\](){}<>]*[^\[\](){}<>\s])\s*[\])>}]")
@@ -341,21 +342,9 @@ def _factor(unit: str, target: str) -> float:
 @cache
 def _parsed(text: str) -> tuple[tuple[str, str], ...]:
     """Return the readings of a text as a unit: what pint calls it, and its dimension."""
-    plain = (
-        re.sub(
-            "[\u0300-\u036f]",
-            "",
-            normalize("NFD", _CYRILLIC.sub(_latin, text.replace("Å", "angstrom"))),
-        )
-        .replace("µ", "u")
-        .replace("μ", "u")
-        .replace('"', "inch")
-        .replace("″", "inch")
-        .replace("°", "deg")
-        .replace("⁻¹", "-1")
-        .replace("ms-1", "m/s")  # as in v_ms-1, and not 1/ms
-        .replace("%", " % ")
-    )
+    plain = normalize("NFD", _CYRILLIC.sub(_latin, text.replace("Å", "angstrom")))
+    plain = re.sub("[\u0300-\u036f]", "", plain).translate(_SIGNS)
+    plain = plain.replace("⁻¹", "-1").replace("ms-1", "m/s")  # as in v_ms-1, and not 1/ms
     plain = re.sub("(?<=[a-z])Per(?=[A-Z])", "/", plain)
     plain = re.sub(r"(?i)(?<![^\W\d_])(?:per|pro|por|par)(?![^\W\d_])", "/", plain)
     if len(plain) > 40 or not re.fullmatch(r"[\w\s/.*·⋅^%²-]+", plain):

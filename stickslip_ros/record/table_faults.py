@@ -1,0 +1,158 @@
+"""Faults and imperfections of a run that a table shows: they are left out, or refused, or told."""
+
+import re
+from collections.abc import Iterator
+from math import nan
+from typing import Any
+
+import numpy as np
+
+from stickslip_ros.arrays import FloatArray, IntArray
+from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.record.faults import Jumps, lost_velocities, shift_note
+from stickslip_ros.record.imperfections import play_note, ripple_note
+from stickslip_ros.record.table_clock import Rows, finite_rows, picked
+from stickslip_ros.record.table_units import Cells
+from stickslip_ros.record.units import units_in
+
+Values = dict[str, FloatArray]
+"""Quantities by name, arrays of shape (rows,)."""
+_DRIVES = re.compile(r"(?i)mot|enc|spind|screw|c?mdpos|cmd|soll|ref|set|target|consigne|vis\b")
+"""Starts of words in the name of a column with the position of what drives the slide."""
+_SMALLEST_TURN, _SAME_TURN = 256.0, 0.01
+"""Least turn of a counter that wraps once; relative difference of a jump from it."""
+
+
+def without_faults(cells: Cells, values: Values, rows: Rows) -> Iterator[str]:
+    """Leave out what no motion makes; yield sentences on this, and on what the values show.
+
+    `values` are quantities at the `rows` of the table. Raises InvalidInputError if the positions
+    are those of a counter that wraps.
+    """
+    yield from _without_lost_positions(cells, values, rows)
+    if "velocity" in values:
+        yield from _without_lost_velocities(cells, values, rows)
+    units = ("rad", "N m") if cells.table.form.rotary else ("m", "N")
+    if "reference" in values:
+        yield from play_note(values["reference"], values["position"], units[0], "the reference")
+    else:
+        for name, column in _driving_columns(cells):
+            driving = picked(column, rows)
+            if driving.shape == values["position"].shape:
+                yield from play_note(driving, values["position"], units[0], name)
+    if "force" in values:
+        yield from ripple_note(values["time"], values["position"], values["force"], units)
+
+
+def _driving_columns(cells: Cells) -> Iterator[tuple[str, FloatArray]]:
+    """Yield the first column that nobody asked for, and that is named like what drives the slide.
+
+    It is complete, in the unit of the position.
+    """
+    table, position = cells.table, cells.asked["position"]
+    if not position.bare or len(position.places) != 1:
+        return
+
+    def factors(place: int) -> list[float]:
+        return [unit.factor for unit in units_in(table.names[place], table.units[place], "m")]
+
+    unit = factors(position.places[0])
+    for place, name in enumerate(table.names):
+        words = re.findall(r"[^\W\d_]+", name)
+        is_unused = place not in cells.columns and place in table.columns.values()
+        if is_unused and any(map(_DRIVES.match, words)) and factors(place) == unit:
+            (column,) = table.read([place])
+            if np.isfinite(column).all():
+                yield (
+                    table.name(place),
+                    np.asarray(column, float) * cells.conversions["position"].factor,
+                )
+            return
+
+
+def _without_lost_positions(cells: Cells, values: Values, rows: Rows) -> Iterator[str]:
+    """Leave out positions that no motion makes; yield sentences on them."""
+    table, factor = cells.table, cells.conversions["position"].factor
+    present = finite_rows(values["position"])
+    jumps = Jumps(picked(values["position"], present), _rounding(cells))
+
+    def line(row: Any) -> str:
+        return table.line(int(rows[present[row]]))
+
+    if (wrap := jumps.wrap()) is not None:
+        turn = f"{wrap.turn / factor:.10g}"
+        text = f"unwrap({cells.asked['position'].text}, {turn})"
+        raise InvalidInputError(
+            f"{table.path}: the position jumps {len(wrap.rows)} times by {turn}, the "
+            f"first time at {line(wrap.rows[0])}, as of a counter that wraps: position="
+            f"{text}{'' if factor == 1.0 else f'*{factor:g}'}"
+        )
+    if len(lost := jumps.dropouts()):
+        first, lost = line(lost[0]), lost if isinstance(present, range) else present[lost]
+        yield _left_out(values, "position", lost, first, "no motion does")
+    for row, size in jumps.shifts():
+        if way := _unwrapped(cells, int(rows[present[row]])):
+            raise InvalidInputError(
+                f"{table.path}: the position jumps as a counter that wraps, at {line(row)}: {way}"
+            )
+        place = f"at {line(row)}, {values['time'][present[row]]:.6g} s after the first row"
+        yield shift_note(size, place, "rad" if table.form.rotary else "m")
+
+
+def _without_lost_velocities(cells: Cells, values: Values, rows: Rows) -> Iterator[str]:
+    """Leave out velocities that contradict the others or the positions; yield sentences on them."""
+    position, velocity = values["position"], values["velocity"]
+    both = np.flatnonzero(np.isfinite(position) & np.isfinite(velocity))
+    fault, spikes = lost_velocities(values["time"][both], position[both], velocity[both])
+    if fault is not None:
+        values["velocity"] = np.full(len(velocity), nan)
+        yield f"the velocity {fault}: it is left out"
+    elif spikes.any():
+        first = cells.table.line(int(rows[both[spikes][0]]))
+        yield _left_out(values, "velocity", both[spikes], first, "the positions do not")
+
+
+def _left_out(values: Values, name: str, lost: IntArray, first: str, why: str) -> str:
+    """Leave out what a quantity jumps to, and back from; return the sentence on this."""
+    values[name] = values[name].copy()
+    values[name][lost] = nan
+    return (
+        f"the {name} jumps away and back, as {why}, in {len(lost)} rows, the first is {first}: "
+        "they are left out"
+    )
+
+
+def _rounding(cells: Cells) -> float:
+    """Return how much the position, linear in its columns, errs by the last digits of these."""
+    asked = cells.asked["position"]
+    rows = np.zeros((len(asked.places), 1 + len(asked.places)))  # no column, and each by itself
+    for number, place in enumerate(asked.places):
+        column = np.abs(cells.columns[place])
+        largest = np.max(column, where=np.isfinite(column), initial=0.0)
+        rows[number, 1 + number] = np.spacing(largest)
+    values = np.atleast_1d(asked.value([*rows])) * cells.conversions["position"].factor
+    with np.errstate(all="ignore"):
+        return float(np.nan_to_num(np.sum(np.abs(values - values[0])), posinf=0.0))
+
+
+def _unwrapped(cells: Cells, row: int) -> str:
+    """Return the expression that unwraps a position which jumps by a power of 2, or nothing.
+
+    Its column must be of whole numbers.
+    """
+    asked, factor = cells.asked["position"], cells.conversions["position"].factor
+    if len(asked.places) != 1:
+        return ""
+    (place,), known = asked.places, cells.table.columns
+    near = np.asarray(cells.columns[place], float)[max(0, row - 9) : row + 9]
+    jump = np.max(np.abs(np.diff(near)), initial=1.0)
+    turn = 2.0 ** np.rint(np.log2(jump))
+    same = abs(turn - jump) <= _SAME_TURN * turn
+    if turn < _SMALLEST_TURN or not same or np.any(near != np.rint(near)):
+        return ""
+    names = "|".join(re.escape(alias) for alias in known if known[alias] == place)
+    text = f"unwrap({cells.table.number(place)}, {turn:.0f})"
+    if not asked.bare:
+        column = rf"(?<![\w.])['\"]?(?:{names})(?!\w)['\"]?"
+        text = re.sub(column, text, asked.text, count=1)
+    return f"position={text}" + f"*{factor:.12g}" * (factor != 1.0)
