@@ -18,14 +18,14 @@ from stickslip_ros.text import shown
 
 NO_UNITS = ("", "-", "1", "unit", "units", "einheit", "einheiten")
 _LONG = {"nano": "n", "micro": "u", "mikro": "u", "milli": "m", "mili": "m", "centi": "c",
-         "zenti": "c", "kilo": "k"}  # fmt: skip
+         "zenti": "c", "kilo": "k", "chilo": "k"}  # fmt: skip
 _ANY_LONG = "|".join(_LONG)
 _SPELLINGS = tuple(
     (name, dimension, re.compile(f"({prefixes})?(?:{words})"))
     for name, dimension, prefixes, words in (
-        ("m", "L", f"[pnumcdk]|{_ANY_LONG}", "m|met(?:er[sn]?|res?|ros?|ri)"),
+        ("m", "L", f"[pnumcdk]|{_ANY_LONG}", "m|met(?:er[sn]?|res?|ros?|r[iy]?)"),
         ("s", "T", f"[num]|{_ANY_LONG}", r"s|se[ckg](?:s|[ou]nd\w{0,2})?"),
-        ("N", "F", f"[umck]|da|{_ANY_LONG}", "n|newtons?"),
+        ("N", "F", f"[umck]|da|{_ANY_LONG}", "n|newton[sy]?"),
         ("N m", "FL", "[umck]", "nm"),
         ("N cm", "FL", "", "ncm"),
         ("N mm", "FL", "", "nmm"),
@@ -44,6 +44,7 @@ _SPELLINGS = tuple(
         ("knot", "L/T", "", "knots?|kts"),
         ("m/min", "L/T", "m", "mpm|mmin"),
         ("ft/s", "L/T", "", "fps"),
+        ("ft/min", "L/T", "", "fpm"),
         ("inch/s", "L/T", "", "ips|inps"),
         ("inch/min", "L/T", "", "ipm"),
         ("degree/s", "R/T", "", "dps|degp?s"),
@@ -53,16 +54,16 @@ _SPELLINGS = tuple(
         ("yard", "L", "", "yds?|yards?"),
         ("angstrom", "L", "", "angstr[oö]ms?"),
         ("thou", "L", "", "thou|mils?"),
-        ("micron", "L", "", "mi[ck]rons?|mkm"),
+        ("micron", "L", "", "mi[ck]ron[sy]?|micras?|mkm"),
         ("min", "T", "", r"min(?:s|ut\w{1,2})?"),
         ("hour", "T", "", "h|hrs?|hours?|stunden?|horas?|heures?|or[ae]"),
         ("day", "T", "", "d|days?|tage?"),
-        ("degree", "R", "m|milli", r"deg(?:s|r\w*)?|grad(?:i|os?)?"),
+        ("degree", "R", "m|milli", r"deg(?:s|[ru]\w*)?|stopni\w*|grad(?:i|os?)?"),
         ("gon", "R", "m", "gon|grad"),
-        ("turn", "turns", "", "r|u|tr|rot"),
+        ("turn", "turns", "", "r|u|tr|rot|obr"),
         ("turn", "R", "", "revs?|revolutions?|turns?|umdr(?:ehung(?:en)?)?|tours?|giri|vueltas?"),
-        ("arcsec", "R", "", "arcsec(?:onds?)?"),
-        ("arcmin", "R", "", "arcmin(?:utes?)?"),
+        ("arcsec", "R", "", r"(?:arc|bogen)se[ck](?:[ou]nd\w{1,2})?"),
+        ("arcmin", "R", "", r"(?:arc|bogen)min(?:ut\w{1,2})?"),
         ("kgf", "F", "", "kgf|kp"),
         ("lbf", "F", "k", "lbf"),
         ("kip", "F", "", "kips?"),
@@ -75,7 +76,7 @@ _SPELLINGS = tuple(
             "other",
             "[kum]",
             r"[vwgk]|volts?|grams?|kgs|kilos?|tons?|tonn(?:e[ns]?|ellat[ae])|toneladas?|pa|bar|lbs?|oz|degc|°c|%"
-            "|percent|pct|prozent",
+            "|pounds?|percent|pct|prozent",
         ),
     )
 )
@@ -101,14 +102,16 @@ _FORCE = re.compile(r"forc|fuerz|forz|torq|moment|coup|copp|effort|\w*(?:kraft|m
 _SQUARED = re.compile(r"(?i)(?<![^\W\d_])(?:[cdm]?m|rad|deg)[\W_]?s\W{0,2}[2²](?!\d)")
 """Units of an acceleration, as ms2."""
 _LATIN = {
-    **{"мк": "u", "см": "cm", "кгс": "kgf", "тс": "tf", "град": "deg", "об": "r"},
-    **dict(zip("мскнгдчриа", "mskngdhria", strict=True)),
+    **{"мк": "u", "см": "cm", "кгс": "kgf", "тс": "tf", "град": "deg", "об": "r", "ью": "ew"},
+    **dict(zip("мскнгдчриалетыуо", "mskngdhrialetyuo", strict=True)),
 }
 _SIGNS = str.maketrans({"µ": "u", "μ": "u", '"': "inch", "″": "inch", "°": "deg", "%": " % "})
 _CYRILLIC = re.compile("|".join(_LATIN), re.IGNORECASE)
 """Units in Cyrillic letters, the longer first."""
 _BRACKETED = re.compile(r"[\[(<{]\s*([^\[\](){}<>]*[^\[\](){}<>\s])\s*[\])>}]")
 _MARK = re.compile(r"\s*[/,]\s*|\s+(?:in|en|em)\s+")
+_PER = r"(?:per|pro|por|par)(?![^\W\d_])"
+"""Word for a ratio."""
 _MARKS = " _-.,;:/#"
 """What is between words."""
 _START = re.compile(
@@ -252,8 +255,10 @@ def _stated(name: str, plain: str, given: str, target: str) -> Iterator[Unit]:
     cell, bracketed = given.strip().strip("[]()"), _BRACKETED.findall(name)
     marked = [plain[mark.end() :] for mark in _MARK.finditer(plain)]
     for text in filter(None, [cell, *bracketed, *marked, *re.findall("%$", plain)]):
-        words = [word for word in text.split() if word.strip(".").casefold() not in _DOUBTFUL]
-        tried = [text, *words[:1]] if re.search(r"\d", text) else [text, *words[-1:], *words[:1]]
+        whole = re.sub(r"(?i)^(?:in|en|em)\s+", "", text)
+        words = re.split(r"[\s,;]+", whole)
+        words = [word for word in words if word.strip(".").casefold() not in _DOUBTFUL]
+        tried = [whole, *words[:1]] if re.search(r"\d", text) else [whole, *words[-1:], *words[:1]]
         if readings := next(filter(None, ([*_read(attempt, target)] for attempt in tried)), []):
             yield from readings
         elif text.lower() not in (*NO_UNITS, *_DOUBTFUL):
@@ -271,7 +276,7 @@ def _last(name: str, target: str) -> Iterator[Unit]:
     starts = [match.start() for match in _START.finditer(name)]
     for start in starts[-4:]:
         text, before = name[start:], name[:start]
-        rest = text[3:] if re.match(r"(?i)in[\W_]", text) else ""
+        rest = text[3:] if re.match(rf"(?i)in[\W_](?!{_PER})", text) else ""
         if readings := [*_read(rest, target)] or [*_read(text, target)]:
             if re.match(r"(?i)per(?![^\W_])", text) and _counts(before):
                 break
@@ -298,14 +303,17 @@ def _last(name: str, target: str) -> Iterator[Unit]:
 
 def _between(name: str, starts: Sequence[int], target: str) -> Iterator[Unit]:
     """Yield what words may be that others follow; mm_s there is no unit of length."""
-    first = int(len(starts) > 1 and len(name[starts[0] : starts[1]].strip(_MARKS)) == 1)
+    first = int(re.match(r"[^\W_][\W_]+[^\W_]", name) is not None)
     while first < len(starts) - 1:
         for end in range(min(first + 3, len(starts) - 1), first, -1):
             text = name[starts[first] : starts[end]].strip(_MARKS)
-            known = {dimension for _, dimension in _parsed(text)} & {*_DIMENSIONS.values()}
+            unit = re.sub(r"^\d[\d.]*(?=[^\W_])", "", text)
+            known = {dimension for _, dimension in _parsed(unit)} & {*_DIMENSIONS.values()}
             if known and len(text) > 1 and text.casefold() != "in":
                 readings = [*_read(text, target)]
                 yield from readings or [Unit(text, nan, target)] * (end > first + 1)
+                if unit != text:  # a number of units, or of the column
+                    yield from _read(unit, target)
                 if readings and text.casefold() in _DOUBTFUL_LAST:
                     yield Unit("", 1.0, target)
                 first = end - 1
@@ -345,8 +353,8 @@ def _parsed(text: str) -> tuple[tuple[str, str], ...]:
     plain = normalize("NFD", _CYRILLIC.sub(_latin, text.replace("Å", "angstrom")))
     plain = re.sub("[\u0300-\u036f]", "", plain).translate(_SIGNS)
     plain = plain.replace("⁻¹", "-1").replace("ms-1", "m/s")  # as in v_ms-1, and not 1/ms
-    plain = re.sub("(?<=[a-z])Per(?=[A-Z])", "/", plain)
-    plain = re.sub(r"(?i)(?<![^\W\d_])(?:per|pro|por|par)(?![^\W\d_])", "/", plain)
+    plain = re.sub("(?<=[a-z])P(?:er|ro|or|ar)(?=[A-Z])", "/", plain)
+    plain = re.sub(rf"(?i)(?<![^\W\d_]){_PER}", "/", plain)
     if len(plain) > 40 or not re.fullmatch(r"[\w\s/.*·⋅^%²-]+", plain):
         return ()
     sides: list[list[str]] = [[], []]

@@ -13,7 +13,7 @@ HEADERS = {
     "s": {
         1e-3: "Zeit [ms]|Zeit in ms|Zeit, ms|Time (msec)|t / ms|t/ms|Time ms|time_ms|timeMs"
         "|TimeMS|TIME_MS"
-        "|Время, мс"
+        "|Время, мс|Время, миллисекунды"
         "|millis|ms|Temps (ms)|temps en ms|Tiempo / ms|Tiempo_ms|ms_today|time_ms_since_boot"
         "|t.ms|t:ms|t-ms|millis()|t_ms1"
         "|Zeit (Millisekunden)|time [milliseconds]",
@@ -21,7 +21,7 @@ HEADERS = {
         1e-9: "timestamp [ns]|nanosec|t_ns",
         1.0: "t [s]|time_s|Zeit in Sekunden|Temps, secondes|tiempo en segundos|Time (sec)",
         60.0: "t [min]|Zeit in min|t / min|Time, min|durée (minutes)",
-        DOUBTFUL: "t_min|t_h|min|tick|time_10ms|sample count",
+        DOUBTFUL: "t_min|t_h|min|tick|time_10ms|10us ticks|sample count",
         NO_UNIT: "t|time|Timestamp|data[1]|t_m|index|max|#time|t_d.x|params|Time (abs)",
     },
     "m": {
@@ -29,12 +29,13 @@ HEADERS = {
         "|x-mm|x_mm|x [mm]"
         "|x (mm)|x <mm>|X_MM|Position mm (act)|pos_mm_act|déplacement en mm|Posición (mm)"
         "|spostamento [mm]"
-        "|Weg in Millimeter|Weg in Millimetern|x [milímetros]|pos_mm1|mm10|pos_mm_filt"
+        "|Lage (mm, Ist)|Przemieszczenie (milimetry)|Weg in Millimeter"
+        "|Weg in Millimetern|x [milímetros]|pos_mm1|mm10|pos_mm_filt"
         "|Перемещение, мм|x_мм|位移mm|Weg (in mm)|course (millimètres)|x [1e-3 m]|mm",
         0.9144: "x_yards|x [yd]|x in yd",
         1e-10: "x_Å",
         1e-6: "pos, mkm|x [um]|x (µm)|x [micron]|vdcdt_um|Weg / µm",
-        1e-4: "x [0.1 mm]|x (0,1 mm)",
+        1e-4: "x [0.1 mm]|x (0,1 mm)|x (in 0.1 mm)",
         1e-2: "pos_cm",
         1e-9: "pos_nm",
         1e-12: "IDS.pos1 [pm]",
@@ -44,11 +45,13 @@ HEADERS = {
         2.54e-5: "X (thou)|x_mil",
         1.0: "x [m]|x_m|Weg in m|tacho_meters|phi_rad",
         TURN: "phi_rev|pos [turns]|Winkel in Umdrehungen",
-        DEGREE: "phi [Grad]|phi [°]|phi_deg|Winkel in Grad|angle (degrés)|angulo en grados",
+        DEGREE: "phi [Grad]|phi [°]|phi_deg|Winkel in Grad|angle (degrés)|angulo en grados"
+        "|Угол, градусы|kat_stopnie",
+        DEGREE / 60: "Winkel in Bogenminuten",
         DOUBTFUL: "x_in|position_in|xIn|in|cm|phi [grad]|pos [inc]|Position [counts]|pos_counts"
         "|Encoder count|count|yd|x_yd"
         "|Weg [Inkremente]|Droop pulses (by 1 pls.)|Position [V]|Pos [%]|x (1/1000 mm)"
-        "|Weg / mV|x_0.1um|x (in 0.1 mm)"
+        "|Weg / mV|x_0.1um"
         "|pos_cnt|pos (qc)|LVDT volts|Position %|tenths of mm|[mm]/10|x [mm x 1000]|Weg x10^-3 m"
         "|Drehmoment [Nm]|x_mm_s_filt|pos_x1000|usteps|adc",
         NO_UNIT: "x|pos|x_N|phi_h|pos_d|x_min|Position (min)|Position (X)|x_max|data[2]|pos_s|A"
@@ -56,13 +59,16 @@ HEADERS = {
     },
     "m/s": {
         1e-3: "Скорость, мм/с|v [mm/s]"
-        "|v / (mm/s)|v mm/s|v_mm_s|v in mm/s|v_mm_per_s|v_mmps|v_mmPerS|vMm_s|vitesse, mm/s",
+        "|v / (mm/s)|v mm/s|v_mm_s|v in mm/s|v_mm_per_s|v_mmps|v_mmPerS|BandMmProS|vMm_s"
+        "|vitesse, mm/s",
+        0.3048 / 60: "Belt FPM",
+        0.0254: "v_in_per_s",
         1e-3 / 60: "Speed mm/min|feed_mm_min|v_mm_min_filtered",
         1.0: "v [m/s]|v_ms-1|v [ms⁻¹]|v_m_s|omega_rad_s|w [rad/s]",
         TURN / 60: "об/мин"
         "|rpm|speed_rpm|SpeedRPM|n [1/min]|n / min⁻¹|n [min-1]|n [min^-1]|n [U/min]"
         "|Drehzahl in U/min|tr/min"
-        "|giri/min|motor rev/min",
+        "|giri/min|obroty_obr_min|motor rev/min",
         TURN: "n [rev/s]|f [Hz]",
         1e3 * TURN / 60: "krpm",
         0.44704: "v_mph",
@@ -73,14 +79,16 @@ HEADERS = {
     },
     "N": {
         1e3: "F / kN|F_act_kN_act|Усилие, кН|F [kN]|F_kN|force_kn|ForceKN|Kraft in kN|Fuerza (kN)"
+        "|kN applied|Forza in chilonewton|Сила, килоньютоны"
         "|force, kN",
-        1.0: "force_N|F_in_N|Kraft in N|F [N]|M [Nm]|T [N·m]|T / Nm|torque_nm|TorqueNm|effort en N",
+        1.0: "force_N|F_in_N|Kraft in N|F [N]|M [Nm]|T [N·m]|T / Nm|torque_nm|TorqueNm|effort en N"
+        "|Kraft (in Newton)",
         1e-3: "torque_mNm|torque_mNm_act|n mN filtered|M [N mm]|F [mN]",
         10.0: "F_daN",
         9.80665: "load [kgf]",
         1.3558179483314: "torque_lbft|M [ftlb]",
         DOUBTFUL: "F_in_N*10|I [Arms]|M [0.1%]|F [t]|F_t|F_dyn|F_dyn_filt|F / t|Last in t|Сила, т"
-        "|F / g|F_tons|thrust_grams|load_pct|lb|torque_counts"
+        "|F / g|F_tons|thrust_grams|load_pct|lb|Force_Pounds|torque_counts"
         "|force_mn|I [A]|load [kg]|torque [%]|force_kg|cell_mV|u_V|p_bar",
         NO_UNIT: "F|force|torque|u|A|current_A|x_max|F (t)|Ft|F_T|force_N_filt",
     },
