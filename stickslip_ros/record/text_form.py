@@ -271,6 +271,8 @@ def _head_in(texts: Sequence[_Line], first: int, skip: int, width: int) -> Head:
     for upper_place, upper in above[:1]:
         if are_units(lower):
             return Head(upper, lower, place + 1, upper_place, first)
+        if [without_unit(name) or name for name in upper] == lower:
+            return Head(upper, empty, None, upper_place, first)
         if are_units(upper):
             return Head(lower, upper, upper_place + 1, upper_place, first)
     return Head(lower, empty, None, place, first)

@@ -150,6 +150,7 @@ def test_times_of_day_have_no_unit(tmp_path: Path) -> None:
         ("Trace 1\nms;mm\nt;x\n", "t", "x", ANY_FORM, "the first line skipped, units in line 2"),
         ("t [ms];x [mm]\n", "#1", "#2", TableFormat(skip=1), "semicolons as separators"),
         ("Zeit;Weg\nms;mm ±1 µm\n", "Zeit", "Weg", ANY_FORM, "decimal commas, units in line 2"),
+        ("# t in ms; x [mm]\nt;x\n", "t", "x", ANY_FORM, "decimal commas"),
         ("Zeit [ms];Weg [mm]\n-;%\n", "Zeit", "Weg [mm]*1e-3", ANY_FORM, "units in line 2"),
     ],
 )
