@@ -28,7 +28,7 @@ QUANTITIES = {
 """Units of the quantities that a table may have; time and position it must have."""
 MOTION, FORCES = ("position", "velocity"), ("force", "disturbance", "friction_force")
 """Quantities of which rows without a number lack samples; those that hold until the next value."""
-_LARGE = 100.0
+_LARGE = 10.0
 """Range of positions without a unit, from which it is said that they are taken as m or rad."""
 
 
@@ -97,6 +97,11 @@ class Cells:
         by_column = {k: v for one in self.conversions.values() for k, v in one.units.items()}
         if by_column:
             units = [f"{name}: {unit.text}" for name, unit in by_column.items()]
+            for name, expression in asked.items():
+                if name != "time" and expression.bare and not self.conversions[name].units:
+                    unit = "A" if name == "force" and form.per_ampere else QUANTITIES[name]
+                    unit = ROTARY.get(unit, unit) if form.rotary else unit
+                    units.append(f"{expression.text}: no known unit, taken as {unit}")
             yield f"units: {'; '.join(dict.fromkeys(units))}"
         angles = [unit.text for unit in by_column.values() if unit.target in ROTARY.values()]
         if angles and not form.rotary:

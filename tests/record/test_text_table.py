@@ -118,6 +118,19 @@ def test_a_unit_that_is_not_sure_is_refused_with_a_way(
     )
 
 
+@pytest.mark.parametrize(
+    ("names", "sentence"),
+    [
+        ("t [s],x in Foo", "units: t [s]: s; x in Foo: no known unit, taken as m"),
+        ("t,x", "the position, x, has no unit and counts in m, from 0 to 19"),
+    ],
+)
+def test_what_is_taken_as_si_units_is_said(tmp_path: Path, names: str, sentence: str) -> None:
+    text = f"{names}\n" + "".join(f"{n / 10},{n}\n" for n in range(20))
+    notes = read(tmp_path, text, "#1", names.partition(",")[2]).notes
+    assert any(sentence in note for note in notes)
+
+
 def test_a_difference_of_columns_has_their_unit(tmp_path: Path) -> None:
     lines = [f"{t:.4f},{1e3 * x + 2:.9f},2" for t, x in zip(TIME, POSITION, strict=True)]
     text = "t,act [mm],cmd [mm]\n" + "\n".join(lines)
