@@ -51,8 +51,9 @@ class Stability(Result):
     def continuous_system(self) -> LinearSystem | None:
         """Matrices of the linear loop with continuous control; None if there is none."""
         law = self.scenario.control_law
-        control = None if law is None else law.continuous
-        return control and continuous_system(self.scenario.plant.as_drive(), control)
+        if law is None or law.continuous is None:
+            return None
+        return continuous_system(self.scenario.plant.as_drive(), law.continuous)
 
     @property
     def sampled_system(self) -> LinearSystem | None:

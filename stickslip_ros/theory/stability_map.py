@@ -116,6 +116,9 @@ def stable_feeds(
         loop = LinearSampledLoop.from_drive(moved, *sampling)
         return loop is not None and loop.spectral_radius(law) < 1.0
 
+    def sign(speed: float) -> float:
+        return 1.0 if is_stable(speed) else -1.0
+
     if not drive.belt_speed:
         return None
     speeds = (drive.belt_speed * np.geomspace(*SEARCHED_FEEDS, 100)).tolist()
@@ -126,6 +129,6 @@ def stable_feeds(
     ends = speeds[:1] * known[0]
     for low, high, *states in zip(speeds, speeds[1:], known, known[1:], strict=False):
         if states[0] != states[1]:
-            ends.append(bisect(lambda speed: is_stable(speed) - 0.5, low, high, rtol=1e-4))
+            ends.append(bisect(sign, low, high, rtol=1e-4))
     ends += speeds[-1:] * known[-1]
     return [*zip(ends[::2], ends[1::2], strict=True)]
