@@ -8,6 +8,7 @@ rounding and limits are not, and are left out.
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import accumulate, pairwise
 from math import frexp, inf, log
 from typing import Any, Self
 
@@ -243,12 +244,7 @@ class LinearSampledLoop:
         require("the search for stable gains", self.drive, ONE_MASS)
         corner = corner_frequency / self.drive.angular_frequency
         boundary = GainBoundary(
-            self.plant[0],
-            self.held,
-            self.delay[0],
-            self.period,
-            corner,
-            self.difference_samples,
+            self.plant[0], self.held, self.delay[0], self.period, corner, self.difference_samples
         )
         return boundary.stable_intervals(
             self.drive.force_scale / self.drive.speed_scale,
@@ -281,9 +277,8 @@ class LinearSampledLoop:
         half of what it spans; the sum is kept. A loop of small order is returned as it is.
         """
         spans = self.difference_samples
-        if self.motor_difference_samples:
-            return self
-        if self.under_way + spans <= 21:  # searching many gains is quick
+        # Searching many gains is quick with a small order.
+        if self.motor_difference_samples or self.under_way + spans <= 21:
             return self
         latest = self.force_delay + spans / self.rate
         rate = min(self.rate, max(20.0 / latest, 5.0 * self.drive.angular_frequency))
@@ -370,44 +365,44 @@ class LinearSampledLoop:
 
         The unit of the law's states is that of the speed: no eigenvalue depends on it.
         """
-        whole, split = self.delay
-        under_way, drive = self.under_way, self.drive
-        slide, starting, ending = self.held
+        (whole, split), drive = self.delay, self.drive
         stacked, states = feedback.output.shape[:-1], feedback.output.shape[-1]
-        order, spans, of_motor = len(slide), self.difference_samples, self.motor_difference_samples
-        law, first, past = slice(order, order + states), order + states, order + states + under_way
-        size = past + spans + of_motor
+        spans = self.difference_samples, self.motor_difference_samples
+        sizes = len(self.plant[1]), states, self.under_way, *spans
+        slots = (slice(*ends) for ends in pairwise(accumulate(sizes, initial=0)))
+        plant, law, under_way, earlier, earlier_motor = slots
+        size, (slide, starting, ending) = sum(sizes), self.held
         matrix = np.zeros((*stacked, size, size))
-        forces = np.zeros((*stacked, 1 + under_way, size))
-        seen = np.eye(2, size)  # what the controller sees of the state
-        if spans:
-            seen[SPEED, SPEED] = 0.0
-            seen[SPEED, POSITION] = 1.0 / (spans * self.period)
-            seen[SPEED, past + spans - 1] = -seen[SPEED, POSITION]
-        motor = len(self.jacobian) - 2
-        if feedback.direct.shape[-1] > 2:
-            seen = np.vstack([seen, np.eye(2, size, motor)])
-            if of_motor:
-                seen[3, motor + 1] = 0.0
-                seen[3, motor] = 1.0 / (of_motor * self.period)
-                seen[3, -1] = -seen[3, motor]
+        bodies = ((POSITION, earlier), (len(self.jacobian) - 2, earlier_motor))
+        seen = np.vstack([self._seen(*body, size) for body in bodies])[: feedback.direct.shape[-1]]
         units = np.resize([drive.length_scale, drive.speed_scale], len(seen))
+        forces = np.zeros((*stacked, 1 + self.under_way, size))
         forces[..., 0, :] = (feedback.direct * units / drive.force_scale) @ seen
         forces[..., 0, law] = feedback.output * drive.speed_scale / drive.force_scale
-        forces[..., 1:, first:past] = np.eye(under_way)
-        matrix[..., :order, :order] = slide
-        matrix[..., :order, :] += starting[:, None] * forces[..., whole, None, :]
+        forces[..., 1:, under_way] = np.eye(self.under_way)
+        matrix[..., plant, plant] = slide
+        matrix[..., plant, :] += starting[:, None] * forces[..., whole, None, :]
         if split > 0.0:
-            matrix[..., :order, :] += ending[:, None] * forces[..., whole + 1, None, :]
+            matrix[..., plant, :] += ending[:, None] * forces[..., whole + 1, None, :]
         matrix[..., law, :] += (feedback.input * (units / drive.speed_scale)) @ seen
         matrix[..., law, law] += feedback.state
-        matrix[..., first:past, :] = forces[..., :-1, :]
-        for place, count, start in ((POSITION, spans, past), (motor, of_motor, past + spans)):
-            if count:
-                matrix[..., start, place] = 1.0
-                stop = start + count
-                matrix[..., start + 1 : stop, start : stop - 1] = np.eye(count - 1)
+        matrix[..., under_way, :] = forces[..., :-1, :]
+        for position, before in bodies:  # the newest becomes that of now
+            matrix[..., before, :] = np.eye(size)[np.r_[position, before][:-1]]
         return matrix
+
+    def _seen(self, position: int, earlier: slice, size: int) -> FloatArray:
+        """Return displacement and velocity of a body, as the controller sees them, by the state.
+
+        The velocity is a difference where there are `earlier` positions.
+        """
+        seen = np.eye(2, size, position)
+        spans = earlier.stop - earlier.start
+        if spans:
+            seen[1, position + 1] = 0.0
+            seen[1, position] = 1.0 / (spans * self.period)
+            seen[1, earlier.stop - 1] = -seen[1, position]
+        return seen
 
 
 def not_linear(law: str) -> str:
