@@ -10,11 +10,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from stickslip_ros.arrays import FloatArray, median
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.measures.breakpoints import (
-    STICK_SHARE,
-    Breakpoints,
-    breakpoints_from_samples,
-)
+from stickslip_ros.measures.breakpoints import STICK_SHARE, Breakpoints, breakpoints_from_samples
 from stickslip_ros.measures.cycle_measures import (
     UNBOUNDED_BELT_SPEEDS,
     Cycle,

@@ -207,15 +207,11 @@ class WindowMeter:
         row = samples.row(lows[0].time) if lows else len(samples)
         row = max(min(row - _MARGIN, len(samples) - _HELD), len(samples) - _MOST_SAMPLES)
         if row > 0:
-            self._drop_first(row)
+            self._rows = slice(self._rows.start + row, self._rows.stop)
+            while len(lows) > 1 and lows[0].time < self._table[0, self._rows.start]:
+                lows.popleft()
+                self._cycles.popleft()
         return completed
-
-    def _drop_first(self, rows: int) -> None:
-        """Drop the samples before the window, and the cycles that began with them."""
-        self._rows = slice(self._rows.start + rows, self._rows.stop)
-        while len(self._lows) > 1 and self._lows[0].time < self._table[0, self._rows.start]:
-            self._lows.popleft()
-            self._cycles.popleft()
 
 
 def _is_resting(samples: NoisySamples, cycles: Sequence[Cycle], lows: Sequence[Point]) -> bool:

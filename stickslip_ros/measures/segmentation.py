@@ -196,8 +196,8 @@ def _measured(
     step = max(step, encoder_step(relative[-_LOOK:], ROUNDING))
     noise = white_noise(relative[-_LOOK:])
     speed = abs(belt_velocity) or _mean_speed(time, relative, max(step, 6.0 * noise))
-    travel = speed * (float(time[-1] - time[0]) / (len(time) - 1))
-    rests = _rests_apart(relative, travel, noise, step)
+    sample_period = float(time[-1] - time[0]) / (len(time) - 1)
+    rests = _rests_apart(relative, speed * sample_period, noise, step)
     starts = _cycle_starts(time, rests)[-most_cycles - 1 :]
     if not starts:
         return None
@@ -212,7 +212,9 @@ def _measured(
     period = float(release[-1] - release[0]) / (len(release) - 1)
     durations = np.add.reduceat([slip.duration for slip in used], np.array(starts[:-1]) - starts[0])
     shares = 1.0 - durations / np.diff(release)
-    feed = _advance(used) / float(release[-1] - release[0])
+    travel = np.array([slip.travel for slip in used])
+    onward = abs(float(np.sum(travel))) >= _NO_FEED * float(np.sum(np.abs(travel)))
+    feed = float(np.sum(travel)) / float(release[-1] - release[0]) if onward else 0.0
     if not belt_velocity:
         position = position - feed * (time - time[0])
     width = float(np.median([slip.duration for slip in used]))
@@ -239,13 +241,6 @@ def _measured(
         creep_error=creep_error / unit,
         slip_samples=width,
     )
-
-
-def _advance(slips: list[SlipEdges]) -> float:
-    """Return the travel of slips on the whole, m; 0 where they only go to and fro."""
-    travel = np.array([slip.travel for slip in slips])
-    advance = float(np.sum(travel))
-    return advance if abs(advance) >= _NO_FEED * float(np.sum(np.abs(travel))) else 0.0
 
 
 def _errors(means: CycleMeans, slips: list[SlipEdges], width: float, resolution: float) -> Cycle:

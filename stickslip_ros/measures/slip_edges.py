@@ -39,11 +39,6 @@ class Rest(NamedTuple):
     last: int
     level: float
 
-    @property
-    def middle(self) -> int:
-        """Row in its middle."""
-        return (self.first + self.last) // 2
-
 
 class SlipEdges(NamedTuple):
     """When a slip begins and ends, s, with the standard errors, and how far it travels, m."""
@@ -63,7 +58,7 @@ def slip_edges(
     time: FloatArray, position: FloatArray, before: Rest, after: Rest, noise: float, step: float
 ) -> SlipEdges:
     """Return the edges of the slip between two rests; SI units."""
-    first, last = before.middle, after.middle
+    first, last = ((rest.first + rest.last) // 2 for rest in (before, after))
     travel = after.level - before.level
     size = abs(travel)
     course = (position[first : last + 1] - before.level) * (1.0 if travel > 0.0 else -1.0)

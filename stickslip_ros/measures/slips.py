@@ -83,12 +83,16 @@ def slips_in(time: FloatArray, position: FloatArray, threshold: SlipThreshold) -
     take. Its duration is that from a tenth to nine tenths of the drop, the transition duration of
     IEEE Std 181. When the first stick began is not known.
     """
+    from scipy.ndimage import maximum_filter1d, median_filter  # takes long to import
+
     slips: list[Slip] = []
     if len(time) <= 2 * _MEDIAN:
         return slips
     drop, step = threshold.drop, float(time[_MEDIAN * 2] - time[0]) / (_MEDIAN * 2)
     span = max(round(min(threshold.within / step, len(time))), 1) if step > 0.0 else 1
-    smooth, highest = _smooth_and_highest(position, span)
+    # The last medians are not known yet.
+    smooth: FloatArray = median_filter(position, _MEDIAN, mode="nearest")[: -(_MEDIAN // 2)]
+    highest = maximum_filter1d(smooth, span + 1, origin=span // 2, mode="nearest")
     low = np.flatnonzero(smooth < highest - drop)
     landing: int | None = None
     while True:
@@ -125,14 +129,6 @@ def _landing(smooth: FloatArray, start: int, drop: float, span: int) -> int | No
         if start + count >= len(smooth):
             return None
         count *= 2
-
-
-def _smooth_and_highest(position: FloatArray, span: int) -> tuple[FloatArray, FloatArray]:
-    """Return the medians but the last, not known yet, and the highest of each and `span` before."""
-    from scipy.ndimage import maximum_filter1d, median_filter  # takes long to import
-
-    smooth: FloatArray = median_filter(position, _MEDIAN, mode="nearest")[: -(_MEDIAN // 2)]
-    return smooth, maximum_filter1d(smooth, span + 1, origin=span // 2, mode="nearest")
 
 
 def _slip(time: FloatArray, smooth: FloatArray, top: int, bottom: int, landing: int | None) -> Slip:
