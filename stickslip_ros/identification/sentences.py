@@ -159,7 +159,7 @@ def unidentified(findings: Findings) -> Mapping[str, str]:
         if isinf(estimate.standard_error):
             sure = f"{estimate.value:.4g} is one of many values that fit alike"
         if findings.chosen.remark == OUT_OF_TIME:
-            why[name] = f"the limit of work was reached at {estimate.value:.4g}; see the note on it"
+            why[name] = f"{estimate.value:.4g} is from a fit that the limit of work ended"
             continue
         why[name] = f"{sure}; a run with other speeds and forces may identify it"
     return why
