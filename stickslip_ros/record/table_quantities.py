@@ -58,9 +58,8 @@ def quantities_of(
         columns = {**columns, "belt_velocity": repr(float(belt_speed))}
     needed = "velocity" if "position" not in columns and "velocity" in columns else "position"
     asked = _asked(table, columns, ("time", needed))
+    _check_column(table, "time", asked["time"])
     clock = asked["time"].places
-    if not clock:
-        raise InvalidInputError(f"{table.path}: time = {columns['time']} must be a column")
     clocks = {name: clock_of(table, clock, expression) for name, expression in asked.items()}
     cells = Cells(table, asked, columns_of(table, asked, clock, *clocks.values()))
     times, rows = times_of(cells, clock, clocks.values())
@@ -94,8 +93,16 @@ def speed_and_force(table: Table, columns: Mapping[str, str]) -> Quantities:
     `columns` has both, and errors are those of `quantities_of`.
     """
     asked = _asked(table, columns, ("velocity", "force"))
+    for name, expression in asked.items():
+        _check_column(table, name, expression)
     cells = Cells(table, asked, columns_of(table, asked, asked["velocity"].places))
     return Quantities({name: np.atleast_1d(cells.value(name)) for name in asked}, cells.notes)
+
+
+def _check_column(table: Table, name: str, asked: Expression) -> None:
+    """Refuse a number in place of a column."""
+    if not asked.places:
+        raise InvalidInputError(f"{table.path}: {name} = {asked.text} must be a column")
 
 
 def _asked(

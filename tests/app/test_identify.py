@@ -156,3 +156,6 @@ def test_a_map_gives_friction_alone(stickslip: Run, tmp_path: Path) -> None:
     assert again["parameters"] == stickslip.json(*arguments)["parameters"]
     model = ss.friction_map(table, columns={"velocity": "v", "force": "f*2"})
     assert stickslip.json(*arguments) == model.to_dict()
+    refused = stickslip(*arguments[:-1], "velocity=0.01,force=f")
+    assert (refused.returncode, refused.stdout) == (2, "")
+    assert "velocity = 0.01 must be a column" in refused.stderr
