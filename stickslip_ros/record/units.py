@@ -75,8 +75,8 @@ _SPELLINGS = tuple(
             "",
             "other",
             "[kum]",
-            r"[vwgk]|volts?|grams?|kgs|kilos?|tons?|tonn(?:e[ns]?|ellat[ae])|toneladas?|pa|bar|lbs?|oz|degc|°c|%"
-            "|pounds?|percent|pct|prozent",
+            "[vwgk]|volts?|grams?|kgs|kilos?|tons?|tonn(?:e[ns]?|ellat[ae])|toneladas?|lbs?|oz"
+            "|pounds?|pa|bar|degc|°c|%|percent|pct|prozent",
         ),
     )
 )
@@ -85,11 +85,13 @@ them. Those without a name for pint are of other quantities; turns as in U/min o
 _DIMENSIONS = {"m": "L", "m/s": "L/T", "N": "F", "s": "T", "rad": "R", "rad/s": "R/T", "N m": "FL",
                "A": "I", "N/A": "F/I", "N m/A": "FL/I"}  # fmt: skip
 _COUNTS = re.compile(
-    r"counts?|cts|[cp]ps|adc|inc|incr(?:ements?)?|ink(?:r\w*)?|puls\w*|impuls\w*|pls|ticks?|(?:micro|u)?steps|lsb|digits?|erpm|cnts?|qc"
+    r"counts?|cnts?|cts|[cp]ps|adc|inc|incr(?:ements?)?|ink(?:r\w*)?|puls\w*|impuls\w*|pls|ticks?"
+    r"|(?:micro|u)?steps|lsb|digits?|erpm|qc"
 )
 """Words for numbers of an encoder, a motor or a clock, of which only the owner knows the size."""
 _SCALED = re.compile(
-    r"(?i)(?:[*/\xd7]|\sx)\s*10+\b|[\s_]x10+(?=[^\W\d_])|_x100+$|\b(?:tenth|hundredth|zehntel|hundertstel)s?\b"
+    r"(?i)(?:[*/\xd7]|\sx)\s*10+\b|[\s_]x10+(?=[^\W\d_])|_x100+$"
+    r"|\b(?:tenth|hundredth|thousandth|zehntel|hundertstel|tausendstel)s?\b"
 )
 """What says that numbers are multiples of a unit."""
 _OTHERS = {

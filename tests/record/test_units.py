@@ -52,7 +52,8 @@ HEADERS = {
         "|Encoder count|count|yd|x_yd"
         "|Weg [Inkremente]|Droop pulses (by 1 pls.)|Position [V]|Pos [%]|x (1/1000 mm)"
         "|Weg / mV|x_0.1um"
-        "|pos_cnt|pos (qc)|LVDT volts|Position %|tenths of mm|[mm]/10|x [mm x 1000]|Weg x10^-3 m"
+        "|pos_cnt|pos (qc)|LVDT volts|Position %|[mm]/10|x [mm x 1000]|Weg x10^-3 m"
+        "|tenths of mm|thousandths of an inch"
         "|Drehmoment [Nm]|x_mm_s_filt|pos_x1000|usteps|adc",
         NO_UNIT: "x|pos|x_N|phi_h|pos_d|x_min|Position (min)|Position (X)|x_max|data[2]|pos_s|A"
         "|mu|accel_x|in_position|x10|pos_x10|x_amplitude",
