@@ -73,9 +73,9 @@ class Tuning:
                 # Less is not worth a larger cubic gain.
                 if other[0] > (value[0], 1.05 * value[1]):
                     value, law = other
-        return self._told(law, value[1])
+        return self._with_limits(law, value[1])
 
-    def _told(self, law: ControlLaw, rate: float) -> Tuned:
+    def _with_limits(self, law: ControlLaw, rate: float) -> Tuned:
         """Return gains with the limits that they miss, in words, too; `rate` is the decay rate."""
         loops, drives = self.loops, self.drives
         if rate <= 0.0:
