@@ -240,7 +240,7 @@ def design(
         Largest force, N. By default this is the scenario's.
     spread : float or str
         Largest deviation of a constant of the drive, as a share, or `fit`: as the fit leaves them
-        open. The gains hold 20 drives that it draws; other 40 judge them.
+        open. The gains must hold 20 drawn drives; 40 others then judge them.
     progress : callable, optional
         Receives the share that is done, 0 to 1.
 

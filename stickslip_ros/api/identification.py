@@ -1,7 +1,7 @@
 """Identification: a model of a drive from recordings."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from typing_extensions import override
 
 from stickslip_ros.api.page import Summary
+from stickslip_ros.api.recordings import with_forms
 from stickslip_ros.api.results import Parts, Result
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.identification import sentences
@@ -30,9 +31,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from stickslip_ros.show.style import FigureStyle
-
-
-_FORM, _LAYOUT = ({part.name for part in fields(kind)} for kind in (TableFormat, BagLayout))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -104,9 +102,7 @@ class Model(Result):
         InvalidInputError
             If it has several parts, or lacks what a prediction needs.
         """
-        form = {name: options.pop(name) for name in _FORM if name in options}
-        layout = {name: options.pop(name) for name in _LAYOUT if name in options}
-        options |= {"form": TableFormat(**form), "layout": BagLayout(**layout)}
+        options = with_forms(options)
         records = read_records(Path(recording), columns, start=start, end=end, **options)
         if len(records) > 1:
             raise InvalidInputError(

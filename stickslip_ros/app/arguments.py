@@ -296,7 +296,7 @@ def _spread(text: str) -> float | str:
 
 
 def whole(what: str, least: int, most: int) -> Callable[[str], int]:
-    """Return what parses a whole number; `what` it is has places for the bounds."""
+    """Return a parser of whole numbers; `what` names them in messages, with {} for each bound."""
 
     def parse(text: str) -> int:
         if not (text.isascii() and text.isdigit() and least <= int(text) <= most):

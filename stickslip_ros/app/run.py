@@ -225,7 +225,7 @@ def record(
 
 
 def _again(words: Sequence[str]) -> str:
-    """Return the command of another such run: of these words, without the bag, which exists."""
+    """Return these words as a command, without --bag: that directory exists now."""
     kept = [w for before, w in pairwise(["", *words]) if "--bag" not in (before, w.split("=")[0])]
     return shlex.join(["stickslip", *kept])
 

@@ -196,7 +196,7 @@ def runs_of(bags: Iterable[Path]) -> dict[Path, dict[Path, float]]:
 
 
 def _gap(before: Path, after: Path) -> float | None:
-    """Return the time, s, from the end of a bag to the begin of one that continues it, or None."""
+    """Return the time (s) from the end of a bag to the bag that continues it, None if none does."""
     with BagFiles(before) as one, BagFiles(after) as other:
         plants, analyzers = (
             [bag.metadata(f"stickslip_ros/{node}") for bag in (one, other)]

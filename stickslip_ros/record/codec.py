@@ -317,7 +317,7 @@ class _Joints:
         return [message.doubles(message.count()) for _ in range(3)]
 
     def check_counts(self, fields: int = 3, always: int = 0) -> None:
-        """Refuse other numbers than one for each joint or, but for the first fields, none."""
+        """Refuse sequences without one value per joint; all but the first `always` may be empty."""
         counts, number = [count for _, count in self.sequences], len(self.names)
         if {*counts[:always]} <= {number} and {*counts[:fields]} <= {0, number}:
             return

@@ -59,7 +59,7 @@ class MachineMotion:
         self._left_out = Counter[str]()
         self._sources = _Sources(joint, topic, where, layout)
         self._fault = ""
-        """Why velocities are those of the positions; empty: they are those recorded."""
+        """Why velocities are computed from the positions; empty if the recorded ones are used."""
         self._belt = nan
         self._last: SampleColumns | None = None
 

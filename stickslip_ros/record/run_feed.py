@@ -139,8 +139,8 @@ class RunFeed:
             )
         if report["stick_fraction"] is None and report["regime"] == Regime.STICK_SLIP:
             notes.append(
-                f"the stick fraction is not known: {report['cycles']} whole cycles do not tell its "
-                "error, three do"
+                "the stick fraction is not known: its error needs three whole cycles, and there "
+                f"are {report['cycles']}"
             )
         if self._slips is not None:
             slips, slip_notes = self._slips.report(report["position_noise"], length)

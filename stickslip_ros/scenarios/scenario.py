@@ -126,7 +126,7 @@ class Scenario:
 
     @property
     def gains_of_base(self) -> list[str]:
-        """Those of `gains` from a base of the file that the drive, but for its feed, is from."""
+        """Those of `gains` whose file is a more distant base than the drive's, belt speed aside."""
         order = [self.path, *self.bases]
         place = {name: order.index(path) for name, path in self.files.items()}
         drive = [f"plant.{name}" for name in self.plant.drive_names() if name != "belt_speed"]

@@ -123,7 +123,7 @@ class Rest:
 
 @dataclass(frozen=True)
 class _Started(Sensor):
-    """A sensor that measures already."""
+    """A sensor whose measurement began before the trial."""
 
     measure: Measure | None = None
 

@@ -271,19 +271,13 @@ class Grid:
         tuple[float, ...]
             One value for each axis, in the unit of its parameter.
         """
-        values: list[float] = []
-        for axis in reversed(self.axes):
-            index, number = divmod(index, axis.count)
-            values.append(axis.value(number))
-        return tuple(reversed(values))
+        numbers = np.unravel_index(index % prod(self.shape), self.shape)
+        return tuple(axis.value(int(n)) for axis, n in zip(self.axes, numbers, strict=True))
 
     def corners(self) -> Iterator[int]:
         """Yield the indices of the points at the ends of all axes."""
-        for ends in product((0, 1), repeat=len(self.axes)):
-            index = 0
-            for axis, end in zip(self.axes, ends, strict=True):
-                index = index * axis.count + end * (axis.count - 1)
-            yield index
+        for corner in product(*((0, count - 1) for count in self.shape)):
+            yield int(np.ravel_multi_index(corner, self.shape))
 
     def chains(self) -> Iterator[range]:
         """Yield the indices of each chain in its order; without a continuation, all together."""

@@ -205,7 +205,7 @@ def test_a_table_on_a_guide_at_rest_has_the_measures_of_its_stick_slip(tmp_path:
     belt = {"time": "t", "position": "0.01*t-x", "belt_velocity": "0.01"}
     few = report_of_recording(path, belt, end=2.4)
     assert (few["regime"], few["stick_fraction"]) == ("stick_slip", None)
-    assert any("2 whole cycles do not tell its error, three do" in note for note in few["notes"])
+    assert any("needs three whole cycles, and there are 2" in note for note in few["notes"])
     notes = report_of_recording(path, {**belt, "position": "x*1e6"})["notes"]
     assert any("it diverges, or one of them is in another unit" in note for note in notes)
 
