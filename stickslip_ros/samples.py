@@ -53,12 +53,12 @@ class Sample(NamedTuple):
     motor: MotorSample | None = None
     """State of the motor; None if it is ideal."""
 
-    def of(self, body: str) -> "Sample | MotorSample":
+    def body(self, name: str) -> "Sample | MotorSample":
         """Return what has position and velocity of a body.
 
         Parameters
         ----------
-        body : str
+        name : str
             "table", the slide, or "motor".
 
         Returns
@@ -71,11 +71,11 @@ class Sample(NamedTuple):
         InvalidInputError
             If there is no such motor.
         """
-        if body == "table":
+        if name == "table":
             return self
         if self.motor is None:
             raise InvalidInputError(
-                f"feedback of the {body}: the samples have no motor, as with plant.motor.kind = "
+                f"feedback of the {name}: the samples have no motor, as with plant.motor.kind = "
                 "ideal; feedback of the table needs none"
             )
         return self.motor

@@ -373,8 +373,8 @@ def compare(
     >>> import stickslip_ros as ss
     >>> drive = ss.scenario("feed_drive", controller="velocity_feedback", velocity_gain=-3000.0)
     >>> laws = "velocity_feedback,washout"
-    >>> found = ss.compare(drive, laws, disturbances="step", given=laws, duration=1.0)
-    >>> [(rank.law, rank.held) for rank in found.ranks]
+    >>> ranking = ss.compare(drive, laws, disturbances="step", given=laws, duration=1.0)
+    >>> [(rank.law, rank.held) for rank in ranking.ranks]
     [('velocity_feedback', 1.0), ('washout', 1.0)]
     """
     chosen = as_scenario(scenario)

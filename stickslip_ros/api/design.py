@@ -258,8 +258,8 @@ def design(
     Examples
     --------
     >>> import stickslip_ros as ss
-    >>> found = ss.design("feed_drive", belt_speed=0.04, force_limit=200)
-    >>> found.scenario.washout_controller.force_limit
+    >>> proposal = ss.design("feed_drive", belt_speed=0.04, force_limit=200)
+    >>> proposal.scenario.washout_controller.force_limit
     200.0
     """
     chosen = as_scenario(scenario)

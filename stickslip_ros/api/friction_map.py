@@ -148,8 +148,8 @@ def friction_map(
     ...     table = Path(folder, "map.csv")
     ...     rows = [f"{v / 100},{15.0 + 0.8 * v}" for v in range(1, 20)]
     ...     _ = table.write_text("\n".join(["v,f", *rows]))
-    ...     found = ss.friction_map(table, columns={"velocity": "v", "force": "f"})
-    >>> found.law, round(found.parameters["plant.friction.viscous"].value, 3)
+    ...     fitted = ss.friction_map(table, columns={"velocity": "v", "force": "f"})
+    >>> fitted.law, round(fitted.parameters["plant.friction.viscous"].value, 3)
     ('coulomb', 80.0)
     """
     form, paths = TableFormat(decimal, skip, encoding, rotary), [*map(Path, tables)]

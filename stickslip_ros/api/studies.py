@@ -71,7 +71,7 @@ class Points(TabularResult):
         """Further columns of a table: an array of a value for each point, by name."""
 
     @abstractmethod
-    def _found(self) -> dict[str, Any]:
+    def _results(self) -> dict[str, Any]:
         """Return what belongs to all points together, for JSON."""
 
     def write_csv(self, stream: TextIO) -> None:
@@ -89,7 +89,7 @@ class Points(TabularResult):
         studied = self.study.as_dict()
         studied.pop("scenario")
         columns = json_entries(self.columns, self.further)
-        return {**self.scenario.provenance(), **self._found(), **studied, **columns}
+        return {**self.scenario.provenance(), **self._results(), **studied, **columns}
 
     def _table(self) -> Table:
         columns, plan = self.columns, self.study.plan
@@ -161,7 +161,7 @@ class Sweep(Points):
         ways = np.array([*map(str, plan.directions)], dtype=object)
         return {"direction": np.repeat(ways, plan.size // len(ways))}
 
-    def _found(self) -> dict[str, Any]:
+    def _results(self) -> dict[str, Any]:
         speeds = self.transitions.items()
         return {"transitions": {name.lower().replace(" ", "_"): values for name, values in speeds}}
 
@@ -219,7 +219,7 @@ class Basin(Points):
         """The place in the attractors of each start."""
         return {"attractor": self.basins.places}
 
-    def _found(self) -> dict[str, Any]:
+    def _results(self) -> dict[str, Any]:
         return {"attractors": [asdict(attractor) for attractor in self.attractors]}
 
     @override
@@ -300,8 +300,8 @@ def sweep(
     Examples
     --------
     >>> import stickslip_ros as ss
-    >>> found = ss.sweep(ss.scenario("paper", expects_control=False), belt_speed=(0.40, 0.48, 9))
-    >>> [regime.value for regime in found.columns.regime[[0, -1]]]
+    >>> diagram = ss.sweep(ss.scenario("paper", expects_control=False), belt_speed=(0.40, 0.48, 9))
+    >>> [regime.value for regime in diagram.columns.regime[[0, -1]]]
     ['stick_slip', 'pure_slip']
     """
     if carry is not None and carry not in list(Continuation):

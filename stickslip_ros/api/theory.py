@@ -83,8 +83,8 @@ class Stability(Result):
         Examples
         --------
         >>> import stickslip_ros as ss
-        >>> found = ss.stability("feed_drive")
-        >>> loop, radius = found.to_control(), found.sampled_loop["spectral_radius"]
+        >>> theory = ss.stability("feed_drive")
+        >>> loop, radius = theory.to_control(), theory.sampled_loop["spectral_radius"]
         >>> loop.dt, bool(abs(abs(loop.poles()).max() - radius) < 1e-9)
         (0.001, True)
         """
@@ -157,8 +157,8 @@ def stability(scenario: ScenarioLike, spread: float | str = 0.0) -> Stability:
     Examples
     --------
     >>> import stickslip_ros as ss
-    >>> found = ss.stability("paper")
-    >>> found.open_loop["stable"], found.closed_loop["stable"]
+    >>> theory = ss.stability("paper")
+    >>> theory.open_loop["stable"], theory.closed_loop["stable"]
     (False, True)
     """
     chosen = as_scenario(scenario)

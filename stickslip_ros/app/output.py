@@ -92,7 +92,7 @@ def progress_bar(
     """
     left = _TimeLeft(label, total, advice, even)
     if not sys.stderr.isatty():
-        with _told(label) if lines else nullcontext([label]) as said:
+        with _telling(label) if lines else nullcontext([label]) as said:
 
             def follow(done: float, label: str | None = None) -> None:
                 left.after(done)
@@ -153,7 +153,7 @@ class _TimeLeft:
 
 
 @contextmanager
-def _told(label: str) -> Generator[list[str]]:
+def _telling(label: str) -> Generator[list[str]]:
     """Tell every ten seconds what is done, and for how long; provide the place of its label."""
     said, begin, ended = [label], monotonic(), Event()
 

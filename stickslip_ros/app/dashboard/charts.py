@@ -51,7 +51,7 @@ def points(name: str, colour: str, size: float, symbol: str = "circle") -> dict[
     return {"type": "scatter", "name": name, "data": []} | look
 
 
-def _of(grid: int) -> dict[str, int]:
+def _axes(grid: int) -> dict[str, int]:
     return {"xAxisIndex": grid, "yAxisIndex": grid}
 
 
@@ -69,12 +69,12 @@ TRACE: dict[str, Any] = {
     ],
     "yAxis": [AXIS | {"gridIndex": index} for index in range(3)],
     "series": [
-        line("slide", BLUE) | _of(0),
-        line("slide", BLUE) | _of(1),
-        line("belt", GREY, "dashed") | _of(1),
-        line("control force", ORANGE) | {"step": "end"} | _of(2),
-        line("held, no new force", ORANGE, "dotted") | _of(2),
-        points("sent, not applied", ORANGE, 3) | _of(2),
+        line("slide", BLUE) | _axes(0),
+        line("slide", BLUE) | _axes(1),
+        line("belt", GREY, "dashed") | _axes(1),
+        line("control force", ORANGE) | {"step": "end"} | _axes(2),
+        line("held, no new force", ORANGE, "dotted") | _axes(2),
+        points("sent, not applied", ORANGE, 3) | _axes(2),
         line("A", GREEN, "dotted"),
         line("B", SKY_BLUE, "dotted"),
     ],

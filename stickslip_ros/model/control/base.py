@@ -48,7 +48,7 @@ class LinearFeedback(NamedTuple):
     direct: FloatArray
     """D, shape (2,) or (4,)."""
 
-    def of(self, body: str) -> Self:
+    def for_body(self, body: str) -> Self:
         """Return the same feedback of the motion of another body.
 
         Parameters
@@ -268,7 +268,7 @@ class ControlLaw(ABC):
             Time since the last sample, s; 0 at the first one.
         sample : Sample
             Sample to answer. A law uses stamp, position and velocity, which are what a sensor
-            measures, of the slide, or of the motor behind it: `sample.of(body)`.
+            measures, of the slide, or of the motor behind it: `sample.body(body)`.
         reference : Reference
             Reference at that sample.
 

@@ -71,8 +71,8 @@ class Cascade(ControlLaw, TwoBodyControl):
     ) -> tuple[float, State]:
         integral, rate, *memory = state
         position, velocity, acceleration = reference.filled
-        error = self.position_gain * (position - sample.of(self.feedback).position) + velocity
-        error -= sample.of(self.velocity_feedback).velocity
+        error = self.position_gain * (position - sample.body(self.feedback).position) + velocity
+        error -= sample.body(self.velocity_feedback).velocity
         added, memory = self.washout.respond((memory[0], memory[1]), elapsed, sample, reference)
         added += self.velocity_gain * error + self.feed_forward_mass * acceleration
         after = integral + rate * elapsed
@@ -100,7 +100,7 @@ class Cascade(ControlLaw, TwoBodyControl):
 
     @override
     def rest(self, position: Any, speed: Any) -> Sequence[Any]:
-        return 0.0, *self.washout.rest(0.0, _of(self.washout_feedback, speed))
+        return 0.0, *self.washout.rest(0.0, _seen(self.washout_feedback, speed))
 
     @override
     def state_rates(self, position: Any, speed: Any, states: Sequence[Any]) -> Sequence[Any]:
@@ -108,18 +108,17 @@ class Cascade(ControlLaw, TwoBodyControl):
         rate = gain * self._error(position, speed)
         if isinstance(gain, float) and gain == 0.0:  # not determined: it decays
             rate = -self.corner_frequency * states[0]
-        seen = _of(self.washout_feedback, speed)
+        seen = _seen(self.washout_feedback, speed)
         return rate, *self.washout.state_rates(0.0, seen, states[1:])
 
     def control_force(self, position: Any, speed: Any, states: Sequence[Any]) -> Any:
         """Return u without a reference."""
-        washed = self.washout.control_force(0.0, _of(self.washout_feedback, speed), states[1:])
+        washed = self.washout.control_force(0.0, _seen(self.washout_feedback, speed), states[1:])
         return self.velocity_gain * self._error(position, speed) + states[0] + washed
 
     def _error(self, position: Any, speed: Any) -> Any:
-        return -self.position_gain * _of(self.feedback, position) - _of(
-            self.velocity_feedback, speed
-        )
+        seen = _seen(self.feedback, position), _seen(self.velocity_feedback, speed)
+        return -self.position_gain * seen[0] - seen[1]
 
     @override
     def state_scales(self, drive: Drive) -> Sequence[float]:
@@ -130,5 +129,5 @@ class Cascade(ControlLaw, TwoBodyControl):
         return np.full_like(speed, np.inf)
 
 
-def _of(which: str, pair: Any) -> Any:
+def _seen(which: str, pair: Any) -> Any:
     return pair[0] if which == TABLE else pair[1]

@@ -38,7 +38,7 @@ class DisturbanceObserver(FeedbackLaw):
     @override
     def initial_state(self, sample: Sample, reference: Reference) -> State:
         # No disturbance is known yet.
-        momentum_flow = self.bandwidth * self.nominal_mass * sample.of(self.feedback).velocity
+        momentum_flow = self.bandwidth * self.nominal_mass * sample.body(self.feedback).velocity
         return momentum_flow, momentum_flow
 
     @override
@@ -46,7 +46,7 @@ class DisturbanceObserver(FeedbackLaw):
         self, state: State, elapsed: float, sample: Sample, reference: Reference
     ) -> tuple[float, State]:
         filtered, held = state
-        seen = sample.of(self.feedback)
+        seen = sample.body(self.feedback)
         filtered -= expm1(-self.bandwidth * elapsed) * (held - filtered)
         momentum_flow = self.bandwidth * self.nominal_mass * seen.velocity
         disturbance = momentum_flow - filtered
@@ -57,7 +57,7 @@ class DisturbanceObserver(FeedbackLaw):
 
     @override
     def linear_feedback(self, period: float) -> LinearFeedback:
-        return superposed(replace(self, feedback=TABLE), period).of(self.feedback)
+        return superposed(replace(self, feedback=TABLE), period).for_body(self.feedback)
 
     @override
     def for_drive(self, drive: Drive) -> Self:

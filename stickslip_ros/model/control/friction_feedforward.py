@@ -43,7 +43,7 @@ class FrictionFeedforward(Pid):
     def respond(
         self, state: State, elapsed: float, sample: Sample, reference: Reference
     ) -> tuple[float, State]:
-        error, rate = tracking_error(sample.of(self.feedback), reference)
+        error, rate = tracking_error(sample.body(self.feedback), reference)
         _, velocity, acceleration = reference.filled
         speed = velocity - sample.belt_velocity
         forward = self.nominal_mass * acceleration + self.viscous_damping * speed

@@ -44,7 +44,7 @@ class LugreObserver(FrictionFeedforward):
         self, state: State, elapsed: float, sample: Sample, reference: Reference
     ) -> tuple[float, State]:
         integral, deflection = state
-        error, rate = tracking_error(sample.of(self.feedback), reference)
+        error, rate = tracking_error(sample.body(self.feedback), reference)
         speed = sample.velocity - sample.belt_velocity
         decay = self.bristle_stiffness * abs(speed) / max(self.size(abs(speed)), 1e-30)
         drift = speed + self.observer_gain * error - decay * deflection

@@ -43,7 +43,7 @@ class Pid(FeedbackLaw):
     def respond(
         self, state: State, elapsed: float, sample: Sample, reference: Reference
     ) -> tuple[float, State]:
-        error, rate = tracking_error(sample.of(self.feedback), reference)
+        error, rate = tracking_error(sample.body(self.feedback), reference)
         force, integral = self.force_and_integral(state[0], elapsed, error, rate, 0.0)
         return force, (integral,)
 
@@ -86,7 +86,7 @@ class Pid(FeedbackLaw):
             Sample period, s.
         """
         gains = {name: getattr(self, name) for name in Pid.tuned}
-        return superposed(Pid(**gains), period).of(self.feedback)
+        return superposed(Pid(**gains), period).for_body(self.feedback)
 
 
 def tracking_error(body: Sample | MotorSample, reference: Reference) -> tuple[float, float]:

@@ -40,7 +40,7 @@ class ResetIntegral(Pid):
         self, state: State, elapsed: float, sample: Sample, reference: Reference
     ) -> tuple[float, State]:
         integral, side = state
-        error, rate = tracking_error(sample.of(self.feedback), reference)
+        error, rate = tracking_error(sample.body(self.feedback), reference)
         if abs(error) > self.reset_band:
             before, side = side, 1.0 if error > 0.0 else -1.0
             if before == -side:

@@ -43,7 +43,7 @@ class SlidingMode(FeedbackLaw):
     def respond(
         self, state: State, elapsed: float, sample: Sample, reference: Reference
     ) -> tuple[float, State]:
-        error, rate = tracking_error(sample.of(self.feedback), reference)
+        error, rate = tracking_error(sample.body(self.feedback), reference)
         distance, layer = rate + self.slope * error, self.boundary_layer
         share = distance / layer if layer > abs(distance) else (distance > 0.0) - (distance < 0.0)
         force = self.nominal_mass * (reference.filled[2] + self.slope * rate)
@@ -56,7 +56,7 @@ class SlidingMode(FeedbackLaw):
         gain = self.switching_force / self.boundary_layer
         direct = -np.array([gain * self.slope, gain + self.nominal_mass * self.slope])
         feedback = LinearFeedback(np.empty((0, 0)), np.empty((0, 2)), np.empty(0), direct)
-        return feedback.of(self.feedback)
+        return feedback.for_body(self.feedback)
 
     @override
     def for_drive(self, drive: Drive) -> Self:

@@ -43,14 +43,14 @@ class VelocityFeedback(FeedbackLaw, ContinuousControl):
     def respond(
         self, state: State, elapsed: float, sample: Sample, reference: Reference
     ) -> tuple[float, State]:
-        seen = sample if self.feedback == TABLE else sample.of(self.feedback)
+        seen = sample if self.feedback == TABLE else sample.body(self.feedback)
         return self.control_force(seen.position, seen.velocity, ()), state
 
     @override
     def linear_feedback(self, period: float) -> LinearFeedback:
         direct = np.array([self.position_gain, self.velocity_gain])
         feedback = LinearFeedback(np.empty((0, 0)), np.empty((0, 2)), np.empty(0), direct)
-        return feedback.of(self.feedback)
+        return feedback.for_body(self.feedback)
 
     @override
     def silenced(self) -> Self:

@@ -59,7 +59,7 @@ class Washout(FeedbackLaw, ContinuousControl):
 
     def initial_state(self, sample: Sample, reference: Reference) -> State:
         """Return a filter at rest: z = y, and y, m/s; see `ControlLaw.initial_state`."""
-        velocity = sample.of(self.feedback).velocity
+        velocity = sample.body(self.feedback).velocity
         return velocity, velocity
 
     @override
@@ -67,7 +67,7 @@ class Washout(FeedbackLaw, ContinuousControl):
         self, state: State, elapsed: float, sample: Sample, reference: Reference
     ) -> tuple[float, State]:
         low_passed, held = state
-        velocity = (sample if self.feedback == TABLE else sample.of(self.feedback)).velocity
+        velocity = (sample if self.feedback == TABLE else sample.body(self.feedback)).velocity
         low_passed -= expm1(-self.corner_frequency * elapsed) * (held - low_passed)
         return self.force(velocity - low_passed), (low_passed, velocity)
 
@@ -79,7 +79,7 @@ class Washout(FeedbackLaw, ContinuousControl):
             np.array([[0.0, step]]),
             np.array([-gain]),
             np.array([0.0, gain]),
-        ).of(self.feedback)
+        ).for_body(self.feedback)
 
     def silenced(self) -> Self:
         """Return the filter alone, which gives no force."""
