@@ -10,8 +10,8 @@ from stickslip_ros.model.constants import constants_of
 from stickslip_ros.model.control import ContinuousControl
 from stickslip_ros.model.control.base import seen_by
 from stickslip_ros.model.drive import Drive, DriveConstants, ScaledDrive
-from stickslip_ros.model.drive_forces import DriveForces
 from stickslip_ros.model.drive_layout import SIGN, SPEED, states_of, switches_of
+from stickslip_ros.model.equations import DriveForces
 from stickslip_ros.model.hybrid import HybridSystem, Instant, Mode, structure_number
 from stickslip_ros.model.rounding import LIFT_ROUNDING
 from stickslip_ros.model.symbols import numbers, structure
@@ -93,12 +93,6 @@ class DimensionlessDrive(HybridSystem):
         """Whether belt speed and load are constant."""
         return self.steady and not self._loaded
 
-    @cached_property
-    def _is_static(self) -> bool:
-        """Whether friction follows from the speed alone."""
-        law = self.drive.friction
-        return self.autonomous and not law.states and not law.switches
-
     def initial_state(self, position: float, velocity: float) -> list[float]:
         """Return the state at the start: the memory is that of the law, the controller at rest.
 
@@ -111,6 +105,10 @@ class DimensionlessDrive(HybridSystem):
             rest = control.rest(*seen_by(control, position, velocity, motor))
         lagging = (0.0,) * len(self.drive.actuator.states)
         return [position, velocity, *map(float, memory), *rest, *lagging, *motor]
+
+    def held_inputs(self, control: float, disturbance: float) -> list[float]:
+        """Return the values of `inputs` for these forces, which are one where both act alike."""
+        return [control + disturbance] if len(self.inputs) == 1 else [control, disturbance]
 
     def belt_speed(self, mode: Mode, time: float) -> float:
         """Return the speed of the belt."""
@@ -151,12 +149,8 @@ class DimensionlessDrive(HybridSystem):
 
     def friction_force(self, mode: Mode, instant: Instant) -> float:
         """Return the friction force on the slide."""
-        sign, drive = mode.switches[SIGN], self.drive
-        if sign == 0.0:
+        if mode.switches[SIGN] == 0.0:
             return self.held_force(mode, instant)
-        if self._is_static:
-            relative_speed = instant.state[SPEED] - drive.belt_speed
-            return drive.normal_force * float(drive.friction.coefficient(relative_speed, sign))
         return self.normal_force(mode, instant.time) * self._coefficient(mode, instant)
 
     def _coefficient(self, mode: Mode, instant: Instant) -> float:

@@ -11,8 +11,8 @@ from stickslip_ros.model import equations
 from stickslip_ros.model.constants import constants_of
 from stickslip_ros.model.dimensionless_drive import DimensionlessDrive
 from stickslip_ros.model.drive import UNBOUNDED_SPEED, Drive, DriveConstants
-from stickslip_ros.model.drive_forces import DriveForces
 from stickslip_ros.model.drive_layout import SIGN, SPEED, DriveSwitches
+from stickslip_ros.model.equations import DriveForces
 from stickslip_ros.model.hybrid import Flow, Guard, Instant, Mode, Transition
 from stickslip_ros.model.motor import Motor
 from stickslip_ros.model.rounding import HYSTERESIS, LIFT_ROUNDING

@@ -33,10 +33,6 @@ class PlainDriveSystem(DriveSystem):
             return self.forces.reaction(instant)
         return float(self._friction(instant.state[SPEED] - self._speed, sign))
 
-    def starting_mode(self, instant: Instant) -> Mode:
-        """Return stick, or slip in the direction of the relative speed."""
-        return self.settled(_FORWARD, instant)  # the state gives the mode: none continues
-
     def settled(self, mode: Mode, instant: Instant) -> Mode:
         """Return stick, or slip in the direction of the relative speed."""
         relative_speed = instant.state[SPEED] - self._speed
@@ -48,11 +44,6 @@ class PlainDriveSystem(DriveSystem):
         if settled is mode is _STUCK and self.control is not None:
             self.nudge_off_guard(_STUCK, instant)
         return settled
-
-    def reach_belt(self, mode: Mode, instant: Instant) -> Mode:
-        """Stick, or slip on in either direction, where the slide reaches the belt speed."""
-        instant.state[SPEED] = self._speed
-        return self._resting(mode, instant)
 
     def _resting(self, mode: Mode, instant: Instant) -> Mode:
         held = self.forces.reaction(instant)

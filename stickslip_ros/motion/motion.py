@@ -86,7 +86,6 @@ class Motion(DriveView):
     def _set_scales(self) -> None:
         self._frequency = self.clock.frequency = self._drive.angular_frequency
         self.core.budget.per_unit = _STEPS_PER_SECOND / self._frequency
-        self._has_one_force = len(self._system.inputs) == 1
         self._fades = not self._system.sticks
 
     def restart(
@@ -160,7 +159,7 @@ class Motion(DriveView):
 
     @force.setter
     def force(self, force: float) -> None:
-        self._hold(0, force)
+        self.core.hold(0, self._scaled(force))
 
     def set_forces(self, control: float, disturbance: float) -> None:
         """Set the control force and the disturbance force, held until you set them again.
@@ -172,17 +171,12 @@ class Motion(DriveView):
         disturbance : float
             Disturbance force on the slide, N.
         """
-        if self._has_one_force:
-            control += disturbance
-        elif disturbance != self.core.instant.inputs[1] * self._weight:
-            self._hold(1, disturbance)
-        self._hold(0, control)
+        for number, force in enumerate(self._system.held_inputs(control, disturbance)):
+            self.core.hold(number, self._scaled(force))
 
-    def _hold(self, number: int, force: float) -> None:
-        scaled = force / self._weight
-        if not -_LARGEST_FORCE <= scaled <= _LARGEST_FORCE:
-            scaled = max(-_LARGEST_FORCE, min(_LARGEST_FORCE, scaled))
-        self.core.hold(number, scaled)
+    def _scaled(self, force: float) -> float:
+        """Return a force (N), dimensionless and within bounds."""
+        return max(-_LARGEST_FORCE, min(_LARGEST_FORCE, force / self._weight))
 
     def advance_under(self, control: float, disturbance: float, duration: float) -> None:
         """Set the forces, and advance: the same as `set_forces` and `advance`, in less time.
@@ -194,11 +188,12 @@ class Motion(DriveView):
         duration : float
             Time to advance by, s.
         """
-        core, one = self.core, self._has_one_force
+        core, inputs = self.core, self.core.instant.inputs
+        one = len(inputs) == 1
         force = (control + disturbance if one else control) / self._weight
         if (
             not self._fades  # an advance prepares nothing else
-            and (one or disturbance == core.instant.inputs[1] * self._weight)
+            and (one or disturbance == inputs[1] * self._weight)
             and -_LARGEST_FORCE <= force <= _LARGEST_FORCE
             and core.step_shortly(duration * self._frequency, force)
         ):
@@ -285,9 +280,7 @@ class Motion(DriveView):
         if drive.actuator.states == old.actuator.states:
             ratio = old.force_scale / drive.force_scale
             state[system.slots.actuator] = [value * ratio for value in lagging]
-        forces = [force + disturbance] if self._has_one_force else [force, disturbance]
-        scaled = (acting / self._weight for acting in forces)
-        inputs = [max(-_LARGEST_FORCE, min(_LARGEST_FORCE, acting)) for acting in scaled]
+        inputs = [self._scaled(acting) for acting in system.held_inputs(force, disturbance)]
         core.change(system, state, inputs, self.clock.scaled)
         if remembers and law.switches:
             core.enter(system.continued(before, core.mode, core.instant))
