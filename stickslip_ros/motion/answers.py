@@ -5,7 +5,7 @@ from collections.abc import Callable
 from enum import StrEnum
 from math import isfinite
 
-from stickslip_ros.motion.sample_stamps import SampleStamps
+from stickslip_ros.motion.sampler import SampleStamps
 
 
 class Verdict(StrEnum):

@@ -13,8 +13,7 @@ from stickslip_ros.model.sensor import EXACT_SENSOR, Sensor
 from stickslip_ros.model.signals import NO_SIGNAL, Signal
 from stickslip_ros.motion.answers import Answers, Verdict
 from stickslip_ros.motion.force_line import ForceLine
-from stickslip_ros.motion.sample_stamps import SampleStamps
-from stickslip_ros.motion.sampler import Sampler
+from stickslip_ros.motion.sampler import Sampler, SampleStamps
 from stickslip_ros.samples import Sample
 from stickslip_ros.stamps import NANOSECONDS
 

@@ -1,12 +1,34 @@
-"""The sampler of a loop: the motion at a sample, as sensors measure it."""
+"""The samples of a loop: their stamps, and the motion at each, as sensors measure it."""
 
+from fractions import Fraction
 from typing import TYPE_CHECKING
 
 from stickslip_ros.model.sensor import Sensor
 from stickslip_ros.samples import MotorSample, Sample
+from stickslip_ros.stamps import NANOSECONDS
 
 if TYPE_CHECKING:  # a node without a motion needs no heyoka
     from stickslip_ros.motion.motion import Motion
+
+
+class SampleStamps:
+    """Stamps of samples at a fixed rate: the whole nanoseconds nearest to the instants n/rate."""
+
+    def __init__(self, start: int, rate: float) -> None:
+        """Start at a stamp, ns, with `rate` samples per second."""
+        self._start = start
+        self.period = NANOSECONDS / Fraction(rate)
+        """Sample period, ns, exactly."""
+        self._nanoseconds, self._samples = self.period.as_integer_ratio()
+
+    def stamp(self, number: int) -> int:
+        """Return the stamp (ns) of a sample, by its number from 0."""
+        since = number * self._nanoseconds
+        return self._start + (since if self._samples == 1 else _rounded(since, self._samples))
+
+    def number(self, stamp: int) -> int:
+        """Return the number of the sample whose stamp (ns) is nearest; negative before sample 0."""
+        return _rounded((stamp - self._start) * self._samples, self._nanoseconds)
 
 
 class Sampler:
@@ -63,3 +85,10 @@ class Sampler:
             return sample
         position, velocity, motor = self._true
         return sample._replace(position=position, velocity=velocity, motor=motor)
+
+
+def _rounded(numerator: int, denominator: int) -> int:
+    """Return the quotient rounded to the nearest whole number; a half is rounded to even."""
+    whole, rest = divmod(numerator, denominator)
+    excess = 2 * rest - denominator
+    return whole + (excess > 0 or (excess == 0 and whole % 2))

@@ -3,6 +3,7 @@
 From one sample to the next, Python takes several times longer than the integration.
 """
 
+from collections.abc import Callable
 from functools import partial
 from math import factorial
 from typing import Any, Self
@@ -20,7 +21,6 @@ from stickslip_ros.motion.compiled_flow import parameter_values
 from stickslip_ros.motion.controller import Controller
 from stickslip_ros.motion.motion import RecordedMotion
 from stickslip_ros.motion.sampled_loop import SampledLoop
-from stickslip_ros.motion.series import Series
 from stickslip_ros.samples import Sample
 
 LEAST_TICKS = 5_000
@@ -172,8 +172,8 @@ def _slip(
     system: Any, flow: str, x: Any, y: Any, force: Any, step: Any, order: int
 ) -> tuple[list[Any], Any, Any]:
     """Return what is above zero if the slide slips on, and position and speed after a tick."""
-    position = Series(lambda k: speed[k - 1] * (step / k) if k else x)
-    speed = Series(lambda k: acceleration[k - 1] * (step / k) if k else y)
+    position = _Series(lambda k: speed[k - 1] * (step / k) if k else x)
+    speed = _Series(lambda k: acceleration[k - 1] * (step / k) if k else y)
     acceleration = system.expressions.sliding_acceleration(position, speed, force)
     orders = range(order, -1, -1)
     sizes = [_size(speed[k]) for k in orders]
@@ -190,7 +190,7 @@ def _size(value: Any) -> Any:
 
 def _is_polynomial(system: PlainDriveSystem) -> bool:
     """Return whether the friction law of a system accepts series."""
-    speed = Series(lambda k: system.variables[0])
+    speed = _Series(lambda k: system.variables[0])
     try:
         return system.expressions.sliding_acceleration(speed, speed, 0.0)[1] is not None
     except TypeError:
@@ -206,3 +206,44 @@ def _order(loop: SampledLoop, motion: RecordedMotion) -> int:
     while order <= _LARGEST_ORDER and step**order > 0.1 * _ROUNDING * factorial(order):
         order += 1
     return order
+
+
+class _Series:
+    """Power series in time, the motion between two samples; polynomials accept it.
+
+    Its coefficients are made from those before when they are asked for, and kept.
+    """
+
+    def __init__(self, coefficient: Callable[[int], Any]) -> None:
+        self._coefficient, self._known = coefficient, list[Any]()
+
+    def __getitem__(self, number: int) -> Any:
+        while len(self._known) <= number:
+            self._known.append(self._coefficient(len(self._known)))
+        return self._known[number]
+
+    def __add__(self, other: Any) -> "_Series":
+        if isinstance(other, _Series):
+            return _Series(lambda k: self[k] + other[k])
+        return _Series(lambda k: self[k] if k else self[k] + other)
+
+    __radd__ = __add__
+
+    def __neg__(self) -> "_Series":
+        return self * -1.0
+
+    def __sub__(self, other: Any) -> "_Series":
+        return self + -other
+
+    def __rsub__(self, other: Any) -> "_Series":
+        return -self + other
+
+    def __mul__(self, other: Any) -> "_Series":
+        if isinstance(other, _Series):
+            return _Series(lambda k: sum(self[i] * other[k - i] for i in range(k + 1)))
+        return _Series(lambda k: self[k] * other)
+
+    __rmul__ = __mul__
+
+    def __truediv__(self, other: Any) -> "_Series":
+        return self * (1.0 / other)
