@@ -28,9 +28,8 @@ from rclpy.task import Future
 from benchmarks.slices import Row, by_turns
 from stickslip_ros.nodes.analyzer import AnalyzerNode
 from stickslip_ros.nodes.base.child_process import start_child
-from stickslip_ros.nodes.base.machine import own_domain
 from stickslip_ros.nodes.base.managed import ManagedNode
-from stickslip_ros.nodes.base.network import domain_variables
+from stickslip_ros.nodes.base.network import domain_variables, own_domain
 from stickslip_ros.nodes.base.spinner import spin
 from stickslip_ros.nodes.plant import PlantNode
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode

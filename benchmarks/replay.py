@@ -24,8 +24,7 @@ from benchmarks.lateness import SLEEP_LOOP, lateness, lateness_rows, sleep_loop
 from benchmarks.parties import ROS_ARGUMENTS, ros
 from benchmarks.slices import Row, show
 from stickslip_ros.nodes.base.child_process import start_child
-from stickslip_ros.nodes.base.machine import own_domain
-from stickslip_ros.nodes.base.network import domain_variables
+from stickslip_ros.nodes.base.network import domain_variables, own_domain
 from stickslip_ros.nodes.base.spinner import spin
 from stickslip_ros.nodes.replay import ReplayNode
 from stickslip_ros.nodes.replaying.player import Message

@@ -23,8 +23,7 @@ import numpy as np
 from rclpy.node import Node
 
 from benchmarks.soak import Sendings
-from stickslip_ros.nodes.base.machine import own_domain
-from stickslip_ros.nodes.base.network import domain_variables
+from stickslip_ros.nodes.base.network import domain_variables, own_domain
 from stickslip_ros.nodes.base.process import loopback_session
 from stickslip_ros.record.reader import Recording
 from stickslip_ros.record.topics import CONTROL_FORCE, JOINT_STATES, RECORDED

@@ -32,8 +32,7 @@ from rclpy.node import Node
 
 from stickslip_ros.motion.motion import Motion
 from stickslip_ros.nodes.base.endpoints import message_class, qos_profile
-from stickslip_ros.nodes.base.machine import own_domain
-from stickslip_ros.nodes.base.network import domain_variables
+from stickslip_ros.nodes.base.network import domain_variables, own_domain
 from stickslip_ros.nodes.base.process import loopback_session
 from stickslip_ros.record.codec import unpack_header
 from stickslip_ros.record.reader import Recording

@@ -30,7 +30,7 @@ from stickslip_ros.app.optional_dependencies import check_dashboard, loading_ros
 from stickslip_ros.app.output import print_json, print_parts, progress_bar, tell
 from stickslip_ros.errors import BagError, InvalidInputError, RunError
 from stickslip_ros.installed_packages import find_executable
-from stickslip_ros.nodes.base.machine import NamespaceInUseError
+from stickslip_ros.nodes.base.network import NamespaceInUseError
 from stickslip_ros.scenarios import DEFAULT_NAMESPACE, Pace
 from stickslip_ros.text import number_in
 

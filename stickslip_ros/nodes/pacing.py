@@ -1,4 +1,4 @@
-"""Pace a node by the clock, or by answers and a recorder, and check its timing."""
+"""Pace a node by the clock, or by answers and a recorder."""
 
 import ctypes
 import gc
@@ -12,7 +12,6 @@ from typing import Any
 from typing_extensions import override
 
 from stickslip_ros.errors import StickslipError
-from stickslip_ros.measures.timing import Timing
 from stickslip_ros.motion.sampled_loop import SampledLoop
 from stickslip_ros.nodes.base.managed import ManagedNode
 from stickslip_ros.record.topics import RECORDED, force_topics
@@ -25,9 +24,6 @@ _LONG_WAIT = 0.05
 """Wait, s, above which the wait must be interruptible."""
 
 NO_FORCE = "no control force arrives: continuing without"
-
-_CHECKS = 10
-"""Number of checks of the timing over which shares are computed."""
 
 
 class Sleeper:
@@ -356,37 +352,3 @@ def _be_prompt() -> None:
         ctypes.CDLL(None).prctl(29, 1)  # PR_SET_TIMERSLACK
     sys.setswitchinterval(1e-4)
     gc.freeze()  # objects made by imports take tens of ms to traverse
-
-
-class TimingMonitor:
-    """Checks the counts of late forces and samples of a segment regularly, and reports problems."""
-
-    def __init__(self) -> None:
-        self._counts = deque([(0, 0, 0)], maxlen=_CHECKS + 1)
-        self._kind = ""
-
-    def turns_to(self, kind: str) -> bool:
-        """Return whether problems are of another kind than at the last call; empty: there is none.
-
-        At the first call the last kind is none.
-        """
-        before, self._kind = self._kind, kind
-        return kind != before
-
-    def check(
-        self, samples: int, late_forces: int, missed_deadlines: int, *, controlled: bool
-    ) -> str:
-        """Return a complaint about the last calls, or an empty string.
-
-        Without a controller, expected or not, no force can be late.
-        """
-        counts = samples, late_forces, missed_deadlines
-        if not controlled:  # only forces after its return count
-            self._counts = deque(
-                ((n, late_forces, missed) for n, _, missed in self._counts), maxlen=_CHECKS + 1
-            )
-        before = self._counts[0]
-        self._counts.append(counts)
-        latest = Timing(*(now - then for now, then in zip(counts, before, strict=True)))
-        few = latest.samples < 100  # too few for a meaningful share
-        return "" if few else latest.warning("latest ")

@@ -19,8 +19,8 @@ from stickslip_ros.motion.sampled_loop import LOCKSTEP_START, SampledLoop
 from stickslip_ros.nodes.base import managed
 from stickslip_ros.nodes.base.managed import Diagnosis, ManagedNode, diagnosis
 from stickslip_ros.nodes.base.process import run_node
-from stickslip_ros.nodes.forecast import FORECAST_DURATION, Forecast
-from stickslip_ros.nodes.pacing import NO_FORCE, LockstepPacer, RealtimePacer, TimingMonitor
+from stickslip_ros.nodes.pacing import NO_FORCE, LockstepPacer, RealtimePacer
+from stickslip_ros.nodes.timing import FORECAST_DURATION, Forecast, TimingMonitor
 from stickslip_ros.record import codec, topics
 from stickslip_ros.samples import Sample
 from stickslip_ros.scenarios import Pace

@@ -10,8 +10,7 @@ from xml.etree import ElementTree
 import pytest
 import yaml
 
-from stickslip_ros.nodes.base.machine import own_domain
-from stickslip_ros.nodes.base.network import this_machine_only
+from stickslip_ros.nodes.base.network import own_domain, this_machine_only
 from stickslip_ros.scenarios.files import load_scenario
 from tests.docs.page import CHECKOUT, DIRECTIVES, Block, blocks, directives_file, pages
 from tests.docs.shell import Shell

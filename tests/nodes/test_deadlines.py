@@ -11,9 +11,9 @@ from stickslip_ros.motion.sampled_loop import SampledLoop
 from stickslip_ros.nodes import pacing
 from stickslip_ros.nodes.analyzer import AnalyzerNode
 from stickslip_ros.nodes.base.managed import FORECAST, STATE
-from stickslip_ros.nodes.forecast import Forecast, forecast
-from stickslip_ros.nodes.pacing import RealtimePacer, TimingMonitor
+from stickslip_ros.nodes.pacing import RealtimePacer
 from stickslip_ros.nodes.plant import PlantNode
+from stickslip_ros.nodes.timing import Forecast, TimingMonitor, forecast
 from stickslip_ros.record.report import report_of_recording
 from stickslip_ros.samples import Sample
 from stickslip_ros.scenarios.plant_parameters import PlantParameters
@@ -148,7 +148,7 @@ def test_the_rate_that_would_do_is_that_at_which_few_forces_would_be_late(
 def test_a_force_ends_the_wait_of_the_samples_before_it(monkeypatch: pytest.MonkeyPatch) -> None:
     """Every third sample is answered, half a period after it; the first second is left out."""
     now = 0.0
-    monkeypatch.setattr("stickslip_ros.nodes.forecast.time.monotonic", lambda: now)
+    monkeypatch.setattr("stickslip_ros.nodes.timing.time.monotonic", lambda: now)
     expected = forecast([0.025, 0.015, 0.005] * 67, 100.0)
     observed = Forecast(100.0, lambda number: number / 100.0)
     for number in range(0, 303, 3):

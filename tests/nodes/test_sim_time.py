@@ -8,7 +8,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from stickslip_ros.nodes.plant import PlantNode
-from stickslip_ros.nodes.running.user_controller import ControllerThread
+from stickslip_ros.nodes.running.composition import ControllerThread
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
 from stickslip_ros.record.codec import unpack_header
 from stickslip_ros.record.topics import JOINT_STATES

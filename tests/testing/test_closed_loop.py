@@ -22,7 +22,7 @@ from stickslip_ros.errors import BagError, InvalidInputError, RunError
 from stickslip_ros.motion.motion import Motion
 from stickslip_ros.motion.sampled_loop import LOCKSTEP_START, SampledLoop
 from stickslip_ros.nodes.base.managed import WARN
-from stickslip_ros.nodes.running.user_controller import ControllerThread
+from stickslip_ros.nodes.running.composition import ControllerThread
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
 from stickslip_ros.record.reader import Recording
 from stickslip_ros.record.recorder import Recorder

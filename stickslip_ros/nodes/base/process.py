@@ -18,7 +18,7 @@ from rclpy.utilities import remove_ros_args
 
 from stickslip_ros.errors import InvalidInputError, StickslipError
 from stickslip_ros.model.constants import Changes
-from stickslip_ros.nodes.base import machine, network
+from stickslip_ros.nodes.base import network
 from stickslip_ros.nodes.base.child_process import die_with_parent
 from stickslip_ros.nodes.base.managed import ManagedNode
 from stickslip_ros.nodes.base.parameters import first_line
@@ -50,7 +50,7 @@ def ros_session(
     Raises InvalidInputError if the environment names no domain, or ROS refuses the arguments.
     """
     if domain is None:
-        domain = machine.domain_of_environment()
+        domain = network.domain_of_environment()
     try:
         rclpy.init(
             args=list(arguments),
@@ -160,12 +160,12 @@ def _this_process_only_here() -> Mapping[str, str]:
     variables = network.this_machine_only()
     context, arguments = Context(), ["--ros-args", *_NO_LOGS_ELSEWHERE]
     with (
-        machine.own_domain() as domain,
+        network.own_domain() as domain,
         network.environment({**variables, network.DISCOVERY_RANGE: "OFF"}),
         ros_session(arguments, context=context, domain=domain) as spinner,
     ):
         spinner.add(Node("which_addresses", context=context))
-        elsewhere_free = machine.is_free(machine.port(domain, machine.FIRST_PROCESS), "127.0.0.2")
+        elsewhere_free = network.is_free(network.port(domain, network.FIRST_PROCESS), "127.0.0.2")
     return variables if elsewhere_free else {network.DISCOVERY_RANGE: "LOCALHOST"}
 
 

@@ -22,7 +22,7 @@ from stickslip_ros.nodes.base.clients import (
     LifecycleClient,
     setting_call,
 )
-from stickslip_ros.nodes.base.machine import domain_of_environment, lock_namespace
+from stickslip_ros.nodes.base.network import domain_of_environment, lock_namespace
 from stickslip_ros.nodes.base.process import ROS_ARGUMENTS, ros_session
 from stickslip_ros.nodes.base.spinner import Spinner, signal_handlers_kept, stop_on_signals
 from stickslip_ros.nodes.running.controller_search import ControllerSearch

@@ -14,16 +14,20 @@ from xml.etree import ElementTree
 import pytest
 
 from stickslip_ros.errors import InvalidInputError, RunError
-from stickslip_ros.nodes.base import machine
-from stickslip_ros.nodes.base.machine import lock_namespace, own_domain
-from stickslip_ros.nodes.base.network import prefer_prompt_middleware, this_machine_only
+from stickslip_ros.nodes.base import network
+from stickslip_ros.nodes.base.network import (
+    lock_namespace,
+    own_domain,
+    prefer_prompt_middleware,
+    this_machine_only,
+)
 from stickslip_ros.testing import ClosedLoop
 from tests.nodes.graph import PATIENCE, wait_for
 from tests.testing import controllers
 
 HOLDER = """
 import os, signal
-from stickslip_ros.nodes.base.machine import lock_namespace, own_domain
+from stickslip_ros.nodes.base.network import lock_namespace, own_domain
 with own_domain() as domain, lock_namespace(f"/test/locked_{os.getppid()}", 7):
     print(domain, flush=True)
     signal.pause()
@@ -106,8 +110,8 @@ def test_a_sandbox_that_refuses_to_bind_does_not_hinder_a_run(
 @pytest.fixture
 def only_domain(monkeypatch: pytest.MonkeyPatch) -> int:
     """The only domain that can be had: the last one, since others take the first free one."""
-    only = machine.DOMAINS[-1]
-    monkeypatch.setattr(machine, "DOMAINS", [only])
+    only = network.DOMAINS[-1]
+    monkeypatch.setattr(network, "DOMAINS", [only])
     return only
 
 
@@ -137,7 +141,7 @@ def test_a_domain_in_which_ros_runs_already_is_left_alone(
 
 def test_a_loop_that_fails_leaves_its_domain_to_the_next(monkeypatch: pytest.MonkeyPatch) -> None:
     """Though the failure is kept, and with it all that it went through."""
-    monkeypatch.setattr(machine, "DOMAINS", machine.DOMAINS[-4:-2])  # one is for a look around
+    monkeypatch.setattr(network, "DOMAINS", network.DOMAINS[-4:-2])  # one is for a look around
     failures = []
     for _ in range(3):
         with pytest.raises(ZeroDivisionError) as failure, ClosedLoop("paper", controller=None):

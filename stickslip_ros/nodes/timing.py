@@ -1,12 +1,13 @@
-"""Forecast of a run in real time: which forces will be late, and a rate at which few would be."""
+"""Timing of a run: which forces will be late, at which rate few would be, and which are late now."""
 
 import time
+from collections import deque
 from collections.abc import Callable, Sequence
 from math import floor, log10
 
 import numpy as np
 
-from stickslip_ros.measures.timing import NOTABLE_SHARE, percentage
+from stickslip_ros.measures.timing import NOTABLE_SHARE, Timing, percentage
 from stickslip_ros.text import quantity
 
 FORECAST_DURATION = 60.0
@@ -14,6 +15,8 @@ FORECAST_DURATION = 60.0
 _SETTLED, _OBSERVED = 1.0, 2.0
 """Wall time, s, that is left out at the start, where all is done for the first time; and that is
 observed."""
+_CHECKS = 10
+"""Number of checks of the timing over which shares are computed."""
 
 
 class Forecast:
@@ -54,3 +57,37 @@ def forecast(waits: Sequence[float], rate: float) -> str:
     enough = (1.0 + 1e-9) / longest  # rounding must not cost a digit
     digit = 10.0 ** floor(log10(enough))
     return f"{outlook}; {quantity(floor(enough / digit) * digit, 'Hz')} would do"
+
+
+class TimingMonitor:
+    """Checks the counts of late forces and samples of a segment regularly, and reports problems."""
+
+    def __init__(self) -> None:
+        self._counts = deque([(0, 0, 0)], maxlen=_CHECKS + 1)
+        self._kind = ""
+
+    def turns_to(self, kind: str) -> bool:
+        """Return whether problems are of another kind than at the last call; empty: there is none.
+
+        At the first call the last kind is none.
+        """
+        before, self._kind = self._kind, kind
+        return kind != before
+
+    def check(
+        self, samples: int, late_forces: int, missed_deadlines: int, *, controlled: bool
+    ) -> str:
+        """Return a complaint about the last calls, or an empty string.
+
+        Without a controller, expected or not, no force can be late.
+        """
+        counts = samples, late_forces, missed_deadlines
+        if not controlled:  # only forces after its return count
+            self._counts = deque(
+                ((n, late_forces, missed) for n, _, missed in self._counts), maxlen=_CHECKS + 1
+            )
+        before = self._counts[0]
+        self._counts.append(counts)
+        latest = Timing(*(now - then for now, then in zip(counts, before, strict=True)))
+        few = latest.samples < 100  # too few for a meaningful share
+        return "" if few else latest.warning("latest ")
