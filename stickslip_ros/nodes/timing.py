@@ -1,4 +1,4 @@
-"""Timing of a run: which forces will be late, at which rate few would be, and which are late now."""
+"""Timing of a run: which forces will be late, a rate at which few would be, and what is late."""
 
 import time
 from collections import deque
