@@ -16,9 +16,9 @@ import numpy as np
 
 from stickslip_ros.arrays import IntArray
 from stickslip_ros.errors import BagError
+from stickslip_ros.record.bag_formats import mcap_of
 from stickslip_ros.record.cdr import Messages
 from stickslip_ros.record.compression import unpack_file
-from stickslip_ros.record.converted_bag import mcap_of
 from stickslip_ros.record.mcap_file import McapFile
 from stickslip_ros.record.metadata import metadata_faults
 from stickslip_ros.stamps import NANOSECONDS

@@ -13,7 +13,7 @@ from typing_extensions import override
 from stickslip_ros.arrays import FloatArray, IntArray
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.files import open_regular
-from stickslip_ros.record.converted_bag import OTHER_BAGS
+from stickslip_ros.record.bag_formats import OTHER_BAGS
 from stickslip_ros.record.faults import differences
 from stickslip_ros.record.reader import RunBlock
 from stickslip_ros.record.table_clock import stamps_of

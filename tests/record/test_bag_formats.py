@@ -12,7 +12,7 @@ from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_typestore
 
 from stickslip_ros.errors import BagError
-from stickslip_ros.record import converted_bag
+from stickslip_ros.record import bag_formats
 from stickslip_ros.record.reader import Recording
 from tests.record.test_reader import JOINT_STATES, state
 
@@ -76,4 +76,4 @@ def test_a_missing_library_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "rosbags.convert.cli", None)
     monkeypatch.setattr("resource.setrlimit", lambda *_: None)
     with pytest.raises(SystemExit, match="install rosbags"):
-        converted_bag._main(Path("bag"), Path("mcap"))
+        bag_formats._main(Path("bag"), Path("mcap"))
