@@ -79,7 +79,7 @@ class Margin(Result):
 
     @override
     def draw(self, style: "FigureStyle") -> "Figure":
-        from stickslip_ros.show.margin_figure import margin_figure
+        from stickslip_ros.show.identification_figure import margin_figure
 
         if not self.onset.feeds:
             raise InvalidInputError("there is no decay to draw: " + "; ".join(self.notes))

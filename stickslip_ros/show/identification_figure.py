@@ -1,4 +1,4 @@
-"""The figure of an identification: the friction curve, and residuals by speed, position, time."""
+"""The figures of recordings that were fitted: an identification, a friction map, a margin."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -11,10 +11,11 @@ from matplotlib.figure import Figure
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.identification.findings import Findings
 from stickslip_ros.identification.fit import QUANTILE
+from stickslip_ros.measures.onset import Onset
 from stickslip_ros.model.friction import FrictionLaw
 from stickslip_ros.show.drawing import DOTS
 from stickslip_ros.show.quantities import SI, Units
-from stickslip_ros.show.style import BLUE, GREEN, ORANGE, SCREEN, FigureStyle, finish, styled
+from stickslip_ros.show.style import BLUE, GREEN, GREY, ORANGE, SCREEN, FigureStyle, finish, styled
 
 _MEASURED: Any = DOTS | {"ms": 7.0, "alpha": 0.15}
 """Wider than the curve, which hides what it fits."""
@@ -160,3 +161,30 @@ def _free_run(figure: Figure, place: Any, findings: Findings, units: Units, *, s
     scale, label = units.axis("difference", "m", away)
     lower.plot(time, away / scale, color=GREEN)
     lower.set(xlabel="time (s)", ylabel=label)
+
+
+@styled
+def margin_figure(
+    names: str, onset: Onset, *, style: FigureStyle = SCREEN, units: Units = SI
+) -> Figure:
+    """Return the figure: decay rates, families that fit, and the interval of the onset."""
+    figure = style.figure(8.0, 5.0)
+    axes = figure.add_subplot()
+    feeds = [(feed.belt_speed, feed.decay_rate, 1.96 * feed.decay_error) for feed in onset.feeds]
+    speed, rate, error = np.array(feeds).T
+    scale, label = units.axis("belt speed", "m/s", speed)
+    axes.errorbar(speed / scale, rate, error, fmt=".", color=BLUE, capsize=3.0, label="measured")
+    for name, family in onset.families.items():
+        if not family.rejected:
+            over = np.linspace(min(family.onset_speed, 0.5 * speed[0]), speed[-1], 200)
+            axes.plot(over / scale, family.decay_rate(over), lw=1.0, label=name)
+    if onset.upper is not None:
+        ends = (onset.lower or 0.0) / scale, onset.upper / scale
+        axes.axvspan(*ends, color=ORANGE, alpha=0.2, label="onset, 95 % interval")
+    axes.axhline(0.0, color=GREY, lw=0.8)
+    axes.set(xlabel=label, ylabel="decay rate (1/s)")
+    axes.set_xlim(left=0.0)
+    axes.legend(loc="best")
+    style.set_title(figure, f"Onset of vibration, {names}")
+    finish(figure)
+    return figure

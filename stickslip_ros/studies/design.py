@@ -22,9 +22,8 @@ from stickslip_ros.studies.case_outcome import Disturbance
 from stickslip_ros.studies.controller_trial import FILTER_SETTLED, Vibration
 from stickslip_ros.studies.design_trial import Check, Task, Trial
 from stickslip_ros.studies.drive_loops import Tuned
-from stickslip_ros.studies.gain_search import rounded
 from stickslip_ros.studies.spread import drawn, held_interval
-from stickslip_ros.studies.tuning import NEAR, RESERVE, Tuning
+from stickslip_ros.studies.tuning import NEAR, RESERVE, Tuning, rounded
 from stickslip_ros.theory.linear_sampled_loop import LinearSampledLoop, why_no_linear_loop
 from stickslip_ros.theory.stability_map import StabilityMap
 

@@ -15,10 +15,10 @@ from socketio.packet import Packet
 from starlette.testclient import TestClient
 from starlette.websockets import WebSocketDisconnect
 
-from stickslip_ros.app.dashboard import web_log
+from stickslip_ros.app.dashboard import server
 from stickslip_ros.app.dashboard.frames import Frames
 from stickslip_ros.app.dashboard.page import Pages
-from stickslip_ros.app.dashboard.web_log import WebLog, log_here_alone
+from stickslip_ros.app.dashboard.server import WebLog, log_here_alone
 from tests.app.dashboard.test_frames import fed
 
 ORIGIN = {"origin": "http://testserver"}
@@ -120,7 +120,7 @@ def test_requests_do_not_fill_the_terminal(
     printed: StringIO, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     now = [100.0]
-    monkeypatch.setattr(web_log, "monotonic", lambda: now[0])
+    monkeypatch.setattr(server, "monotonic", lambda: now[0])
     logger = logging.getLogger("web")
     for _ in range(2):
         for number in range(1000):

@@ -23,7 +23,7 @@ from stickslip_ros.app.dashboard.theory import (
     friction_curve,
     stability_map,
 )
-from stickslip_ros.app.dashboard.theory_charts import (
+from stickslip_ros.app.dashboard.theory_panel import (
     bifurcation_chart,
     decay_chart,
     friction_chart,
