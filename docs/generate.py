@@ -18,7 +18,7 @@ from stickslip_ros.measures.cycle_measures import Regime
 from stickslip_ros.model.constants import Parameter
 from stickslip_ros.record.topics import TOPICS
 from stickslip_ros.scenarios.files import load_scenario
-from stickslip_ros.scenarios.node_parameters import NodeParameters
+from stickslip_ros.scenarios.parameter_group import NodeParameters
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, ReplayParameters
 from stickslip_ros.studies.stability import stability
 

@@ -20,7 +20,8 @@ from stickslip_ros.model.constants import Parameter, constants_of
 from stickslip_ros.model.control import CONTROL_LAWS, ControlLaw
 from stickslip_ros.model.control.base import seen_by
 from stickslip_ros.model.friction import LAWS, Directional, FrictionLaw
-from stickslip_ros.scenarios.validation import ParameterGroup, checked
+from stickslip_ros.scenarios.parameter_group import ParameterGroup
+from stickslip_ros.scenarios.refusals import checked
 
 if TYPE_CHECKING:
     from importlib.metadata import Distribution, EntryPoint

@@ -22,7 +22,7 @@ from stickslip_ros.model.friction import (
 )
 from stickslip_ros.scenarios.curve_file import Pairs, read_curve
 from stickslip_ros.scenarios.foreign_laws import FRICTION_LAWS, add_laws_of_other_packages
-from stickslip_ros.scenarios.validation import ParameterGroup
+from stickslip_ros.scenarios.parameter_group import ParameterGroup
 from stickslip_ros.text import renamed, shown
 
 add_laws_of_other_packages()

@@ -27,7 +27,7 @@ from stickslip_ros.motion.controller import Controller
 from stickslip_ros.record import ForceSource, TimeSource
 from stickslip_ros.record.codec import FORCE_TYPES
 from stickslip_ros.scenarios.foreign_laws import CONTROLLERS
-from stickslip_ros.scenarios.node_parameters import SHORTEST_TIME, NodeParameters, numbered_force
+from stickslip_ros.scenarios.parameter_group import SHORTEST_TIME, NodeParameters, numbered_force
 from stickslip_ros.scenarios.plant_parameters import PlantParameters
 from stickslip_ros.scenarios.signal_parameters import ReferenceParameters
 from stickslip_ros.text import did_you_mean

@@ -17,13 +17,17 @@ from stickslip_ros.record.codec import FORCE_TYPES, UNSTAMPED
 from stickslip_ros.scenarios import Pace
 from stickslip_ros.scenarios.curve_file import Pairs
 from stickslip_ros.scenarios.friction_parameters import Friction
-from stickslip_ros.scenarios.node_parameters import SHORTEST_TIME, NodeParameters, numbered_force
+from stickslip_ros.scenarios.parameter_group import (
+    SHORTEST_TIME,
+    NodeParameters,
+    ParameterGroup,
+    numbered_force,
+)
 from stickslip_ros.scenarios.signal_parameters import (
     BeltParameters,
     DisturbanceParameters,
     LoadParameters,
 )
-from stickslip_ros.scenarios.validation import ParameterGroup
 from stickslip_ros.text import shown
 
 if TYPE_CHECKING:

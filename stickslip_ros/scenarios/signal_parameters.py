@@ -13,7 +13,7 @@ from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.model.constants import Changes, at_build, constant
 from stickslip_ros.model.signals import NO_SIGNAL, SIGNALS, Signal, table
 from stickslip_ros.scenarios.curve_file import Pairs, read_curve
-from stickslip_ros.scenarios.validation import ParameterGroup
+from stickslip_ros.scenarios.parameter_group import ParameterGroup
 
 _NEEDS = {kind: list(signature(make).parameters) for kind, make in SIGNALS.items()}
 """Arguments of the function of each kind of signal: parameters, the sample period, the points."""

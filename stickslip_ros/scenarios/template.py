@@ -9,7 +9,7 @@ from typing import Any
 from stickslip_ros.model.constants import Changes, Parameter
 from stickslip_ros.scenarios import ros_yaml
 from stickslip_ros.scenarios.files import Scenario
-from stickslip_ros.scenarios.node_parameters import NodeParameters
+from stickslip_ros.scenarios.parameter_group import NodeParameters
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
 from stickslip_ros.scenarios.ros_yaml import PARAMETERS_KEY
 from stickslip_ros.scenarios.sections import BASE_SECTION, FIT_COLUMNS

@@ -7,7 +7,7 @@ from math import inf
 
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.model.constants import Parameter
-from stickslip_ros.scenarios.node_parameters import NodeParameters
+from stickslip_ros.scenarios.parameter_group import NodeParameters
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
 from stickslip_ros.scenarios.scenario import DEFAULT, Scenario
 from stickslip_ros.scenarios.template import own_first

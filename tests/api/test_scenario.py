@@ -9,7 +9,7 @@ import stickslip_ros as ss
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.scenarios.keywords import keyword_of, parameter_of
-from stickslip_ros.scenarios.node_parameters import NodeParameters
+from stickslip_ros.scenarios.parameter_group import NodeParameters
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
 from stickslip_ros.studies.columns import COLUMNS
 

@@ -7,7 +7,7 @@ import pytest
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.model.constants import Parameter
 from stickslip_ros.scenarios.files import load_scenario, parameter_file
-from stickslip_ros.scenarios.node_parameters import NodeParameters
+from stickslip_ros.scenarios.parameter_group import NodeParameters
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
 from tests.scenarios.files import refusal, scenario_file
 from tests.scenarios.values import CONFLICTS, MODELS, UNKNOWN, bad_values, bits, good_values

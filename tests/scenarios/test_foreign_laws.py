@@ -27,7 +27,7 @@ from stickslip_ros.scenarios.foreign_laws import (
     check_control_law,
     check_friction_law,
 )
-from stickslip_ros.scenarios.node_parameters import NodeParameters
+from stickslip_ros.scenarios.parameter_group import NodeParameters
 from tests.scenarios.foreign_laws import BRAKE, FALLING, write_package
 
 Install = Callable[..., None]

@@ -15,7 +15,7 @@ from stickslip_ros.model.friction import LAWS
 from stickslip_ros.model.sensor import EXACT_SENSOR, MeasuredVelocity, Sensor
 from stickslip_ros.motion import Motion
 from stickslip_ros.scenarios.files import load_scenario
-from stickslip_ros.scenarios.node_parameters import NodeParameters
+from stickslip_ros.scenarios.parameter_group import NodeParameters
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, ControllerParameters
 from stickslip_ros.scenarios.plant_parameters import PlantParameters
 from tests.examples import examples

@@ -18,7 +18,7 @@ from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.model.constants import Changes
 from stickslip_ros.model.constants import Parameter as ModelParameter
 from stickslip_ros.scenarios import LONGEST_NAMESPACE
-from stickslip_ros.scenarios.node_parameters import NodeParameters
+from stickslip_ros.scenarios.parameter_group import NodeParameters
 from stickslip_ros.scenarios.ros_yaml import number_in
 from stickslip_ros.text import shown
 

@@ -23,7 +23,7 @@ from stickslip_ros.nodes.base.child_process import die_with_parent
 from stickslip_ros.nodes.base.managed import ManagedNode
 from stickslip_ros.nodes.base.parameters import first_line
 from stickslip_ros.nodes.base.spinner import Spinner, ignore_stop_signals, spin, stop_on_signals
-from stickslip_ros.scenarios.node_parameters import NodeParameters
+from stickslip_ros.scenarios.parameter_group import NodeParameters
 from stickslip_ros.scenarios.sections import read_file, section_matches
 from stickslip_ros.standard_streams import open_closed_streams
 

@@ -11,7 +11,7 @@ from itertools import count
 from pathlib import Path
 from typing import Any
 
-from stickslip_ros.scenarios.node_parameters import NodeParameters
+from stickslip_ros.scenarios.parameter_group import NodeParameters
 
 _THREADS = Path("/proc/self/task")
 _MCL_CURRENT_AND_FUTURE = 3

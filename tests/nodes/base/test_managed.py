@@ -10,7 +10,7 @@ from std_msgs.msg import Float64
 from stickslip_ros.nodes.base.managed import OK, WARN, ManagedNode
 from stickslip_ros.record.codec import pack_header
 from stickslip_ros.record.topics import AMPLITUDE, DIAGNOSTICS, RECORDED
-from stickslip_ros.scenarios.node_parameters import NodeParameters
+from stickslip_ros.scenarios.parameter_group import NodeParameters
 from tests.nodes.graph import Graph
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from stickslip_ros.nodes.base import scheduling
 from stickslip_ros.nodes.base.scheduling import schedule_process, share_missed
-from stickslip_ros.scenarios.node_parameters import NodeParameters
+from stickslip_ros.scenarios.parameter_group import NodeParameters
 from tests.nodes.graph import Graph
 from tests.nodes.processes import Processes
 from tests.nodes.samples import Samples
@@ -18,7 +18,7 @@ from tests.nodes.samples import Samples
 _WITHOUT_RIGHTS = """
 import os, resource
 from stickslip_ros.nodes.base.scheduling import schedule_process
-from stickslip_ros.scenarios.node_parameters import NodeParameters
+from stickslip_ros.scenarios.parameter_group import NodeParameters
 resource.setrlimit(resource.RLIMIT_RTPRIO, (0, 0))
 resource.setrlimit(resource.RLIMIT_MEMLOCK, (65536, 65536))
 if os.geteuid() == 0:

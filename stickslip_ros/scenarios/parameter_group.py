@@ -1,27 +1,26 @@
-"""Groups of parameters: checked, changed, and given by flat name."""
+"""Groups of parameters: checked, changed, and given by flat name; and the group of every node."""
 
+import re
 from collections.abc import Iterator, Mapping
-from contextlib import suppress
 from dataclasses import dataclass, fields, replace
 from enum import StrEnum
 from functools import cache
-from math import inf, isfinite, isnan
 from operator import attrgetter
 from pathlib import Path
 from typing import Any, Self
 
+from typing_extensions import override
+
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.model.constants import LARGEST, SMALLEST, Parameter, parameters_of
+from stickslip_ros.model.constants import Parameter, at_build, at_rest, constant, parameters_of
 from stickslip_ros.scenarios.curve_file import Pairs
+from stickslip_ros.scenarios.refusals import checked
 from stickslip_ros.text import by_group, did_you_mean, shown
 
-_KIND_NAMES = {
-    bool: "true or false",
-    int: "a whole number",
-    float: "a number",
-    str: "a string",
-    list: "a list of strings",
-}
+SHORTEST_TIME = 1e-3
+"""Shortest time-out or period of a node, s."""
+_NAME = "[A-Za-z_][A-Za-z0-9_]*"
+_NODE_NAME = re.compile(f"/?({_NAME}/)*{_NAME}")
 
 
 @dataclass(frozen=True)
@@ -166,58 +165,50 @@ def _changed(
         return part
 
 
-def checked(parameter: Parameter, value: Any) -> Any:
-    """Return the value of a parameter, as its type.
+@dataclass(frozen=True)
+class NodeParameters(ParameterGroup):
+    """Parameters that every node has."""
 
-    Raises InvalidInputError that names parameter, value and what is allowed.
-    """
-    kind = parameter.kind
-    if parameter.choices:
-        if isinstance(value, str) and value in parameter.choices:
-            return parameter.choices[parameter.choices.index(value)]
-    elif kind is float:
-        if isinstance(value, int | float) and not isinstance(value, bool):
-            with suppress(OverflowError):
-                number = float(value)
-                if parameter.unset and isnan(number):
-                    return parameter.default
-                if _within(parameter, number):
-                    return number
-    elif kind is int:
-        if isinstance(value, int) and not isinstance(value, bool) and _within(parameter, value):
-            return value
-    elif kind is list:
-        if isinstance(value, list) and all(isinstance(item, str) for item in value):
-            return [*value]
-    elif isinstance(value, kind):
-        return value
-    raise InvalidInputError(_refusal(parameter, value))
-
-
-def _within(parameter: Parameter, number: float) -> bool:
-    least, largest = parameter.least, parameter.largest
-    return (
-        (isfinite(number) or not (parameter.finite or isnan(number)))
-        and (least is None or number >= least)
-        and (largest is None or number <= largest)
+    autostart: bool = at_rest(True, "Configure and activate the node at start.")
+    wait_for: list[str] = at_rest(
+        [], "Nodes that must subscribe to this node's topics before it activates."
+    )
+    use_sim_time: bool = constant(False, "Take ROS time from /clock.")
+    thread_priority: int = at_rest(
+        0,
+        "Priority (SCHED_FIFO) of the threads of the node's process; 0: ordinary scheduling.",
+        whole=True,
+        at_least=0,
+        at_most=99,
+    )
+    cpu_affinity: int = at_rest(
+        -1,
+        "Processor on which the node's process runs; -1: any.",
+        whole=True,
+        at_least=-1,
+        at_most=4095,
+    )
+    lock_memory: bool = at_rest(
+        False,
+        "Keep the memory of the node's process from being paged out.",
     )
 
+    @override
+    def completed(self, prefix: str, curves: dict[str, Pairs]) -> Self:
+        if not all(_NODE_NAME.fullmatch(name) for name in self.wait_for):
+            raise ValueError(
+                f"wait_for = {shown(self.wait_for)} is invalid: must be names of nodes, "
+                "of letters, digits and _, not starting with a digit"
+            )
+        return self
 
-def _refusal(parameter: Parameter, value: Any) -> str:
-    """Return one line on a value that is refused and what is allowed."""
-    refused = f"{parameter.name} = {shown(value)} is invalid: "
-    if isinstance(value, str) and value in parameter.refused:
-        return refused + parameter.refused[value]
-    kind = parameter.kind
-    allowed = "a finite number" if kind is float and parameter.finite else _KIND_NAMES[kind]
-    extreme = isinstance(value, int | float) and (
-        LARGEST < abs(value) < inf or 0 < value < SMALLEST
+
+def numbered_force() -> Any:
+    """Return the field of the number of the force in the messages of a controller."""
+    return at_build(
+        0,
+        "Number of the force in the arrays on `control_force`, from 1; 0: they have only one.",
+        whole=True,
+        at_least=0,
+        at_most=1000,
     )
-    bounds = parameter.limits if extreme else parameter.bounds
-    if bounds:
-        allowed = bounds if parameter.choices else f"{allowed} {bounds}"
-    unit = f"{'' if bounds else ' in'} {parameter.unit}" if parameter.unit else ""
-    if parameter.unset:
-        unit += f", or nan ({parameter.unset})"
-    text = ", not text" if isinstance(value, str) and kind is not str else ""
-    return f"{refused}must be {allowed}{unit}{text}"
