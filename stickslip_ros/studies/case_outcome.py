@@ -1,8 +1,8 @@
 """One case of a comparison: a law holds a drive against a disturbance, or positions it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf, pi
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -87,8 +87,9 @@ FOLLOWING = {
 """What an outcome has of how the slide follows its reference."""
 
 
-class Outcome(NamedTuple):
-    """What a case came to; SI units, None for what its task does not have.
+@dataclass(frozen=True)
+class LoopOutcome:
+    """What a loop came to; SI units, None for what is not known.
 
     The time that is judged is its last third: after the disturbance, or under a sine.
     """
@@ -115,6 +116,12 @@ class Outcome(NamedTuple):
     """Time from the end of the disturbance, or of the reference's motion, until it is held."""
     at_limit: Annotated[float | None, Quantity("share of time at the limit")] = None
     """Share of all samples at which the force had its limit."""
+
+
+@dataclass(frozen=True)
+class Outcome(LoopOutcome):
+    """What a case came to; None for what its task, regulation or positioning, does not have."""
+
     final_error: Annotated[float | None, Quantity("final error", "m")] = None
     """Largest distance from the reference in the time that is judged; of positioning."""
     hunting_amplitude: Annotated[float | None, Quantity("hunting amplitude", "m")] = None
@@ -184,11 +191,12 @@ def simulate_case(
         return _positioned(outcome, position - target, target, late, tolerance, plant.rate)
     allowed = tolerance * abs(drive.belt_speed)
     if disturbance.kind == "sine":
-        return outcome._replace(held=outcome.sticking == 0.0)
+        return replace(outcome, held=outcome.sticking == 0.0)
     ends = {"step": _END, "none": 0.0}.get(disturbance.kind, _START) * duration
     omega = drive.angular_frequency if drive.has_spring else 0.0
     distance = np.hypot(omega * (position - middle), velocity)
-    return outcome._replace(
+    return replace(
+        outcome,
         held=outcome.sticking == 0.0 and swing <= allowed,
         settling_time=settling_time(distance, 2.0 * allowed, ends, plant.rate),
     )
@@ -210,7 +218,8 @@ def _positioned(
     final = float(np.abs(error[late]).max())
     following = followed(np.arange(len(error)) / rate, target, target + error)
     values = {} if following is None else vars(following.values)
-    return outcome._replace(
+    return replace(
+        outcome,
         **{name: values.get(name) for name in FOLLOWING},
         held=final <= allowed,
         settling_time=settling_time(np.abs(error), allowed, ends, rate),

@@ -11,28 +11,41 @@ import numpy as np
 import numpy.typing as npt
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.measures.cycle_measures import CycleMeasures, Measures, Regime
+from stickslip_ros.measures.cycle_measures import Measures, Regime
 from stickslip_ros.quantities import Quantity, quantities_of
 from stickslip_ros.studies.plan import Grid, Plan
 
-_OF_CYCLES = quantities_of(Measures)
+_MEASURES = quantities_of(Measures)
 
 
 @dataclass(frozen=True)
-class Columns(CycleMeasures[FloatArray]):
+class Columns:
     """The results of the n points of a study, in the order of its plan; SI units.
 
     All arrays have shape (n,); the turning points are a list. NaN or None marks a value that does
-    not exist, such as the period of a motion at rest, and a point that is not computed yet.
+    not exist, such as the period of a motion at rest, and a point that is not computed yet. A
+    column that has the name of a field of `Measures` is that measure of the settled motion.
     """
 
     plan: Plan
     """The points of the study."""
     done: npt.NDArray[np.bool_]
     """Whether the point is computed."""
-    cycles: Annotated[npt.NDArray[np.intp], _OF_CYCLES["cycles"]]
+    amplitude: Annotated[FloatArray, _MEASURES["amplitude"]]
+    """Half of the peak-to-peak displacement, m."""
+    velocity_amplitude: Annotated[FloatArray, _MEASURES["velocity_amplitude"]]
+    """Half of the peak-to-peak velocity, m/s."""
+    midpoint: Annotated[FloatArray, _MEASURES["midpoint"]]
+    """Middle of the displacement, m."""
+    period: Annotated[FloatArray, _MEASURES["period"]]
+    """Duration of a cycle, s."""
+    frequency: Annotated[FloatArray, _MEASURES["frequency"]]
+    """Cycles per second, Hz."""
+    stick_fraction: Annotated[FloatArray, _MEASURES["stick_fraction"]]
+    """Share of the time in which the slide sticks to the belt, 0 to 1."""
+    cycles: Annotated[npt.NDArray[np.intp], _MEASURES["cycles"]]
     """Number of cycles that the measures are means of."""
-    regime: Annotated[npt.NDArray[np.object_], _OF_CYCLES["regime"]]
+    regime: Annotated[npt.NDArray[np.object_], _MEASURES["regime"]]
     """The `Regime`, or None."""
     steady: Annotated[npt.NDArray[np.bool_], Quantity("whether the motion has settled")]
     """Whether the motion has settled."""

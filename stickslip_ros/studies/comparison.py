@@ -159,7 +159,7 @@ class Comparison(PointStudy[Cases]):
                 plan.disturbances[case.disturbance],
                 plan.tolerance,
             )
-            return outcome._replace(number=index), None
+            return replace(outcome, number=index), None
         except (StickslipError, ArithmeticError) as error:
             return Outcome(index, held=False, reason=" ".join(str(error).split())), None
 

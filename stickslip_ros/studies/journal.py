@@ -91,8 +91,7 @@ class Journal:
     def add(self, piece: Piece) -> None:
         """Take a piece, and hand it to the operating system."""
         if self._file is not None:
-            end = None if piece.end is None else astuple(piece.end)
-            text = json.dumps({"points": piece.points, "end": end}, separators=(",", ":"))
+            text = json.dumps(piece._asdict(), separators=(",", ":"), default=astuple)
             offset = self._file.seek(0, os.SEEK_END)
             self._file.write(_line(text.encode(), offset))
             self._file.flush()
