@@ -34,14 +34,13 @@ from stickslip_ros.scenarios.plant_parameters import PlantParameters
 from stickslip_ros.show.measure_table import doubt, measures_text, report_tables
 from stickslip_ros.show.parameter_tables import recorded_tables
 from stickslip_ros.show.quantities import Units
-from stickslip_ros.show.run_history import RunHistory
+from stickslip_ros.show.run_history import DrawnRun, RunHistory
 from stickslip_ros.stamps import NANOSECONDS
 from stickslip_ros.tables import TextTable
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from stickslip_ros.show.run_figure import DrawnRun
     from stickslip_ros.show.style import FigureStyle
 
 _COLUMNS = quantities_of(MotorTrajectory) | {"stamp": Quantity("stamp", "ns")}
@@ -88,10 +87,8 @@ class RecordedRun(TabularResult):
         """Sentences on the parts that are missing in the bag."""
         return self.report["missing"]
 
-    def as_drawn(self) -> "DrawnRun":
+    def as_drawn(self) -> DrawnRun:
         """Return what figures draw of the run."""
-        from stickslip_ros.show.run_figure import DrawnRun
-
         notes, title = [*self.missing, *self.report["notes"]], f"Recorded run, {self.path}"
         parts = self._history, self.measures, self.drive, notes, title
         return DrawnRun(str(self.path), *parts, rotary=self._rotary)

@@ -26,7 +26,7 @@ from stickslip_ros.scenarios.plant_parameters import PlantParameters
 from stickslip_ros.show.measure_table import measures_text, simulation_tables
 from stickslip_ros.show.parameter_tables import scenario_tables
 from stickslip_ros.show.quantities import Units
-from stickslip_ros.show.run_history import RunHistory
+from stickslip_ros.show.run_history import DrawnRun, RunHistory
 from stickslip_ros.studies import simulate as simulation
 
 if TYPE_CHECKING:
@@ -70,7 +70,7 @@ class Run(TabularResult):
 
     @override
     def draw(self, style: "FigureStyle") -> "Figure":
-        from stickslip_ros.show.run_figure import DrawnRun, run_figure
+        from stickslip_ros.show.run_figure import run_figure
         from stickslip_ros.show.style import title_of
 
         title, plant = title_of("Simulated run", self.scenario), self.scenario.plant

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from math import ceil
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -14,8 +14,6 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.measures.cycle_measures import Measures
-from stickslip_ros.model.drive import Drive
 from stickslip_ros.show.drawing import (
     BELT,
     HELD,
@@ -38,8 +36,8 @@ from stickslip_ros.show.drawing import (
     with_edges,
 )
 from stickslip_ros.show.measure_table import measures_text
-from stickslip_ros.show.quantities import SI, Units
-from stickslip_ros.show.run_history import DrawnMotion, RunHistory
+from stickslip_ros.show.quantities import SI
+from stickslip_ros.show.run_history import DrawnRun
 from stickslip_ros.show.style import (
     AMBER,
     BLUE,
@@ -56,9 +54,6 @@ from stickslip_ros.show.style import (
     styled,
     wrapped,
 )
-
-LAST_CYCLES = 5
-"""Number of cycles that are enlarged, and in the phase portrait."""
 
 _REST: Any = {"color": GREEN, "lw": 1.2, "ls": ":", "zorder": 2.5}
 _CONTROL: Any = {"color": ORANGE, "lw": 1.6, "drawstyle": "steps-post"}
@@ -78,38 +73,6 @@ _LOOKS: list[dict[str, Any]] = [
 _ENLARGED = ", enlarged"
 _LEAST_ROWS = 20
 """Rows of a motion that is worth being enlarged."""
-
-
-class DrawnRun(NamedTuple):
-    """A run to draw."""
-
-    name: str
-    """Name beside other runs."""
-    history: RunHistory
-    measures: Measures
-    drive: Drive | None
-    """None if it is unknown."""
-    notes: Sequence[str] = ()
-    """Sentences on the run, shown below the title."""
-    title: str = ""
-    disturbed: bool = False
-    """Whether a disturbance is added to the control force."""
-    rotary: bool = False
-    """Whether the displacement is an angle."""
-
-    @property
-    def units(self) -> Units:
-        """Units in which the run is shown."""
-        return Units.for_drive(self.drive, rotary=self.rotary)
-
-    @property
-    def last_cycles(self) -> DrawnMotion:
-        """The last `LAST_CYCLES` cycles; without a period a fixed share of the run."""
-        time = self.history.motion.time
-        span = float(time[-1] - time[0]) if len(time) else 0.0
-        natural = self.drive.natural_period if self.drive and self.drive.has_spring else 0.0
-        duration = LAST_CYCLES * (self.measures.period or natural)
-        return self.history.end(min(duration, span) or 0.05 * span)
 
 
 @styled

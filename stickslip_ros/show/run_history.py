@@ -1,15 +1,22 @@
 """History of a run, reduced to the points that its figure needs, with every peak."""
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from stickslip_ros.arrays import BoolArray, FloatArray, IntArray, median
+from stickslip_ros.measures.cycle_measures import Measures
 from stickslip_ros.measures.run_meter import RunAnalysis
 from stickslip_ros.measures.sample_meter import MeasuredMotion
 from stickslip_ros.measures.sampling_grid import LONGEST_GAP
+from stickslip_ros.model.drive import Drive
 from stickslip_ros.samples import LARGEST
+from stickslip_ros.show.quantities import Units
+
+LAST_CYCLES = 5
+"""Number of cycles that are enlarged, and in the phase portrait."""
 
 _FIRST_ROWS = 20_000
 """Rows of the start that are kept unchanged, for a phase portrait."""
@@ -269,3 +276,35 @@ class RunHistory:
             self.switched_on = float(time[acting[0]])
         for trace, drawn in ((self.control, rows & acted), (self.dropped, rows & ~acted)):
             trace.add(time[drawn], force[drawn])
+
+
+class DrawnRun(NamedTuple):
+    """A run to draw."""
+
+    name: str
+    """Name beside other runs."""
+    history: RunHistory
+    measures: Measures
+    drive: Drive | None
+    """None if it is unknown."""
+    notes: Sequence[str] = ()
+    """Sentences on the run, shown below the title."""
+    title: str = ""
+    disturbed: bool = False
+    """Whether a disturbance is added to the control force."""
+    rotary: bool = False
+    """Whether the displacement is an angle."""
+
+    @property
+    def units(self) -> Units:
+        """Units in which the run is shown."""
+        return Units.for_drive(self.drive, rotary=self.rotary)
+
+    @property
+    def last_cycles(self) -> DrawnMotion:
+        """The last `LAST_CYCLES` cycles; without a period a fixed share of the run."""
+        time = self.history.motion.time
+        span = float(time[-1] - time[0]) if len(time) else 0.0
+        natural = self.drive.natural_period if self.drive and self.drive.has_spring else 0.0
+        duration = LAST_CYCLES * (self.measures.period or natural)
+        return self.history.end(min(duration, span) or 0.05 * span)

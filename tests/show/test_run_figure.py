@@ -25,8 +25,8 @@ from stickslip_ros.record.reader import Recording
 from stickslip_ros.record.report import report_of_recording
 from stickslip_ros.samples import SampleColumns
 from stickslip_ros.show.drawing import with_edges
-from stickslip_ros.show.run_figure import LAST_CYCLES, DrawnRun, run_figure
-from stickslip_ros.show.run_history import DrawnMotion, RunHistory
+from stickslip_ros.show.run_figure import run_figure
+from stickslip_ros.show.run_history import LAST_CYCLES, DrawnMotion, DrawnRun, RunHistory
 from stickslip_ros.show.style import SCREEN, STYLES, FigureStyle
 from tests.drives import FEED_DRIVE, PAPER
 from tests.show.texts import faults, in_styles, legend_texts
