@@ -11,7 +11,7 @@ from typing import Any
 
 from benchmarks import dashboard
 from benchmarks.slices import LACKING, Row, table
-from stickslip_ros.versions import versions
+from stickslip_ros.installed_packages import versions
 
 NAMES = (
     "start",

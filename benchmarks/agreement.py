@@ -39,7 +39,7 @@ from benchmarks.random_drives import (
     sticks_of,
 )
 from stickslip_ros.errors import StickslipError
-from stickslip_ros.versions import versions
+from stickslip_ros.installed_packages import versions
 
 REQUIRED = 1e-7
 ACCURATE = 1e-8

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import stickslip_ros as ss
-from stickslip_ros.versions import versions
+from stickslip_ros.installed_packages import versions
 
 RECORD = Path(
     os.environ.get("STICKSLIP_DATA", Path(__file__).parents[2] / "shared" / "data"),

@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from stickslip_ros.installed_packages import versions
 from stickslip_ros.model.control import Cascade
 from stickslip_ros.model.motor import Motor
 from stickslip_ros.motion import Motion
@@ -26,7 +27,6 @@ from stickslip_ros.motion.sampled_loop import LOCKSTEP_START, SampledLoop
 from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.theory.linear import expand
 from stickslip_ros.theory.linear_sampled_loop import LinearSampledLoop
-from stickslip_ros.versions import versions
 
 RATE = 1000.0
 RATIOS = (0.1, 1.0, 10.0)

@@ -22,9 +22,9 @@ from typing import Any
 import numpy as np
 
 from benchmarks.slices import LACKING
+from stickslip_ros.installed_packages import versions
 from stickslip_ros.record.reader import Recording
 from stickslip_ros.testing import ClosedLoop, own_domain
-from stickslip_ros.versions import versions
 
 FILE = Path(__file__).with_suffix(".json")
 TOPICS = (

@@ -26,8 +26,8 @@ from typing import Any
 import numpy as np
 
 import stickslip_ros as ss
+from stickslip_ros.installed_packages import versions
 from stickslip_ros.record.report import report_of_recording
-from stickslip_ros.versions import versions
 
 READINGS = ("position", "command less position", "position and velocity")
 KINDS = ("sticks", "sticks", "sticks", "sticks", "uneven", "even")

@@ -21,6 +21,7 @@ from typing import Any
 
 import numpy as np
 
+from stickslip_ros.installed_packages import versions
 from stickslip_ros.model.constants import constants_of
 from stickslip_ros.model.control import ControlLaw
 from stickslip_ros.scenarios.files import Scenario, load_scenario
@@ -29,7 +30,6 @@ from stickslip_ros.studies.design import Task, design
 from stickslip_ros.studies.design_trial import Trial
 from stickslip_ros.studies.drive_loops import DriveLoops
 from stickslip_ros.studies.tuning import Tuning
-from stickslip_ros.versions import versions
 
 DRIVES = 60
 LAWS = {False: ("washout", "velocity_feedback", "pid"), True: ("cascade", "pid")}

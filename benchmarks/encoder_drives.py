@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 import stickslip_ros as ss
-from stickslip_ros.versions import versions
+from stickslip_ros.installed_packages import versions
 
 LAWS = ("stribeck", "exponential", "gaussian", "stiction", "linear")
 VALUES = ("amplitude", "period", "stick_fraction")

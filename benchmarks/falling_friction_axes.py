@@ -31,7 +31,7 @@ from stickslip_ros.identification.fit import QUANTILE
 from stickslip_ros.identification.identify import identify
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.sentences import notes
-from stickslip_ros.versions import versions
+from stickslip_ros.installed_packages import versions
 
 AXES, DURATION, STEP = 40, 12.0, 2e-5
 ENCODER, FORCE_NOISE = 1e-6, 0.01

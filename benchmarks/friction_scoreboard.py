@@ -29,10 +29,10 @@ import numpy as np
 from scipy.integrate import DOP853, solve_ivp
 
 from benchmarks.memory_reference import Array, Law, MemoryDrive
+from stickslip_ros.installed_packages import versions
 from stickslip_ros.model.drive import Drive
 from stickslip_ros.model.friction import ElastoPlastic, Exponential, LuGre
 from stickslip_ros.motion import Motion
-from stickslip_ros.versions import versions
 
 TURNS = 3
 SAMPLES = 57

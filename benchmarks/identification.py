@@ -31,6 +31,7 @@ from stickslip_ros.identification.fit import QUANTILE
 from stickslip_ros.identification.identify import identify
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.sentences import unidentified
+from stickslip_ros.installed_packages import versions
 from stickslip_ros.model.actuator import Actuator
 from stickslip_ros.model.drive import Drive
 from stickslip_ros.model.friction import (
@@ -43,7 +44,6 @@ from stickslip_ros.model.friction import (
 )
 from stickslip_ros.model.signals import table
 from stickslip_ros.motion import Motion
-from stickslip_ros.versions import versions
 
 NORMAL_FORCE = 1000.0
 _CURVE = Exponential(static=0.4037, kinetic=0.2519, decay_speed=0.0203, viscous=0.507)

@@ -29,9 +29,9 @@ from stickslip_ros.identification.identified_law import DELAY, LAG
 from stickslip_ros.identification.identify import identify
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.servo import Servo, closed_loop
+from stickslip_ros.installed_packages import versions
 from stickslip_ros.model.drive import Drive
 from stickslip_ros.model.friction import Coulomb, Directional
-from stickslip_ros.versions import versions
 
 CASES = (
     *(f"axis {rate} 0" for rate in (250, 500, 1000, 2000)),

@@ -28,13 +28,13 @@ from typing import Any
 import numpy as np
 
 import stickslip_ros as ss
+from stickslip_ros.installed_packages import versions
 from stickslip_ros.measures import Measures
 from stickslip_ros.measures.sample_assumptions import SampleAssumptions
 from stickslip_ros.measures.sample_meter import SampleMeter
 from stickslip_ros.model.sensor import MeasuredVelocity, Sensor
 from stickslip_ros.samples import SampleColumns
 from stickslip_ros.stamps import NANOSECONDS
-from stickslip_ros.versions import versions
 
 BELT_SPEEDS = (0.01, 0.02, 0.03, 0.04, 0.044, 0.048)
 RESOLUTIONS = (1e-7, 1e-6, 5e-6)

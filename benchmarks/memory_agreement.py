@@ -35,7 +35,7 @@ from benchmarks.random_memory_drives import (
     random_memory_drive,
 )
 from stickslip_ros.errors import StickslipError
-from stickslip_ros.versions import versions
+from stickslip_ros.installed_packages import versions
 
 REQUIRED = dict.fromkeys(LAWS, 1e-8)
 RTOL = dict.fromkeys(LAWS, 1e-12)

@@ -21,6 +21,7 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import RunError
+from stickslip_ros.installed_packages import versions
 from stickslip_ros.measures.cycle_measures import Regime
 from stickslip_ros.measures.slips import SlipThreshold, slip_report, slips_in
 from stickslip_ros.model.drive import Drive
@@ -33,7 +34,6 @@ from stickslip_ros.model.friction import (
 from stickslip_ros.motion import Motion
 from stickslip_ros.record.table_file import table_of
 from stickslip_ros.record.table_quantities import quantities_of
-from stickslip_ros.versions import versions
 
 DATA = Path(
     os.environ.get("STICKSLIP_DATA", Path(__file__).parents[2] / "shared" / "data"),

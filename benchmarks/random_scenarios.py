@@ -26,7 +26,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from stickslip_ros.errors import StickslipError
-from stickslip_ros.versions import versions
+from stickslip_ros.installed_packages import versions
 from tests.studies.random_scenarios import CHANGES, differences, original
 
 SCENARIOS = 300

@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass
 from statistics import median
 from typing import NoReturn, TypeVar
 
-from stickslip_ros.versions import versions
+from stickslip_ros.installed_packages import versions
 
 T = TypeVar("T")
 

@@ -1,4 +1,4 @@
-"""Find installed ROS packages and their executables."""
+"""Installed packages: ROS packages and their executables, and versions of software."""
 
 import os
 import sys
@@ -54,6 +54,20 @@ def find_executable(name: str) -> Path:
             + did_you_mean(executable, files, f"it has {', '.join(sorted(files)) or 'none'}")
         )
     return files[executable]
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of Python, this package and the packages that its results depend on."""
+    import platform  # these two take longer to import than the start of a command should take
+    from importlib import metadata
+
+    by_package = {"python": platform.python_version()}
+    for package in ("stickslip_ros", "heyoka", "numpy", "mcap", "rclpy"):
+        try:
+            by_package[package] = metadata.version(package)
+        except metadata.PackageNotFoundError:
+            continue
+    return by_package
 
 
 def _executables(folder: Path) -> Iterator[Path]:

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from stickslip_ros.errors import StickslipError
 from stickslip_ros.files import written
+from stickslip_ros.installed_packages import versions
 from stickslip_ros.tables import TextTable
 from stickslip_ros.text import printable
-from stickslip_ros.versions import versions
 
 if TYPE_CHECKING:
     from markupsafe import Markup

@@ -14,12 +14,12 @@ import numpy as np
 
 from stickslip_ros.api.page import Summary, write_page
 from stickslip_ros.errors import RunError
+from stickslip_ros.installed_packages import versions
 from stickslip_ros.quantities import Quantity
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.show.quantities import Units
 from stickslip_ros.tables import TextTable
 from stickslip_ros.text import finite, printable
-from stickslip_ros.versions import versions
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

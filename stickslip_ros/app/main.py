@@ -12,10 +12,10 @@ from typing import NoReturn
 from stickslip_ros.app import INTERRUPTED
 from stickslip_ros.app.commands import COMMANDS, command_parser, overview
 from stickslip_ros.errors import InvalidInputError, StickslipError
+from stickslip_ros.installed_packages import versions
 from stickslip_ros.interrupts import raise_interrupts
 from stickslip_ros.standard_streams import nowhere, open_closed_streams
 from stickslip_ros.text import did_you_mean
-from stickslip_ros.versions import versions
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

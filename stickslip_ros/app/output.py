@@ -10,9 +10,9 @@ from threading import Event, Thread
 from time import monotonic
 from typing import TYPE_CHECKING, Any, Protocol
 
+from stickslip_ros.installed_packages import versions
 from stickslip_ros.tables import TextTable
 from stickslip_ros.text import finite, printable
-from stickslip_ros.versions import versions
 
 if TYPE_CHECKING:
     from rich.console import Console

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, fields, is_dataclass, replace
 from enum import StrEnum
 from functools import cache, cached_property, partial
 from math import ceil, inf, isinf, isnan, nextafter
-from typing import Any, TypedDict, TypeVar, Unpack
+from typing import Any, TypeVar
 
 _Part = TypeVar("_Part")
 
@@ -195,28 +195,13 @@ class Parameter:
         )
 
 
-class _Attributes(TypedDict, total=False):
-    """Attributes of `Parameter` that few constants have."""
-
-    at_least: float
-    at_most: float
-    below: float
-    positive: bool
-    whole: bool
-    simplifies: bool
-    changes: Changes
-    refused: Mapping[str, str]
-    unset: str
-    file: bool
-
-
 def constant(
     default: Any,
     meaning: str,
     unit: str | None = None,
     *,
     choices: Iterable[str] = (),
-    **attributes: Unpack[_Attributes],
+    **attributes: Any,
 ) -> Any:
     """Describe a constant, or an option of a node, as the default of a dataclass field.
 

@@ -142,11 +142,8 @@ class HybridSystem(ABC):
     @property
     def index(self) -> Mapping[str, int]:
         """Index of constants, inputs, switches and of the time at the start, by name."""
-        return self.shared("index", self._numbered)
-
-    def _numbered(self) -> Mapping[str, int]:
         names = (*self.constants, *self.inputs, *self.switches, "epoch")
-        return {name: number for number, name in enumerate(names)}
+        return self.shared("index", lambda: {name: n for n, name in enumerate(names)})
 
     @cached_property
     def symbols(self) -> Symbols:

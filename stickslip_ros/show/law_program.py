@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partialmethod
 from math import isfinite
 from typing import Any, Union
 
@@ -83,18 +84,6 @@ class Symbol:
         """Return the exponential less 1."""
         return self._with("expm1", self)
 
-    def __lt__(self, other: Operand) -> bool:
-        return self._decides("<", other)
-
-    def __le__(self, other: Operand) -> bool:
-        return self._decides("<=", other)
-
-    def __gt__(self, other: Operand) -> bool:
-        return self._decides(">", other)
-
-    def __ge__(self, other: Operand) -> bool:
-        return self._decides(">=", other)
-
     def __eq__(self, other: object) -> bool:
         if other is self or not isinstance(other, int | float | Symbol):
             return other is self
@@ -110,6 +99,11 @@ class Symbol:
             return (other > 0.0) == (comparison in ("<", "<="))
         assert self.explorer is not None
         return self.explorer.decide(self._with(comparison, self, other))
+
+    __lt__ = partialmethod(_decides, "<")
+    __le__ = partialmethod(_decides, "<=")
+    __gt__ = partialmethod(_decides, ">")
+    __ge__ = partialmethod(_decides, ">=")
 
 
 @dataclass(frozen=True, eq=False)

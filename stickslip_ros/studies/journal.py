@@ -17,10 +17,10 @@ import numpy as np
 
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.files import user_cache
+from stickslip_ros.installed_packages import versions
 from stickslip_ros.studies.columns import Columns
 from stickslip_ros.studies.settling import MotionState
 from stickslip_ros.studies.study import Piece, PointStudy
-from stickslip_ros.versions import versions
 
 _OPENING, _VERSION = b'{"format": "stickslip_ros study ', b'2"'
 _NO_JOURNAL = "exists already, and is not the journal of a study"
@@ -46,7 +46,8 @@ class Journal:
         """
         self.study, self.path = study, path
         self.columns = Columns.empty(study.plan) if columns is None else columns
-        self._ends: dict[int, MotionState | None] = {}
+        self.ends: dict[int, MotionState | None] = {}
+        """State in which the newest point of a chain ended; None if it failed or diverged."""
         self._file: BinaryIO | None = None
         if path is None:
             return
@@ -81,13 +82,6 @@ class Journal:
         """Number of points that are done."""
         return int(np.count_nonzero(self.columns.done))
 
-    def state_after(self, index: int) -> MotionState | None:
-        """Return the state in which the newest point of a chain ended.
-
-        None if the motion failed or diverged.
-        """
-        return self._ends[index]
-
     def add(self, piece: Piece) -> None:
         """Take a piece, and hand it to the operating system."""
         if self._file is not None:
@@ -108,8 +102,8 @@ class Journal:
             # Of a chain only the newest end is needed, in either direction.
             first, last = piece.points[0].number, piece.points[-1].number
             for neighbour in (first - 1, first + 1):
-                self._ends.pop(neighbour, None)
-            self._ends[last] = piece.end
+                self.ends.pop(neighbour, None)
+            self.ends[last] = piece.end
 
     def _read(self, file: BinaryIO) -> None:
         text = _heading(self.study)

@@ -275,7 +275,7 @@ def _missing(journal: Journal) -> Iterator[tuple[range, MotionState | None]]:
             if len(run):
                 first, last = int(run[0]), int(run[-1])
                 carried = plan.continuation and first
-                start = journal.state_after(points[first - 1]) if carried else None
+                start = journal.ends[points[first - 1]] if carried else None
                 yield points[first : last + 1], start
 
 

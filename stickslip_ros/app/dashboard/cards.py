@@ -6,9 +6,8 @@ import time
 from nicegui import ui
 from nicegui.events import GenericEventArguments
 
-from stickslip_ros.app.dashboard.charts import CYCLES
 from stickslip_ros.app.dashboard.controls import number_within, refusal_label, refusals_in, report
-from stickslip_ros.app.dashboard.elements import card, chart, named, table
+from stickslip_ros.app.dashboard.elements import CYCLES, card, chart, named, table
 from stickslip_ros.app.dashboard.run_requests import Impulse, Requests
 from stickslip_ros.app.dashboard.run_state import ABSENT, SILENT, Health, RunState
 from stickslip_ros.measures.cycle_measures import RESTS

@@ -13,9 +13,15 @@ from fastapi.responses import FileResponse
 from nicegui import core, ui
 
 from stickslip_ros.app.dashboard.cards import ControlCard, CyclesCard, EventsCard, NodesCard
-from stickslip_ros.app.dashboard.charts import PORTRAIT, TRACE
 from stickslip_ros.app.dashboard.controls import ParametersCard, Settings
-from stickslip_ros.app.dashboard.elements import card, chart, heading, show_commands
+from stickslip_ros.app.dashboard.elements import (
+    PORTRAIT,
+    TRACE,
+    card,
+    chart,
+    heading,
+    show_commands,
+)
 from stickslip_ros.app.dashboard.ended_run import EndedRun, EndNotice
 from stickslip_ros.app.dashboard.frames import PERIODS, Frames
 from stickslip_ros.app.dashboard.header import Header

@@ -8,8 +8,18 @@ import numpy as np
 from contourpy import contour_generator
 from nicegui import ui
 
-from stickslip_ros.app.dashboard.charts import AXIS, CENTRED, LEGEND, STILL, TOOLBOX, line, points
-from stickslip_ros.app.dashboard.elements import call, card, chart
+from stickslip_ros.app.dashboard.elements import (
+    AXIS,
+    CENTRED,
+    LEGEND,
+    STILL,
+    TOOLBOX,
+    call,
+    card,
+    chart,
+    line,
+    points,
+)
 from stickslip_ros.app.dashboard.run_state import RunState
 from stickslip_ros.app.dashboard.theory import (
     Decay,

@@ -13,12 +13,12 @@ from typing import Any
 from rclpy.node import Node
 
 from stickslip_ros.errors import BagError, InvalidInputError
+from stickslip_ros.installed_packages import versions
 from stickslip_ros.nodes.analyzing.incoming import Message
 from stickslip_ros.record.recorder import Recorder
 from stickslip_ros.record.topics import Topic
 from stickslip_ros.scenarios.curve_file import CURVES, Pairs, read_pairs
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, AnalyzerParameters
-from stickslip_ros.versions import versions
 
 
 class LiveBag:

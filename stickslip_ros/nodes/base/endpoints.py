@@ -54,28 +54,21 @@ def mismatch(writer: QoSProfile, reader: QoSProfile) -> str:
     return reason if compatibility == QoSCompatibility.ERROR else ""
 
 
-def matching_readers(node: Node, writer: Publisher) -> list[TopicEndpointInfo]:
-    """Return the readers in the graph that match a publisher of the node."""
+def matching_ends(node: Node, end: Publisher | Subscription) -> list[TopicEndpointInfo]:
+    """Return the readers, or writers, in the graph that match a publisher, or subscription."""
+    kind: Any = end.msg_type
+    type_name = f"{kind.__module__.partition('.')[0]}/msg/{kind.__name__}"
+    if isinstance(end, Publisher):
+        others = node.get_subscriptions_info_by_topic(end.topic_name)
+        pairs = [(end.qos_profile, other.qos_profile) for other in others]
+    else:
+        others = node.get_publishers_info_by_topic(end.topic_name)
+        pairs = [(other.qos_profile, end.qos_profile) for other in others]
     return [
-        reader
-        for reader in node.get_subscriptions_info_by_topic(writer.topic_name)
-        if _same_type(reader, writer) and not mismatch(writer.qos_profile, reader.qos_profile)
+        other
+        for other, (writer, reader) in zip(others, pairs, strict=True)
+        if other.topic_type == type_name and not mismatch(writer, reader)
     ]
-
-
-def matching_writers(node: Node, reader: Subscription) -> list[TopicEndpointInfo]:
-    """Return the writers in the graph that match a subscription of the node."""
-    return [
-        writer
-        for writer in node.get_publishers_info_by_topic(reader.topic_name)
-        if _same_type(writer, reader) and not mismatch(writer.qos_profile, reader.qos_profile)
-    ]
-
-
-def _same_type(other: TopicEndpointInfo, ours: Publisher | Subscription) -> bool:
-    kind: Any = ours.msg_type
-    package = kind.__module__.partition(".")[0]
-    return other.topic_type == f"{package}/msg/{kind.__name__}"
 
 
 def _explicit(profile: QoSProfile) -> QoSProfile:

@@ -21,8 +21,7 @@ from rclpy.timer import Timer
 from stickslip_ros.errors import BagError, InvalidInputError, StickslipError
 from stickslip_ros.nodes.base.endpoints import (
     KeepingNode,
-    matching_readers,
-    matching_writers,
+    matching_ends,
     message_class,
     qos_profile,
 )
@@ -340,12 +339,12 @@ class ManagedNode(KeepingNode, ParameterNode[ParametersT], ABC):
         }
         for end in self.kept:
             if isinstance(end, Publisher):
-                readers = matching_readers(self, end)
+                readers = matching_ends(self, end)
                 known = {reader.node_name for reader in readers}
                 peers |= known if self.read_last in (None, end) else known - recorders
                 matched = end.get_subscription_count() >= len(readers)
             elif isinstance(end, Subscription):
-                matched = end.get_publisher_count() >= len(matching_writers(self, end))
+                matched = end.get_publisher_count() >= len(matching_ends(self, end))
             else:
                 continue
             if not matched:
