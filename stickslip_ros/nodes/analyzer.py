@@ -16,7 +16,6 @@ from rclpy.serialization import deserialize_message, serialize_message
 from std_msgs.msg import Float64
 
 from stickslip_ros.measures.cycle_measures import trend_text
-from stickslip_ros.measures.run_report import report_of
 from stickslip_ros.nodes.analyzing.incoming import Incoming, Message, recorded_topics
 from stickslip_ros.nodes.analyzing.live_bag import LiveBag
 from stickslip_ros.nodes.analyzing.live_measures import LiveMeasures, PlantTiming
@@ -85,7 +84,7 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         if not self.active:
             return OK, "", bag
         measures = self._activation.measures
-        report = report_of(measures.meter, measures.meter.motion.measured(quick=True))
+        report = measures.report(quick=True)
         counts = {name: report[name] for name in ("regime", "steady", "samples", "lost_samples")}
         counts["trend"] = trend_text(report)
         notes = {"notes": "; ".join(report["notes"])}
@@ -159,7 +158,7 @@ class Activation:
         meter = self.measures.meter
         if meter.timing is not None and self._timing.complete:
             meter.published = meter.timing.samples
-        report = report_of(meter)
+        report = self.measures.report()
         self._incoming.close()
         for end in (self._recorded, *self._periodic):
             self._node.release(end)

@@ -15,7 +15,7 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from stickslip_ros.arrays import IntArray
-from stickslip_ros.errors import BagError
+from stickslip_ros.errors import BagError, InvalidInputError
 from stickslip_ros.record.bag_formats import mcap_of
 from stickslip_ros.record.cdr import Messages
 from stickslip_ros.record.compression import unpack_file
@@ -181,9 +181,14 @@ def runs_of(bags: Iterable[Path]) -> dict[Path, dict[Path, float]]:
 
     NAME_2 continues NAME if an analyzer that was restarted has written it, with `bag_exists: next`,
     its messages are later, and the parameters of the plant, where both have them, are the same.
+    Raises InvalidInputError for a bag that is given twice.
     """
     runs: dict[Path, dict[Path, float]] = {}
+    known = set[Path]()
     for bag in bags:
+        if bag.resolve() in known:
+            raise InvalidInputError(f"{bag} is given twice")
+        known.add(bag.resolve())
         for first, continued in runs.items():
             if re.fullmatch(re.escape(str(first)) + r"_\d+", str(bag)) and bag.is_dir():
                 gap = _gap([first, *continued][-1], bag)

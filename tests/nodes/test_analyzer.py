@@ -6,6 +6,7 @@ from dataclasses import replace
 from itertools import pairwise
 from math import cos, sin
 from pathlib import Path
+from unittest import mock
 
 import pytest
 from builtin_interfaces.msg import Time
@@ -45,7 +46,7 @@ from stickslip_ros.stamps import NANOSECONDS
 from tests.nodes.graph import PATIENCE, Graph
 from tests.record.runs import full_disk
 
-_FIGURES = r"stick_slip: amplitude \d+\.?\d* mm, frequency \d+\.?\d* mHz, stick fraction 0\.\d{1,3}"
+_FIGURES = r"stick_slip: amplitude 0\.\d+, frequency 0\.\d+, stick fraction 0\.\d{1,3}"
 
 
 def run_to_the_end(
@@ -102,7 +103,7 @@ def test_it_records_the_bytes_it_hears_measures_them_and_logs_each_figure_once(
         for line in capfd.readouterr().err.splitlines()
         if "amplitude" in line and "report: " not in line
     ]
-    assert lines[-1].startswith("stick_slip: amplitude 318.6 mm, ")
+    assert lines[-1].startswith("stick_slip: amplitude 0.3186, ")
     assert all(re.fullmatch(_FIGURES, line) for line in lines)
     assert all(one != next_one for one, next_one in pairwise(lines))
 
@@ -483,3 +484,14 @@ def test_the_text_has_what_is_known(
     live.cycles = 4
     name = "stick_slip" if regime else "regime not known"
     assert live.text() == f"{name}: amplitude 1 mm, frequency 2 Hz, {end}"
+    live.assume_plant(dict.fromkeys(("mass", "stiffness", "normal_force"), 1.0))
+    assert live.text() == f"{name}: amplitude 0.001, frequency 2, {end}"
+
+
+@pytest.mark.parametrize(("normal_force", "unit"), [(1.0, ""), (2.0, "m")])
+def test_the_report_of_a_dimensionless_drive_has_no_units(normal_force: float, unit: str) -> None:
+    live = LiveMeasures(AnalyzerParameters(), DroppedMessages.__new__(DroppedMessages))
+    live.assume_plant({"mass": 1.0, "stiffness": 1.0, "normal_force": normal_force})
+    with mock.patch.object(live.meter.motion, "measured", wraps=live.meter.motion.measured) as call:
+        live.report()
+    assert call.call_args.args == (unit,)

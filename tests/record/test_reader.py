@@ -12,7 +12,8 @@ from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2 import Writer as RosbagsWriter
 from rosbags.typesys import Stores, get_typestore
 
-from stickslip_ros.errors import BagError
+from stickslip_ros.errors import BagError, InvalidInputError
+from stickslip_ros.record.bag_files import runs_of
 from stickslip_ros.record.codec import pack_joint_state, pack_wrench
 from stickslip_ros.record.reader import Recording
 from stickslip_ros.record.recorder import Recorder
@@ -259,6 +260,11 @@ def test_forces_of_strangers_do_not_get_in_the_way(tmp_path):
             recorder.write(recorder.add_topic(topic, kind, DEPTH), data, 1)
     with Recording(tmp_path / "bag") as recording:
         assert recording.control_forces.force.tolist() == [4.0]
+
+
+def test_a_bag_that_is_given_twice_is_refused(tmp_path):
+    with pytest.raises(InvalidInputError, match="bag is given twice"):
+        runs_of([tmp_path / "bag", tmp_path / "other", tmp_path / "other" / ".." / "bag"])
 
 
 def test_what_is_no_bag_is_refused(tmp_path):

@@ -18,6 +18,7 @@ from stickslip_ros.measures.noise import import_for_noise
 from stickslip_ros.measures.onset_watch import OnsetWatch
 from stickslip_ros.measures.ring_down import RingDown
 from stickslip_ros.measures.run_meter import RunMeter
+from stickslip_ros.measures.run_report import report_of
 from stickslip_ros.measures.sample_assumptions import SampleAssumptions
 from stickslip_ros.measures.timing import Timing
 from stickslip_ros.model.drive import Drive
@@ -44,6 +45,8 @@ class LiveMeasures:
         self.watch = OnsetWatch()
         self.cycles = 0
         """Number of cycles so far."""
+        self.length = "m"
+        """Unit of positions in texts; empty for a dimensionless drive."""
         self._parameters, self._dropped = parameters, dropped
         joint, belt_joint = parameters.joint or None, parameters.belt_joint or None
         by_effort = parameters.force_type == "effort"
@@ -81,6 +84,10 @@ class LiveMeasures:
         self.meter.feed_forces(efforts, dropped)
         return cycles, ring_downs
 
+    def report(self, *, quick: bool = False) -> dict[str, Any]:
+        """Return the report of the run so far; see `SampleMeter.measured` for `quick`."""
+        return report_of(self.meter, self.meter.motion.measured(self.length, quick=quick))
+
     def text(self) -> str:
         """Return the measures of the last window of cycles in words."""
         measures = self.meter.motion.measures(quick=True)
@@ -89,8 +96,8 @@ class LiveMeasures:
             return regime
         share = measures.stick_fraction
         return (
-            f"{regime}: amplitude {quantity(measures.amplitude, 'm')}, "
-            f"frequency {quantity(measures.frequency, 'Hz')}, "
+            f"{regime}: amplitude {quantity(measures.amplitude, self.length)}, "
+            f"frequency {quantity(measures.frequency, self.length and 'Hz')}, "
             f"stick fraction {'not known' if share is None else f'{share:.3g}'}"
         )
 
@@ -98,8 +105,10 @@ class LiveMeasures:
         """Read the samples as those of a plant with these parameters, by flat name."""
         self._assume(self._parameters.reading_of(plant))
         with suppress(InvalidInputError, KeyError, TypeError):  # a plant of another version
-            period = Drive(mass=plant["mass"], stiffness=plant["stiffness"]).natural_period
+            drive = Drive(**{name: plant[name] for name in ("mass", "stiffness", "normal_force")})
+            period = drive.natural_period
             self.watch.pause = max(1.0, period if period < inf else 0.0)
+            self.length = "" if drive.is_dimensionless else "m"
 
     def _assume(self, reading: SampleAssumptions) -> None:
         self.meter.motion.reading = reading
