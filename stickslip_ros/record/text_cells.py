@@ -19,14 +19,15 @@ TIME = re.compile(
 _LOOK = 10
 """Cells by which a column has times."""
 _DAY = 86_400.0
+_COMMAS = {",": "decimal commas"}
 
 
 class OtherMarkError(Exception):
     """A decimal mark is not what it was taken for; its text is the mark."""
 
 
-def values_of(cells: Any, decimal: str, given: str | None) -> tuple[Any, bool]:
-    """Return numbers, or instants, of a column as pandas has read it, and whether commas are marks.
+def values_of(cells: Any, decimal: str, given: str | None) -> tuple[Any, dict[str, str]]:
+    """Return numbers, or instants, of a column as pandas has read it, and what marks were read as.
 
     `decimal` is the mark of the table as far as it is known, and `given` one that the user gave: by
     this the other one groups digits. Raises OtherMarkError.
@@ -34,25 +35,29 @@ def values_of(cells: Any, decimal: str, given: str | None) -> tuple[Any, bool]:
     import pandas as pd
 
     if cells.dtype.kind in "iuf":
-        return np.array(cells), cells.dtype.kind == "f" and decimal == ","
+        return np.array(cells), _COMMAS if cells.dtype.kind == "f" and decimal == "," else {}
     if cells.dtype.kind == "b":
-        return np.full(len(cells), np.nan), False
+        return np.full(len(cells), np.nan), {}
     text = cells.astype(str).str.strip(" \t'\"")
     instant = next(filter(None, map(TIME.fullmatch, text.dropna()[:_LOOK])), None)
     if instant is not None:
-        return _instants(text, instant), False
+        return _instants(text, instant), {}
+    spaced = next(iter(text[text.str.contains(r"\d \d{3}", na=False)]), None)
     text = text.str.replace(GROUPED, "", regex=True)
     if given is None:
         grouped = ((".", r",\d*[.,]"), (",", r"\.\d*[.,]"))  # commas, or points, group digits
-        marks = (mark for mark, pattern in grouped if text.str.contains(pattern).any())
+        others = (mark for mark, pattern in grouped if text.str.contains(pattern).any())
         points = decimal == "," and text.str.contains(".", regex=False).any()
-        if mark := next(marks, "," * bool(points)):
+        if mark := next(others, "," * bool(points)):
             raise OtherMarkError(mark)
     else:
         text = text.str.replace("," if given == "." else ".", "", regex=False)
-    has_commas = given != "." and bool(text.str.contains(",", regex=False).any())
+    has_commas = given != "." and text.str.contains(",", regex=False).any()
+    marks = _COMMAS if has_commas else {}
+    if spaced is not None:  # they may be two numbers
+        marks = {**marks, " ": f"{spaced} as {re.sub(GROUPED, '', spaced)}"}
     numbers: Any = pd.to_numeric(text.str.replace(",", ".", regex=False), errors="coerce")
-    return numbers.to_numpy(float, na_value=np.nan), has_commas
+    return numbers.to_numpy(float, na_value=np.nan), marks
 
 
 def check_thousands(values: FloatArray, decimal: str) -> None:

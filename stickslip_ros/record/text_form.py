@@ -8,10 +8,10 @@ import codecs
 import csv
 import os
 import re
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from io import BytesIO, StringIO
+from io import BytesIO
 from itertools import islice
 from pathlib import Path
 from statistics import mode
@@ -39,8 +39,14 @@ _NUMBER = re.compile(
 )
 _Line = tuple[int, list[str]]
 """Place of a line, and its cells."""
-_CYRILLIC = re.compile(rb"[\xe0-\xff](?:[\xe0-\xff]{2}|[\xc0-\xde\xec])|\xec\xf1")
-"""Letters in cp1251 that cp1252 would show as a row of accents, such as those of mm and ms."""
+_CYRILLIC = re.compile(
+    rb"[\xe0-\xff](?:[\xe0-\xff]{2}|[\xc0-\xde\xec])|\xec\xf1|[\xc0-\xdf]{3}|\xcc[\xcc\xd1]|\xca\xcd"
+)
+"""Letters in cp1251 that cp1252 would show as a row of accents, such as those of mm, ms and kN."""
+_BROKEN = re.compile(r'(?<![^\n,;\t|])"[^"\n]*(?:\n[^"\n]*){1,3}"(?![^\n,;\t|])')
+"""A cell in quotes of several lines, as a name with its unit below."""
+_JOINED = "\v\n"
+"""In place of a line that is at the start of the next one."""
 _COMMENT = re.compile(r"^\s*(?:#|%|//)\s*")
 _NO_NUMBERS = ("", "na", "n/a", "null", "none", "#n/a", "#na", "<na>")
 
@@ -100,12 +106,12 @@ class TextForm(Head):
         is_unit = behind[0].lower() in NO_UNITS[3:] if behind[0] else are_units(cells)
         return cells[0] if is_unit else ""
 
-    def features(self, *, decimal_commas: bool) -> list[str]:
-        """Return what is not the usual, as phrases; decimal commas if they were seen."""
+    def features(self, marks: Iterable[str]) -> list[str]:
+        """Return what is not the usual, as phrases, with what marks in the cells were read as."""
         skipped = f"the first {self.skipped} lines" if self.skipped > 1 else "the first line"
         unusual = {
             f"{_SEPARATORS[self.separator]} as separators": self.separator != ",",
-            "decimal commas": decimal_commas,
+            **dict.fromkeys(marks, True),
             f"text in {self.encoding}": not self.encoding.startswith("utf-8"),
             f"{skipped} skipped": self.skipped > 0,
             f"the names in each row: {listed(self.columns)}": self.labelled,
@@ -139,7 +145,8 @@ def form_of(stream: BinaryIO, given: TableFormat) -> TextForm:
     head = _head_in(texts, first, skip, rows.width)
     labels = {} if texts else rows.labels
     names = [labels.get(place - 1, name) for place, name in enumerate(head.names)]
-    head = replace(head, names=names)
+    joined = lines[: head.skipped].count(_JOINED)
+    head = replace(head, names=names, skipped=head.skipped - joined)
     blank = re.compile(f"(^|{re.escape(rows.separator)}) ", re.MULTILINE)
     form = TextForm(
         **vars(head),
@@ -161,7 +168,10 @@ def _lines_of(head: bytes, encoding: str | None) -> tuple[list[str], str]:
     text = head.decode(encoding, errors="replace")
     if len(re.findall(r"[\x00-\x08\x0e-\x1f]", text)) > len(text) // 100:
         raise ValueError("it is no text; say its encoding if it is, such as utf-16")
-    lines = [*StringIO(text, newline=None)]
+    text = _BROKEN.sub(lambda cell: cell[0].replace("\n", "\v"), re.sub("\r\n?", "\n", text))
+    lines = list[str]()
+    for line in text.split("\n"):
+        lines += [_JOINED] * line.count("\v") + [line.replace("\v", " ") + "\n"]
     cut_off = len(head) == _HEAD and len(lines) > 1
     return lines[:-1] if cut_off else lines, encoding
 

@@ -44,7 +44,8 @@ class TextTable(Table):
         self._refused: Sequence[int] = ()
         self._rows: IntArray | None = None
         """Lines of the rows that were read, from that of the first one; None: all."""
-        self._has_commas = False
+        self._marks: dict[str, str] = {}
+        """What marks in the cells were read as."""
 
     @property
     @override
@@ -60,7 +61,7 @@ class TextTable(Table):
     @property
     @override
     def notes(self) -> list[str]:
-        features, notes = self._text.features(decimal_commas=self._has_commas), [*self._converted]
+        features, notes = self._text.features(self._marks.values()), [*self._converted]
         if features:
             notes.append(f"the table is read with {', '.join(features)}")
         if refused := self._refused:
@@ -100,9 +101,9 @@ class TextTable(Table):
                     frame = _rows_of(frame, *wanted)
                 rows.append(frame.index.to_numpy())
                 for place in places:
-                    values, has_commas = values_of(frame[place], self.decimal, self.form.decimal)
+                    values, marks = values_of(frame[place], self.decimal, self.form.decimal)
                     parts[place].append(values)
-                    self._has_commas |= has_commas
+                    self._marks = marks | self._marks
         self._rows = np.concatenate(rows)
         if wanted is not None and not len(self._rows):
             texts = (row[wanted[0]] for row in self._text.first_rows)

@@ -59,6 +59,10 @@ def read(
         (("t;µ\n" + rows(";")).encode("cp1252"), "t", "µ"),
         (("время, с;x\n" + rows(";")).encode("cp1251"), "время", "x"),
         (("t;бД\n" + rows(";")).encode("cp1251"), "t", "бД"),
+        (b"T;X \xcc\xcc\n" + rows(";").encode(), "T", "'X \u041c\u041c'*1"),
+        (b"T \xcc\xd1;x\n" + rows(";").encode(), "'T \u041c\u0421'*1", "x"),
+        ('"t\n[s]","x"\n' + rows(), "t [s]", "x"),
+        ('# 5" stroke\r\n"Zeit\r\n(s)";"Weg\n\n(m)"\r\n' + rows(";"), "Zeit (s)", "Weg  (m)"),
         (("t;Größe\n" + rows(";")).encode("cp1252"), "t", "Größe"),
         (("t;posição\n" + rows(";")).encode("cp1252"), "t", "posição"),
         (("t;x\n" + rows(";")).encode("utf-16"), "t", "x"),
@@ -461,6 +465,14 @@ def test_a_table_is_longer_than_what_is_looked_at_first(
     monkeypatch.setattr("stickslip_ros.record.text_form._LARGEST", 600)
     with pytest.raises(BagError, match="it has more than 600 bytes"):
         read(tmp_path, "t,x\n" + rows(), "t", "x")
+
+
+def test_a_blank_in_numbers_is_said(tmp_path: Path) -> None:
+    """It stands between thousands, or between two numbers."""
+    text = "t;x\n" + "".join(f"{n};{500 + n} 300\n" for n in range(20))
+    found = read(tmp_path, text, "t", "x")
+    assert found.samples.position[1] == 501300.0
+    assert found.notes[0].endswith("semicolons as separators, 500 300 as 500300")
 
 
 def test_what_is_left_out_is_counted_and_its_first_line_named(tmp_path: Path) -> None:
