@@ -119,6 +119,8 @@ class Table(ABC):
     """Period of the rows that a line above them tells, s and in its own unit."""
     decimal = "."
     """Decimal mark."""
+    remarks: Sequence[str] = ()
+    """Lines above the table that are neither names nor units of its columns."""
 
     @property
     def notes(self) -> Sequence[str]:

@@ -10,10 +10,11 @@ from stickslip_ros.arrays import FloatArray, windows
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.quantities import ROTARY
 from stickslip_ros.record.expressions import Expression
+from stickslip_ros.record.remarks import mentions, unit_told
 from stickslip_ros.record.table_columns import ROW, Table
 from stickslip_ros.record.units import Unit, other_quantity, units_in
 from stickslip_ros.samples import LARGEST
-from stickslip_ros.text import quantity
+from stickslip_ros.text import quantity, shown
 
 QUANTITIES = {
     "time": "s",
@@ -95,13 +96,16 @@ class Cells:
             text = quantity(newtons, "N m" if form.rotary else "N")
             yield f"the force is {asked['force'].text}, a current, times {text} for 1 A"
         by_column = {k: v for one in self.conversions.values() for k, v in one.units.items()}
-        if by_column:
-            units = [f"{name}: {unit.text}" for name, unit in by_column.items()]
-            for name, expression in asked.items():
-                if name != "time" and expression.bare and not self.conversions[name].units:
-                    unit = "A" if name == "force" and form.per_ampere else QUANTITIES[name]
-                    unit = ROTARY.get(unit, unit) if form.rotary else unit
-                    units.append(f"{expression.text}: no known unit, taken as {unit}")
+        units = [f"{name}: {unit.text}" for name, unit in by_column.items()]
+        for name, expression in asked.items():
+            if name != "time" and expression.bare and not self.conversions[name].units:
+                unit = "A" if name == "force" and form.per_ampere else QUANTITIES[name]
+                beside = next(mentions(self.table.remarks, unit), None)
+                unit = ROTARY.get(unit, unit) if form.rotary else unit
+                if by_column or beside:
+                    line = f", below the line {shown(beside.line)}" if beside else ""
+                    units.append(f"{expression.text}: no known unit, taken as {unit}{line}")
+        if units:
             yield f"units: {'; '.join(dict.fromkeys(units))}"
         angles = [unit.text for unit in by_column.values() if unit.target in ROTARY.values()]
         if angles and not form.rotary:
@@ -160,6 +164,12 @@ def _unit(table: Table, place: int, start: str, column: str, meaning: _Meaning) 
     kind, target, meant, way = meaning
     cells = table.names[place], table.units[place]
     readings = units_in(*cells, target)
+    if not readings and (told := unit_told(table.remarks, table.names[place])):
+        readings = units_in(cells[0], told, target)
+    said = [] if readings else [m for m in mentions(table.remarks, target) if not m.is_fact]
+    if said:
+        readings = [*{m.unit.factor: m.unit for m in said}.values(), Unit("", 1.0, target)]
+        start += f" by the line {shown(said[0].line)} above,"
     if target == "A" and not readings:
         readings = [unit._replace(factor=nan) for unit in units_in(*cells, "N")]
     if len(readings) > 1:

@@ -16,6 +16,7 @@ from itertools import islice
 from pathlib import Path
 from statistics import mode
 from typing import BinaryIO
+from unicodedata import normalize
 
 from stickslip_ros.files import open_regular
 from stickslip_ros.record.expressions import listed
@@ -29,8 +30,8 @@ _TAIL = 10
 """Lines at their end that are rows of the table: by them the others are known."""
 _TOP = 100
 """Lines on top that may be names or tell the period; first rows that are kept."""
-_LARGEST, _MOST_COLUMNS = 1 << 33, 10_000
-"""Bytes of a file, and columns."""
+_LARGEST, _MOST_COLUMNS, _LONGEST = 1 << 33, 10_000, 500
+"""Bytes of a file, columns, and characters of a line above them in which units are looked for."""
 
 _SEPARATORS = {"\t": "tabs", ";": "semicolons", "|": "|", " ": "spaces", ",": "commas"}
 _NUMBER = re.compile(
@@ -85,6 +86,8 @@ class TextForm(Head):
     """Period of the rows that a line above them tells, s and in its own unit."""
     first_lines: Sequence[str]
     """The first rows."""
+    remarks: Sequence[str]
+    """Lines above the rows that are neither names nor units, nor tell the period."""
 
     @property
     def width(self) -> int:
@@ -145,6 +148,8 @@ def form_of(stream: BinaryIO, given: TableFormat) -> TextForm:
     head = _head_in(texts, first, skip, rows.width)
     labels = {} if texts else rows.labels
     names = [labels.get(place - 1, name) for place, name in enumerate(head.names)]
+    known = {head.skipped, (head.units_line or 0) - 1}
+    above = [line for place, line in enumerate(lines[: head.first][:_TOP]) if place not in known]
     joined = lines[: head.skipped].count(_JOINED)
     head = replace(head, names=names, skipped=head.skipped - joined)
     blank = re.compile(f"(^|{re.escape(rows.separator)}) ", re.MULTILINE)
@@ -158,8 +163,14 @@ def form_of(stream: BinaryIO, given: TableFormat) -> TextForm:
         labelled=len(labels) > 0,
         period=period,
         first_lines=lines[head.first : head.first + _TOP],
+        remarks=[_remark(line) for line in above if not period_in(line)],
     )
     return replace(form, units=[unit or form.unit_behind(n) for n, unit in enumerate(form.units)])
+
+
+def _remark(line: str) -> str:
+    """Return a line without the mark of a comment, in usual characters."""
+    return normalize("NFKC", _COMMENT.sub("", line)[:_LONGEST].strip())
 
 
 def _lines_of(head: bytes, encoding: str | None) -> tuple[list[str], str]:

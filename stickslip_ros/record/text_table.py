@@ -40,7 +40,7 @@ class TextTable(Table):
         with opened(path, content) as stream:
             self._text = text = form_of(stream, given)
         self.names, self.columns, self.units = text.names, text.columns, text.units
-        self.decimal, self.period = text.decimal, text.period
+        self.decimal, self.period, self.remarks = text.decimal, text.period, text.remarks
         self._refused: Sequence[int] = ()
         self._rows: IntArray | None = None
         """Lines of the rows that were read, from that of the first one; None: all."""

@@ -37,7 +37,7 @@ _SPELLINGS = tuple(
         ("rad", "R", f"[um]|{_ANY_LONG}", r"rad(?:s|ian\w*)?"),
         ("turn/s", "R/T", "k", "hz|rps"),
         ("turn/min", "R/T", "k", "rpm|upm|umin"),
-        ("m/s", "L/T", "m", "mps"),
+        ("m/s", "L/T", "[um]", "mps"),
         ("mm/s", "L/T", "", "mms(?:ec)?"),
         ("km/hour", "L/T", "", "kmh|kph"),
         ("mile/hour", "L/T", "", "mph"),
@@ -60,7 +60,7 @@ _SPELLINGS = tuple(
         ("day", "T", "", "d|days?|tage?"),
         ("degree", "R", "m|milli", r"deg(?:s|[ru]\w*)?|stopni\w*|grad(?:i|os?)?"),
         ("gon", "R", "m", "gon|grad"),
-        ("turn", "turns", "", "r|u|tr|rot|obr"),
+        ("turn", "turns", "", "r|u|tr|rot|obr|ot"),
         ("turn", "R", "", "revs?|revolutions?|turns?|umdr(?:ehung(?:en)?)?|tours?|giri|vueltas?"),
         ("arcsec", "R", "", r"(?:arc|bogen)se[ck](?:[ou]nd\w{1,2})?"),
         ("arcmin", "R", "", r"(?:arc|bogen)min(?:ut\w{1,2})?"),
@@ -90,8 +90,10 @@ _COUNTS = re.compile(
 )
 """Words for numbers of an encoder, a motor or a clock, of which only the owner knows the size."""
 _SCALED = re.compile(
-    r"(?i)(?:[*/\xd7]|\sx)\s*10+\b|[\s_]x10+(?=[^\W\d_])|_x100+$"
+    r"(?i)(?:/|[\s(\[]x)\s*(?:10+\b|1?e[-+]?\d)|[*\xd7·]\s*\d[\d.,]*|\d[\d.,]*\s*[*\xd7]"
+    r"|[\s_]x10+(?=[^\W\d_])|_x100+(?!\w)"
     r"|\b(?:tenth|hundredth|thousandth|zehntel|hundertstel|tausendstel)s?\b"
+    r"|\b(?:d[eé]cim|dixi[eè]m|cent[ei][sè][im]|mill?[eiè][sè][im])\w+"
 )
 """What says that numbers are multiples of a unit."""
 _OTHERS = {
@@ -105,11 +107,14 @@ _SQUARED = re.compile(r"(?i)(?<![^\W\d_])(?:[cdm]?m|rad|deg)[\W_]?s\W{0,2}[2²](
 """Units of an acceleration, as ms2."""
 _LATIN = {
     **{"мк": "u", "см": "cm", "кгс": "kgf", "тс": "tf", "град": "deg", "об": "r", "ью": "ew"},
+    **{"ミリ": "milli", "マイクロ": "micro", "メートル": "m", "ニュートン": "N"},
+    **dict(zip("毫微千秒米牛", "muksmN", strict=True)),
     **dict(zip("мскнгдчриалетыуо", "mskngdhrialetyuo", strict=True)),
 }
-_SIGNS = str.maketrans({"µ": "u", "μ": "u", '"': "inch", "″": "inch", "°": "deg", "%": " % "})
-_CYRILLIC = re.compile("|".join(_LATIN), re.IGNORECASE)
-"""Units in Cyrillic letters, the longer first."""
+_SIGNS = str.maketrans({"µ": "u", '"': "inch", "°": "deg", "%": " % ", "^": ""})
+_USUAL = str.maketrans({"μ": "µ", "\u2212": "-", "\u2215": "/"})
+_OTHER_LETTERS = re.compile("|".join(_LATIN), re.IGNORECASE)
+"""Units in other letters than Latin ones, the longer first."""
 _BRACKETED = re.compile(r"[\[(<{]\s*([^\[\](){}<>]*[^\[\](){}<>\s])\s*[\])>}]")
 _MARK = re.compile(r"\s*[/,]\s*|\s+(?:in|en|em)\s+")
 _PER = r"(?:per|pro|por|par)(?![^\W\d_])"
@@ -118,9 +123,14 @@ _MARKS = " _-.,;:/#"
 """What is between words."""
 _START = re.compile(
     r"(?<![^\W_])(?=[^\W_])|(?<=[^\W\d_A-Z])(?=[A-Z])|(?<=\d)(?=[^\W\d_])"
-    r"|(?<=[^\x00-\u03ff])(?=[a-zA-Zµμ])|(?=°)"
+    r"|(?<=[^\x00-\u03ff])(?=[a-zA-Zµ])|(?=[°毫微]|ミリ|マイクロ)"
 )
 """Where a word starts: after a mark, in PosMM, after a number, and after Chinese letters."""
+_FACTOR = re.compile(
+    r"(?i)[x\xd7]?\s*(?:10(?:\^|\*\*|(?=[-+]))(?P<power>[-+]?\d+)"
+    r"|(?P<number>\d+(?:[.,]\d+)?(?:e[-+]?\d+)?|e[-+]?\d+))(?=[\s*·]*[^\W\d_])"
+)
+"""A number, or a power of ten, before a unit."""
 _DOUBTFUL, _DOUBTFUL_ALONE = ("in", "min", "h", "d"), ("cm", "dm")
 """Units that may be other words at the end of a name, or where they are all of it."""
 _DOUBTFUL_LAST = (*_DOUBTFUL, "yd", "dyn")
@@ -154,8 +164,9 @@ def units_in(name: str, given: str, target: str) -> list[Unit]:
     `given` is its cell in a line of units, or empty; `target` the SI unit of the quantity for
     linear motion; a unit of the same quantity of rotary motion is one, too.
     """
-    name = name[:_LONGEST].replace("()", "")
-    scaled, tens = _SCALED.search(name), name.removesuffix("_x10")
+    name, given = _usual(name).replace("()", ""), _usual(given)
+    multiple = _BRACKETED.sub(lambda text: "" if any(_read(text[1], target)) else text[0], name)
+    scaled, tens = _SCALED.search(f"{multiple};{given}"), name.removesuffix("_x10")
     if scaled or (tens != name and any(_last(tens, target))):  # rpm_x10, but not pos_x10
         return [Unit(scaled[0] if scaled else name, nan, target)]
     plain = _BRACKETED.sub(" ", name).strip()
@@ -195,7 +206,8 @@ def force_per_ampere(constant: str, pitch: float | None, *, rotary: bool) -> flo
 
 def are_units(cells: Sequence[str]) -> bool:
     """Return whether the cells of a line are units, but for those that say so or are empty."""
-    units = [cell.strip("[]()") for cell in cells if cell.strip("[]()").lower() not in NO_UNITS]
+    units = [_usual(cell).strip("[]()") for cell in cells]
+    units = [unit for unit in units if unit.lower() not in NO_UNITS]
     first = [unit.partition(" ")[0] for unit in units]
     known = sum(
         bool(_parsed(unit) or _counts(unit))
@@ -217,7 +229,7 @@ def other_quantity(name: str) -> str | None:
 
 def without_unit(name: str) -> str:
     """Return the name of a column without the unit in brackets or after a mark, or nothing."""
-    name = name[:_LONGEST]
+    name = _usual(name)
     if match := re.fullmatch(rf"(.+?)\s*{_BRACKETED.pattern}\s*", name):
         return match[1]
     return next(
@@ -330,9 +342,11 @@ def _counts(text: str) -> bool:
 
 def _read(text: str, target: str) -> Iterator[Unit]:
     """Yield the readings of a text, with or without a number, as a unit of a quantity."""
-    number = re.match(r"\d+(?:[.,]\d+)?(?:e-?\d+)?(?=\s*[^\W\d_])", text)
-    unit = text[number.end() :].strip() if number else text
-    scale = float(number[0].replace(",", ".")) if number else 1.0
+    unit, scale = text, 1.0
+    if factor := _FACTOR.match(text):
+        number = factor["number"] or f"e{factor['power']}"
+        unit = text[factor.end() :].strip(" *·")
+        scale = float(re.sub("(?i)^e", "1e", number.replace(",", ".")))
     for si_unit in dict.fromkeys((target, ROTARY.get(target, target))):
         for name, dimension in _parsed(unit):
             if dimension == _DIMENSIONS[si_unit]:
@@ -352,15 +366,15 @@ def _factor(unit: str, target: str) -> float:
 @cache
 def _parsed(text: str) -> tuple[tuple[str, str], ...]:
     """Return the readings of a text as a unit: what pint calls it, and its dimension."""
-    plain = normalize("NFD", _CYRILLIC.sub(_latin, text.replace("Å", "angstrom")))
+    plain = normalize("NFD", _OTHER_LETTERS.sub(_latin, text.replace("Å", "angstrom")))
     plain = re.sub("[\u0300-\u036f]", "", plain).translate(_SIGNS)
-    plain = plain.replace("⁻¹", "-1").replace("ms-1", "m/s")  # as in v_ms-1, and not 1/ms
+    plain = plain.replace("ms-1", "m/s")  # as in v_ms-1, and not 1/ms
     plain = re.sub("(?<=[a-z])P(?:er|ro|or|ar)(?=[A-Z])", "/", plain)
     plain = re.sub(rf"(?i)(?<![^\W\d_]){_PER}", "/", plain)
-    if len(plain) > 40 or not re.fullmatch(r"[\w\s/.*·⋅^%²-]+", plain):
+    if len(plain) > 40 or not re.fullmatch(r"[\w\s/.*·⋅%-]+", plain):
         return ()
     sides: list[list[str]] = [[], []]
-    below, words = 0, re.findall(r"[^\W\d_²]+|%|/|-1|\d+|²", plain)
+    below, words = 0, re.findall(r"[^\W\d_]+|%|/|-1|\d+", plain)
     for number, word in enumerate(words):
         if word == "/":
             below = 1
@@ -373,7 +387,7 @@ def _parsed(text: str) -> tuple[tuple[str, str], ...]:
         return ()
     readings = [*_composed(over, under)]
     if len(over) == 2 and not under:
-        readings += _composed(over[:1], over[1:])
+        readings += _composed(over[:1], [[unit for unit in over[1] if unit[0] != "day"]])
     return tuple(readings)
 
 
@@ -390,6 +404,14 @@ def _composed(
             yield unit if over else f"turn{unit}", f"{above.replace('turns', 'R') or 'R'}/{below}"
         if not over and unit == "/s":
             yield "rad/s", "R/T"
+
+
+@cache
+def _usual(text: str) -> str:
+    """Return a text with usual characters for those of full width, exponents, and units of one."""
+    text = re.sub("[⁻¹²³⁰⁴-⁹]+", lambda exponent: f"^{exponent[0]}", text[:_LONGEST])
+    text = normalize("NFKC", text.replace("″", '"')).translate(_USUAL)
+    return re.sub(r"(?<=[\W_])µ(?!\w)", "µm", text)
 
 
 def _latin(letters: re.Match[str]) -> str:

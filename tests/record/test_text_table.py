@@ -168,6 +168,9 @@ def test_times_of_day_have_no_unit(tmp_path: Path) -> None:
         ("t [ms];x [mm]\n", "#1", "#2", TableFormat(skip=1), "semicolons as separators"),
         ("Zeit;Weg\nms;mm ±1 µm\n", "Zeit", "Weg", ANY_FORM, "decimal commas, units in line 2"),
         ("# t in ms; x [mm]\nt;x\n", "t", "x", ANY_FORM, "decimal commas"),
+        ("# Einheiten: Zeit ms; Weg mm\nZeit;Weg\n", "Zeit", "Weg", ANY_FORM, "the first line"),
+        ("% x: position in mm\n% t: ms\nt;x\n", "t", "x", ANY_FORM, "the first 2 lines skipped"),
+        ("Čas v ms, poloha v mm\nčas;poloha\n", "čas", "poloha", ANY_FORM, "the first line"),
         ("Zeit [ms];Weg [mm]\n-;%\n", "Zeit", "Weg [mm]*1e-3", ANY_FORM, "units in line 2"),
     ],
 )
@@ -179,6 +182,30 @@ def test_units_above_and_below_the_names_and_of_skipped_names_are_used(
     assert found.samples.stamp.tolist() == [500_000 * number for number in range(50)]
     assert found.samples.position == pytest.approx(1e-3 * np.arange(50.0))
     assert note in found.notes[0]
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("All lengths in mm, times in s", "by the line 'All lengths in mm, times in s' above, may"),
+        ("units: V, kN, mm", "may be in mm (0.001 m) or m (1 m): position=#2*0.001 or position=#2"),
+        ("unit = inch", "may be in inch (0.0254 m)"),
+        ("x: encoder counts", "is in counts, which is no unit of position"),
+        ("stroke 20 mm, feed (mm/min): 5", "x: no known unit, taken as m, below the line 'stroke"),
+        ("units: s, V", "x: no known unit, taken as m, below the line 'units: s, V'"),
+        ("2024-05-01 10:00:00 machine 3, load 12 kg, sampled at 1 kHz", ""),
+        ("Operator: A. Smith, h = 12 d, turn off the yard light; position in m, time in s", ""),
+    ],
+)
+def test_units_in_lines_above_are_asked_for_or_said(tmp_path: Path, line: str, said: str) -> None:
+    text = f"# {line}\nt,x\n" + rows()
+    if "may" in said or " is " in said or "inch" in said:
+        with pytest.raises(InvalidInputError, match=re.escape(said)):
+            read(tmp_path, text, "t", "x")
+    else:
+        assert said in "".join(read(tmp_path, text, "t", "x").notes[1:2])
+        assert len(read(tmp_path, text, "t", "x").notes) == 2 + (said != "")
+    assert read(tmp_path, text, "t", "x*1").samples.position.tolist() == POSITION.tolist()
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,8 @@ HEADERS = {
         "|Время, мс|Время, миллисекунды"
         "|millis|ms|Temps (ms)|temps en ms|Tiempo / ms|Tiempo_ms|ms_today|time_ms_since_boot"
         "|t.ms|t:ms|t-ms|millis()|t_ms1"
-        "|Zeit (Millisekunden)|time [milliseconds]",
+        "|Zeit (Millisekunden)|time [milliseconds]"
+        "|t (x10^-3 s)|t [1e-3 s]|t (10⁻³ s)|t (E-3 s)|時間 [㎳]|時間\uff08ミリ秒\uff09|时间毫秒",
         1e-6: "timestamp_us|Time [µs]|t / us|micros|zeit_usec",
         1e-9: "timestamp [ns]|nanosec|t_ns",
         1.0: "t [s]|time_s|Zeit in Sekunden|Temps, secondes|tiempo en segundos|Time (sec)",
@@ -34,7 +35,7 @@ HEADERS = {
         "|Перемещение, мм|x_мм|位移mm|Weg (in mm)|course (millimètres)|x [1e-3 m]|mm",
         0.9144: "x_yards|x [yd]|x in yd",
         1e-10: "x_Å",
-        1e-6: "pos, mkm|x [um]|x (µm)|x [micron]|vdcdt_um|Weg / µm",
+        1e-6: "pos, mkm|x [um]|x (µm)|x [micron]|vdcdt_um|Weg / µm|Weg / µ|位置 [㎛]|t (10^-6 m)",
         1e-4: "x [0.1 mm]|x (0,1 mm)|x (in 0.1 mm)",
         1e-2: "pos_cm",
         1e-9: "pos_nm",
@@ -49,6 +50,8 @@ HEADERS = {
         "|Угол, градусы|kat_stopnie",
         DEGREE / 60: "Winkel in Bogenminuten",
         DOUBTFUL: "x_in|position_in|xIn|in|cm|phi [grad]|pos [inc]|Position [counts]|pos_counts"
+        "|x *0,001 mm|1000*x [m]|x [m·10⁻³]|x (x1000)|x x1e-3 m|corsa (centesimi)"
+        "|x (millièmes de m)"
         "|Encoder count|count|yd|x_yd"
         "|Weg [Inkremente]|Droop pulses (by 1 pls.)|Position [V]|Pos [%]|x (1/1000 mm)"
         "|Weg / mV|x_0.1um"
@@ -72,15 +75,16 @@ HEADERS = {
         "|giri/min|obroty_obr_min|motor rev/min",
         TURN: "n [rev/s]|f [Hz]",
         1e3 * TURN / 60: "krpm",
+        1e-6: "rVel_umps",
         0.44704: "v_mph",
         1852 / 3600: "v_knots",
         DEGREE: "w [deg/s]|w_deg_s|w_dps|°/s|omega_degps",
         DOUBTFUL: "n [1/s]|vel_counts_s|counts_per_s|v_cps|w_rad|rpm_x10|v [mm]|erpm|v_mm|speed_ms",
-        NO_UNIT: "v|v_m|v_s|v_min|v_max|Servo motor speed|vel",
+        NO_UNIT: "v|v_m|v_s|v_min|v_max|Servo motor speed|vel|v_rot",
     },
     "N": {
-        1e3: "F / kN|F_act_kN_act|Усилие, кН|F [kN]|F_kN|force_kn|ForceKN|Kraft in kN|Fuerza (kN)"
-        "|kN applied|Forza in chilonewton|Сила, килоньютоны"
+        1e3: "F (x10³ N)|F / kN|F_act_kN_act|Усилие, кН|F [kN]|F_kN|force_kn|ForceKN|Kraft in kN"
+        "|Fuerza (kN)|kN applied|Forza in chilonewton|Сила, килоньютоны"
         "|force, kN",
         1.0: "force_N|F_in_N|Kraft in N|F [N]|M [Nm]|T [N·m]|T / Nm|torque_nm|TorqueNm|effort en N"
         "|Kraft (in Newton)",
@@ -90,7 +94,7 @@ HEADERS = {
         1.3558179483314: "torque_lbft|M [ftlb]",
         DOUBTFUL: "F_in_N*10|I [Arms]|M [0.1%]|F [t]|F_t|F_dyn|F_dyn_filt|F / t|Last in t|Сила, т"
         "|F / g|F_tons|thrust_grams|load_pct|lb|Force_Pounds|torque_counts"
-        "|force_mn|I [A]|load [kg]|torque [%]|force_kg|cell_mV|u_V|p_bar",
+        "|force_mn|F_N_x1000|I [A]|load [kg]|torque [%]|force_kg|cell_mV|u_V|p_bar",
         NO_UNIT: "F|force|torque|u|A|current_A|x_max|F (t)|Ft|F_T|force_N_filt",
     },
 }  # fmt: skip

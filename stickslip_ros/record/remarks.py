@@ -1,0 +1,60 @@
+"""Units that lines above a table tell of its columns, or that they mention."""
+
+import re
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+from stickslip_ros.record.units import Unit, are_units, units_in
+
+_WORD = re.compile(r"[^\W\d_][^\s\d,;:=()\[\]{}<>|、]*")
+_WORDS = re.compile(r"(?i)(?:in|min|h|d|yd|dyn|mil|turns?|rot|foot|yard|day|grad)\W*")
+"""Units that may be other words."""
+_IN = r"(?<!\w)(?:in|en|em|v|w|в)\s"
+_TOLD = re.compile(rf"(?i)(?:{_IN}|[\[(:=/])\s*$")
+"""What is before a unit that may be another word."""
+_LABEL = re.compile(r"(?i)unit|einheit|unidad|jednot|единиц|单位|単位")
+"""What is in the line of a unit of one letter."""
+_NUMBER_BEFORE = re.compile(r"(?i)\d[\d.,]*(?:e[-+]?\d+)?\s*[\[(]?$")
+_NUMBER_BEHIND = re.compile(r"[\s\])}>:;,=\"]*[-+]?\d")
+
+
+class Mention(NamedTuple):
+    """A unit in a line above a table."""
+
+    unit: Unit
+    line: str
+    is_fact: bool
+    """Whether a number has it, or it is of another quantity: it tells no column."""
+
+
+def unit_told(lines: Sequence[str], name: str) -> str:
+    """Return the unit that is behind the name of a column in lines above, or nothing."""
+    column = re.compile(
+        rf"(?i)(?<!\w){re.escape(name)}(?!\w)(?:\s*[:=-].*[\s(\[]|\W*(?:{_IN})?)([^\W\d]\S*?)[\W_]*$"
+    )
+    parts = (part for line in lines for part in re.split(r"[,;|\t、]", line) if name)
+    units = {match[1] for match in map(column.search, parts) if match and are_units([match[1]])}
+    return units.pop() if len(units) == 1 else ""
+
+
+def mentions(lines: Sequence[str], target: str) -> Iterator[Mention]:
+    """Yield the units of a quantity, with the SI unit `target`, in lines above, but for this."""
+    for line in lines:
+        label = _LABEL.search(line)
+        for match in _WORD.finditer(line):
+            before, word, behind = line[: match.start()], match[0], line[match.end() :]
+            certain = not _WORDS.fullmatch(word) and (len(word) > 1 or label)
+            if certain or _TOLD.search(before):
+                number = _NUMBER_BEFORE.search(before) or _NUMBER_BEHIND.match(behind)
+                for unit in units_in("", word, target):
+                    if unit.factor > 0.0 and unit.factor != 1.0:
+                        yield Mention(unit, line, number is not None)
+                    elif label and are_units([word]) and not _is_of_motion(word):
+                        yield Mention(unit, line, True)
+
+
+def _is_of_motion(word: str) -> bool:
+    """Return whether a word is a unit of a quantity of the motion."""
+    return any(
+        unit.factor > 0.0 for si in ("s", "m", "m/s", "N") for unit in units_in("", word, si)
+    )
