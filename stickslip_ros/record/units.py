@@ -90,7 +90,7 @@ _COUNTS = re.compile(
 )
 """Words for numbers of an encoder, a motor or a clock, of which only the owner knows the size."""
 _SCALED = re.compile(
-    r"(?i)(?:/|[\s(\[]x)\s*(?:10+\b|1?e[-+]?\d)|[*\xd7·]\s*\d[\d.,]*|\d[\d.,]*\s*[*\xd7]"
+    r"(?i)/\s*10+(?!\d)|(?:/|[\s(\[]x)\s*(?:10+\b|1?e[-+]?\d)|[*\xd7·]\s*\d[\d.,]*|\d[\d.,]*\s*[*\xd7]"
     r"|[\s_]x10+(?=[^\W\d_])|_x100+(?!\w)"
     r"|\b(?:tenth|hundredth|thousandth|zehntel|hundertstel|tausendstel)s?\b"
     r"|\b(?:d[eé]cim|dixi[eè]m|cent[ei][sè][im]|mill?[eiè][sè][im])\w+"
@@ -108,10 +108,11 @@ _SQUARED = re.compile(r"(?i)(?<![^\W\d_])(?:[cdm]?m|rad|deg)[\W_]?s\W{0,2}[2²](
 _LATIN = {
     **{"мк": "u", "см": "cm", "кгс": "kgf", "тс": "tf", "град": "deg", "об": "r", "ью": "ew"},
     **{"ミリ": "milli", "マイクロ": "micro", "メートル": "m", "ニュートン": "N"},
+    **{"転": "rot", "分": "min"},
     **dict(zip("毫微千秒米牛", "muksmN", strict=True)),
     **dict(zip("мскнгдчриалетыуо", "mskngdhrialetyuo", strict=True)),
 }
-_SIGNS = str.maketrans({"µ": "u", '"': "inch", "°": "deg", "%": " % ", "^": ""})
+_SIGNS = str.maketrans({"µ": "u", '"': "inch", "°": "deg", "%": " % ", "‰": " % ", "^": ""})
 _USUAL = str.maketrans({"μ": "µ", "\u2212": "-", "\u2215": "/"})
 _OTHER_LETTERS = re.compile("|".join(_LATIN), re.IGNORECASE)
 """Units in other letters than Latin ones, the longer first."""
@@ -123,9 +124,9 @@ _MARKS = " _-.,;:/#"
 """What is between words."""
 _START = re.compile(
     r"(?<![^\W_])(?=[^\W_])|(?<=[^\W\d_A-Z])(?=[A-Z])|(?<=\d)(?=[^\W\d_])"
-    r"|(?<=[^\x00-\u03ff])(?=[a-zA-Zµ])|(?=[°毫微]|ミリ|マイクロ)"
+    r"|(?<=[^\x00-\u03ff])(?=[a-zA-Zµ])|(?=[°毫微]|ミリ|マイクロ)|(?<=[^\W\d_])(?=mm$|kN$)"
 )
-"""Where a word starts: after a mark, in PosMM, after a number, and after Chinese letters."""
+"""Where a word starts: after a mark, in PosMM or posmm, after a number or Chinese letters."""
 _FACTOR = re.compile(
     r"(?i)[x\xd7]?\s*(?:10(?:\^|\*\*|(?=[-+]))(?P<power>[-+]?\d+)"
     r"|(?P<number>\d+(?:[.,]\d+)?(?:e[-+]?\d+)?|e[-+]?\d+))(?=[\s*·]*[^\W\d_])"

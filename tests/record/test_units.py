@@ -27,7 +27,7 @@ HEADERS = {
     },
     "m": {
         1e-3: "Weg / mm|Weg/mm|Weg in mm|Position, mm|Position mm|PositionMM|posMm|pos.mm|x:mm"
-        "|x-mm|x_mm|x [mm]"
+        "|x-mm|x_mm|x [mm]|xmm|posmm"
         "|x (mm)|x <mm>|X_MM|Position mm (act)|pos_mm_act|déplacement en mm|Posición (mm)"
         "|spostamento [mm]"
         "|Lage (mm, Ist)|Przemieszczenie (milimetry)|Weg in Millimeter"
@@ -51,7 +51,7 @@ HEADERS = {
         DEGREE / 60: "Winkel in Bogenminuten",
         DOUBTFUL: "x_in|position_in|xIn|in|cm|phi [grad]|pos [inc]|Position [counts]|pos_counts"
         "|x *0,001 mm|1000*x [m]|x [m·10⁻³]|x (x1000)|x x1e-3 m|corsa (centesimi)"
-        "|x (millièmes de m)"
+        "|x (millièmes de m)|Weg 1/100mm"
         "|Encoder count|count|yd|x_yd"
         "|Weg [Inkremente]|Droop pulses (by 1 pls.)|Position [V]|Pos [%]|x (1/1000 mm)"
         "|Weg / mV|x_0.1um"
@@ -69,7 +69,7 @@ HEADERS = {
         0.0254: "v_in_per_s",
         1e-3 / 60: "Speed mm/min|feed_mm_min|v_mm_min_filtered",
         1.0: "v [m/s]|v_ms-1|v [ms⁻¹]|v_m_s|omega_rad_s|w [rad/s]",
-        TURN / 60: "об/мин"
+        TURN / 60: "об/мин|回転数 (転/分)"
         "|rpm|speed_rpm|SpeedRPM|n [1/min]|n / min⁻¹|n [min-1]|n [min^-1]|n [U/min]"
         "|Drehzahl in U/min|tr/min"
         "|giri/min|obroty_obr_min|motor rev/min",
@@ -83,7 +83,8 @@ HEADERS = {
         NO_UNIT: "v|v_m|v_s|v_min|v_max|Servo motor speed|vel|v_rot",
     },
     "N": {
-        1e3: "F (x10³ N)|F / kN|F_act_kN_act|Усилие, кН|F [kN]|F_kN|force_kn|ForceKN|Kraft in kN"
+        1e3: "F (x10³ N)|FkN|F / kN|F_act_kN_act|Усилие, кН|F [kN]|F_kN|force_kn|ForceKN"
+        "|Kraft in kN"
         "|Fuerza (kN)|kN applied|Forza in chilonewton|Сила, килоньютоны"
         "|force, kN",
         1.0: "force_N|F_in_N|Kraft in N|F [N]|M [Nm]|T [N·m]|T / Nm|torque_nm|TorqueNm|effort en N"
@@ -94,7 +95,7 @@ HEADERS = {
         1.3558179483314: "torque_lbft|M [ftlb]",
         DOUBTFUL: "F_in_N*10|I [Arms]|M [0.1%]|F [t]|F_t|F_dyn|F_dyn_filt|F / t|Last in t|Сила, т"
         "|F / g|F_tons|thrust_grams|load_pct|lb|Force_Pounds|torque_counts"
-        "|force_mn|F_N_x1000|I [A]|load [kg]|torque [%]|force_kg|cell_mV|u_V|p_bar",
+        "|force_mn|F_N_x1000|M (‰)|I [A]|load [kg]|torque [%]|force_kg|cell_mV|u_V|p_bar",
         NO_UNIT: "F|force|torque|u|A|current_A|x_max|F (t)|Ft|F_T|force_N_filt",
     },
 }  # fmt: skip
