@@ -97,7 +97,7 @@ def agree(known: Measures, unknown: Measures) -> bool:
 
 @pytest.mark.long
 @example(5, 30.0)  # comes to rest on a belt that moves
-@examples(quick=2, thorough=20, deadline=None)
+@examples(quick=2, thorough=10, deadline=None)
 @given(st.integers(0, 10_000), st.sampled_from([0.0, 30.0, 1000.0]))
 def test_live_bag_and_table_give_one_answer(seed: int, steps: float) -> None:
     """What is known of the plant may tell more, and what is not known says nothing else."""

@@ -156,10 +156,10 @@ def test_errors_that_are_common_to_equal_taps_are_not_averaged_out() -> None:
 @pytest.mark.long
 def test_machines_of_three_laws_are_covered() -> None:
     """A part of the study in benchmarks/onset.py."""
-    rows = [tried(seed) for seed in range(30)]
+    rows = [tried(seed) for seed in range(15)]
     found = summary(rows)
     assert found["covered"] >= 0.92
     assert found["below_limit"] >= 0.95
     assert found["near_limits"] == found["near"]
     assert found["near_median_limit"] <= 1.1
-    assert [row["lower"] for row in map(quiet, range(10))] == 10 * [None]
+    assert [row["lower"] for row in map(quiet, range(5))] == 5 * [None]

@@ -73,7 +73,7 @@ def test_edges_on_a_steep_curve_are_found(scale: float) -> None:
 
 @pytest.mark.parametrize(
     ("stick_time", "seeds"),
-    [(0.010, 8), *(pytest.param(each, 40, marks=pytest.mark.long) for each in (0.003, 0.030))],
+    [(0.010, 8), *(pytest.param(each, 20, marks=pytest.mark.long) for each in (0.003, 0.030))],
 )
 def test_under_noise_the_stick_time_is_within_its_error(stick_time: float, seeds: int) -> None:
     """The errors, over their standard error, have a deviation near one.
