@@ -54,7 +54,7 @@ def test_pid_control_hunts_with_the_period_of_the_continuous_solution() -> None:
 
     times = np.arange(START, 135.0, 1e-2)
     solved: Any = solve_ivp(
-        rates, (0.0, 135.0), np.zeros(4), "DOP853", t_eval=times, rtol=1e-8, atol=1e-11
+        rates, (0.0, 135.0), np.zeros(4), "LSODA", t_eval=times, rtol=1e-8, atol=1e-11
     )
     amplitude, period = hunting(solved.y[0] - 1.0, 1e-3, 100.0)
     assert period == pytest.approx(24.44, rel=1e-3)
