@@ -30,6 +30,10 @@ _MOST_NODES_UNROLLED = 4000
 Unrolled code runs up to six times faster, but takes many seconds to compile if it is that large.
 """
 
+_ROUGH_TOLERANCE, _MOST_ROUGH_UNROLLED = 1e-9, 64
+"""Error of a step, relative to the largest variable, with a little more than half of the orders,
+and the number of variables above which its code keeps its loops."""
+
 Marks = list[tuple[float, float, float]]
 """Time, and the first two states, at the zeros of a flow's marks."""
 
@@ -46,6 +50,8 @@ class Detail(Flag):
 
     No mode has a closed form then.
     """
+    ROUGH = auto()
+    """Steps with errors above rounding, but far below those of measurements: half of the work."""
 
 
 class CompiledFlow:
@@ -191,17 +197,17 @@ class IntegratorPool:
 
 def _compile(system: HybridSystem, name: str, detail: Detail) -> Any:
     flow = system.shared_flow(name)
-    equations = list(zip(system.variables, flow.rates, strict=True))
+    equations: Any = list(zip(system.variables, flow.rates, strict=True))
     nodes = sum(len(guard.margin) for guard in flow.guards)
+    rough, watched = Detail.ROUGH in detail, Detail.MARKS in detail
     if Detail.DERIVATIVES in detail:
         equations = hy.var_ode_sys(equations, _variations(system), order=1)
         nodes += sum(len(rate) for _, rate in equations.sys)
-        most = _MOST_NODES_UNROLLED // 2
+        many = nodes > _MOST_NODES_UNROLLED // 2
+        keeps_loops = len(equations.sys) > _MOST_ROUGH_UNROLLED if rough else many
     else:
-        nodes += sum(map(len, flow.rates))
-        most = _MOST_NODES_UNROLLED
+        keeps_loops = nodes + sum(map(len, flow.rates)) > _MOST_NODES_UNROLLED
     downward = hy.event_direction.negative
-    watched = Detail.MARKS in detail
     # The compiler rounds by all that it compiles together.
     marks = flow.marks if watched or system.many_steps else ()
     return compiled_integrator(
@@ -212,7 +218,8 @@ def _compile(system: HybridSystem, name: str, detail: Detail) -> Any:
             hy.nt_event(mark, callback=_Finder(zero_speed=number == 0, keep=watched))
             for number, mark in enumerate((*marks, *flow.step_limiters))
         ],
-        compact_mode=nodes > most,
+        compact_mode=keeps_loops,
+        tol=_ROUGH_TOLERANCE if rough else 0.0,
         fast_math=True,  # a quarter faster; the error stays below 2e-12 over 190 periods
     )
 

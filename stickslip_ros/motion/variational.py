@@ -131,7 +131,7 @@ class VariationalMotion(Motion):
         velocity: float,
         control: ContinuousControl | None = None,
     ) -> None:
-        super().__init__(drive, position, velocity, control, Detail.DERIVATIVES)
+        super().__init__(drive, position, velocity, control, Detail.DERIVATIVES | Detail.ROUGH)
         self._derivatives = self.core.observer = Derivatives()
         self.core.note_start()
 
