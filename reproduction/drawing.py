@@ -1,6 +1,7 @@
 """Drawing the paper's figures: bifurcation diagrams and phase portraits."""
 
 import re
+from io import BytesIO
 from math import ceil
 from pathlib import Path
 from textwrap import fill
@@ -11,6 +12,7 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.lines import Line2D
+from PIL import Image
 
 from reproduction.figures import (
     LAST_CYCLES,
@@ -20,6 +22,7 @@ from reproduction.figures import (
     Portrait,
     PortraitFigure,
 )
+from stickslip_ros.files import written
 from stickslip_ros.measures.breakpoints import Breakpoints
 from stickslip_ros.show.quantities import GREEK, Units
 from stickslip_ros.show.study_figure import draw_section, draw_transitions, regime_handles
@@ -31,6 +34,7 @@ from stickslip_ros.show.style import (
     SCREEN,
     FigureStyle,
     finish,
+    rendered,
     save,
     styled,
 )
@@ -68,10 +72,16 @@ def paper_figure(figure: PaperFigure, *, style: FigureStyle = SCREEN) -> Figure:
 
 def save_paper_figure(drawn: Figure, path: Path, style: FigureStyle = SCREEN) -> None:
     """Write a drawing to `path`; the format follows the ending."""
-    if style.printed:
-        save(drawn, path, dots_per_inch=style.dots_per_inch)
-    else:
-        save(drawn, path, colours=_KEPT_COLOURS, dots_per_inch=_KEPT_DOTS)
+    if style.printed or path.suffix != ".png":
+        save(drawn, path, dots_per_inch=style.dots_per_inch if style.printed else _KEPT_DOTS)
+        return
+    with Image.open(BytesIO(rendered(drawn, "png", _KEPT_DOTS))) as image:
+        # This method, unlike the usual one, keeps colours that few points have.
+        few = image.convert("RGB").quantize(_KEPT_COLOURS, Image.Quantize.MAXCOVERAGE)
+    smaller = BytesIO()
+    few.save(smaller, format="png", optimize=True)
+    with written(path, replace=True) as stream:
+        stream.buffer.write(smaller.getvalue())
 
 
 def typeset(text: str) -> str:

@@ -21,7 +21,6 @@ from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties
 from matplotlib.textpath import TextToPath
 from matplotlib.ticker import AutoLocator
-from PIL import Image
 
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.files import written
@@ -292,27 +291,12 @@ def _legend_columns(handles: Sequence[Artist], room: float, most: int) -> int:
     return 1
 
 
-def save(
-    figure: Figure,
-    path: Path,
-    *,
-    colours: int | None = None,
-    dots_per_inch: float = SCREEN.dots_per_inch,
-) -> None:
+def save(figure: Figure, path: Path, *, dots_per_inch: float = SCREEN.dots_per_inch) -> None:
     """Write a figure to `path`; the format follows the ending: .png, .svg or .pdf.
 
-    Vector formats keep text as text. A limited number of `colours` makes a PNG, to be kept with the
-    sources, a third as large. Raises OSError if the file cannot be written.
+    Vector formats keep text as text. Raises OSError if the file cannot be written.
     """
-    kind = path.suffix[1:].lower()
-    drawn = rendered(figure, kind, dots_per_inch)
-    if kind == "png" and colours is not None:
-        with Image.open(BytesIO(drawn)) as image:
-            # This method, unlike the usual one, keeps colours that few points have.
-            few = image.convert("RGB").quantize(colours, Image.Quantize.MAXCOVERAGE)
-        smaller = BytesIO()
-        few.save(smaller, format="png", optimize=True)
-        drawn = smaller.getvalue()
+    drawn = rendered(figure, path.suffix[1:].lower(), dots_per_inch)
     with written(path, replace=True) as stream:
         stream.buffer.write(drawn)
 

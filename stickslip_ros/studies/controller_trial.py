@@ -98,8 +98,8 @@ class Vibration:
 
 
 @dataclass(frozen=True)
-class Outcome:
-    """The result of a trial; SI units."""
+class Caught:
+    """What came of a vibration, or of a start, under control; SI units."""
 
     peak_force: float
     """Largest force, N."""
@@ -175,7 +175,7 @@ class Bench:
         position, velocity = np.array(states).T
         return Vibration(drive, self.rate, cycle.regime, cycle.period, position, velocity)
 
-    def catch(self, vibration: Vibration, law: Washout, patience: float) -> Outcome:
+    def catch(self, vibration: Vibration, law: Washout, patience: float) -> Caught:
         """Return the worst outcome of control, its filter settled, that catches a vibration.
 
         It is activated at several phases, and where its force is largest. The vibration has
@@ -204,7 +204,7 @@ class Bench:
                 slowest = max(slowest, caught.settling_time)
             measured = start if measure is None else measure(number, *start)
             controller.answer(_sample(drive, stamp, *measured))
-        return Outcome(peak, slowest, grows=False)
+        return Caught(peak, slowest, grows=False)
 
     def returns(self, drive: Drive, law: Washout, speed: float) -> bool:
         """Return whether the slide returns when it starts from its equilibrium at `speed` (m/s).
@@ -265,7 +265,7 @@ class Bench:
         stamp: int,
         patience: float,
         size: float,
-    ) -> Outcome:
+    ) -> Caught:
         """Run the loop until the distance has stayed small for a natural period, or `patience`."""
         loop, drive = self._loop(motion, _Started(measure=measure), stamp), motion.drive
         omega, equilibrium = drive.angular_frequency, drive.equilibrium_position
@@ -285,7 +285,7 @@ class Bench:
             loop.advance()
         settled = number - last > calm and not loop.unbounded
         grows = loop.unbounded or (not settled and recent >= size)
-        return Outcome(peak, last / self.rate if settled else None, grows)
+        return Caught(peak, last / self.rate if settled else None, grows)
 
 
 def _measured(motion: RecordedMotion, loading: float) -> Measures:
