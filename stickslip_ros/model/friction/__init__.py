@@ -1,6 +1,11 @@
 """The friction laws, each with an entry in `LAWS`."""
 
-from stickslip_ros.model.friction.base import FrictionLaw, FrictionMemory, SteadyFriction
+from stickslip_ros.model.friction.base import (
+    FrictionLaw,
+    FrictionMemory,
+    FrictionObserver,
+    SteadyFriction,
+)
 from stickslip_ros.model.friction.coulomb import Coulomb
 from stickslip_ros.model.friction.dahl import Dahl
 from stickslip_ros.model.friction.directional import Directional
@@ -9,7 +14,6 @@ from stickslip_ros.model.friction.exponential import Exponential
 from stickslip_ros.model.friction.linear import Linear
 from stickslip_ros.model.friction.lugre import CurveFollower, LuGre, SteadyPart
 from stickslip_ros.model.friction.maxwell_slip import MaxwellSlip
-from stickslip_ros.model.friction.observer import FrictionObserver
 from stickslip_ros.model.friction.stiction import Stiction
 from stickslip_ros.model.friction.stribeck import Stribeck
 from stickslip_ros.model.friction.table import Table
