@@ -54,6 +54,10 @@ class DimensionlessDrive(HybridSystem):
         self.may_lift = 1.0 + load.bounds[0] < -LIFT_ROUNDING
         """Whether the normal force may fall below zero: then a guard ends the motion."""
         self._loaded = bool(load.pieces)
+        is_static = self.autonomous and not law.states and not law.switches
+        self._static_friction = law.coefficient if is_static else None
+        # What is constant, mostly: these take longer to look up.
+        self._speed, self._normal = self.drive.belt_speed, self.drive.normal_force
         if isinstance(drive, ScaledDrive):
             of_law = (name for name, _ in numbers(law, "friction"))
             self.free_constants = ("mass", "damping", "stiffness", "bias_force", *of_law)
@@ -149,8 +153,12 @@ class DimensionlessDrive(HybridSystem):
 
     def friction_force(self, mode: Mode, instant: Instant) -> float:
         """Return the friction force on the slide."""
-        if mode.switches[SIGN] == 0.0:
+        sign = mode.switches[SIGN]
+        if sign == 0.0:
             return self.held_force(mode, instant)
+        if self._static_friction is not None:  # in less time
+            coefficient = self._static_friction(instant.state[SPEED] - self._speed, sign)
+            return self._normal * float(coefficient)
         return self.normal_force(mode, instant.time) * self._coefficient(mode, instant)
 
     def _coefficient(self, mode: Mode, instant: Instant) -> float:

@@ -36,7 +36,6 @@ class DriveSystem(DimensionlessDrive):
     In slip the slide follows eq. 5; where it reaches the speed of the belt it sticks if its law can
     hold it, -mu_forward N <= h <= mu_backward N with the reaction h. Otherwise it passes that speed
     or slips the other way. In stick it moves with the belt until the reaction leaves these limits.
-    `PlainDriveSystem`, which is that of most motions, says the same in plain numbers.
     """
 
     def __init__(self, drive: Drive, control: ContinuousControl | None = None) -> None:
@@ -50,6 +49,7 @@ class DriveSystem(DimensionlessDrive):
         self.has_parts = len(law.switches) > 0
         """Whether several margins may fall to zero at one instant, see `apply_pending_guards`."""
         self._frequency = drive.angular_frequency
+        self._no_law = (0.0,) * len(law.switches)
         self.forward_limit, self.backward_limit = map(float, law.limits)
         largest = max(self.forward_limit, self.backward_limit)
         self._largest_friction = largest * (1.0 + load.bounds[1])
@@ -129,9 +129,8 @@ class DriveSystem(DimensionlessDrive):
         """Return stick, or slip in the direction of the relative speed; see the class."""
         belt = self.drive.belt.switches_at(instant.time)
         load = self.drive.load.switches_at(instant.time)
-        law = (0.0,) * len(self.drive.friction.switches)
         motor = (0.0,) * len(self.switches[self.switch_slots.motor])
-        stick = Mode(STICK, (0.0, *law, *belt, *load, *motor))
+        stick = Mode(STICK, (0.0, *self._no_law, *belt, *load, *motor))
         self._check_contact(stick, instant)
         return self._settled_at(self.belt_speed(stick, instant.time), stick, instant)
 
@@ -149,8 +148,10 @@ class DriveSystem(DimensionlessDrive):
             sign > 0.0 and state[SPEED] > self._above_belt
         ):
             return mode  # in less time
+        if self.steady:
+            return self._settled_at(self._speed, mode, instant)
         belt_speed = self.belt_speed(mode, instant.time)
-        if mode.flow == STICK and not self.steady:  # without the rounding of the integration
+        if mode.flow == STICK:  # without the rounding of the integration
             state[SPEED] = belt_speed
         return self._settled_at(belt_speed, mode, instant)
 
@@ -158,7 +159,7 @@ class DriveSystem(DimensionlessDrive):
         relative_speed = instant.state[SPEED] - belt_speed
         if relative_speed == 0.0:
             resting = self._resting(mode, instant)
-            if resting is mode:
+            if resting is mode and self.closed_flow is None:
                 self.nudge_off_guard(mode, instant)
             return resting
         sign = copysign(1.0, relative_speed)
@@ -294,7 +295,7 @@ class DriveSystem(DimensionlessDrive):
     def _resting(self, mode: Mode, instant: Instant) -> Mode:
         """Return the mode of a slide that has the speed of the belt."""
         if self.sticks:
-            normal = self.normal_force(mode, instant.time)
+            normal = self._normal if not self._loaded else self.normal_force(mode, instant.time)
             held = self.held_force(mode, instant)
             if held > normal * self.backward_limit:
                 return self._slip(mode, -1.0, instant)
@@ -302,8 +303,7 @@ class DriveSystem(DimensionlessDrive):
                 return self._slip(mode, 1.0, instant)
             if mode.flow == STICK:
                 return mode
-            law = (0.0,) * len(self.drive.friction.switches)
-            return Mode(STICK, with_switches(mode, SIGN, (0.0, *law)).switches)
+            return Mode(STICK, (0.0, *self._no_law, *mode.switches[self.switch_slots.law.stop :]))
         forward = self._slip(mode, 1.0, instant)
         accelerates = self.friction_force(forward, instant) >= self.held_force(mode, instant)
         return forward if accelerates else self._slip(mode, -1.0, instant)

@@ -121,9 +121,8 @@ class HybridSystem(ABC):
         """Return a flow by its name; systems of one structure share it."""
         return self.shared(("flow", name), lambda: self.flow(name))
 
-    def has_closed_form(self, mode: Mode) -> bool:
-        """Return whether `closed_form` solves the modes of this one's flow."""
-        return False
+    closed_flow: str | None = None
+    """Name of the flow whose modes `closed_form` solves; None without one."""
 
     def closed_form(
         self, mode: Mode, instant: Instant, duration: float

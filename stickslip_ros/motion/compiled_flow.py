@@ -166,7 +166,7 @@ class IntegratorPool:
         """Return the integrator of a mode, unless that has a closed form, and its transitions."""
         name, system, flow = mode.flow, self._system, None
         if name not in self._by_flow:
-            if self.derive or not system.has_closed_form(mode):
+            if self.derive or name != system.closed_flow:
                 flow = self._borrow(name, self._detail)
                 flow.load(system)
             self._by_flow[name] = flow, system.shared_flow(name).transitions
