@@ -17,13 +17,13 @@ AFTER_STAMP = slice(12, None)
 PAPER = [
     "paper",
     "--pace=lockstep",
-    "--duration=8",
+    "--duration=5",
     "-p=plant.belt_speed=0.3",
     "-p=plant.disturbance.kind=sine",
     "-p=plant.disturbance.amplitude=0.05",
     "-p=plant.disturbance.frequency=0.7",
     "-p=plant.disturbance.start=1.0",
-    "-p=plant.disturbance.duration=5.0",
+    "-p=plant.disturbance.duration=3.0",
     "-p=plant.force_delay=0.0037",
     "-p=plant.force_jitter=0.021",
 ]
@@ -48,17 +48,16 @@ def test_lockstep_gives_the_same_bag_composed_in_processes_and_on_a_busy_machine
         assert done.returncode == 0, done.stderr
 
     run("composed", "--composed")
-    run("processes")
     with busy_machine():
         run("composed_busy", "--composed")
         run("processes_busy")
     messages = messages_of(tmp_path / "composed")
     counts = {topic.rpartition("/")[2]: len(heard) for topic, heard in messages.items()}
     assert counts.keys() == TOPICS
-    assert counts["joint_states"] == counts["control_force"] == 801
-    assert counts["applied_disturbance"] > 400
-    assert counts["dropped_force"] > 100
-    for other in ("processes", "composed_busy", "processes_busy"):
+    assert counts["joint_states"] == counts["control_force"] == 501
+    assert counts["applied_disturbance"] > 200
+    assert counts["dropped_force"] > 60
+    for other in ("composed_busy", "processes_busy"):
         assert messages_of(tmp_path / other) == messages, other
 
 

@@ -384,7 +384,7 @@ def test_a_page_that_comes_and_goes_changes_nothing(
     start_stickslip: Start, browser: Browser, tmp_path: Path
 ) -> None:
     command = ("run", "paper", "--pace", "lockstep")
-    alone = start_stickslip(*command, "--duration", "50", "--bag", "alone")
+    alone = start_stickslip(*command, "--duration", "20", "--bag", "alone")
     assert alone.wait(PATIENCE) == 0
     served = Served(start_stickslip("dashboard"))
     first = browser.new_page()
@@ -395,7 +395,7 @@ def test_a_page_that_comes_and_goes_changes_nothing(
     first.close()
     second = browser.new_page()
     second.goto(served.url)
-    second.wait_for_function("stickslip.motion?.end > 51")
+    second.wait_for_function("stickslip.motion?.end > 21")
     second.close()
     watched.send_signal(signal.SIGINT)
     assert watched.wait(PATIENCE) == 130
