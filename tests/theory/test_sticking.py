@@ -111,7 +111,7 @@ def test_sticking_ends_near_the_minimum_of_friction_where_the_law_is_stiff(
 
 
 @pytest.mark.long
-@settings(max_examples=20)
+@settings(max_examples=10)
 @given(
     st.one_of(
         st.builds(Stribeck, st.just(0.4), st.floats(0.1, 0.39), st.floats(0.05, 2.0)),
