@@ -28,7 +28,7 @@ settings.register_profile(
     max_examples=EXAMPLES,
     print_blob=True,
 )
-settings.register_profile(THOROUGH, settings.get_profile("quick"), max_examples=50)
+settings.register_profile(THOROUGH, settings.get_profile("quick"), max_examples=30)
 settings.load_profile("quick")
 
 # What a shell starts in the background ignores SIGINT, and what the tests start would, too.
