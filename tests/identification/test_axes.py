@@ -234,7 +234,7 @@ def test_an_encoder_that_drops_out_leaves_the_model_right() -> None:
 @pytest.mark.long
 def test_friction_that_falls_with_presliding() -> None:
     """Bristles of 15 um: what they do near reversals is not taken for the curve."""
-    own, true = falling.records((2,), 6.0)[2], falling.axis(2)
+    own, true = falling.records((2,), 4.0)[2], falling.axis(2)
     judged = falling.judged(2, identify([own]))
     assert judged["law"] == "exponential"
     assert judged["worst"] < 0.02
