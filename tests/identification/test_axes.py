@@ -124,7 +124,7 @@ def test_the_committed_study() -> None:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("case", [case for case in conditions.CASES if not case.startswith("late")])
+@pytest.mark.parametrize("case", conditions.CASES[1:10:2])
 def test_a_twentieth_of_the_study(case: str) -> None:
     """Of 25 intervals of 95 %."""
     assert conditions.summary(case, 5)["covered"] > 0.8
