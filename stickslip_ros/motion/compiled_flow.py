@@ -152,6 +152,8 @@ class IntegratorPool:
         self._detail = detail
         self.derive = Detail.DERIVATIVES in detail
         """Whether derivatives are integrated."""
+        self.phased = self.derive and Detail.ROUGH not in detail
+        """Whether each phase counts, however short: no short step is prepared."""
         self._by_flow = self._loaded.setdefault(detail, {})
 
     def set_constant(self, name: str, value: float) -> None:
@@ -209,7 +211,7 @@ def _compile(system: HybridSystem, name: str, detail: Detail) -> Any:
         keeps_loops = nodes + sum(map(len, flow.rates)) > _MOST_NODES_UNROLLED
     downward = hy.event_direction.negative
     # The compiler rounds by all that it compiles together.
-    marks = flow.marks if watched or system.many_steps else ()
+    marks = flow.marks if watched or (system.many_steps and not rough) else ()
     return compiled_integrator(
         equations,
         [0.0] * len(system.states),

@@ -159,7 +159,7 @@ class HybridMotion:
         step = self._short_step
         if step is None or not step(duration, force):
             return False
-        if self.observer is not None:
+        if self.observer is not None and not self._integrators.derive:
             self._report(self.observer, Phase(self.mode, duration, None, self.mode))
         return True
 
@@ -169,10 +169,13 @@ class HybridMotion:
         Raises TooManyStepsError beyond the budget.
         """
         derives = self._integrators.derive
-        if self._short_step is None and duration <= _SHORTEST_REPEATED and not derives:
+        short = duration <= _SHORTEST_REPEATED and not self._integrators.phased
+        if self._short_step is None and short:
             self._short_step = short_step(
                 self.system, self.mode, self.instant, self.flow, self._corner
             )
+            if derives and self.observer is not None:
+                self.observer.begin(self.mode, self.flow, 0.0, duration)
         if self.step_shortly(duration):
             return
         self.budget.left += STEPS_PER_ADVANCE

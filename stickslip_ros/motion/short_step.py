@@ -38,13 +38,13 @@ def short_step(
     It looks nothing up: between two samples, that takes longer than the integration. A mode ends at
     the time `corner` whatever the state.
     """
-    settled, state, raw = system.settled, instant.state, instant.state.cast("B")
-    inputs = instant.inputs
+    settled, inputs = system.settled, instant.inputs
+    raw = (instant.state if flow is None else flow.state.data).cast("B")
     if flow is None:
         closed_form = system.closed_form
 
         def move(duration: float, force: float | None) -> bool:
-            before = state.tobytes()
+            before = raw.tobytes()
             if force is not None:
                 inputs[0] = force
             if settled(mode, instant) is mode and closed_form(mode, instant, duration)[0] is None:
@@ -61,7 +61,7 @@ def short_step(
     def integrate(duration: float, force: float | None) -> bool:
         if duration > _LONGEST_ADVANCE or duration >= corner - instant.time:
             return False
-        before = state.tobytes()
+        before = raw.tobytes()
         if force is not None:
             inputs[0] = force
             for index in places:
