@@ -3,7 +3,6 @@
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
-from itertools import islice
 from math import inf, pi, sqrt
 
 import numpy as np
@@ -41,8 +40,9 @@ _EXACT_SHARE = 1e-9
 """Share of the motion up to which an error is none: recordings of simulations have no noise."""
 _NEAR_SHARE = 1e-3
 """Share of the motion from which on an error needs no other start."""
-_SHAPES = (0.1, 0.3, 0.8)
-"""Shapes from which the search starts, besides that of the regression: shares of the speeds."""
+_SHAPES, _STARTS = (0.1, 0.3, 0.8), 3
+"""Shapes from which the search starts, besides that of the regression: shares of the speeds; starts
+from which it takes steps, besides the first."""
 _GIVEN_UP_LOSS_RATIO = 100.0
 """A law whose squared error is larger by this factor is given up: than noise, or than LuGre's after
 the first steps, or than the best law's before constants are added that the records ask for."""
@@ -136,12 +136,12 @@ class LawSearch:
         fastest = float(self.rows.speeds[-1])
         thorough = law.one_way.shaped and noise == inf
         shapes = [share * fastest for share in _SHAPES] if thorough else []
-        starts = (
+        starts = [
             start
             for shape in (None, *shapes)
             for start in self._starts(law, self._regression(law.one_way, shape))
-        )
-        for values in islice(starts, 1, None):
+        ]
+        for values in self._nearest(law, starts[1:]):
             if self.limit.is_over or rms(tried[-1].residual) < _NEAR_SHARE * tried[-1].scale:
                 break
             tried.append(self._begun(law, values))
@@ -215,10 +215,22 @@ class LawSearch:
 
     def _begun(self, law: IdentifiedLaw, values: Mapping[str, float]) -> Refinement:
         """Return the fit to short segments after the first steps from a start."""
-        short = self._trajectories(law, _SHORT_SEGMENT * self.period, _SEARCH_SAMPLES)
         names = [*self.free, *law.coordinates]
         names = [name for name in names if name not in (*self.friction, *law.optional)]
-        return refine(short, names, self._known(law, values), most=_FIRST_STEPS)
+        return refine(self._short(law), names, self._known(law, values), most=_FIRST_STEPS)
+
+    def _nearest(
+        self, law: IdentifiedLaw, starts: Sequence[Mapping[str, float]]
+    ) -> Sequence[Mapping[str, float]]:
+        """Return the starts of a search that fit best as they are, the best one first."""
+        if len(starts) <= _STARTS:
+            return starts
+        task, losses = self._short(law), dict[int, float]()
+        for number, values in enumerate(starts):
+            errors = Errors.at(task, (), self._known(law, values), task.starts)
+            left = errors.without_starts(errors.residual[:, None])
+            losses[number] = float(np.sum(left * left))
+        return [starts[number] for number in sorted(losses, key=losses.__getitem__)[:_STARTS]]
 
     def _settled(self, near: Errors, most: int = _STEPS) -> Refinement:
         """Return the best fit near other values: segments with wrong starts try others."""
@@ -277,6 +289,9 @@ class LawSearch:
     def _regression(self, law: IdentifiedLaw, shape: float | None = None) -> Regression:
         fixed = {name: self.fixed.get(name, 0.0) for name in LINEAR if name not in self.free}
         return regress(self.rows, law, self.free, fixed, shape)
+
+    def _short(self, law: IdentifiedLaw) -> Trajectories:
+        return self._trajectories(law, _SHORT_SEGMENT * self.period, _SEARCH_SAMPLES)
 
     def _trajectories(self, law: IdentifiedLaw, length: float, most: int) -> Trajectories:
         # Of the segments of long records one of so many is used.
