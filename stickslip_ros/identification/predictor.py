@@ -10,7 +10,7 @@ from typing import Self
 
 import numpy as np
 
-from stickslip_ros.arrays import FloatArray
+from stickslip_ros.arrays import FloatArray, IntArray
 from stickslip_ros.identification.record import Record, lagged
 from stickslip_ros.model.drive import Drive
 from stickslip_ros.model.signals import table
@@ -95,20 +95,17 @@ class Predictor:
         state at the start of the part, then by the free constants of the drive, all
         dimensionless; another motion has none, shape (rows, 0).
         """
-        motion: Motion | None = None
-        end, count = -1, len(self.measured)
+        record, count = self.record, len(self.measured)
         units = np.array([drive.length_scale, drive.speed_scale])[:count, np.newaxis, np.newaxis]
+        motion = kind(self.with_belt(drive), *starts[0].tolist())
+        varied = motion if isinstance(motion, VariationalMotion) else None
         for part, (position, velocity) in zip(parts, starts.tolist(), strict=True):
-            if motion is None or motion.unbounded or part.start != end:
-                left = self.measured.shape[1] - part.start
-                motion = kind(self.with_belt(drive, part.start, left), position, velocity)
             memory = None
             if drive.friction.states:
-                belt_speed = float(self.record.belt_velocity[part.start])
-                memory = steady_memory(drive, velocity, belt_speed)
+                memory = steady_memory(drive, velocity, float(record.belt_velocity[part.start]))
+            motion.clock.time = part.start * record.period
             motion.restart(position, velocity, memory)
-            end, length = part.stop, part.stop - part.start
-            varied = motion if isinstance(motion, VariationalMotion) else None
+            length = part.stop - part.start
             outputs = np.full((count, length), np.nan)
             by = np.zeros((*outputs.shape, varied.derivatives.shape[1] if varied else 0))
             for number in chain((0,), self._samples(motion, part.start, length, delay)):
@@ -118,8 +115,6 @@ class Predictor:
                 if varied:
                     by[:, number] = varied.derivatives[:count]
             yield outputs.ravel(), (by * units).reshape(outputs.size, -1)
-            # The clock of the belt goes on to the start of the next part.
-            motion.advance(self.record.period)
 
     def _samples(self, motion: Motion, start: int, count: int, delay: float) -> Iterator[int]:
         """Yield the number of each sample but the first when the motion has reached it."""
@@ -143,20 +138,17 @@ class Predictor:
             if number % steps == 0:
                 yield number // steps
 
-    def with_belt(self, drive: Drive, start: int, count: int) -> Drive:
-        """Return the drive with the belt of a part of the record."""
-        belt, period = self.record.belt_velocity, self.record.period
-        end = min(start + count, len(belt)) - 1
-        inside = self._corners[(self._corners > start) & (self._corners < end)]
-        if len(self._corners) == 2 and belt[0] == belt[-1]:
-            return replace(drive, belt_speed=float(belt[start]))
-        places = np.array([start, *inside, end])
-        times = ((places - start) * period).tolist()
-        points = list(zip(times, belt[places].tolist(), strict=True))
+    def with_belt(self, drive: Drive) -> Drive:
+        """Return the drive with the belt of the record."""
+        belt, corners = self.record.belt_velocity, self._corners
+        if len(corners) == 2 and belt[0] == belt[-1]:
+            return replace(drive, belt_speed=float(belt[0]))
+        times = (corners * self.record.period).tolist()
+        points = list(zip(times, belt[corners].tolist(), strict=True))
         return replace(drive, belt_speed=0.0, belt=table(points))
 
 
-def _corners(values: FloatArray) -> FloatArray:
+def _corners(values: FloatArray) -> IntArray:
     """Return the indices between which straight lines describe the values (Douglas, Peucker)."""
     tolerance = _TOLERANCE * float(np.abs(values).max())
     kept, open_ends = {0, len(values) - 1}, [(0, len(values) - 1)]

@@ -120,7 +120,7 @@ def closed_loop(
     span, period = servo.difference_samples, record.period
     position = record.position
     velocity = float(position[span] - position[0]) / (span * period)
-    belt = Predictor(record).with_belt(drive, 0, len(position))
+    belt = Predictor(record).with_belt(drive)
     motion = Motion(belt, float(position[0]), velocity)
     loop = SampledLoop(motion, 1.0 / period, LOCKSTEP_START, force_delay=max(delay, 0.0))
     # Before the record the slide moves as at its start.

@@ -29,7 +29,7 @@ _ROUGH_SAMPLES = 5
 """Samples at the start of a record whose velocity is rough."""
 _LONG_DELAY = 100.0
 """Size of a delay and of a lag from which steps are made, in sample periods."""
-_RUN_TIME, _DIFFERENCE_TIME, _MEMORY_TIMES = 1e-5, 7e-6, 5.0
+_RUN_TIME, _DIFFERENCE_TIME, _MEMORY_TIMES = 1e-5, 7e-6, 2.0
 """Usual processor time of a sample with its derivatives, s, of each difference, s, and how many
 times as long a memory takes."""
 _UNBOUNDED_ERROR = 10.0
