@@ -2,30 +2,24 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from itertools import chain
-from math import inf, sqrt
+from math import inf
 
 from stickslip_ros.identification.choice import AUTO
 from stickslip_ros.identification.fit import OUT_OF_TIME
 from stickslip_ros.identification.identified_law import IdentifiedLaw, label_of
-from stickslip_ros.identification.law_search import (
-    LawSearch,
-    is_white,
-    loss_of,
-    noise_of,
-    remarked,
-)
+from stickslip_ros.identification.law_search import LawSearch, remarked
 from stickslip_ros.identification.laws import DAHL, LUGRE, DirectionalAdapter
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.refinement import Refinement
+from stickslip_ros.identification.stopping_rules import (
+    is_hopeless,
+    is_white,
+    loss_of,
+    may_have_memory,
+    noise_of,
+)
 from stickslip_ros.identification.time_limit import TimeLimit
 
-POOR_ERROR = 0.1
-"""Error, as a share of the motion, from which a model does not describe it."""
-_MISSING_INPUT_ERROR = 0.5
-"""Such an error, from which a memory is not tried: an input is missing."""
-_HOPELESS_LOSS_RATIO = 4.0
-"""A model whose squared error is larger than that of the best one by this factor is not fitted
-further."""
 _SEARCH_TIME = 0.7
 """Share of the time in which laws are searched; in the rest the best ones are fitted further."""
 _LAW_TIME = 0.25
@@ -60,10 +54,10 @@ class DriveTask:
         plain = [*(competitor for competitor in laws if not competitor.memory), *tables]
         plain = search.by_regression(plain)
         self._begin(plain, progress)
-        if law == AUTO and _may_have_memory(search.begun):
+        if law == AUTO and may_have_memory(search.begun):
             progress(label_of(LUGRE))
             least = min(map(loss_of, search.begun))
-            if _HOPELESS_LOSS_RATIO * search.first(LUGRE).loss < least:
+            if is_hopeless(least, search.first(LUGRE)):
                 self._compete([LUGRE], progress)
         bristles = models[0] if models else None
         self._compete(plain, progress)
@@ -71,7 +65,7 @@ class DriveTask:
         if several and models and noise_of(chain(search.begun, models)) == inf:
             self._compete([DirectionalAdapter(min(models, key=loss_of).law)], progress)
         rivals = [rival for rival in laws if rival.memory and (bristles is None or rival != LUGRE)]
-        if law == AUTO and bristles is None and not _may_have_memory(models):
+        if law == AUTO and bristles is None and not may_have_memory(models):
             rivals = []
         for rival in rivals:
             if rival is DAHL or noise_of(models) == inf:
@@ -114,8 +108,8 @@ class DriveTask:
 
     def _finished(self, fits: Sequence[Refinement]) -> list[Refinement]:
         """Return searched models fitted further, the better ones first, as far as time allows."""
-        least = min(map(loss_of, fits))
-        near = [fit for fit in fits if fit.loss <= _HOPELESS_LOSS_RATIO * least]
+        best = min(fits, key=loss_of)
+        near = [fit for fit in fits if not is_hopeless(fit.loss, best)]
         finished = {fit: remarked(fit, _HOPELESS) for fit in fits}
         for number, fit in enumerate(sorted(near, key=loss_of)):
             self._limit.begin_stage(1.0 / (len(near) - number))
@@ -123,13 +117,3 @@ class DriveTask:
             if finished[fit].remark == OUT_OF_TIME:
                 self.left.append(label_of(fit.law))
         return [*finished.values()]
-
-
-def _share(fit: Refinement) -> float:
-    """Return the rms error as a share of the rms motion."""
-    return sqrt(fit.loss / len(fit.residual)) / fit.scale
-
-
-def _may_have_memory(fits: Sequence[Refinement]) -> bool:
-    """Return whether a memory may explain the errors: no noise, and no input that is missing."""
-    return noise_of(fits) == inf and min(map(_share, fits)) < _MISSING_INPUT_ERROR

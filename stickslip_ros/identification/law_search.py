@@ -1,6 +1,6 @@
 """The search of one friction law: the motion of a drive on a spring is simulated and fitted."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from math import inf, pi, sqrt
@@ -21,6 +21,12 @@ from stickslip_ros.identification.rests import static_force
 from stickslip_ros.identification.rows import LINEAR, Rows
 from stickslip_ros.identification.search import refine
 from stickslip_ros.identification.segment_starts import Errors, best_starts
+from stickslip_ros.identification.stopping_rules import (
+    is_given_up,
+    is_rounding,
+    is_white,
+    loss_of,
+)
 from stickslip_ros.identification.time_limit import TimeLimit
 from stickslip_ros.identification.trajectories import Trajectories, segments_of
 
@@ -32,20 +38,11 @@ _RIVAL_STEPS = 20
 """Steps from the best start while the errors of another law are noise."""
 _RESTART_LOSS_RATIO = 0.95
 """Other starts of segments must lower the squared error to this share, or the search ends."""
-_ROUNDING = 1.4
-"""Errors, in rounding errors of the encoder, up to which no other start is tried."""
-_WHITE_CORRELATION = 0.3
-"""Correlation of successive errors up to which they are noise: rounding leaves some."""
-_EXACT_SHARE = 1e-9
-"""Share of the motion up to which an error is none: recordings of simulations have no noise."""
 _NEAR_SHARE = 1e-3
 """Share of the motion from which on an error needs no other start."""
 _SHAPES, _STARTS = (0.1, 0.3, 0.8), 3
 """Shapes from which the search starts, besides that of the regression: shares of the speeds; starts
 from which it takes steps, besides the first."""
-_GIVEN_UP_LOSS_RATIO = 100.0
-"""A law whose squared error is larger by this factor is given up: than noise, or than LuGre's after
-the first steps, or than the best law's before constants are added that the records ask for."""
 _OPTIONAL_GAIN, _OPTIONAL_ERRORS = 0.05, 4.0
 """Share of the squared error, and standard errors, for which one more constant is searched."""
 _CLEAR_GAIN = 0.5
@@ -131,7 +128,7 @@ class LawSearch:
         the first steps is not searched further.
         """
         tried = [self.first(law)]
-        if is_white(tried[0]) or tried[0].loss > _GIVEN_UP_LOSS_RATIO * noise:
+        if is_white(tried[0]) or is_given_up(tried[0], noise):
             return tried
         fastest = float(self.rows.speeds[-1])
         thorough = law.one_way.shaped and noise == inf
@@ -151,7 +148,7 @@ class LawSearch:
         settled: list[Refinement] = []
         for near in sorted(tried, key=loss_of)[:finalists]:
             settled.append(self._settled(near, most))
-            if is_white(settled[-1]) or _is_rounding(settled[-1]) or self.limit.is_over:
+            if is_white(settled[-1]) or is_rounding(settled[-1]) or self.limit.is_over:
                 break
         return settled
 
@@ -159,8 +156,8 @@ class LawSearch:
         """Return the best fit of a law with a memory to short segments, from a LuGre model."""
         # The static friction of Dahl's law is the kinetic one.
         begun = self._begun(law, {**like.values, "static": like.values["kinetic"]})
-        given_up = is_white(begun) or begun.loss > _GIVEN_UP_LOSS_RATIO * like.loss
-        return [begun if given_up else self._settled(begun)]
+        stays = is_white(begun) or is_given_up(begun, like.loss)
+        return [begun if stays else self._settled(begun)]
 
     def extended(self, near: Sequence[Refinement], least: float) -> Refinement:
         """Return the best fit of a law with the constants that the records ask for.
@@ -168,14 +165,14 @@ class LawSearch:
         `near` has its fits without them, in the order in which they are tried. Where the squared
         error of the best law so far is much less, `least`, they are as they are.
         """
-        if min(map(loss_of, near)) > _GIVEN_UP_LOSS_RATIO * least:
-            return min(near, key=loss_of)
+        if is_given_up(best := min(near, key=loss_of), least):
+            return best
         extended: list[Refinement] = []
         for fit in near:
             names = () if is_white(fit) else (*OPTIONAL, *fit.law.optional)
             more = self._with(names, fit, least_share=_OPTIONAL_GAIN)
             extended.append(more)
-            if is_white(more) or _is_rounding(more):
+            if is_white(more) or is_rounding(more):
                 break
         return min(extended, key=loss_of)
 
@@ -308,38 +305,11 @@ class LawSearch:
         return {DELAY: 0.0, LAG: 0.0, **values, **friction, **self.fixed}
 
 
-def is_white(fit: Refinement) -> bool:
-    """Return whether errors are noise, as far as their successive ones tell, or none."""
-    exact = rms(fit.residual) < _EXACT_SHARE * fit.scale
-    return exact or abs(fit.correlation) < _WHITE_CORRELATION
-
-
-def _is_rounding(fit: Refinement) -> bool:
-    """Return whether the errors of positions are as small as those of the encoder.
-
-    They repeat where a slide sticks and the belt moves by whole steps of it between samples.
-    """
-    task = fit.task
-    step = min(record.resolution for record in task.records)
-    rows = task.of_positions
-    return rms(fit.residual[rows]) < _ROUNDING * step / sqrt(12.0) * rms(task.weight[rows])
-
-
 def _errors_from_zero(fit: Refinement, name: str) -> float:
     """Return by how many standard errors a fitted coordinate differs from zero."""
     place = [*fit.names].index(name)
     error = sqrt(max(fit.covariance[place, place], 0.0))
     return abs(fit.values[name]) / error if error > 0.0 else inf
-
-
-def loss_of(fit: Refinement) -> float:
-    """Return the squared error of a fit."""
-    return fit.loss
-
-
-def noise_of(fits: Iterable[Refinement]) -> float:
-    """Return the least squared error of fits whose errors are noise; infinite if there is none."""
-    return min(map(loss_of, filter(is_white, fits)), default=inf)
 
 
 def remarked(fit: Refinement, remark: str) -> Refinement:

@@ -6,7 +6,7 @@ from dataclasses import replace
 from functools import cached_property
 from itertools import chain
 from math import copysign, expm1
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 
@@ -19,6 +19,12 @@ from stickslip_ros.motion.variational import VariationalMotion
 
 _LAG_STEPS = 3
 """Steps of a sample in which a force that lags is held: one alone moves the slide otherwise."""
+_FIRST = 20
+"""Samples from which the velocity at the start is found."""
+_UNBOUNDED_LOSS = 1e300
+"""Squared error of a motion that is not bounded, m^2."""
+_SPEED_TOLERANCE = 1e-3
+"""Tolerance of the velocity at the start, as a share of the range in which it is sought."""
 _TOLERANCE = 1e-6
 """Largest error of the belt velocity between corners, as a share of its largest value."""
 
@@ -75,6 +81,29 @@ class Predictor:
         start = np.array([[self.record.position[0], velocity]])
         ((outputs, _),) = self.followed(drive, [slice(0, count)], start, 0.0)
         return outputs[:count]
+
+    def free_run(self, drive: Drive) -> tuple[float, FloatArray]:
+        """Return the motion of a drive through the whole record, with its force, without feedback.
+
+        It starts at the measured position with the velocity that fits best, m/s, which is returned
+        before the positions, m. The velocity is found by bounded minimization (R. P. Brent,
+        Algorithms for Minimization Without Derivatives, 1973) around that of the first samples.
+        """
+        from scipy.optimize import minimize_scalar  # takes long to import
+
+        record, first = self.record, self.record.position[:_FIRST]
+        slope = float(np.polyfit(np.arange(len(first)) * record.period, first, 1)[0])
+        # The range also makes up for the friction over the first stroke.
+        spread = 3.0 * abs(slope) + float(np.std(np.diff(first))) / record.period
+
+        def loss(velocity: float) -> float:
+            error = self.positions(drive, float(velocity)) - record.position
+            return float(np.mean(error * error)) if np.isfinite(error).all() else _UNBOUNDED_LOSS
+
+        solve: Any = minimize_scalar  # its types know no bounds
+        bounds, options = (slope - spread, slope + spread), {"xatol": _SPEED_TOLERANCE * spread}
+        velocity = float(solve(loss, bounds=bounds, method="bounded", options=options).x)
+        return velocity, self.positions(drive, velocity)
 
     def followed(
         self,

@@ -12,7 +12,6 @@ from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.identification.covariance import BLOCKS, block_covariance
 from stickslip_ros.identification.filtered import filtered
 from stickslip_ros.identification.fit import Fit, ForceErrors, Friction
-from stickslip_ros.identification.free_run import free_run
 from stickslip_ros.identification.identified_law import DELAY, IdentifiedLaw
 from stickslip_ros.identification.laws import DirectionalAdapter
 from stickslip_ros.identification.predictor import Predictor
@@ -110,7 +109,7 @@ class Regression(Fit):
 
     @override
     def free_run(self, record: Record) -> FloatArray:
-        return free_run(Predictor(record.delayed(self.delay)), self.drive(1.0))[1]
+        return Predictor(record.delayed(self.delay)).free_run(self.drive(1.0))[1]
 
     def at(self, point: FloatArray) -> "Regression":
         """Return the same with the unknowns and then the shapes of a point."""

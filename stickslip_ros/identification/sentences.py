@@ -5,11 +5,12 @@ from math import isfinite, isinf
 
 import numpy as np
 
-from stickslip_ros.identification.drives import POOR_ERROR
 from stickslip_ros.identification.findings import Findings
 from stickslip_ros.identification.fit import OUT_OF_TIME
 from stickslip_ros.identification.record import FEWEST, Record
 
+_POOR_ERROR = 0.1
+"""Error, as a share of the motion, from which a model does not describe it."""
 _VAGUE_ERROR = 0.5
 """Standard error, as a share of the value, from which a constant counts as not identifiable."""
 _FAR_SHARE = 0.3
@@ -30,7 +31,7 @@ _BY_DIRECTION = "it merges with friction by direction, and is taken as 0"
 def notes(findings: Findings) -> Sequence[str]:
     """Return sentences on what makes the model doubtful."""
     texts: list[str] = []
-    if findings.chosen.error >= POOR_ERROR:
+    if findings.chosen.error >= _POOR_ERROR:
         texts.append(
             f"the model does not describe the recordings: its error is {findings.chosen.error:.0%} "
             "of what it predicts; an input may be missing (a disturbance, the velocity of the "

@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray, rms
-from stickslip_ros.identification.free_run import free_run
 from stickslip_ros.identification.predictor import Predictor
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.regression import Regression, solve
@@ -153,7 +152,7 @@ class _FreeRuns:
 
     def _runs(self, fit: Regression) -> list[tuple[float, FloatArray]]:
         drive = fit.drive(1.0)
-        return [free_run(predictor, drive) for predictor in self._predictors]
+        return [predictor.free_run(drive) for predictor in self._predictors]
 
 
 def _slope(fit: Regression, low: float, high: float) -> float:

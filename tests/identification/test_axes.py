@@ -11,7 +11,6 @@ from benchmarks import falling_friction_axes as falling
 from benchmarks import identification_conditions as conditions
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.identification.findings import Findings
-from stickslip_ros.identification.free_run import free_run
 from stickslip_ros.identification.identify import identify
 from stickslip_ros.identification.laws import SaturatingAdapter
 from stickslip_ros.identification.predictor import Predictor
@@ -352,7 +351,7 @@ def test_no_velocity_at_the_start_near_the_found_one_is_better() -> None:
     start = Record("axis", 1e-3, still, still, force=force)
     position = np.rint(Predictor(start).positions(drive, velocity) / 1e-6) * 1e-6
     moved = replace(start, position=position)
-    found, positions = free_run(Predictor(moved), drive)
+    found, positions = Predictor(moved).free_run(drive)
     assert found == pytest.approx(velocity, rel=0.05)
     error = np.std(positions - position)
     for share in (-0.05, -0.01, 0.01, 0.05):
