@@ -7,17 +7,16 @@ import os
 import re
 import tempfile
 from collections import deque
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, closing
+from itertools import chain
 from pathlib import Path
-from typing import NamedTuple, Self
-
-import numpy as np
+from typing import Self
 
 from stickslip_ros.arrays import IntArray
 from stickslip_ros.errors import BagError, InvalidInputError
 from stickslip_ros.record.bag_formats import mcap_of
-from stickslip_ros.record.cdr import Messages
+from stickslip_ros.record.chunk import MessageBlock
 from stickslip_ros.record.compression import unpack_file
 from stickslip_ros.record.mcap_file import McapFile
 from stickslip_ros.record.metadata import metadata_faults
@@ -26,36 +25,6 @@ from stickslip_ros.text import printable
 
 _PACKED_SUFFIX = ".mcap.zstd"
 """Suffix of the files that rosbag2 compressed as a whole."""
-
-
-class Block(NamedTuple):
-    """Adjacent messages of a bag in the order of its file, such as those of one chunk.
-
-    The serialized message i is `data[begin[i] : end[i]]`; arrays have the shape (messages,).
-    """
-
-    names: Sequence[str]
-    """Full names of topics."""
-    topic: IntArray
-    """Place of the topic of each message among these names."""
-    log_time: IntArray
-    """Log times, ns."""
-    data: bytes
-    begin: IntArray
-    end: IntArray
-
-    @property
-    def messages(self) -> Messages:
-        """The serialized messages."""
-        return Messages(self.data, self.begin, self.end)
-
-    def of_topic(self, name: str) -> "Block":
-        """Return the messages on one of these topics."""
-        rows = self.topic == self.names.index(name)
-        if rows.all():
-            return self
-        columns = self.log_time[rows], self.data, self.begin[rows], self.end[rows]
-        return Block(self.names, self.topic[rows], *columns)
 
 
 class BagFiles:
@@ -104,30 +73,30 @@ class BagFiles:
         in_files = (sentence for file in self.files for sentence in file.damage)
         return [*map(printable, (*self._metadata_faults, *self._unreadable, *in_files))]
 
-    def message_blocks(self, *topics: str) -> Iterator[Block]:
-        """Yield the messages of these topics, given by their full names, block by block.
+    def message_blocks(self, *topics: str) -> Iterator[dict[str, MessageBlock]]:
+        """Yield the messages of these topics, by their full names, block by block.
 
-        Raises BagError if the operating system fails to read the bag.
+        A block, such as a chunk, is in the order of its file. Raises BagError if the operating
+        system fails to read the bag.
         """
         for file in self.files:
-            topic_of = np.full(1 << 16, -1)
+            channels = {topic: list[int]() for topic in topics}
             for number, channel in file.channels.items():
-                if channel.topic in topics:
-                    topic_of[number] = topics.index(channel.topic)
-            for block in file.blocks(np.flatnonzero(topic_of >= 0).tolist()):
-                topic = topic_of[block.channel]
-                yield Block(topics, topic, block.log_time, block.data, block.begin, block.end)
+                channels.get(channel.topic, []).append(number)
+            for block in file.blocks([*chain(*channels.values())]):
+                yield {topic: block.on_channels(numbers) for topic, numbers in channels.items()}
 
     def messages(self, *topics: str) -> Iterator[tuple[str, int, bytes]]:
         """Yield topic, log time (ns) and CDR data of each message of these topics, in file order.
 
         Topics and errors are those of `message_blocks`.
         """
-        for block in self.message_blocks(*topics):
-            columns = (block.topic, block.log_time, block.begin, block.end)
-            name_of = dict(enumerate(block.names))
-            for topic, stamp, begin, end in zip(*(c.tolist() for c in columns), strict=True):
-                yield name_of[topic], stamp, block.data[begin:end]
+        for file in self.files:
+            names = {n: channel.topic for n, channel in file.channels.items()}
+            for block in file.blocks([n for n, topic in names.items() if topic in topics]):
+                columns = (block.channel, block.log_time, block.begin, block.end)
+                for number, stamp, begin, end in zip(*(c.tolist() for c in columns), strict=True):
+                    yield names[number], stamp, block.data[begin:end]
 
     def offered_qos(self, topic: str) -> str:
         """Return the QoS profiles that the recorded publishers of a topic (full name) offered.
@@ -210,10 +179,15 @@ def _gap(before: Path, after: Path) -> float | None:
         restarted = (analyzers[0] or {}).get("bag_exists") == '"next"'
         if not restarted or analyzers[0] != analyzers[1]:
             return None
-        ends = [block.log_time.max() for block in one.message_blocks(*one.topics)]
-        begin = next((block.log_time.min() for block in other.message_blocks(*other.topics)), 0)
+        ends = [times.max() for block in one.message_blocks(*one.topics) for times in _times(block)]
+        first = next(other.message_blocks(*other.topics), {})
+        begin = min((times.min() for times in _times(first)), default=0)
         gap = int(begin - max(ends, default=begin)) / NANOSECONDS
         return gap if gap > 0.0 and (plants[0] == plants[1] or None in plants) else None
+
+
+def _times(block: Mapping[str, MessageBlock]) -> Iterator[IntArray]:
+    return (messages.log_time for messages in block.values() if len(messages))
 
 
 def _mcap_files(path: Path) -> list[Path]:

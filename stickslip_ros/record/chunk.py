@@ -14,7 +14,7 @@ from mcap.opcode import Opcode
 from numpy.typing import NDArray
 
 from stickslip_ros.arrays import IntArray
-from stickslip_ros.record.cdr import joined
+from stickslip_ros.record.cdr import Messages, joined
 from stickslip_ros.record.compression import ZSTD_MAGIC, unpack_message
 
 HEAD = struct.Struct("<BQ")
@@ -76,6 +76,11 @@ class MessageBlock:
 
     def __len__(self) -> int:
         return len(self.begin)
+
+    @property
+    def messages(self) -> Messages:
+        """The serialized messages."""
+        return Messages(self.data, self.begin, self.end)
 
     @property
     def channel(self) -> NDArray[np.uint16]:

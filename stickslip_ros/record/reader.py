@@ -12,9 +12,10 @@ import numpy as np
 
 from stickslip_ros.arrays import IntArray
 from stickslip_ros.errors import BagError
-from stickslip_ros.record.bag_files import BagFiles, Block
+from stickslip_ros.record.bag_files import BagFiles
 from stickslip_ros.record.bag_layout import ANY_LAYOUT, BagLayout, DriveInBag
 from stickslip_ros.record.cdr import Layout, Messages, Refused, decode
+from stickslip_ros.record.chunk import MessageBlock
 from stickslip_ros.record.codec import (
     CONTROLLER_STATE,
     controller_references_in,
@@ -257,10 +258,10 @@ class Recording(BagFiles):
         parts: list[ColumnsT] = []
         counts: dict[str, Refused] = {}
         for block in self.message_blocks(name) if name else ():
-            part, refused = decode(*block.messages)
+            part, refused = decode(*block[name].messages)
             if by_log:
-                whole = len(part) == len(block.log_time)
-                part = replace(part, stamp=block.log_time) if whole else part[:0]
+                log_time = block[name].log_time
+                part = replace(part, stamp=log_time) if len(part) == len(log_time) else part[:0]
             parts.append(part)
             _count(counts, name, refused)
         columns = decode(b"", nothing, nothing)[0].followed_by(*parts)
@@ -317,14 +318,14 @@ class _RunReader:
                 run = RunBlock(states, *run[1:3], True, self._motion.estimated)
             yield run
 
-    def _decoded(self, block: Block) -> _Run:
-        sent = block.of_topic(self._states)
+    def _decoded(self, block: Mapping[str, MessageBlock]) -> _Run:
+        sent = block[self._states]
         states, forces, refused = self._motion.read(sent.messages, sent.log_time)
         _count(self.refused, self._states, refused)
         if self._drive.effort_is_of_actuator:
             states = replace(states, friction_force=np.full(len(states), np.nan))
         if not self._by_effort:
-            sent = block.of_topic(self._forces)
+            sent = block[self._forces]
             if self._force_layout is None:
                 forces, refused = wrenches_in(*sent.messages)
             else:
@@ -333,7 +334,7 @@ class _RunReader:
                 )
                 self._unstamped |= unstamped
             _count(self.refused, self._forces, refused)
-        dropped, refused = wrenches_in(*block.of_topic(self._dropped).messages)
+        dropped, refused = wrenches_in(*block[self._dropped].messages)
         _count(self.refused, self._dropped, refused)
         return states, forces, dropped
 
