@@ -113,12 +113,6 @@ class DriveInBag:
         return int(kept) if number is None and 0.0 < kept < inf else number
 
     @cached_property
-    def effort_is_of_actuator(self) -> bool:
-        """Whether our plant recorded the force of its actuator in place of the friction."""
-        plant = self.source.metadata("stickslip_ros/plant") or {}
-        return plant.get("effort") == '"actuator"'
-
-    @cached_property
     def prefix(self) -> str:
         """Prefix of the names of the drive's topics; BagError if there are several drives."""
         if self.layout.states_topic is not None:

@@ -140,11 +140,6 @@ class FileWriter:
         self._next_sync = now + 0.1  # s: a sync slows down the caller
         return True
 
-    def close_to_messages(self) -> None:
-        """Pass all data to the operating system; messages go into the next file."""
-        self.writer.flush()
-        self.stream.limit = inf
-
     def finish(self) -> None:
         """Complete the file and sync it; if this fails, raise OSError and leave whole records."""
         try:

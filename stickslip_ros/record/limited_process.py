@@ -6,25 +6,19 @@ import subprocess
 import sys
 from collections.abc import Generator
 from contextlib import contextmanager
-from typing import BinaryIO, NamedTuple
+from typing import BinaryIO
 
 _MEMORY = 1 << 30
 """Bytes that reading a file may take."""
 
 
-class Result(NamedTuple):
-    """What a process wrote."""
-
-    output: bytes
-    notes: list[str]
-
-
 def result_of(
     module: str, *arguments: str, seconds: float, stream: BinaryIO | None = None
-) -> Result:
+) -> tuple[bytes, list[str]]:
     """Return what a module of the package writes as a process, with a stream as standard input.
 
-    Raises ValueError, with the last line that it wrote to standard error, if it fails.
+    That is standard output, and the lines of standard error. Raises ValueError, with the last of
+    these lines, if it fails.
     """
     paths = os.pathsep.join(filter(None, sys.path))
     settings = {**os.environ, "PYTHONPATH": paths, "OPENBLAS_NUM_THREADS": "1"}
@@ -38,7 +32,7 @@ def result_of(
     lines = child.stderr.decode(errors="replace").strip().splitlines()
     if child.returncode != 0:
         raise ValueError(lines[-1] if lines else "it is damaged")
-    return Result(child.stdout, lines)
+    return child.stdout, lines
 
 
 @contextmanager

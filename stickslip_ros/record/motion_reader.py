@@ -1,7 +1,6 @@
 """The motion in joint states, of our plant and of other machines: in bags and on live topics."""
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 from functools import partial
 from itertools import chain
 
@@ -40,8 +39,9 @@ class MotionReader:
         """
         self._topic, self._layout, self._belt_speed = topic, layout, belt_speed
         self._where = f"on {topic} of {source}" if source else f"on {topic}"
-        self._finder = _JointFinder(layout, kind, self._where)
-        self._joint: _Joint | None = None
+        self._kind = kind
+        self._layout_of: Callable[[bytes], Layout] | None = None
+        """Where messages have the joint, once it is known."""
         self._machine: MachineMotion | None = None
         self._stamps = StampCheck(self._where)
         self.clock_offset: int | None = None
@@ -70,13 +70,9 @@ class MotionReader:
         Raises BagError if the joint must be chosen, or is not there, if the stamps tell no times,
         or if two sources take turns.
         """
-        if self._joint is None:
-            self._joint = joint = self._finder.joint_in(messages)
-            if joint is not None and joint.name is not None:
-                self._machine = MachineMotion(
-                    joint.name, self._topic, self._where, self._layout, self._belt_speed
-                )
-        layout_of = joint_state_layout if self._joint is None else self._joint.layout_of
+        if self._layout_of is None:
+            self._layout_of = self._find_joint(messages)
+        layout_of = self._layout_of or joint_state_layout
         rows, stamp, values, refused = decode(*messages, layout_of, 7)
         if log_time is not None:
             if len(rows) and self.clock_offset is None:
@@ -95,32 +91,15 @@ class MotionReader:
         """Return all samples with velocities that agree with the positions."""
         return samples if self._machine is None else self._machine.without_lost_velocities(samples)
 
-
-@dataclass(frozen=True)
-class _Joint:
-    name: str | None
-    """None for the slide of our plant."""
-    layout_of: Callable[[bytes], Layout]
-
-
-@dataclass(frozen=True)
-class _JointFinder:
-    """Finds the slide among the joints of messages."""
-
-    layout: BagLayout
-    kind: str
-    where: str
-    """Where the messages are, for messages to the user."""
-
-    def joint_in(self, messages: Messages) -> _Joint | None:
-        """Return the joint by the names in the first messages; None if they name none.
+    def _find_joint(self, messages: Messages) -> Callable[[bytes], Layout] | None:
+        """Return where messages have the joint, by the names in the first ones; None without any.
 
         Raises BagError if it must be chosen, or what was chosen is not there.
         """
         seen: list[list[str]] = []
 
         def layout_of(data: bytes) -> Layout:
-            joints = STATE_TYPES[self.kind](data, "joint state")
+            joints = STATE_TYPES[self._kind](data, "joint state")
             seen.append(joints.names)
             return joints.layout_of()
 
@@ -128,15 +107,15 @@ class _JointFinder:
         known = dict.fromkeys(chain(*seen))
         if not known:
             return None
-        joint, belt = self.layout.joint, self.layout.belt_joint
-        ours = self.kind.startswith("sensor") and any({SLIDE, BELT} <= {*names} for names in seen)
+        joint, belt = self._layout.joint, self._layout.belt_joint
+        ours = self._kind.startswith("sensor") and any({SLIDE, BELT} <= {*names} for names in seen)
         if ours and joint is None and belt is None:
-            if self.layout.force == "effort":
+            if self._layout.force == "effort":
                 raise BagError(
-                    f"the effort {self.where} is the friction of our plant: the force is on "
+                    f"the effort {self._where} is the friction of our plant: the force is on "
                     "control_force, and --force effort is refused"
                 )
-            return _Joint(None, joint_state_layout)
+            return joint_state_layout
         others = [name for name in known if name != belt]
         if joint is None and len(others) != 1:
             raise self._several(others)
@@ -145,25 +124,27 @@ class _JointFinder:
             if chosen is not None and chosen not in known:
                 raise BagError(
                     printable(
-                        f"{option} = {shown(chosen)} is refused: the joint states {self.where} "
+                        f"{option} = {shown(chosen)} is refused: the joint states {self._where} "
                         f"are of the joints {_listed(known)}"
                     )
                 )
+        where = self._topic, self._where
+        self._machine = MachineMotion(name, *where, self._layout, self._belt_speed)
         if joint is None:
-            return _Joint(name, partial(self._only_joint, name))
-        return _Joint(name, partial(joint_layout, joint=name, belt=belt, kind=self.kind))
+            return partial(self._only_joint, name)
+        return partial(joint_layout, joint=name, belt=belt, kind=self._kind)
 
     def _only_joint(self, joint: str, data: bytes) -> Layout:
         """Return the layout of the only joint; refuse messages of others."""
-        names, belt = STATE_TYPES[self.kind](data, "joint state").names, self.layout.belt_joint
+        names, belt = STATE_TYPES[self._kind](data, "joint state").names, self._layout.belt_joint
         if joint not in names and belt not in names:
             raise self._several([joint, *names])
-        return joint_layout(data, joint, belt, self.kind)
+        return joint_layout(data, joint, belt, self._kind)
 
     def _several(self, names: Iterable[str]) -> BagError:
         return BagError(
             printable(
-                f"the joint states {self.where} are of the joints {_listed(names)}: --joint NAME "
+                f"the joint states {self._where} are of the joints {_listed(names)}: --joint NAME "
                 "must choose one"
             )
         )

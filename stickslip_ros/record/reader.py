@@ -292,6 +292,8 @@ class _RunReader:
         by_layout = self._by_log or drive.layout.force_topic or kind != CONTROL_FORCE.type_name
         layouts = force_layouts(drive.layout.joint, drive.force_number)
         self._force_layout = layouts[kind] if by_layout else None
+        plant = drive.source.metadata("stickslip_ros/plant") or {}
+        self._has_friction = plant.get("effort") != '"actuator"'
         self._unstamped = False
         self.refused: dict[str, Refused] = {}
         """What could not be decoded so far, by topic."""
@@ -322,7 +324,7 @@ class _RunReader:
         sent = block[self._states]
         states, forces, refused = self._motion.read(sent.messages, sent.log_time)
         _count(self.refused, self._states, refused)
-        if self._drive.effort_is_of_actuator:
+        if not self._has_friction:
             states = replace(states, friction_force=np.full(len(states), np.nan))
         if not self._by_effort:
             sent = block[self._forces]

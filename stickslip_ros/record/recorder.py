@@ -11,6 +11,7 @@ from collections import deque
 from collections.abc import Callable, Collection, Generator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack, closing, contextmanager, suppress
+from math import inf
 from pathlib import Path
 from typing import Any, Literal, NoReturn, Self
 
@@ -228,7 +229,8 @@ class Recorder:
             with self._writing():
                 self._wait_for_tasks(at_most=3)  # in case the disk is slower than the caller
                 finished = self._file
-                finished.close_to_messages()
+                finished.writer.flush()
+                finished.stream.limit = inf
                 self._open_file()
                 self._in_background(self._finish, finished)
                 self._sync = None

@@ -88,10 +88,12 @@ def times_of(
 ) -> tuple[dict[Clock, FloatArray], Rows]:
     """Return times by columns, s from the first of the clock, and the rows that have one."""
     table, asked, (factor, units) = cells.table, cells.asked["time"], cells.conversions["time"]
-    times = {
-        places: _exact(asked, [cells.columns[place] for place in places])
-        for places in dict.fromkeys((clock, *others))
-    }
+    times: dict[Clock, Any] = {}
+    for places in dict.fromkeys((clock, *others)):
+        columns = [cells.columns[place] for place in places]
+        counts = len(columns) > 1 or columns[0].dtype.kind == "i"
+        exact = np.longdouble if counts else float  # a float has no digits for ns since 1970
+        times[places] = asked.value([np.asarray(column, exact) for column in columns])
     rows = finite_rows(times[clock])
     if not len(rows):
         raise InvalidInputError(f"{table.path}: no time is a finite number")
@@ -119,13 +121,6 @@ def times_of(
         since = np.asarray(since, float)
         times[places] = since if places == clock else since + table.form.shift
     return times, rows
-
-
-def _exact(clock: Expression, cells: Sequence[Any]) -> Any:
-    """Return the times of an expression with all their digits."""
-    counts = len(cells) > 1 or cells[0].dtype.kind == "i"
-    exact = np.longdouble if counts else float  # a float has no digits for ns since 1970
-    return clock.value([np.asarray(column, exact) for column in cells])
 
 
 def in_order(table: Table, clock: Expression, factor: float, time: FloatArray, rows: Rows) -> Rows:

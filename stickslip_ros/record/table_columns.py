@@ -117,8 +117,6 @@ class Table(ABC):
     """Their kind, as numpy has it, and the first of them, ns."""
     period: tuple[float, float] | None = None
     """Period of the rows that a line above them tells, s and in its own unit."""
-    decimal = "."
-    """Decimal mark."""
     remarks: Sequence[str] = ()
     """Lines above the table that are neither names nor units of its columns."""
 

@@ -83,7 +83,7 @@ class JoinedTable(Table):
     def __init__(self, first: Table, second: Table) -> None:
         """Take both tables."""
         self.path, self.form, self.period = first.path, first.form, first.period
-        self.decimal, self.remarks = first.decimal, [*first.remarks, *second.remarks]
+        self.remarks = [*first.remarks, *second.remarks]
         self._tables = first, second
         self.second_from = self._width = len(first.names)
         self.names, self.units = [*first.names, *second.names], [*first.units, *second.units]

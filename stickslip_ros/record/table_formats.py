@@ -272,14 +272,13 @@ def read_foreign(stream: BinaryIO, form: str, most: int) -> ForeignTable:
     matrix. Raises ValueError if the file cannot be read, or if its vectors have more than `most`
     numbers.
     """
-    result = result_of(__name__, form, str(most), seconds=_TIME, stream=stream)
-    if result.output.startswith(_TEXT):
-        return ForeignTable(result.output[len(_TEXT) :], {}, {}, result.notes)
-    with np.load(BytesIO(result.output), allow_pickle=False) as arrays:
-        names = {name.partition("=")[2]: name for name in arrays}
-        vectors = {name: arrays[key] for name, key in names.items()}
-    units = {name: key.partition("=")[0] for name, key in names.items()}
-    return ForeignTable(None, vectors, units, [])
+    output, notes = result_of(__name__, form, str(most), seconds=_TIME, stream=stream)
+    if output.startswith(_TEXT):
+        return ForeignTable(output[len(_TEXT) :], {}, {}, notes)
+    with np.load(BytesIO(output), allow_pickle=False) as arrays:
+        parts = {name.partition("="): arrays[name] for name in arrays}
+    vectors = {name: vector for (_, _, name), vector in parts.items()}
+    return ForeignTable(None, vectors, {name: unit for unit, _, name in parts}, [])
 
 
 def _main(form: str, most: int) -> None:

@@ -208,12 +208,28 @@ class _LastRows:
     """Rows at the end of the head of a table: all of one width, and by them others are known."""
 
     separator: str
-    cells: list[list[str]]
+    rows: list[list[str]]
+    """Cells of the lines, whatever their width."""
 
-    @property
+    @cached_property
     def width(self) -> int:
         """Number of columns."""
-        return len(self.cells[0])
+        return mode(map(len, self.rows))
+
+    @cached_property
+    def cells(self) -> list[list[str]]:
+        """Those of the rows of this width."""
+        return [row for row in self.rows if len(row) == self.width]
+
+    def likelihood(self, lines: Sequence[str]) -> float:
+        """Return the share of numbers among the cells, and a little more for a line of names."""
+        if self.width < 2:
+            return 0.0
+        values = sum(_is_value(cell) for row in self.cells for cell in row)
+        filled = sum(cell != "" for row in self.rows for cell in row)
+        above = (_cells(_COMMENT.sub("", line), self.separator) for line in lines[:_TOP])
+        named = any(len(row) == self.width and all(map(_is_text, row)) for row in above)
+        return values / max(1, filled) + 0.1 * named
 
     @property
     def decimal(self) -> str:
@@ -259,10 +275,8 @@ def _last_rows(lines: list[str]) -> _LastRows:
     tail = [*islice(filter(str.strip, reversed(lines)), _TAIL)][::-1]
     if not tail:
         raise ValueError("it is empty")
-    separator = max(_SEPARATORS, key=lambda mark: _likelihood(mark, tail, lines))
-    rows = [_cells(line, separator) for line in tail]
-    width = mode(map(len, rows))
-    return _LastRows(separator, [row for row in rows if len(row) == width])
+    candidates = [_LastRows(mark, [_cells(line, mark) for line in tail]) for mark in _SEPARATORS]
+    return max(candidates, key=lambda rows: rows.likelihood(lines))
 
 
 def _check_rows(rows: _LastRows, fewest: int) -> None:
@@ -339,22 +353,6 @@ def _columns(names: Sequence[str], labels: Collection[int]) -> dict[str, int]:
             if name:
                 columns.setdefault(name, place)
     return columns
-
-
-def _likelihood(separator: str, tail: Sequence[str], lines: Sequence[str]) -> float:
-    """Return the share of numbers among the cells, and a little more for a line of names."""
-    rows = [_cells(line, separator) for line in tail]
-    width = mode(map(len, rows))
-    if width < 2:
-        return 0.0
-    cells = [cell for row in rows for cell in row]
-    values = sum(_is_value(cell) for row in rows if len(row) == width for cell in row)
-    named = any(
-        len(row) == width and all(map(_is_text, row))
-        for row in (_cells(_COMMENT.sub("", line), separator) for line in lines[:_TOP])
-    )
-    empty = sum(not cell for cell in cells)
-    return values / max(1, len(cells) - empty) + 0.1 * named
 
 
 def _cells(line: str, separator: str) -> list[str]:

@@ -40,7 +40,7 @@ class TextTable(Table):
         with opened(path, content) as stream:
             self._text = text = form_of(stream, given)
         self.names, self.columns, self.units = text.names, text.columns, text.units
-        self.decimal, self.period, self.remarks = text.decimal, text.period, text.remarks
+        self.period, self.remarks = text.period, text.remarks
         self._refused: Sequence[int] = ()
         self._rows: IntArray | None = None
         """Lines of the rows that were read, from that of the first one; None: all."""
@@ -88,7 +88,7 @@ class TextTable(Table):
             return self._read(places)
 
     def _read(self, places: Sequence[int]) -> list[Any]:
-        wanted, rows, count = self.wanted, list[IntArray](), 0
+        wanted, text, rows, count = self.wanted, self._text, list[IntArray](), 0
         parts: dict[int, list[Any]] = {place: [] for place in places}
         with closing(self._frames()) as frames:
             for frame in frames:
@@ -101,7 +101,7 @@ class TextTable(Table):
                     frame = _rows_of(frame, *wanted)
                 rows.append(frame.index.to_numpy())
                 for place in places:
-                    values, marks = values_of(frame[place], self.decimal, self.form.decimal)
+                    values, marks = values_of(frame[place], text.decimal, self.form.decimal)
                     parts[place].append(values)
                     self._marks = marks | self._marks
         self._rows = np.concatenate(rows)
@@ -160,7 +160,7 @@ class TextTable(Table):
         if values.dtype.kind in "mM":
             values, self.start = seconds(values, self.start)
         elif self.form.decimal is None and values.dtype.kind == "f":
-            check_thousands(values, self.decimal)
+            check_thousands(values, self._text.decimal)
         return values
 
 
