@@ -4,7 +4,7 @@ import re
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import inf
-from typing import Any, NamedTuple, Self, get_args
+from typing import Any, get_args
 
 from stickslip_ros.errors import BagError, InvalidInputError
 from stickslip_ros.record import ForceSource, TimeSource
@@ -51,17 +51,10 @@ ANY_LAYOUT = BagLayout()
 """Nothing is known of the layout."""
 
 
-class NumberedTopic(NamedTuple):
-    """Name of a topic, and the number in brackets behind it."""
-
-    name: str
-    number: int | None
-
-    @classmethod
-    def parse(cls, text: str) -> Self:
-        """Return the parts of a text."""
-        parts = _NUMBERED.fullmatch(text)
-        return cls(parts[1], int(parts[2])) if parts else cls(text, None)
+def numbered(topic: str | None) -> tuple[str, int | None]:
+    """Return the name of a topic, empty without one, and the number in brackets behind it."""
+    parts = _NUMBERED.fullmatch(topic or "")
+    return (parts[1], int(parts[2])) if parts else (topic or "", None)
 
 
 @dataclass(frozen=True)
@@ -108,7 +101,7 @@ class DriveInBag:
     @cached_property
     def force_number(self) -> int | None:
         """The place of the force in an array of numbers, from 1; None if it is not known."""
-        number = NumberedTopic.parse(self.layout.force_topic or "").number
+        _, number = numbered(self.layout.force_topic)
         kept = number_in(self.analyzer.get("force_number", ""))
         return int(kept) if number is None and 0.0 < kept < inf else number
 
@@ -116,7 +109,7 @@ class DriveInBag:
     def prefix(self) -> str:
         """Prefix of the names of the drive's topics; BagError if there are several drives."""
         if self.layout.states_topic is not None:
-            return NumberedTopic.parse(self.layout.states_topic).name.rpartition("/")[0] + "/"
+            return numbered(self.layout.states_topic)[0].rpartition("/")[0] + "/"
         if self.namespace is not None:
             return f"/{self.namespace.strip('/')}/".replace("//", "/")
         for topic in RECORDED_TOPICS:
@@ -146,7 +139,7 @@ class DriveInBag:
         if given is None:
             return self._usual_name(topic)
         types = tuple(STATE_TYPES) if topic == JOINT_STATES else FORCE_TYPES
-        name, topics = NumberedTopic.parse(given).name, self.source.topics
+        (name, _), topics = numbered(given), self.source.topics
         if topics.get(name) not in types:
             allowed = sorted(other for other, kind in topics.items() if kind in types)
             raise BagError(

@@ -9,7 +9,7 @@ import numpy as np
 
 from stickslip_ros.arrays import BoolArray, FloatArray, IntArray
 from stickslip_ros.errors import BagError
-from stickslip_ros.record.bag_layout import BagLayout, NumberedTopic
+from stickslip_ros.record.bag_layout import BagLayout, numbered
 from stickslip_ros.record.faults import (
     LARGEST_SHARE,
     MOST_SHIFTS,
@@ -197,7 +197,7 @@ class _Sources:
 
     def __init__(self, joint: str, topic: str, where: str, layout: BagLayout) -> None:
         self._joint, self._topic, self._where = joint, topic, where
-        self._number = NumberedTopic.parse(layout.states_topic or "").number
+        _, self._number = numbered(layout.states_topic)
         self._grid: tuple[int, int, int] | None = None
         self._first_stamp: int | None = None
         self._shifts: list[tuple[int, float]] = []

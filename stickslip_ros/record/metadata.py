@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import yaml
-from mcap.records import Channel
 
 from stickslip_ros.files import open_regular, written
 from stickslip_ros.record.mcap_file import McapFile
@@ -52,8 +51,15 @@ class BagDescription:
         assert statistics is not None
         for channel_id, channel in sorted(file.channels.items()):
             if channel.topic not in self._topics:
-                kind = file.schemas[channel.schema_id].name
-                self._topics[channel.topic] = _topic_entry(channel, kind)
+                profiles = channel.metadata.get("offered_qos_profiles", "")
+                about = {
+                    "name": channel.topic,
+                    "type": file.schemas[channel.schema_id].name,
+                    "serialization_format": channel.message_encoding,
+                    "offered_qos_profiles": offered_profiles(profiles),
+                    "type_description_hash": channel.metadata.get("topic_type_hash", ""),
+                }
+                self._topics[channel.topic] = {"topic_metadata": about, "message_count": 0}
             count = statistics.channel_message_counts.get(channel_id, 0)
             self._topics[channel.topic]["message_count"] += count
         start, end = statistics.message_start_time, statistics.message_end_time
@@ -94,21 +100,6 @@ def metadata_faults(directory: Path, files: Sequence[Path]) -> list[str]:
 
 def _as_yaml(information: dict[str, Any]) -> str:
     return yaml.dump(information, Dumper=_DUMPER, sort_keys=False)
-
-
-def _topic_entry(channel: Channel, type_name: str) -> dict[str, Any]:
-    return {
-        "topic_metadata": {
-            "name": channel.topic,
-            "type": type_name,
-            "serialization_format": channel.message_encoding,
-            "offered_qos_profiles": offered_profiles(
-                channel.metadata.get("offered_qos_profiles", "")
-            ),
-            "type_description_hash": channel.metadata.get("topic_type_hash", ""),
-        },
-        "message_count": 0,
-    }
 
 
 def offered_profiles(qos: str) -> list[Any]:

@@ -74,8 +74,6 @@ class TextForm(Head):
 
     encoding: str
     separator: str
-    has_blanks: bool
-    """Whether blanks follow separators."""
     decimal: str
     """Decimal mark."""
     columns: Mapping[str, int]
@@ -152,12 +150,10 @@ def form_of(stream: BinaryIO, given: TableFormat) -> TextForm:
     above = [line for place, line in enumerate(lines[: head.first][:_TOP]) if place not in known]
     joined = lines[: head.skipped].count(_JOINED)
     head = replace(head, names=names, skipped=head.skipped - joined)
-    blank = re.compile(f"(^|{re.escape(rows.separator)}) ", re.MULTILINE)
     form = TextForm(
         **vars(head),
         encoding=encoding,
         separator=rows.separator,
-        has_blanks=blank.search("".join(lines)) is not None,
         decimal=given.decimal or rows.decimal,
         columns=_columns(names, labels),
         labelled=len(labels) > 0,

@@ -133,7 +133,7 @@ class TextTable(Table):
                 index_col=False,
                 sep=r"\s+" if text.separator == " " else text.separator,
                 decimal=self.form.decimal or text.decimal,
-                skipinitialspace=text.has_blanks,
+                skipinitialspace=True,
                 skip_blank_lines=False,
                 on_bad_lines="warn",
                 low_memory=False,

@@ -292,14 +292,10 @@ def _last(name: str, target: str) -> Iterator[Unit]:
     for start in starts[-4:]:
         text, before = name[start:], name[:start]
         rest = text[3:] if re.match(rf"(?i)in[\W_](?!{_PER})", text) else ""
-        if readings := [*_read(rest, target)] or [*_read(text, target)]:
+        if readings := [*_doubted(rest, target)] or [*_doubted(text, target, alone=not before)]:
             if re.match(r"(?i)per(?![^\W_])", text) and _counts(before):
                 break
             yield from readings
-            if text.casefold() in (_DOUBTFUL_LAST if before else _DOUBTFUL_LAST + _DOUBTFUL_ALONE):
-                yield Unit("", 1.0, target)
-            if text[0].isdigit():  # a number of units, or of the column
-                yield from _read(text.lstrip("0123456789."), target)
             return
     ends = [*starts[1:], len(name)]
     words = [name[start:end].strip(_MARKS) for start, end in zip(starts, ends, strict=False)]
@@ -322,18 +318,24 @@ def _between(name: str, starts: Sequence[int], target: str) -> Iterator[Unit]:
     while first < len(starts) - 1:
         for end in range(min(first + 3, len(starts) - 1), first, -1):
             text = name[starts[first] : starts[end]].strip(_MARKS)
-            unit = re.sub(r"^\d[\d.]*(?=[^\W_])", "", text)
-            known = {dimension for _, dimension in _parsed(unit)} & {*_DIMENSIONS.values()}
+            parsed = _parsed(text.lstrip("0123456789."))
+            known = {dimension for _, dimension in parsed} & {*_DIMENSIONS.values()}
             if known and len(text) > 1 and text.casefold() != "in":
-                readings = [*_read(text, target)]
+                readings = [*_doubted(text, target)]
                 yield from readings or [Unit(text, nan, target)] * (end > first + 1)
-                if unit != text:  # a number of units, or of the column
-                    yield from _read(unit, target)
-                if readings and text.casefold() in _DOUBTFUL_LAST:
-                    yield Unit("", 1.0, target)
                 first = end - 1
                 break
         first += 1
+
+
+def _doubted(text: str, target: str, *, alone: bool = False) -> Iterator[Unit]:
+    """Yield the readings of words of a name, or of all of it, as a unit or something else."""
+    yield from _read(text, target)
+    if text[:1].isdigit():  # a number of units, or of the column
+        yield from _read(text.lstrip("0123456789."), target)
+    doubtful = _DOUBTFUL_LAST + _DOUBTFUL_ALONE if alone else _DOUBTFUL_LAST
+    if text.casefold() in doubtful and any(_read(text, target)):
+        yield Unit("", 1.0, target)
 
 
 def _counts(text: str) -> bool:
