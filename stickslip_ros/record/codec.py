@@ -222,7 +222,8 @@ def unpack_header(data: bytes) -> int:
     if data[:4] == LITTLE_ENDIAN and len(data) >= _STAMP.size:
         _, sec, nanosec = _STAMP.unpack_from(data)
         return sec * NANOSECONDS + nanosec
-    return _header_layout(data).read(data)[0]
+    message = Decoder(data, "header")
+    return Layout(message, message.header_stamp(), []).read(data)[0]
 
 
 def joint_state_columns(messages: Sequence[bytes]) -> tuple[SampleColumns, Refused]:
@@ -428,11 +429,6 @@ def _command_layout(data: bytes, joint: str | None) -> Layout:
         f"a joint command of the joints {reprlib.repr(names)} has {efforts} efforts; must be one, "
         "or one for each joint"
     )
-
-
-def _header_layout(data: bytes) -> Layout:
-    message = Decoder(data, "header")
-    return Layout(message, message.header_stamp(), [])
 
 
 def _columns_in(

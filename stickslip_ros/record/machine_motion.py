@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from stickslip_ros.arrays import BoolArray, FloatArray, IntArray
+from stickslip_ros.arrays import BoolArray, IntArray
 from stickslip_ros.errors import BagError
 from stickslip_ros.record.bag_layout import BagLayout, numbered
 from stickslip_ros.record.faults import (
@@ -129,7 +129,11 @@ class MachineMotion:
         if self._recorded is None and (position | velocity).any():
             both, positions = map(np.count_nonzero, (position & velocity, position))
             self._recorded = _Recorded(bool(positions), bool(2 * both >= positions))
-            self._check_effort(samples.friction_force)
+            if self._by_effort and not np.isfinite(samples.friction_force).any():
+                raise BagError(
+                    f"the joint states {self._where} have no effort of {printable(self._joint)}: "
+                    "--force effort is refused; --force-topic names a topic of forces"
+                )
         recorded = self._recorded or _Recorded(False, False)
         kept = position | velocity
         for why, lacking in (
@@ -155,13 +159,6 @@ class MachineMotion:
         belt = belt[newest]
         self._belt = float(belt[-1])
         return replace(samples, belt_velocity=belt[1:])
-
-    def _check_effort(self, effort: FloatArray) -> None:
-        if self._by_effort and not np.isfinite(effort).any():
-            raise BagError(
-                f"the joint states {self._where} have no effort of {printable(self._joint)}: "
-                "--force effort is refused; --force-topic names a topic of forces"
-            )
 
     def _completed(self, samples: SampleColumns) -> SampleColumns:
         """Return the samples with a belt, and with velocities or positions from the others.

@@ -42,25 +42,11 @@ class MotionReader:
         self._kind = kind
         self._layout_of: Callable[[bytes], Layout] | None = None
         """Where messages have the joint, once it is known."""
-        self._machine: MachineMotion | None = None
+        self.machine: MachineMotion | None = None
+        """Motion of another machine; None for joint states of our plant, or before any."""
         self._stamps = StampCheck(self._where)
         self.clock_offset: int | None = None
         """Log time less stamp of the first sample, ns."""
-
-    @property
-    def of_another_machine(self) -> bool:
-        """Whether the joint states are not those of our plant."""
-        return self._machine is not None
-
-    @property
-    def estimated(self) -> bool:
-        """Whether velocities are those of the positions."""
-        return self._machine is not None and self._machine.estimated
-
-    @property
-    def notes(self) -> list[str]:
-        """Sentences on what was left out, and what is assumed."""
-        return [] if self._machine is None else self._machine.notes
 
     def read(
         self, messages: Messages, log_time: IntArray | None = None
@@ -81,15 +67,11 @@ class MotionReader:
                 stamp = log_time[rows]
         samples = SampleColumns(stamp, *values)
         forces = ForceColumns(stamp[:0], values[0, :0])
-        if self._machine is not None:
-            samples, forces = self._machine.read(samples)
+        if self.machine is not None:
+            samples, forces = self.machine.read(samples)
         if self._layout.time != "log":
-            self._stamps.check(samples.stamp, ours=self._machine is None)
+            self._stamps.check(samples.stamp, ours=self.machine is None)
         return samples, forces, refused
-
-    def without_lost_velocities(self, samples: SampleColumns) -> SampleColumns:
-        """Return all samples with velocities that agree with the positions."""
-        return samples if self._machine is None else self._machine.without_lost_velocities(samples)
 
     def _find_joint(self, messages: Messages) -> Callable[[bytes], Layout] | None:
         """Return where messages have the joint, by the names in the first ones; None without any.
@@ -129,7 +111,7 @@ class MotionReader:
                     )
                 )
         where = self._topic, self._where
-        self._machine = MachineMotion(name, *where, self._layout, self._belt_speed)
+        self.machine = MachineMotion(name, *where, self._layout, self._belt_speed)
         if joint is None:
             return partial(self._only_joint, name)
         return partial(joint_layout, joint=name, belt=belt, kind=self._kind)

@@ -309,15 +309,15 @@ class _RunReader:
             run = self._decoded(block)
             gathered.append(run)
             count += sum(map(len, run))
-            if count >= least and not self._motion.of_another_machine:
+            if count >= least and self._motion.machine is None:
                 yield RunBlock(*_joined(gathered))
                 gathered, count = [], 0
         self._check_clocks()
         if gathered:
             run = RunBlock(*_joined(gathered))
-            if self._motion.of_another_machine:
-                states = self._motion.without_lost_velocities(run.joint_states)
-                run = RunBlock(states, *run[1:3], True, self._motion.estimated)
+            if (machine := self._motion.machine) is not None:
+                states = machine.without_lost_velocities(run.joint_states)
+                run = RunBlock(states, *run[1:3], True, machine.estimated)
             yield run
 
     def _decoded(self, block: Mapping[str, MessageBlock]) -> _Run:
@@ -352,7 +352,8 @@ class _RunReader:
 
     def notes(self, run: RunBlock) -> list[str]:
         """Return sentences on how the motion was read up to the end of a block."""
-        notes, states = self._motion.notes, run.joint_states
+        machine, states = self._motion.machine, run.joint_states
+        notes = [] if machine is None else machine.notes
         if self._by_effort:
             time = (states.stamp - states.stamp[:1]) / NANOSECONDS
             notes += ripple_note(time, states.position, run.control_forces.force, ("m", "N"))

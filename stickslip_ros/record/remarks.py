@@ -49,12 +49,13 @@ def mentions(lines: Sequence[str], target: str) -> Iterator[Mention]:
                 for unit in units_in("", word, target):
                     if unit.factor > 0.0 and unit.factor != 1.0:
                         yield Mention(unit, line, number is not None)
-                    elif label and are_units([word]) and not _is_of_motion(word):
+                    elif (
+                        label
+                        and are_units([word])
+                        and not any(
+                            other.factor > 0.0
+                            for si_unit in ("s", "m", "m/s", "N")
+                            for other in units_in("", word, si_unit)
+                        )
+                    ):
                         yield Mention(unit, line, True)
-
-
-def _is_of_motion(word: str) -> bool:
-    """Return whether a word is a unit of a quantity of the motion."""
-    return any(
-        unit.factor > 0.0 for si in ("s", "m", "m/s", "N") for unit in units_in("", word, si)
-    )

@@ -109,14 +109,14 @@ def report_of_recording(
         )
     ) as recording:
         meter = _meter_for(recording, window, stick_speed, observer)
-        if part.is_whole:
+        if start <= 0.0 and end == inf:
             meter.published = _kept_number(recording, "timing", "published")
         run = RunFeed(meter, part, observer, take, slips, recording.references)
         # Measuring each chunk by itself would take twice as long.
         for block in recording.blocks(least=20_000):
             run.feed(block)
         run.finish()
-        if run.first is None:
+        if run.first is None and isinstance(recording, Recording):
             raise _nothing_in(recording, path, namespace)
         report = _completed(run.report(path, length), recording, has_states=run.has_states)
         report["notes"] += [
@@ -143,9 +143,7 @@ def _meter_for(
     return meter
 
 
-def _nothing_in(
-    recording: Recording | TableRecording, path: Path, namespace: str | None
-) -> BagError:
+def _nothing_in(recording: Recording, path: Path, namespace: str | None) -> BagError:
     topics = ", ".join(f"{name} ({kind})" for name, kind in sorted(recording.topics.items()))
     return BagError(
         f"the bag {path} holds no {JOINT_STATES.name} and no {CONTROL_FORCE.name}"

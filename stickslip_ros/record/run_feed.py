@@ -50,11 +50,6 @@ class RunPart:
         before = "" if self.end == inf else f" and before {self.end:g} s"
         return f"from {self.start:g} s on{before}"
 
-    @property
-    def is_whole(self) -> bool:
-        """Whether it is the whole run."""
-        return self.start <= 0.0 and self.end == inf
-
     def rows(self, stamp: IntArray, first: int) -> BoolArray:
         """Return which stamps, ns, are within the part of a run that begins at the first stamp."""
         start, end = (

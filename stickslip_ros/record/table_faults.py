@@ -31,7 +31,15 @@ def without_faults(cells: Cells, values: Values, rows: Rows) -> Iterator[str]:
     """
     yield from _without_lost_positions(cells, values, rows)
     if "velocity" in values:
-        yield from _without_lost_velocities(cells, values, rows)
+        position, velocity = values["position"], values["velocity"]
+        both = np.flatnonzero(np.isfinite(position) & np.isfinite(velocity))
+        fault, spikes = lost_velocities(values["time"][both], position[both], velocity[both])
+        if fault is not None:
+            values["velocity"] = np.full(len(velocity), nan)
+            yield f"the velocity {fault}: it is left out"
+        elif spikes.any():
+            first = cells.table.line(int(rows[both[spikes][0]]))
+            yield _left_out(values, "velocity", both[spikes], first, "the positions do not")
     units = ("rad", "N m") if cells.table.form.rotary else ("m", "N")
     if "reference" in values:
         yield from play_note(values["reference"], values["position"], units[0], "the reference")
@@ -97,19 +105,6 @@ def _without_lost_positions(cells: Cells, values: Values, rows: Rows) -> Iterato
             )
         place = f"at {line(row)}, {values['time'][present[row]]:.6g} s after the first row"
         yield shift_note(size, place, "rad" if table.form.rotary else "m")
-
-
-def _without_lost_velocities(cells: Cells, values: Values, rows: Rows) -> Iterator[str]:
-    """Leave out velocities that contradict the others or the positions; yield sentences on them."""
-    position, velocity = values["position"], values["velocity"]
-    both = np.flatnonzero(np.isfinite(position) & np.isfinite(velocity))
-    fault, spikes = lost_velocities(values["time"][both], position[both], velocity[both])
-    if fault is not None:
-        values["velocity"] = np.full(len(velocity), nan)
-        yield f"the velocity {fault}: it is left out"
-    elif spikes.any():
-        first = cells.table.line(int(rows[both[spikes][0]]))
-        yield _left_out(values, "velocity", both[spikes], first, "the positions do not")
 
 
 def _left_out(values: Values, name: str, lost: IntArray, first: str, why: str) -> str:

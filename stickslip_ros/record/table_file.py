@@ -175,11 +175,6 @@ class TableRecording:
     """A table does not tell which forces did not act."""
 
     @property
-    def topics(self) -> dict[str, str]:
-        """A table has none."""
-        return {}
-
-    @property
     def missing(self) -> list[str]:
         """A table that can be read is complete."""
         return []

@@ -88,7 +88,9 @@ class TextTable(Table):
             return self._read(places)
 
     def _read(self, places: Sequence[int]) -> list[Any]:
-        wanted, text, rows, count = self.wanted, self._text, list[IntArray](), 0
+        import pandas as pd
+
+        wanted, decimal, rows, count = self.wanted, self._text.decimal, list[IntArray](), 0
         parts: dict[int, list[Any]] = {place: [] for place in places}
         with closing(self._frames()) as frames:
             for frame in frames:
@@ -98,10 +100,13 @@ class TextTable(Table):
                 if frame[places[0]].hasnans:
                     frame = frame[~frame.isna().all(axis=1)]
                 if wanted is not None:
-                    frame = _rows_of(frame, *wanted)
+                    place, value, number = wanted
+                    text = frame[place].astype(str).str.strip(" \t'\"")
+                    same = pd.to_numeric(text, errors="coerce") == number
+                    frame = frame[(text == value) | same]
                 rows.append(frame.index.to_numpy())
                 for place in places:
-                    values, marks = values_of(frame[place], text.decimal, self.form.decimal)
+                    values, marks = values_of(frame[place], decimal, self.form.decimal)
                     parts[place].append(values)
                     self._marks = marks | self._marks
         self._rows = np.concatenate(rows)
@@ -162,12 +167,3 @@ class TextTable(Table):
         elif self.form.decimal is None and values.dtype.kind == "f":
             check_thousands(values, self._text.decimal)
         return values
-
-
-def _rows_of(frame: Any, place: int, value: str, number: float) -> Any:
-    """Return the rows of a frame with a value, as a text or a number, in a column."""
-    import pandas as pd
-
-    text = frame[place].astype(str).str.strip(" \t'\"")
-    same = pd.to_numeric(text, errors="coerce") == number
-    return frame[(text == value) | same]

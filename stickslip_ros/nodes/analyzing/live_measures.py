@@ -74,7 +74,8 @@ class LiveMeasures:
     def measure(self) -> tuple[list[Cycle], list[RingDown]]:
         """Measure what was added; return the cycles and ring-downs that have ended."""
         states, efforts = self._read(JOINT_STATES, self._read_states, NO_SAMPLES, NO_FORCES)
-        if self._motion.estimated and self.meter.motion.reading.noisy is None:
+        machine = self._motion.machine
+        if machine and machine.estimated and self.meter.motion.reading.noisy is None:
             self._assume(SampleAssumptions(noisy=True))
         cycles, ring_downs = self.meter.motion.feed(states), self.watch.feed(states)
         self.cycles += len(cycles)
