@@ -153,11 +153,9 @@ def runs_of(bags: Iterable[Path]) -> dict[Path, dict[Path, float]]:
     Raises InvalidInputError for a bag that is given twice.
     """
     runs: dict[Path, dict[Path, float]] = {}
-    known = set[Path]()
     for bag in bags:
-        if bag.resolve() in known:
+        if bag.resolve() in {other.resolve() for one in runs for other in (one, *runs[one])}:
             raise InvalidInputError(f"{bag} is given twice")
-        known.add(bag.resolve())
         for first, continued in runs.items():
             if re.fullmatch(re.escape(str(first)) + r"_\d+", str(bag)) and bag.is_dir():
                 gap = _gap([first, *continued][-1], bag)

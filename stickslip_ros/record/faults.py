@@ -1,7 +1,7 @@
 """Faults of sensors that a recording shows: dropouts, wraps, and velocities that cannot be."""
 
-from dataclasses import dataclass
 from math import pi
+from typing import NamedTuple
 
 import numpy as np
 
@@ -31,8 +31,7 @@ the two; share of the displacements that a delay makes, from which a velocity is
 them by which the motion between the velocities is unknown."""
 
 
-@dataclass(frozen=True)
-class Wrap:
+class Wrap(NamedTuple):
     """Jumps of a counter that wraps."""
 
     turn: float

@@ -156,7 +156,7 @@ def _nothing_in(recording: Recording, path: Path, namespace: str | None) -> BagE
 def _completed(
     report: dict[str, Any], recording: Recording | TableRecording, *, has_states: bool
 ) -> dict[str, Any]:
-    notes, missing = [*recording.notes, *report["notes"]], recording.missing
+    notes, missing = [*recording.notes, *report["notes"]], [*recording.missing]
     plant = recording.metadata("stickslip_ros/plant") or {}
     if report["peak_force"] is None and plant.get("expects_control") == "true":
         notes.append("the plant expects control, and no control force was recorded or is read")

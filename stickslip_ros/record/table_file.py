@@ -146,7 +146,7 @@ def table_of(path: Path, form: TableFormat = ANY_FORM) -> Table:
         for sign, what in _OTHERS.items():
             if sign in (path.suffix.lower(), start[: len(sign)]):
                 raise ValueError(f"it is {what}")
-        foreign = format_of(path, stream)
+        foreign = format_of(start, path.suffix.lower())
         if foreign is None:
             return TextTable(path, form)
         content = read_foreign(stream, foreign, _MOST_NUMBERS)
@@ -171,13 +171,10 @@ class TableRecording:
     """Whether the velocities are estimated from the positions."""
     notes: tuple[str, ...]
     """Sentences on what the table does not have."""
+    missing = ()
+    """A table that can be read is complete."""
     dropped_known = False
     """A table does not tell which forces did not act."""
-
-    @property
-    def missing(self) -> list[str]:
-        """A table that can be read is complete."""
-        return []
 
     def blocks(self, least: int = 1) -> Iterator[RunBlock]:
         """Yield samples, forces and no dropped forces, as recorded by another machine."""

@@ -5,12 +5,10 @@ process: which of them are installed is up to the user.
 """
 
 import json
-import os
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from io import BytesIO
 from itertools import islice
-from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
 from zipfile import BadZipFile, ZipFile
 
@@ -27,8 +25,6 @@ _HDF5 = b"\x89HDF\r\n\x1a\n"
 _MOST_LEVELS, _MOST_COLUMNS = 10, 1000
 """Structures in structures, and columns of a matrix, or fields of a message, that are read."""
 
-_START = 16
-"""First bytes that tell a format."""
 _TIME = 60
 """Seconds that reading a file may take."""
 _TEXT = b"text:"
@@ -229,23 +225,23 @@ def _fields(name: str, value: Any) -> Iterator[tuple[str, Any]]:
         yield name, value
 
 
-MAT = Adapter("an HDF5 file, as MAT of version 7.3,", "h5py", _of_mat)
+_MAT = Adapter("an HDF5 file, as MAT of version 7.3,", "h5py", _of_mat)
 _YAML = Adapter("YAML", "PyYAML", _of_yaml)
-BY_START = {
-    b"MATLAB": MAT,
-    b"PK\x03\x04": Adapter("an Excel workbook", "openpyxl", _of_archive),
-    b"PAR1": Adapter("a Parquet file", "pyarrow", _of_parquet),
-    b"TDSm": Adapter("a TDMS file", "npTDMS", _of_tdms),
-}
-"""Adapters by the first bytes of a file."""
 _JSON = Adapter("JSON", "pandas", _of_json)
-BY_END = {
-    **dict.fromkeys((".mat", ".h5", ".hdf5"), MAT),
+_BY_START = {
+    "MATLAB": _MAT,
+    "PK\x03\x04": Adapter("an Excel workbook", "openpyxl", _of_archive),
+    "PAR1": Adapter("a Parquet file", "pyarrow", _of_parquet),
+    "TDSm": Adapter("a TDMS file", "npTDMS", _of_tdms),
+}
+_ADAPTERS = {
+    **_BY_START,
+    **dict.fromkeys((".mat", ".h5", ".hdf5"), _MAT),
     **dict.fromkeys((".yaml", ".yml"), _YAML),
     **dict.fromkeys((".json", ".jsonl", ".ndjson"), _JSON),
     ".npy": Adapter("a numpy array", "numpy", _of_array),
 }
-"""Adapters by the end of its name."""
+"""Adapters by the first bytes of a file, and by the end of its name."""
 
 
 class ForeignTable(NamedTuple):
@@ -258,11 +254,10 @@ class ForeignTable(NamedTuple):
     notes: list[str]
 
 
-def format_of(path: Path, stream: BinaryIO) -> str | None:
-    """Return how the format of an open file is known, by its first bytes or its end; or None."""
-    start = os.pread(stream.fileno(), _START, 0)
-    sign = next((sign.decode() for sign in BY_START if start.startswith(sign)), None)
-    return sign or (path.suffix.lower() if path.suffix.lower() in BY_END else None)
+def format_of(start: bytes, suffix: str) -> str | None:
+    """Return how a format is known, by the first bytes of a file or the end of its name."""
+    sign = next((sign for sign in _BY_START if start.startswith(sign.encode())), suffix)
+    return sign if sign in _ADAPTERS else None
 
 
 def read_foreign(stream: BinaryIO, form: str, most: int) -> ForeignTable:
@@ -283,7 +278,7 @@ def read_foreign(stream: BinaryIO, form: str, most: int) -> ForeignTable:
 
 def _main(form: str, most: int) -> None:
     """Write what is in the file at standard input to standard output, as text or as numpy does."""
-    adapter = BY_END.get(form) or BY_START[form.encode()]
+    adapter = _ADAPTERS[form]
     with limited(f"{adapter.format} is read by {adapter.package}: install it"):
         table = adapter.read(sys.stdin.buffer.read())
         if isinstance(table, str):

@@ -147,7 +147,11 @@ def form_of(stream: BinaryIO, given: TableFormat) -> TextForm:
     labels = {} if texts else rows.labels
     names = [labels.get(place - 1, name) for place, name in enumerate(head.names)]
     known = {head.skipped, (head.units_line or 0) - 1}
-    above = [line for place, line in enumerate(lines[: head.first][:_TOP]) if place not in known]
+    above = [
+        normalize("NFKC", _COMMENT.sub("", line)[:_LONGEST].strip())
+        for place, line in enumerate(lines[: head.first][:_TOP])
+        if place not in known and not period_in(line)
+    ]
     joined = lines[: head.skipped].count(_JOINED)
     head = replace(head, names=names, skipped=head.skipped - joined)
     form = TextForm(
@@ -159,14 +163,9 @@ def form_of(stream: BinaryIO, given: TableFormat) -> TextForm:
         labelled=len(labels) > 0,
         period=period,
         first_lines=lines[head.first : head.first + _TOP],
-        remarks=[_remark(line) for line in above if not period_in(line)],
+        remarks=above,
     )
     return replace(form, units=[unit or form.unit_behind(n) for n, unit in enumerate(form.units)])
-
-
-def _remark(line: str) -> str:
-    """Return a line without the mark of a comment, in usual characters."""
-    return normalize("NFKC", _COMMENT.sub("", line)[:_LONGEST].strip())
 
 
 def _lines_of(head: bytes, encoding: str | None) -> tuple[list[str], str]:
