@@ -43,6 +43,7 @@ def mentions(lines: Sequence[str], target: str) -> Iterator[Mention]:
         label = _LABEL.search(line)
         for match in _WORD.finditer(line):
             before, word, behind = line[: match.start()], match[0], line[match.end() :]
+            word = word if are_units([word]) else word.partition("/")[2] or word  # as in x/mm
             certain = not _WORDS.fullmatch(word) and (len(word) > 1 or label)
             if certain or _TOLD.search(before):
                 number = _NUMBER_BEFORE.search(before) or _NUMBER_BEHIND.match(behind)

@@ -414,6 +414,7 @@ def _usual(text: str) -> str:
     """Return a text with usual characters for those of full width, exponents, and units of one."""
     text = re.sub("[⁻¹²³⁰⁴-⁹]+", lambda exponent: f"^{exponent[0]}", text[:_LONGEST])
     text = normalize("NFKC", text.replace("″", '"')).translate(_USUAL)
+    text = re.sub(rf"(?i)\b({_ANY_LONG})[ -](?=[ms])", r"\1", text)
     return re.sub(r"(?<=[\W_])µ(?!\w)", "µm", text)
 
 

@@ -189,6 +189,7 @@ def test_units_above_and_below_the_names_and_of_skipped_names_are_used(
     [
         ("All lengths in mm, times in s", "by the line 'All lengths in mm, times in s' above, may"),
         ("units: V, kN, mm", "may be in mm (0.001 m) or m (1 m): position=#2*0.001 or position=#2"),
+        ("x/mm y/mm", "may be in mm (0.001 m)"),
         ("unit = inch", "may be in inch (0.0254 m)"),
         ("x: encoder counts", "is in counts, which is no unit of position"),
         ("stroke 20 mm, feed (mm/min): 5", "x: no known unit, taken as m, below the line 'stroke"),

@@ -16,7 +16,7 @@ HEADERS = {
         "|Время, мс|Время, миллисекунды"
         "|millis|ms|Temps (ms)|temps en ms|Tiempo / ms|Tiempo_ms|ms_today|time_ms_since_boot"
         "|t.ms|t:ms|t-ms|millis()|t_ms1"
-        "|Zeit (Millisekunden)|time [milliseconds]"
+        "|Zeit (Millisekunden)|time (milli seconds)|time [milliseconds]"
         "|t (x10^-3 s)|t [1e-3 s]|t (10⁻³ s)|t (E-3 s)|時間 [㎳]|時間\uff08ミリ秒\uff09|时间毫秒",
         1e-6: "timestamp_us|Time [µs]|t / us|micros|zeit_usec",
         1e-9: "timestamp [ns]|nanosec|t_ns",
