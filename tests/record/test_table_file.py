@@ -275,7 +275,11 @@ def test_a_force_constant_must_fit_to_the_axis(form: Any, refusal: str) -> None:
 
 def test_a_current_and_a_force_are_not_confused(tmp_path: Path) -> None:
     columns, amperes = {"time": "t", "position": "x"}, TableFormat(force_constant="50N/A")
-    path = csv_of(tmp_path / "log.csv", **lists(t=TIME, x=POSITION, **{"i [A]": TIME}, F_N=TIME))
+    table = {"i [A]": TIME, "F_N": TIME, "Motorstrom": TIME}
+    path = csv_of(tmp_path / "log.csv", **lists(t=TIME, x=POSITION, **table))
+    with pytest.raises(InvalidInputError, match="a current by its name, which tells no force"):
+        read_table(path, {**columns, "force": "Motorstrom"})
+    read_table(path, {**columns, "force": "Motorstrom*0.3"})
     with pytest.raises(InvalidInputError, match=r"is in A, .*--force-constant 0.35Nm/A with"):
         read_table(path, {**columns, "force": "#3"})
     with pytest.raises(InvalidInputError, match="is in N, which is no unit of a current"):
