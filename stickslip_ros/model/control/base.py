@@ -82,8 +82,8 @@ class ContinuousControl(Protocol):
     expressions. All values are in SI units, or dimensionless after `scaled`.
     """
 
-    states: ClassVar[Sequence[str]]
-    """Names of the states."""
+    states: ClassVar[Sequence[str]] = ()
+    """Names of the states; a control with states defines `rest`, `state_rates`, `state_scales`."""
 
     def scaled(self, drive: Drive) -> Self:
         """Return the same control with dimensionless constants, in the scales of `drive`.
@@ -112,7 +112,7 @@ class ContinuousControl(Protocol):
         sequence
             Values of `states`.
         """
-        ...
+        return ()
 
     def state_rates(self, position: Any, speed: Any, states: Sequence[Any]) -> Sequence[Any]:
         """Return the rates of the states.
@@ -124,7 +124,7 @@ class ContinuousControl(Protocol):
         states : sequence of float, array or expression
             Values of `states`.
         """
-        ...
+        return ()
 
     def control_force(self, position: Any, speed: Any, states: Sequence[Any]) -> Any:
         """Return the force on the slide.
@@ -144,7 +144,7 @@ class ContinuousControl(Protocol):
         drive : Drive
             Drive that defines the scales.
         """
-        ...
+        return ()
 
     def bound(self, speed: Any) -> Any:
         """Return forces on the speed that give a cycle at least the energy that the control gives.
@@ -157,9 +157,9 @@ class ContinuousControl(Protocol):
         Returns
         -------
         ndarray
-            Forces, shape of `speed`; infinite where no bound is known.
+            Forces, shape of `speed`; infinite, as by default, where no bound is known.
         """
-        ...
+        return np.full_like(speed, inf)
 
 
 class TwoBodyControl(ContinuousControl):

@@ -124,10 +124,6 @@ class Cascade(ControlLaw, TwoBodyControl):
     def state_scales(self, drive: Drive) -> Sequence[float]:
         return drive.force_scale, *self.washout.state_scales(drive)
 
-    def bound(self, speed: Any) -> Any:
-        """Return infinity: no bound is known; see `ContinuousControl.bound`."""
-        return np.full_like(speed, np.inf)
-
 
 def _seen(which: str, pair: Any) -> Any:
     return pair[0] if which == TABLE else pair[1]

@@ -15,7 +15,6 @@ from stickslip_ros.model.control.base import (
     LinearFeedback,
     State,
 )
-from stickslip_ros.model.drive import Drive
 from stickslip_ros.samples import Reference, Sample
 
 
@@ -30,7 +29,6 @@ class VelocityFeedback(FeedbackLaw, ContinuousControl):
     name: ClassVar[str] = "velocity_feedback"
     accepts_expressions: ClassVar[bool] = True
     tuned: ClassVar[Sequence[str]] = ("velocity_gain",)
-    states: ClassVar[Sequence[str]] = ()
 
     velocity_gain: Any = constant(
         -1.0, "Gain k1 of the velocity; a negative gain removes energy.", "N s/m"
@@ -56,21 +54,9 @@ class VelocityFeedback(FeedbackLaw, ContinuousControl):
     def silenced(self) -> Self:
         return replace(self, position_gain=0.0, velocity_gain=0.0)
 
-    @override
-    def rest(self, position: Any, speed: Any) -> Sequence[Any]:
-        return ()
-
-    @override
-    def state_rates(self, position: Any, speed: Any, states: Sequence[Any]) -> Sequence[Any]:
-        return ()
-
     def control_force(self, position: Any, speed: Any, states: Sequence[Any]) -> Any:
         """Return u = k0 x + k1 y; see `ContinuousControl.control_force`."""
         return self.position_gain * position + self.velocity_gain * speed
-
-    @override
-    def state_scales(self, drive: Drive) -> Sequence[float]:
-        return ()
 
     def bound(self, speed: Any) -> Any:
         """Return k1 y: the spring stores what it takes; see `ContinuousControl.bound`."""

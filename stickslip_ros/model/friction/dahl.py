@@ -35,11 +35,6 @@ class Dahl(FrictionLaw):
         """Return mu(v_r) = -mu_s s in steady slip; see `SteadyFriction.coefficient`."""
         return -self.static * sign + 0.0 * relative_speed
 
-    @property
-    def size_range(self) -> tuple[float, float]:
-        """The static coefficient, twice."""
-        return self.static, self.static
-
     def friction(self, relative_speed: Any, sign: Any, memory: Values, switches: Values) -> Any:
         """Return -S z; see `FrictionMemory.friction`."""
         return -self.bristle_stiffness * memory[0]
