@@ -2,6 +2,8 @@
 
 import re
 from collections.abc import Iterator, Sequence
+from functools import cache
+from math import isnan
 from typing import NamedTuple
 
 from stickslip_ros.record.units import Unit, are_units, units_in
@@ -16,6 +18,8 @@ _LABEL = re.compile(r"(?i)unit|einheit|unidad|jednot|единиц|单位|単位"
 """What is in the line of a unit of one letter."""
 _NUMBER_BEFORE = re.compile(r"(?i)\d[\d.,]*(?:e[-+]?\d+)?\s*[\[(]?$")
 _NUMBER_BEHIND = re.compile(r"[\s\])}>:;,=\"]*[-+]?\d")
+_TARGETS = ("s", "m", "m/s", "N")
+"""SI units of the quantities of a motion."""
 
 
 class Mention(NamedTuple):
@@ -43,20 +47,18 @@ def mentions(lines: Sequence[str], target: str) -> Iterator[Mention]:
         label = _LABEL.search(line)
         for match in _WORD.finditer(line):
             before, word, behind = line[: match.start()], match[0], line[match.end() :]
-            word = word if are_units([word]) else word.partition("/")[2] or word  # as in x/mm
+            word = word if are_units([word]) else word.partition("/")[2]  # as in x/mm
             certain = not _WORDS.fullmatch(word) and (len(word) > 1 or label)
-            if certain or _TOLD.search(before):
-                number = _NUMBER_BEFORE.search(before) or _NUMBER_BEHIND.match(behind)
-                for unit in units_in("", word, target):
-                    if unit.factor > 0.0 and unit.factor != 1.0:
-                        yield Mention(unit, line, number is not None)
-                    elif (
-                        label
-                        and are_units([word])
-                        and not any(
-                            other.factor > 0.0
-                            for si_unit in ("s", "m", "m/s", "N")
-                            for other in units_in("", word, si_unit)
-                        )
-                    ):
-                        yield Mention(unit, line, True)
+            if not are_units([word]) or not (certain or _TOLD.search(before)):
+                continue
+            number = _NUMBER_BEFORE.search(before) or _NUMBER_BEHIND.match(behind)
+            for unit in _readings(word, target):
+                if unit.factor > 0.0 and unit.factor != 1.0:
+                    yield Mention(unit, line, number is not None)
+                elif label and all(isnan(u.factor) for si in _TARGETS for u in _readings(word, si)):
+                    yield Mention(unit, line, True)
+
+
+@cache
+def _readings(word: str, target: str) -> Sequence[Unit]:
+    return units_in("", word, target)
