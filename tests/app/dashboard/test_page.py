@@ -139,7 +139,8 @@ CHANGED = re.compile(r"t = .* s: \w+\.\w+: .* to ")
 
 SLOW = (
     *("run", "feed_drive", "--dashboard", "--bag", "bag"),
-    *("-p", "plant.real_time_factor=0.25", "-p", "washout_controller.start_after=0"),
+    *("-p", "plant.real_time_factor=0.5", "-p", "plant.rate=500"),
+    *("-p", "washout_controller.start_after=0"),
 )
 """A run in slow motion: a busy machine has time for each answer."""
 
