@@ -68,9 +68,6 @@ class Trio:
             self.send(node, signal.SIGCONT)
         self.wait_for_closed_loop()
 
-    def is_there(self, node: str) -> bool:
-        return node in self._running and self._running[node].poll() is None
-
     def end(self) -> None:
         """End the nodes as Ctrl-C does, the analyzer last."""
         for node in reversed(NODES):
