@@ -203,9 +203,10 @@ def unit_of_steps(
             f"the time starts at {first:.6g}, which is no date in s: time={column}*NUMBER converts "
             "it, with 0.001 from ms, 1e-06 from µs, 1e-07 from 100 ns, 1e-09 from ns"
         )
+    unit, factor = ("ms", "0.001") if step < 100.0 else ("µs", "1e-06")
     return 1.0, [
-        f"the time has no unit and counts in s, {quantity(step, 's')} from row to row: in ms it is "
-        f"time={column}*0.001"
+        f"the time has no unit and counts in s, {quantity(step, 's')} from row to row: in {unit} "
+        f"it is time={column}*{factor}"
     ]
 
 

@@ -98,13 +98,14 @@ class Cells:
         by_column = {k: v for one in self.conversions.values() for k, v in one.units.items()}
         units = [f"{name}: {unit.text}" for name, unit in by_column.items()]
         for name, expression in asked.items():
-            if name != "time" and expression.bare and not self.conversions[name].units:
+            timed = name == "time" and (self.table.clocks or self.table.period)
+            known = timed or self.conversions[name].units or self.table.is_own(asked)
+            if expression.bare and not known:
                 unit = "A" if name == "force" and form.per_ampere else QUANTITIES[name]
                 beside = next(mentions(self.table.remarks, unit), None)
                 unit = ROTARY.get(unit, unit) if form.rotary else unit
-                if by_column or beside:
-                    line = f", below the line {shown(beside.line)}" if beside else ""
-                    units.append(f"{expression.text}: no known unit, taken as {unit}{line}")
+                line = f", below the line {shown(beside.line)}" if beside else ""
+                units.append(f"{expression.text}: no known unit, taken as {unit}{line}")
         if units:
             yield f"units: {'; '.join(dict.fromkeys(units))}"
         angles = [unit.text for unit in by_column.values() if unit.target in ROTARY.values()]

@@ -1,14 +1,20 @@
 """What the cells of a column as text mean: numbers with their marks, or instants."""
 
 import re
+import warnings
 from typing import Any
 
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray
+from stickslip_ros.record.units import are_units
 
 GROUPED = r"(?:(?<=\d)(?<!\d{4})['\u2019\xa0\u202f ](?=\d{3}(?!\d)))"
 """Marks between thousands that are no decimal marks."""
+NUMBER = re.compile(
+    rf"[-+]?(?:\d+(?:{GROUPED}\d{{3}})*(?:[.,]\d+)*\.?|[.,]\d+)(?:[eE][-+]?\d+)?|[-+]?(?:nan|inf|infinity)",
+    re.IGNORECASE,
+)
 _CLOCK = r"\d{1,2}:\d\d(?::\d\d(?:[.,:]\d+)?)?"
 TIME = re.compile(
     rf"(?P<date>\d{{1,4}}([-./])\d{{1,2}}\2\d{{1,4}})(?:,?[T ] ?{_CLOCK})?"
@@ -20,6 +26,13 @@ _LOOK = 10
 """Cells by which a column has times."""
 _DAY = 86_400.0
 _COMMAS = {",": "decimal commas"}
+
+
+def unit_of(cell: str) -> str:
+    """Return the unit behind the number in a cell, or nothing."""
+    unit = cell.lstrip("0123456789.,+-eE'\u2019\xa0\u202f ")
+    number = cell[: len(cell) - len(unit)]
+    return unit if NUMBER.fullmatch(number.strip()) and are_units([unit]) else ""
 
 
 class OtherMarkError(Exception):
@@ -39,6 +52,8 @@ def values_of(cells: Any, decimal: str, given: str | None) -> tuple[Any, dict[st
     if cells.dtype.kind == "b":
         return np.full(len(cells), np.nan), {}
     text = cells.astype(str).str.strip(" \t'\"")
+    if unit := unit_of(next(iter(text.dropna()), "")):
+        text = text.str.removesuffix(unit).str.rstrip()
     instant = next(filter(None, map(TIME.fullmatch, text.dropna()[:_LOOK])), None)
     if instant is not None:
         return _instants(text, instant), {}
@@ -91,7 +106,9 @@ def _instants(text: Any, like: re.Match[str]) -> Any:
     instants: Any = pd.to_datetime(text, format="ISO8601", utc=True, errors="coerce")
     if instants.isna().all():
         day_first = "." in (like["date"] or "")
-        instants = pd.to_datetime(text, dayfirst=day_first, utc=True, errors="coerce")
+        with warnings.catch_warnings():  # that they have no common form
+            warnings.simplefilter("ignore", UserWarning)
+            instants = pd.to_datetime(text, dayfirst=day_first, utc=True, errors="coerce")
     return instants.dt.tz_localize(None).to_numpy("datetime64[ns]")
 
 

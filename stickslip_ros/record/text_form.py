@@ -21,7 +21,7 @@ from unicodedata import normalize
 from stickslip_ros.files import open_regular
 from stickslip_ros.record.expressions import listed
 from stickslip_ros.record.table_columns import TableFormat
-from stickslip_ros.record.text_cells import GROUPED, TIME
+from stickslip_ros.record.text_cells import NUMBER, TIME, unit_of
 from stickslip_ros.record.units import NO_UNITS, are_units, joined_units, period_in, without_unit
 
 _HEAD = 1 << 20
@@ -34,10 +34,6 @@ _LARGEST, _MOST_COLUMNS, _LONGEST = 1 << 33, 10_000, 500
 """Bytes of a file, columns, and characters of a line above them in which units are looked for."""
 
 _SEPARATORS = {"\t": "tabs", ";": "semicolons", "|": "|", " ": "spaces", ",": "commas"}
-_NUMBER = re.compile(
-    rf"[-+]?(?:\d+(?:{GROUPED}\d{{3}})*(?:[.,]\d+)*\.?|[.,]\d+)(?:[eE][-+]?\d+)?|[-+]?(?:nan|inf|infinity)",
-    re.IGNORECASE,
-)
 _Line = tuple[int, list[str]]
 """Place of a line, and its cells."""
 _CYRILLIC = re.compile(
@@ -99,7 +95,13 @@ class TextForm(Head):
         return [row for row in rows if len(row) == self.width]
 
     def unit_behind(self, place: int) -> str:
-        """Return the unit behind a column in all rows, in a column named `unit` or not at all."""
+        """Return the unit behind a column in all rows, in a column named `unit` or not at all.
+
+        It is in the cells of the column or in those of the next one.
+        """
+        inside = {unit_of(row[place]) for row in self.first_rows}
+        if len(inside) == 1 and (unit := inside.pop()):
+            return unit
         behind = self.names[place + 1 : place + 2]
         cells = [*{row[place + 1] for row in self.first_rows if behind}]
         if len(cells) != 1 or place + 1 not in self.columns.values():
@@ -247,7 +249,8 @@ class _LastRows:
         return {
             place: text
             for place, text in enumerate(self.cells[0][:-1])
-            if not self.numeric[place]
+            if text
+            and not self.numeric[place]
             and self.numeric[place + 1]
             and not (self.numeric[0] and are_units([text]))
             and all(row[place] == text for row in self.cells)
@@ -279,8 +282,8 @@ def _check_rows(rows: _LastRows, fewest: int) -> None:
     if rows.width < fewest or sum(rows.numeric) < fewest:
         raise ValueError(
             "it has no rows of two numbers or more, whatever the separator: numbers stand alone in "
-            "their cells, not as t=0.1 or 1.2mm; options say its --decimal mark, the lines to "
-            "--skip and its --encoding"
+            "their cells or before a unit, not as t=0.1; options say its --decimal mark, the lines "
+            "to --skip and its --encoding"
         )
     if rows.width > _MOST_COLUMNS:
         raise ValueError(f"it has more than {_MOST_COLUMNS} columns")
@@ -319,6 +322,8 @@ def _texts_above(lines: list[str], first: int, skip: int, rows: _LastRows) -> li
         row = joined_units(row, width)
         if len(row) == width - 1 and not any(cells[-1] for cells in rows.cells):
             row.append("")  # a separator at the end of each row
+        if len(row) == width + 1 and row[-1] == "Comment":
+            row.pop()  # LabVIEW names a column that few rows have
         if len(row) != width:
             may_be_names = len(row) > 1 and rows.separator != " " and place >= skip
             if may_be_names and not (texts or values):
@@ -364,7 +369,7 @@ def _cells(line: str, separator: str) -> list[str]:
 
 
 def _is_value(cell: str) -> bool:
-    return _NUMBER.fullmatch(cell) is not None or TIME.fullmatch(cell) is not None
+    return any(kind.fullmatch(cell) for kind in (NUMBER, TIME)) or unit_of(cell) != ""
 
 
 def _is_text(cell: str) -> bool:

@@ -95,7 +95,10 @@ _SCALED = re.compile(
     r"|\b(?:tenth|hundredth|thousandth|zehntel|hundertstel|tausendstel)s?\b"
     r"|\b(?:d[eé]cim|dixi[eè]m|cent[ei][sè][im]|mill?[eiè][sè][im])\w+"
 )
-"""What says that numbers are multiples of a unit."""
+_SCALED_BEFORE = re.compile(
+    r"(?i)(?:[x\xd7]\s*10+|10+(?=\s*[*\xd7·])|100+|1e[-+]?\d+|10(?:\^|\*\*)[-+]?\d+)[\s*\xd7·]+(?=[^\W\d_])"
+)
+"""What says that numbers are multiples of a unit, and what says so before a name."""
 _OTHERS = {
     "an acceleration": re.compile(r"acc(?:el\w*)?$|beschl|accél|acel"),
     "a current": re.compile(r"current|is?[qd]$|(?:\w*motor)?strom|corrente|corriente|courant"),
@@ -168,8 +171,12 @@ def units_in(name: str, given: str, target: str) -> list[Unit]:
     name, given = _usual(name).replace("()", ""), _usual(given)
     multiple = _BRACKETED.sub(lambda text: "" if any(_read(text[1], target)) else text[0], name)
     scaled, tens = _SCALED.search(f"{multiple};{given}"), name.removesuffix("_x10")
+    before = _SCALED_BEFORE.match(multiple)
+    if before and not _parsed(multiple[before.end() :]):  # 1000 x [m], but not 10 um
+        scaled = before
     if scaled or (tens != name and any(_last(tens, target))):  # rpm_x10, but not pos_x10
-        return [Unit(scaled[0] if scaled else name, nan, target)]
+        bracketed = (text for text in _BRACKETED.findall(name) if _SCALED.search(text))
+        return [Unit(next(bracketed, scaled[0].strip() if scaled else name), nan, target)]
     plain = _BRACKETED.sub(" ", name).strip()
     stated, last = [*_stated(name, plain, given, target)], [*_last(plain, target)]
     known, words = ([unit for unit in units if not isnan(unit.factor)] for units in (stated, last))

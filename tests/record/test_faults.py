@@ -98,8 +98,8 @@ def test_what_is_left_out_of_a_table_is_said(tmp_path: Path) -> None:
     columns = {"time": "t", "position": "x", "velocity": "v"}
     path = table_of(tmp_path / "log.csv", t=TIME, x=position, v=velocity)
     found = read_table(path, columns)
-    assert "away and back, as no motion does, in 2 rows, the first is line 102" in found.notes[0]
-    assert "as the positions do not, in 2 rows, the first is line 302" in found.notes[1]
+    assert "away and back, as no motion does, in 2 rows, the first is line 102" in found.notes[1]
+    assert "as the positions do not, in 2 rows, the first is line 302" in found.notes[2]
     assert np.flatnonzero(~found.samples.is_valid).tolist() == [100, 101]
     assert found.samples.velocity[[300, 900]] == pytest.approx(VELOCITY[[300, 900]], abs=1e-3)
     path = table_of(tmp_path / "log.csv", t=TIME, x=POSITION, v=1e3 * VELOCITY)
@@ -113,7 +113,7 @@ def test_a_jump_from_which_it_does_not_come_back_is_said(tmp_path: Path) -> None
     path = table_of(tmp_path / "log.csv", t=TIME, x=position)
     found = read_table(path, {"time": "t", "position": "x"})
     sentence = "the position jumps by 300 mm, at line 1502, 1.5 s after the first row, and does not"
-    assert found.notes[0].startswith(sentence)
+    assert found.notes[1].startswith(sentence)
     assert np.array_equal(found.samples.position, position)
 
 

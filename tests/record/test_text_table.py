@@ -205,7 +205,7 @@ def test_units_in_lines_above_are_asked_for_or_said(tmp_path: Path, line: str, s
             read(tmp_path, text, "t", "x")
     else:
         assert said in "".join(read(tmp_path, text, "t", "x").notes[1:2])
-        assert len(read(tmp_path, text, "t", "x").notes) == 2 + (said != "")
+        assert len(read(tmp_path, text, "t", "x").notes) == 3
     assert read(tmp_path, text, "t", "x*1").samples.position.tolist() == POSITION.tolist()
 
 
@@ -436,11 +436,34 @@ def test_a_counter_that_wraps_once_is_refused_with_the_expression(tmp_path: Path
     assert np.ptp(read(tmp_path, text, "t", said).samples.position) == pytest.approx(2980e-9)
 
 
+@pytest.mark.parametrize(
+    ("names", "row", "time", "position"),
+    [
+        ("t,x,F\n", "{ms} ms,{mm} mm,3.0", "t", "x"),
+        ("t\tx\n", "{ms}ms\t{mm}mm", "t", "x"),
+        ("t;x;F\n", "{s} sec;{mm} mm;3.0 N", "t", "x"),
+        ("Length,4.0e3,,-0.0005,0.0\n", ",,,{s},{x}", "#4", "#5"),  # an oscilloscope
+    ],
+)
+def test_units_stand_behind_values_and_empty_columns_count(
+    tmp_path: Path, names: str, row: str, time: str, position: str
+) -> None:
+    lines = [
+        row.format(ms=f"{1e3 * t:.10g}", s=f"{t:.10g}", mm=f"{1e3 * x:.15g}", x=f"{x:.15g}")
+        for t, x in zip(TIME.tolist(), POSITION.tolist(), strict=True)
+    ]
+    found = read(tmp_path, names + "\n".join(lines), time, position).samples
+    assert found.position[-len(TIME) :] == pytest.approx(POSITION, rel=1e-9)
+    assert (np.diff(found.stamp) == 500_000).all()
+
+
 def test_differences_of_decimals_do_not_jump(tmp_path: Path) -> None:
     commands = [(n, 4e-5 * min(n, 2500)) for n in range(3000)]
     lines = [f"{n * 2e-3:.4f},{cmd:.8f},{cmd - 4e-5:.8f}" for n, cmd in commands]
     found = read(tmp_path, "t,cmd,act\n" + "\n".join(lines), "t", "cmd-act")
-    assert found.notes == ("the velocity is not recorded: it is the difference of the positions",)
+    assert found.notes[1:] == (
+        "the velocity is not recorded: it is the difference of the positions",
+    )
 
 
 def test_a_table_that_gives_no_sample_is_refused(tmp_path: Path) -> None:

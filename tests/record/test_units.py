@@ -51,6 +51,7 @@ HEADERS = {
         DEGREE / 60: "Winkel in Bogenminuten",
         DOUBTFUL: "x_in|position_in|xIn|in|cm|phi [grad]|pos [inc]|Position [counts]|pos_counts"
         "|x *0,001 mm|1000*x [m]|x [m·10⁻³]|x (x1000)|x x1e-3 m|corsa (centesimi)"
+        "|1000 x / m|10^3 x / m|1000·x [m]|x10 pos_um"
         "|x (millièmes de m)|Weg 1/100mm"
         "|Encoder count|count|yd|x_yd"
         "|Weg [Inkremente]|Droop pulses (by 1 pls.)|Position [V]|Pos [%]|x (1/1000 mm)"
