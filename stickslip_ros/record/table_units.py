@@ -29,8 +29,6 @@ QUANTITIES = {
 """Units of the quantities that a table may have; time and position it must have."""
 MOTION, FORCES = ("position", "velocity"), ("force", "disturbance", "friction_force")
 """Quantities of which rows without a number lack samples; those that hold until the next value."""
-_LARGE = 10.0
-"""Range of positions without a unit, from which it is said that they are taken as m or rad."""
 
 
 class _Meaning(NamedTuple):
@@ -79,15 +77,6 @@ class Cells:
     def _units_notes(self) -> Iterator[str]:
         """Yield sentences on units that the table has, and on those that it lacks."""
         asked, form = self.asked, self.table.form
-        position, axis = asked.get("position"), "rad" if form.rotary else "m"
-        if position and position.bare and not self.conversions["position"].units:
-            column = self.columns[position.places[0]]
-            low, high = float(np.fmin.reduce(column)), float(np.fmax.reduce(column))
-            if high - low >= _LARGE and (column.dtype.kind == "i" or axis == "m"):
-                yield (
-                    f"the position, {position.text}, has no unit and counts in {axis}, from "
-                    f"{low:.6g} to {high:.6g}: in another one, *NUMBER converts it"
-                )
         if "time" in asked and ROW in asked["time"].places:
             by = "--period" if form.period else "a line above them"
             text = quantity(float(asked["time"].text[4:]), "s")

@@ -126,7 +126,7 @@ def test_a_unit_that_is_not_sure_is_refused_with_a_way(
     ("names", "sentence"),
     [
         ("t [s],x in Foo", "units: t [s]: s; x in Foo: no known unit, taken as m"),
-        ("t,x", "the position, x, has no unit and counts in m, from 0 to 19"),
+        ("t,x", "units: #1: no known unit, taken as s; x: no known unit, taken as m"),
     ],
 )
 def test_what_is_taken_as_si_units_is_said(tmp_path: Path, names: str, sentence: str) -> None:
