@@ -138,7 +138,8 @@ class LawSearch:
             for shape in (None, *shapes)
             for start in self._starts(law, self._regression(law.one_way, shape))
         ]
-        for values in self._nearest(law, starts[1:]):
+        nearest = sorted(starts[1:], key=lambda values: self._misfit(law, values))
+        for values in nearest[:_STARTS]:
             if self.limit.is_over or rms(tried[-1].residual) < _NEAR_SHARE * tried[-1].scale:
                 break
             tried.append(self._begun(law, values))
@@ -216,18 +217,12 @@ class LawSearch:
         names = [name for name in names if name not in (*self.friction, *law.optional)]
         return refine(self._short(law), names, self._known(law, values), most=_FIRST_STEPS)
 
-    def _nearest(
-        self, law: IdentifiedLaw, starts: Sequence[Mapping[str, float]]
-    ) -> Sequence[Mapping[str, float]]:
-        """Return the starts of a search that fit best as they are, the best one first."""
-        if len(starts) <= _STARTS:
-            return starts
-        task, losses = self._short(law), dict[int, float]()
-        for number, values in enumerate(starts):
-            errors = Errors.at(task, (), self._known(law, values), task.starts)
-            left = errors.without_starts(errors.residual[:, None])
-            losses[number] = float(np.sum(left * left))
-        return [starts[number] for number in sorted(losses, key=losses.__getitem__)[:_STARTS]]
+    def _misfit(self, law: IdentifiedLaw, values: Mapping[str, float]) -> float:
+        """Return the squared error at a start of a search, to first order, before any step."""
+        task = self._short(law)
+        errors = Errors.at(task, (), self._known(law, values), task.starts)
+        left = errors.without_starts(errors.residual[:, None])
+        return float(np.sum(left * left))
 
     def _settled(self, near: Errors, most: int = _STEPS) -> Refinement:
         """Return the best fit near other values: segments with wrong starts try others."""

@@ -17,6 +17,7 @@ from stickslip_ros.identification.time_limit import TimeLimit
 from stickslip_ros.model.drive import Drive, in_units_of
 from stickslip_ros.model.drive_layout import MEMORY
 from stickslip_ros.model.plain_drive import drive_system
+from stickslip_ros.motion.motion import Motion
 from stickslip_ros.motion.variational import VariationalMotion
 
 _STEP = 1e-4
@@ -159,13 +160,9 @@ class Trajectories:
                 return np.column_stack(columns) if columns else np.empty((len(base), 0))
 
             of_constants = by_coordinates(partial(_constants_of, drive))
-            scaled, delay = in_units_of(drive, drive), values[DELAY]
+            scaled = in_units_of(drive, drive)
             units = 1.0 / scaled.length_scale, 1.0 / scaled.speed_scale
-            runs = (
-                run
-                for predictor, parts, begun in self._by_record(values, starts)
-                for run in predictor.followed(scaled, parts, begun, delay, VariationalMotion)
-            )
+            runs = self._runs(scaled, values, starts, VariationalMotion)
             each_segment = zip(self.parts, self.segments, starts.tolist(), runs, strict=True)
             for part, segment, (_, velocity), (predicted, rows) in each_segment:
                 order = rows.shape[1] - len(of_constants)
@@ -201,17 +198,12 @@ class Trajectories:
 
     def _predicted(self, values: Mapping[str, float], starts: FloatArray) -> FloatArray:
         """Return the outputs of all segments; far away where there is no motion."""
-        delay = values[DELAY]
         try:
-            drive = self._drive(values)
-            parts_outputs = [
-                output
-                for predictor, parts, begun in self._by_record(values, starts)
-                for output, _ in predictor.followed(drive, parts, begun, delay)
-            ]
+            runs = self._runs(self._drive(values), values, starts, Motion)
+            outputs = np.concatenate([output for output, _ in runs])
         except (InvalidInputError, RunError):
-            return self._bounded(np.full(len(self.measured), np.nan))
-        return self._bounded(np.concatenate(parts_outputs))
+            outputs = np.full(len(self.measured), np.nan)
+        return self._bounded(outputs)
 
     def _drive(self, values: Mapping[str, float]) -> Drive:
         """Return the drive of coordinates; raises InvalidInputError if there is none."""
@@ -221,15 +213,16 @@ class Trajectories:
             raise InvalidInputError(refusal)
         return drive
 
-    def _by_record(
-        self, values: Mapping[str, float], starts: FloatArray
-    ) -> Iterator[tuple[Predictor, Sequence[slice], FloatArray]]:
-        """Yield each predictor with its segments and their starts, which follow one another."""
+    def _runs(
+        self, drive: Drive, values: Mapping[str, float], starts: FloatArray, kind: type[Motion]
+    ) -> Iterator[tuple[FloatArray, FloatArray]]:
+        """Yield the outputs of each segment, and their derivatives; see `Predictor.followed`."""
         pairs = zip(self.segments, starts, strict=True)
         for predictor, segments_of_record in groupby(pairs, key=lambda pair: pair[0].predictor):
             segments, begun = zip(*segments_of_record, strict=True)
             parts = [segment.samples for segment in segments]
-            yield predictor.lagging(values[LAG]), parts, np.array(begun)
+            followed = predictor.lagging(values[LAG]).followed
+            yield from followed(drive, parts, np.array(begun), values[DELAY], kind)
 
     def _bounded(self, outputs: FloatArray) -> FloatArray:
         span = _UNBOUNDED_ERROR * float(np.ptp(self.measured))

@@ -342,18 +342,3 @@ def test_a_disturbance_is_not_late_as_the_force_is() -> None:
     late, _ = closed_loop(record, axis(COULOMB), weak, 0.02)
     assert np.flatnonzero(late)[0] == 101
     assert late.tolist() == closed_loop(record, axis(COULOMB), weak, 0.0)[0].tolist()
-
-
-def test_no_velocity_at_the_start_near_the_found_one_is_better() -> None:
-    drive, velocity = axis(Coulomb(static=20.0, viscous=200.0)), 0.35
-    time, still = 1e-3 * np.arange(4000), np.zeros(4000)
-    force = 60.0 * np.sin(9.0 * time) + 40.0 * np.sin(31.0 * time)
-    start = Record("axis", 1e-3, still, still, force=force)
-    position = np.rint(Predictor(start).positions(drive, velocity) / 1e-6) * 1e-6
-    moved = replace(start, position=position)
-    found, positions = Predictor(moved).free_run(drive)
-    assert found == pytest.approx(velocity, rel=0.05)
-    error = np.std(positions - position)
-    for share in (-0.05, -0.01, 0.01, 0.05):
-        other = Predictor(moved).positions(drive, (1.0 + share) * found)
-        assert error < 1.05 * np.std(other - position)
