@@ -69,7 +69,7 @@ class Derivatives:
     @property
     def matrix(self) -> FloatArray:
         """Derivatives of the states (rows); may be a view that the next step overwrites."""
-        return self._matrix if self._holder is None else self._integrated(self._holder)
+        return self._matrix
 
     def _integrated(self, flow: CompiledFlow | None) -> FloatArray:
         """Return the derivatives in an integrator."""
@@ -80,16 +80,16 @@ class Derivatives:
     def begin(self, mode: Mode, flow: CompiledFlow | None, now: float, end: float) -> float:
         """Hand the derivatives to the integrator; see `PhaseObserver`."""
         if flow is not self._holder:
-            matrix = self.matrix
-            self._integrated(flow)[:] = matrix
-            self._holder = flow
+            held = self._integrated(flow)
+            held[:] = self._matrix
+            self._matrix, self._holder = held, flow
         return end
 
     def take(self, phase: Phase, system: DriveSystem, instant: Instant) -> None:
         """Let the derivatives jump at a guard; see `PhaseObserver`."""
         if phase.guard is None or phase.following is None:
             return
-        matrix, order = self.matrix.copy(), len(self._matrix)
+        matrix, order = self._matrix.copy(), len(self._matrix)
         state = np.array(phase.state_at_guard)
         before, gradients = rates(system, phase.mode, instant, state)
         gradient = gradients[order + phase.guard]
