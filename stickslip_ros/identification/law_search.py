@@ -40,9 +40,9 @@ _RESTART_LOSS_RATIO = 0.95
 """Other starts of segments must lower the squared error to this share, or the search ends."""
 _NEAR_SHARE = 1e-3
 """Share of the motion from which on an error needs no other start."""
-_SHAPES, _STARTS = (0.1, 0.3, 0.8), 3
-"""Shapes from which the search starts, besides that of the regression: shares of the speeds; starts
-from which it takes steps, besides the first."""
+_SHAPES, _MEMORY_STARTS = (0.1, 0.3, 0.8), 3
+"""Shapes from which the search starts, besides that of the regression: shares of the speeds; and
+the number of starts of a law with a memory from which it takes steps, besides the first."""
 _OPTIONAL_GAIN, _OPTIONAL_ERRORS = 0.05, 4.0
 """Share of the squared error, and standard errors, for which one more constant is searched."""
 _CLEAR_GAIN = 0.5
@@ -138,8 +138,10 @@ class LawSearch:
             for shape in (None, *shapes)
             for start in self._starts(law, self._regression(law.one_way, shape))
         ]
-        nearest = sorted(starts[1:], key=lambda values: self._misfit(law, values))
-        for values in nearest[:_STARTS]:
+        others = starts[1:]
+        if law.memory:  # its steps take long, and no coordinate stays as it is at the start
+            others = sorted(others, key=lambda values: self._misfit(law, values))[:_MEMORY_STARTS]
+        for values in others:
             if self.limit.is_over or rms(tried[-1].residual) < _NEAR_SHARE * tried[-1].scale:
                 break
             tried.append(self._begun(law, values))
