@@ -17,6 +17,8 @@ _NEAR_NOISES = 4.0
 """Distance from a rest that is none, in standard deviations of the noise."""
 _NEAR_SHARE = 1e-3
 """Distance from a rest that is none, as a share of the slip."""
+_OVER = 3.0
+"""Distance beyond a rest from which a slip overshoots it, in distances that are none."""
 _FAR_SHARE = 0.25
 """Distance from a rest up to which an edge is fitted, as a share of the slip, at most."""
 _FAR_NEARS = 40.0
@@ -78,15 +80,19 @@ def _edge(
     course: FloatArray, near: float, size: float, powers: tuple[float, ...]
 ) -> tuple[float, float]:
     """Return the row at which a course leaves zero on its way to a slip of this size; its error."""
-    inside = np.flatnonzero(course <= near)
+    inside = np.flatnonzero(np.abs(course) <= near)
+    over = course < -_OVER * near
+    over[: inside[0] if len(inside) else None] = False
+    if over.any():  # beyond the rest, from where the slide comes back
+        inside, size = inside[inside < np.argmax(over)], -float(course.min())
     last = int(inside[-1]) if len(inside) else 0
     far = near + min(_FAR_SHARE * size, _FAR_NEARS * near)
-    beyond = np.flatnonzero(course[last + 1 :] > far)
+    beyond = np.flatnonzero(np.abs(course[last + 1 :]) > far)
     end = last + 2 + int(beyond[0]) if len(beyond) else len(course)
     rows = np.arange(last + 1, min(end, len(course)))
     if len(rows) < 3:
         return last + 0.5, hypot(_ROW_ERROR, 0.3)
-    values, middle = np.maximum(course[rows], 0.0), (rows[0] + rows[-1]) / 2.0
+    values, middle = np.abs(course[rows]), (rows[0] + rows[-1]) / 2.0
     lag, exponents = rows - middle, np.array(powers)[:, np.newaxis]
     roots = values ** (1.0 / exponents)
     offset, slope = roots.mean(axis=1), roots @ lag / (lag @ lag)

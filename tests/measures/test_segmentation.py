@@ -1,0 +1,67 @@
+"""Rests and slips that are not those of a simulated drive, as machines record them."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from stickslip_ros.arrays import FloatArray
+from stickslip_ros.measures.segmentation import stick_slip
+from tests.measures.records import milliseconds
+
+PERIOD, TRAVEL, SLIP, STEP = 0.7, 1e-3, 0.2, 2e-6
+STAMPS = milliseconds(8000)
+
+
+def stairs(time: FloatArray, over: float = 0.0, uneven: float = 0.0) -> FloatArray:
+    """Rests, and slips by a travel within `SLIP`, which may go too far first; m.
+
+    Rests are longer and shorter by turns by an `uneven` share, as the travel after them.
+    """
+    position = np.zeros(len(time))
+    for number in range(round(time[-1] / PERIOD) + 2):
+        late = uneven * PERIOD * (number % 2)
+        u = np.clip((time - number * PERIOD - late) / SLIP, 0.0, 1.0)
+        slip = (1.0 - np.cos(np.pi * u)) / 2.0
+        if over:
+            slip = (
+                np.where(u < 0.5, 0.0, 1.0)
+                + np.where(u < 0.5, 1.0 + over, over) * (1.0 - np.cos(2.0 * np.pi * u)) / 2.0
+            )
+        position += slip * TRAVEL * (1.0 - uneven if number % 2 else 1.0 + uneven)
+    return position
+
+
+def late(time: FloatArray) -> FloatArray:
+    """Return times of which a twentieth is late by most of a sample period."""
+    return time + 7e-4 * (np.random.default_rng(1).random(len(time)) < 0.05)
+
+
+def dropped(time: FloatArray) -> FloatArray:
+    """Return nineteen of twenty times."""
+    return time[np.random.default_rng(1).random(len(time)) > 0.05]
+
+
+@pytest.mark.parametrize("over", [0.0, 0.03, 0.08, 0.2, 0.5])
+@pytest.mark.parametrize("noise", [0.0, STEP])
+def test_a_slip_that_overshoots_ends_when_it_has_come_back(over: float, noise: float) -> None:
+    time = STAMPS * 1e-9
+    position = stairs(time, over) + noise * np.random.default_rng(1).standard_normal(len(time))
+    found = stick_slip(time, np.round(position / STEP) * STEP, 0.0, 20, STEP)
+    assert found is not None
+    assert found.rests
+    assert found.cycle.period == pytest.approx(PERIOD, rel=1e-3)
+    assert found.cycle.stick_fraction == pytest.approx(1.0 - SLIP / PERIOD, abs=0.02)
+
+
+@pytest.mark.parametrize("times", [late, dropped])
+@pytest.mark.parametrize("uneven", [0.0, 0.3])
+def test_rests_by_turns_and_stamps_that_are_uneven_change_little(
+    times: Callable[[FloatArray], FloatArray], uneven: float
+) -> None:
+    time = times(STAMPS * 1e-9)
+    found = stick_slip(time, np.round(stairs(time, 0.0, uneven) / STEP) * STEP, 0.0, 20, STEP)
+    assert found is not None
+    assert found.rests
+    assert found.cycle.period == pytest.approx(PERIOD, rel=0.05)
+    assert found.cycle.stick_fraction == pytest.approx(1.0 - SLIP / PERIOD, abs=0.02)
