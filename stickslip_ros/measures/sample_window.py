@@ -26,9 +26,9 @@ from stickslip_ros.measures.single_cycles import (
     vertex,
 )
 
-REVERSAL, _REVERSAL_SHARE = 8.0, 0.1
-"""Least size of a reversal, in standard deviations of the noise, and as a share of the last cycle.
-"""
+REVERSAL, _REVERSAL_STEPS, _REVERSAL_SHARE = 8.0, 1.5, 0.1
+"""Least size of a reversal, in standard deviations of the noise, in steps of the encoder, and as a
+share of the last cycle."""
 _BATCH, _LOOK_INTERVAL, _FIRST_LOOK, _LOOK_LENGTH = 32, 512, 128, 2048
 """Number of samples after which cycles are looked for, after which, and first, the noise is
 estimated and cycles are looked for in long ones, and from which the noise is estimated."""
@@ -160,6 +160,9 @@ class WindowMeter:
         if count < 3:
             return
         noise, step = white_noise(position), encoder_step(position)
+        # One step from each sample to the next is a uniform motion, as of a slide that sticks.
+        if np.ptp(position) > (count - 1.5) * step and np.abs(np.diff(position)).max() < 1.5 * step:
+            step = 0.0
         if belt.any():  # the encoder may be that of a guide at rest
             course = position - float(belt[-1]) * (recent.time - recent.time[0])
             step = max(step, encoder_step(course, ROUNDING))
@@ -168,11 +171,8 @@ class WindowMeter:
             self.noise, self.noisy = noise, True
         if step > 0.0:
             self.step = min(self.step or inf, step)
-            # Steps that divide the travel of a sample leave no noise where it is looked for. One
-            # step from each sample to the next is a uniform motion, as of a slide that sticks.
-            uniform = np.ptp(position) > (count - 1.5) * step
-            uniform = uniform and float(np.abs(np.diff(position)).max()) < 1.5 * step
-            self.noisy |= self.step > _ROUNDING_SHARE * moved and not uniform
+            # Steps that divide the travel of a sample leave no noise where it is looked for.
+            self.noisy |= self.step > _ROUNDING_SHARE * moved
         fastest = float(np.abs(recent.velocity).max())
         of_velocity = white_noise(recent.velocity)
         if of_velocity > max(_ROUNDING_SHARE * fastest, PRECISION * float(np.abs(belt).max())):
@@ -189,7 +189,7 @@ class WindowMeter:
         size = 2.0 * self._cycles[-1].amplitude if moves else 0.0
         completed: list[Cycle] = []
         # The median of the last position takes one more.
-        least = max(REVERSAL * self.noise, _REVERSAL_SHARE * size)
+        least = max(REVERSAL * self.noise, _REVERSAL_STEPS * self.step, _REVERSAL_SHARE * size)
         for rows in reversals(held.position[first:-1], least):
             high, low = (first + row for row in rows)
             reach = reach_beside(low, high)

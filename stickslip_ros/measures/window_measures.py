@@ -51,6 +51,8 @@ _LEAST_SLIP, _APART = 12.0, 4.0
 """Samples in a slip from which it does; errors of a stick fraction within which both agree."""
 _SAME_VELOCITY, _REST_SHARE = 0.05, 0.2
 """Relative difference of two velocities of a guide that are the same; share of rests on another."""
+_UNLIKE = 0.2
+"""Standard error of the mean period, in periods, above which cycles have nothing in common."""
 _OTHER_SPEED = 0.1
 """Share of the belt speed by which that of a stick differs at most."""
 _SLIP_SHARE = 0.1
@@ -236,7 +238,9 @@ def _by_reversals(
         measures = replace(measures, errors={**measures.errors, "stick_fraction": error})
     if measures.stick_fraction and measures.cycles < LEAST_CYCLES:  # nobody knows how much it errs
         measures = replace(measures, stick_fraction=None)
-    return measures, None
+    periods = [cycle.period for cycle in part.cycles]
+    unlike = np.std(periods) > _UNLIKE * np.mean(periods) * len(periods) ** 0.5
+    return _undecided(measures) if unlike else measures, None
 
 
 def _by_line(

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from stickslip_ros.arrays import FloatArray
+from stickslip_ros.measures.cycle_measures import Regime
+from stickslip_ros.measures.sample_assumptions import UNKNOWN
 from stickslip_ros.measures.segmentation import stick_slip
-from tests.measures.records import milliseconds
+from tests.measures.records import columns, fed, milliseconds
 
 PERIOD, TRAVEL, SLIP, STEP = 0.7, 1e-3, 0.2, 2e-6
 STAMPS = milliseconds(8000)
@@ -65,3 +67,12 @@ def test_rests_by_turns_and_stamps_that_are_uneven_change_little(
     assert found.rests
     assert found.cycle.period == pytest.approx(PERIOD, rel=0.05)
     assert found.cycle.stick_fraction == pytest.approx(1.0 - SLIP / PERIOD, abs=0.02)
+
+
+@pytest.mark.parametrize("start", [150, 250, 400, 600, 650])
+def test_a_capture_of_one_and_a_half_periods_has_no_false_regime(start: int) -> None:
+    time = STAMPS[: round(1500.0 * PERIOD)] * 1e-9
+    seen = np.round(stairs(time + start * 1e-3) / 1.6e-5) * 1.6e-5
+    feed = TRAVEL / PERIOD
+    measures = fed(columns(STAMPS[: len(time)], feed * time - seen, None, feed), UNKNOWN).measures()
+    assert measures.regime in (None, Regime.STICK_SLIP)
