@@ -124,7 +124,9 @@ def _fit(
         row[2] = noise / prior
         residual = np.append(x - design[:, 3:] @ linear, -shape[2] * row[2])
         change = _least_squares(np.vstack([design, row]), residual)[:3]
-        shape = shape + _limited(change, omega, abs(float(shape[0])))
+        limits = omega * np.array([0.02, 0.02, 0.002])  # what the next step bears
+        limits[2] += abs(shape[0]) / 4.0
+        shape = shape + np.clip(change, -limits, limits)
         linear = _least_squares(_columns(time, shape), x)
         if np.all(np.abs(change) < 1e-7 * omega):
             break
@@ -164,12 +166,6 @@ def _design(
         for step, change in zip(steps, np.diag(steps), strict=True)
     ]
     return np.column_stack([*slopes, _columns(time, shape)])
-
-
-def _limited(change: FloatArray, omega: float, decay: float) -> FloatArray:
-    """Return a change of the shape within what the next step bears."""
-    limits = omega * np.array([0.02, 0.02, 0.002]) + np.array([0.0, 0.0, decay / 4.0])
-    return np.clip(change, -limits, limits)
 
 
 def _columns(time: FloatArray, shape: FloatArray) -> FloatArray:

@@ -65,7 +65,10 @@ class Window:
     @property
     def resting(self) -> bool:
         """Whether no reversal has come for several periods."""
-        return _is_resting(self.samples, self.cycles, self.lows)
+        if not self.cycles:
+            return False
+        since = float(self.samples.time[-1]) - self.lows[-1].time
+        return since > STALE_PERIODS * self.cycles[-1].period
 
 
 class WindowMeter:
@@ -180,12 +183,12 @@ class WindowMeter:
 
     def _advance(self) -> list[Cycle]:
         """Return the cycles that the samples since the last one complete."""
-        held, lows = self._held, self._lows
-        samples = held[:-_UNKNOWN]
+        held, lows, window = self._held, self._lows, self.window(alone=True)
+        samples = window.samples
         first = samples.row(lows[-1].time) if lows else max(len(samples) - _WITHOUT_CYCLES, 0)
         if len(samples) - first >= _WITHOUT_CYCLES and self._run % _LOOK_INTERVAL:
             return []
-        moves = self._cycles and not _is_resting(samples, self._cycles, lows)
+        moves = self._cycles and not window.resting
         size = 2.0 * self._cycles[-1].amplitude if moves else 0.0
         completed: list[Cycle] = []
         # The median of the last position takes one more.
@@ -212,9 +215,3 @@ class WindowMeter:
                 lows.popleft()
                 self._cycles.popleft()
         return completed
-
-
-def _is_resting(samples: NoisySamples, cycles: Sequence[Cycle], lows: Sequence[Point]) -> bool:
-    if not cycles:
-        return False
-    return float(samples.time[-1]) - lows[-1].time > STALE_PERIODS * cycles[-1].period
