@@ -20,7 +20,7 @@ from stickslip_ros.identification.laws import (
 )
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.regression import Regression, regress
-from stickslip_ros.identification.rows import LINEAR, Rows
+from stickslip_ros.identification.regression_rows import LINEAR, Rows
 from stickslip_ros.identification.time_limit import TimeLimit
 
 _RESOLVED_ERROR_RATIO = 0.9

@@ -13,7 +13,7 @@ from stickslip_ros.identification.identified_law import DELAY, IdentifiedLaw
 from stickslip_ros.identification.laws import COMPETING, KNOWN_LAWS, TableAdapter
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.regression import Regression
-from stickslip_ros.identification.rows import LINEAR
+from stickslip_ros.identification.regression_rows import LINEAR
 from stickslip_ros.identification.table_adjustment import adjusted
 from stickslip_ros.identification.time_limit import TimeLimit
 from stickslip_ros.model.constants import constants_of

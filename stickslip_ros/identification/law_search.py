@@ -17,8 +17,8 @@ from stickslip_ros.identification.predictor import Predictor
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.refinement import OPTIONAL, Refinement
 from stickslip_ros.identification.regression import Regression, regress
+from stickslip_ros.identification.regression_rows import LINEAR, Rows
 from stickslip_ros.identification.rests import static_force
-from stickslip_ros.identification.rows import LINEAR, Rows
 from stickslip_ros.identification.search import refine
 from stickslip_ros.identification.segment_starts import Errors, best_starts
 from stickslip_ros.identification.stopping_rules import (

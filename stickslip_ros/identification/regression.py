@@ -16,7 +16,7 @@ from stickslip_ros.identification.identified_law import DELAY, IdentifiedLaw
 from stickslip_ros.identification.laws import DirectionalAdapter
 from stickslip_ros.identification.predictor import Predictor
 from stickslip_ros.identification.record import Record
-from stickslip_ros.identification.rows import Rows
+from stickslip_ros.identification.regression_rows import Rows
 
 _FASTEST_SHAPE = 4.0
 """Largest shape of a curve that is sought, in fastest speeds."""

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from stickslip_ros.model.drive import Drive
 from stickslip_ros.model.sensor import EXACT_SENSOR, Sensor
 from stickslip_ros.model.signals import NO_SIGNAL, Signal
-from stickslip_ros.motion.answers import Answers, Verdict
+from stickslip_ros.motion.force_answers import Answers, Verdict
 from stickslip_ros.motion.force_line import ForceLine
 from stickslip_ros.motion.sampler import Sampler, SampleStamps
 from stickslip_ros.samples import Sample

@@ -13,7 +13,7 @@ from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 
 from stickslip_ros.errors import BagError, InvalidInputError
-from stickslip_ros.motion.answers import Verdict
+from stickslip_ros.motion.force_answers import Verdict
 from stickslip_ros.motion.motion import Motion
 from stickslip_ros.motion.sampled_loop import LOCKSTEP_START, SampledLoop
 from stickslip_ros.nodes.base import managed

@@ -12,7 +12,7 @@ from typing import Any
 
 from stickslip_ros.errors import BagError, InvalidInputError
 from stickslip_ros.record.expressions import Expression, listed
-from stickslip_ros.record.units import force_per_ampere
+from stickslip_ros.record.header_units import force_per_ampere
 from stickslip_ros.text import shown
 
 _OWN_COLUMNS = {

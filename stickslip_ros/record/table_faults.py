@@ -10,10 +10,10 @@ import numpy as np
 from stickslip_ros.arrays import FloatArray, IntArray
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.record.faults import Jumps, lost_velocities, shift_note
+from stickslip_ros.record.header_units import units_in
 from stickslip_ros.record.imperfections import play_note, ripple_note
 from stickslip_ros.record.table_clock import Rows, finite_rows, picked
 from stickslip_ros.record.table_units import Cells
-from stickslip_ros.record.units import units_in
 
 Values = dict[str, FloatArray]
 """Quantities by name, arrays of shape (rows,)."""

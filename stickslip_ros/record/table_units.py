@@ -9,10 +9,10 @@ import numpy as np
 from stickslip_ros.arrays import FloatArray, windows
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.quantities import ROTARY
+from stickslip_ros.record.comment_units import mentions, unit_told
 from stickslip_ros.record.expressions import Expression
-from stickslip_ros.record.remarks import mentions, unit_told
+from stickslip_ros.record.header_units import Unit, other_quantity, units_in
 from stickslip_ros.record.table_columns import ROW, Table
-from stickslip_ros.record.units import Unit, other_quantity, units_in
 from stickslip_ros.samples import LARGEST
 from stickslip_ros.text import quantity, shown
 

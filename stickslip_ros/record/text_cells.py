@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.record.units import are_units
+from stickslip_ros.record.header_units import are_units
 
 GROUPED = r"(?:(?<=\d)(?<!\d{4})['\u2019\xa0\u202f ](?=\d{3}(?!\d)))"
 """Marks between thousands that are no decimal marks."""

@@ -20,9 +20,15 @@ from unicodedata import normalize
 
 from stickslip_ros.files import open_regular
 from stickslip_ros.record.expressions import listed
+from stickslip_ros.record.header_units import (
+    NO_UNITS,
+    are_units,
+    joined_units,
+    period_in,
+    without_unit,
+)
 from stickslip_ros.record.table_columns import TableFormat
 from stickslip_ros.record.text_cells import NUMBER, TIME, unit_of
-from stickslip_ros.record.units import NO_UNITS, are_units, joined_units, period_in, without_unit
 
 _HEAD = 1 << 20
 """Bytes from which the form is found."""

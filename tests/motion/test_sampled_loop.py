@@ -14,8 +14,8 @@ from stickslip_ros.model.control import VelocityFeedback
 from stickslip_ros.model.sensor import Measure, Sensor
 from stickslip_ros.model.signals import sine, step
 from stickslip_ros.motion import Motion, RecordedMotion
-from stickslip_ros.motion.answers import Verdict
 from stickslip_ros.motion.controller import Controller
+from stickslip_ros.motion.force_answers import Verdict
 from stickslip_ros.motion.sampled_loop import SampledLoop
 from stickslip_ros.motion.sampler import SampleStamps
 from stickslip_ros.motion.simulation import simulate_sampled

@@ -13,8 +13,8 @@ from stickslip_ros.measures.cycle_measures import Measures, Regime
 from stickslip_ros.measures.cycle_meter import CycleMeter
 from stickslip_ros.model.control import Washout
 from stickslip_ros.motion import Motion, RecordedMotion
-from stickslip_ros.motion.answers import Verdict
 from stickslip_ros.motion.controller import Controller
+from stickslip_ros.motion.force_answers import Verdict
 from stickslip_ros.motion.sampled_loop import LOCKSTEP_START, SampledLoop
 from stickslip_ros.motion.simulation import simulate_sampled
 from tests.drives import FEED_DRIVE, PAPER

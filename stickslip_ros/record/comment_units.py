@@ -6,7 +6,7 @@ from functools import cache
 from math import isnan
 from typing import NamedTuple
 
-from stickslip_ros.record.units import Unit, are_units, units_in
+from stickslip_ros.record.header_units import Unit, are_units, units_in
 
 _WORD = re.compile(r"[^\W\d_][^\s\d,;:=()\[\]{}<>|、]*")
 _WORDS = re.compile(r"(?i)(?:in|min|h|d|yd|dyn|mil|turns?|rot|foot|yard|day|grad)\W*")

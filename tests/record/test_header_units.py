@@ -4,7 +4,13 @@ from math import inf, isnan, pi
 
 import pytest
 
-from stickslip_ros.record.units import are_units, other_quantity, period_in, units_in, without_unit
+from stickslip_ros.record.header_units import (
+    are_units,
+    other_quantity,
+    period_in,
+    units_in,
+    without_unit,
+)
 
 TURN, DEGREE = 2.0 * pi, pi / 180.0
 NO_UNIT, DOUBTFUL = inf, 0.0
