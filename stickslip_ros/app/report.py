@@ -62,7 +62,7 @@ def run(arguments: argparse.Namespace) -> None:
     from stickslip_ros.record.bag_files import runs_of
     from stickslip_ros.record.table_file import is_table
 
-    bags: list[Path] = arguments.recordings
+    bags: list[Path] = [*dict.fromkeys(arguments.recordings)]
     check_results(arguments)
     for option, path in (("--plot", arguments.plot), ("--html", arguments.html)):
         if path is not None and len(bags) > _MOST_DRAWN:
