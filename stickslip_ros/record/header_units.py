@@ -298,6 +298,7 @@ def _last(name: str, target: str) -> Iterator[Unit]:
     starts = [match.start() for match in _START.finditer(name)]
     for start in starts[-4:]:
         text, before = name[start:], name[:start]
+        text = text.lower() if text in ("Ms", "Mm", "Us", "Um") else text  # as in timeMs
         rest = text[3:] if re.match(rf"(?i)in[\W_](?!{_PER})", text) else ""
         if readings := [*_doubted(rest, target)] or [*_doubted(text, target, alone=not before)]:
             if re.match(r"(?i)per(?![^\W_])", text) and _counts(before):

@@ -182,9 +182,10 @@ class Table(ABC):
         number = next(filter(_NUMBERED.match, known), f"#{place + 1}")
         return number if number[0] == "#" else f"'{number}'"
 
-    def is_own(self, quantities: Iterable[str]) -> bool:
-        """Return whether these quantities are in columns that have their names."""
-        return all(self.columns.keys() & _OWN_COLUMNS.get(name, ()) for name in quantities)
+    @property
+    def is_own(self) -> bool:
+        """Whether the table has the columns that `stickslip simulate --out` always writes."""
+        return self.columns.keys() >= {*_OWN_COLUMNS} - {"force", "reference"}
 
     @property
     def own_columns(self) -> dict[str, str]:

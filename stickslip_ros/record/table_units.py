@@ -64,7 +64,14 @@ class Cells:
     ) -> None:
         """Take expressions by quantity, and columns by place; see `conversion` for errors."""
         self.table, self.asked, self.columns = table, asked, columns
-        self.conversions = {name: conversion(table, name, text) for name, text in asked.items()}
+        self.conversions, refused = dict[str, Conversion](), list[str]()
+        for name, text in asked.items():
+            try:
+                self.conversions[name] = conversion(table, name, text)
+            except InvalidInputError as error:
+                refused.append(str(error).removeprefix(f"{table.path}: "))
+        if refused:
+            raise InvalidInputError(f"{table.path}: {'; '.join(refused)}")
         self.notes = [*table.notes, *_lost_cells(table, columns, asked), *self._units_notes()]
         """Sentences on how the table was read."""
 
@@ -88,7 +95,7 @@ class Cells:
         units = [f"{name}: {unit.text}" for name, unit in by_column.items()]
         for name, expression in asked.items():
             timed = name == "time" and (self.table.clocks or self.table.period)
-            known = timed or self.conversions[name].units or self.table.is_own(asked)
+            known = timed or self.conversions[name].units or self.table.is_own
             if expression.bare and not known:
                 unit = "A" if name == "force" and form.per_ampere else QUANTITIES[name]
                 beside = next(mentions(self.table.remarks, unit), None)
@@ -155,7 +162,11 @@ def _unit(table: Table, place: int, start: str, column: str, meaning: _Meaning) 
     cells = table.names[place], table.units[place]
     readings = units_in(*cells, target)
     if not readings and (told := unit_told(table.remarks, table.names[place])):
-        readings = units_in(cells[0], told, target)
+        by_line = units_in(cells[0], told, target)
+        readings = [
+            unit if isnan(unit.factor) else unit._replace(text=f"{unit.text} by a line above")
+            for unit in by_line
+        ]
     said = [] if readings else [m for m in mentions(table.remarks, target) if not m.is_fact]
     if said:
         readings = [*{m.unit.factor: m.unit for m in said}.values(), Unit("", 1.0, target)]

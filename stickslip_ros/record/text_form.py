@@ -51,6 +51,8 @@ _BROKEN = re.compile(r'(?<![^\n,;\t|])"[^"\n]*(?:\n[^"\n]*){1,3}"(?![^\n,;\t|])'
 _JOINED = "\v\n"
 """In place of a line that is at the start of the next one."""
 _COMMENT = re.compile(r"^\s*(?:#|%|//)\s*")
+_UNIT_OF = re.compile(r"(?i)\w\W?units?\W*$")
+"""What is before the unit of a channel: `HUnit`, `Length unit:`."""
 _NO_NUMBERS = ("", "na", "n/a", "null", "none", "#n/a", "#na", "<na>")
 
 
@@ -156,7 +158,7 @@ def form_of(stream: BinaryIO, given: TableFormat) -> TextForm:
     names = [labels.get(place - 1, name) for place, name in enumerate(head.names)]
     known = {head.skipped, (head.units_line or 0) - 1}
     above = [
-        normalize("NFKC", _COMMENT.sub("", line)[:_LONGEST].strip())
+        normalize("NFKC", _COMMENT.sub("", line)[:_LONGEST].replace('"', " ").strip())
         for place, line in enumerate(lines[: head.first][:_TOP])
         if place not in known and not period_in(line)
     ]
@@ -326,6 +328,8 @@ def _texts_above(lines: list[str], first: int, skip: int, rows: _LastRows) -> li
         row = _cells(_COMMENT.sub("", lines[place]), rows.separator)
         _, values = rows.texts_and_values(row)
         row = joined_units(row, width)
+        if len(row) == 2 and _UNIT_OF.search(row[0]) and are_units(row[1:]):
+            break  # a fact of an oscilloscope: HUnit, s
         if len(row) == width - 1 and not any(cells[-1] for cells in rows.cells):
             row.append("")  # a separator at the end of each row
         if len(row) == width + 1 and row[-1] == "Comment":

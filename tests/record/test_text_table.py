@@ -194,6 +194,7 @@ def test_units_above_and_below_the_names_and_of_skipped_names_are_used(
         ("x: encoder counts", "is in counts, which is no unit of position"),
         ("stroke 20 mm, feed (mm/min): 5", "x: no known unit, taken as m, below the line 'stroke"),
         ("units: s, V", "x: no known unit, taken as m, below the line 'units: s, V'"),
+        ('"Length unit:","cm"', "above, may be in cm (0.01 m)"),
         ("2024-05-01 10:00:00 machine 3, load 12 kg, sampled at 1 kHz", ""),
         ("Operator: A. Smith, h = 12 d, turn off the yard light; position in m, time in s", ""),
     ],
