@@ -306,6 +306,17 @@ class SampleMeter:
             speed = STICK_SHARE * (self._speeds.belt or self._speeds.slip)
         return self.reading._replace(stick_speed=speed)
 
+    @property
+    def _by_breakpoints(self) -> bool:
+        """Whether breakpoints are needed: the samples may be exact, or an observer wants them."""
+        return not self.reading.noisy or self._observer is not None
+
+    @property
+    def _by_window(self) -> bool:
+        """Whether a window is needed: for samples with noise, few in a cycle, or beside a guide."""
+        few = self._per_cycle < FEW_SAMPLES
+        return self.reading.noisy is not False or self._speeds.belt == 0.0 or few
+
     def _feed_segment(self, samples: SampleColumns) -> list[Cycle]:
         """Feed the meters with samples that continue the motion, from the last one fed on."""
         stamp, belt = samples.stamp, samples.belt_velocity
@@ -314,24 +325,14 @@ class SampleMeter:
         new = slice(0 if self._last is None else 1, None)
         self.drift.position.feed(time[new], samples.position[new])
         self._speeds.slip = max(self._speeds.slip, float(np.abs(samples.velocity - belt).max()))
-        given, breakpoints, cycles = self.reading.noisy, None, list[Cycle]()
-        if not given or self._observer is not None:
-            with np.errstate(over="ignore", invalid="ignore"):
-                breakpoints = breakpoints_from_samples(
-                    time,
-                    samples.position,
-                    samples.velocity,
-                    belt,
-                    stick_speed=self._known.stick_speed or 0.0,
-                    exact_times=self._grid.on_grid(np.diff(stamp)),
-                )
-            if self._last is not None:
-                breakpoints = breakpoints[1:]  # the first sample was fed with the previous block
+        breakpoints, cycles = None, list[Cycle]()
+        if self._by_breakpoints:
+            breakpoints = self._breakpoints(samples, time)
             self._meter.within = self.reading.within
             cycles = self._meter.feed(breakpoints, float(belt[-1]), self._speeds.belt)
             if cycles and len(time) > 1:
                 self._per_cycle = cycles[-1].period / median(np.diff(time))
-        if given is not False or self._speeds.belt == 0.0 or self._per_cycle < FEW_SAMPLES:
+        if self._by_window:
             under_noise = self._window.feed(
                 time[new], samples.position[new], samples.velocity[new], belt[new]
             )
@@ -343,14 +344,27 @@ class SampleMeter:
             observed = (stamp - self.origin) / NANOSECONDS
             # Rounding may put a breakpoint after the last sample.
             rows = np.minimum(np.searchsorted(time, breakpoints.time), len(time) - 1)
-            known = LONGEST_GAP * median(np.diff(observed)) if len(observed) > 1 else inf
             self._observer.take_motion(
                 MeasuredMotion(
                     replace(breakpoints, time=np.interp(breakpoints.time, time, observed)),
                     belt[rows],
                     cycles,
                     (np.array(ends) + (observed[0] - time[0])).tolist(),
-                    known,
+                    LONGEST_GAP * median(np.diff(observed)) if len(observed) > 1 else inf,
                 )
             )
         return cycles
+
+    def _breakpoints(self, samples: SampleColumns, time: FloatArray) -> Breakpoints:
+        """Return the breakpoints of samples at these times, s, behind those fed before."""
+        with np.errstate(over="ignore", invalid="ignore"):
+            breakpoints = breakpoints_from_samples(
+                time,
+                samples.position,
+                samples.velocity,
+                samples.belt_velocity,
+                stick_speed=self._known.stick_speed or 0.0,
+                exact_times=self._grid.on_grid(np.diff(samples.stamp)),
+            )
+        # The first sample was fed with the previous block.
+        return breakpoints if self._last is None else breakpoints[1:]
