@@ -10,6 +10,7 @@ from collections import deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, closing
 from itertools import chain
+from os.path import abspath
 from pathlib import Path
 from typing import Self
 
@@ -154,7 +155,7 @@ def runs_of(bags: Iterable[Path]) -> dict[Path, dict[Path, float]]:
     """
     runs: dict[Path, dict[Path, float]] = {}
     for bag in bags:
-        if bag.resolve() in {other.resolve() for one in runs for other in (one, *runs[one])}:
+        if abspath(bag) in {abspath(other) for one in runs for other in (one, *runs[one])}:
             raise InvalidInputError(f"{bag} is given twice")
         for first, continued in runs.items():
             if re.fullmatch(re.escape(str(first)) + r"_\d+", str(bag)) and bag.is_dir():
