@@ -48,11 +48,6 @@ class DimensionlessDrive(HybridSystem):
         self.inputs = ("force", "disturbance") if separate else ("force",)
         self.forces = DriveForces(self.drive, self.control, self.slots)
         """The forces at an instant, but for friction."""
-        self.has_guide_damping = self.drive.guide_damping != 0.0
-        self.steady = not belt.pieces
-        """Whether the speed of the belt is constant."""
-        self.may_lift = 1.0 + load.bounds[0] < -LIFT_ROUNDING
-        """Whether the normal force may fall below zero: then a guard ends the motion."""
         self._loaded = bool(load.pieces)
         is_static = self.autonomous and not law.states and not law.switches
         self._static_friction = law.coefficient if is_static else None
@@ -91,6 +86,21 @@ class DimensionlessDrive(HybridSystem):
                 yield "step_limiter", 1.0 / (_CHANGE_IN_A_STEP * law.characteristic_speed)
         free = [name for name in self.free_constants if name in constants_of(DriveConstants)]
         yield from ((name, getattr(drive, name)) for name in free if name not in names)
+
+    @cached_property
+    def has_guide_damping(self) -> bool:
+        """Whether the guide damps the slide."""
+        return self.drive.guide_damping != 0.0
+
+    @cached_property
+    def may_lift(self) -> bool:
+        """Whether the normal force may fall below zero: then a guard ends the motion."""
+        return 1.0 + self.drive.load.bounds[0] < -LIFT_ROUNDING
+
+    @cached_property
+    def steady(self) -> bool:
+        """Whether the speed of the belt is constant."""
+        return not self.drive.belt.pieces
 
     @cached_property
     def autonomous(self) -> bool:
