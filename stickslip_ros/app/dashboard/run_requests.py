@@ -18,15 +18,17 @@ from std_srvs.srv import Trigger
 
 from stickslip_ros.app.dashboard.run_state import Health, RunState
 from stickslip_ros.nodes.base.clients import OnAnswer, ServiceCall, setting_call, transition_request
-from stickslip_ros.nodes.base.endpoints import qos_profile
-from stickslip_ros.record.codec import pack_wrench
-from stickslip_ros.record.topics import DISTURBANCE_FORCE
+from stickslip_ros.nodes.base.endpoints import PollingNode, qos_profile, waiting_messages
+from stickslip_ros.record.codec import pack_wrench, wrench_columns
+from stickslip_ros.record.topics import APPLIED_DISTURBANCE, DISTURBANCE_FORCE
 from stickslip_ros.stamps import NANOSECONDS
 
 LONGEST_IMPULSE = 1e6
 """Longest duration of an impulse in simulated time, s."""
 
 _ANSWER_TIMEOUT = 10.0
+_LATEST_START = 1.0
+"""Simulated time, s, after which an impulse has begun, even if the plant does not say so."""
 
 Answer = Future[str]
 """Result of a request: empty if it succeeded, otherwise a sentence with the reason."""
@@ -128,7 +130,7 @@ class Impulse:
     """A force on the slide for a simulated time."""
 
     def __init__(
-        self, node: Node, clock: Clock, run: RunState, take_samples: Callable[[], None]
+        self, node: PollingNode, clock: Clock, run: RunState, take_samples: Callable[[], None]
     ) -> None:
         """Publish through a node with a steady clock; `take_samples` brings `run` up to date."""
         self._node, self._clock, self._run = node, clock, run
@@ -136,8 +138,11 @@ class Impulse:
         self._force = node.create_publisher(
             WrenchStamped, DISTURBANCE_FORCE.name, qos_profile(DISTURBANCE_FORCE)
         )
-        self._end = 0
-        """Stamp at which the force ends, ns."""
+        self._applied = node.create_polled_subscription(
+            APPLIED_DISTURBANCE, qos_profile(APPLIED_DISTURBANCE)
+        )
+        self._duration = self._end = 0
+        """Duration, and stamp at which the force ends, ns."""
         self._timer: Timer | None = None
 
     def apply(self, force: float, duration: float) -> Answer:
@@ -156,7 +161,10 @@ class Impulse:
                 return
             self._take_samples()
             self._force.publish(pack_wrench(self._run.newest, force))
-            self._end = self._run.newest + round(duration * NANOSECONDS)
+            begins = self._timer is None and self._applied.get_publisher_count()
+            wait = _LATEST_START if begins else 0.0
+            self._duration = round(duration * NANOSECONDS)
+            self._end = self._run.newest + round(wait * NANOSECONDS) + self._duration
             units = self._run.units
             push, lasting = units.text(force, "N"), units.text(duration, "s")
             self._run.add_event(f"impulse of {push} for {lasting}", push)
@@ -168,7 +176,9 @@ class Impulse:
         return answer
 
     def end_if_due(self) -> None:
-        """End it if the newest sample is at its end."""
+        """End it if the newest sample is at its end, counted from the first that it acted on."""
+        for start in wrench_columns(list(waiting_messages(self._applied)))[0].stamp:
+            self._end = min(self._end, int(start) + self._duration)
         if self._timer is not None and self._run.newest >= self._end:
             self._stop(self._timer)
 
