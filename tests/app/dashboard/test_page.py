@@ -321,15 +321,15 @@ def test_what_an_engineer_does(start_stickslip: Start, page: Page, tmp_path: Pat
     control.click()
     expect(page.get_by_text("steady sliding", exact=True).first).to_be_visible()
     page.get_by_role("button", name="Store B").click()
-    row = page.get_by_role("row").filter(has=page.get_by_text("regime", exact=True))
-    expect(row).to_contain_text("stick-slip")
-    expect(row).to_contain_text("steady sliding")
-    assert accessibility(page) == []
 
     # Before and after are in the window of 200 periods, and in its samples.
     page.get_by_text("200 periods").click()
     wait_for(lambda: swing(page) > 500.0, "before and after are drawn")
     page.get_by_role("button", name="Pause view").click()
+    row = page.get_by_role("row").filter(has=page.get_by_text("regime", exact=True))
+    expect(row).to_contain_text("stick-slip")
+    expect(row).to_contain_text("steady sliding")
+    assert accessibility(page) == []
     time_plots = page.locator(".chart.tall")
 
     def told() -> str:
