@@ -4,16 +4,16 @@ import csv
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import Any, TextIO
 
 import numpy as np
 from typing_extensions import override
 
 from stickslip_ros.api.design import gains, gains_text
 from stickslip_ros.api.page import Summary
-from stickslip_ros.api.results import Parts, Table, TabularResult, attributes, column
+from stickslip_ros.api.results import Drawing, Parts, Table, TabularResult, attributes, column
 from stickslip_ros.api.runs import limit_text
 from stickslip_ros.api.scenarios import ScenarioLike, as_scenario
 from stickslip_ros.api.studies import Values, axis_of
@@ -41,11 +41,6 @@ from stickslip_ros.studies.runner import CountPoints, compute_columns
 from stickslip_ros.studies.spread import spread_text
 from stickslip_ros.tables import TextTable
 from stickslip_ros.theory.linear_sampled_loop import settling_time
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from stickslip_ros.show.style import FigureStyle
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -137,7 +132,7 @@ class ComparedLaws(TabularResult):
         return mean, error
 
     @override
-    def draw(self, style: "FigureStyle") -> "Figure":
+    def _drawing(self) -> Drawing:
         from stickslip_ros.show.comparison_figure import comparison_figure
 
         error, *_ = self.ranks[0].means
@@ -148,7 +143,7 @@ class ComparedLaws(TabularResult):
             rank.law: {name: self.at_points(rank.law, name) for name in (*names, "held")}
             for rank in self.ranks
         }
-        return comparison_figure(self.study, values, names, style=style)
+        return partial(comparison_figure, self.study, values, names)
 
     @property
     def _columns(self) -> dict[str, Any]:

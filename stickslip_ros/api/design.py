@@ -2,12 +2,13 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from functools import partial
+from typing import Any, NamedTuple
 
 from typing_extensions import override
 
 from stickslip_ros.api.page import Summary
-from stickslip_ros.api.results import Parts, Table, TabularResult, attributes, column
+from stickslip_ros.api.results import Drawing, Parts, Table, TabularResult, attributes, column
 from stickslip_ros.api.scenarios import ScenarioLike, as_scenario
 from stickslip_ros.errors import InvalidInputError, RunError
 from stickslip_ros.model.constants import constants_of
@@ -23,11 +24,6 @@ from stickslip_ros.studies.design import Check, Design, Task
 from stickslip_ros.studies.design import design as designed
 from stickslip_ros.studies.drive_loops import LINEAR
 from stickslip_ros.text import finite, shown
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from stickslip_ros.show.style import FigureStyle
 
 _CHECKS, _REST = quantities_of(Check), quantities_of(Rest)
 _WORST = ("predicted_settling_time", "settling_time", "predicted_peak_force", "peak_force")
@@ -92,14 +88,14 @@ class Proposal(TabularResult):
         return {} if self.design.tuned is None else self.design.tuned.poles
 
     @override
-    def draw(self, style: "FigureStyle") -> "Figure":
+    def _drawing(self) -> Drawing:
         from stickslip_ros.show.comparison_figure import bode_figure
         from stickslip_ros.show.stability_figure import design_figure
 
         if self.controller is None:
             raise RunError(self._nothing)
         washout = isinstance(self.controller, Washout) and self.design.vibrations
-        return (design_figure if washout else bode_figure)(self.design, style=style)
+        return partial(design_figure if washout else bode_figure, self.design)
 
     @property
     def _nothing(self) -> str:

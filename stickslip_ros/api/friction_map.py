@@ -2,14 +2,15 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from typing_extensions import override
 
 from stickslip_ros.api.page import Summary
-from stickslip_ros.api.results import Parts, Result
+from stickslip_ros.api.results import Drawing, Parts, Result
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.identification.fit import Estimate
 from stickslip_ros.identification.friction_map import FittedCurve, fitted_curves
@@ -18,11 +19,6 @@ from stickslip_ros.record.table_file import table_of
 from stickslip_ros.record.table_quantities import speed_and_force
 from stickslip_ros.show.identification_table import constants_table
 from stickslip_ros.show.quantities import SI, Units
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from stickslip_ros.show.style import FigureStyle
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -74,12 +70,12 @@ class FrictionMap(Result):
         yield from self.notes
 
     @override
-    def draw(self, style: "FigureStyle") -> "Figure":
+    def _drawing(self) -> Drawing:
         from stickslip_ros.show.identification_figure import map_figure
 
         laws = [curve.law for curve in self.curves]
         pairs = self.velocity, self.force
-        return map_figure(self._names, *pairs, laws, style=style, units=self._units)
+        return partial(map_figure, self._names, *pairs, laws, units=self._units)
 
     @property
     def _names(self) -> str:

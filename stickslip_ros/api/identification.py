@@ -2,15 +2,15 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from typing_extensions import override
 
 from stickslip_ros.api.page import Summary
 from stickslip_ros.api.recordings import with_forms
-from stickslip_ros.api.results import Parts, Result
+from stickslip_ros.api.results import Drawing, Parts, Result
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.identification import sentences
 from stickslip_ros.identification.findings import Findings
@@ -26,11 +26,6 @@ from stickslip_ros.record.table_columns import TableFormat
 from stickslip_ros.scenarios.files import Scenario, load_scenario
 from stickslip_ros.show.identification_table import identification_tables
 from stickslip_ros.show.quantities import SI, Units
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from stickslip_ros.show.style import FigureStyle
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -128,10 +123,10 @@ class Model(Result):
         return load_scenario(str(path))
 
     @override
-    def draw(self, style: "FigureStyle") -> "Figure":
+    def _drawing(self) -> Drawing:
         from stickslip_ros.show.identification_figure import identification_figure
 
-        return identification_figure(self.findings, style=style, units=self._units)
+        return partial(identification_figure, self.findings, units=self._units)
 
     @cached_property
     def predictions(self) -> dict[str, dict[str, float | None]]:

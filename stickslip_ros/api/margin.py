@@ -2,16 +2,17 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from typing_extensions import override
 
 from stickslip_ros.api.page import Summary
 from stickslip_ros.api.recordings import with_forms
-from stickslip_ros.api.results import Parts, Result
+from stickslip_ros.api.results import Drawing, Parts, Result
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.identification.recordings import read_all
 from stickslip_ros.measures.onset import FeedDecay, Onset, onset_of
@@ -19,11 +20,6 @@ from stickslip_ros.measures.ring_down import RingDown, ring_downs, why_no_ring_d
 from stickslip_ros.quantities import quantities_of
 from stickslip_ros.show.quantities import SI, Units
 from stickslip_ros.tables import TextTable
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from stickslip_ros.show.style import FigureStyle
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -78,12 +74,12 @@ class Margin(Result):
         )
 
     @override
-    def draw(self, style: "FigureStyle") -> "Figure":
+    def _drawing(self) -> Drawing:
         from stickslip_ros.show.identification_figure import margin_figure
 
         if not self.onset.feeds:
             raise InvalidInputError("there is no decay to draw: " + "; ".join(self.notes))
-        return margin_figure(self._names, self.onset, style=style, units=self.units)
+        return partial(margin_figure, self._names, self.onset, units=self.units)
 
     @property
     def _names(self) -> str:

@@ -4,15 +4,15 @@ import json
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, fields
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from typing_extensions import override
 
 from stickslip_ros.api.page import Summary
-from stickslip_ros.api.results import Parts, Result, Table, TabularResult
+from stickslip_ros.api.results import Drawing, Parts, Result, Table, TabularResult
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.measures.cycle_measures import Measures, measures_of
@@ -37,11 +37,6 @@ from stickslip_ros.show.quantities import Units
 from stickslip_ros.show.run_history import DrawnRun, RunHistory
 from stickslip_ros.stamps import NANOSECONDS
 from stickslip_ros.tables import TextTable
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from stickslip_ros.show.style import FigureStyle
 
 _COLUMNS = quantities_of(MotorTrajectory) | {"stamp": Quantity("stamp", "ns")}
 
@@ -137,8 +132,8 @@ class RecordedRun(TabularResult):
         return Summary("Recorded run", str(self.path), verdict, self.settings(), facts)
 
     @override
-    def draw(self, style: "FigureStyle") -> "Figure":
-        return Comparison((self,)).draw(style)
+    def _drawing(self) -> Drawing:
+        return Comparison((self,)).draw
 
     def _table(self) -> Table:
         samples = self.samples
@@ -171,10 +166,10 @@ class Comparison(Result):
     """The runs."""
 
     @override
-    def draw(self, style: "FigureStyle") -> "Figure":
+    def _drawing(self) -> Drawing:
         from stickslip_ros.show.run_figure import run_figure
 
-        return run_figure(*(run.as_drawn() for run in self.runs), style=style)
+        return partial(run_figure, *(run.as_drawn() for run in self.runs))
 
     @override
     def _entries(self) -> dict[str, Any]:

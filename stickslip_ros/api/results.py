@@ -2,7 +2,7 @@
 
 import json
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from html import escape
 from importlib import import_module
@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 
 Parts = Iterable[TextTable | str]
 """Tables and sentences that a result prints as."""
+Drawing = Callable[..., Any]
+"""Draws a figure in a `style`."""
 
 
 class Result(ABC):
@@ -43,13 +45,18 @@ class Result(ABC):
         """Return the tables and sentences that the result prints as."""
 
     @abstractmethod
-    def draw(self, style: "FigureStyle") -> "Figure":
+    def _drawing(self) -> Drawing:
+        """Return what draws the figure; the parameters are the options of `plot`."""
+
+    def draw(self, style: "FigureStyle", **options: Any) -> "Figure":
         """Return the figure in a style, as `plot` does in one of a name.
 
         Parameters
         ----------
         style : FigureStyle
             Size, resolution and layout.
+        **options : Any
+            Options of `plot` except the style.
 
         Returns
         -------
@@ -63,6 +70,7 @@ class Result(ABC):
         RunError
             If a design has nothing to propose.
         """
+        return self._drawing(**options)(style=style)
 
     @abstractmethod
     def _entries(self) -> Mapping[str, Any]:

@@ -3,15 +3,15 @@
 import sys
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from math import inf
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from typing_extensions import override
 
 from stickslip_ros.api.page import Summary
-from stickslip_ros.api.results import Parts, Table, TabularResult, attributes
+from stickslip_ros.api.results import Drawing, Parts, Table, TabularResult, attributes
 from stickslip_ros.api.scenarios import ScenarioLike, as_scenario
 from stickslip_ros.measures.cycle_measures import Measures
 from stickslip_ros.measures.following import Followed, Following, followed
@@ -28,11 +28,6 @@ from stickslip_ros.show.parameter_tables import scenario_tables
 from stickslip_ros.show.quantities import Units
 from stickslip_ros.show.run_history import DrawnRun, RunHistory
 from stickslip_ros.studies import simulate as simulation
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from stickslip_ros.show.style import FigureStyle
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -69,14 +64,14 @@ class Run(TabularResult):
         return self._recorder.trajectory()
 
     @override
-    def draw(self, style: "FigureStyle") -> "Figure":
+    def _drawing(self) -> Drawing:
         from stickslip_ros.show.run_figure import run_figure
         from stickslip_ros.show.style import title_of
 
         title, plant = title_of("Simulated run", self.scenario), self.scenario.plant
         parts = self._history, self.truth or self.measures, plant.as_drive(), (), title
         drawn = DrawnRun(self.scenario.name, *parts, disturbed=plant.disturbance.kind != "none")
-        return run_figure(drawn, style=style)
+        return partial(run_figure, drawn)
 
     def _table(self) -> Table:
         columns, recorder = vars(self.trajectory), self._recorder

@@ -5,7 +5,7 @@ from collections import Counter
 from collections.abc import Mapping
 from concurrent.futures import Executor
 from dataclasses import asdict, dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from operator import index
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
@@ -14,7 +14,7 @@ import numpy as np
 from typing_extensions import override
 
 from stickslip_ros.api.page import Summary
-from stickslip_ros.api.results import Parts, Table, TabularResult, attributes
+from stickslip_ros.api.results import Drawing, Parts, Table, TabularResult, attributes
 from stickslip_ros.api.scenarios import ScenarioLike, as_scenario
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import InvalidInputError
@@ -44,8 +44,6 @@ from stickslip_ros.text import shown
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-    from stickslip_ros.show.style import FigureStyle
 
 Values = tuple[float | str, float | str, int] | tuple[float | str, float | str, int, str]
 """First and last value, how many, and optionally "log"."""
@@ -166,19 +164,10 @@ class Sweep(Points):
         return {"transitions": {name.lower().replace(" ", "_"): values for name, values in speeds}}
 
     @override
-    def draw(self, style: "FigureStyle", colour: str = "regime") -> "Figure":
-        """Return the figure in a style.
-
-        Parameters
-        ----------
-        style : FigureStyle
-            Size, resolution and layout.
-        colour : str
-            As for `plot`.
-        """
+    def _drawing(self, colour: str = "regime") -> Drawing:
         from stickslip_ros.show.study_figure import sweep_figure
 
-        return sweep_figure(self.columns, self.study, colour, style=style)
+        return partial(sweep_figure, self.columns, self.study, colour)
 
     @override
     def _summary(self) -> Summary:
@@ -223,10 +212,10 @@ class Basin(Points):
         return {"attractors": [asdict(attractor) for attractor in self.attractors]}
 
     @override
-    def draw(self, style: "FigureStyle") -> "Figure":
+    def _drawing(self) -> Drawing:
         from stickslip_ros.show.study_figure import basin_figure
 
-        return basin_figure(self.columns, self.basins, self.study, style=style)
+        return partial(basin_figure, self.columns, self.basins, self.study)
 
     @override
     def _summary(self) -> Summary:

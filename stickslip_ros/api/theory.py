@@ -2,12 +2,13 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from functools import partial
+from typing import Any
 
 from typing_extensions import override
 
 from stickslip_ros.api.page import Summary
-from stickslip_ros.api.results import Parts, Result, optional
+from stickslip_ros.api.results import Drawing, Parts, Result, optional
 from stickslip_ros.api.scenarios import ScenarioLike, as_scenario
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.scenarios.files import Scenario
@@ -16,11 +17,6 @@ from stickslip_ros.show.study_tables import stability_tables
 from stickslip_ros.studies import stability as stabilities
 from stickslip_ros.theory.linear_sampled_loop import LinearSampledLoop
 from stickslip_ros.theory.linear_system import LinearSystem, continuous_system, sampled_system
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from stickslip_ros.show.style import FigureStyle
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -105,13 +101,13 @@ class Stability(Result):
         )
 
     @override
-    def draw(self, style: "FigureStyle") -> "Figure":
+    def _drawing(self) -> Drawing:
         from stickslip_ros.show.stability_figure import scenario_stability_figure, why_no_figure
 
         reason = why_no_figure(self.scenario)
         if reason is not None:
             raise InvalidInputError(f"there is nothing to draw: {reason}")
-        return scenario_stability_figure(self.scenario, style=style)
+        return partial(scenario_stability_figure, self.scenario)
 
     @override
     def _entries(self) -> dict[str, Any]:
