@@ -21,8 +21,6 @@ from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.recordings import read_all, read_records
 from stickslip_ros.identification.scenario import written_scenario
 from stickslip_ros.model.drive import Drive
-from stickslip_ros.record.bag_layout import BagLayout
-from stickslip_ros.record.table_columns import TableFormat
 from stickslip_ros.scenarios.files import Scenario, load_scenario
 from stickslip_ros.show.identification_table import identification_tables
 from stickslip_ros.show.quantities import SI, Units
@@ -64,9 +62,6 @@ class Model(Result):
         self,
         recording: Path | str,
         columns: Mapping[str, str] | None = None,
-        *,
-        start: float = 0.0,
-        end: float = float("inf"),
         **options: Any,
     ) -> dict[str, float | None]:
         """Return what the model predicts of a recording.
@@ -77,11 +72,8 @@ class Model(Result):
             A bag or a table.
         columns : mapping, optional
             Columns of a table, as for `read_table`.
-        start, end : float, optional
-            Part to predict, s from the first sample.
         **options
-            How it is read: `namespace`, `belt_speed`, and those from `joint` to `encoding` of
-            `identify`.
+            How it is read, as for `identify`; `start` and `end` are those of the part to predict.
 
         Returns
         -------
@@ -97,8 +89,7 @@ class Model(Result):
         InvalidInputError
             If it has several parts, or lacks what a prediction needs.
         """
-        options = with_forms(options)
-        records = read_records(Path(recording), columns, start=start, end=end, **options)
+        records = read_records(Path(recording), columns, **with_forms(options))
         if len(records) > 1:
             raise InvalidInputError(
                 f"{recording} has {len(records)} parts between long gaps: one must be chosen by "
@@ -199,30 +190,11 @@ def identify(
     columns: Mapping[str, str] | None = None,
     law: str = AUTO,
     fixed: Mapping[str, float | str] | None = None,
-    start: float = 0.0,
-    end: float = float("inf"),
-    namespace: str | None = None,
-    belt_speed: float | None = None,
-    joint: str | None = None,
-    belt_joint: str | None = None,
-    states_topic: str | None = None,
-    force_topic: str | None = None,
-    time: str = "header",
-    force: str = "topic",
-    decimal: str | None = None,
-    skip: int | None = None,
-    encoding: str | None = None,
-    period: float | None = None,
-    where: str | None = None,
-    session: int | None = None,
-    second: Path | str | None = None,
-    shift: float = 0.0,
-    force_constant: str | None = None,
-    pitch: float | None = None,
     rotary: bool = False,
     check: Sequence[Path | str] = (),
     progress: Callable[[str], None] = lambda _: None,
     time_limit: float = AUTO_TIME,
+    **options: Any,
 ) -> Model:
     """Fit a model to recordings of a drive.
 
@@ -236,16 +208,6 @@ def identify(
         Friction law, or `"auto"`: the one that predicts held-out parts best.
     fixed : mapping, optional
         Constants that are known, such as `{"plant.mass": 95.0}` or `"95kg"`, SI units.
-    start, end : float, optional
-        Part to use, s from the first sample of each recording.
-    namespace : str, optional
-        ROS namespace of the drive, where a bag holds several.
-    belt_speed : float, optional
-        Belt speed, m/s, in place of what the recordings have.
-    joint, belt_joint, states_topic, force_topic, time, force : optional
-        Where bags of another machine have motion and force, as for `read_bag`.
-    decimal, skip, encoding, period, where, session, second, shift, force_constant, pitch : optional
-        Form of the tables, as for `read_table`.
     rotary : bool, optional
         Whether displacements are angles, rad, and forces torques, N m: they are shown as such.
     check : sequence of Path or str, optional
@@ -254,6 +216,10 @@ def identify(
         Receives the name of the friction law that is tried.
     time_limit : float, optional
         Work for `"auto"`, in s of a usual processor, after which the best law so far is taken.
+    **options : optional
+        How the recordings are read: `start` and `end` of the part, `namespace` and `belt_speed` of
+        the drive, `joint`, `belt_joint`, `states_topic`, `force_topic`, `time` and `force` as for
+        `read_bag`, and the form of tables, from `decimal` to `pitch`, as for `read_table`.
 
     Returns
     -------
@@ -281,22 +247,7 @@ def identify(
     '1e+06 N/m'
     """
     fitted, others = ([*dict.fromkeys(map(Path, paths))] for paths in (recordings, check))
-    read = read_all(
-        [*fitted, *others],
-        columns,
-        start=start,
-        end=end,
-        namespace=namespace,
-        belt_speed=belt_speed,
-        form=TableFormat(
-            *(decimal, skip, encoding, rotary, period, where, session),
-            second=None if second is None else Path(second),
-            shift=shift,
-            force_constant=force_constant,
-            pitch=pitch,
-        ),
-        layout=BagLayout(joint, belt_joint, states_topic, force_topic, time, force),
-    )
+    read = read_all([*fitted, *others], columns, **with_forms({**options, "rotary": rotary}))
     records = [record for path in fitted for record in read[path]]
     findings = identify_records(records, law, constants(fixed or {}), progress, time_limit)
     predicted = {

@@ -375,7 +375,7 @@ def read_table(
         period=period,
         where=where,
         session=session,
-        second=None if second is None else Path(second),
+        second=second,
         shift=shift,
         force_constant=force_constant,
         pitch=pitch,
@@ -439,6 +439,8 @@ def with_forms(options: Mapping[str, Any]) -> dict[str, Any]:
     Raises InvalidInputError if one of them is not allowed.
     """
     others = dict(options)
+    if others.get("second") is not None:
+        others["second"] = Path(others["second"])
     for name, kind in (("form", TableFormat), ("layout", BagLayout)):
         given = {part.name: others.pop(part.name) for part in fields(kind) if part.name in others}
         others |= {name: kind(**given)} if given else {}
