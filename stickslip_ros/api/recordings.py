@@ -31,7 +31,13 @@ from stickslip_ros.samples import NO_FORCES, NO_SAMPLES, ForceColumns, SampleCol
 from stickslip_ros.scenarios.curve_file import CURVES, as_pairs
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
 from stickslip_ros.scenarios.plant_parameters import PlantParameters
-from stickslip_ros.show.measure_table import doubt, measures_text, report_tables
+from stickslip_ros.show.measure_table import (
+    doubt,
+    measure_table,
+    measures_text,
+    report_sentences,
+    slip_table,
+)
 from stickslip_ros.show.parameter_tables import recorded_tables
 from stickslip_ros.show.quantities import Units
 from stickslip_ros.show.run_history import DrawnRun, RunHistory
@@ -189,12 +195,16 @@ class Comparison(Result):
 
     @override
     def parts(self) -> Parts:
-        runs = {str(run.path): run for run in self.runs}
-        return report_tables(
-            {path: run.report for path, run in runs.items()},
-            {path: run.drive for path, run in runs.items()},
-            {path: run.units for path, run in runs.items()},
-        )
+        several = len(self.runs) > 1
+        runs = {str(run.path) * several: run for run in self.runs}
+        title = "" if several else str(self.runs[0].path)
+        reports = {name: run.report for name, run in runs.items()}
+        yield measure_table(title, reports, {name: run.units for name, run in runs.items()})
+        for name, run in runs.items():
+            if run.report["slips"] is not None:
+                yield slip_table(run.report["slips"], run.units)
+            for text in report_sentences(run.report, run.drive):
+                yield f"{name}: {text}" if several else text
 
 
 def read_bag(

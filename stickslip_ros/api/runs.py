@@ -23,7 +23,7 @@ from stickslip_ros.progress import Progress
 from stickslip_ros.quantities import number_of
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.scenarios.plant_parameters import PlantParameters
-from stickslip_ros.show.measure_table import measures_text, simulation_tables
+from stickslip_ros.show.measure_table import measure_table, measures_text, why_no_cycle
 from stickslip_ros.show.parameter_tables import scenario_tables
 from stickslip_ros.show.quantities import Units
 from stickslip_ros.show.run_history import DrawnRun, RunHistory
@@ -112,9 +112,16 @@ class Run(TabularResult):
 
     @override
     def parts(self) -> Parts:
-        runs = self.measures, self.truth, self._following
-        yield from simulation_tables(self.scenario, self.duration, *runs)
-        yield from self.notes
+        columns, units = {"": self.measures}, self._units
+        if self.truth is not None:
+            columns = {"measured": self.measures, "true": self.truth}
+        runs = zip(columns.items(), self._following, strict=False)
+        values = {name: {**run.as_dict(), **follows} for (name, run), follows in runs}
+        title = f"{self.scenario.name}, {self.duration:g} {units.of_unit('s')}".rstrip()
+        yield measure_table(title, values, dict.fromkeys(values, units))
+        regime, drive = (self.truth or self.measures).regime, self.scenario.plant.as_drive()
+        reason = why_no_cycle(regime, self.duration, drive)
+        yield from [*filter(None, [reason]), *self.notes]
 
 
 def sentence(measures: str) -> str:

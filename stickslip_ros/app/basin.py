@@ -1,11 +1,12 @@
 """`stickslip basin`: which motion a start leads to."""
 
 import argparse
+from functools import partial
 from typing import TYPE_CHECKING
 
 from stickslip_ros.app.arguments import add_json, add_scenario, scenario_of
 from stickslip_ros.app.result import add_plot, check_results
-from stickslip_ros.app.study_command import add_running, computed, finish, settling_of
+from stickslip_ros.app.study_command import add_running, give_study, settling_of
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.studies.options import BASIN_COUNT, BASIN_OPTIONS
 
@@ -60,8 +61,7 @@ def run(arguments: argparse.Namespace) -> None:
     )
     check_results(arguments)
     label = f"basins of {scenario.name}, {study.plan.size} starts"
-    with computed(arguments, study, label) as journal:
-        finish(arguments, journal, Basin(study, journal.columns))
+    give_study(arguments, study, label, partial(Basin, study))
 
 
 def _plan(arguments: argparse.Namespace, scenario: "Scenario") -> "Plan":

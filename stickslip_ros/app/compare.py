@@ -15,7 +15,7 @@ from stickslip_ros.app.arguments import (
 )
 from stickslip_ros.app.output import progress_bar, tell
 from stickslip_ros.app.result import add_results, check_results
-from stickslip_ros.app.study_command import add_workers, check_out, computed, finish, scenario_over
+from stickslip_ros.app.study_command import add_workers, check_out, give_study, scenario_over
 from stickslip_ros.text import printable
 
 _DESCRIPTION = """Compare control laws on one drive. The gains of each law are tuned by one rule for
@@ -126,9 +126,8 @@ def run(arguments: argparse.Namespace) -> None:
         )
     label = f"comparison on {scenario.name}, {study.plan.size} cases"
     outcomes = Outcomes(study.plan.size)
-    with computed(arguments, study, label, outcomes) as journal:
-        result = ComparedLaws(study, outcomes, tuned, arguments.rank_by)
-        finish(arguments, journal, result)
+    result = ComparedLaws(study, outcomes, tuned, arguments.rank_by)
+    give_study(arguments, study, label, lambda _: result, outcomes)
     if chosen is not None and arguments.out is None:
         files = {rank.law: gains_file(result.scenarios[rank.law]) for rank in result.ranks}
         paths = {law: chosen / f"{law}.yaml" for law in files}

@@ -2,8 +2,8 @@
 
 import argparse
 import os
-from collections.abc import Generator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from stickslip_ros.api.comparison import ComparedLaws
     from stickslip_ros.api.studies import Points
     from stickslip_ros.scenarios.files import Scenario
-    from stickslip_ros.studies.journal import Journal
     from stickslip_ros.studies.plan import Axis
     from stickslip_ros.studies.study import PointStudy
 
@@ -108,13 +107,18 @@ def check_out(out: Path | None) -> None:
         check_new("--out", out)
 
 
-@contextmanager
-def computed(
-    arguments: argparse.Namespace, study: "PointStudy[Any]", label: str, columns: Any = None
-) -> "Generator[Journal]":
-    """Compute the missing points of the study, and provide its complete journal.
+def give_study(
+    arguments: argparse.Namespace,
+    study: "PointStudy[Any]",
+    label: str,
+    result_of: "Callable[[Any], Points | ComparedLaws]",
+    columns: Any = None,
+    **options: Any,
+) -> None:
+    """Compute the missing points of the study; write and print the result of its columns.
 
-    `columns` take the points; by default those of a sweep.
+    `columns` take the points; by default those of a sweep. The `options` are those of the result's
+    `plot`. Then the journal need not be kept any more.
     """
     from stickslip_ros.studies.journal import Journal, kept_journal
     from stickslip_ros.studies.runner import DaskError, dask_executor, run, run_here
@@ -149,7 +153,16 @@ def computed(
             raise RunError(f"--dask {error}{kept}") from None
         except RunError as error:
             raise RunError(f"{error}{kept}") from None
-        yield journal
+        result = result_of(journal.columns)
+        write_results(arguments, result, **options)
+        if out is not None:
+            with writing("--out", out), written(out, then=journal.discard) as stream:
+                if out.suffix.lower() == ".csv":
+                    result.write_csv(stream)
+                else:
+                    result.write_json(stream)
+        print_result(arguments, result)
+        journal.discard()
 
 
 def _advice(study: "PointStudy[Any]") -> str:
@@ -164,25 +177,3 @@ def _advice(study: "PointStudy[Any]") -> str:
         check_continuous(study.scenario)
         return "; every sample is simulated: --continuous-control is several times as fast"
     return ""
-
-
-def finish(
-    arguments: argparse.Namespace,
-    journal: "Journal",
-    result: "Points | ComparedLaws",
-    **options: Any,
-) -> None:
-    """Write and print the result of a complete journal, which need not be kept any more then.
-
-    The `options` are those of the result's `plot`.
-    """
-    write_results(arguments, result, **options)
-    out: Path | None = arguments.out
-    if out is not None:
-        with writing("--out", out), written(out, then=journal.discard) as stream:
-            if out.suffix.lower() == ".csv":
-                result.write_csv(stream)
-            else:
-                result.write_json(stream)
-    print_result(arguments, result)
-    journal.discard()

@@ -1,13 +1,13 @@
 """`stickslip sweep`: the settled motion of a scenario over one parameter or two."""
 
 import argparse
+from functools import partial
 
 from stickslip_ros.app.arguments import add_scenario, naming
 from stickslip_ros.app.result import add_results, check_results
 from stickslip_ros.app.study_command import (
     add_running,
-    computed,
-    finish,
+    give_study,
     scenario_over,
     settling_of,
 )
@@ -67,5 +67,4 @@ def run(arguments: argparse.Namespace) -> None:
     )
     check_results(arguments)
     label = f"sweep of {study.scenario.name}, {study.plan.size} points"
-    with computed(arguments, study, label) as journal:
-        finish(arguments, journal, Sweep(study, journal.columns), colour=arguments.colour)
+    give_study(arguments, study, label, partial(Sweep, study), colour=arguments.colour)

@@ -1,6 +1,6 @@
 """The tables of runs: measures side by side, slips, and why there is no regime."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from math import inf
 from typing import Any
 
@@ -8,7 +8,6 @@ from stickslip_ros.measures.cycle_measures import Measures, Regime, trend_text
 from stickslip_ros.measures.slips import Slip
 from stickslip_ros.model.drive import Drive
 from stickslip_ros.quantities import quantities_of
-from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.show.quantities import MEASURES, NOISE, SI, Units
 from stickslip_ros.tables import TextTable
 
@@ -36,51 +35,6 @@ _DISTRIBUTION = ("mean", "standard_error", "q05", "median", "q95")
 
 _LARGEST_RATIO = 10.0
 """Ratio of belt speed and critical feed speed beyond which the unit is probably wrong."""
-
-
-def simulation_tables(
-    scenario: Scenario,
-    duration: float,
-    measures: Measures,
-    truth: Measures | None,
-    following: Sequence[Mapping[str, Any]] = ({}, {}),
-) -> Iterator[TextTable | str]:
-    """Yield the measures of a simulated run, and why it has no regime.
-
-    With a sensor there are also the measures of the motion itself, the `truth`. `following` has for
-    both how they follow a reference.
-    """
-    drive = scenario.plant.as_drive()
-    units = Units.for_drive(drive)
-    columns = {"": measures} if truth is None else {"measured": measures, "true": truth}
-    runs = zip(columns.items(), following, strict=False)
-    values = {name: {**run.as_dict(), **follows} for (name, run), follows in runs}
-    title = f"{scenario.name}, {duration:g} {units.of_unit('s')}".rstrip()
-    yield measure_table(title, values, dict.fromkeys(values, units))
-    reason = why_no_cycle((truth or measures).regime, duration, drive)
-    if reason is not None:
-        yield reason
-
-
-def report_tables(
-    reports: Mapping[str, Mapping[str, Any]],
-    drives: Mapping[str, Drive | None],
-    units: Mapping[str, Units],
-) -> Iterator[TextTable | str]:
-    """Yield the measures of recordings side by side, then slips and sentences of each.
-
-    The reports, the drives that were recorded and the units are by the path of the recording.
-    """
-    if len(reports) > 1:
-        yield measure_table("", reports, units)
-    else:
-        ((path, only),) = reports.items()
-        yield measure_table(path, {"": only}, {"": units[path]})
-    for path, report in reports.items():
-        if report["slips"] is not None:
-            yield slip_table(report["slips"], units[path])
-        for sentence in report_sentences(report, drives[path]):
-            yield f"{path}: {sentence}" if len(reports) > 1 else sentence
 
 
 def report_sentences(report: Mapping[str, Any], drive: Drive | None) -> list[str]:
