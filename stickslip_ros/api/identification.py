@@ -59,10 +59,7 @@ class Model(Result):
         return self.findings.drive
 
     def check(
-        self,
-        recording: Path | str,
-        columns: Mapping[str, str] | None = None,
-        **options: Any,
+        self, recording: Path | str, columns: Mapping[str, str] | None = None, **options: Any
     ) -> dict[str, float | None]:
         """Return what the model predicts of a recording.
 

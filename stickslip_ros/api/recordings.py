@@ -145,11 +145,7 @@ class RecordedRun(TabularResult):
         samples = self.samples
         first = int(samples.stamp[0]) if len(samples) else 0
         time = (samples.stamp - first) / NANOSECONDS
-        columns = {
-            **vars(samples),
-            "time": time,
-            "control_force": _answers(samples, self.forces),
-        }
+        columns = {**vars(samples), "time": time, "control_force": _answers(samples, self.forces)}
         if not samples.has_motor:
             columns = {name: column for name, column in columns.items() if "motor" not in name}
         units, source = self.units, {"bag": str(self.path)}

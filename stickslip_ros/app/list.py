@@ -48,11 +48,7 @@ def run(arguments: argparse.Namespace) -> None:
     ]
     if arguments.json:
         print_json(
-            {
-                "scenarios": scenarios,
-                "friction_laws": friction_laws,
-                "control_laws": control_laws,
-            }
+            {"scenarios": scenarios, "friction_laws": friction_laws, "control_laws": control_laws}
         )
         return
     _print("scenarios", {scenario["name"]: [scenario["description"]] for scenario in scenarios})

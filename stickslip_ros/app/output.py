@@ -27,6 +27,10 @@ _LINE_INTERVAL = 10.0
 
 _FRAME = 3
 """Characters that the frame of a column takes, beside one for the whole table."""
+_STYLES = {
+    "EQUILIBRIUM": "green", "STICK_SLIP": "yellow", "PURE_SLIP": "yellow", "UNBOUNDED": "red",
+}  # fmt: skip
+"""Style of the cells that are highlighted on a terminal, by regime."""
 
 
 class Progress(Protocol):
@@ -181,6 +185,8 @@ def _print_framed(
     from rich.table import Table
     from rich.text import Text
 
+    from stickslip_ros.measures.cycle_measures import Regime
+
     if title:
         console.print(Text(title, "table.title"), soft_wrap=True)
     labels, *columns = zip(headings, *rows, strict=True)
@@ -200,19 +206,7 @@ def _print_framed(
             fields = [list(field) for field in zip(headings[1:], cells, strict=True)]
             _print_framed(console, f"{headings[0]} {label}".strip(), ["", ""], fields)
         return
-    styles = _styles()
+    styles = {Regime.label(Regime[name]): style for name, style in _STYLES.items()}
     for row in rows:
         table.add_row(*(Text(cell, styles.get(re.split(r" \(|,", cell)[0], "")) for cell in row))
     console.print(table)
-
-
-def _styles() -> dict[str, str]:
-    """Return the style of each cell that is highlighted on a terminal."""
-    from stickslip_ros.measures.cycle_measures import Regime
-
-    return {
-        Regime.label(Regime.EQUILIBRIUM): "green",
-        Regime.label(Regime.STICK_SLIP): "yellow",
-        Regime.label(Regime.PURE_SLIP): "yellow",
-        Regime.label(Regime.UNBOUNDED): "red",
-    }

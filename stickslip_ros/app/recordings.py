@@ -110,9 +110,7 @@ def add_reading(parser: argparse.ArgumentParser) -> None:
         "(default: the end)",
     )
     parser.add_argument(
-        "--namespace",
-        metavar="NS",
-        help="ROS namespace of the drive, if a bag holds several",
+        "--namespace", metavar="NS", help="ROS namespace of the drive, if a bag holds several"
     )
     add_bag_layout(parser)
 

@@ -141,9 +141,7 @@ def _write_figure(arguments: argparse.Namespace, draw: "Callable[[FigureStyle], 
     from stickslip_ros.show.style import STYLES, save
 
     style = replace(
-        STYLES[arguments.style or "screen"],
-        size=arguments.size,
-        titled=not arguments.no_title,
+        STYLES[arguments.style or "screen"], size=arguments.size, titled=not arguments.no_title
     )
     figure = draw(style)
     with writing("--plot", arguments.plot), warnings.catch_warnings():

@@ -5,12 +5,7 @@ from functools import partial
 
 from stickslip_ros.app.arguments import add_scenario, naming
 from stickslip_ros.app.result import add_results, check_results
-from stickslip_ros.app.study_command import (
-    add_running,
-    give_study,
-    scenario_over,
-    settling_of,
-)
+from stickslip_ros.app.study_command import add_running, give_study, scenario_over, settling_of
 from stickslip_ros.studies.options import Continuation, SettlingOptions
 
 _DESCRIPTION = """Measure the settled motion of a scenario over the values of one parameter or two:

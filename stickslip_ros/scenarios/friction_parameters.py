@@ -127,8 +127,11 @@ class Friction(_constants(reverse=False), _ChosenLaw):
             )
 
         def read(group: Any, name: str) -> Any:
-            is_read = in_use and group.file
-            pairs = read_curve(f"{prefix}{name}", group.file, _refusal, curves) if is_read else ()
+            if not (in_use and group.file):
+                return replace(group, points=())
+            pairs = read_curve(
+                f"{prefix}{name}", group.file, lambda points: Table(points).refusal(), curves
+            )
             return replace(group, points=pairs)
 
         completed = replace(read(self, "file"), reverse=read(self.reverse, "reverse.file"))
@@ -215,7 +218,3 @@ def law_parameters(law: type[FrictionLaw]) -> list[str]:
     if issubclass(law, Table):
         return ["file"]
     return [name for name in law.constants() if name in Friction.__dataclass_fields__]
-
-
-def _refusal(points: Pairs) -> str | None:
-    return Table(points).refusal()

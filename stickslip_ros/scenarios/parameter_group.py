@@ -189,8 +189,7 @@ class NodeParameters(ParameterGroup):
         at_most=4095,
     )
     lock_memory: bool = at_rest(
-        False,
-        "Keep the memory of the node's process from being paged out.",
+        False, "Keep the memory of the node's process from being paged out."
     )
 
     @override

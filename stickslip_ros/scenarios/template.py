@@ -107,10 +107,12 @@ def scenario_schema() -> dict[str, Any]:
     Sections of other nodes may have any content. A group of parameters may be nested
     (`friction: {law: ...}`) or flat (`friction.law: ...`), as in ROS.
     """
-    sections: dict[str, Any] = {
-        node: _schema_of_section(_schemas(list(model.known.values())))
-        for node, model in NODE_PARAMETERS.items()
-    }
+    sections: dict[str, Any] = {}
+    for node, model in NODE_PARAMETERS.items():
+        schemas: dict[str, Any] = {}  # by name, those of a group also nested
+        for parameter in model.known.values():
+            _add(schemas, parameter.name, _schema(parameter))
+        sections[node] = _schema_of_section(schemas)
     base = {
         "type": "string",
         "minLength": 1,
@@ -147,14 +149,6 @@ def _schema_of_section(properties: Mapping[str, Any]) -> dict[str, Any]:
         "required": [PARAMETERS_KEY],
         "additionalProperties": False,
     }
-
-
-def _schemas(parameters: list[Parameter]) -> dict[str, Any]:
-    """Return the schemas of parameters by name, those of a group also nested."""
-    schemas: dict[str, Any] = {}
-    for parameter in parameters:
-        _add(schemas, parameter.name, _schema(parameter))
-    return schemas
 
 
 def _add(schemas: dict[str, Any], name: str, schema: Mapping[str, Any]) -> None:

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from math import inf
+from types import MappingProxyType
 from typing import Any
 
 from stickslip_ros.measures.cycle_measures import Measures, Regime, trend_text
@@ -29,8 +30,6 @@ _SAME_SCALE = {
 }
 """The quantity with which a value is compared to see whether it is rounding error."""
 
-_ALL_SI: Mapping[str, Units] = {}
-
 _DISTRIBUTION = ("mean", "standard_error", "q05", "median", "q95")
 
 _LARGEST_RATIO = 10.0
@@ -47,7 +46,9 @@ def report_sentences(report: Mapping[str, Any], drive: Drive | None) -> list[str
 
 
 def measure_table(
-    title: str, columns: Mapping[str, Mapping[str, Any]], units: Mapping[str, Units] = _ALL_SI
+    title: str,
+    columns: Mapping[str, Mapping[str, Any]],
+    units: Mapping[str, Units] = MappingProxyType({}),
 ) -> TextTable:
     """Return measures by name as a table with one column for each of `columns`.
 

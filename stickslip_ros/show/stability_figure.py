@@ -103,12 +103,6 @@ def scenario_stability_figure(scenario: Scenario, *, style: FigureStyle = SCREEN
         branches = BifurcationBranches.around(scenario.plant.as_drive())
         title = title_of("Bifurcation diagram", scenario, ["plant.belt_speed"])
         return branches_figure(branches, title=title, style=style)
-    title = title_of("Stability of the sampled loop", scenario)
-    return stability_figure(*_stability_map(scenario), title=title, style=style)
-
-
-def _stability_map(scenario: Scenario) -> tuple[StabilityMap, CriticalGainCurves]:
-    """Return the map of decay rates of the sampled loop, and the critical gains over the delay."""
     plant = scenario.plant
     drive, gains = plant.as_drive(), gains_of(scenario.control_law)
     loop = LinearSampledLoop.from_drive(drive, *plant.linear_sampling)
@@ -119,7 +113,8 @@ def _stability_map(scenario: Scenario) -> tuple[StabilityMap, CriticalGainCurves
     delays = np.linspace(0.0, latest, 41)
     sampling = rates, delays, plant.sensor, plant.answer_every
     curves = CriticalGainCurves.over(drive, gains.corner_frequency, *sampling)
-    return StabilityMap.around(loop, gains), curves
+    title = title_of("Stability of the sampled loop", scenario)
+    return stability_figure(StabilityMap.around(loop, gains), curves, title=title, style=style)
 
 
 @styled

@@ -248,7 +248,7 @@ def _closed_loop(drive: Drive, law: ControlLaw | None, plant: PlantParameters) -
         lambda: (
             limit_cycle_from_hopf(drive, control) if drive.motor is None else None,
             limit_cycle_of_run(drive, 0.0, control=control),
-        ),
+        )
     )
     cycles = [cycle for cycle in possible or () if cycle is not None]
     if len(cycles) > 1 and isclose(cycles[0].position, cycles[1].position, rel_tol=1e-6):

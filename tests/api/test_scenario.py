@@ -132,9 +132,7 @@ def test_it_prints_as_what_it_is_and_says_what_is_left_to_defaults(tmp_path: Pat
 def test_the_controller_is_chosen_and_its_constants_are_keywords() -> None:
     found = ss.scenario("paper", controller="velocity_feedback", velocity_gain=-0.5)
     assert found == load_scenario(
-        "paper",
-        ["velocity_feedback_controller.velocity_gain=-0.5"],
-        controller="velocity_feedback",
+        "paper", ["velocity_feedback_controller.velocity_gain=-0.5"], controller="velocity_feedback"
     )
     assert found.controller.node == "velocity_feedback_controller"
     again = ss.scenario(ss.scenario("paper"), controller="velocity_feedback", velocity_gain=-0.5)

@@ -107,11 +107,7 @@ REFUSED: Mapping[str, Mapping[str, str]] = {
         "bag --plot out.png --size 50x50 --dpi 600": "50x50 --dpi 600: would be 9e+08 pixels",
         "bag --no-title": "--no-title: needs --plot FILE, which is not given",
     },
-    "repair": {
-        "bag": "OUT",
-        "bag bag": "exists already",
-        "bag text/out": "not a directory",
-    },
+    "repair": {"bag": "OUT", "bag bag": "exists already", "bag text/out": "not a directory"},
     "replay": {
         "nosuch": "nosuch ... does not exist",
         "bag --start 10": "start = 10.0 s ... 9.99 s long",
@@ -182,10 +178,7 @@ REFUSED: Mapping[str, Mapping[str, str]] = {
         f"{LOG} --out a.txt": "must end in .yaml",
         f"{LOG} --out kept.yaml": PLACE,
     },
-    "show": {
-        "papr": "did you mean paper?",
-        "two.yaml": TWO,
-    },
+    "show": {"papr": "did you mean paper?", "two.yaml": TWO},
     "new": {
         "kept.yaml": f"FILE kept.yaml: {PLACE}",
         "mine.txt": "mine.txt: must end in .yaml or .yml",

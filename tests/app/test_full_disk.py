@@ -12,10 +12,7 @@ _OLD = b"a figure of before"
 
 @pytest.mark.parametrize(
     "command",
-    [
-        "new new.yaml --complete",
-        "simulate feed_drive --duration 0.2 --out new.csv --plot old.png",
-    ],
+    ["new new.yaml --complete", "simulate feed_drive --duration 0.2 --out new.csv --plot old.png"],
 )
 def test_the_old_file_stays_and_the_next_call_works(
     command: str, stickslip: Run, tmp_path: Path

@@ -142,9 +142,7 @@ def test_a_progress_bar_says_what_is_done_next(
     assert "identifying: stribeck" in capsys.readouterr().err
 
 
-def test_a_long_work_writes_lines_into_a_pipe(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_long_work_writes_lines_into_a_pipe(monkeypatch: pytest.MonkeyPatch) -> None:
     told: list[str] = []
     monkeypatch.setattr(output, "tell", told.append)
     monkeypatch.setattr(output, "_LINE_INTERVAL", 1e-3)
@@ -168,10 +166,7 @@ def test_the_end_of_a_work_waits_for_no_line_and_none_follows(
 @pytest.mark.parametrize("on_a_terminal", [True, False])
 @pytest.mark.parametrize(("first", "begin"), [(0, 30.0), (100, 0.0)], ids=["compiles", "goes on"])
 def test_the_time_left_is_told_after_a_quarter(
-    on_a_terminal: bool,
-    first: int,
-    begin: float,
-    monkeypatch: pytest.MonkeyPatch,
+    on_a_terminal: bool, first: int, begin: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """True within a half, of points that compile at the begin; not of points that differ."""
     monkeypatch.setattr(sys.stderr, "isatty", lambda: on_a_terminal)

@@ -54,11 +54,7 @@ CASES: dict[str, tuple[tuple[str, ...], Callable[[], Result], str]] = {
         lambda: ss.sweep(free(), belt_speed=(0.3, 0.5, 3), carry="both"),
         "stick-slip at",
     ),
-    "basin": (
-        (*FREE, "--sample", "3"),
-        lambda: ss.basin(free(), sample=3),
-        "stick-slip 100.0%",
-    ),
+    "basin": ((*FREE, "--sample", "3"), lambda: ss.basin(free(), sample=3), "stick-slip 100.0%"),
     "stability": (
         ("feed_drive",),
         lambda: ss.stability("feed_drive"),
@@ -98,8 +94,7 @@ def draws_nothing(*_: Any, **__: Any) -> Any:
 
 
 @pytest.mark.parametrize(
-    "name",
-    [pytest.param(n, marks=pytest.mark.long) if n.endswith("sensor") else n for n in CASES],
+    "name", [pytest.param(n, marks=pytest.mark.long) if n.endswith("sensor") else n for n in CASES]
 )
 def test_a_command_prints_and_a_page_shows_what_python_returns(
     name: str, stickslip: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

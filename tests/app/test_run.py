@@ -22,9 +22,7 @@ from tests.nodes.runs import FORCES, STATES, messages_of, record_states
 
 @pytest.mark.long
 def test_samples_that_the_analyzer_has_not_taken_in_at_the_end_are_waited_for(
-    start_stickslip: Start,
-    graph: Graph,
-    tmp_path: Path,
+    start_stickslip: Start, graph: Graph, tmp_path: Path
 ) -> None:
     health = graph.listen(DIAGNOSTICS)
     in_real_time = ("--pace", "realtime", "--duration", "10")
@@ -159,9 +157,7 @@ def test_without_a_node_it_says_how_to_start_one(stickslip: Run) -> None:
 
 
 def test_it_says_what_it_waits_for_plays_to_the_end_and_is_done(
-    start_stickslip: Start,
-    graph: Graph,
-    tmp_path: Path,
+    start_stickslip: Start, graph: Graph, tmp_path: Path
 ) -> None:
     gone = {"stickslip_ros/plant": {"friction.law": '"rate_state"'}}  # no law of today
     record_states(tmp_path / "bag", 200, tables=gone)

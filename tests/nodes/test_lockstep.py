@@ -150,8 +150,7 @@ def test_a_controller_that_falls_silent_is_waited_for_once_and_taken_back(
 
     controller.trigger_activate()
     graph.wait_until(
-        lambda: watch.forces[-1:] > watch.stamps[given_up : given_up + 1],
-        "forces come again",
+        lambda: watch.forces[-1:] > watch.stamps[given_up : given_up + 1], "forces come again"
     )
     watch.wait_for(10)
     late = plant.diagnose()[2]["late_forces"]

@@ -94,11 +94,7 @@ def processor_time(pid: int) -> float:
 @pytest.mark.long
 @pytest.mark.parametrize(
     ("end", "reliability"),
-    [
-        (signal.SIGSTOP, "RELIABLE"),
-        (signal.SIGSTOP, "BEST_EFFORT"),
-        (signal.SIGKILL, "RELIABLE"),
-    ],
+    [(signal.SIGSTOP, "RELIABLE"), (signal.SIGSTOP, "BEST_EFFORT"), (signal.SIGKILL, "RELIABLE")],
 )
 def test_a_reader_that_is_stopped_or_killed_costs_the_plant_nothing(
     graph: Graph, processes: Processes, end: signal.Signals, reliability: str

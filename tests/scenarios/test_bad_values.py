@@ -24,9 +24,7 @@ def taken_or_refused(model: NodeParameters, name: str, value: Any) -> Any:
 
 
 @models
-def test_bad_values_are_refused_with_name_value_and_what_is_allowed(
-    model: NodeParameters,
-) -> None:
+def test_bad_values_are_refused_with_name_value_and_what_is_allowed(model: NodeParameters) -> None:
     for parameter in model.known.values():
         for value in bad_values(parameter):
             with pytest.raises(InvalidInputError) as caught:

@@ -21,10 +21,7 @@ from stickslip_ros.scenarios.plant_parameters import PlantParameters
 from tests.examples import examples
 
 # Only while a node is not active; every physical parameter and gain can be set at any time.
-FIXED: dict[str, set[str]] = {
-    "plant": {"rate", "pace"},
-    "analyzer": {"bag", "window"},
-}
+FIXED: dict[str, set[str]] = {"plant": {"rate", "pace"}, "analyzer": {"bag", "window"}}
 
 
 def known(node: str) -> dict[str, Parameter]:

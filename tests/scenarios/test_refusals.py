@@ -46,10 +46,7 @@ PARAMETERS = [
     ("{friction: {static: 0.1}}", "minimum = 0.25", "static = 0.1"),
     ("{friction: {law: exponential, kinetic: 0.5}}", "kinetic = 0.5", "static = 0.4"),
     ("{force_delay: 5e3, force_jitter: 6e3}", "force_jitter = 6000.0 s", "1e6 periods"),
-    (
-        "{friction: {statik: 0.4}}",
-        "unknown parameter friction.statik = 0.4; did you mean fric",
-    ),
+    ("{friction: {statik: 0.4}}", "unknown parameter friction.statik = 0.4; did you mean fric"),
     ("{mass: {kg: 1}}", "unknown parameter mass.kg = 1; did you mean mass?"),
     ("{1: a}", "unknown parameter 1 = 'a'; known are actuator.*, answer_every, autostart,"),
 ]

@@ -93,9 +93,7 @@ def test_beyond_the_critical_cubic_gain_rest_cycle_and_running_away_coexist() ->
     critical = critical_gains(drive, washout)
     linear, cubic = 1.1 * critical.linear, critical.cubic + 1.0
     scenario = paper(
-        corner,
-        f"washout_controller.linear_gain={linear}",
-        f"washout_controller.cubic_gain={cubic}",
+        corner, f"washout_controller.linear_gain={linear}", f"washout_controller.cubic_gain={cubic}"
     )
     middle = drive.equilibrium_position
     plan = Grid((Axis(POSITION, middle - 0.8, middle + 0.8, 5), Axis(VELOCITY, -0.8, 0.8, 5)))

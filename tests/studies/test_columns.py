@@ -23,10 +23,7 @@ from tests.studies.studies import SHORT, free, speeds
 MINIMUM = Axis("plant.friction.minimum", 0.1, 0.6, 4)
 SPEED = Axis("plant.belt_speed", 0.0, 0.6, 5)
 SLOPE = Axis("plant.friction.slope", 0.3, 0.9, 3)
-STARTS = (
-    Axis("plant.initial.position", -1.0, 1.0, 2),
-    Axis("plant.initial.velocity", 0.0, 1.0, 2),
-)
+STARTS = (Axis("plant.initial.position", -1.0, 1.0, 2), Axis("plant.initial.velocity", 0.0, 1.0, 2))
 
 STUDIES = {
     "both ways": Study(free(), Grid((MINIMUM, SPEED), Continuation.BOTH), SHORT),

@@ -24,9 +24,7 @@ SPEED = Axis("plant.belt_speed", 0.2, 0.5, 5)
 STUDIES = {
     "carried on": Study(free(), Grid((MINIMUM, SPEED), Continuation.BOTH), SHORT),
     "one chain": Study(
-        free(),
-        Grid((replace(MINIMUM, first=0.41, last=0.2, count=9),), Continuation.UP),
-        SHORT,
+        free(), Grid((replace(MINIMUM, first=0.41, last=0.2, count=9),), Continuation.UP), SHORT
     ),
 }
 """Some of whose points are refused: the chains go on after them."""

@@ -108,8 +108,7 @@ def at_once(study: Study) -> list[Point]:
 
 
 @pytest.mark.parametrize(
-    "name",
-    ["each alone", *(pytest.param(name, marks=pytest.mark.long) for name in [*STUDIES][1:])],
+    "name", ["each alone", *(pytest.param(name, marks=pytest.mark.long) for name in [*STUDIES][1:])]
 )
 def test_in_this_process_in_threads_and_in_any_order_the_points_are_the_same(name: str) -> None:
     study = STUDIES[name]

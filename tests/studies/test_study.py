@@ -161,7 +161,7 @@ numbers = st.one_of(st.none(), st.floats(allow_nan=False))
         st.booleans(),
         st.lists(st.floats(allow_nan=False)).map(tuple),
         st.none() | st.text(),
-    ),
+    )
 )
 @example(Point(0, 0.1 + 0.2, ulp(0.0), inf, -0.0, 1e22, turning_points=(-0.0, ulp(0.0))))
 def test_a_point_is_the_same_read_back(point: Point) -> None:

@@ -158,7 +158,7 @@ PORTRAIT: dict[str, Any] = {
                 "lineStyle": {"color": GREY, "type": "dashed"},
                 "label": {"formatter": "belt", "position": "insideEndTop"},
                 "data": [],
-            },
+            }
         },
     ],
 }

@@ -180,7 +180,7 @@ def stability_chart(stability: StabilityMap, drive: Drive, gains: Washout | None
                 _line(name, contour[:, 0], contour[:, 1], SKY_BLUE, style, width=1.2)
                 for contour in contours.lines(level)
             ]
-    series += [_region(text, *place) for text, place in _regions(stability, linear)]
+    series += _regions(stability, linear)
     options = _options(units.label(units.plain("cutoff frequency"), "rad/s"), label, series)
     options["xAxis"] |= {"type": "log", "min": float(corners[0]), "max": float(corners[-1])}
     options["yAxis"] |= {"min": float(linear[0]), "max": float(linear[-1])}
@@ -224,8 +224,9 @@ def decay_chart(decay: Decay, drive: Drive) -> Options:
     return _options(real, imaginary, series)
 
 
-def _regions(stability: StabilityMap, linear: Any) -> Iterable[tuple[str, tuple[float, float]]]:
-    """Yield "stable" and "unstable", each with the median place of its region."""
+def _regions(stability: StabilityMap, linear: Any) -> Iterable[Options]:
+    """Yield "stable" and "unstable", each at the median place of its region."""
+    label = {"show": True, "fontStyle": "italic", "fontSize": 12, "color": GREY}
     for text, inside in (
         ("stable", stability.decay_rates > 0.0),
         ("unstable", stability.decay_rates < 0.0),
@@ -233,7 +234,9 @@ def _regions(stability: StabilityMap, linear: Any) -> Iterable[tuple[str, tuple[
         rows, columns = np.nonzero(inside)
         if len(rows) > 20:
             corner = stability.corner_frequencies[int(np.median(rows))]
-            yield text, (float(corner), float(linear[int(np.median(columns))]))
+            place = [_number(corner), _number(linear[int(np.median(columns))])]
+            look = {"silent": True, "label": label | {"formatter": text}, "data": [place]}
+            yield points("", GREY, 1) | look
 
 
 def _options(x: str, y: str, series: Sequence[Options]) -> Options:
@@ -261,12 +264,6 @@ def _line(
 
 def _point(name: str, x: float, y: float) -> Options:
     return points(name, GREEN, 14, "diamond") | {"z": 5, "data": [[_number(x), _number(y)]]}
-
-
-def _region(text: str, x: float, y: float) -> Options:
-    label = {"show": True, "formatter": text, "fontStyle": "italic", "fontSize": 12, "color": GREY}
-    place = {"silent": True, "label": label, "data": [[_number(x), _number(y)]]}
-    return points("", GREY, 1) | place
 
 
 def _verticals(marks: Iterable[tuple[float, str, str, str]]) -> Options:

@@ -25,9 +25,7 @@ ThingT = TypeVar("ThingT")
 
 
 def qos_profile(
-    topic: Topic[Any],
-    depth: int | None = None,
-    reliability: ReliabilityPolicy | None = None,
+    topic: Topic[Any], depth: int | None = None, reliability: ReliabilityPolicy | None = None
 ) -> QoSProfile:
     """Return the quality of service of a topic, or one with another depth or reliability."""
     return QoSProfile(

@@ -54,15 +54,17 @@ def share_missed(period: float, duration: float = 1.0) -> float:
 
 
 def _set_priority(priority: int) -> None:
-    for thread in _threads():
-        with suppress(ProcessLookupError):  # it ended meanwhile
-            os.sched_setscheduler(thread, os.SCHED_FIFO, os.sched_param(priority))
+    _for_threads(os.sched_setscheduler, os.SCHED_FIFO, os.sched_param(priority))
 
 
 def _set_affinity(processor: int) -> None:
-    for thread in _threads():
-        with suppress(ProcessLookupError):
-            os.sched_setaffinity(thread, {processor})
+    _for_threads(os.sched_setaffinity, {processor})
+
+
+def _for_threads(apply: Callable[..., object], *values: Any) -> None:
+    for thread in _THREADS.iterdir():
+        with suppress(ProcessLookupError):  # it ended meanwhile
+            apply(int(thread.name), *values)
 
 
 def _lock_memory(_: bool) -> None:
@@ -74,10 +76,6 @@ def _lock_memory(_: bool) -> None:
     if library.mlockall(_MCL_CURRENT_AND_FUTURE):
         number = ctypes.get_errno()
         raise OSError(number, os.strerror(number))
-
-
-def _threads() -> list[int]:
-    return [int(thread.name) for thread in _THREADS.iterdir()]
 
 
 _LIMITS = "see /etc/security/limits.conf"

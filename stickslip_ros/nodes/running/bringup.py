@@ -16,12 +16,7 @@ from rclpy.task import Future
 
 from stickslip_ros.errors import RunError
 from stickslip_ros.nodes.base.child_process import EXIT_TIMEOUT, ChildProcesses, how_it_ended
-from stickslip_ros.nodes.base.clients import (
-    ACTIVE,
-    NEXT_TRANSITION,
-    LifecycleClient,
-    setting_call,
-)
+from stickslip_ros.nodes.base.clients import ACTIVE, NEXT_TRANSITION, LifecycleClient, setting_call
 from stickslip_ros.nodes.base.network import domain_of_environment, lock_namespace
 from stickslip_ros.nodes.base.process import ROS_ARGUMENTS, ros_session
 from stickslip_ros.nodes.base.spinner import Spinner, signal_handlers_kept, stop_on_signals
