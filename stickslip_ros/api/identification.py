@@ -187,11 +187,30 @@ def identify(
     columns: Mapping[str, str] | None = None,
     law: str = AUTO,
     fixed: Mapping[str, float | str] | None = None,
+    start: float = 0.0,
+    end: float = float("inf"),
+    namespace: str | None = None,
+    belt_speed: float | None = None,
+    joint: str | None = None,
+    belt_joint: str | None = None,
+    states_topic: str | None = None,
+    force_topic: str | None = None,
+    time: str = "header",
+    force: str = "topic",
+    decimal: str | None = None,
+    skip: int | None = None,
+    encoding: str | None = None,
+    period: float | None = None,
+    where: str | None = None,
+    session: int | None = None,
+    second: Path | str | None = None,
+    shift: float = 0.0,
+    force_constant: str | None = None,
+    pitch: float | None = None,
     rotary: bool = False,
     check: Sequence[Path | str] = (),
     progress: Callable[[str], None] = lambda _: None,
     time_limit: float = AUTO_TIME,
-    **options: Any,
 ) -> Model:
     """Fit a model to recordings of a drive.
 
@@ -205,6 +224,16 @@ def identify(
         Friction law, or `"auto"`: the one that predicts held-out parts best.
     fixed : mapping, optional
         Constants that are known, such as `{"plant.mass": 95.0}` or `"95kg"`, SI units.
+    start, end : float, optional
+        Part to use, s from the first sample of each recording.
+    namespace : str, optional
+        ROS namespace of the drive, where a bag holds several.
+    belt_speed : float, optional
+        Belt speed, m/s, in place of what the recordings have.
+    joint, belt_joint, states_topic, force_topic, time, force : optional
+        Where bags of another machine have motion and force, as for `read_bag`.
+    decimal, skip, encoding, period, where, session, second, shift, force_constant, pitch : optional
+        Form of the tables, as for `read_table`.
     rotary : bool, optional
         Whether displacements are angles, rad, and forces torques, N m: they are shown as such.
     check : sequence of Path or str, optional
@@ -213,10 +242,6 @@ def identify(
         Receives the name of the friction law that is tried.
     time_limit : float, optional
         Work for `"auto"`, in s of a usual processor, after which the best law so far is taken.
-    **options : optional
-        How the recordings are read: `start` and `end` of the part, `namespace` and `belt_speed` of
-        the drive, `joint`, `belt_joint`, `states_topic`, `force_topic`, `time` and `force` as for
-        `read_bag`, and the form of tables, from `decimal` to `pitch`, as for `read_table`.
 
     Returns
     -------
@@ -243,8 +268,11 @@ def identify(
     >>> f"{model.drive.stiffness:.4g} N/m"
     '1e+06 N/m'
     """
+    options = locals()  # all arguments
+    for name in ("recordings", "law", "fixed", "check", "progress", "time_limit"):
+        del options[name]
     fitted, others = ([*dict.fromkeys(map(Path, paths))] for paths in (recordings, check))
-    read = read_all([*fitted, *others], columns, **with_forms({**options, "rotary": rotary}))
+    read = read_all([*fitted, *others], **with_forms(options))
     records = [record for path in fitted for record in read[path]]
     findings = identify_records(records, law, constants(fixed or {}), progress, time_limit)
     predicted = {
