@@ -16,12 +16,12 @@ from stickslip_ros.api.page import Summary
 from stickslip_ros.api.results import Drawing, Parts, Table, TabularResult, attributes, column
 from stickslip_ros.api.runs import limit_text
 from stickslip_ros.api.scenarios import ScenarioLike, as_scenario
-from stickslip_ros.api.studies import Values, axis_of
+from stickslip_ros.api.studies import Values, axes_of
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.progress import Progress
 from stickslip_ros.quantities import Quantity
 from stickslip_ros.scenarios.files import Scenario
-from stickslip_ros.scenarios.keywords import keyword_of, parameter_of
+from stickslip_ros.scenarios.keywords import keyword_of
 from stickslip_ros.show.parameter_tables import scenario_tables
 from stickslip_ros.show.quantities import Units
 from stickslip_ros.studies.case_outcome import FOLLOWING, OUTCOMES, is_positioning
@@ -36,7 +36,6 @@ from stickslip_ros.studies.comparison import (
     ranked,
 )
 from stickslip_ros.studies.drive_loops import Tuned, with_law
-from stickslip_ros.studies.plan import Axis
 from stickslip_ros.studies.runner import CountPoints, compute_columns
 from stickslip_ros.studies.spread import spread_text
 from stickslip_ros.tables import TextTable
@@ -374,13 +373,10 @@ def compare(
     """
     chosen = as_scenario(scenario)
     check_rank(rank_by, chosen)
-    every = [*map(Axis.parse, axes)]
-    for keyword, values in parameters.items():
-        every.append(axis_of(keyword, parameter_of(keyword, chosen.nodes), values, listed=True))
     study, tuned = compared(
         chosen,
         controllers,
-        every,
+        axes_of(chosen, axes, parameters),
         disturbances=disturbances,
         given=given,
         seeds=seeds,

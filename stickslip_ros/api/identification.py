@@ -154,15 +154,7 @@ class Model(Result):
                 }
                 for candidate in findings.candidates
             ],
-            "curves": [
-                {
-                    "direction": curve.direction,
-                    "speed": curve.speed.tolist(),
-                    "force": curve.force.tolist(),
-                    "standard_error": curve.standard_error.tolist(),
-                }
-                for curve in findings.curves
-            ],
+            "curves": [vars(curve) for curve in findings.curves],
             "notes": self._notes,
             "servo": None if findings.servo is None else vars(findings.servo),
             "force_delay": findings.chosen.delay,

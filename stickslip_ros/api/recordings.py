@@ -46,9 +46,6 @@ from stickslip_ros.tables import TextTable
 
 _COLUMNS = quantities_of(MotorTrajectory) | {"stamp": Quantity("stamp", "ns")}
 
-Part = SampleColumns | ForceColumns
-"""Consecutive joint states or control forces."""
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RecordedRun(TabularResult):
@@ -269,21 +266,12 @@ def read_bag(
     >>> recorded.measures.regime.value, f"{recorded.measures.amplitude:.2e}"
     ('stick_slip', '3.26e-04')
     """
-    runs = runs_of(map(Path, (path, *continued)))
+    options = locals()  # all arguments
+    bag, others = Path(options.pop("path")), options.pop("continued")
+    runs = runs_of([bag, *map(Path, others)])
     if len(runs) > 1:
         raise InvalidInputError(f"{[*runs][1]} does not continue the run in {path}")
-    return recorded_run(
-        Path(path),
-        table=False,
-        continued=runs[Path(path)],
-        start=start,
-        end=end,
-        namespace=namespace,
-        belt_speed=belt_speed,
-        layout=BagLayout(joint, belt_joint, states_topic, force_topic, time, force),
-        rotary=rotary,
-        slips=slips,
-    )
+    return recorded_run(bag, table=False, continued=runs[bag], **options)
 
 
 def read_table(
@@ -365,27 +353,8 @@ def read_table(
     >>> run.measures.regime.value, round(1e6 * run.measures.amplitude)
     ('stick_slip', 434)
     """
-    return recorded_run(
-        Path(path),
-        table=True,
-        columns=columns,
-        start=start,
-        end=end,
-        stick_speed=stick_speed,
-        belt_speed=belt_speed,
-        rotary=rotary,
-        slips=slips,
-        decimal=decimal,
-        skip=skip,
-        encoding=encoding,
-        period=period,
-        where=where,
-        session=session,
-        second=second,
-        shift=shift,
-        force_constant=force_constant,
-        pitch=pitch,
-    )
+    options = locals()  # all arguments
+    return recorded_run(Path(options.pop("path")), table=True, **options)
 
 
 def recorded_run(
@@ -402,18 +371,10 @@ def recorded_run(
 
     Its samples need not be `kept`; a run that is not to be `drawn` is measured faster.
     """
-    history = RunHistory()
-    samples: list[SampleColumns] = []
-    forces: list[ForceColumns] = []
-
-    def take(part: Part) -> None:
-        if isinstance(part, SampleColumns):
-            samples.append(part)
-        else:
-            forces.append(part)
-
-    taking: dict[str, Any] = {"take": take} if kept else {}
-    observer = history if drawn else None
+    given = with_forms({**options, "rotary": rotary})
+    history, taken = RunHistory(), list[SampleColumns | ForceColumns]()
+    if kept:
+        given["take"] = taken.append
     table = is_table(path) if table is None else table
     drive = None if table else recorded_drive(path, namespace)
     unit = "" if Units.for_drive(drive).dimensionless else "m"
@@ -422,21 +383,13 @@ def recorded_run(
         table=table,
         namespace=namespace,
         length="rad" if rotary else unit,
-        observer=observer,
-        **taking,
-        **with_forms({**options, "rotary": rotary}),
+        observer=history if drawn else None,
+        **given,
     )
-    return RecordedRun(
-        path,
-        NO_SAMPLES.followed_by(*samples),
-        NO_FORCES.followed_by(*forces),
-        report,
-        drive,
-        history,
-        table,
-        namespace,
-        rotary,
-    )
+    samples = NO_SAMPLES.followed_by(*(t for t in taken if isinstance(t, SampleColumns)))
+    forces = NO_FORCES.followed_by(*(t for t in taken if isinstance(t, ForceColumns)))
+    parts = samples, forces, report, drive, history, table, namespace, rotary
+    return RecordedRun(path, *parts)
 
 
 def with_forms(options: Mapping[str, Any]) -> dict[str, Any]:

@@ -2,7 +2,7 @@
 
 from abc import abstractmethod
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property, partial
@@ -298,13 +298,7 @@ def sweep(
     chosen = as_scenario(scenario)
     study = sweep_study(
         chosen,
-        [
-            *map(Axis.parse, axes),
-            *(
-                axis_of(keyword, parameter_of(keyword, chosen.nodes), given, listed=True)
-                for keyword, given in parameters.items()
-            ),
-        ],
+        axes_of(chosen, axes, parameters),
         continuation=None if carry is None else Continuation(carry),
         settling=_settling(SettlingOptions(), transient, cycles),
         continuous=continuous,
@@ -387,6 +381,13 @@ def basin(
         study, workers=workers, executor=executor, path=journal, progress=progress
     )
     return Basin(study, columns)
+
+
+def axes_of(scenario: Scenario, texts: Sequence[str], given: Mapping[str, Any]) -> list[Axis]:
+    """Return the axes that are given as texts and by keyword."""
+    parameters = {keyword: parameter_of(keyword, scenario.nodes) for keyword in given}
+    named = (axis_of(name, parameters[name], given[name], listed=True) for name in given)
+    return [*map(Axis.parse, texts), *named]
 
 
 def axis_of(name: str, parameter: str, given: Any, *, listed: bool = False) -> Axis:

@@ -73,8 +73,12 @@ def run(arguments: argparse.Namespace) -> None:
     give_result(arguments, proposal)
     if not arguments.json and text is not None and arguments.out is None:
         print("--out FILE writes the scenario with these gains, --json prints it: parameter_file")
-    if arguments.out is not None:
-        _write(arguments.out, text)
+    out: Path | None = arguments.out
+    if out is not None and text is None:
+        _report_omitted(f"--out {out}: not written")
+    elif out is not None and text is not None:
+        write_new("--out", out, text)
+        tell(f"{out} is written: `{shlex.join(['stickslip', 'run', str(out)])}` runs it")
 
 
 def _belt_speeds(text: str | None) -> tuple[float, float] | None:
@@ -84,14 +88,6 @@ def _belt_speeds(text: str | None) -> tuple[float, float] | None:
     if len(speeds) > 2:
         raise InvalidInputError(f"--belt-speed {text!r}: must be LOW:HIGH, or one speed, in m/s")
     return speeds[0], speeds[-1]
-
-
-def _write(path: Path, text: str | None) -> None:
-    if text is None:
-        _report_omitted(f"--out {path}: not written")
-        return
-    write_new("--out", path, text)
-    tell(f"{path} is written: `{shlex.join(['stickslip', 'run', str(path)])}` runs it")
 
 
 def _report_omitted(what: str) -> None:

@@ -5,7 +5,6 @@ import sys
 from collections.abc import Iterable
 from inspect import getdoc
 from itertools import chain, repeat
-from pathlib import Path
 from shutil import get_terminal_size
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any
@@ -37,11 +36,15 @@ def run(arguments: argparse.Namespace) -> None:
     from stickslip_ros.scenarios.foreign_laws import CONTROLLERS, FRICTION_LAWS
     from stickslip_ros.scenarios.friction_parameters import law_parameters
     from stickslip_ros.scenarios.parameters import controller_node
+    from stickslip_ros.scenarios.sections import leading_comment
 
     for kind, family in (("friction law", FRICTION_LAWS), ("control law", CONTROLLERS)):
         for name, reason in family.refused.items():
             tell(f"{kind} {name} is refused: {reason}")
-    scenarios = [_scenario(name, path) for name, path in shipped_scenarios().items()]
+    scenarios = [
+        {"name": name, "description": leading_comment(path), "path": str(path)}
+        for name, path in shipped_scenarios().items()
+    ]
     friction_laws = [_law(law, "plant.friction", law_parameters(law)) for law in LAWS.values()]
     control_laws = [
         _law(law, controller_node(name), law.constants()) for name, law in CONTROL_LAWS.items()
@@ -57,9 +60,11 @@ def run(arguments: argparse.Namespace) -> None:
         ("control laws, --controller", control_laws),
     ):
         print()
-        _print(
-            heading, {law["name"]: [law["description"], _short(law["parameters"])] for law in laws}
-        )
+        texts: dict[str, list[str]] = {}
+        for law in laws:
+            names = ", ".join(name.rpartition(".")[2] for name in law["parameters"])
+            texts[law["name"]] = [law["description"], f"parameters: {names}"]
+        _print(heading, texts)
 
 
 def _print(heading: str, items: dict[str, list[str]]) -> None:
@@ -77,12 +82,6 @@ def _print(heading: str, items: dict[str, list[str]]) -> None:
             print(printable(f"{lead:{width}}{line}"))
 
 
-def _scenario(name: str, path: Path) -> dict[str, str]:
-    from stickslip_ros.scenarios.sections import leading_comment
-
-    return {"name": name, "description": leading_comment(path), "path": str(path)}
-
-
 def _law(
     law: "type[FrictionLaw | ControlLaw]", group: str, parameters: Iterable[str]
 ) -> dict[str, Any]:
@@ -91,7 +90,3 @@ def _law(
         "description": (getdoc(law) or "").partition("\n")[0],
         "parameters": [f"{group}.{name}" for name in parameters],
     }
-
-
-def _short(parameters: list[str]) -> str:
-    return "parameters: " + ", ".join(parameter.rpartition(".")[2] for parameter in parameters)

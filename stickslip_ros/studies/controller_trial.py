@@ -62,23 +62,16 @@ class Vibration:
         """Whether the drive vibrates without control."""
         return self.period is not None
 
-    def peak_speed(self, corner_frequency: float) -> float:
-        """Return the largest output, m/s, of the filter with a cutoff frequency in rad/s."""
-        return float(np.abs(self._filtered(corner_frequency)).max(initial=0.0))
-
     def peak_force(self, gains: Washout) -> float:
         """Return the largest force, N, of a controller activated at the worst phase."""
-        return float(np.abs(self._force(gains)).max(initial=0.0))
+        return float(self.forces(gains).max(initial=0.0))
 
-    def worst_sample(self, gains: Washout) -> int:
-        """Return the row of the sample at which that force is largest."""
-        return int(np.argmax(np.abs(self._force(gains))))
+    def forces(self, gains: Washout) -> FloatArray:
+        """Return the size of the force, N, of a controller activated at each sample."""
+        return np.abs(gains.force(self.filtered(gains.corner_frequency)))
 
-    def _force(self, gains: Washout) -> FloatArray:
-        return gains.force(self._filtered(gains.corner_frequency))
-
-    def _filtered(self, corner_frequency: float) -> FloatArray:
-        """Return the output of a settled filter of eq. 17 for the velocity, m/s.
+    def filtered(self, corner_frequency: float) -> FloatArray:
+        """Return the output of a settled filter of eq. 17 (rad/s) for the velocity, m/s.
 
         The whole cycles are treated as a periodic sequence, and the filter's response is applied
         to each harmonic.
@@ -187,7 +180,7 @@ class Bench:
         settled = ceil(FILTER_SETTLED / law.corner_frequency * self.rate / count) * count
         cycle = vibration.period * self.rate
         rows = {int(phase * cycle / _PHASES) for phase in range(_PHASES)}
-        due = {settled + row for row in rows | {vibration.worst_sample(law)}}
+        due = {settled + row for row in rows | {int(vibration.forces(law).argmax())}}
         columns = zip(vibration.position.tolist(), vibration.velocity.tolist(), strict=True)
         states, measure = list(columns), self._measure([])
         peak = slowest = 0.0

@@ -121,7 +121,8 @@ class Design:
         forces = np.zeros((len(around.corner_frequencies), len(around.linear_gains)))
         for row, corner_frequency in enumerate(around.corner_frequencies.tolist()):
             for vibration in self.vibrations:
-                speeds = np.linspace(0.0, vibration.peak_speed(corner_frequency), 50)
+                outputs = np.abs(vibration.filtered(corner_frequency))
+                speeds = np.linspace(0.0, outputs.max(initial=0.0), 50)
                 gains = Washout(corner_frequency, linear, around.gains.cubic_gain)
                 force = np.abs(gains.force(speeds)).max(axis=1)
                 forces[row] = np.maximum(forces[row], force)
