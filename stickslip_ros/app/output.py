@@ -28,8 +28,11 @@ _LINE_INTERVAL = 10.0
 _FRAME = 3
 """Characters that the frame of a column takes, beside one for the whole table."""
 _STYLES = {
-    "EQUILIBRIUM": "green", "STICK_SLIP": "yellow", "PURE_SLIP": "yellow", "UNBOUNDED": "red",
-}  # fmt: skip
+    "EQUILIBRIUM": "green",
+    "STICK_SLIP": "yellow",
+    "PURE_SLIP": "yellow",
+    "UNBOUNDED": "red",
+}
 """Style of the cells that are highlighted on a terminal, by regime."""
 
 
