@@ -62,10 +62,12 @@ setup(
         NAME: [
             "py.typed",
             "api/*.html",
+            "app/completion.*sh",
             "app/dashboard/*.css",
             "app/dashboard/*.js",
             "nodes/base/*.xml",
             "show/*.jinja",
+            "show/*.mplstyle",
         ]
     },
     data_files=[

@@ -2,6 +2,7 @@
 
 import argparse
 import re
+from pathlib import Path
 
 from stickslip_ros.app.commands import COMMANDS, command_parser
 
@@ -15,46 +16,6 @@ _FUNCTIONS = {
     "CONTROLLER": "_stickslip_controller_files",
 }
 """What completes an argument in the shell, by its metavar."""
-
-_BASH = """
-_stickslip_parameters() { compgen -W '@PARAMETERS@' -- "$1"; }
-_stickslip_words_or_files() {
-    compgen -W "$2" -- "$1"
-    compgen -f -X "!$3" -- "$1"
-    compgen -d -- "$1"
-}
-_stickslip_scenario_files() { _stickslip_words_or_files "$1" '@SCENARIOS@' '*.y*ml'; }
-_stickslip_controller_files() { _stickslip_words_or_files "$1" '@LAWS@' '*.py'; }
-# bash splits words at "=": NAME=VALUE is completed as one word, --OPTION=VALUE as two.
-_stickslip() {
-    local words=("") word
-    for word in "${COMP_WORDS[@]:0:COMP_CWORD+1}"; do
-        case ${words[-1]},$word in
-            --*,=) words+=("") ;;
-            *,= | *=,* | ,*) words[-1]+=$word ;;
-            *) words+=("$word") ;;
-        esac
-    done
-    local COMP_WORDS=("${words[@]}") COMP_CWORD=$((${#words[@]} - 1))
-    _shtab_stickslip
-    [[ ${COMPREPLY[0]-} == *= ]] && compopt -o nospace
-    [[ ${words[-1]} == *=* ]] && COMPREPLY=("${COMPREPLY[@]#*=}")
-    return 0
-}
-"""
-_ZSH = """
-_stickslip_parameters() {
-    local words=(@PARAMETERS@)
-    compadd "$@" -S '' -- ${(M)words:#*=}
-    compadd "$@" -- ${words:#*=}
-}
-_stickslip_words_or_files() {
-    _alternative "words::($1)" "files::_path_files -g '$2'" 'folders::_path_files -/'
-}
-_stickslip_scenario_files() { _stickslip_words_or_files '@SCENARIOS@' '*.y*ml' }
-_stickslip_controller_files() { _stickslip_words_or_files '@LAWS@' '*.py' }
-(( $+functions[compdef] )) || { autoload -Uz compinit && compinit }
-"""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -97,7 +58,7 @@ def run(arguments: argparse.Namespace) -> None:
         for parameter in model.known.values()
         for value in (("true", "false") if parameter.kind is bool else parameter.choices or ("",))
     ]
-    text = {"bash": _BASH, "zsh": _ZSH}[arguments.shell]
+    text = Path(__file__).with_suffix(f".{arguments.shell}").read_text(encoding="utf-8")
     for place, words in (
         ("@PARAMETERS@", parameters),
         ("@SCENARIOS@", shipped_scenarios()),

@@ -72,45 +72,14 @@ DASHES = ("--", ":", "-.")
 MANY = 5000
 """Number of points or cells from which a vector figure contains them as an image."""
 
-_LOOK: dict[str, Any] = {
-    "font.size": 9.0,
-    "axes.labelsize": 9.0,
-    "axes.titlesize": 10.0,
-    "figure.titlesize": 10.0,
-    "legend.fontsize": 8.0,
-    "xtick.labelsize": 8.0,
-    "ytick.labelsize": 8.0,
-    "lines.linewidth": 1.2,
-    "axes.axisbelow": True,
-    "axes.grid": True,
-    "grid.color": "#E5E5E5",
-    "grid.linewidth": 0.6,
-    "hatch.linewidth": 0.6,
-    "figure.constrained_layout.use": True,
-    "svg.fonttype": "none",
-    "svg.hashsalt": "stickslip_ros",
-    "pdf.fonttype": 42,
-}
 
-_PRINTED: dict[str, Any] = {
-    "font.size": 8.0,
-    "axes.labelsize": 8.0,
-    "axes.titlesize": 8.0,
-    "figure.titlesize": 8.0,
-    "legend.fontsize": 7.0,
-    "legend.title_fontsize": 7.0,
-    "legend.handlelength": 1.8,
-    "legend.columnspacing": 1.2,
-    "xtick.labelsize": 7.0,
-    "ytick.labelsize": 7.0,
-    "axes.linewidth": 0.6,
-    "xtick.major.width": 0.6,
-    "ytick.major.width": 0.6,
-    "lines.linewidth": 1.0,
-    "figure.constrained_layout.h_pad": 0.03,
-    "figure.constrained_layout.w_pad": 0.03,
-}
-"""Settings that differ in print."""
+_LOOK, _PRINTED = (
+    mpl.rc_params_from_file(
+        Path(__file__).with_name(f"{name}.mplstyle"), use_default_template=False
+    )
+    for name in ("screen", "print")
+)
+"""Settings of every figure, and those that differ in print."""
 
 _UNBROKEN = "\u00a0"
 
