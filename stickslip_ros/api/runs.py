@@ -14,7 +14,7 @@ from stickslip_ros.api.page import Summary
 from stickslip_ros.api.results import Drawing, Parts, Table, TabularResult, attributes
 from stickslip_ros.api.scenarios import ScenarioLike, as_scenario
 from stickslip_ros.measures.cycle_measures import Measures
-from stickslip_ros.measures.following import Followed, Following, followed
+from stickslip_ros.measures.following import Following, followed
 from stickslip_ros.measures.run_meter import RunAnalysis
 from stickslip_ros.measures.sample_meter import NOT_JUDGED
 from stickslip_ros.model.control import ControlLaw
@@ -251,7 +251,10 @@ def measured_run(
         measured=measured,
     )
     unit = Units.for_drive(scenario.plant.as_drive()).of_unit("m")
-    seen, itself = _followed(pursuer, unit)
+    seen = itself = None
+    if pursuer is not None:
+        time, reference, *motions = pursuer.pursuit
+        itself, seen = (followed(time, reference, motion, unit) for motion in motions)
     history.take_analysis(RunAnalysis(None, None, seen))
     true_measures, notes = None, [NOT_JUDGED] if scenario.reading.varies else []
     if measured is not None:
@@ -270,13 +273,3 @@ def measured_run(
         recorder,
         history,
     )
-
-
-def _followed(
-    recorder: SampleRecorder | None, unit: str
-) -> tuple[Followed | None, Followed | None]:
-    """Return how measured and true positions follow the reference; None without one."""
-    if recorder is None:
-        return None, None
-    time, reference, true, measured = recorder.pursuit
-    return followed(time, reference, measured, unit), followed(time, reference, true, unit)

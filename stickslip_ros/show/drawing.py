@@ -13,7 +13,7 @@ from matplotlib.gridspec import GridSpec, GridSpecFromSubplotSpec, SubplotSpec
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from stickslip_ros.arrays import FloatArray, IntArray
+from stickslip_ros.arrays import FloatArray
 from stickslip_ros.measures.mean_cycle import MeanCycle
 from stickslip_ros.measures.run_meter import RunAnalysis
 from stickslip_ros.measures.slips import Slip
@@ -200,7 +200,9 @@ def draw_cycles(
             if column == 2 and _sticks_unseen(history):
                 say(axes, "not known of single cycles")
                 continue
-            rows = _cycle_rows(*run)
+            time, *columns = run
+            length = float(time[-1] - time[0]) / PIXELS if len(time) else 1.0
+            rows = peaks(intervals(time, length or 1.0), *columns)  # in each pixel column
             every = max(1, len(rows) // most)
             axes.plot(run[0][rows], run[column][rows] / size, markevery=every, **look)
         largest = max(float(run[column].max(initial=0.0)) / size for run in cycles)
@@ -214,12 +216,6 @@ def _sticks_unseen(history: RunHistory) -> bool:
     ends, _, stick_fraction = history.cycles
     share = stick_time[-1] > _UNSEEN * (time[-1] - time[0]) if len(time) else False
     return bool(share and len(ends) and not stick_fraction.any())
-
-
-def _cycle_rows(time: FloatArray, *columns: FloatArray) -> IntArray:
-    """Return the rows of the cycles to draw: in each pixel column all peaks."""
-    span = float(time[-1] - time[0]) if len(time) else 0.0
-    return peaks(intervals(time, span / PIXELS or 1.0), *columns)
 
 
 def shade(axes: Axes, pane: Pane) -> None:

@@ -5,7 +5,7 @@ from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import ceil, hypot, inf, nan
-from typing import Annotated, Any, Self
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -20,7 +20,6 @@ from stickslip_ros.motion.controller import Controller, answer
 from stickslip_ros.motion.sampled_loop import LOCKSTEP_START, SampledLoop
 from stickslip_ros.quantities import Quantity
 from stickslip_ros.samples import Sample
-from stickslip_ros.scenarios.plant_parameters import PlantParameters
 from stickslip_ros.stamps import NANOSECONDS
 from stickslip_ros.theory.cycle_bounds import loading_time, release_position
 from stickslip_ros.theory.linear_sampled_loop import SETTLED
@@ -131,13 +130,6 @@ class Bench:
     rate: float
     force_delay: float
     sensor: Sensor = EXACT_SENSOR
-
-    @classmethod
-    def of_plant(cls, plant: PlantParameters) -> Self:
-        """Return the trials of the controller of a plant whose loop the theory covers."""
-        sensor = plant.sensor.every(plant.answer_every)
-        assert sensor is not None
-        return cls(plant.control_rate, plant.force_delay, sensor)
 
     def vibration(self, drive: Drive) -> Vibration:
         """Return the vibration of `drive`, the largest if there are several.

@@ -125,7 +125,9 @@ class DriveLoops:
             spans = (sensor.spans // plant.answer_every for sensor in seen)
             loop = LinearSampledLoop(at_feed, rate, delay, _jacobian(at_feed), *spans)
             self.plants.append(PlantResponse.of_loop(loop))
-        self.bench = Bench.of_plant(plant)
+        answered = plant.sensor.every(plant.answer_every)
+        assert answered is not None  # or there was a reason
+        self.bench = Bench(rate, plant.force_delay, answered)
         slopes = [float(plant.loop.jacobian[SPEED, SPEED]) for plant in self.plants]
         ends = sorted({int(np.argmin(slopes)), int(np.argmax(slopes))})
         self.deciding = self.plants

@@ -111,7 +111,10 @@ class _Page:
             self._header = Header(listener, ended)
             self._empty = ui.element("section").classes("w-full notice")
             with self._empty:
-                _say_how_to_start(run.namespace)
+                heading(2, f"No drive is running in {run.namespace}").classes("text-lg")
+                ui.label("Start one in a terminal; this page shows it as soon as it is there:")
+                command = ["stickslip", "run", "feed_drive", "--namespace", run.namespace]
+                show_commands([shlex.join(command)])
             self.end = EndNotice(ended, listener)
             with ui.element("div").classes("board") as self._board:
                 with ui.element("div").classes("charts"):
@@ -169,10 +172,3 @@ class _Page:
         self._header.refresh(switching=self._control.busy, settings=self._settings.described())
         for part in self._cards:
             part.refresh()
-
-
-def _say_how_to_start(namespace: str) -> None:
-    heading(2, f"No drive is running in {namespace}").classes("text-lg")
-    ui.label("Start one in a terminal; this page shows it as soon as it is there:")
-    command = ["stickslip", "run", "feed_drive"]
-    show_commands([shlex.join([*command, "--namespace", namespace])])
