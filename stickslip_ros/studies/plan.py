@@ -1,6 +1,6 @@
 """The points of a study: values of parameters on a grid, or random values within ranges."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
@@ -204,7 +204,24 @@ def _numbers(*nodes: str) -> Iterator[str]:
 
 
 @dataclass(frozen=True)
-class Grid:
+class _OverAxes:
+    """Points that are values of parameters along axes."""
+
+    axes: tuple[Axis, ...]
+    """The axes, of different parameters; of a sample the counts do not matter."""
+
+    def __post_init__(self) -> None:
+        if len({*self.parameters}) < len(self.axes):
+            raise InvalidInputError(f"{', '.join(self.parameters)}: must be different parameters")
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """NODE.PARAMETER of the axes."""
+        return tuple(axis.parameter for axis in self.axes)
+
+
+@dataclass(frozen=True)
+class Grid(_OverAxes):
     """All combinations of the values of one or more axes; the last axis varies fastest.
 
     With a `continuation`, points follow each other along the last axis, and the grid has all points
@@ -213,20 +230,13 @@ class Grid:
 
     kind: ClassVar[str] = "grid"
     """Name of this kind of plan in journals and tables."""
-    axes: tuple[Axis, ...]
-    """The axes."""
     continuation: Continuation | None = None
     """Direction in which points follow each other; None: each starts in the initial state."""
 
     def __post_init__(self) -> None:
-        _check_different(self.parameters)
+        super().__post_init__()
         if self.size > MOST_POINTS:
             raise InvalidInputError(f"{self.size} points: must be at most {MOST_POINTS:,}")
-
-    @property
-    def parameters(self) -> tuple[str, ...]:
-        """NODE.PARAMETER of the axes."""
-        return tuple(axis.parameter for axis in self.axes)
 
     @property
     def directions(self) -> tuple[Continuation | None, ...]:
@@ -291,7 +301,7 @@ class Grid:
 
 
 @dataclass(frozen=True)
-class RandomSample:
+class RandomSample(_OverAxes):
     """Independent random values, uniformly distributed between the ends of some axes.
 
     For a logarithmic axis the logarithms are uniformly distributed. A point depends on the seed
@@ -302,8 +312,6 @@ class RandomSample:
     """Name of this kind of plan in journals and tables."""
     continuation: ClassVar[None] = None
     """None: the points of a sample are independent."""
-    axes: tuple[Axis, ...]
-    """The ranges; their counts do not matter."""
     size: int
     """Number of points."""
     seed: int = 0
@@ -314,12 +322,7 @@ class RandomSample:
             raise InvalidInputError(f"{self.size} points: must be from 1 to {MOST_POINTS:,}")
         if self.seed < 0:
             raise InvalidInputError(f"seed {self.seed}: must be 0 or more")
-        _check_different(self.parameters)
-
-    @property
-    def parameters(self) -> tuple[str, ...]:
-        """NODE.PARAMETER of the axes."""
-        return tuple(axis.parameter for axis in self.axes)
+        super().__post_init__()
 
     def values(self, index: int) -> tuple[float, ...]:
         """Return the values of the parameters at a point, as `Grid` does.
@@ -345,8 +348,3 @@ class RandomSample:
 
 Plan = Grid | RandomSample
 """The points of a study, by index from 0."""
-
-
-def _check_different(parameters: Sequence[str]) -> None:
-    if len(set(parameters)) < len(parameters):
-        raise InvalidInputError(f"{', '.join(parameters)}: must be different parameters")
