@@ -19,9 +19,9 @@ from stickslip_ros.measures.run_meter import RunAnalysis
 from stickslip_ros.measures.slips import Slip
 from stickslip_ros.model.drive import Drive
 from stickslip_ros.quantities import Quantity, quantities_of
+from stickslip_ros.show import BLUE, GREEN, GREY, LIGHT_GREY, ORANGE
 from stickslip_ros.show.quantities import MEASURES, Units
 from stickslip_ros.show.run_history import DrawnMotion, RunHistory, intervals, peaks
-from stickslip_ros.show.style import BLUE, GREEN, GREY, LIGHT_GREY, ORANGE
 
 MOTION: Any = {"color": BLUE, "lw": 1.0}
 BELT: Any = {"color": "black", "lw": 1.0, "ls": "--", "zorder": 2.5}

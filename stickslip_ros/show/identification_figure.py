@@ -13,9 +13,10 @@ from stickslip_ros.identification.findings import Findings
 from stickslip_ros.identification.fit import QUANTILE
 from stickslip_ros.measures.onset import Onset
 from stickslip_ros.model.friction import FrictionLaw
+from stickslip_ros.show import BLUE, GREEN, GREY, ORANGE
 from stickslip_ros.show.drawing import DOTS
 from stickslip_ros.show.quantities import SI, Units
-from stickslip_ros.show.style import BLUE, GREEN, GREY, ORANGE, SCREEN, FigureStyle, finish, styled
+from stickslip_ros.show.style import SCREEN, FigureStyle, finish, styled
 
 _MEASURED: Any = DOTS | {"ms": 7.0, "alpha": 0.15}
 """Wider than the curve, which hides what it fits."""

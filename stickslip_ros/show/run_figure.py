@@ -14,6 +14,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from stickslip_ros.arrays import FloatArray
+from stickslip_ros.show import AMBER, BLUE, GREEN, GREY, LIGHT_GREY, ORANGE, PURPLE, SKY_BLUE
 from stickslip_ros.show.drawing import (
     BELT,
     HELD,
@@ -38,22 +39,7 @@ from stickslip_ros.show.drawing import (
 from stickslip_ros.show.measure_table import measures_text
 from stickslip_ros.show.quantities import SI
 from stickslip_ros.show.run_history import DrawnRun
-from stickslip_ros.show.style import (
-    AMBER,
-    BLUE,
-    GREEN,
-    GREY,
-    LIGHT_GREY,
-    MANY,
-    ORANGE,
-    PURPLE,
-    SCREEN,
-    SKY_BLUE,
-    FigureStyle,
-    finish,
-    styled,
-    wrapped,
-)
+from stickslip_ros.show.style import MANY, SCREEN, FigureStyle, finish, styled, wrapped
 
 _REST: Any = {"color": GREEN, "lw": 1.2, "ls": ":", "zorder": 2.5}
 _CONTROL: Any = {"color": ORANGE, "lw": 1.6, "drawstyle": "steps-post"}

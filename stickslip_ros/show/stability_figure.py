@@ -17,18 +17,12 @@ from matplotlib.ticker import MaxNLocator
 from stickslip_ros.arrays import BoolArray, FloatArray
 from stickslip_ros.measures.cycle_measures import Regime
 from stickslip_ros.scenarios.files import Scenario
+from stickslip_ros.show import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, SKY_BLUE
 from stickslip_ros.show.quantities import Units
 from stickslip_ros.show.style import (
-    BLUE,
     DASHES,
-    GREEN,
-    GREY,
-    INK,
-    ORANGE,
-    PURPLE,
     REGIMES,
     SCREEN,
-    SKY_BLUE,
     FigureStyle,
     finish,
     styled,

@@ -18,21 +18,15 @@ from matplotlib.path import Path
 
 from stickslip_ros.arrays import BoolArray, FloatArray
 from stickslip_ros.measures.cycle_measures import Regime
+from stickslip_ros.show import AMBER, GREY, INK, LIGHT_GREY, PURPLE, SKY_BLUE, YELLOW
 from stickslip_ros.show.drawing import label_axis
 from stickslip_ros.show.quantities import MEASURES, Units, check_colour
 from stickslip_ros.show.study_tables import attractor_name
 from stickslip_ros.show.style import (
-    AMBER,
     DASHES,
-    GREY,
-    INK,
-    LIGHT_GREY,
     MANY,
-    PURPLE,
     REGIMES,
     SCREEN,
-    SKY_BLUE,
-    YELLOW,
     FigureStyle,
     Look,
     finish,

@@ -26,19 +26,8 @@ from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.files import written
 from stickslip_ros.measures.cycle_measures import Regime
 from stickslip_ros.scenarios.files import Scenario
+from stickslip_ros.show import BLUE, GREEN, GREY, LIGHT_GREY, ORANGE, SKY_BLUE, YELLOW
 from stickslip_ros.text import printable, shown
-
-BLUE, ORANGE, GREEN, SKY_BLUE, GREY = "#0072B2", "#D55E00", "#009E73", "#56B4E9", "#999999"
-"""Colours of Okabe and Ito's palette, which is safe for colour-blind readers, and a grey."""
-
-YELLOW, PURPLE, AMBER = "#F0E442", "#CC79A7", "#E69F00"
-"""Three more of that palette."""
-
-LIGHT_GREY = "#CCCCCC"
-"""Colour of elements without information."""
-
-INK = "#333333"
-"""Colour of hatches, visible on every colour except black."""
 
 
 class Look(NamedTuple):

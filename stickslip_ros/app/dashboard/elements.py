@@ -12,7 +12,7 @@ from typing import Any
 
 from nicegui import ui
 
-from stickslip_ros.show.style import BLUE, GREEN, GREY, ORANGE, SKY_BLUE
+from stickslip_ros.show import BLUE, GREEN, GREY, ORANGE, SKY_BLUE
 
 AXIS: dict[str, Any] = {
     "type": "value",

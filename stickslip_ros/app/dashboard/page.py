@@ -28,7 +28,7 @@ from stickslip_ros.app.dashboard.header import Header
 from stickslip_ros.app.dashboard.listener import ListenerNode
 from stickslip_ros.app.dashboard.theory import Theory
 from stickslip_ros.app.dashboard.theory_panel import TheoryPanel
-from stickslip_ros.show.style import BLUE, GREEN, GREY, ORANGE, SKY_BLUE
+from stickslip_ros.show import BLUE, GREEN, GREY, ORANGE, SKY_BLUE
 
 _REFRESH = 0.25
 _FAREWELL_TIME = 5.0

@@ -35,8 +35,8 @@ from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.model.control import Washout
 from stickslip_ros.model.drive import Drive
 from stickslip_ros.scenarios.parameters import CONTROLLER_PARAMETERS, controller_node
+from stickslip_ros.show import BLUE, GREEN, GREY, ORANGE, SKY_BLUE
 from stickslip_ros.show.quantities import Units
-from stickslip_ros.show.style import BLUE, GREEN, GREY, ORANGE, SKY_BLUE
 from stickslip_ros.theory.bifurcation_branches import BifurcationBranches, Branch
 from stickslip_ros.theory.gain_intervals import gains_of
 from stickslip_ros.theory.linear_sampled_loop import settling_time
