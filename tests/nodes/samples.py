@@ -26,6 +26,6 @@ class Samples:
         enough = len(self.stamps) + count
         self._graph.wait_until(lambda: len(self.stamps) >= enough, f"{count} further samples")
 
-    def longest_gap(self, first: int = 0) -> float:
-        """Return the longest time, s, between two samples that follow each other."""
-        return max(b - a for a, b in pairwise(self.arrivals[first:]))
+    def gaps(self, first: int = 0) -> list[float]:
+        """Return the times, s, between samples that follow each other."""
+        return [b - a for a, b in pairwise(self.arrivals[first:])]

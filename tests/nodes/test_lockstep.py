@@ -77,10 +77,10 @@ def test_a_killed_analyzer_holds_the_plant_up_once_until_another_is_back(
     watch.wait_for(500)
     analyzer.kill()
     graph.wait_until(lambda: watch.log_lines(SILENT_RECORDER), "it is given up")
-    began = time.monotonic()
+    given_up = len(watch.stamps)
     watch.wait_for(2000)
     # Every window of samples would have taken the timeout.
-    assert time.monotonic() - began < 10.0 * timeout
+    assert sum(gap >= timeout for gap in watch.gaps(given_up)) < 5
     for level, message in watch.further_health(2):
         assert level == WARN
         assert SILENT_RECORDER in message
@@ -92,7 +92,7 @@ def test_a_killed_analyzer_holds_the_plant_up_once_until_another_is_back(
     assert watch.stamps == grid(figures["samples"])
     assert figures["late_forces"] == 0
     assert len(watch.log_lines(SILENT_RECORDER)) == 1
-    assert watch.longest_gap() >= timeout
+    assert max(watch.gaps()) >= timeout
 
 
 def test_in_real_time_the_log_tells_that_the_controller_is_lost_and_that_it_is_back(
@@ -108,7 +108,8 @@ def test_in_real_time_the_log_tells_that_the_controller_is_lost_and_that_it_is_b
     controller.trigger_activate()
     graph.wait_until(lambda: watch.log_lines("in time again"), "the return is logged")
     plant.trigger_deactivate()
-    assert len(watch.log_lines(NO_FORCE)) == 1
+    # A busy machine may have held a force up before, which is told as well.
+    assert len(watch.log_lines(NO_FORCE)) == len(watch.log_lines("in time again"))
 
 
 def test_time_in_which_the_plant_does_not_run_is_not_silence_of_others(
@@ -166,4 +167,4 @@ def test_a_controller_that_falls_silent_is_waited_for_once_and_taken_back(
     assert late == len(unanswered) + too_late
     assert NO_FORCE not in message
     assert len(watch.log_lines(NO_FORCE)) == 1
-    assert watch.longest_gap() >= timeout
+    assert max(watch.gaps()) >= timeout

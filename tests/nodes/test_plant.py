@@ -181,7 +181,7 @@ def test_realtime_keeps_the_stamps_on_the_grid_and_its_pace_and_holds_late_force
 def test_forces_that_do_not_act_are_published_as_they_were_sent(graph: Graph, pace: str) -> None:
     heard = graph.listen(JOINT_STATES, raw=True)
     dropped = graph.listen(DROPPED_FORCE, raw=True)
-    plant = graph.add(PlantNode, pace=pace, wait_for=["observer"], rate=5.0)
+    plant = graph.add(PlantNode, pace=pace, wait_for=["observer"], rate=0.01)
     force = answers(graph)
     graph.wait_until(lambda: heard, "sample 0")
     stamp = int(joint_state_columns(heard[:1])[0].stamp[0])

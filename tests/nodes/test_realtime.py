@@ -47,10 +47,10 @@ def value(health: list[DiagnosticStatus], name: str) -> int:
 def test_after_a_stall_every_sample_follows_at_once_and_the_schedule_stands(
     graph: Graph, processes: Processes
 ) -> None:
-    rate, duration = 300.0, 3.0
+    rate = 300.0
     samples = Samples(graph)
     health = graph.health("plant")
-    parameters = {"expects_control": False, "wait_for": "[observer]", "duration": duration}
+    parameters = {"expects_control": False, "wait_for": "[observer]"}
     plant = processes.node("plant", pace="realtime", rate=rate, **parameters)
     samples.wait_for(200)
     before = len(samples.stamps)
@@ -60,17 +60,16 @@ def test_after_a_stall_every_sample_follows_at_once_and_the_schedule_stands(
     stall = time.monotonic() - stopped
     plant.send_signal(signal.SIGCONT)
 
-    count = round(duration * rate) + 1
-    graph.wait_until(lambda: len(samples.stamps) == count, "every sample comes")
-    graph.wait_until(lambda: value(health, "samples") == count, "the plant tells its values")
+    samples.wait_for(round(stall * rate) + 400)
+    count = len(samples.stamps)
+    graph.wait_until(lambda: value(health, "samples") >= count, "the plant tells its values")
     nanoseconds = 1_000_000_000 / rate
     assert [stamp - samples.stamps[0] for stamp in samples.stamps] == [
-        round(number * nanoseconds) for number in range(count)
+        round(number * nanoseconds) for number in range(len(samples.stamps))
     ]
-    assert count > value(health, "missed_deadlines") >= stall * rate - 5
-    # The second half of the rest: by then the plant has caught up.
-    after = (before + round(stall * rate) + count) // 2
-    delayed = least_delay(samples, after, None) - least_delay(samples, 0, before)
+    assert value(health, "samples") > value(health, "missed_deadlines") >= stall * rate - 5
+    # The latest ones: by then the plant has caught up.
+    delayed = least_delay(samples, -200, None) - least_delay(samples, 0, before)
     assert abs(delayed) < 0.5 * stall
 
 
@@ -123,7 +122,7 @@ def test_a_reader_that_is_stopped_or_killed_costs_the_plant_nothing(
     stranger.send_signal(end)
     samples.wait_for(1500)  # some effects take seconds to show
     assert any(relative_cost(1000) < 1.6 * usual for _ in range(5))
-    assert samples.longest_gap(first) < 0.9
+    assert max(samples.gaps(first)) < 0.9
     assert samples.stamps == [samples.stamps[0] + n * 2_000_000 for n in range(len(samples.stamps))]
 
 

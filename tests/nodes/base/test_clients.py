@@ -14,7 +14,7 @@ from stickslip_ros.nodes.base.clients import LifecycleClient, ServiceCall, param
 from stickslip_ros.nodes.base.process import loopback_session
 from stickslip_ros.nodes.plant import PlantNode
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
-from tests.nodes.graph import Graph
+from tests.nodes.graph import PATIENCE, Graph, wait_for
 
 CONFIGURE = Transition.TRANSITION_CONFIGURE
 ACTIVATE = Transition.TRANSITION_ACTIVATE
@@ -27,7 +27,7 @@ def client(domain: int) -> Iterator[LifecycleClient]:
         asking = Node("asking", context=context)
         spinner.add(asking)
         spinner.add(WashoutControllerNode(context=context, overrides={"autostart": False}))
-        yield LifecycleClient(spinner, asking, "washout_controller", 1.0)
+        yield LifecycleClient(spinner, asking, "washout_controller", PATIENCE)
 
 
 def test_each_transition_is_made_once(client: LifecycleClient) -> None:
@@ -52,10 +52,10 @@ def test_the_state_replaces_an_answer_that_is_lost(
             take(call, pending)
 
     monkeypatch.setattr(ServiceCall, "_take", lose_the_first)
-    assert client.change_state(CONFIGURE)
+    monkeypatch.setattr(client, "_timeout", 0.5)
+    wait_for(lambda: client.change_state(CONFIGURE), "it is configured")
     assert [answer.success for answer in lost] == [True]
-    assert client.change_state(ACTIVATE)
-    assert client.state() == "active"
+    wait_for(lambda: client.change_state(ACTIVATE), "it is active")
 
 
 class _Slow:
