@@ -92,6 +92,13 @@ def copy_checkout(to: Path) -> None:
             shutil.copy2(CHECKOUT / name, to / name)
 
 
+def copy_compiled(to: Path) -> None:
+    """Copy what Python has compiled of the package: in each copy it would be compiled again."""
+    for compiled in (CHECKOUT / "stickslip_ros").rglob("__pycache__/*.pyc"):
+        (to / compiled.relative_to(CHECKOUT)).parent.mkdir(exist_ok=True)
+        shutil.copy2(compiled, to / compiled.relative_to(CHECKOUT))
+
+
 def free_port() -> int:
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
@@ -104,6 +111,7 @@ class Shell:
     def __init__(self, scratch: Path, domain: int) -> None:
         self.checkout = scratch / "stickslip_ros"
         copy_checkout(self.checkout)
+        copy_compiled(self.checkout)
         self._scratch = scratch
         self._common = {k: v for k, v in os.environ.items() if k not in _CALLERS}
         self._common |= {
