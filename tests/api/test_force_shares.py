@@ -11,7 +11,6 @@ NOT_COMPARED = {"scenario", "parameters", "parameter_file", "overrides"}
 """Of a scenario, not of its motion."""
 
 ANSWERS: dict[str, Callable[[ss.Scenario, ss.Scenario], Any]] = {
-    "run": lambda free, _: ss.simulate(free, duration=1.0),
     "sweep": lambda free, _: ss.sweep(free, belt_speed=("20 mm/s", "60 mm/s", 2)),
     "basin": lambda free, _: ss.basin(
         free, position=("-1 mm", "1 mm", 2), velocity=("-0.1 m/s", "0.1 m/s", 2)

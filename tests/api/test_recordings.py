@@ -99,12 +99,15 @@ def test_notes_have_the_units_of_the_drive(name: str, drop: str, tmp_path: Path)
     assert any(note.startswith(f"the least drop of a slip, {drop}, is within") for note in notes)
 
 
-def recorded_with(folder: Path, parameters: dict[str, str]) -> Drive | None:
-    """Return the drive of a bag with the parameters of feed_drive, but for some."""
+def recorded_with(
+    folder: Path, parameters: dict[str, str], curves: dict[str, str] | None = None
+) -> Drive | None:
+    """Return the drive of a bag with the parameters of feed_drive, but for some, and curves."""
     with Recorder(folder / "bag") as recorder:
         everything = ss.scenario("feed_drive").plant.flat()
         given = {name: json.dumps(value) for name, value in everything.items()}
         recorder.add_metadata("stickslip_ros/plant", given | parameters)
+        recorder.add_metadata("stickslip_ros/curves", curves or {})
     return recorded_drive(folder / "bag")
 
 
@@ -121,6 +124,14 @@ def test_a_bag_does_not_have_other_files_read(group: str, tmp_path: Path) -> Non
 @pytest.mark.parametrize("mass", ["[" * 100_000, "-1", "NaN"])
 def test_parameters_that_are_none_are_no_drive(mass: str, tmp_path: Path) -> None:
     assert recorded_with(tmp_path, {"mass": mass}) is None
+
+
+@pytest.mark.parametrize(
+    "curve", ['[[0, 0.4], [0.5, "x"]]', "3", "[[0, 1e999], [1, 1]]", "[[1]]", "["]
+)
+def test_a_curve_that_is_none_makes_no_drive(curve: str, tmp_path: Path) -> None:
+    parameters = {"friction.law": '"table"', "friction.file": '"/none.csv"'}
+    assert recorded_with(tmp_path, parameters, {"/none.csv": curve}) is None
 
 
 @pytest.fixture(scope="module")

@@ -87,24 +87,6 @@ def test_what_cannot_be_drawn_or_designed_is_refused() -> None:
             ss.design("feed_drive", belt_speed=speed)  # pyright: ignore
 
 
-def test_a_design_runs_and_keeps_to_its_limit() -> None:
-    one = ss.design(ss.scenario("feed_drive", force_jitter=1e-4), belt_speed=0.04, force_limit=200)
-    assert one.design.task.belt_speeds == (0.04, 0.04)
-    assert "force_jitter is omitted" in (one.remark or "")
-    scenario = one.scenario
-    assert scenario.plant.belt_speed == 0.04
-    assert scenario.controller.control_law == one.controller
-    assert scenario.washout_controller.force_limit == 200.0
-    run = ss.simulate(ss.scenario(scenario, start_after=3.0), duration=8)
-    assert run.measures.regime == "equilibrium"
-    assert np.abs(run.trajectory.control_force).max() <= 200.0
-    assert "proposal" in repr(one)
-    frame = one.to_pandas()
-    assert frame["belt_speed"].tolist() == [check.belt_speed for check in one.checks]
-    assert frame.attrs["units"]["peak_force"] == "N"
-    assert one.margins is not None
-
-
 def test_the_critical_feed_speed_has_an_interval_for_a_spread_of_the_constants() -> None:
     drive = load_scenario("feed_drive", ["plant.expects_control=false"])
     found = ss.stability(drive, spread=0.5)

@@ -47,7 +47,11 @@ class Run:
         """Return what a command that succeeds prints with --json."""
         done = self(*arguments, "--json")
         assert done.returncode == 0, done.stderr
-        return json.loads(done.stdout)
+        return json.loads(done.stdout, parse_constant=_refuse)
+
+
+def _refuse(constant: str) -> None:
+    raise AssertionError(f"{constant} is not JSON")
 
 
 class RunOfItsOwn(Run):

@@ -10,10 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from stickslip_ros.nodes.analyzer import AnalyzerNode
 from stickslip_ros.nodes.plant import PlantNode
 from stickslip_ros.record.reader import Recording
-from stickslip_ros.record.recorder import Recorder
 from tests.app.conftest import REFERENCE, Run, Start, ended
 from tests.app.test_run import children, command, is_complete, is_running, wait_for_samples
 from tests.nodes.graph import PATIENCE, Graph, wait_for
@@ -61,23 +59,6 @@ def test_a_plant_that_gives_up_is_reported_and_its_bag_is_closed(
     assert "the plant could not continue: the motion is too stiff to be followed" in done.stderr
     assert done.stderr.endswith("the bag bag is closed\n")
     assert is_complete(tmp_path / "bag")
-
-
-def test_a_bag_that_another_run_has_begun_meanwhile_is_left_alone(
-    stickslip: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    with Recorder(tmp_path / "bag"):
-        pass
-    theirs = {path.name: path.read_bytes() for path in (tmp_path / "bag").iterdir()}
-    assert AnalyzerNode.connect  # it is imported, and checks the bag by itself
-    monkeypatch.setattr("stickslip_ros.record.recorder.check_new_bag", lambda _: None)
-    done = stickslip("run", "paper", "--composed", "--bag", "bag")
-    assert done.returncode == 1
-    assert done.stderr.endswith(
-        "stickslip run: analyzer could not start: the bag bag exists already and is not "
-        "overwritten; nothing was recorded\n"
-    )
-    assert {path.name: path.read_bytes() for path in (tmp_path / "bag").iterdir()} == theirs
 
 
 @pytest.mark.parametrize("flush_period", [0.01, 10.0])

@@ -1,8 +1,5 @@
 """`stickslip stability`: the paper's values, and the reasons for missing values."""
 
-import json
-from typing import Any
-
 import pytest
 
 from stickslip_ros.scenarios.files import load_scenario
@@ -12,19 +9,9 @@ from tests.app.conftest import Run
 from tests.theory.closed_forms import CubicLoop
 
 
-def stability(stickslip: Run, *arguments: str) -> dict[str, Any]:
-    done = stickslip("stability", *arguments, "--json")
-    assert done.returncode == 0, done.stderr
-
-    def refuse(constant: str) -> None:
-        raise AssertionError(f"{constant} is not JSON")
-
-    return json.loads(done.stdout, parse_constant=refuse)
-
-
 def test_the_papers_drive(stickslip: Run) -> None:
     speed = ("-p", "plant.belt_speed=0.49", "-p", "plant.damping=0.01")
-    found = stability(stickslip, "paper", *speed)
+    found = stickslip.json("stability", "paper", *speed)
     open_loop, closed_loop = found["open_loop"], found["closed_loop"]
     real, imaginary = (0.44 - 1.8 * 0.49**2) / 2.0, 0.99999235
     assert open_loop["eigenvalues"][0] == [pytest.approx(real), pytest.approx(imaginary)]
@@ -111,7 +98,7 @@ def test_coexisting_cycles_are_told_apart(stickslip: Run, monkeypatch: pytest.Mo
     law = [text for override in overrides for text in ("-p", override)]
     theory = theory_of(load_scenario("paper", overrides))
     monkeypatch.setattr("stickslip_ros.studies.stability.stability", lambda *_: theory)
-    found = stability(stickslip, "paper", *law)
+    found = stickslip.json("stability", "paper", *law)
     assert found["open_loop"]["stable"] is True
     unstable, stable = found["open_loop"]["limit_cycles"]
     assert (unstable["stable"], unstable["regime"]) == (False, "pure_slip")

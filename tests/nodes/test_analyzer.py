@@ -29,7 +29,6 @@ from stickslip_ros.nodes.plant import PlantNode
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
 from stickslip_ros.record.codec import joint_state_columns, pack_joint_state, pack_wrench
 from stickslip_ros.record.reader import Recording
-from stickslip_ros.record.recorder import Recorder
 from stickslip_ros.record.report import report_of_recording
 from stickslip_ros.record.topics import (
     AMPLITUDE,
@@ -258,17 +257,6 @@ def test_it_keeps_the_curves_in_files_that_parameters_name(graph: Graph, tmp_pat
     assert without == with_files
     assert float(without.friction.coefficient(-0.5, -1.0)) == 0.24
     assert without.belt.at(4.5) == pytest.approx(0.025, rel=1e-12)
-
-
-def test_a_curve_in_a_bag_that_is_none_makes_no_drive(tmp_path: Path) -> None:
-    parameters = {"friction.law": '"table"', "friction.file": '"/none.csv"'}
-    for number, curve in enumerate(
-        ('[[0, 0.4], [0.5, "x"]]', "3", "[[0, 1e999], [1, 1]]", "[[1]]", "[")
-    ):
-        with Recorder(tmp_path / f"bag_{number}") as recorder:
-            recorder.add_metadata("stickslip_ros/plant", parameters)
-            recorder.add_metadata("stickslip_ros/curves", {"/none.csv": curve})
-        assert recorded_drive(tmp_path / f"bag_{number}") is None
 
 
 def test_no_sample_counts_as_recorded_before_the_parameters_are(

@@ -16,9 +16,9 @@ TEXTS = ["1" + 400 * "0", 5000 * "9", "0x" + 5000 * "f", "1e400", "[1]", "[yes]"
 models = pytest.mark.parametrize("model", MODELS.values(), ids=MODELS.keys())
 
 
-def taken_or_refused(model: NodeParameters, name: str, value: Any) -> Any:
+def changed_or_refused(model: NodeParameters, name: str, value: Any) -> NodeParameters | str:
     try:
-        return model.changed({name: value}, "test").flat()[name]
+        return model.changed({name: value}, "test")
     except InvalidInputError as error:
         return str(error)
 
@@ -38,10 +38,19 @@ def test_bad_values_are_refused_with_name_value_and_what_is_allowed(model: NodeP
 
 @models
 def test_good_values_are_taken_as_they_are(model: NodeParameters) -> None:
+    """And all parameters, told one by one, make the same ones again."""
+    names = {parameter.name for parameter in model.known.values()}
     for parameter in model.known.values():
         for value in good_values(parameter):
-            taken = taken_or_refused(model, parameter.name, value)
-            assert bits(taken) == bits(value) or any(each in taken for each in CONFLICTS)
+            changed = changed_or_refused(model, parameter.name, value)
+            if isinstance(changed, str):
+                assert any(each in changed for each in CONFLICTS)
+                continue
+            flat = changed.flat()
+            assert bits(flat[parameter.name]) == bits(value)
+            assert flat.keys() == names
+            assert {type(each) for each in flat.values()} <= {bool, int, float, str, list}
+            assert model.changed(flat, "test") == changed
 
 
 @models

@@ -9,9 +9,9 @@ import pytest
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.model.constants import constants_of
 from stickslip_ros.model.friction import LAWS, Directional, Exponential, Stribeck, Table
-from stickslip_ros.scenarios.files import load_scenario, parameter_file
+from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.scenarios.plant_parameters import PlantParameters
-from stickslip_ros.scenarios.template import commented_file, scenario_schema
+from stickslip_ros.scenarios.template import scenario_schema
 from tests.scenarios.files import plant, refusal, scenario_file, section
 
 CURVE = "0,0.4\n0.1,0.3\n0.5,0.25\n"
@@ -81,16 +81,6 @@ def test_the_names_of_a_drive_are_those_that_make_its_law() -> None:
     two = plant(friction__law="exponential", friction__exponent=2.0)
     assert "friction.exponent" in two.drive_names()
     assert two.as_drive().friction == Exponential(0.4, 0.25, 0.5, 0.0, 2.0)
-
-
-def test_a_complete_file_gives_the_same_parameters(tmp_path: Path) -> None:
-    assert "reverse" not in repr(load_scenario("paper"))
-    scenario = load_scenario("paper", ["plant.friction.reverse.static=0.35"])
-    assert "plant.friction.reverse.static" in repr(scenario)
-    commented = scenario_file(tmp_path, commented_file(scenario, "A copy."))
-    assert load_scenario(commented).plant == scenario.plant
-    plain = scenario_file(tmp_path, parameter_file(scenario.as_dict()))
-    assert load_scenario(plain).plant == scenario.plant
 
 
 def test_the_schema_has_nested_groups() -> None:

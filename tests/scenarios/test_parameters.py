@@ -1,11 +1,8 @@
 """The models of the nodes' parameters, and the values derived from them."""
 
 from math import inf
-from typing import Any
 
 import pytest
-from hypothesis import assume, given
-from hypothesis import strategies as st
 
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.measures.sample_assumptions import SampleAssumptions
@@ -15,10 +12,8 @@ from stickslip_ros.model.friction import LAWS
 from stickslip_ros.model.sensor import EXACT_SENSOR, MeasuredVelocity, Sensor
 from stickslip_ros.motion import Motion
 from stickslip_ros.scenarios.files import load_scenario
-from stickslip_ros.scenarios.parameter_group import NodeParameters
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, ControllerParameters
 from stickslip_ros.scenarios.plant_parameters import PlantParameters
-from tests.examples import examples
 
 # Only while a node is not active; every physical parameter and gain can be set at any time.
 FIXED: dict[str, set[str]] = {"plant": {"rate", "pace"}, "analyzer": {"bag", "window"}}
@@ -64,60 +59,6 @@ def test_no_node_is_waited_for_that_cannot_be() -> None:
     for name in ("1bad", "", "a-b", "/", "a//b", "a/", "a/1b", "ä", "a\n"):
         with pytest.raises(InvalidInputError, match=r"test: wait_for = .* must be names of nodes"):
             PlantParameters().changed({"wait_for": ["plant", name]}, "test")
-
-
-@st.composite
-def values_of(draw: st.DrawFn, model: NodeParameters) -> dict[str, Any]:
-    """Values for some of the parameters, within all bounds."""
-    strategies: dict[type, st.SearchStrategy[Any]] = {
-        bool: st.booleans(),
-        str: st.text(),
-        list: st.lists(st.from_regex("/?([A-Z]+/)?[a-z_][a-z0-9_]*", fullmatch=True)),
-    }
-    parameters = {parameter.name: parameter for parameter in model.known.values()}
-    values: dict[str, Any] = {}
-    for name in sorted(draw(st.sets(st.sampled_from(sorted(parameters))))):
-        kind, choices = parameters[name].kind, parameters[name].choices
-        least, largest = parameters[name].least or 0, parameters[name].largest or inf
-        if kind is int:
-            strategies[int] = st.integers(int(least), int(min(largest, 4_000)))
-        elif kind is float:
-            end = min(largest, 1e3)
-            strategies[float] = st.floats(max(least, 1e-3), end)
-            if end >= 1.0:
-                strategies[float] |= st.integers(1, int(end))
-        values[name] = draw(st.sampled_from(choices) if choices else strategies[kind])
-    if any(name.endswith((".static", ".minimum", ".kinetic")) for name in values):
-        # The largest of the coefficients.
-        values |= {"friction.static": 1e6, "friction.reverse.static": 1e6}
-    assume(values.get("friction.law") != "table")  # it needs a file
-    values.pop("friction.curve", None)
-    for sensor in ("sensor", "motor.sensor"):
-        values.pop(f"{sensor}.velocity", None)  # a difference has no noise of its own
-    for part in ("belt", "load", "disturbance"):
-        values.pop(f"{part}.kind", None)  # it makes demands on the others
-    if values.keys() & {"mass", "stiffness", "rate"}:
-        values |= {"rate": 1e3}  # above all natural frequencies
-    return values
-
-
-@pytest.mark.parametrize("node", NODE_PARAMETERS)
-@examples(quick=5, thorough=40)
-@given(data=st.data())
-def test_flat_values_give_the_parameters_again(node: str, data: st.DataObject) -> None:
-    model = NODE_PARAMETERS[node]
-    values = data.draw(values_of(model))
-    delay = values.get("force_delay", 0.0) + values.get("force_jitter", 0.0)
-    assume(delay * values.get("rate", 100.0) <= 1e6)
-    assume(values.get("reference.kind", "none") in ("none", "topic"))  # others need a duration
-    assume(values.get("motor.kind") != "mass" or values.get("stiffness") != 0.0)
-    assume(node != "plant" or values.get("command_rule") == "newest" or "force_type" not in values)
-    parameters = model.changed(values, "test")
-    flat = parameters.flat()
-    assert {name: flat[name] for name in values} == values
-    assert set(flat) == set(known(node))
-    assert {type(value) for value in flat.values()} <= {bool, int, float, str, list}
-    assert model.changed(flat, "test") == parameters
 
 
 def test_the_plant_has_the_parts_of_its_parameters() -> None:

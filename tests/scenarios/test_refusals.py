@@ -190,6 +190,7 @@ def test_a_complete_file_is_taken_whatever_its_law_does_not_use(tmp_path: Path) 
     scenarios = [load_scenario(name) for name in shipped_scenarios()]
     laws = ("coulomb", "linear", "lugre")
     scenarios += [load_scenario("feed_drive", [f"plant.friction.law={law}"]) for law in laws]
+    scenarios.append(load_scenario("paper", ["plant.friction.reverse.static=0.35"]))
     for scenario in scenarios:
         path = scenario_file(tmp_path, commented_file(scenario, "A copy."))
         read = load_scenario(path, controller=scenario.controller.law)

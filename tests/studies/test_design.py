@@ -72,7 +72,9 @@ def test_a_proposal_holds_in_simulation_and_its_file_has_the_gains() -> None:
     assert 0.0 < margin < pi
     radius = max(np.abs(poles).max() for poles in found.poles.values())
     assert -np.log(radius) * 1000.0 == pytest.approx(found.design.tuned.decay_rate, rel=1e-6)
-    assert len(found.to_pandas()) == 10
+    frame = found.to_pandas()
+    assert frame["belt_speed"].tolist() == [check.belt_speed for check in found.checks]
+    assert frame.attrs["units"]["peak_force"] == "N"
     assert found.plot().axes
 
 
