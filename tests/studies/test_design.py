@@ -19,8 +19,6 @@ from stickslip_ros.studies.case_outcome import Disturbance
 from stickslip_ros.studies.design import Design, Designer, Task, design
 from stickslip_ros.studies.design_trial import Trial
 from stickslip_ros.studies.spread import drawn
-from stickslip_ros.theory.linear_sampled_loop import LinearSampledLoop
-from tests.drives import FEED_DRIVE
 from tests.scenarios.files import scenario_file
 
 WASHOUT = Washout(3.0, -2.0, 0.0)
@@ -269,14 +267,6 @@ def test_late_and_over_a_wide_range_too_it_brings_the_drive_to_rest() -> None:
     check_from_its_own_limit_cycle(force_delay=0.005, belt_speeds=(0.008, 0.04), force_limit=300.0)
 
 
-def test_nothing_near_a_proposal_is_much_faster() -> None:
-    gains = proposal(designed(belt_speeds=AT_40))
-    loop = LinearSampledLoop.from_drive(FEED_DRIVE, 1000.0)
-    corners = gains.corner_frequency * np.linspace(0.5, 2.0, 31)
-    linear = gains.linear_gain * np.linspace(0.5, 2.0, 31)
-    assert loop.decay_rate(gains) > 0.95 * loop.decay_rates(corners, linear).max()
-
-
 @pytest.mark.long
 def test_a_tighter_limit_is_slower_and_in_the_end_there_is_nothing() -> None:
     nothing = designed(belt_speeds=AT_40, force_limit=0.0)
@@ -381,9 +371,11 @@ def test_it_is_tried_with_sensor_and_actuator_and_tells_what_they_leave() -> Non
 
 
 @pytest.mark.long
-def test_a_coarse_actuator_leaves_a_vibration() -> None:
+def test_a_coarse_actuator_leaves_a_vibration(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("stickslip_ros.studies.design._ATTEMPTS", 1)
     coarse = ss.scenario("feed_drive", actuator_limit=200.0, actuator_resolution=20.0)
     remark = ss.design(coarse, belt_speed=(0.04, 0.04)).remark
     assert "does not decay to 1 % with the noise and rounding of sensor and actuator" in remark
+    monkeypatch.undo()
     check, *_ = designed(belt_speeds=AT_40, force_limit=100.0).checks
     assert check.rest is None
