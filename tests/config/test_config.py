@@ -70,8 +70,7 @@ def messages() -> Messages:
             environment.setenv(name, value)
         with closing(Graph(domain)) as graph:
             heard = graph.listen(DIAGNOSTICS)
-            analyzer = graph.add(AnalyzerNode)
-            graph.wait_until(lambda: analyzer.active, "it is active")
+            graph.add_active(AnalyzerNode)
             heard.clear()
             graph.wait_until(lambda: heard, "it tells its health")
             made[DIAGNOSTICS.name] = heard[-1]

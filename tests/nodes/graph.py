@@ -61,6 +61,12 @@ class Graph:
         self.adopt(made)
         return made
 
+    def add_active(self, node: type[ManagedNode[Any]], **parameters: Any) -> Any:
+        """Add one of our nodes and wait until it is active."""
+        made = self.add(node, **parameters)
+        self.wait_until(lambda: made.active, f"{made.get_name()} is active")
+        return made
+
     def adopt(self, node: Node) -> None:
         """Add a node that exists already."""
         self._nodes.append(node)

@@ -37,8 +37,8 @@ def start_loop(graph: Graph, bag: Path, **plant_parameters: object) -> tuple[Any
     analyzer = graph.add(AnalyzerNode, bag=str(bag))
     controller = graph.add(WashoutControllerNode, wait_for=["analyzer"])
     graph.wait_until(lambda: analyzer.active and controller.active, "both active")
-    plant = graph.add(PlantNode, wait_for=["analyzer", "washout_controller"], **plant_parameters)
-    graph.wait_until(lambda: plant.active, "plant active")
+    listeners = ["analyzer", "washout_controller"]
+    plant = graph.add_active(PlantNode, wait_for=listeners, **plant_parameters)
     return analyzer, controller, plant
 
 

@@ -55,8 +55,7 @@ def run_to_the_end(
 
     Return level and message of the last diagnosis of the analyzer before that.
     """
-    analyzer = graph.add(AnalyzerNode, bag=str(bag), window=window)
-    graph.wait_until(lambda: analyzer.active, "analyzer active")
+    analyzer = graph.add_active(AnalyzerNode, bag=str(bag), window=window)
     parameters = {"wait_for": ["analyzer"], "expects_control": False, **plant_parameters}
     plant = graph.add(PlantNode, **parameters)
     recorded = graph.listen(RECORDED)
@@ -154,8 +153,7 @@ def test_it_measures_a_joint_of_another_machine(graph: Graph, tmp_path: Path, ki
     message = Float64MultiArray(data=[9.0, -3.0]) if kind == "array" else Float64(data=-3.0)
     force_type = "effort" if effort else f"std_msgs/msg/{type(message).__name__}"
     machine = {"joint": "axis", "belt_speed": 0.5, "force_type": force_type, "force_number": 2}
-    analyzer = graph.add(AnalyzerNode, bag=str(tmp_path / "bag"), **machine)
-    graph.wait_until(lambda: analyzer.active, "analyzer active")
+    analyzer = graph.add_active(AnalyzerNode, bag=str(tmp_path / "bag"), **machine)
     best_effort = qos_profile(JOINT_STATES, reliability=ReliabilityPolicy.BEST_EFFORT)
     states = graph.observer.create_publisher(JointState, "joint_states", best_effort)
     topic = "other" if effort else "control_force"
@@ -188,8 +186,7 @@ def test_it_measures_a_joint_of_another_machine(graph: Graph, tmp_path: Path, ki
 
 
 def test_it_says_that_a_joint_must_be_chosen(graph: Graph) -> None:
-    analyzer = graph.add(AnalyzerNode)
-    graph.wait_until(lambda: analyzer.active, "analyzer active")
+    analyzer = graph.add_active(AnalyzerNode)
     states = graph.publisher(JOINT_STATES, 1)
     state = JointState(name=["wrist", "axis"], position=[9.0, 1.0])
     state.header.stamp.sec = 5
@@ -407,8 +404,7 @@ def test_a_disk_that_is_full_before_the_topics_are_in_the_bag_leaves_none(
 
 def test_on_a_full_disk_it_says_so_and_goes_on_measuring(graph: Graph, tmp_path: Path) -> None:
     bag = tmp_path / "bag"
-    analyzer = graph.add(AnalyzerNode, bag=str(bag), flush_period=0.01)
-    graph.wait_until(lambda: analyzer.active, "analyzer active")
+    analyzer = graph.add_active(AnalyzerNode, bag=str(bag), flush_period=0.01)
     diagnostics, amplitudes = graph.listen(DIAGNOSTICS), graph.listen(AMPLITUDE)
     parameters = {"expects_control": False, "duration": 60.0, "wait_for": ["analyzer"]}
     plant = graph.add(PlantNode, autostart=False, **parameters)

@@ -152,8 +152,7 @@ def test_what_waits_up_to_the_bound_is_recorded_and_beyond_it_is_counted(
     health = graph.health("plant")
     graph.add(AnalyzerNode, bag=str(bag))
     parameters = {"rate": RATE, "expects_control": False, "duration": (samples - 1) / RATE}
-    plant = graph.add(PlantNode, pace="realtime", wait_for=["analyzer"], **parameters)
-    graph.wait_until(lambda: plant.active, "the plant starts")
+    plant = graph.add_active(PlantNode, pace="realtime", wait_for=["analyzer"], **parameters)
     wait_for(lambda: plant.diagnose()[2]["samples"] == samples, "all samples are published")
     graph.wait_until(lambda: is_paused(health), "the plant tells its counts")
     graph.deactivate("analyzer")
