@@ -205,12 +205,18 @@ ANSWERS: dict[str, tuple[Callable[..., Any], str]] = {
 
 
 def test_an_answer_that_is_none_ends_in_a_sentence(install: Install, stickslip: Run) -> None:
-    for respond, reason in ANSWERS.values():
-        install(respond=respond)
+    for member, given, time, reason in (
+        *(("respond", respond, "0", reason) for respond, reason in ANSWERS.values()),
+        ("respond", lambda *a: (nan if a[3].velocity else 0.0, a[1]), "0.01", "its force is nan, "),
+        ("initial_state", _raising(KeyError("x")), "0", "KeyError: 'x'"),
+        ("initial_state", lambda *_: None, "0", f"its state is None, {STATE}"),
+        ("initial_state", lambda *_: (1.0, inf), "0", f"its state is (1.0, inf), {STATE}"),
+    ):
+        install(**{member: given})
         done = stickslip("simulate", "paper", "--duration", "1", "--controller", "hostile")
         assert (done.returncode, done.stdout) == (1, "")
         last = done.stderr.splitlines()[-1]
-        assert last == f"stickslip simulate: {LAW} fails at 0 s: {reason}"
+        assert last.startswith(f"stickslip simulate: {LAW} fails at {time} s: {reason}")
 
 
 @pytest.mark.parametrize("answer", ["nan", "exit"])
@@ -231,24 +237,6 @@ def test_in_a_study_it_is_the_reason_of_each_point(
     with pytest.raises(RunError) as failed:
         ss.simulate(scenario, 1.0)
     assert str(failed.value) == whole
-
-
-def test_an_initial_state_that_is_none_ends_in_a_sentence(install: Install, stickslip: Run) -> None:
-    for initial, reason in (
-        (_raising(KeyError("x")), "KeyError: 'x'"),
-        (lambda *_: None, f"its state is None, {STATE}"),
-        (lambda *_: (1.0, inf), f"its state is (1.0, inf), {STATE}"),
-    ):
-        install(initial_state=initial)
-        done = stickslip("simulate", "paper", "--duration", "1", "--controller", "hostile")
-        assert done.returncode == 1
-        assert done.stderr.endswith(f"{LAW} fails at 0 s: {reason}\n")
-
-
-def test_the_time_is_that_of_the_sample(install: Install, stickslip: Run) -> None:
-    install(respond=lambda _, state, elapsed, sample, __: (nan if sample.velocity else 0.0, state))
-    done = stickslip("simulate", "paper", "--duration", "1", "--controller", "hostile")
-    assert f"{LAW} fails at 0.01 s: its force is nan" in done.stderr
 
 
 def test_any_real_number_is_a_force(install: Install) -> None:

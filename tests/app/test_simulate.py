@@ -81,17 +81,6 @@ def test_the_file_has_the_trajectory_to_the_last_digit(
         assert rows_of(tmp_path / "some.csv") == rows[::7]
 
 
-def test_a_run_that_fails_leaves_no_file(
-    stickslip: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("stickslip_ros.motion.hybrid_motion._SPARE_STEPS", 10_000)
-    stiff = ("-p", "plant.damping=1e9", "--continuous-control")
-    done = stickslip("simulate", "paper", *stiff, "--out", "run.csv")
-    assert done.returncode == 1
-    assert "too stiff" in done.stderr
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_where_nothing_is_measured_it_says_why(stickslip: Run) -> None:
     for arguments, why in (
         ("-p plant.belt_speed=40 --yes --duration 1", "in 1 s: the slide has neither turned back"),

@@ -64,7 +64,6 @@ CALLS = [  # tests/app/test_results.py has others
     ("basin", ("basin", "paper", "--no-control", *GRID, *SHORT)),
     ("stability", ("stability", "feed_drive", "-p", "plant.friction.law=coulomb")),
     ("stability", ("stability", "paper", "-p", "plant.belt_speed=0")),
-    ("design", ("design", *RIG, "0.06")),
     ("design", ("design", *RIG, "0.02:0.04", "-p", "plant.force_delay=0.02")),
     pytest.param("design", ("design", *RIG, "0.03", *ENCODER), marks=pytest.mark.long),
     ("design", ("design", *RIG, "0.04", "--controller", "velocity_feedback", "--spread", "0.1")),

@@ -14,6 +14,7 @@ from stickslip_ros.app.commands import COMMANDS
 from stickslip_ros.app.main import command_parser
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
 from tests.docs.page import CHECKOUT, pages, public_names, spans
+from tests.slow import listed
 
 
 def text_of(page: str) -> str:
@@ -117,6 +118,11 @@ def test_every_guarantee_names_a_test_that_exists() -> None:
         assert guarantee
         assert re.fullmatch(r"`(reproduction/)?tests/[\w/]+\.py::test_\w+`", test), test
         assert exists(test.strip("`")), test
+
+
+def test_every_slow_test_that_is_listed_exists() -> None:
+    for test in listed():
+        assert exists(test), f"{test}: run `make slow`"
 
 
 @cache
