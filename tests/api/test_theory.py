@@ -74,11 +74,6 @@ def test_without_control_the_figure_is_the_bifurcation_diagram() -> None:
 
 
 def test_what_cannot_be_drawn_or_designed_is_refused() -> None:
-    scenario = ss.scenario("paper", expects_control=False, friction_reverse_static=0.5)
-    with pytest.raises(InvalidInputError, match="nothing to draw: the bifurcation diagram needs"):
-        ss.stability(scenario).plot()
-    with pytest.raises(InvalidInputError, match="without control there are no gains"):
-        ss.design(scenario)
     scenario = load_scenario("feed_drive", controller="velocity_feedback")
     with pytest.raises(InvalidInputError, match="nothing to draw: this exists for the washout law"):
         ss.stability(scenario).plot()

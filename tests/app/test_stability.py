@@ -83,15 +83,6 @@ def test_what_is_left_out_is_said_where_it_matters() -> None:
     assert notes["sampled_loop"] == "the scenario has no controller"
 
 
-def test_the_table_says_why(stickslip: Run) -> None:
-    options = ("-p", "plant.friction.law=coulomb", "--no-control")
-    done = stickslip("stability", "paper", *options)
-    assert done.returncode == 0, done.stderr
-    assert "the equilibrium is stable at every one" in done.stdout
-    assert "the scenario has no controller" in done.stdout
-    assert "nan" not in done.stdout
-
-
 @pytest.mark.long
 def test_coexisting_cycles_are_told_apart(stickslip: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     overrides = ("plant.friction.law=exponential", "plant.friction.decay_speed=0.05")

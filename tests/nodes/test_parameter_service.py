@@ -148,13 +148,7 @@ def test_what_ros2_dumps_it_loads_again(graph: Graph, name: str, tmp_path: Path)
         names = sorted(answer.result.names)
         request = GetParameters.Request(names=names)
         values = graph.call(GetParameters, f"/test/{name}/get_parameters", request).values
-        dumped: dict[str, Any] = {}
-        for parameter, value in zip(names, values, strict=True):
-            *groups, last = parameter.split(".")
-            group = dumped
-            for each in groups:
-                group = group.setdefault(each, {})
-            group[last] = parameter_value_to_python(value)
+        dumped = dict(zip(names, map(parameter_value_to_python, values), strict=True))
         file = tmp_path / "dump.yaml"
         file.write_text(yaml.dump({f"/test/{name}": {"ros__parameters": dumped}}))
         parameters = parameter_dict_from_yaml_file(str(file), use_wildcard=True)  # as `param load`

@@ -114,6 +114,8 @@ def test_the_table_has_what_there_is_and_what_a_lyapunov_coefficient_means() -> 
     lines = _lines(scenario, found, notes)
     assert not [line for line in lines if line.endswith("-")]
     assert "sampled loop" not in lines
+    said = [part for part in stability_tables(scenario, found, notes) if isinstance(part, str)]
+    assert any(each.endswith(": the scenario has no controller") for each in said)
     gentle = "-0.225 (no hysteresis: the vibration starts gently)"
     assert [line.endswith(gentle) for line in lines if "Lyapunov" in line] == [True]
     found["open_loop"]["first_lyapunov_coefficients"] = [0.5, None]
