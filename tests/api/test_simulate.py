@@ -10,15 +10,8 @@ import stickslip_ros as ss
 from stickslip_ros.errors import InvalidInputError, RunError
 from stickslip_ros.studies.simulate import simulate
 
-COLUMNS = [
-    "time",
-    "position",
-    "velocity",
-    "friction_force",
-    "control_force",
-    "belt_position",
-    "belt_velocity",
-]
+COLUMNS = ["time", "position", "velocity"]
+COLUMNS += ["friction_force", "control_force", "belt_position", "belt_velocity"]
 
 
 @pytest.fixture(scope="module")

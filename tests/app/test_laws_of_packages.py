@@ -4,7 +4,7 @@ import csv
 import json
 import shutil
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
 from importlib import import_module
@@ -19,17 +19,21 @@ import stickslip_ros as ss
 from benchmarks.dop853 import Curve, Dop853Drive, none
 from stickslip_ros.errors import RunError
 from stickslip_ros.model.constants import constant
-from stickslip_ros.model.control import CONTROL_LAWS, ControlLaw, VelocityFeedback
+from stickslip_ros.model.control import ControlLaw, VelocityFeedback
 from stickslip_ros.model.control.base import LinearFeedback
 from stickslip_ros.scenarios.foreign_laws import CONTROLLERS
 from stickslip_ros.scenarios.parameters import (
-    CONTROLLER_PARAMETERS,
-    NODE_PARAMETERS,
     ControllerParameters,
 )
 from tests.app.conftest import Run, RunOfItsOwn
 from tests.docs.page import CHECKOUT
-from tests.scenarios.foreign_laws import BRAKE, FALLING, write_example, write_package
+from tests.scenarios.foreign_laws import (
+    BRAKE,
+    FALLING,
+    make_known,
+    write_example,
+    write_package,
+)
 
 Install = Callable[..., None]
 
@@ -148,7 +152,7 @@ def _endless(law: Any, state: Any, elapsed: Any, sample: Any, reference: Any) ->
 
 
 @pytest.fixture
-def install() -> Iterator[Install]:
+def install(monkeypatch: pytest.MonkeyPatch) -> Install:
     """Add the law `hostile`, a damper, with other members."""
     import_module("stickslip_ros.studies.plan")  # keeps the nodes that are known when it is loaded
 
@@ -163,16 +167,11 @@ def install() -> Iterator[Install]:
 
     def add(**members: Any) -> None:
         law = dataclass(frozen=True)(type("Hostile", (Damper,), members))
-        CONTROL_LAWS[law.name] = law
         made = object.__new__(law)  # as if it failed from now on
         vars(made).update(vars(Damper()))
-        model = ControllerParameters(control_law=made)
-        CONTROLLER_PARAMETERS[law.name] = NODE_PARAMETERS["hostile_controller"] = model
+        make_known(monkeypatch, law, ControllerParameters(control_law=made))
 
-    yield add
-    for known in (CONTROL_LAWS, CONTROLLER_PARAMETERS):
-        known.pop("hostile", None)
-    NODE_PARAMETERS.pop("hostile_controller", None)
+    return add
 
 
 LAW = "the control law hostile of package others"

@@ -21,7 +21,10 @@ from tests.docs.page import CHECKOUT
 from tests.nodes.graph import PATIENCE, wait_for
 
 # Variables that tie a process to the installation in which the tests run.
-_OURS = ("_ROS_WHEELS_BOOTSTRAP_COMPLETE", "AMENT_PREFIX_PATH", "LD_LIBRARY_PATH", "PYTHONPATH")
+OURS = (
+    *("_ROS_WHEELS_BOOTSTRAP_COMPLETE", "AMENT_PREFIX_PATH", "COLCON_PREFIX_PATH"),
+    *("LD_LIBRARY_PATH", "PYTHONPATH"),
+)
 # Variables that make, pytest and the fixtures of a test set.
 _CALLERS = (
     *this_machine_only(),
@@ -150,7 +153,7 @@ class Shell:
 
     def renew(self) -> None:
         """Reset the environment to that of a new shell."""
-        self._environment = {k: v for k, v in self._common.items() if k not in _OURS} | {
+        self._environment = {k: v for k, v in self._common.items() if k not in OURS} | {
             "PATH": os.pathsep.join([f"{sys.base_prefix}/bin", *self._path])
         }
         environment = self.checkout / ".venv"

@@ -1,6 +1,5 @@
 """The controller node of any law, and references, on the real middleware."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
 from math import nan
@@ -12,7 +11,7 @@ from rclpy.duration import Duration
 from rclpy.parameter import Parameter
 
 from stickslip_ros.model.constants import constant
-from stickslip_ros.model.control import CONTROL_LAWS, ControlLaw
+from stickslip_ros.model.control import ControlLaw
 from stickslip_ros.model.control.base import State
 from stickslip_ros.model.signals import ramp
 from stickslip_ros.nodes.analyzer import AnalyzerNode
@@ -29,10 +28,10 @@ from stickslip_ros.record.topics import CONTROL_FORCE, JOINT_STATES, REFERENCE
 from stickslip_ros.samples import Reference, Sample
 from stickslip_ros.scenarios.parameters import (
     CONTROLLER_PARAMETERS,
-    NODE_PARAMETERS,
     ControllerParameters,
 )
 from tests.nodes.graph import PATIENCE, Graph
+from tests.scenarios.foreign_laws import make_known
 
 SECOND = 1_000_000_000
 
@@ -57,19 +56,10 @@ class Servo(ControlLaw):
 
 
 @pytest.fixture
-def servo() -> Iterator[partial[ControllerNode]]:
+def servo(monkeypatch: pytest.MonkeyPatch) -> partial[ControllerNode]:
     """The node of a law that follows a reference."""
-    node = "servo_controller"
-    CONTROL_LAWS[Servo.name] = Servo
-    CONTROLLER_PARAMETERS[Servo.name] = NODE_PARAMETERS[node] = ControllerParameters(
-        control_law=Servo()
-    )
-    try:
-        yield partial(ControllerNode, Servo.name)
-    finally:
-        for known in (CONTROL_LAWS, CONTROLLER_PARAMETERS):
-            del known[Servo.name]
-        del NODE_PARAMETERS[node]
+    make_known(monkeypatch, Servo, ControllerParameters(control_law=Servo()))
+    return partial(ControllerNode, Servo.name)
 
 
 class Loop:

@@ -6,19 +6,10 @@ from pathlib import Path
 import ament_index_python
 import pytest
 
-from tests.docs.shell import copy_checkout
+from tests.docs.shell import OURS, copy_checkout
 
 PACKAGE = "stickslip_ros"
 SOURCE = Path(__file__).parents[2]
-
-# What ties a process to the installation that the tests themselves run in.
-OURS = {
-    "_ROS_WHEELS_BOOTSTRAP_COMPLETE",
-    "AMENT_PREFIX_PATH",
-    "COLCON_PREFIX_PATH",
-    "LD_LIBRARY_PATH",
-    "PYTHONPATH",
-}
 
 
 @pytest.fixture(scope="session")

@@ -8,26 +8,16 @@ from packaging.requirements import Requirement
 PACKAGE = "stickslip_ros"
 SOURCE = Path(__file__).parents[2]
 
+KEYLESS = "axe-playwright-python contourpy control distributed heyoka ipykernel lz4 markdown-it-py"
+KEYLESS += " mcap nbclient nicegui npTDMS pyarrow shtab xarray zstandard"
 # What package.xml calls what setup.py names: rosdep keys, where there are any.
-KEYS = {
-    "axe-playwright-python": set(),
-    "contourpy": set(),
-    "control": set(),
-    "distributed": set(),
+KEYS = {name: set[str]() for name in KEYLESS.split()} | {
     "fastapi": {"python3-fastapi"},
     "jinja2": {"python3-jinja2"},
-    "heyoka": set(),
     "h5py": {"python3-h5py"},
     "hypothesis": {"python3-hypothesis"},
-    "ipykernel": set(),
     "jsonschema": {"python3-jsonschema"},
-    "lz4": set(),
-    "markdown-it-py": set(),
     "matplotlib": {"python3-matplotlib"},
-    "mcap": set(),
-    "nbclient": set(),
-    "nicegui": set(),
-    "npTDMS": set(),
     "numpy": {"python3-numpy"},
     "openpyxl": {"python3-openpyxl"},
     "orjson": {"python3-orjson"},
@@ -35,7 +25,6 @@ KEYS = {
     "pillow": {"python3-pil"},
     "pint": {"python3-pint"},
     "playwright": {"chromium-browser"},  # what it drives; itself it has no key
-    "pyarrow": set(),
     "pytest": {"python3-pytest"},
     "pytest-timeout": {"python3-pytest-timeout"},
     "pyyaml": {"python3-yaml"},
@@ -58,11 +47,8 @@ KEYS = {
     "rosbags": {"python3-rosbags-pip"},
     "scipy": {"python3-scipy"},
     "setuptools": {"python3-setuptools"},
-    "shtab": set(),
     "typing_extensions": {"python3-typing-extensions"},
     "uvicorn": {"python3-uvicorn"},
-    "xarray": set(),
-    "zstandard": set(),
 }
 
 

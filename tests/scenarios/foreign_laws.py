@@ -4,7 +4,15 @@ import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 
+import pytest
+
+from stickslip_ros.model.control import CONTROL_LAWS, ControlLaw
 from stickslip_ros.scenarios.foreign_laws import FRICTION_LAWS
+from stickslip_ros.scenarios.parameters import (
+    CONTROLLER_PARAMETERS,
+    NODE_PARAMETERS,
+    ControllerParameters,
+)
 from tests.docs.page import CHECKOUT
 
 FALLING = '''
@@ -58,6 +66,15 @@ class Brake(ControlLaw):
         """Refuse a strength above 1e6."""
         return None if self.strength <= 1e6 else f"strength = {self.strength} must not exceed 1e6"
 '''
+
+
+def make_known(
+    patch: pytest.MonkeyPatch, law: type[ControlLaw], parameters: ControllerParameters
+) -> None:
+    """Let a law and the parameters of its node be known, as if a package had brought them."""
+    patch.setitem(CONTROL_LAWS, law.name, law)
+    patch.setitem(CONTROLLER_PARAMETERS, law.name, parameters)
+    patch.setitem(NODE_PARAMETERS, f"{law.name}_controller", parameters)
 
 
 def write_package(
