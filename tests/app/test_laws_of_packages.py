@@ -22,18 +22,10 @@ from stickslip_ros.model.constants import constant
 from stickslip_ros.model.control import ControlLaw, VelocityFeedback
 from stickslip_ros.model.control.base import LinearFeedback
 from stickslip_ros.scenarios.foreign_laws import CONTROLLERS
-from stickslip_ros.scenarios.parameters import (
-    ControllerParameters,
-)
+from stickslip_ros.scenarios.parameters import ControllerParameters
 from tests.app.conftest import Run, RunOfItsOwn
 from tests.docs.page import CHECKOUT
-from tests.scenarios.foreign_laws import (
-    BRAKE,
-    FALLING,
-    make_known,
-    write_example,
-    write_package,
-)
+from tests.scenarios.foreign_laws import BRAKE, FALLING, make_known, write_example, write_package
 
 Install = Callable[..., None]
 

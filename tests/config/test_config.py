@@ -40,14 +40,7 @@ FOXGLOVE = json.loads((CONFIG / "foxglove_layout.json").read_text())
 PLOTJUGGLER = ElementTree.parse(CONFIG / "plotjuggler_layout.xml").getroot()
 RVIZ = yaml.safe_load((CONFIG / "feed_drive.rviz").read_text())["Visualization Manager"]
 
-PLOTTED = (
-    JOINT_STATES,
-    CONTROL_FORCE,
-    APPLIED_DISTURBANCE,
-    AMPLITUDE,
-    STICK_FRACTION,
-    FREQUENCY,
-)
+PLOTTED = (JOINT_STATES, CONTROL_FORCE, APPLIED_DISTURBANCE, AMPLITUDE, STICK_FRACTION, FREQUENCY)
 
 # What does not come from our nodes: robot_state_publisher publishes it.
 DESCRIPTION = f"{DEFAULT_NAMESPACE}/robot_description"

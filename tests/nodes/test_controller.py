@@ -26,10 +26,7 @@ from stickslip_ros.record.codec import (
 from stickslip_ros.record.reader import Recording
 from stickslip_ros.record.topics import CONTROL_FORCE, JOINT_STATES, REFERENCE
 from stickslip_ros.samples import Reference, Sample
-from stickslip_ros.scenarios.parameters import (
-    CONTROLLER_PARAMETERS,
-    ControllerParameters,
-)
+from stickslip_ros.scenarios.parameters import CONTROLLER_PARAMETERS, ControllerParameters
 from tests.nodes.graph import PATIENCE, Graph
 from tests.scenarios.foreign_laws import make_known
 
