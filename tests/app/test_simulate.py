@@ -12,21 +12,9 @@ from stickslip_ros.quantities import quantities_of
 from tests.app.conftest import Run
 
 
-@pytest.mark.parametrize(
-    "control", ["--no-control", pytest.param("--continuous-control", marks=pytest.mark.long)]
-)
-def test_a_figure_is_of_the_motion_that_is_measured(
-    stickslip: Run, tmp_path: Path, control: str
-) -> None:
-    call = ("simulate", "paper", control, "--duration", "100", "--json")
-    plain = json.loads(stickslip(*call).stdout)
-    done = stickslip(*call, "--plot", "run.svg", "--no-title")
-    assert (done.returncode, done.stderr) == (0, "")
-    found = json.loads(done.stdout)
-    assert found["regime"] == plain["regime"]
-    assert found["amplitude"] == pytest.approx(plain["amplitude"], rel=1e-6, abs=1e-9)
-    if control == "--no-control":
-        assert found == plain
+def test_a_figure_is_of_the_motion_that_is_measured(stickslip: Run, tmp_path: Path) -> None:
+    call = ("simulate", "paper", "--no-control", "--duration", "100")
+    assert stickslip.json(*call, "--plot", "run.svg", "--no-title") == stickslip.json(*call)
     figure = (tmp_path / "run.svg").read_text(encoding="utf-8")
     for text in ("phase portrait", "control force<", "each cycle"):
         assert text in figure

@@ -11,8 +11,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from multiprocessing import active_children, parent_process
 from pathlib import Path
+from queue import Queue
 from select import select
-from threading import Condition, Thread
 from typing import Any
 
 import pytest
@@ -48,46 +48,32 @@ STUDIES = {
 """Among whose points some are refused and some run away."""
 
 
-class Shuffled(Executor):
-    """Computes tasks in random order, one at a time, in a thread."""
+class AnyOrder(Queue[Any]):
+    """Gives what it holds in random order."""
 
-    def __init__(self, seed: int = 0) -> None:
-        self.most_pending = 0
+    def __init__(self, seed: int) -> None:
+        super().__init__()
         self._random = random.Random(seed)
-        self._pending: list[tuple[Future[Any], Callable[[], Any]]] = []
-        self._unfinished = 0
-        self._ended = False
-        self._changed = Condition()
-        self._thread = Thread(target=self._work)
-        self._thread.start()
+
+    def _get(self) -> Any:
+        self.queue.rotate(self._random.randrange(len(self.queue)))
+        return self.queue.popleft()
+
+
+class Shuffled(ThreadPoolExecutor):
+    """Computes tasks in random order, one at a time."""
+
+    def __init__(self, seed: int) -> None:
+        super().__init__(1)
+        self._work_queue: Any = AnyOrder(seed)
+        self._futures: list[Future[Any]] = []
+        self.most_pending = 0
 
     def submit(self, task: Any, /, *arguments: Any, **_: Any) -> Future[Any]:
-        future: Future[Any] = Future()
-        with self._changed:
-            self._pending.append((future, lambda: task(*arguments)))
-            self._unfinished += 1
-            self.most_pending = max(self.most_pending, self._unfinished)
-            self._changed.notify()
-        return future
-
-    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        with self._changed:
-            self._ended = True
-            self._changed.notify()
-        self._thread.join()
-
-    def _work(self) -> None:
-        while True:
-            with self._changed:
-                self._changed.wait_for(lambda: self._ended or self._pending)
-                if not self._pending:
-                    return
-                future, task = self._pending.pop(self._random.randrange(len(self._pending)))
-            if future.set_running_or_notify_cancel():
-                result = task()
-                with self._changed:
-                    self._unfinished -= 1
-                future.set_result(result)
+        self._futures.append(super().submit(task, *arguments))
+        pending = sum(not future.done() for future in self._futures)
+        self.most_pending = max(self.most_pending, pending)
+        return self._futures[-1]
 
 
 @pytest.fixture(autouse=True)
