@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Callable
-from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +14,7 @@ from stickslip_ros.errors import RunError
 from stickslip_ros.scenarios.files import load_scenario
 from tests.app.browser import headless_browser
 from tests.app.conftest import REFERENCE, Run
+from tests.docs.parsed_html import Html
 from tests.docs.test_json import differences
 
 LOG = "log.csv"
@@ -114,40 +114,10 @@ def test_a_command_prints_and_a_page_shows_what_python_returns(
     assert all(line in text for line in repr(result).splitlines())
     monkeypatch.setattr(type(result), "draw", draws_nothing)
     result.to_html(tmp_path / "page.html")
-    found = Page(tmp_path / "page.html")
+    found = Html((tmp_path / "page.html").read_text(encoding="utf-8"))
     assert verdict in found.text
     assert "There is no figure: it takes too long" in found.text
     assert "table" in found.tags
-
-
-class Page(HTMLParser):
-    """The tags, identifiers, references and text of a page."""
-
-    def __init__(self, path: Path) -> None:
-        super().__init__()
-        self.tags: list[str] = []
-        self.attributes: list[tuple[str, str]] = []
-        self.text = ""
-        self.feed(path.read_text(encoding="utf-8"))
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.tags.append(tag)
-        self.attributes += [(name, value or "") for name, value in attrs]
-
-    def handle_data(self, data: str) -> None:
-        self.text += f"{data} "
-
-    @property
-    def identifiers(self) -> list[str]:
-        return [value for name, value in self.attributes if name == "id"]
-
-    @property
-    def references(self) -> list[str]:
-        """What links, images, and clipping paths refer to; no namespaces."""
-        named = [v for n, v in self.attributes if n in ("href", "xlink:href", "src")]
-        return named + [
-            found for _, v in self.attributes for found in re.findall(r"url\((.*?)\)", v)
-        ]
 
 
 def test_a_page_tells_the_force_of_a_disturbance_beside_that_of_the_control(
@@ -156,7 +126,7 @@ def test_a_page_tells_the_force_of_a_disturbance_beside_that_of_the_control(
     run = ss.simulate("axis", 1.4)
     monkeypatch.setattr(type(run), "draw", draws_nothing)
     run.to_html(tmp_path / "page.html")
-    found = " ".join(Page(tmp_path / "page.html").text.split())
+    found = " ".join(Html((tmp_path / "page.html").read_text(encoding="utf-8")).text.split())
     assert "control force and disturbance at most 18.91 N" in found
 
 
@@ -167,7 +137,7 @@ def test_a_page_is_one_file_whose_identifiers_are_its_own(stickslip: Run, tmp_pa
     (tmp_path / "drive.yaml").rename(tmp_path / f"{name}.yaml")
     done = stickslip("simulate", f"{name}.yaml", "--duration", "1", "--html", "page.html")
     assert done.returncode == 0, done.stderr
-    found = Page(tmp_path / "page.html")
+    found = Html((tmp_path / "page.html").read_text(encoding="utf-8"))
     assert found.tags.count("svg") == 2
     assert not {"script", "link", "iframe", "object"} & {*found.tags}
     assert len({*found.identifiers}) == len(found.identifiers) > 10
