@@ -3,7 +3,7 @@
 import json
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -11,7 +11,9 @@ import pytest
 from stickslip_ros.record.reader import Recording
 from tests.app.conftest import Run, Start, ended
 from tests.app.test_run import children, command, is_complete, is_running, wait_for_samples
+from tests.nodes.conftest import processes  # noqa: F401 - a fixture used here
 from tests.nodes.graph import wait_for
+from tests.nodes.processes import Processes
 from tests.testing import controllers
 
 pytestmark = pytest.mark.process
@@ -167,30 +169,24 @@ def test_no_controller_outlives_the_run(
 
 @pytest.fixture
 def start_damper(
-    process_environment: dict[str, str], tmp_path: Path
-) -> Iterator[Callable[..., subprocess.Popen[bytes]]]:
-    """Start a controller that no run knows of."""
+    process_environment: dict[str, str],
+    processes: Processes,  # noqa: F811
+    tmp_path: Path,
+) -> Callable[[str], object]:
+    """Start a controller in a namespace, of which no run knows."""
     script = tmp_path / "damper.py"
     script.write_text(damper("Damper"), encoding="utf-8")
     environment = process_environment | {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
-    started: list[subprocess.Popen[bytes]] = []
-
-    def start(namespace: str = "/feed_drive") -> subprocess.Popen[bytes]:
-        arguments = ["--ros-args", "-r", f"__ns:={namespace}"]
-        started.append(subprocess.Popen([sys.executable, script, *arguments], env=environment))
-        return started[-1]
-
-    yield start
-    for process in started:
-        process.kill()
-        process.wait()
+    return lambda namespace: processes.start(
+        [script, "--ros-args", "-r", f"__ns:={namespace}"], env=environment
+    )
 
 
 def test_an_external_controller_is_waited_for(
-    start_stickslip: Start, start_damper: Callable[..., subprocess.Popen[bytes]]
+    start_stickslip: Start, start_damper: Callable[[str], object]
 ) -> None:
     """Other nodes are not treated as the controller."""
-    start_damper(namespace="/other")
+    start_damper("/other")
     arguments = ("paper", "--composed", "--external-controller", "--duration", "2", "--json")
     process = start_stickslip("run", *arguments)
     waits = read_until(process, "waiting for a controller")
@@ -201,7 +197,7 @@ def test_an_external_controller_is_waited_for(
     assert read_until(process, "/other/damper reads").endswith(
         "reads /other/joint_states, the plant publishes /feed_drive/joint_states\n"
     )
-    start_damper()
+    start_damper("/feed_drive")
     output, _ = ended(process, 0)
     result = json.loads(output)
     assert (result["samples"], result["late_forces"]) == (201, 0)

@@ -36,24 +36,26 @@ class Processes:
         arguments += ["-r", f"__ns:={namespace}"]
         for key, value in parameters.items():
             arguments += ["-p", f"{key.replace('__', '.')}:={value}"]
-        return self._start(arguments)
+        return self.start(arguments)
 
     def piped(self, node: str, *ros_arguments: str) -> subprocess.Popen[str]:
         """Start one of our nodes as `ros2 run` does, and keep what it prints."""
         command = ["-m", f"stickslip_ros.nodes.{node}", "--ros-args", *ros_arguments]
-        return self._start(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        return self.start(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
     def stranger(self, reliability: str = "RELIABLE") -> subprocess.Popen[bytes]:
         """Start a node that only listens to the joint states, as `ros2 topic echo` does."""
-        return self._start(["-c", _LISTENER, reliability])
+        return self.start(["-c", _LISTENER, reliability])
 
     def end(self) -> None:
         for process in self._started:
             process.kill()
             process.communicate()
 
-    def _start(self, arguments: list[str], **options: Any) -> subprocess.Popen[Any]:
-        process = subprocess.Popen([sys.executable, *arguments], env=self._environment, **options)
+    def start(self, arguments: list[Any], **options: Any) -> subprocess.Popen[Any]:
+        """Start Python with these arguments."""
+        given = {"env": self._environment, **options}
+        process = subprocess.Popen([sys.executable, *arguments], **given)
         self._started.append(process)
         return process
 

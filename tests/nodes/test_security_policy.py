@@ -2,8 +2,6 @@
 
 import signal
 import subprocess
-import sys
-from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 from xml.etree import ElementTree
@@ -12,6 +10,7 @@ import pytest
 from rclpy.node import NodeNameNonExistentError
 
 from tests.nodes.graph import Graph
+from tests.nodes.processes import Processes
 
 POLICY = Path(__file__).parents[2] / "config" / "sros2_policy.xml"
 NAMESPACE = "/feed_drive"
@@ -62,16 +61,11 @@ def look(graph: Graph, seen: Uses) -> None:
 
 @pytest.fixture(params=[pytest.param([], marks=pytest.mark.long), pytest.param(["--composed"])])
 def run(
-    request: pytest.FixtureRequest, process_environment: dict[str, str], tmp_path: Path
-) -> Iterator[subprocess.Popen[bytes]]:
+    request: pytest.FixtureRequest, processes: Processes, tmp_path: Path
+) -> subprocess.Popen[bytes]:
     command = ["-m", "stickslip_ros.app.main", "run", "paper", "--pace", "realtime"]
     truth = ["-p", "plant.publish_truth=true"]
-    run = subprocess.Popen(
-        [sys.executable, *command, *truth, *request.param], cwd=tmp_path, env=process_environment
-    )
-    yield run
-    run.kill()
-    run.wait()
+    return processes.start([*command, *truth, *request.param], cwd=tmp_path)
 
 
 @pytest.mark.process
