@@ -65,9 +65,8 @@ class Tuned:
         """Poles of the linear loop per sample, by belt speed, m/s."""
         poles: dict[float, npt.NDArray[np.complex128]] = {}
         for response in self.responses:
-            loop = response.plant.loop
-            matrix = loop.transition_matrix(response.feedback)
-            poles[loop.drive.belt_speed] = np.linalg.eigvals(matrix).astype(np.complex128)
+            values = np.linalg.eigvals(response.transitions)
+            poles[response.plant.loop.drive.belt_speed] = values.astype(np.complex128)
         return poles
 
 
@@ -164,21 +163,16 @@ class DriveLoops:
 
     def decay_rates(self, laws: Sequence[ControlLaw]) -> FloatArray:
         """Return the smallest decay rate with each law, 1/s; approximate for a long delay."""
-        rates = np.full(len(laws), inf)
-        for loop in self._coarse:
-            forms = (linear_part(law, loop) for law in laws)
-            stacked = LinearFeedback(*map(np.array, zip(*forms, strict=True)))
-            radii = np.abs(np.linalg.eigvals(loop.transition_matrix(stacked))).max(axis=-1)
-            with np.errstate(divide="ignore"):
-                rates = np.minimum(rates, -np.log(radii) * loop.rate)
-        return rates
+        forms = (linear_part(law, self._coarse[0]) for law in laws)
+        stacked = LinearFeedback(*map(np.array, zip(*forms, strict=True)))
+        return np.min([loop.decay_rates_of(stacked) for loop in self._coarse], axis=0)
 
     def judged(
         self, law: Any, plants: Sequence[PlantResponse], vibrations: Sequence[Vibration]
     ) -> Tuned:
         """Return what the loops of these plants say of a stable law that catches vibrations."""
         feedback = linear_part(law, plants[0].loop)
-        responses = tuple(LoopResponse(plant, feedback) for plant in plants)
+        responses = LoopResponse.of_plants(plants, feedback)
         noise = max(loop.noise_force(*self.noises) for loop in responses)
         peak = most = 0.0
         for loop in responses:
@@ -195,7 +189,7 @@ class DriveLoops:
         return Tuned(
             law,
             self.goal,
-            min(plant.loop.decay_rate(feedback) for plant in plants),
+            min(loop.decay_rate for loop in responses),
             _least(loop.delay_margin for loop in responses),
             _least(loop.phase_margin for loop in responses),
             max((factor for factor in below if factor is not None), default=None),
@@ -220,8 +214,7 @@ class DriveLoops:
             return abs(friction + copysign(motor.friction, speed) + motor.damping * speed)
         if not drive.has_spring:
             return abs(friction)
-        loop = response.plant.loop
-        matrix, pushed = loop.transition_matrix(response.feedback), loop.disturbed
+        matrix, pushed = response.transitions, response.plant.loop.disturbed
         forced = np.pad(pushed, (0, len(matrix) - len(pushed)))
         rest = np.linalg.solve(np.eye(len(matrix)) - matrix, forced)
         share = abs(1.0 - float(rest[POSITION]))  # dimensionless: the force of the spring

@@ -17,7 +17,7 @@ import numpy as np
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.model.constants import scaled
-from stickslip_ros.model.control import ControlLaw, LinearFeedback
+from stickslip_ros.model.control import ControlLaw, LinearFeedback, Washout
 from stickslip_ros.model.drive import Drive
 from stickslip_ros.model.drive_layout import POSITION, SPEED
 from stickslip_ros.model.sensor import EXACT_SENSOR, Sensor
@@ -204,8 +204,7 @@ class LinearSampledLoop:
         float
             Decay rate, 1/s; below zero the deviation grows.
         """
-        radius = self.spectral_radius(law)
-        return -log(radius) * self.rate if radius > 0.0 else inf
+        return decay_rate(self.transition_matrix(law), self.rate)
 
     def decay_rates(self, corner_frequencies: FloatArray, linear_gains: FloatArray) -> FloatArray:
         """Return the decay rates over cutoff frequencies and linear gains.
@@ -224,9 +223,24 @@ class LinearSampledLoop:
         """
         shape = (len(corner_frequencies), linear_gains.shape[-1])
         rows = zip(corner_frequencies, np.broadcast_to(linear_gains, shape), strict=True)
-        radii = np.array([self._radii(d, row) for d, row in rows]).reshape(shape)
+        families = (feedback_family(*row, 1.0 / self.rate) for row in rows)
+        return np.array([*map(self.decay_rates_of, families)]).reshape(shape)
+
+    def decay_rates_of(self, laws: LinearFeedback) -> FloatArray:
+        """Return the decay rates of many laws.
+
+        Parameters
+        ----------
+        laws : LinearFeedback
+            Linear parts of the laws, stacked along the first axis.
+
+        Returns
+        -------
+        ndarray
+            Decay rates, 1/s; shape (m,).
+        """
         with np.errstate(divide="ignore"):
-            return -np.log(radii) * self.rate
+            return -np.log(_spectral_radius(self.transition_matrix(laws))) * self.rate
 
     def stable_linear_gains(self, corner_frequency: float) -> list[GainInterval]:
         """Return all linear gains of eq. 18 with which the loop is stable.
@@ -248,7 +262,7 @@ class LinearSampledLoop:
         )
         return boundary.stable_intervals(
             self.drive.force_scale / self.drive.speed_scale,
-            lambda gain: float(self._radii(corner_frequency, np.array([gain]))[0]),
+            lambda gain: self.spectral_radius(Washout(corner_frequency, gain, 0.0)),
         )
 
     def critical_linear_gain(self, corner_frequency: float) -> float | None:
@@ -335,7 +349,7 @@ class LinearSampledLoop:
         after, starting = self._slide(1.0 - split)
         return after @ before, starting, after @ ending
 
-    @property
+    @cached_property
     def disturbed(self) -> FloatArray:
         """Effect of a disturbance force of one on the slide and its actuator in a period; (n,)."""
         matrix, _ = self.plant
@@ -355,10 +369,6 @@ class LinearSampledLoop:
         block[:order, :order], block[:order, order] = matrix, force
         transition = _exponential(block * (periods * self.period))
         return transition[:order, :order], transition[:order, order]
-
-    def _radii(self, corner_frequency: float, linear_gains: FloatArray) -> FloatArray:
-        family = feedback_family(corner_frequency, linear_gains, 1.0 / self.rate)
-        return _spectral_radius(self._transitions(family))
 
     def _transitions(self, feedback: LinearFeedback) -> FloatArray:
         """Return the transition matrix, or those of laws that are stacked, (..., n, n).
@@ -408,6 +418,12 @@ class LinearSampledLoop:
 def not_linear(law: str) -> str:
     """Return a clause that says that the control law of this name has no linear form."""
     return f"the control law {law} is not linear near the equilibrium"
+
+
+def decay_rate(transitions: FloatArray, rate: float) -> float:
+    """Return the decay rate (1/s) of a loop with this transition matrix at a rate (Hz)."""
+    radius = float(_spectral_radius(transitions))
+    return -log(radius) * rate if radius > 0.0 else inf
 
 
 def settling_time(decay_rate: float) -> float | None:

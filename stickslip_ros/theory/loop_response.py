@@ -1,7 +1,8 @@
 """Frequency response of the sampled loop: margins, sensitivity, and the force that it needs."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
 from math import ceil, log2, pi, sqrt
 from typing import Self
 
@@ -12,7 +13,7 @@ from stickslip_ros.arrays import FloatArray
 from stickslip_ros.model.control import LinearFeedback, VelocityFeedback
 from stickslip_ros.model.control.base import MOTOR, TABLE
 from stickslip_ros.model.drive_layout import POSITION, SPEED
-from stickslip_ros.theory.linear_sampled_loop import LinearSampledLoop
+from stickslip_ros.theory.linear_sampled_loop import LinearSampledLoop, decay_rate
 
 _PERIODS = 40.0
 """Natural periods that the response to a step covers, at least."""
@@ -67,6 +68,22 @@ class PlantResponse:
         delayed = stacked[..., 0] * (z**-whole)[:, None]
         return cls(loop, 2.0 * pi * turns * loop.rate, delayed, stacked[..., 1])
 
+    @cached_property
+    def z(self) -> ComplexArray:
+        """Factor of a period, e^(j w T); shape (n,)."""
+        return np.exp(1j * self.frequency / self.loop.rate)
+
+    def by_law(self, form: LinearFeedback) -> ComplexArray:
+        """Return the force of a law by what it sees, N/m and N s/m; shape (n, 2) or (n, 4)."""
+        z = self.z
+        response = np.broadcast_to(form.direct.astype(complex), (len(z), len(form.direct)))
+        if len(form.state):
+            states = z[:, None, None] * np.eye(len(form.state)) - form.state
+            response = response + form.output @ np.linalg.solve(states, form.input.astype(complex))
+        count = self.by_control.shape[1]  # two for each body that there is
+        padded = np.pad(response, ((0, 0), (0, max(count - response.shape[1], 0))))
+        return padded[:, :count].astype(np.complex128)
+
 
 @dataclass(frozen=True, eq=False)
 class LoopResponse:
@@ -77,24 +94,31 @@ class LoopResponse:
     feedback: LinearFeedback
     """The law, linear."""
 
+    law: ComplexArray
+    """Force by what the law sees, N/m and N s/m; shape (n, 2) or (n, 4)."""
+
+    @classmethod
+    def of_plants(cls, plants: Sequence[PlantResponse], law: LinearFeedback) -> tuple[Self, ...]:
+        """Return the responses of plants at the same frequencies with a law."""
+        response = plants[0].by_law(law)
+        return tuple(cls(plant, law, response) for plant in plants)
+
     @cached_property
-    def law(self) -> ComplexArray:
-        """Force by what the law sees, N/m and N s/m; shape (n, 2) or (n, 4)."""
-        form, z = self.feedback, np.exp(1j * self.plant.frequency / self.plant.loop.rate)
-        response = np.broadcast_to(form.direct.astype(complex), (len(z), len(form.direct)))
-        if len(form.state):
-            states = z[:, None, None] * np.eye(len(form.state)) - form.state
-            response = response + form.output @ np.linalg.solve(states, form.input.astype(complex))
-        count = self.plant.by_control.shape[1]  # two for each body that there is
-        padded = np.pad(response, ((0, 0), (0, max(count - response.shape[1], 0))))
-        return padded[:, :count].astype(np.complex128)
+    def transitions(self) -> FloatArray:
+        """Matrix from the state at one sample to the next, see `LinearSampledLoop`; (m, m)."""
+        return self.plant.loop.transition_matrix(self.feedback)
+
+    @property
+    def decay_rate(self) -> float:
+        """Rate at which a small deviation decays, 1/s."""
+        return decay_rate(self.transitions, self.plant.loop.rate)
 
     @cached_property
     def open_loop(self) -> ComplexArray:
         """Loop transfer function L, which is unstable at -1."""
         return -(self.law * self.plant.by_control).sum(axis=1)
 
-    @property
+    @cached_property
     def sensitivity(self) -> ComplexArray:
         """Sensitivity S = 1/(1 + L)."""
         return 1.0 / (1.0 + self.open_loop)
@@ -107,13 +131,13 @@ class LoopResponse:
     @property
     def phase_margin(self) -> float | None:
         """Smallest angle between L and -1 where |L| = 1, rad; None if |L| never is."""
-        angles = [abs(margin) for margin, _ in self._crossings()]
+        angles = [abs(margin) for margin, _ in self._crossings]
         return min(angles, default=None)
 
     @property
     def delay_margin(self) -> float | None:
         """Smallest delay, s, that turns L to -1 where |L| = 1; None if there is none."""
-        delays = [margin % (2.0 * pi) / frequency for margin, frequency in self._crossings()]
+        delays = [margin % (2.0 * pi) / frequency for margin, frequency in self._crossings]
         return min(delays, default=None)
 
     @property
@@ -129,8 +153,9 @@ class LoopResponse:
         above = [factor for factor in factors if factor > 1.0]
         return max(below, default=None), min(above, default=None)
 
+    @cached_property
     def _crossings(self) -> list[tuple[float, float]]:
-        """Return pi + arg L, rad, and the frequency, rad/s, wherever |L| = 1."""
+        """Sums pi + arg L, rad, and the frequency, rad/s, wherever |L| = 1."""
         size, frequency = np.log(np.abs(self.open_loop) + 1e-300), self.plant.frequency
         rows = np.flatnonzero(size[1:] * size[:-1] < 0.0)
         share = size[rows] / (size[rows] - size[rows + 1])
@@ -144,9 +169,8 @@ class LoopResponse:
         """Return the control force after a step of 1 N of the disturbance, at the samples."""
         by_step = self.sensitivity * (self.law * self.plant.by_disturbance).sum(axis=1)
         count = 2 * len(by_step)
-        step = np.repeat([1.0, -1.0], count)  # the step of a square wave of long period
         spectrum = np.zeros(count + 1, dtype=complex)
-        spectrum[1::2] = by_step * np.fft.rfft(step)[1::2]
+        spectrum[1::2] = by_step * _step_spectrum(count)
         response = np.fft.irfft(spectrum, 2 * count)[:count]
         return (response + response[-1]) / 2.0
 
@@ -155,16 +179,21 @@ class LoopResponse:
 
         The first is that of the slide, a second that of a motor.
         """
-        loop = self.plant.loop
-        z, total = np.exp(1j * self.plant.frequency / loop.rate), 0.0
+        loop, total = self.plant.loop, 0.0
         for body, (noise, spans) in enumerate(zip(noises, _differences(loop), strict=False)):
             if noise == 0.0 or 2 * body >= self.law.shape[1]:
                 continue
             by_noise = self.law[:, 2 * body].copy()
             if spans:
-                by_noise += self.law[:, 2 * body + 1] * _rate(spans, loop.rate, z)
+                by_noise += self.law[:, 2 * body + 1] * _rate(spans, loop.rate, self.plant.z)
             total += noise**2 * float(np.mean(np.abs(by_noise * self.sensitivity) ** 2))
         return sqrt(total)
+
+
+@cache
+def _step_spectrum(count: int) -> ComplexArray:
+    """Return the odd lines of a step that is that of a square wave of so many samples."""
+    return np.fft.rfft(np.repeat([1.0, -1.0], count))[1::2]
 
 
 def _differences(loop: LinearSampledLoop) -> tuple[int, int]:

@@ -52,7 +52,8 @@ def loop_of(
 def response_of(loop: LinearSampledLoop, law: ControlLaw) -> LoopResponse:
     feedback = law.linear_part(1.0 / loop.rate)
     assert feedback is not None
-    return LoopResponse(PlantResponse.of_loop(loop), feedback)
+    (response,) = LoopResponse.of_plants([PlantResponse.of_loop(loop)], feedback)
+    return response
 
 
 @laws
