@@ -173,11 +173,10 @@ def answer(loop: SampledLoop, controller: Controller | None) -> float:
         return 0.0
     if loop.answered:
         return loop.answers.force
-    sample = loop.sample
-    force = controller.answer(sample)
+    force = controller.answer(loop.sample)
     if force is None:
         return 0.0
-    loop.offer(sample.stamp, force)
+    loop.answers.accept(loop.sample_number, force)
     return force
 
 

@@ -4,7 +4,7 @@ It knows no clock and no messages: its user decides when to advance. The plant n
 run this same loop.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from math import isfinite
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -311,29 +311,6 @@ class SampledLoop:
         assert due is not None  # an ideal loop asks for a force at each sample
         self._line.send(last, *due)
         self.sample = self._take_sample(belt_position)
-
-    def run(self, answer: Callable[[Sample], float | None]) -> Iterator[float]:
-        """Answer each sample that asks for it at once and advance to the next, without end.
-
-        Parameters
-        ----------
-        answer : callable
-            Returns the control force (N, finite) for a sample, or None for no answer.
-
-        Yields
-        ------
-        float
-            Control force for the sample before the present one, N; 0 for no answer, and the last
-            one where none is asked for.
-        """
-        force: float | None = self.answers.force
-        while True:
-            if self.answers.asks(self.sample_number):
-                force = answer(self.sample)
-                if force is not None:
-                    self.answers.accept(self.sample_number, force)
-            self.advance()
-            yield 0.0 if force is None else force
 
     def _take_sample(self, belt_position: float) -> Sample:
         number, friction_force = self.sample_number, None

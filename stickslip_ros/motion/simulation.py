@@ -104,17 +104,23 @@ def measure_block(
         observer.take_motion(MeasuredMotion(breakpoints, belt_velocity, cycles, meter.ends))
 
 
-def _observed(
-    ticks: Iterator[float], loop: SampledLoop, recorder: SampleRecorder | None, seen: list[Sample]
+def _ticks(
+    loop: SampledLoop,
+    controller: Controller | None,
+    recorder: SampleRecorder | None = None,
+    seen: list[Sample] | None = None,
 ) -> Iterator[float]:
-    """Yield the forces of ticks; a recorder takes each sample, and the next is added to `seen`."""
-    true, measured = loop.true_sample, loop.sample
-    for force in ticks:
+    """Answer each sample and advance to the next, without end; yield the forces.
+
+    A recorder takes each sample, and the next is added to `seen`.
+    """
+    while True:
+        force = answer(loop, controller)
         if recorder is not None:
-            recorder.take(true, force, measured)
-            true = loop.true_sample
-        measured = loop.sample
-        seen.append(measured)
+            recorder.take(loop.true_sample, force, loop.sample)
+        loop.advance()
+        if seen is not None:
+            seen.append(loop.sample)
         yield force
 
 
@@ -174,11 +180,12 @@ def simulate_sampled(
     """
     samples, done = round(duration / loop.period), 0
     seen, blocks = [loop.sample], None
-    ticks = loop.run((lambda _: None) if controller is None else controller.answer)
     if recorder is not None or measured is not None:
-        ticks = _observed(ticks, loop, recorder, seen)
-    elif samples >= LEAST_TICKS:
-        blocks = TickBlocks.for_loop(loop, motion, controller)
+        ticks = _ticks(loop, controller, recorder, seen)
+    else:
+        ticks = _ticks(loop, controller)
+        if samples >= LEAST_TICKS:
+            blocks = TickBlocks.for_loop(loop, motion, controller)
     while done < samples and not motion.unbounded:
         forces = _forces(ticks, blocks, motion, min(_BLOCK, samples - done))
         measure_block(motion, meter, observer)

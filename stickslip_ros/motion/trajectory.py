@@ -173,17 +173,10 @@ class SampleRecorder(ABC):
         number = self._number
         if number - self._now * self._rate > _ROUNDING:
             return
-        drive = motion.drive
+        drive, (x, velocity, friction, belt_speed, motor) = motion.drive, motion.reading()
         travel = drive.belt.integral(0.0, number / self._rate)
-        sample = Sample(
-            0,
-            motion.position,
-            motion.velocity,
-            motion.friction_force,
-            drive.belt_speed * number / self._rate + travel,
-            motion.belt_speed,
-            motion.motor,
-        )
+        travel += drive.belt_speed * number / self._rate
+        sample = Sample(0, x, velocity, friction, travel, belt_speed, motor)
         self.take(sample, motion.applied_force)
 
 

@@ -15,7 +15,7 @@ from stickslip_ros.model.drive import Drive
 from stickslip_ros.model.hybrid import Mode
 from stickslip_ros.model.sensor import Sensor
 from stickslip_ros.motion import RecordedMotion, hybrid_motion
-from stickslip_ros.motion.controller import Controller
+from stickslip_ros.motion.controller import Controller, answer
 from stickslip_ros.motion.recurrence import Recurrence
 from stickslip_ros.motion.sampled_loop import SampledLoop
 from tests.drives import PAPER
@@ -124,7 +124,7 @@ def general(*_: object) -> hybrid_motion.ShortStep:
     return lambda duration, force: False
 
 
-def observed(law: str, kind: str, place: str, seed: int, part: str, *, runs: bool) -> list[object]:
+def observed(law: str, kind: str, place: str, seed: int, part: str) -> list[object]:
     """Return samples, forces and breakpoints of a controlled loop, half of them recorded."""
     drive = random_drives.drive_of_place(seed, law, kind, place)
     motion = RecordedMotion(drive.drive, drive.position, drive.velocity)
@@ -133,17 +133,10 @@ def observed(law: str, kind: str, place: str, seed: int, part: str, *, runs: boo
     unit = drive.plain.normal_force / drive.plain.speed_scale
     washout = Washout(0.3 * drive.plain.angular_frequency, -0.2 * unit, 0.0)
     controller, found = Controller(washout), list[object]()
-    forces = loop.run(controller.answer)
     for number in range(400):
         motion.recording = number >= 200
-        if runs:
-            force = next(forces)
-        else:
-            sample = loop.sample
-            force = controller.answer(sample)
-            assert force is not None
-            loop.offer(sample.stamp, force)
-            loop.advance()
+        force = answer(loop, controller)
+        loop.advance()
         found += [force, loop.sample, loop.true_sample]
     points = motion.take_breakpoints()
     found += [points.time.tolist(), points.position.tolist(), points.velocity.tolist()]
@@ -161,7 +154,7 @@ def observed(law: str, kind: str, place: str, seed: int, part: str, *, runs: boo
 def test_the_motion_is_that_of_the_general_case(
     law: str, kind: str, place: str, seed: int, part: str
 ) -> None:
-    found = observed(law, kind, place, seed, part, runs=True)
+    found = observed(law, kind, place, seed, part)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(hybrid_motion, "short_step", general)
-        assert found == observed(law, kind, place, seed, part, runs=False)
+        assert found == observed(law, kind, place, seed, part)
