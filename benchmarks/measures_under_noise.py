@@ -97,9 +97,7 @@ def measured(
     """Return the measures of what the sensor tells of a motion, with the belt speed as told."""
     measure = case.sensor(seed).start(_PERIOD)
     assert measure is not None
-    told = np.array(
-        [measure(k, *each) for k, each in enumerate(zip(position, velocity, strict=True))]
-    )
+    told = np.array([*map(measure, position, velocity)])
     count = len(position)
     unknown, belt = np.full(count, np.nan), np.full(count, belt_speed or case.belt_speed)
     stamp = np.arange(count) * round(_PERIOD * NANOSECONDS)

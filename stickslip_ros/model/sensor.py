@@ -11,9 +11,9 @@ import numpy as np
 
 from stickslip_ros.model.constants import MOST_STEPS, at_rest, constants_of
 
-Measure = Callable[[int, float, float], tuple[float, float]]
-"""Returns the measured position (m) and velocity (m/s) for the number of a sample, and its true
-position and velocity. It is called once for each sample, in order."""
+Measure = Callable[[float, float], tuple[float, float]]
+"""Returns the measured position (m) and velocity (m/s) for the true ones. It is called once for
+each sample, in order."""
 
 LONGEST_DIFFERENCE = 300
 """Largest number of samples of a difference; the order of the sampled loop grows with it."""
@@ -118,13 +118,15 @@ class Sensor:
             )
         return None
 
-    def start(self, period: float) -> Measure | None:
+    def start(self, period: float, number: int = 0) -> Measure | None:
         """Return what measures a segment of samples, or what follows a reset.
 
         Parameters
         ----------
         period : float
             Sample period, s.
+        number : int, optional
+            Number of the first sample.
 
         Returns
         -------
@@ -134,14 +136,14 @@ class Sensor:
         if self.exact:
             return None
         resolution = self.position_resolution
-        of_position = _Noise(self.position_noise, self.seed, 0) if self.position_noise else None
-        of_velocity = _Noise(self.velocity_noise, self.seed, 1) if self.velocity_noise else None
+        of_position = _deviates(self.position_noise, self.seed, 0, number)
+        of_velocity = _deviates(self.velocity_noise, self.seed, 1, number)
         earlier = deque[float](maxlen=self.spans) if self.spans else None
 
         # Without calls or objects that could be avoided: it is a part of each sample.
-        def measure(number: int, position: float, velocity: float) -> tuple[float, float]:
+        def measure(position: float, velocity: float) -> tuple[float, float]:
             if of_position is not None:
-                position += next(of_position.upcoming or of_position.start(number))
+                position += next(of_position)
             if resolution:
                 steps = position / resolution
                 if -MOST_STEPS < steps < MOST_STEPS:
@@ -150,33 +152,28 @@ class Sensor:
                 velocity = (position - earlier[0]) / (len(earlier) * period) if earlier else 0.0
                 earlier.append(position)
             elif of_velocity is not None:
-                velocity += next(of_velocity.upcoming or of_velocity.start(number))
+                velocity += next(of_velocity)
             return position, velocity
 
         return measure
 
 
-class _Noise:
-    """Normal deviates, each of which depends on the seed and the number of the sample only."""
+def _deviates(deviation: float, seed: int, kind: int, number: int) -> Iterator[float] | None:
+    """Return normal deviates from the number of a sample on; None without a deviation.
 
-    def __init__(self, deviation: float, seed: int, kind: int) -> None:
-        self._deviation = deviation
-        self._key = seed % _WORD, seed // _WORD, kind
-        # The only normal deviates of numpy with a guarantee that they stay the same.
-        self._random = np.random.RandomState()  # takes ten times as long to make as to seed
-        self.upcoming: Iterator[float] | None = None
-        """Deviates of the next sample and those that follow, once it is known."""
+    Each of them depends on the seed and the number of its sample only.
+    """
+    if not deviation:
+        return None
+    # The only normal deviates of numpy with a guarantee that they stay the same. It takes ten times
+    # as long to make as to seed.
+    random, (first, place) = np.random.RandomState(), divmod(number, _BLOCK)
 
-    def start(self, number: int) -> Iterator[float]:
-        """Return the deviates from a sample on."""
-        first, place = divmod(number, _BLOCK)
-        deviates = chain.from_iterable(map(self._block, count(first)))
-        self.upcoming = islice(deviates, place, None)
-        return self.upcoming
+    def deviates(block: int) -> list[float]:
+        random.seed([seed % _WORD, seed // _WORD, kind, block % _WORD, block // _WORD])
+        return (deviation * random.standard_normal(_BLOCK)).tolist()
 
-    def _block(self, block: int) -> list[float]:
-        self._random.seed([*self._key, block % _WORD, block // _WORD])
-        return (self._deviation * self._random.standard_normal(_BLOCK)).tolist()
+    return islice(chain.from_iterable(map(deviates, count(first))), place, None)
 
 
 EXACT_SENSOR = Sensor()

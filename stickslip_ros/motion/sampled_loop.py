@@ -320,7 +320,7 @@ class SampledLoop:
         if self._scenario_disturbance is not None:
             disturbance = self._scenario_disturbance.at(number * self.period)
         self.disturbance = disturbance + self.asked_disturbance
-        return self._sampler.take(number, self.stamps.stamp(number), belt_position, friction_force)
+        return self._sampler.take(self.stamps.stamp(number), belt_position, friction_force)
 
     def _change(self) -> float:
         """Take the drive and the state that were set since the last sample.
@@ -336,6 +336,6 @@ class SampledLoop:
             self._sampler.follow_drive()
         if start is not None:
             motion.restart(*start)
-            self._sampler.restart_sensors()
+            self._sampler.restart_sensors(self.sample_number)
             friction_force = motion.friction_force
         return friction_force

@@ -41,13 +41,13 @@ class Sampler:
         self._motion, self._period = motion, period
         self._sensor, self._motor_sensor = sensor, motor_sensor
         self._true: tuple[float, float, MotorSample | None] = (0.0, 0.0, None)
-        self.restart_sensors()
+        self.restart_sensors(0)
         self.follow_drive()
 
-    def restart_sensors(self) -> None:
-        """Start the sensors again: what follows does not continue the motion so far."""
-        self._measure = self._sensor.start(self._period)
-        self._measure_motor = self._motor_sensor.start(self._period)
+    def restart_sensors(self, number: int) -> None:
+        """Start the sensors again at a sample: it does not continue the motion so far."""
+        self._measure = self._sensor.start(self._period, number)
+        self._measure_motor = self._motor_sensor.start(self._period, number)
         self._measures = self._measure is not None or self._measure_motor is not None
 
     def follow_drive(self) -> None:
@@ -63,19 +63,17 @@ class Sampler:
         """Whether samples are exact, and the speed of the belt is constant."""
         return self.belt is None and not self._measures
 
-    def take(
-        self, number: int, stamp: int, belt_position: float, friction_force: float | None
-    ) -> Sample:
-        """Return the sample of a number; the friction force (N) is that of the motion if None."""
+    def take(self, stamp: int, belt_position: float, friction_force: float | None) -> Sample:
+        """Return the sample of a stamp; the friction force (N) is that of the motion if None."""
         position, velocity, friction, belt_speed, motor = self._motion.reading()
         if friction_force is not None:
             friction = friction_force
         if self._measures:
             self._true = position, velocity, motor
             if self._measure is not None:
-                position, velocity = self._measure(number, position, velocity)
+                position, velocity = self._measure(position, velocity)
             if motor is not None and self._measure_motor is not None:
-                motor = MotorSample(*self._measure_motor(number, *motor))
+                motor = MotorSample(*self._measure_motor(*motor))
         values = stamp, position, velocity, friction, belt_position, belt_speed, motor
         return tuple.__new__(Sample, values)  # half as long as the constructor
 

@@ -119,7 +119,7 @@ class _Started(Sensor):
 
     measure: Measure | None = None
 
-    def start(self, period: float) -> Measure | None:
+    def start(self, period: float, number: int = 0) -> Measure | None:
         return self.measure
 
 
@@ -187,7 +187,7 @@ class Bench:
                 if caught.settling_time is None:
                     return replace(caught, peak_force=peak)
                 slowest = max(slowest, caught.settling_time)
-            measured = start if measure is None else measure(number, *start)
+            measured = start if measure is None else measure(*start)
             controller.answer(_sample(drive, stamp, *measured))
         return Caught(peak, slowest, grows=False)
 
@@ -231,8 +231,8 @@ class Bench:
         """Return what measures, after it has measured these positions and velocities."""
         measure = self.sensor.start(1.0 / self.rate)
         if measure is not None:
-            for number, state in enumerate(before):
-                measure(number, *state)
+            for state in before:
+                measure(*state)
         return measure
 
     def _loop(self, motion: Motion, sensor: Sensor, stamp: int) -> SampledLoop:

@@ -17,8 +17,8 @@ DIFFERENCE = Sensor(velocity=MeasuredVelocity.DIFFERENCE)
 
 def measured(sensor: Sensor, positions: np.ndarray, first: int = 0) -> np.ndarray:
     """Positions and velocities (rows) that a sensor tells; the true velocity is 0."""
-    measure = sensor.start(PERIOD)
-    rows = [measure(number, x, 0.0) for number, x in enumerate(positions.tolist(), first)]
+    measure = sensor.start(PERIOD, first)
+    rows = [measure(x, 0.0) for x in positions.tolist()]
     return np.array(rows).T
 
 
@@ -104,7 +104,7 @@ def test_a_constant_velocity_is_told_within_the_error(spans: int) -> None:
     if spans:
         sensor = replace(DIFFERENCE, position_resolution=1e-6, difference_samples=spans)
     measure = sensor.start(PERIOD)
-    told = [measure(n, 0.0123 * n * PERIOD, 0.0123)[1] for n in range(2000)][spans + 1 :]
+    told = [measure(0.0123 * n * PERIOD, 0.0123)[1] for n in range(2000)][spans + 1 :]
     worst = np.abs(np.array(told) - 0.0123).max()
     error = 1e-6 / (spans * PERIOD) if spans else 4.0 * 1e-4
     assert 0.5 * error < worst <= error

@@ -1,6 +1,7 @@
 """The sampled loop: stamps, changes under way, the sensor and the actuator."""
 
 from dataclasses import dataclass, replace
+from itertools import count
 from random import Random
 
 import numpy as np
@@ -188,11 +189,11 @@ class Encoder(Sensor):
     noise: float = 0.01
     resolution: float = 0.005
 
-    def start(self, period: float) -> Measure:
-        last: list[float] = []
+    def start(self, period: float, number: int = 0) -> Measure:
+        last, numbers = list[float](), count(number)
 
-        def measure(number: int, position: float, velocity: float) -> tuple[float, float]:
-            noise = Random(number).gauss(0.0, self.noise)
+        def measure(position: float, velocity: float) -> tuple[float, float]:
+            noise = Random(next(numbers)).gauss(0.0, self.noise)
             measured = self.resolution * round((position + noise) / self.resolution)
             speed = (measured - last[0]) / period if last else 0.0
             last[:] = [measured]

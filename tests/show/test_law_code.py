@@ -124,8 +124,8 @@ def test_velocities_are_differences_as_the_sensor_takes_them(spans: int, tmp_pat
     measure = scenario.plant.sensor.start(scenario.plant.period)
     assert measure is not None
     state, elapsed = None, 0.0
-    for number, position in enumerate(np.random.default_rng(1).normal(0.0, 1e-5, 50).tolist()):
-        sample = Sample(0, *measure(number, position, 0.0), 0.0, 0.0, 0.0)
+    for position in np.random.default_rng(1).normal(0.0, 1e-5, 50).tolist():
+        sample = Sample(0, *measure(position, 0.0), 0.0, 0.0, 0.0)
         state = state or law.initial_state(sample, Reference())
         force, state = law.respond(state, elapsed, sample, Reference())
         elapsed = scenario.plant.period
