@@ -6,7 +6,7 @@ run this same loop.
 
 from collections.abc import Callable
 from math import isfinite
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 from stickslip_ros.model.drive import Drive
 from stickslip_ros.model.sensor import EXACT_SENSOR, Sensor
@@ -22,17 +22,6 @@ if TYPE_CHECKING:  # a node without a motion needs no heyoka
 
 LOCKSTEP_START = NANOSECONDS
 """Stamp of the first sample if no clock gives one, ns; ROS uses zero for "not set"."""
-
-
-class _Changes(NamedTuple):
-    """Changes that the next sample takes."""
-
-    drive: Drive | None = None
-    start: tuple[float, float] | None = None
-    """Position, m, and velocity, m/s, of the slide."""
-
-
-_NO_CHANGES = _Changes()
 
 
 class SampledLoop:
@@ -133,7 +122,9 @@ class SampledLoop:
         )
         self._line.limiter = motion.drive.actuator.limiter
         self._sampler = Sampler(motion, self.period, sensor, motor_sensor)
-        self._changes = _NO_CHANGES
+        # What the next sample takes: a drive, and position (m) and velocity (m/s) of the slide.
+        self._next_drive: Drive | None = None
+        self._next_start: tuple[float, float] | None = None
         self.follow_disturbance(disturbance)
         self.asked_disturbance = 0.0
         """Disturbance force set by `disturb`, N; acts from the next sample on."""
@@ -170,7 +161,7 @@ class SampledLoop:
             and self.disturbance == self.asked_disturbance == 0.0
             and self._sampler.is_plain
             and self.stamps.period.denominator == 1
-            and self._changes is _NO_CHANGES
+            and self._next_drive is self._next_start is None
             and self._advance == self._motion.advance_under
         )
 
@@ -253,7 +244,7 @@ class SampledLoop:
         drive : Drive
             New drive; the slide keeps its position and velocity, and its actuator its state.
         """
-        self._changes = self._changes._replace(drive=drive)
+        self._next_drive = drive
 
     def reset(self, position: float, velocity: float) -> None:
         """Set the state of the slide at the next sample.
@@ -265,7 +256,7 @@ class SampledLoop:
         velocity : float
             Velocity of the slide, m/s.
         """
-        self._changes = self._changes._replace(start=(position, velocity))
+        self._next_start = position, velocity
 
     def advance(self) -> Sample:
         """Advance with the forces that have arrived; return the next sample, as it is measured.
@@ -314,7 +305,7 @@ class SampledLoop:
 
     def _take_sample(self, belt_position: float) -> Sample:
         number, friction_force = self.sample_number, None
-        if self._changes is not _NO_CHANGES:
+        if self._next_drive is not None or self._next_start is not None:
             friction_force = self._change()
         disturbance = 0.0
         if self._scenario_disturbance is not None:
@@ -329,7 +320,8 @@ class SampledLoop:
         state is new.
         """
         motion, friction_force = self._motion, self._motion.friction_force
-        (drive, start), self._changes = self._changes, _NO_CHANGES
+        drive, start = self._next_drive, self._next_start
+        self._next_drive = self._next_start = None
         if drive is not None:
             motion.drive = drive
             self._line.limiter = drive.actuator.limiter
