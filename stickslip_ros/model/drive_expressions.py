@@ -125,7 +125,7 @@ class DriveExpressions:
         drive, relative_speed = self.drive, speed - self.belt_speed
         held = equations.reaction(drive, position, speed, force)
         if self._system.has_guide_damping:
-            held += drive.guide_damping * relative_speed
+            held += equations.guide_reaction(drive, relative_speed)
         friction = self._normal * drive.friction.coefficient(relative_speed, self._sign)
         return equations.acceleration(drive, friction, held)
 

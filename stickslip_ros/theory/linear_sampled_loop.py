@@ -302,6 +302,11 @@ class LinearSampledLoop:
         return replace(self, rate=rate, force_delay=delay, difference_samples=coarse)
 
     @property
+    def spans(self) -> tuple[int, int]:
+        """Samples that the velocities of slide and motor span as differences, 0 if exact."""
+        return self.difference_samples, self.motor_difference_samples
+
+    @property
     def under_way(self) -> int:
         """Number of forces that are under way at a sample."""
         whole, rest = self.delay
@@ -377,8 +382,7 @@ class LinearSampledLoop:
         """
         (whole, split), drive = self.delay, self.drive
         stacked, states = feedback.output.shape[:-1], feedback.output.shape[-1]
-        spans = self.difference_samples, self.motor_difference_samples
-        sizes = len(self.plant[1]), states, self.under_way, *spans
+        sizes = len(self.plant[1]), states, self.under_way, *self.spans
         slots = (slice(*ends) for ends in pairwise(accumulate(sizes, initial=0)))
         plant, law, under_way, earlier, earlier_motor = slots
         size, (slide, starting, ending) = sum(sizes), self.held

@@ -63,15 +63,14 @@ def sampled_system(loop: LinearSampledLoop, law: ControlLaw | LinearFeedback) ->
     Raises InvalidInputError if the law is not linear near the equilibrium.
     """
     drive, matrix, disturbed = loop.drive, loop.transition_matrix(law), loop.disturbed
-    earlier = loop.difference_samples, loop.motor_difference_samples
-    law_order = len(matrix) - len(disturbed) - loop.under_way - sum(earlier)
+    law_order = len(matrix) - len(disturbed) - loop.under_way - sum(loop.spans)
     names = (
         *drive_system(replace(drive, actuator=IDEAL_ACTUATOR)).states,
         *(f"actuator.{name}" for name in drive.actuator.states),
         *(f"control.{number}" for number in range(1, law_order + 1)),
         *(f"force.{number}" for number in range(1, loop.under_way + 1)),
-        *(f"earlier_x.{number}" for number in range(1, earlier[0] + 1)),
-        *(f"earlier_motor.x.{number}" for number in range(1, earlier[1] + 1)),
+        *(f"earlier_x.{number}" for number in range(1, loop.spans[0] + 1)),
+        *(f"earlier_motor.x.{number}" for number in range(1, loop.spans[1] + 1)),
     )
     forced = np.pad(disturbed, (0, len(matrix) - len(disturbed)))
     return _system(drive, names, matrix, forced, 1.0 / loop.rate)

@@ -60,7 +60,7 @@ class PlantResponse:
         states: ComplexArray = responses.astype(np.complex128)
         rows: list[ComplexArray] = []
         places = [POSITION] if drive.motor is None else [POSITION, seen]
-        for place, spans in zip(places, _differences(loop), strict=False):
+        for place, spans in zip(places, loop.spans, strict=False):
             rows.append(states[:, place] * drive.length_scale)
             speed = states[:, place + SPEED] * drive.speed_scale
             rows.append(rows[-1] * _rate(spans, loop.rate, z)[:, None] if spans else speed)
@@ -180,7 +180,7 @@ class LoopResponse:
         The first is that of the slide, a second that of a motor.
         """
         loop, total = self.plant.loop, 0.0
-        for body, (noise, spans) in enumerate(zip(noises, _differences(loop), strict=False)):
+        for body, (noise, spans) in enumerate(zip(noises, loop.spans, strict=False)):
             if noise == 0.0 or 2 * body >= self.law.shape[1]:
                 continue
             by_noise = self.law[:, 2 * body].copy()
@@ -194,11 +194,6 @@ class LoopResponse:
 def _step_spectrum(count: int) -> ComplexArray:
     """Return the odd lines of a step that is that of a square wave of so many samples."""
     return np.fft.rfft(np.repeat([1.0, -1.0], count))[1::2]
-
-
-def _differences(loop: LinearSampledLoop) -> tuple[int, int]:
-    """Return the samples that the velocities of slide and motor span."""
-    return loop.difference_samples, loop.motor_difference_samples
 
 
 def _rate(spans: int, rate: float, z: ComplexArray) -> ComplexArray:
