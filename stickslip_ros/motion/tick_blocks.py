@@ -4,7 +4,7 @@ From one sample to the next, Python takes several times longer than the integrat
 """
 
 from collections.abc import Callable
-from functools import partial
+from functools import cache, partial
 from math import factorial
 from typing import Any, Self
 
@@ -211,16 +211,14 @@ def _order(loop: SampledLoop, motion: RecordedMotion) -> int:
 class _Series:
     """Power series in time, the motion between two samples; polynomials accept it.
 
-    Its coefficients are made from those before when they are asked for, and kept.
+    A coefficient is made from those before it when it is first asked for.
     """
 
     def __init__(self, coefficient: Callable[[int], Any]) -> None:
-        self._coefficient, self._known = coefficient, list[Any]()
+        self._coefficient = cache(coefficient)
 
     def __getitem__(self, number: int) -> Any:
-        while len(self._known) <= number:
-            self._known.append(self._coefficient(len(self._known)))
-        return self._known[number]
+        return self._coefficient(number)
 
     def __add__(self, other: Any) -> "_Series":
         if isinstance(other, _Series):
