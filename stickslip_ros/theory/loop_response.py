@@ -93,7 +93,6 @@ class LoopResponse:
     """Response without the law."""
     feedback: LinearFeedback
     """The law, linear."""
-
     law: ComplexArray
     """Force by what the law sees, N/m and N s/m; shape (n, 2) or (n, 4)."""
 
