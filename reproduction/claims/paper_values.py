@@ -205,7 +205,7 @@ class Loop:
         system = drive_system(self.drive, self.gains)
         signs = np.sign(states[1] - system.drive.belt_speed)
         modes = [parameter_values(system, Mode(SLIP, (sign,)), (0.0,)) for sign in signs.tolist()]
-        return flow_rates(system, SLIP).at(states, np.array(modes).T)[0]
+        return flow_rates(system, SLIP, states, np.array(modes).T)[0]
 
 
 @cache

@@ -117,7 +117,8 @@ class Drive(DriveConstants):
         That of slide and motor against each other, if the motor has a mass.
         """
         if self.motor is not None and self.has_spring:
-            return 2.0 * pi / self.motor.natural_frequency(self.mass, self.stiffness)
+            reduced_mass = 1.0 / (1.0 / self.mass + 1.0 / self.motor.mass)
+            return 2.0 * pi / sqrt(self.stiffness / reduced_mass)
         return 2.0 * pi / self.angular_frequency if self.has_spring else inf
 
     @cached_property

@@ -1,7 +1,6 @@
 """The motor behind the screw: a second body, between the control force and the spring."""
 
 from dataclasses import dataclass
-from math import sqrt
 from typing import Any
 
 from stickslip_ros.model.constants import constant
@@ -28,8 +27,3 @@ class Motor:
         """Whether dry friction can hold the motor. The constants decide about it."""
         force = self.friction  # of the equations, an expression
         return not (isinstance(force, int | float) and force == 0.0)
-
-    def natural_frequency(self, mass: float, stiffness: float) -> float:
-        """Return the angular frequency, rad/s, of a free slide (kg) and motor on a spring (N/m)."""
-        reduced_mass = 1.0 / (1.0 / mass + 1.0 / self.mass)
-        return sqrt(stiffness / reduced_mass)

@@ -246,33 +246,27 @@ class _Finder:
             self.marks.append((now, x, 0.0 if self._zero_speed else y))
 
 
-class FlowRates:
-    """Rates of a flow, and the gradients of them and of its margins."""
+def flow_rates(
+    system: HybridSystem, name: str, state: FloatArray, parameters: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return the rates of a flow at the start of an integration, and gradients.
 
-    def __init__(self, system: HybridSystem, name: str) -> None:
-        """Compile them for an instant at which an integration starts."""
-        flow, still = system.shared_flow(name), {hy.time: hy.expression(0.0)}
-        by = [*_variations(system), hy.par[system.index["epoch"]]]  # added to the time everywhere
-        rows = [*flow.rates, *(guard.margin for guard in flow.guards)]
-        terms = [*flow.rates, *(hy.diff(row, variable) for row in rows for variable in by)]
-        self._order, self._count = len(system.states), len(by)
-        values = [hy.subs(term, still) for term in terms]
-        self._compiled = compiled_function(values, list(system.variables))
-
-    def at(self, state: FloatArray, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the rates, as the state (n, ...), and the gradients.
-
-        A row of the gradients has the derivatives by the states, the free constants and the time;
-        the shape is (rates and margins; derivatives; ...).
-        """
-        values = evaluated(self._compiled, state, parameters)
-        order = self._order
-        return values[:order], values[order:].reshape(-1, self._count, *state.shape[1:])
+    State and rates have the shape (n, ...). The gradients are those of the rates, then of the
+    margins: a row has the derivatives by the states, the free constants and the time, and the shape
+    is (rates and margins; derivatives; ...).
+    """
+    compiled = system.shared(("rates", name), partial(_compiled_rates, system, name))
+    values, order = evaluated(compiled, state, parameters), len(system.states)
+    count = order + len(system.free_constants) + 1
+    return values[:order], values[order:].reshape(-1, count, *state.shape[1:])
 
 
-def flow_rates(system: HybridSystem, name: str) -> FlowRates:
-    """Return the compiled rates of a flow."""
-    return system.shared(("rates", name), lambda: FlowRates(system, name))
+def _compiled_rates(system: HybridSystem, name: str) -> Any:
+    flow, still = system.shared_flow(name), {hy.time: hy.expression(0.0)}
+    by = [*_variations(system), hy.par[system.index["epoch"]]]  # added to the time everywhere
+    rows = [*flow.rates, *(guard.margin for guard in flow.guards)]
+    terms = [*flow.rates, *(hy.diff(row, variable) for row in rows for variable in by)]
+    return compiled_function([hy.subs(term, still) for term in terms], list(system.variables))
 
 
 def parameter_values(

@@ -98,13 +98,13 @@ class Derivatives:
 def rates(
     system: DriveSystem, mode: Mode, instant: Instant, state: FloatArray | None = None
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the rates in a mode, and the gradients, see `FlowRates`.
+    """Return the rates in a mode, and the gradients, see `flow_rates`.
 
     They are those at a `state`, by default that of the instant.
     """
     state = np.array(instant.state) if state is None else state
     parameters = parameter_values(system, mode, instant.inputs, instant.time)
-    return flow_rates(system, mode.flow).at(state, parameters)
+    return flow_rates(system, mode.flow, state, parameters)
 
 
 class VariationalMotion(Motion):

@@ -273,8 +273,7 @@ def equilibria(system: DriveSystem, parameters: FloatArray) -> FloatArray:
     first step is exact. A motor without control rests there, too. The values are in the order of
     `system.index`. Raises RunError if the iteration does not converge.
     """
-    rates, index, law = flow_rates(system, SLIP), system.index, system.drive.friction
-    order = len(system.states)
+    order, index, law = len(system.states), system.index, system.drive.friction
     free = np.arange(order)
     if system.control is None:
         free = np.delete(free, system.slots.motor)
@@ -286,7 +285,7 @@ def equilibria(system: DriveSystem, parameters: FloatArray) -> FloatArray:
         ]
         states[MEMORY : MEMORY + len(law.states)] = np.array(memory).T
     for _ in range(_ITERATIONS):
-        rate, gradients = rates.at(states, parameters)
+        rate, gradients = flow_rates(system, SLIP, states, parameters)
         jacobians = np.moveaxis(gradients[np.ix_(free, free)], -1, 0)
         try:
             step = np.linalg.solve(jacobians, -rate[free].T[..., np.newaxis])[..., 0].T

@@ -201,7 +201,9 @@ class LuGre(CurveFollower):
 
     def warning(self) -> str | None:
         """Say that the law is not passive, if so; see `SteadyFriction.warning`."""
-        margin = self.passivity_margin
+        low, high = self._dry.size_range
+        excess = high / low - 1.0
+        margin = self.viscous_part - (self.bristle_damping * excess if excess > 0.0 else 0.0)
         if margin > 0.0 or self.bristle_damping == 0.0:
             return None
         return (
@@ -209,10 +211,3 @@ class LuGre(CurveFollower):
             f"{self.viscous_part:g} s/m is {-margin:.4g} s/m below "
             "bristle_damping * (max g / min g - 1)"
         )
-
-    @property
-    def passivity_margin(self) -> float:
-        """mu_v - D (max g / min g - 1), s/m: above zero the law is passive, see the class."""
-        low, high = self._dry.size_range
-        excess = high / low - 1.0
-        return self.viscous_part - (self.bristle_damping * excess if excess > 0.0 else 0.0)
