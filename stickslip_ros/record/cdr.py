@@ -122,19 +122,19 @@ class Layout:
         A missing stamp is 0.
         """
         order = message.byte_order
-        places = {str(name): place for name, place in enumerate(values) if place is not None}
-        self._stamped = stamp is not None
-        stamps = () if stamp is None else (("sec", "i4", stamp), ("nanosec", "u4", stamp + 4))
+        fields = {str(n): ("f8", place) for n, place in enumerate(values) if place is not None}
+        if stamp is not None:
+            fields |= {"sec": ("i4", stamp), "nanosec": ("u4", stamp + 4)}
+        formats, offsets = zip(*fields.values(), strict=True) if fields else ((), ())
         self._table = np.dtype(
             {
-                "names": [*(name for name, _, _ in stamps), *places],
-                "formats": [f"{order}{form}" for _, form, _ in stamps]
-                + [f"{order}f8"] * len(places),
-                "offsets": [*(place for _, _, place in stamps), *places.values()],
+                "names": [*fields],
+                "formats": [order + form for form in formats],
+                "offsets": offsets,
                 "itemsize": len(message.data),
             }
         )
-        self._values = [str(name) if str(name) in places else None for name in range(len(values))]
+        self._fields, self._count = fields, len(values)
         self._mask = np.zeros(len(message.data), np.uint8)
         for stretch in message.structure:
             self._mask[stretch] = 0xFF
@@ -154,11 +154,11 @@ class Layout:
     def table(self, messages: NDArray[np.void]) -> tuple[IntArray, FloatArray]:
         """Return stamps (ns) of shape (messages,) and values of shape (values, messages)."""
         table = messages.view(self._table)
-        values = np.full((len(self._values), len(table)), math.nan)
-        for row, name in zip(values, self._values, strict=True):
-            if name is not None:
-                row[:] = table[name]
-        if not self._stamped:
+        values = np.full((self._count, len(table)), math.nan)
+        for number, row in enumerate(values):
+            if str(number) in self._fields:
+                row[:] = table[str(number)]
+        if "sec" not in self._fields:
             return np.zeros(len(table), np.int64), values
         return table["sec"].astype(np.int64) * NANOSECONDS + table["nanosec"], values
 

@@ -27,7 +27,10 @@ def unpack(compression: str, data: bytes, size: int) -> bytes | None:
         case "":
             unpacked = data
         case "lz4":
-            unpacked = _unpack_lz4(data, size)
+            lz4, packed = LZ4FrameDecompressor(), iter((data,))
+            unpacked = _gathered(
+                lambda most: b"" if lz4.eof else lz4.decompress(next(packed, b""), most), size
+            )
         case "zstd":
             unpacked = _gathered(ZstdDecompressor().stream_reader(data).read, size)
         case _:
@@ -58,18 +61,6 @@ def unpack_file(packed: Path, unpacked: Path) -> None:
                     f"it would take more than half of the free space in {unpacked.parent}",
                 )
             target.write(piece)
-
-
-def _unpack_lz4(data: bytes, size: int) -> bytes:
-    decompressor = LZ4FrameDecompressor()
-    input_once = iter((data,))
-
-    def read(length: int) -> bytes:
-        if decompressor.eof:
-            return b""
-        return decompressor.decompress(next(input_once, b""), length)
-
-    return _gathered(read, size)
 
 
 def _gathered(read: Callable[[int], bytes], size: int) -> bytes:

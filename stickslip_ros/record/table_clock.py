@@ -169,7 +169,8 @@ def check_turns(table: Table, time: FloatArray) -> None:
     same = np.count_nonzero(time[1:] == time[:-1])
     if same < _TURNING_SHARE * len(time) or table.form.where or not (turns := table.turns):
         return
-    name, turn = turns
+    place, turn = turns
+    name = table.name(place).removeprefix("column ")
     raise InvalidInputError(
         f"{table.path}: each time is that of several rows, in which {name} is "
         f"{' and '.join(turn[:_MOST_SESSIONS])}: --where '{name}={turn[0]}' takes one"

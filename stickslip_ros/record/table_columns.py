@@ -117,6 +117,8 @@ class Table(ABC):
     """Their kind, as numpy has it, and the first of them, ns."""
     period: tuple[float, float] | None = None
     """Period of the rows that a line above them tells, s and in its own unit."""
+    turns: tuple[int, Sequence[str]] | None = None
+    """A column whose values take turns in the first rows, as names of joints do, and the values."""
     remarks: Sequence[str] = ()
     """Lines above the table that are neither names nor units of its columns."""
 
@@ -124,11 +126,6 @@ class Table(ABC):
     def notes(self) -> Sequence[str]:
         """Sentences on how the file was read so far."""
         return ()
-
-    @property
-    def turns(self) -> tuple[str, Sequence[str]] | None:
-        """A column whose values take turns in the first rows, such as the names of joints."""
-        return None
 
     @abstractmethod
     def read(self, places: Sequence[int]) -> list[Any]:

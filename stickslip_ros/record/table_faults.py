@@ -9,7 +9,7 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray, IntArray
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.record.faults import Jumps, lost_velocities, shift_note
+from stickslip_ros.record.faults import Jumps, Wrap, lost_velocities, shift_note
 from stickslip_ros.record.header_units import units_in
 from stickslip_ros.record.imperfections import play_note, ripple_note
 from stickslip_ros.record.table_clock import Rows, finite_rows, picked
@@ -87,22 +87,22 @@ def _without_lost_positions(cells: Cells, values: Values, rows: Rows) -> Iterato
     def line(row: Any) -> str:
         return table.line(int(rows[present[row]]))
 
-    if (wrap := jumps.wrap()) is not None:
+    wrap = jumps.wrap()
+    for row, size in jumps.shifts():
+        if turn := _turn_of_counter(cells, int(rows[present[row]]), size):
+            wrap = wrap or Wrap(turn, np.array([row]))
+    if wrap is not None:
         turn = f"{wrap.turn / factor:.10g}"
         text = f"unwrap({cells.asked['position'].text}, {turn})"
         raise InvalidInputError(
             f"{table.path}: the position jumps {len(wrap.rows)} times by {turn}, the "
             f"first time at {line(wrap.rows[0])}, as of a counter that wraps: position="
-            f"{text}{'' if factor == 1.0 else f'*{factor:g}'}"
+            f"{text}{'' if factor == 1.0 else f'*{factor:.12g}'}"
         )
     if len(lost := jumps.dropouts()):
         first, lost = line(lost[0]), lost if isinstance(present, range) else present[lost]
         yield _left_out(values, "position", lost, first, "no motion does")
     for row, size in jumps.shifts():
-        if way := _unwrapped(cells, int(rows[present[row]])):
-            raise InvalidInputError(
-                f"{table.path}: the position jumps as a counter that wraps, at {line(row)}: {way}"
-            )
         place = f"at {line(row)}, {values['time'][present[row]]:.6g} s after the first row"
         yield shift_note(size, place, "rad" if table.form.rotary else "m")
 
@@ -130,24 +130,15 @@ def _rounding(cells: Cells) -> float:
         return float(np.nan_to_num(np.sum(np.abs(values - values[0])), posinf=0.0))
 
 
-def _unwrapped(cells: Cells, row: int) -> str:
-    """Return the expression that unwraps a position which jumps by a power of 2, or nothing.
+def _turn_of_counter(cells: Cells, row: int, size: float) -> float:
+    """Return the turn of a counter that jumps by a power of 2 at a row; 0 if it does not.
 
-    Its column must be of whole numbers.
+    Its column must be of whole numbers; `size` is that of the jump, in the unit of the position.
     """
-    asked, factor = cells.asked["position"], cells.conversions["position"].factor
-    if len(asked.places) != 1:
-        return ""
-    (place,), known = asked.places, cells.table.columns
-    near = np.asarray(cells.columns[place], float)[max(0, row - 9) : row + 9]
-    jump = np.max(np.abs(np.diff(near)), initial=1.0)
+    if len(places := cells.asked["position"].places) != 1:
+        return 0.0
+    near = np.asarray(cells.columns[places[0]], float)[max(0, row - 9) : row + 9]
+    jump = float(np.max(np.abs(np.diff(near)), initial=1.0))
     turn = 2.0 ** np.rint(np.log2(jump))
-    same = abs(turn - jump) <= _SAME_TURN * turn
-    if turn < _SMALLEST_TURN or not same or np.any(near != np.rint(near)):
-        return ""
-    names = "|".join(re.escape(alias) for alias in known if known[alias] == place)
-    text = f"unwrap({cells.table.number(place)}, {turn:.0f})"
-    if not asked.bare:
-        column = rf"(?<![\w.])['\"]?(?:{names})(?!\w)['\"]?"
-        text = re.sub(column, text, asked.text, count=1)
-    return f"position={text}" + f"*{factor:.12g}" * (factor != 1.0)
+    whole = turn >= _SMALLEST_TURN and np.all(near == np.rint(near))
+    return abs(size) * turn / jump if whole and abs(turn - jump) <= _SAME_TURN * turn else 0.0

@@ -82,7 +82,8 @@ class JoinedTable(Table):
 
     def __init__(self, first: Table, second: Table) -> None:
         """Take both tables."""
-        self.path, self.form, self.period = first.path, first.form, first.period
+        self.path, self.form = first.path, first.form
+        self.period, self.turns = first.period, first.turns
         self.remarks = [*first.remarks, *second.remarks]
         self._tables = first, second
         self.second_from = self._width = len(first.names)
@@ -95,11 +96,6 @@ class JoinedTable(Table):
     def notes(self) -> Sequence[str]:
         first, second = self._tables
         return [*first.notes, *(f"{second.path.name}: {note}" for note in second.notes)]
-
-    @property
-    @override
-    def turns(self) -> tuple[str, Sequence[str]] | None:
-        return self._tables[0].turns
 
     @override
     def read(self, places: Sequence[int]) -> list[Any]:

@@ -102,6 +102,16 @@ class TextForm(Head):
         rows = [_cells(line, self.separator) for line in self.first_lines]
         return [row for row in rows if len(row) == self.width]
 
+    @property
+    def turns(self) -> tuple[int, list[str]] | None:
+        """The first column whose values take turns in the first rows, and these values."""
+        for place, cells in enumerate(zip(*self.first_rows, strict=True)):
+            turn = [*dict.fromkeys(cells)]
+            in_turn = all(cell == turn[row % len(turn)] for row, cell in enumerate(cells))
+            if in_turn and 1 < len(turn) <= len(cells) // 2:
+                return place, turn
+        return None
+
     def unit_behind(self, place: int) -> str:
         """Return the unit behind a column in all rows, in a column named `unit` or not at all.
 

@@ -40,23 +40,12 @@ class TextTable(Table):
         with opened(path, content) as stream:
             self._text = text = form_of(stream, given)
         self.names, self.columns, self.units = text.names, text.columns, text.units
-        self.period, self.remarks = text.period, text.remarks
+        self.period, self.remarks, self.turns = text.period, text.remarks, text.turns
         self._refused: Sequence[int] = ()
         self._rows: IntArray | None = None
         """Lines of the rows that were read, from that of the first one; None: all."""
         self._marks: dict[str, str] = {}
         """What marks in the cells were read as."""
-
-    @property
-    @override
-    def turns(self) -> tuple[str, Sequence[str]] | None:
-        for place in range(self._text.width):
-            cells = [row[place] for row in self._text.first_rows]
-            turn = [*dict.fromkeys(cells)]
-            in_turn = all(cell == turn[row % len(turn)] for row, cell in enumerate(cells))
-            if in_turn and 1 < len(turn) <= len(cells) // 2:
-                return self.name(place).removeprefix("column "), turn
-        return None
 
     @property
     @override

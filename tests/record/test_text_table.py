@@ -431,7 +431,7 @@ def test_a_line_is_that_of_the_file_below_lines_that_are_left_out(tmp_path: Path
 def test_a_counter_that_wraps_once_is_refused_with_the_expression(tmp_path: Path) -> None:
     counts = [(2**32 - 900 + 20 * max(0, n - 50) * (n > 80)) % 2**32 for n in range(200)]
     text = "t,n\n" + "".join(f"{n * 1e-3:.3f},{each}\n" for n, each in enumerate(counts))
-    with pytest.raises(InvalidInputError, match="as a counter that wraps") as refused:
+    with pytest.raises(InvalidInputError, match="as of a counter that wraps") as refused:
         read(tmp_path, text, "t", "n*1e-9")
     said = str(refused.value).partition("position=")[2]
     assert np.ptp(read(tmp_path, text, "t", said).samples.position) == pytest.approx(2980e-9)
