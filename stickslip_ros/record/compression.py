@@ -27,10 +27,7 @@ def unpack(compression: str, data: bytes, size: int) -> bytes | None:
         case "":
             unpacked = data
         case "lz4":
-            lz4, packed = LZ4FrameDecompressor(), iter((data,))
-            unpacked = _gathered(
-                lambda most: b"" if lz4.eof else lz4.decompress(next(packed, b""), most), size
-            )
+            unpacked = _unpack_lz4(data, size)
         case "zstd":
             unpacked = _gathered(ZstdDecompressor().stream_reader(data).read, size)
         case _:
@@ -61,6 +58,15 @@ def unpack_file(packed: Path, unpacked: Path) -> None:
                     f"it would take more than half of the free space in {unpacked.parent}",
                 )
             target.write(piece)
+
+
+def _unpack_lz4(data: bytes, size: int) -> bytes:
+    decompressor, packed = LZ4FrameDecompressor(), iter((data,))
+
+    def read(most: int) -> bytes:
+        return b"" if decompressor.eof else decompressor.decompress(next(packed, b""), most)
+
+    return _gathered(read, size)
 
 
 def _gathered(read: Callable[[int], bytes], size: int) -> bytes:

@@ -62,18 +62,17 @@ class TableFormat:
 
     def __post_init__(self) -> None:
         """Refuse what no table has."""
-        if self.decimal not in (None, ".", ","):
-            raise InvalidInputError(f"decimal = {shown(self.decimal)} is invalid: must be . or ,")
-        if self.skip is not None and self.skip < 0:
-            raise InvalidInputError(f"skip = {self.skip} is invalid: must be at least 0")
-        if self.period is not None and not 0.0 < self.period < inf:
-            raise InvalidInputError(f"period = {self.period} is invalid: must be above 0 s")
-        if self.session is not None and self.session < 1:
-            raise InvalidInputError(f"session = {self.session} is invalid: must be at least 1")
-        if not isfinite(self.shift):
-            raise InvalidInputError(f"shift = {self.shift} is invalid: must be a finite number, s")
-        if self.pitch is not None and not 0.0 < self.pitch < inf:
-            raise InvalidInputError(f"pitch = {self.pitch} is invalid: must be above 0 m")
+        for name, allowed, valid in (
+            ("decimal", ". or ,", self.decimal in (None, ".", ",")),
+            ("skip", "at least 0", (self.skip or 0) >= 0),
+            ("period", "above 0 s", self.period is None or 0.0 < self.period < inf),
+            ("session", "at least 1", self.session is None or self.session >= 1),
+            ("shift", "a finite number, s", isfinite(self.shift)),
+            ("pitch", "above 0 m", self.pitch is None or 0.0 < self.pitch < inf),
+        ):
+            if not valid:
+                value = shown(getattr(self, name))
+                raise InvalidInputError(f"{name} = {value} is invalid: must be {allowed}")
         if self.pitch is not None and self.force_constant is None:
             raise InvalidInputError(f"pitch = {self.pitch} is refused: it is for a force_constant")
         _ = self.per_ampere

@@ -47,17 +47,12 @@ class VectorTable(Table):
     """The vectors of a file, such as a MAT file."""
 
     def __init__(
-        self,
-        path: Path,
-        form: TableFormat,
-        vectors: Mapping[str, FloatArray],
-        units: Mapping[str, str],
+        self, path: Path, form: TableFormat, vectors: Mapping[str, tuple[str, FloatArray]]
     ) -> None:
-        """Take the vectors, and their units, by name."""
+        """Take units and vectors by name."""
         self.path, self.form, self.names = path, form, [*vectors]
-        self.units = [units[name] for name in vectors]
+        self.units, self._vectors = zip(*vectors.values(), strict=True)
         self.columns = {name: place for place, name in enumerate(vectors)}
-        self._vectors = [*vectors.values()]
         self._rows: IntArray | None = None
 
     def read(self, places: Sequence[int]) -> list[FloatArray]:
@@ -145,12 +140,12 @@ def table_of(path: Path, form: TableFormat = ANY_FORM) -> Table:
         foreign = format_of(start, path.suffix.lower())
         if foreign is None:
             return TextTable(path, form)
-        content = read_foreign(stream, foreign, _MOST_NUMBERS)
-        if content.text is not None:
-            return TextTable(path, form, content.text, content.notes)
-        if not content.vectors:
+        content, notes = read_foreign(stream, foreign, _MOST_NUMBERS)
+        if isinstance(content, bytes):
+            return TextTable(path, form, content, notes)
+        if not content:
             raise ValueError("it has no column")
-        return VectorTable(path, form, content.vectors, content.units)
+        return VectorTable(path, form, content)
 
 
 @dataclass(frozen=True)

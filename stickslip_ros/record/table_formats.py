@@ -244,36 +244,27 @@ _ADAPTERS = {
 """Adapters by the first bytes of a file, and by the end of its name."""
 
 
-class ForeignTable(NamedTuple):
-    """What is in a file: a table as text, or vectors by name."""
-
-    text: bytes | None
-    vectors: Mapping[str, FloatArray]
-    units: Mapping[str, str]
-    """Units of the vectors by their names; empty where there is none."""
-    notes: list[str]
-
-
 def format_of(start: bytes, suffix: str) -> str | None:
     """Return how a format is known, by the first bytes of a file or the end of its name."""
     sign = next((sign for sign in _BY_START if start.startswith(sign.encode())), suffix)
     return sign if sign in _ADAPTERS else None
 
 
-def read_foreign(stream: BinaryIO, form: str, most: int) -> ForeignTable:
-    """Return what is in a file of a format as `format_of` names it.
+def read_foreign(
+    stream: BinaryIO, form: str, most: int
+) -> tuple[bytes | dict[str, tuple[str, FloatArray]], list[str]]:
+    """Return what is in a file of a format as `format_of` names it, and sentences on how.
 
-    Of a structure `log` the vector `log.t` is a field, and `data[2]` is the second column of a
-    matrix. Raises ValueError if the file cannot be read, or if its vectors have more than `most`
-    numbers.
+    It is a table as text, or vectors by name, each behind its unit, which may be empty. Of a
+    structure `log` the vector `log.t` is a field, and `data[2]` is the second column of a matrix.
+    Raises ValueError if the file cannot be read, or if its vectors have more than `most` numbers.
     """
     output, notes = result_of(__name__, form, str(most), seconds=_TIME, stream=stream)
     if output.startswith(_TEXT):
-        return ForeignTable(output[len(_TEXT) :], {}, {}, notes)
+        return output[len(_TEXT) :], notes
     with np.load(BytesIO(output), allow_pickle=False) as arrays:
         parts = {name.partition("="): arrays[name] for name in arrays}
-    vectors = {name: vector for (_, _, name), vector in parts.items()}
-    return ForeignTable(None, vectors, {name: unit for unit, _, name in parts}, [])
+    return {name: (unit, vector) for (unit, _, name), vector in parts.items()}, notes
 
 
 def _main(form: str, most: int) -> None:
