@@ -75,9 +75,10 @@ class Raising(WithoutArguments):
 
 
 class RaisingByItself(WithoutArguments):
+    about_to_raise = Event()
+
     def __init__(self) -> None:
         super().__init__()
-        self.about_to_raise = Event()
         self.create_timer(0.01, self.fail)
 
     def fail(self) -> None:
@@ -170,19 +171,6 @@ class Slow(Managed):
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         time.sleep(5.0)
         return super().on_configure(state)
-
-
-class WithGain(VelocityFeedback):
-    """Answers with its parameter."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.declare_parameter("gain", 0.0)
-
-    def answer(self, state: JointState) -> None:
-        force = WrenchStamped(header=state.header)
-        force.wrench.force.x = self.get_parameter("gain").value
-        self.force.publish(force)
 
 
 def main() -> None:
