@@ -33,7 +33,7 @@ _COARSE_SHARE, _COMMON_SHARE, _MULTIPLE = 0.02, 0.02, 1e-3
 usual: others are gaps and lost rows; distance of a multiple, in steps of the rounding."""
 _TURNS = [
     float(f"{turn}e{power}")
-    for turn in (86_400, *(2**bits for bits in (8, 16, 24, 31, 32)))
+    for turn in (86_400, 3_600, *(2**bits for bits in (8, 16, 24, 31, 32)))
     for power in (-9, -6, -3, 0, 3, 6, 9)
 ]
 """Turns of clocks and counters, in any units."""

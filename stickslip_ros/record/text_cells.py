@@ -15,7 +15,7 @@ NUMBER = re.compile(
     rf"[-+]?(?:\d+(?:{GROUPED}\d{{3}})*(?:[.,]\d+)*\.?|[.,]\d+)(?:[eE][-+]?\d+)?|[-+]?(?:nan|inf|infinity)",
     re.IGNORECASE,
 )
-_CLOCK = r"\d{1,2}:\d\d(?::\d\d(?:[.,:]\d+)?)?"
+_CLOCK = r"\d{1,2}:\d\d(?::\d\d(?:[.,:]\d+|;\d{3})?|[.,]\d+)?"
 TIME = re.compile(
     rf"(?P<date>\d{{1,4}}([-./])\d{{1,2}}\2\d{{1,4}})(?:,?[T ] ?{_CLOCK})?"
     rf"(?: ?[AP]M)?(?: ?Z|[+-]\d\d(?::?\d\d)?)?|{_CLOCK}(?: ?[AP]M)?",
@@ -100,7 +100,8 @@ def _instants(text: Any, like: re.Match[str]) -> Any:
     import pandas as pd
 
     text = text.str.replace(r",(?=\d)", ".", regex=True)
-    text = text.str.replace(r"(:\d\d:\d\d):(?=\d)", r"\1.", regex=True)
+    text = text.str.replace(r"(:\d\d:\d\d)[:;](?=\d)", r"\1.", regex=True)
+    text = text.str.replace(r"^(?=\d+:\d\d\.)", "0:", regex=True)  # mm:ss.0 of Excel
     if like["date"] is None and like[0][-1] not in "mM":
         return pd.to_timedelta(text, errors="coerce").to_numpy("timedelta64[ns]")
     instants: Any = pd.to_datetime(text, format="ISO8601", utc=True, errors="coerce")

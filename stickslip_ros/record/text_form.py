@@ -9,8 +9,9 @@ import csv
 import os
 import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from io import BytesIO
 from itertools import islice
 from pathlib import Path
@@ -46,6 +47,8 @@ _CYRILLIC = re.compile(
     rb"[\xe0-\xff](?:[\xe0-\xff]{2}|[\xc0-\xde\xec])|\xec\xf1|[\xc0-\xdf]{3}|\xcc[\xcc\xd1]|\xca\xcd"
 )
 """Letters in cp1251 that cp1252 would show as a row of accents, such as those of mm, ms and kN."""
+_JAPANESE = re.compile(rb"(?=[\x81-\x9f])(?:[\x81-\x9f\xe0-\xea][\x40-\x7e\x80-\xfc]){2}")
+"""Two letters in Shift-JIS."""
 _BROKEN = re.compile(r'(?<![^\n,;\t|])"[^"\n]*(?:\n[^"\n]*){1,3}"(?![^\n,;\t|])')
 """A cell in quotes of several lines, as a name with its unit below."""
 _JOINED = "\v\n"
@@ -211,11 +214,22 @@ def _encoding_of(head: bytes) -> str:
     for encoding, high in (("utf-16-le", head[1::2]), ("utf-16-be", head[::2])):
         if 2 * high.count(0) > len(high):
             return encoding
-    try:
-        codecs.getincrementaldecoder("utf-8")().decode(head)
-    except UnicodeDecodeError:
-        return "cp1251" if _CYRILLIC.search(head) else "cp1252"
-    return "utf-8"
+    fitting = [*filter(partial(_decodes, head), ("utf-8", "shift_jis", "cp932"))]
+    if fitting[:1] == ["utf-8"]:
+        return "utf-8"
+    if fitting and _JAPANESE.search(head):
+        raise ValueError(
+            f"it may be Japanese text: --encoding {fitting[0]} reads it, and --encoding cp1252 as "
+            "text of Western Europe"
+        )
+    return "cp1251" if _CYRILLIC.search(head) else "cp1252"
+
+
+def _decodes(head: bytes, encoding: str) -> bool:
+    with suppress(UnicodeDecodeError):
+        codecs.getincrementaldecoder(encoding)().decode(head)
+        return True
+    return False
 
 
 @dataclass(frozen=True)

@@ -218,6 +218,7 @@ def test_units_in_lines_above_are_asked_for_or_said(tmp_path: Path, line: str, s
         "2026-06-01T10:00:{:06.3f}+02:00",
         "01.06.2026 10:00:{:06.3f}",
         "10:00:{:06.3f}",
+        "10:{:06.3f}",
     ],
 )
 @pytest.mark.parametrize("separator", [",", ";"])
@@ -231,6 +232,10 @@ def test_times_of_the_clock_are_seconds(tmp_path: Path, form: str, separator: st
 
 
 def test_a_clock_goes_on_at_midnight(tmp_path: Path) -> None:
+    """Also beside a date, and with milliseconds behind a semicolon, as Rockwell writes them."""
+    times = ("23:59:59;800", "23:59:59;900", "00:00:00;000", "00:00:00;100")
+    text = "".join(f"06/01/2026,{time},{n}.5\n" for n, time in enumerate(times))
+    assert read(tmp_path, text, "#2", "#3").samples.stamp[3] == 300_000_000
     text = "t,x\n23:59:59.8,1\n23:59:59.9,2\n00:00:00.0,3\n00:00:00.1,4\n"
     stamps = read(tmp_path, text, "t", "x").samples.stamp
     assert stamps.tolist() == [100_000_000 * number for number in range(4)]
@@ -542,27 +547,25 @@ def test_what_is_said_of_the_form_is_used(
     assert read(tmp_path, text, "a", "b", form).samples.position.tolist() == position
 
 
-@pytest.mark.parametrize(
-    ("name", "start", "way"),
-    [
+def test_what_is_no_table_is_refused_with_a_way(tmp_path: Path) -> None:
+    japanese = ("時間;位置\n" + rows(";")).encode("shift_jis")
+    for name, content, way in (
+        *(
+            ("log.txt", content, "encoding")
+            for content in (b"only words\nand more\n", b"1\n2\n3\n")
+        ),
+        ("log.txt", b"\0\1\2\3" * 100, "encoding"),
+        ("log.txt", japanese, "--encoding shift_jis reads it"),
         ("log.xls", b"\xd0\xcf\x11\xe0\0\1", "save it as .xlsx"),
         ("log.wav", b"RIFF\0\1", "wavfile"),
         ("log.svdx", b"PK\3\4", "TwinCAT Scope"),
-    ],
-)
-def test_files_of_other_tools_are_refused_by_name(
-    tmp_path: Path, name: str, start: bytes, way: str
-) -> None:
-    (tmp_path / name).write_bytes(start + bytes(100))
-    with pytest.raises(BagError, match=way):
-        read_table(tmp_path / name, {"time": "t", "position": "x"})
-
-
-def test_what_is_no_table_is_refused_with_the_options(tmp_path: Path) -> None:
-    texts = ("only words\nand more\n", "1\n2\n3\n", b"\0\1\2\3" * 100)
-    for text in texts:
-        with pytest.raises(BagError, match="encoding"):
-            read(tmp_path, text, "t", "x")
+    ):
+        (tmp_path / name).write_bytes(content)
+        with pytest.raises(BagError, match=way):
+            read_table(tmp_path / name, {"time": "t", "position": "x"})
+    form = TableFormat(encoding="shift_jis")
+    found = read(tmp_path, japanese, "時間", "位置", form).samples.position
+    assert found.tolist() == POSITION.tolist()
     refusals: list[tuple[dict[str, Any], str]] = [
         ({"decimal": "x"}, "must be . or ,"),
         ({"skip": -1}, "must be at least 0"),
