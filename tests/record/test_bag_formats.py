@@ -8,23 +8,18 @@ import numpy as np
 import pytest
 from rosbags.rosbag1 import Writer
 from rosbags.rosbag2 import StoragePlugin
-from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_typestore
 
 from stickslip_ros.errors import BagError
 from stickslip_ros.record import bag_formats
 from stickslip_ros.record.reader import Recording
-from tests.record.test_reader import JOINT_STATES, state
+from tests.record.test_reader import JOINT_STATES, rosbags_bag, state
 
 STAMP, POSITION = 3_000_000_007, 1.25e-3
 
 
 def _sqlite(path: Path) -> Path:
-    typestore = get_typestore(Stores.ROS2_JAZZY)
-    with Writer2(path, version=9, storage_plugin=StoragePlugin.SQLITE3) as writer:
-        kind = "sensor_msgs/msg/JointState"
-        connection = writer.add_connection(JOINT_STATES, kind, typestore=typestore)
-        writer.write(connection, 5, state(5))
+    rosbags_bag(path, StoragePlugin.SQLITE3)
     return path
 
 

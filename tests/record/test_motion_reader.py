@@ -152,49 +152,36 @@ def test_joints_in_messages_of_their_own_are_several(tmp_path: Path) -> None:
     assert "300 joint states on /machine/joint_states tell nothing of right" in report["notes"][0]
 
 
+LOG = [recorded(number) for number in range(len(TIME))]
+
+
 @pytest.mark.parametrize(
-    ("unit", "step", "reason"),
+    ("stamps", "names", "reason"),
     [
-        (10**20, STEP, "0, which nobody filled in"),
-        (10**9, STEP, "of whole seconds"),
-        (STEP, STEP // 2, "rounded to 1 ms"),
+        ([0] * 300, ["axis"], "0, which nobody filled in"),
+        ([at * (i % 2) for i, at in enumerate(LOG)], ["axis"], "0, .* in: 150 of 300 are 0"),
+        ([at // 10**9 * 10**9 for at in LOG], ["axis"], "of whole seconds"),
+        ([at - at % (2 * STEP) for at in LOG], ["axis"], "rounded to 2 ms"),
+        (
+            [at - at % (2 * STEP) for at in LOG],
+            ["slide", "belt"],
+            "rounded to 2 ms, or those of several plants",
+        ),
     ],
 )
 def test_stamps_that_stand_are_refused_and_the_log_has_others(
-    tmp_path: Path, unit: int, step: int, reason: str
+    tmp_path: Path, stamps: list[int], names: list[str], reason: str
 ) -> None:
-    log = [EPOCH + i * step for i in range(len(TIME))]
-    write_bag(
-        tmp_path / "bag",
-        [
-            (STATES, each, state(each // unit * unit, ["axis"], [x], [0.0]))
-            for each, x in zip(log, POSITION.tolist(), strict=True)
-        ],
-    )
-    with pytest.raises(BagError, match=f"are {reason}: .* --time log takes the times"):
-        report_of_recording(tmp_path / "bag")
-    with Recording(tmp_path / "bag", layout=BagLayout(time="log")) as recording:
-        assert recording.joint_states.stamp.tolist() == log
-        assert recording.missing == []
-
-
-def test_stamps_that_stand_may_be_those_of_several_plants(tmp_path: Path) -> None:
-    names = ["slide", "belt"]
     messages = [
-        (STATES, each, state(each, names, [x, 0.0], [0.0, BELT]))
-        for each, x in zip(np.repeat(STEP * np.arange(1, 200), 2).tolist(), POSITION, strict=False)
+        (STATES, log, state(at, names, [x] * len(names), [0.0] * len(names)))
+        for log, at, x in zip(LOG, stamps, POSITION.tolist(), strict=True)
     ]
     write_bag(tmp_path / "bag", messages)
-    with pytest.raises(BagError, match="are rounded to 1 ms, or those of several plants"):
+    with pytest.raises(BagError, match=f"are {reason}.* --time log takes the times"):
         report_of_recording(tmp_path / "bag")
-
-
-def test_stamps_that_one_of_two_sources_lacks_are_refused(tmp_path: Path) -> None:
-    stamps = {i: recorded(i) * (i % 2) for i in range(len(TIME))}
-    messages = [axis(i, x, stamp=stamps[i]) for i, x in enumerate(POSITION.tolist())]
-    write_bag(tmp_path / "bag", messages)
-    with pytest.raises(BagError, match="0, which nobody filled in: 150 of 300 are 0"):
-        report_of_recording(tmp_path / "bag")
+    with Recording(tmp_path / "bag", layout=BagLayout(time="log")) as recording:
+        assert recording.joint_states.stamp.tolist() == LOG
+        assert recording.missing == []
 
 
 def test_of_two_sources_that_take_turns_one_must_be_chosen(tmp_path: Path) -> None:

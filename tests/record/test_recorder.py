@@ -302,9 +302,7 @@ def test_what_is_finished_is_described_while_the_recording_goes_on(tmp_path):
     assert stamps_in(bag) == ([1, 2], True)
 
 
-@pytest.fixture
-def slow_disk(monkeypatch):
-    """Let the disk take what it is handed when the event is set that is returned; list all that."""
+def test_a_slow_disk_does_not_hold_up_the_recording(tmp_path, monkeypatch):
     ready, handed = Event(), []
 
     def sync(descriptor):
@@ -312,12 +310,6 @@ def slow_disk(monkeypatch):
         assert ready.wait(60.0)
 
     monkeypatch.setattr(os, "fdatasync", sync)
-    yield ready, handed
-    ready.set()
-
-
-def test_a_slow_disk_does_not_hold_up_the_recording(tmp_path, slow_disk):
-    ready, handed = slow_disk
     with Recorder(tmp_path / "bag") as recorder:
         channel = add_a(recorder)
         for stamp in range(100):

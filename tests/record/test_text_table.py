@@ -426,13 +426,6 @@ def test_a_comma_means_the_same_in_all_rows(
     assert found.samples.position[[0, 100]].tolist() == [1200.0, 0.5]
 
 
-def test_a_line_is_that_of_the_file_below_lines_that_are_left_out(tmp_path: Path) -> None:
-    lines = [f"{n},{n}" for n in range(60)]
-    lines[10], lines[20], lines[40] = "1,2,3,4", "", "40,oops"
-    found = read(tmp_path, "t,x\n" + "\n".join(lines), "t", "x")
-    assert any("the first is line 42" in note for note in found.notes), found.notes
-
-
 def test_a_counter_that_wraps_once_is_refused_with_the_expression(tmp_path: Path) -> None:
     counts = [(2**32 - 900 + 20 * max(0, n - 50) * (n > 80)) % 2**32 for n in range(200)]
     text = "t,n\n" + "".join(f"{n * 1e-3:.3f},{each}\n" for n, each in enumerate(counts))
@@ -518,11 +511,13 @@ def test_a_blank_in_numbers_is_said(tmp_path: Path) -> None:
 
 
 def test_what_is_left_out_is_counted_and_its_first_line_named(tmp_path: Path) -> None:
-    text = "t;x\n\n0;1\n1;2\n\n2;a\n3;1e160\n4;5;6\n5;7\n6;8\n7;9\n8;9\n9;9\n10;9\n11;9\n"
+    text = "t;x\n\n0;1\n1;2\n\n4;5;6\n2;a\n3;1e160\n5;7\n6;8\n7;9\n8;9\n9;9\n10;9\n11;9\n"
     found = read(tmp_path, text, "t", "x")
-    assert "column x has no number in 2 of 11 rows; the first is line 6" in found.notes[2]
-    assert "1 lines have more cells than the others" in found.notes[1]
-    assert "line 8" in found.notes[1]
+    assert "column x has no number in 2 of 11 rows; the first is line 7" in found.notes[2]
+    assert (
+        "1 lines have more cells than the others and are left out, the first is line 6"
+        in (found.notes[1])
+    )
 
 
 @pytest.mark.parametrize(
