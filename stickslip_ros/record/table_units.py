@@ -1,6 +1,11 @@
-"""Columns of a table in SI units: what converts them, and which units are refused."""
+"""Columns of a table in SI units: what converts them, and which units are refused.
 
-from collections.abc import Iterator, Mapping
+A unit is that of the column by its header or, without one, that of a line above the table.
+"""
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from functools import cache
 from math import isnan, nan
 from typing import Any, NamedTuple
 
@@ -9,9 +14,8 @@ import numpy as np
 from stickslip_ros.arrays import FloatArray, windows
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.quantities import ROTARY
-from stickslip_ros.record.comment_units import mentions, unit_told
 from stickslip_ros.record.expressions import Expression
-from stickslip_ros.record.header_units import Unit, other_quantity, units_in
+from stickslip_ros.record.header_units import Unit, are_units, other_quantity, units_in
 from stickslip_ros.record.table_columns import ROW, Table
 from stickslip_ros.samples import LARGEST
 from stickslip_ros.text import quantity, shown
@@ -27,8 +31,28 @@ QUANTITIES = {
     "reference": "m",
 }
 """Units of the quantities that a table may have; time and position it must have."""
+_SI = {*QUANTITIES.values()}
 MOTION, FORCES = ("position", "velocity"), ("force", "disturbance", "friction_force")
 """Quantities of which rows without a number lack samples; those that hold until the next value."""
+_WORD = re.compile(r"[^\W\d_][^\s\d,;:=()\[\]{}<>|、]*")
+_WORDS = re.compile(r"(?i)(?:in|min|h|d|yd|dyn|mil|turns?|rot|foot|yard|day|grad)\W*")
+"""Units that may be other words."""
+_IN = r"(?<!\w)(?:in|en|em|v|w|в)\s"
+_TOLD = re.compile(rf"(?i)(?:{_IN}|[\[(:=/])\s*$")
+"""What is before a unit that may be another word."""
+_LABEL = re.compile(r"(?i)unit|einheit|unidad|jednot|единиц|单位|単位")
+"""What is in the line of a unit of one letter."""
+_NUMBER_BEFORE = re.compile(r"(?i)\d[\d.,]*(?:e[-+]?\d+)?\s*[\[(]?$")
+_NUMBER_BEHIND = re.compile(r"[\s\])}>:;,=\"]*[-+]?\d")
+
+
+class _Mention(NamedTuple):
+    """A unit in a line above a table."""
+
+    unit: Unit
+    line: str
+    is_fact: bool
+    """Whether a number has it, or it is of another quantity: it tells no column."""
 
 
 class _Meaning(NamedTuple):
@@ -98,7 +122,7 @@ class Cells:
             known = timed or self.conversions[name].units or self.table.is_own
             if expression.bare and not known:
                 unit = "A" if name == "force" and form.per_ampere else QUANTITIES[name]
-                beside = next(mentions(self.table.remarks, unit), None)
+                beside = next(_mentions(self.table.remarks, unit), None)
                 unit = ROTARY.get(unit, unit) if form.rotary else unit
                 line = f", below the line {shown(beside.line)}" if beside else ""
                 units.append(f"{expression.text}: no known unit, taken as {unit}{line}")
@@ -161,13 +185,13 @@ def _unit(table: Table, place: int, start: str, column: str, meaning: _Meaning) 
     kind, target, meant, way = meaning
     cells = table.names[place], table.units[place]
     readings = units_in(*cells, target)
-    if not readings and (told := unit_told(table.remarks, table.names[place])):
+    if not readings and (told := _unit_told(table.remarks, table.names[place])):
         by_line = units_in(cells[0], told, target)
         readings = [
             unit if isnan(unit.factor) else unit._replace(text=f"{unit.text} by a line above")
             for unit in by_line
         ]
-    said = [] if readings else [m for m in mentions(table.remarks, target) if not m.is_fact]
+    said = [] if readings else [m for m in _mentions(table.remarks, target) if not m.is_fact]
     if said:
         readings = [*{m.unit.factor: m.unit for m in said}.values(), Unit("", 1.0, target)]
         start += f" by the line {shown(said[0].line)} above,"
@@ -219,3 +243,36 @@ def _measurable(values: FloatArray) -> FloatArray:
             small = (size < 1.0 / LARGEST) & (size > 0.0)
             return np.where(size <= LARGEST, np.where(small, 0.0, column), nan)
     return column
+
+
+def _unit_told(lines: Sequence[str], name: str) -> str:
+    """Return the unit that is behind the name of a column in lines above, or nothing."""
+    column = re.compile(
+        rf"(?i)(?<!\w){re.escape(name)}(?!\w)(?:\s*[:=-].*[\s(\[]|\W*(?:{_IN})?)([^\W\d]\S*?)[\W_]*$"
+    )
+    parts = (part for line in lines for part in re.split(r"[,;|\t、]", line) if name)
+    units = {match[1] for match in map(column.search, parts) if match and are_units([match[1]])}
+    return units.pop() if len(units) == 1 else ""
+
+
+def _mentions(lines: Sequence[str], target: str) -> Iterator[_Mention]:
+    """Yield the units of a quantity, with the SI unit `target`, in lines above, but for this."""
+    for line in lines:
+        label = _LABEL.search(line)
+        for match in _WORD.finditer(line):
+            before, word, behind = line[: match.start()], match[0], line[match.end() :]
+            word = word if are_units([word]) else word.partition("/")[2]  # as in x/mm
+            certain = not _WORDS.fullmatch(word) and (len(word) > 1 or label)
+            if not are_units([word]) or not (certain or _TOLD.search(before)):
+                continue
+            number = _NUMBER_BEFORE.search(before) or _NUMBER_BEHIND.match(behind)
+            for unit in _readings(word, target):
+                if unit.factor > 0.0 and unit.factor != 1.0:
+                    yield _Mention(unit, line, number is not None)
+                elif label and all(isnan(u.factor) for si in _SI for u in _readings(word, si)):
+                    yield _Mention(unit, line, True)
+
+
+@cache
+def _readings(word: str, target: str) -> Sequence[Unit]:
+    return units_in("", word, target)
