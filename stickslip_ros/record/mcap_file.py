@@ -104,8 +104,8 @@ class McapFile:
         """By id."""
         self.statistics: Statistics | None = None
         """The statistics record of the file, if it has one."""
-        self._tables: set[int] = set()
-        self._attachments: set[int] = set()
+        self._places: dict[int, set[int]] = {Opcode.METADATA: set(), Opcode.ATTACHMENT: set()}
+        """Where tables and attachments probably are."""
         self._definitions_size = 0
         self._chunked = False
         self._gaps: dict[int, int] = {}
@@ -155,11 +155,11 @@ class McapFile:
 
     def tables(self, name: str | None = None) -> Iterator[Metadata]:
         """Yield the readable metadata records, of this name or all, in file order."""
-        return self._named(name, self._tables, Opcode.METADATA, Metadata.read, LARGEST_TABLE)
+        return self._named(name, Opcode.METADATA, Metadata.read, LARGEST_TABLE)
 
     def attachments(self, name: str | None = None) -> Iterator[Attachment]:
         """Yield the readable attachments, of this name or all, in file order."""
-        return self._named(name, self._attachments, Opcode.ATTACHMENT, Attachment.read, LARGEST)
+        return self._named(name, Opcode.ATTACHMENT, Attachment.read, LARGEST)
 
     def blocks(self, channels: Collection[int]) -> Iterator[MessageBlock]:
         """Yield the messages on these channels in file order, one chunk at a time.
@@ -259,14 +259,13 @@ class McapFile:
                 case Opcode.STATISTICS:
                     self.statistics = _parse(Statistics.read, content)
                     self._chunked = self.statistics.chunk_count > 0
-                case Opcode.METADATA:
-                    self._tables.add(start)
+                case Opcode.METADATA | Opcode.ATTACHMENT:
+                    self._places[opcode].add(start)
                 case Opcode.METADATA_INDEX:
-                    self._tables.add(_parse(MetadataIndex.read, content).offset)
-                case Opcode.ATTACHMENT:
-                    self._attachments.add(start)
+                    self._places[Opcode.METADATA].add(_parse(MetadataIndex.read, content).offset)
                 case Opcode.ATTACHMENT_INDEX:
-                    self._attachments.add(_parse(AttachmentIndex.read, content).offset)
+                    place = _parse(AttachmentIndex.read, content).offset
+                    self._places[Opcode.ATTACHMENT].add(place)
                 case _:
                     pass
         except DamageError:
@@ -363,12 +362,11 @@ class McapFile:
     def _named(
         self,
         name: str | None,
-        places: Collection[int],
         opcode: Opcode,
         read: Callable[[ReadDataStream], NamedT],
         largest: int,
     ) -> Iterator[NamedT]:
-        for record in map(self._record, sorted(places)):
+        for record in map(self._record, sorted(self._places[opcode])):
             if record.opcode != opcode:
                 continue
             try:

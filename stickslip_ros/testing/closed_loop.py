@@ -115,8 +115,7 @@ class ClosedLoop:
         _check_controller(controller)
         self._to_control = controller
         self._is_law = isinstance(controller, str) and controller != _EXTERNAL
-        named = isinstance(controller, str) and controller not in (_OF_SCENARIO, _EXTERNAL)
-        law = str(controller) if named else None
+        law = str(controller) if self._is_law and controller != _OF_SCENARIO else None
         scenario_of_test = load_scenario(
             fspath(scenario),
             [*_OF_A_TEST, *([f"{_EXPECTS_CONTROL}=false"] if controller is None else [])],
@@ -338,7 +337,10 @@ class ClosedLoop:
     def _made_node(self, make: Callable[..., Node]) -> Node:
         if self.context is rclpy.get_default_context():
             node: Any = make()
-        elif _takes_context(make):
+        elif any(
+            argument.kind is Parameter.VAR_KEYWORD or argument.name == "context"
+            for argument in signature(make).parameters.values()
+        ):
             node = make(context=self.context)
         else:
             raise InvalidInputError(
@@ -438,17 +440,13 @@ def _target(override: str) -> str:
     return override.partition("=")[0]
 
 
-def _takes_context(make: Callable[..., Node]) -> bool:
-    return any(
-        argument.kind is Parameter.VAR_KEYWORD or argument.name == "context"
-        for argument in signature(make).parameters.values()
-    )
-
-
 def _check_controller(controller: object) -> None:
-    if callable(controller) or controller in (_OF_SCENARIO, _EXTERNAL, None):
-        return
-    if isinstance(controller, str) and controller in CONTROLLER_PARAMETERS:
+    if callable(controller) or controller in (
+        _OF_SCENARIO,
+        _EXTERNAL,
+        None,
+        *CONTROLLER_PARAMETERS,
+    ):
         return
     if isinstance(controller, Sequence) and not isinstance(controller, str | bytes):
         command = list[Any](controller)

@@ -31,6 +31,17 @@ def state(stamp):
     return pack_joint_state(stamp, (position, 0.0), (velocity, 20.0), (0.0, 0.0))
 
 
+def joint_state(stamp, position, velocity, effort, names=("slide", "belt"), frame=""):
+    """Return a joint state as ROS has it."""
+    from sensor_msgs.msg import JointState
+
+    values = {"position": [*position], "velocity": [*velocity], "effort": [*effort]}
+    message = JointState(name=[*names], **values)
+    message.header.frame_id = frame
+    message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp, SECOND)
+    return message
+
+
 STAMPS = [5 * SECOND + n * SECOND // 100 for n in range(1000)]
 
 

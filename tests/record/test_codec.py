@@ -29,6 +29,7 @@ from stickslip_ros.record.codec import (
     wrench_columns,
 )
 from stickslip_ros.samples import MotorSample, Reference, Sample
+from tests.record.runs import joint_state
 
 JOINT_STATE_PADDING = (*range(17, 20), 34, 35, *range(45, 48), *range(72, 76), *range(96, 100))
 WRENCH_PADDING = range(22, 28)
@@ -43,16 +44,6 @@ def header(stamp, frame=""):
     message = Header(frame_id=frame)
     message.stamp.sec, message.stamp.nanosec = divmod(stamp, 10**9)
     return message
-
-
-def joint_state(stamp, position, velocity, effort, names=("slide", "belt"), frame=""):
-    return JointState(
-        header=header(stamp, frame),
-        name=list(names),
-        position=list(position),
-        velocity=list(velocity),
-        effort=list(effort),
-    )
 
 
 def wrench(stamp, x, y=0.0, z=0.0, frame="slide"):

@@ -7,13 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from geometry_msgs.msg import WrenchStamped
 from hypothesis import given
 from hypothesis import strategies as st
 from rclpy.serialization import serialize_message
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, Float64MultiArray
 
 import stickslip_ros as ss
@@ -21,10 +19,11 @@ from benchmarks.measures_under_noise import motion
 from stickslip_ros.errors import BagError, InvalidInputError
 from stickslip_ros.measures.slips import SlipThreshold
 from stickslip_ros.record.bag_layout import BagLayout
+from stickslip_ros.record.codec import pack_wrench
 from stickslip_ros.record.reader import Recording
 from stickslip_ros.record.report import report_of_recording
 from tests.examples import examples
-from tests.record.runs import write_bag
+from tests.record.runs import joint_state, write_bag
 
 BELT = 0.04
 EPOCH, STEP = 3 * 10**9, 1_000_000
@@ -72,10 +71,7 @@ def state(
     velocity: list[float] | None = None,
     effort: list[float] | None = None,
 ) -> bytes:
-    message = JointState(
-        name=names, position=position, velocity=velocity or [], effort=effort or []
-    )
-    message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp, 10**9)
+    message = joint_state(stamp, position, velocity or [], effort or [], names)
     return serialize_message(message)
 
 
@@ -252,13 +248,6 @@ def command(stamp: int, effort: list[float]) -> bytes:
     return state(stamp, ["wrist", "axis"], [], [], effort)
 
 
-def wrench(stamp: int, force: float) -> bytes:
-    message = WrenchStamped()
-    message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp, 10**9)
-    message.wrench.force.x = force
-    return serialize_message(message)
-
-
 def array(*values: float) -> bytes:
     return serialize_message(Float64MultiArray(data=values))
 
@@ -266,7 +255,7 @@ def array(*values: float) -> bytes:
 @pytest.mark.parametrize(
     ("kind", "topic", "message"),
     [
-        ("geometry_msgs/msg/WrenchStamped", COMMANDS, wrench),
+        ("geometry_msgs/msg/WrenchStamped", COMMANDS, pack_wrench),
         ("std_msgs/msg/Float64", COMMANDS, lambda _, u: serialize_message(Float64(data=u))),
         ("std_msgs/msg/Float64MultiArray", COMMANDS, lambda _, u: array(u)),
         ("std_msgs/msg/Float64MultiArray", f"{COMMANDS}[2]", lambda _, u: array(0.0, u, 1.0)),

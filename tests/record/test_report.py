@@ -1,7 +1,6 @@
 import pytest
 from mcap.writer import CompressionType
 from rclpy.serialization import serialize_message
-from sensor_msgs.msg import JointState
 
 from stickslip_ros.errors import BagError, InvalidInputError
 from stickslip_ros.record.codec import pack_reference
@@ -14,6 +13,7 @@ from tests.record.runs import (
     STAMPS,
     STATES,
     foreign_file,
+    joint_state,
     motion,
     record,
     state,
@@ -24,14 +24,9 @@ from tests.record.runs import (
 def foreign_state(stamp):
     """Return the same as another program may publish it."""
     position, velocity = motion(stamp / SECOND)
-    message = JointState(
-        name=["gripper", "belt", "slide"],
-        position=[7.0, 0.0, position],
-        velocity=[8.0, 20.0, velocity],
-    )
-    message.header.frame_id = "machine"
-    message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp, SECOND)
-    return serialize_message(message)
+    values = [7.0, 0.0, position], [8.0, 20.0, velocity], []
+    names = ["gripper", "belt", "slide"]
+    return serialize_message(joint_state(stamp, *values, names, "machine"))
 
 
 def _held(stamps, every):
