@@ -136,25 +136,20 @@ class DriveInBag:
         """
         chosen = {JOINT_STATES: "states_topic", CONTROL_FORCE: "force_topic"}.get(topic, "")
         given = getattr(self.layout, chosen, None)
-        if given is None:
-            return self._usual_name(topic)
-        types = tuple(STATE_TYPES) if topic == JOINT_STATES else FORCE_TYPES
-        (name, _), topics = numbered(given), self.source.topics
-        if topics.get(name) not in types:
-            allowed = sorted(other for other, kind in topics.items() if kind in types)
+        topics, types = self.source.topics, (topic.type_name,)
+        if topic in (JOINT_STATES, CONTROL_FORCE):
+            types = (*STATE_TYPES,) if topic == JOINT_STATES else FORCE_TYPES
+        fitting = sorted(name for name, kind in topics.items() if kind in types)
+        name = self.prefix + topic.name if given is None else numbered(given)[0]
+        if name in fitting:
+            return name
+        if given is not None:
             raise BagError(
                 printable(
                     f"{chosen} = {shown(name)} is refused: topics of the bag {self.source.path} "
-                    f"that are {', '.join(types)} are {', '.join(allowed) or 'none'}"
+                    f"that are {', '.join(types)} are {', '.join(fitting) or 'none'}"
                 )
             )
-        return name
-
-    def _usual_name(self, topic: Topic[Any]) -> str:
-        topics, name = self.source.topics, self.prefix + topic.name
-        types = FORCE_TYPES if topic == CONTROL_FORCE else (topic.type_name,)
-        if topics.get(name) in types:
-            return name
-        others = {*STATE_TYPES} - {topic.type_name} if topic == JOINT_STATES else ()
-        names = [other for other, kind in topics.items() if kind in others]
-        return names[0] if len(names) == 1 and self.namespace is None else ""
+        others = [other for other in fitting if topics[other] != topic.type_name]
+        is_only = topic == JOINT_STATES and len(others) == 1 and self.namespace is None
+        return others[0] if is_only else ""

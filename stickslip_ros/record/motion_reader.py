@@ -6,7 +6,6 @@ from dataclasses import replace
 from functools import partial
 from itertools import chain
 from math import nan
-from typing import NamedTuple
 
 import numpy as np
 
@@ -161,13 +160,6 @@ def _listed(names: Iterable[str]) -> str:
     return ", ".join(unique[:_MOST_NAMES]) + (", ..." if len(unique) > _MOST_NAMES else "")
 
 
-class _Recorded(NamedTuple):
-    """What the messages have of the joint."""
-
-    position: bool
-    velocity: bool
-
-
 class MachineMotion:
     """The motion of a joint of another machine, read block by block.
 
@@ -181,7 +173,8 @@ class MachineMotion:
         """Take joint, topic and place of the messages, and the belt speed (m/s) of no belt."""
         self._joint, self._topic, self._where = joint, topic, where
         self._layout, self._belt_speed = layout, belt_speed
-        self._recorded: _Recorded | None = None
+        self._recorded: tuple[bool, bool] | None = None
+        """Whether the messages have positions, and velocities, of the joint."""
         self._left_out = Counter[str]()
         self._sources = _Sources(joint, topic, where, layout)
         self._fault = ""
@@ -204,7 +197,7 @@ class MachineMotion:
             for why, number in self._left_out.items()
         ]
         notes += self._sources.notes
-        if not self._recorded.position:
+        if not self._recorded[0]:
             notes.append("the position is not recorded: it is the integral of the velocity")
         elif self._fault:
             notes.append(f"the velocity {self._fault}: it is the difference of the positions")
@@ -223,7 +216,9 @@ class MachineMotion:
         with np.errstate(all="ignore"):  # values of others may overflow
             samples = self._with_values(samples)
             forces = ForceColumns(samples.stamp, samples.friction_force)
-            return self._completed(samples), forces if self._by_effort else forces[:0]
+            return self._completed(samples), forces if self._layout.force == "effort" else forces[
+                :0
+            ]
 
     def without_lost_velocities(self, samples: SampleColumns) -> SampleColumns:
         """Return all samples with velocities that agree with the positions."""
@@ -243,10 +238,6 @@ class MachineMotion:
             velocity[valid] = np.interp(time, time[~spikes], recorded[~spikes])
         return replace(samples, velocity=velocity)
 
-    @property
-    def _by_effort(self) -> bool:
-        return self._layout.force == "effort"
-
     def _with_values(self, samples: SampleColumns) -> SampleColumns:
         """Return the samples that have what the others have of the joint."""
         if self._layout.belt_joint is not None:
@@ -254,18 +245,18 @@ class MachineMotion:
         position, velocity = np.isfinite(samples.position), np.isfinite(samples.velocity)
         if self._recorded is None and (position | velocity).any():
             both, positions = map(np.count_nonzero, (position & velocity, position))
-            self._recorded = _Recorded(bool(positions), bool(2 * both >= positions))
-            if self._by_effort and not np.isfinite(samples.friction_force).any():
+            self._recorded = bool(positions), bool(2 * both >= positions)
+            if self._layout.force == "effort" and not np.isfinite(samples.friction_force).any():
                 raise BagError(
                     f"the joint states {self._where} have no effort of {printable(self._joint)}: "
                     "--force effort is refused; --force-topic names a topic of forces"
                 )
-        recorded = self._recorded or _Recorded(False, False)
+        has_position, has_velocity = self._recorded or (False, False)
         kept = position | velocity
         for why, lacking in (
             (f"tell nothing of {self._joint}", ~kept),
-            ("have no position", kept & ~position & recorded.position),
-            ("have no velocity", kept & ~velocity & recorded.velocity),
+            ("have no position", kept & ~position & has_position),
+            ("have no velocity", kept & ~velocity & has_velocity),
         ):
             if lacking.any():
                 self._left_out[why] += int(np.count_nonzero(lacking))
@@ -300,12 +291,13 @@ class MachineMotion:
             return samples
         whole = samples if self._last is None else self._last.followed_by(samples)
         steps = np.diff(whole.stamp) / NANOSECONDS
-        if not self._recorded.position:
+        has_position, has_velocity = self._recorded
+        if not has_position:
             mean = (whole.velocity[1:] + whole.velocity[:-1]) / 2.0
             start = 0.0 if self._last is None else float(self._last.position[0])
             position = start + np.cumsum(np.append([] if self._last else [0.0], mean * steps))
             samples = replace(samples, position=position)
-        if not self._recorded.velocity:
+        if not has_velocity:
             self._fault = "is not recorded"
             velocity = np.diff(whole.position) / steps
             if self._last is None:

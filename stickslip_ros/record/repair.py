@@ -47,22 +47,18 @@ def repair(path: Path, out: Path, progress: Callable[[int], None] = lambda _: No
             with Recorder(out) as recorder:
                 channels: dict[_Definition, int] = {}
                 for file in bag.files:
-                    _copy_tables(file, recorder)
+                    for table in file.tables():
+                        if table.name != "rosbag2":  # the new bag has its own
+                            recorder.add_metadata(table.name, table.metadata)
+                    for attached in file.attachments():
+                        times = attached.log_time, attached.create_time
+                        recorder.attach(attached.name, attached.data, attached.media_type, *times)
                     _copy_messages(file, recorder, channels, repaired, progress)
         except BaseException:
             shutil.rmtree(out, ignore_errors=True)  # it would look like a complete bag
             raise
         repaired.missing[:0] = bag.damage
     return repaired
-
-
-def _copy_tables(file: McapFile, recorder: Recorder) -> None:
-    for table in file.tables():
-        if table.name != "rosbag2":  # the new bag has its own
-            recorder.add_metadata(table.name, table.metadata)
-    for attachment in file.attachments():
-        times = attachment.log_time, attachment.create_time
-        recorder.attach(attachment.name, attachment.data, attachment.media_type, *times)
 
 
 def _copy_messages(

@@ -160,9 +160,8 @@ def form_of(stream: BinaryIO, given: TableFormat) -> TextForm:
     """Return the form of a table in an open text; raises OSError and ValueError if it has none."""
     lines, encoding = _lines_of(stream.read(_HEAD), given.encoding)
     skip = given.skip or 0
-    rows = _last_rows(lines[skip:])
     period = next(filter(None, map(period_in, lines[:_TOP])), None)
-    _check_rows(rows, fewest=2 if given.period is None and period is None else 1)
+    rows = _last_rows(lines[skip:], fewest=2 if given.period is None and period is None else 1)
     places = range(skip, len(lines))
     first = next((place for place in places if rows.is_row(lines[place])), max(skip, len(lines)))
     texts = _texts_above(lines, first, skip, rows)
@@ -300,17 +299,16 @@ class _LastRows:
         return len(row) == self.width and values > 0 and texts == 0
 
 
-def _last_rows(lines: list[str]) -> _LastRows:
-    """Return the last rows, by the separator that makes most of them numbers."""
+def _last_rows(lines: list[str], fewest: int) -> _LastRows:
+    """Return the last rows, by the separator that makes most of them numbers.
+
+    Raises ValueError for fewer columns of numbers than asked for, and for too many columns.
+    """
     tail = [*islice(filter(str.strip, reversed(lines)), _TAIL)][::-1]
     if not tail:
         raise ValueError("it is empty")
     candidates = [_LastRows(mark, [_cells(line, mark) for line in tail]) for mark in _SEPARATORS]
-    return max(candidates, key=lambda rows: rows.likelihood(lines))
-
-
-def _check_rows(rows: _LastRows, fewest: int) -> None:
-    """Refuse rows with fewer columns of numbers, or with too many columns."""
+    rows = max(candidates, key=lambda rows: rows.likelihood(lines))
     if rows.width < fewest or sum(rows.numeric) < fewest:
         raise ValueError(
             "it has no rows of two numbers or more, whatever the separator: numbers stand alone in "
@@ -319,6 +317,7 @@ def _check_rows(rows: _LastRows, fewest: int) -> None:
         )
     if rows.width > _MOST_COLUMNS:
         raise ValueError(f"it has more than {_MOST_COLUMNS} columns")
+    return rows
 
 
 def _head_in(texts: Sequence[_Line], first: int, skip: int, width: int) -> Head:
