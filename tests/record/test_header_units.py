@@ -66,7 +66,7 @@ HEADERS = {
         "|tenths of mm|thousandths of an inch"
         "|Drehmoment [Nm]|x_mm_s_filt|pos_x1000|usteps|adc",
         NO_UNIT: "x|pos|x_N|phi_h|pos_d|x_min|Position (min)|Position (X)|x_max|data[2]|pos_s|A"
-        "|mu|accel_x|in_position|x10|pos_x10|x_amplitude",
+        "|mu|x in Foo|accel_x|in_position|x10|pos_x10|x_amplitude",
     },
     "m/s": {
         1e-3: "Скорость, мм/с|v [mm/s]"

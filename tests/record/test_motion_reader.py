@@ -94,11 +94,6 @@ def axis(
     return STATES, recorded(number), state(at, [name], *values, effort)
 
 
-def test_without_a_belt_speed_the_belt_is_at_rest_and_a_note_says_so(tmp_path: Path) -> None:
-    report = report_of_recording(record(tmp_path / "bag", 0.0, velocities=True))
-    assert "the belt counts as at rest, unless --belt-speed" in report["notes"][0]
-
-
 def test_of_several_joints_one_must_be_chosen(tmp_path: Path) -> None:
     messages = [
         (STATES, recorded(i), state(recorded(i), ["elbow", "axis"], [0.1, x], [0.0, v]))
@@ -332,6 +327,7 @@ def test_on_a_guide_at_rest_the_measures_are_those_of_the_stick_slip(tmp_path: P
     assert report["regime"] == "stick_slip"
     assert report["stick_fraction"] == pytest.approx(0.1001, abs=2e-3)
     assert report["period"] == pytest.approx(0.0639242, rel=1e-4)
+    assert "the belt counts as at rest, unless --belt-speed" in report["notes"][0]
     assert "advances at 40 mm/s on a guide at rest" in report["notes"][-1]
 
 

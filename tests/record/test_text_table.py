@@ -82,8 +82,6 @@ def test_the_form_of_a_table_is_found(
     ("before", "sentence"),
     [
         ("x [mm]", "units: x [mm]: mm"),
-        ("x_mm", "units: x_mm: mm"),
-        ("x / mm", "units: x / mm: mm"),
         ("x, mm", "units: x, mm: mm"),
         ("x (deg)", "deg is of a rotary axis: what is in m is in rad, as --rotary shows"),
     ],
@@ -120,19 +118,6 @@ def test_a_unit_that_is_not_sure_is_refused_with_a_way(
     assert read(tmp_path, text, "#1", "#2*0.0254").samples.position == pytest.approx(
         0.0254 * POSITION
     )
-
-
-@pytest.mark.parametrize(
-    ("names", "sentence"),
-    [
-        ("t [s],x in Foo", "units: t [s]: s; x in Foo: no known unit, taken as m"),
-        ("t,x", "units: #1: no known unit, taken as s; x: no known unit, taken as m"),
-    ],
-)
-def test_what_is_taken_as_si_units_is_said(tmp_path: Path, names: str, sentence: str) -> None:
-    text = f"{names}\n" + "".join(f"{n / 10},{n}\n" for n in range(20))
-    notes = read(tmp_path, text, "#1", names.partition(",")[2]).notes
-    assert any(sentence in note for note in notes)
 
 
 def test_a_difference_of_columns_has_their_unit(tmp_path: Path) -> None:
