@@ -1,7 +1,6 @@
 """Faults of sensors that a recording shows: dropouts, wraps, and velocities that cannot be."""
 
 from math import pi
-from typing import NamedTuple
 
 import numpy as np
 
@@ -29,15 +28,6 @@ _RATIO, _CORRELATION, _LATE_SHARE, _UNKNOWN_SHARE = 1.4, 0.7, 0.03, 0.1
 """Ratio of displacements to velocities from which these are in another unit; least correlation of
 the two; share of the displacements that a delay makes, from which a velocity is late; share of
 them by which the motion between the velocities is unknown."""
-
-
-class Wrap(NamedTuple):
-    """Jumps of a counter that wraps."""
-
-    turn: float
-    """Size of the jumps."""
-    rows: IntArray
-    """Samples after the jumps."""
 
 
 class Jumps:
@@ -103,10 +93,11 @@ class Jumps:
         sizes = self._step(rows).tolist()
         return [*zip((rows + 1).tolist(), sizes, strict=True)] if len(rows) <= MOST_SHIFTS else []
 
-    def wrap(self) -> Wrap | None:
-        """Return the jumps by one turn, all against the motion; None without any.
+    def wrap(self) -> tuple[float, IntArray] | None:
+        """Return the turn of a counter that wraps, and the samples after its jumps, or None.
 
-        The turn is known from jumps in both directions, or is that of a counter.
+        All jumps are by one turn, and against the motion. The turn is known from jumps in both
+        directions, or is that of a counter.
         """
         rows = self._rows[self._after_quiet & self._before_quiet]
         rows = rows[(rows > 0) & (rows < len(self._signal) - 2)]
@@ -122,8 +113,8 @@ class Jumps:
         known = [candidate * scale for scale in (1.0, self._unit) for candidate in _TURNS]
         nearest = min(known, key=lambda candidate: abs(candidate - turn))
         if abs(nearest - turn) <= _SAME_TURN * turn:
-            return Wrap(nearest, rows + 1)
-        return Wrap(turn, rows + 1) if np.ptp(np.sign(turns)) else None
+            return nearest, rows + 1
+        return (turn, rows + 1) if np.ptp(np.sign(turns)) else None
 
 
 def shift_note(size: float, place: str, unit: str = "m") -> str:

@@ -20,6 +20,10 @@ NO_UNITS = ("", "-", "1", "unit", "units", "einheit", "einheiten")
 _LONG = {"nano": "n", "micro": "u", "mikro": "u", "milli": "m", "mili": "m", "centi": "c",
          "zenti": "c", "kilo": "k", "chilo": "k"}  # fmt: skip
 _ANY_LONG = "|".join(_LONG)
+_OTHER_UNITS = (
+    "[vwgk]|volts?|grams?|kgs|kilos?|tons?|tonn(?:e[ns]?|ellat[ae])|toneladas?|lbs?|oz|pounds?|pa|bar"
+    "|degc|°c|%|percent|pct|prozent"
+)
 _SPELLINGS = tuple(
     (name, dimension, re.compile(f"({prefixes})?(?:{words})"))
     for name, dimension, prefixes, words in (
@@ -71,13 +75,7 @@ _SPELLINGS = tuple(
         ("gf", "F", "", "gf|pond"),
         ("Mgf", "F", "", "tf"),
         ("A", "I", "[kum]", r"a(?:mps?|mpere\w*|rms|eff|pk)?"),
-        (
-            "",
-            "other",
-            "[kum]",
-            "[vwgk]|volts?|grams?|kgs|kilos?|tons?|tonn(?:e[ns]?|ellat[ae])|toneladas?|lbs?|oz"
-            "|pounds?|pa|bar|degc|°c|%|percent|pct|prozent",
-        ),
+        ("", "other", "[kum]", _OTHER_UNITS),
     )
 )
 """Units in machines' data: what pint calls them, their dimension, prefixes, and how people write

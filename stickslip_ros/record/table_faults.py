@@ -9,7 +9,7 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray, IntArray
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.record.faults import Jumps, Wrap, lost_velocities, shift_note
+from stickslip_ros.record.faults import Jumps, lost_velocities, shift_note
 from stickslip_ros.record.header_units import units_in
 from stickslip_ros.record.imperfections import play_note, ripple_note
 from stickslip_ros.record.table_clock import Rows, finite_rows, picked
@@ -90,13 +90,14 @@ def _without_lost_positions(cells: Cells, values: Values, rows: Rows) -> Iterato
     wrap = jumps.wrap()
     for row, size in jumps.shifts():
         if turn := _turn_of_counter(cells, int(rows[present[row]]), size):
-            wrap = wrap or Wrap(turn, np.array([row]))
+            wrap = wrap or (turn, np.array([row]))
     if wrap is not None:
-        turn = f"{wrap.turn / factor:.10g}"
+        size, after = wrap
+        turn = f"{size / factor:.10g}"
         text = f"unwrap({cells.asked['position'].text}, {turn})"
         raise InvalidInputError(
-            f"{table.path}: the position jumps {len(wrap.rows)} times by {turn}, the "
-            f"first time at {line(wrap.rows[0])}, as of a counter that wraps: position="
+            f"{table.path}: the position jumps {len(after)} times by {turn}, the "
+            f"first time at {line(after[0])}, as of a counter that wraps: position="
             f"{text}{'' if factor == 1.0 else f'*{factor:.12g}'}"
         )
     if len(lost := jumps.dropouts()):

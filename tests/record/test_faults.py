@@ -66,11 +66,10 @@ def test_an_encoder_behind_a_command_flickers_by_a_step_without_a_fault(tmp_path
 def test_jumps_by_a_turn_against_the_motion_are_a_wrap() -> None:
     wrap = Jumps((COARSE + 0.02) % 0.03).wrap()
     assert wrap is not None
-    assert wrap.turn == pytest.approx(0.03, rel=1e-6)
+    assert wrap[0] == pytest.approx(0.03, rel=1e-6)
     forward = Jumps(np.round(3e5 * TIME**2 + 2e5 * TIME) % 65536.0).wrap()
     assert forward is not None
-    assert forward.turn == 65536.0
-    assert len(forward.rows) == 85
+    assert (forward[0], len(forward[1])) == (65536.0, 85)
 
 
 def test_a_velocity_that_contradicts_the_positions_is_known() -> None:

@@ -2,17 +2,22 @@ import os
 import resource
 import shutil
 import struct
+import sys
 from itertools import product
+from pathlib import Path
 
+import numpy as np
 import pytest
 import yaml
 import zstandard
 from mcap.writer import CompressionType, IndexType, Writer
+from rosbags.rosbag1 import Writer as Ros1Writer
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2 import Writer as RosbagsWriter
 from rosbags.typesys import Stores, get_typestore
 
 from stickslip_ros.errors import BagError, InvalidInputError
+from stickslip_ros.record import bag_formats
 from stickslip_ros.record.bag_files import runs_of
 from stickslip_ros.record.codec import pack_joint_state, pack_wrench
 from stickslip_ros.record.reader import Recording
@@ -220,6 +225,7 @@ def rosbags_bag(path, plugin, packing=None):
             JOINT_STATES, "sensor_msgs/msg/JointState", typestore=typestore
         )
         writer.write(connection, 5, state(5))
+    return path
 
 
 @pytest.mark.parametrize("packing", [None, *CompressionMode])
@@ -284,3 +290,54 @@ def test_what_is_no_bag_is_refused(tmp_path):
         for name in names:
             with pytest.raises(BagError, match=complaint):
                 Recording(tmp_path / name)
+
+
+def ros_1_bag(path):
+    types = get_typestore(Stores.ROS1_NOETIC)
+    kind = types.types["sensor_msgs/msg/JointState"]
+    header = types.types["std_msgs/msg/Header"]
+    time = types.types["builtin_interfaces/msg/Time"](*divmod(3_000_000_007, 10**9))
+    none = np.array([])
+    message = kind(header(1, time, ""), ["table"], np.array([1.25e-3]), none, none)
+    path = path.with_suffix(".bag")
+    with Ros1Writer(path) as writer:
+        connection = writer.add_connection("/joint_states", kind.__msgtype__, typestore=types)
+        writer.write(connection, 3_000_000_007, types.serialize_ros1(message, kind.__msgtype__))
+    return path
+
+
+@pytest.mark.process
+def test_a_bag_of_sqlite_is_read_by_its_directory_and_by_its_file(tmp_path):
+    bag = rosbags_bag(tmp_path / "bag", StoragePlugin.SQLITE3)
+    for path in (bag, next(bag.glob("*.db3"))):
+        with Recording(path) as recording:
+            assert recording.complete
+            assert list(recording.messages(JOINT_STATES)) == [(JOINT_STATES, 5, state(5))]
+
+
+@pytest.mark.process
+def test_a_bag_of_ros_1_has_the_same_stamps_and_positions(tmp_path):
+    with Recording(ros_1_bag(tmp_path / "bag")) as recording:
+        assert recording.joint_states.stamp.tolist() == [3_000_000_007]
+        assert recording.joint_states.position.tolist() == [1.25e-3]
+
+
+@pytest.mark.process
+@pytest.mark.parametrize(
+    "write", [lambda path: rosbags_bag(path, StoragePlugin.SQLITE3), ros_1_bag]
+)
+def test_a_damaged_bag_is_refused_in_a_sentence(write, tmp_path):
+    path = write(tmp_path / "bag")
+    path = next(path.glob("*.db3")) if path.is_dir() else path
+    content = path.read_bytes()
+    path.write_bytes(content[:60] + content[200:])
+    with pytest.raises(BagError, match="cannot be converted") as refused:
+        Recording(path)
+    assert "\n" not in str(refused.value)
+
+
+def test_a_missing_library_for_a_bag_is_named(monkeypatch):
+    monkeypatch.setitem(sys.modules, "rosbags.convert.cli", None)
+    monkeypatch.setattr("resource.setrlimit", lambda *_: None)
+    with pytest.raises(SystemExit, match="install rosbags"):
+        bag_formats._main(Path("bag"), Path("mcap"))
