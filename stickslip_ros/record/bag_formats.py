@@ -9,8 +9,7 @@ from tempfile import TemporaryDirectory
 from stickslip_ros.errors import BagError
 from stickslip_ros.record.limited_process import limited, result_of
 
-_ROS_1, _SQLITE = b"#ROSBAG", b"SQLite"
-OTHER_BAGS = (_ROS_1, _SQLITE)
+OTHER_BAGS = (b"#ROSBAG", b"SQLite")
 """First bytes of the files of bags that are no MCAP."""
 _TIME = 600
 """Seconds that converting a bag may take."""
@@ -21,10 +20,12 @@ def mcap_of(path: Path, opened: ExitStack) -> Path:
 
     Raises BagError if it cannot be converted.
     """
+    is_other = False
     if os.path.isdir(path):
         is_other = any(path.glob("*.db3")) and not any(path.glob("*.mcap*"))
-    else:
-        is_other = os.path.isfile(path) and _start(path).startswith(OTHER_BAGS)
+    elif os.path.isfile(path):
+        with suppress(OSError), path.open("rb") as stream:
+            is_other = stream.read(max(map(len, OTHER_BAGS))).startswith(OTHER_BAGS)
     if not is_other:
         return path
     directory = opened.enter_context(TemporaryDirectory(prefix="stickslip_ros_"))
@@ -35,12 +36,6 @@ def mcap_of(path: Path, opened: ExitStack) -> Path:
     except ValueError as error:
         raise BagError(f"the bag {path} cannot be converted: {error}") from None
     return target
-
-
-def _start(path: Path) -> bytes:
-    with suppress(OSError), path.open("rb") as stream:
-        return stream.read(max(map(len, OTHER_BAGS)))
-    return b""
 
 
 def _main(source: Path, target: Path) -> None:

@@ -105,13 +105,11 @@ def _of_archive(content: bytes) -> Vectors | str:
 
 
 def _of_numpy(content: bytes) -> Vectors:
-    with np.load(BytesIO(content), allow_pickle=False) as arrays:
-        for name in arrays:
-            yield from _vectors(name, np.squeeze(arrays[name]))
-
-
-def _of_array(content: bytes) -> Vectors:
-    return _vectors("data", np.squeeze(np.load(BytesIO(content), allow_pickle=False)))
+    """Read an array, which is `data`, or an archive of arrays."""
+    loaded: Any = np.load(BytesIO(content), allow_pickle=False)
+    arrays = {"data": loaded} if isinstance(loaded, np.ndarray) else loaded
+    for name in arrays:
+        yield from _vectors(name, np.squeeze(arrays[name]))
 
 
 def _of_excel(content: bytes) -> str:
@@ -239,7 +237,7 @@ _ADAPTERS = {
     **dict.fromkeys((".mat", ".h5", ".hdf5"), _MAT),
     **dict.fromkeys((".yaml", ".yml"), _YAML),
     **dict.fromkeys((".json", ".jsonl", ".ndjson"), _JSON),
-    ".npy": Adapter("a numpy array", "numpy", _of_array),
+    ".npy": Adapter("a numpy array", "numpy", _of_numpy),
 }
 """Adapters by the first bytes of a file, and by the end of its name."""
 

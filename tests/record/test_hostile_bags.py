@@ -166,26 +166,6 @@ def records_of_a_gigabyte() -> list[list[bytes | int]]:
     ]
 
 
-def description_of_a_gigabyte(path: Path) -> Path:
-    bag_of(path, SOUND)
-    os.truncate(path / "metadata.yaml", HUGE)
-    return path
-
-
-def endless_description(path: Path) -> Path:
-    bag_of(path, SOUND)
-    (path / "metadata.yaml").unlink()
-    (path / "metadata.yaml").symlink_to("/dev/zero")
-    return path
-
-
-def description_that_never_comes(path: Path) -> Path:
-    bag_of(path, SOUND)
-    (path / "metadata.yaml").unlink()
-    os.mkfifo(path / "metadata.yaml")
-    return path
-
-
 def definitions_without_end(path: Path) -> Path:
     topics = b"".join(channel(f"/{os.urandom(500_000).hex()}") for _ in range(40))
     return bag_of(path, chunk(schema() + topics), SOUND)
@@ -202,14 +182,22 @@ def profiles_without_end(path: Path) -> Path:
     return bag_of(path, chunk(schema() + record(Opcode.CHANNEL, topic) + message(state(1))))
 
 
-def description_that_repeats_itself(path: Path) -> Path:
-    bag_of(path, SOUND)
-    names = "a0: &a0 [xxxxxxxxxx]\n" + "".join(
-        f"a{n}: &a{n} [{','.join([f'*a{n - 1}'] * 10)}]\n" for n in range(1, 10)
-    )
-    names += "rosbag2_bagfile_information: {relative_file_paths: [*a9]}"
-    (path / "metadata.yaml").write_text(names, encoding="utf-8")
-    return path
+def described(write: Callable[[Path], object]) -> Callable[[Path], Path]:
+    """Return what makes a bag whose description is written, or made, in another way."""
+
+    def make(path: Path) -> Path:
+        bag_of(path, SOUND)
+        (path / "metadata.yaml").unlink()
+        write(path / "metadata.yaml")
+        return path
+
+    return make
+
+
+REPEATED = "a0: &a0 [xxxxxxxxxx]\n" + "".join(
+    f"a{n}: &a{n} [{','.join([f'*a{n - 1}'] * 10)}]\n" for n in range(1, 10)
+)
+REPEATED += "rosbag2_bagfile_information: {relative_file_paths: [*a9]}"
 
 
 def read_by_a_child(bag: Path, out: Path) -> list[tuple[str, int]]:
@@ -232,13 +220,13 @@ def read_by_a_child(bag: Path, out: Path) -> list[tuple[str, int]]:
             pytest.param(make, marks=pytest.mark.long)
             for make in (
                 summary_of_a_gigabyte,
-                description_of_a_gigabyte,
-                endless_description,
-                description_that_never_comes,
+                described(lambda file: (file.touch(), os.truncate(file, HUGE))),
+                described(lambda file: file.symlink_to("/dev/zero")),
+                described(os.mkfifo),
+                described(lambda file: file.write_text(REPEATED)),
                 definitions_without_end,
                 messages_packed_small,
                 profiles_without_end,
-                description_that_repeats_itself,
                 *(
                     lambda path, records=records: bag_of(path, *records)
                     for records in records_of_a_gigabyte()

@@ -86,7 +86,7 @@ def test_vectors_have_the_units_of_their_attributes() -> None:
     assert read[1][2].tolist() == (2.0 * TIME).tolist()
     array = BytesIO()
     np.save(array, np.column_stack([TIME, 2.0 * TIME]))
-    found = {name: each.tolist() for name, _, each in table_formats._of_array(array.getvalue())}
+    found = {name: each.tolist() for name, _, each in table_formats._of_numpy(array.getvalue())}
     assert found == {"data[1]": TIME.tolist(), "data[2]": (2.0 * TIME).tolist()}
 
 
