@@ -36,7 +36,8 @@ class TextTable(Table):
 
         `content` is what a file of another format was converted to, with `notes` on how.
         """
-        self.path, self.form, self._content, self._converted = path, given, content, notes
+        self.path, self.form = path, given
+        self._converted = content, notes
         with opened(path, content) as stream:
             self._text = text = form_of(stream, given)
         self.names, self.columns, self.units = text.names, text.columns, text.units
@@ -50,7 +51,7 @@ class TextTable(Table):
     @property
     @override
     def notes(self) -> list[str]:
-        features, notes = self._text.features(self._marks.values()), [*self._converted]
+        features, notes = self._text.features(self._marks.values()), [*self._converted[1]]
         if features:
             notes.append(f"the table is read with {', '.join(features)}")
         if refused := self._refused:
@@ -115,7 +116,7 @@ class TextTable(Table):
         # From 3.1 on this is the default, and naming it is deprecated.
         exact: Any = {} if version >= (3, 1) else {"float_precision": "round_trip"}
         with (
-            opened(self.path, self._content) as stream,
+            opened(self.path, self._converted[0]) as stream,
             TextIOWrapper(stream, encoding=text.encoding, errors="replace", newline="") as file,
         ):
             for _ in range(text.first):
