@@ -197,16 +197,16 @@ def force_per_ampere(constant: str, pitch: float | None, *, rotary: bool) -> flo
             "motor, or 0.35Nm/A of a motor that turns a screw or a rotary axis"
         )
     ((_, factor, unit), *_) = readings
-    ways = {
-        "N/A": "N/A is of a linear motor, which has no pitch and turns no rotary axis",
+    refusals = {
+        "N/A": "N/A is of a linear motor, which has no pitch and turns no rotary axis; N m/A, a "
+        "motor with a screw, may be meant",
         "N m/A": "N m/A is of a motor that turns either a screw, whose pitch is needed, or a "
-        "rotary axis, which has none",
+        "rotary axis, which has none; N/A, a linear motor, may be meant",
     }
     if pitch is not None and rotary:
         raise InvalidInputError(f"pitch = {pitch} m is refused: a rotary axis has no screw")
     if (pitch is not None) + rotary != (unit == "N m/A"):
-        other = "N/A, a linear motor," if unit == "N m/A" else "N m/A, a motor with a screw,"
-        raise InvalidInputError(f"{given} is refused: {ways[unit]}; {other} may be meant")
+        raise InvalidInputError(f"{given} is refused: {refusals[unit]}")
     return factor if pitch is None else tau * factor / pitch
 
 
