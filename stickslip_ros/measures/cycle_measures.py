@@ -15,6 +15,9 @@ from stickslip_ros.text import quantity
 EQUILIBRIUM_SPEED = 1e-3
 """Speed amplitude, in belt speeds, below which the slide counts as at rest in equilibrium."""
 
+STICKING_SHARE = 0.85
+"""Highest speed, in belt speeds, from which a motion under noise may stick."""
+
 UNBOUNDED_BELT_SPEEDS = 1e3
 """Speed of the slide, in belt speeds, above which a sampled motion counts as unbounded."""
 
@@ -129,7 +132,10 @@ class CycleMeasures(Generic[_Value]):
 
 @dataclass(frozen=True)
 class Cycle(CycleMeasures[float]):
-    """One cycle, from one upward zero crossing of the velocity to the next."""
+    """One cycle, from one upward zero crossing of the velocity to the next.
+
+    Under noise a single one may not tell its stick fraction: then that is NaN.
+    """
 
 
 @dataclass(frozen=True)
@@ -179,8 +185,8 @@ class CycleMeans:
     """Measures of the mean cycle, SI units."""
     errors: Cycle | None
     """Their standard errors, SI units; None if they are not known."""
-    sticks: bool
-    """Whether the cycles stick."""
+    sticks: bool | None
+    """Whether the cycles stick; None if that is not known."""
     amplitudes: FloatArray
     """Amplitude of each cycle, m; shape (cycles,)."""
 
@@ -189,16 +195,20 @@ class CycleMeans:
         """Return the means over single cycles, which stick if more than this share of them does.
 
         The error of a mean is the standard deviation of the cycles over the root of their number;
-        below three it is not known.
+        below three it is not known. Whether they stick, half of them must tell.
         """
         values = np.array([[*vars(cycle).values()] for cycle in cycles])
+        unknown = np.isnan(values[:, -1])
+        known = values[~unknown, -1]
+        values[unknown, -1] = known.mean() if len(known) else 0.0
         count, mean, errors = len(cycles), np.add.reduce(values) / len(cycles), None
         if count >= LEAST_CYCLES:  # as values.std(axis=0, ddof=1), in half of its time
             squares = (values - mean) ** 2
             scatter = np.sqrt(np.add.reduce(squares) / (count - 1)) / count**0.5
             errors = Cycle(*scatter.tolist())
-        sticks = sum(cycle.stick_fraction > 0.0 for cycle in cycles) > share * count
-        return cls(Cycle(*mean.tolist()), errors, sticks, values[:, 0])
+        sticks = bool(np.count_nonzero(known) > share * len(known))
+        told = 2 * len(known) >= count
+        return cls(Cycle(*mean.tolist()), errors, sticks if told else None, values[:, 0])
 
     def measures(self, resting: bool, steady: bool | None, trend: Trend | None) -> Measures:
         """Return the measures of a motion with this mean; one that is `resting` has no period."""
@@ -206,10 +216,11 @@ class CycleMeans:
         if resting:
             regime = Regime.EQUILIBRIUM
             return without_cycles(self.cycle, regime, count, steady=steady, trend=trend)
+        regimes = {None: None, True: Regime.STICK_SLIP, False: Regime.PURE_SLIP}
         return Measures(
-            **vars(self.cycle),
+            **{**vars(self.cycle), **({} if self.sticks is not None else {"stick_fraction": None})},
             cycles=count,
-            regime=Regime.STICK_SLIP if self.sticks else Regime.PURE_SLIP,
+            regime=regimes[self.sticks],
             steady=steady,
             trend=trend,
             errors=None if self.errors is None else {**vars(self.errors)},

@@ -15,8 +15,9 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray, IntArray, rms
-from stickslip_ros.measures.cycle_measures import LEAST_CYCLES, Cycle, CycleMeans
+from stickslip_ros.measures.cycle_measures import LEAST_CYCLES, STICKING_SHARE, Cycle, CycleMeans
 from stickslip_ros.measures.noise import FEW_SAMPLES, LEAST_SAMPLES
+from stickslip_ros.measures.parabolas import vertex
 from stickslip_ros.measures.stick_fit import StickFit, fit_stick
 
 _DIFFERENCE = 1e-6
@@ -29,9 +30,8 @@ in standard errors, from which a stick needs no test."""
 _HARMONICS, _DEGREES = (6, 10, 14, 20, 28), (6, 9, 12, 16, 20, 26)
 """Numbers of harmonics of a cycle without a stick, and degrees of the polynomial of a slip beyond
 the conditions at its ends, from which the data choose."""
-STICKING_SHARE, _PASSING_SHARE = 0.85, 1.2
-"""Highest speed, in belt speeds, from which a motion may stick, and from which it has passed the
-belt instead."""
+_PASSING_SHARE = 1.2
+"""Highest speed, in belt speeds, from which a motion has passed the belt."""
 _FEW_STEPS = 25.0
 """Range, in steps of an encoder without noise, up to which stairs hide the form of the friction."""
 _WHITENING_RESIDUAL, _OFFSETS = 0.45, 16
@@ -457,7 +457,5 @@ def _slow_share(series: Shape, belt_speed: float, stick_speed: float) -> tuple[f
 def _refined(grid: FloatArray, values: FloatArray) -> float:
     """Return where values on a periodic grid are highest, by the parabola through three."""
     at = int(np.argmax(values))
-    before, here, after = values[at - 1], values[at], values[(at + 1) % len(values)]
-    bend = before - 2.0 * here + after
-    shift = 0.5 * (before - after) / bend if bend < 0.0 else 0.0
-    return float(grid[at] + shift * (grid[1] - grid[0]))
+    lag, _ = vertex(values.take([at - 1, at, at + 1], mode="wrap"))
+    return float(grid[at] + lag * (grid[1] - grid[0]))

@@ -21,9 +21,9 @@ from stickslip_ros.measures.single_cycles import (
     NoisySamples,
     Point,
     cycle_between,
+    extreme_near,
     reach_beside,
     reversals,
-    vertex,
 )
 
 REVERSAL, _REVERSAL_STEPS, _REVERSAL_SHARE = 8.0, 1.5, 0.1
@@ -176,10 +176,10 @@ class WindowMeter:
             self.step = min(self.step or inf, step)
             # Steps that divide the travel of a sample leave no noise where it is looked for.
             self.noisy |= self.step > _ROUNDING_SHARE * moved
-        fastest = float(np.abs(recent.velocity).max())
-        of_velocity = white_noise(recent.velocity)
-        if of_velocity > max(_ROUNDING_SHARE * fastest, PRECISION * float(np.abs(belt).max())):
-            self.noisy = True
+        if not self.noisy:
+            fastest = float(np.abs(recent.velocity).max())
+            least = max(_ROUNDING_SHARE * fastest, PRECISION * float(np.abs(belt).max()))
+            self.noisy = white_noise(recent.velocity) > least
 
     def _advance(self) -> list[Cycle]:
         """Return the cycles that the samples since the last one complete."""
@@ -198,8 +198,9 @@ class WindowMeter:
             reach = reach_beside(low, high)
             if low + reach >= len(samples):
                 break  # samples for the fit are missing
-            end = vertex(samples, low, reach)
-            cycle = cycle_between(samples, lows[-1], end, high, self.noise) if lows else None
+            end = extreme_near(samples, low, reach)
+            sensor = self.noise, self.step
+            cycle = cycle_between(samples, lows[-1], end, high, *sensor) if lows else None
             if cycle is not None:
                 self._cycles.append(cycle)
                 self.ends.append(end.time)

@@ -8,17 +8,18 @@ this travel. Cycles are what repeats from release to release, at the edges of th
 (`slip_edges`).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from math import ceil, hypot, inf, sqrt
+from math import ceil, hypot, inf, nan, sqrt
 
 import numpy as np
 
 from stickslip_ros.arrays import BoolArray, FloatArray
 from stickslip_ros.measures.cycle_measures import Cycle, CycleMeans, Measures
 from stickslip_ros.measures.noise import FEWEST_SAMPLES, ROUNDING, encoder_step, white_noise
-from stickslip_ros.measures.single_cycles import parabolas
-from stickslip_ros.measures.slip_edges import Rest, SlipEdges, slip_edges
+from stickslip_ros.measures.parabolas import parabolas
+from stickslip_ros.measures.slip_edges import Rest, SlipEdges, edge, slip_edges
 
 _LOOK = 4096
 """Number of last samples from which noise and step are estimated."""
@@ -36,8 +37,15 @@ _CREEP = 0.03
 """Speed in the rests, in mean speeds, up to which they are rests if it is within its error."""
 _CREEP_ERROR = 0.02
 """Largest standard error of the speed in the rests, in mean speeds, with which they are known."""
+_CYCLE_CREEP_ERROR = 0.06
+"""Largest standard error of the speed in the rest of a single cycle, in mean speeds, likewise."""
 _PASSING = 4.0
 """Speed in the rests, in its standard errors, from which the slide passes."""
+_CYCLE_PASSING = 0.1
+"""Speed in what looks like the rest of a single cycle, in mean speeds, from which it moves."""
+_COARSE = 0.05
+"""Length of a mean, in cycles, from which a single cycle does not show whether, and how long, it
+rests, unless the mean is one of the fewest samples."""
 _LEAST_RIDE = 1e-3
 """Speed in the rests, in belt speeds, from which the velocity of the belt may be wrong."""
 _MOST_RIDE = 0.06
@@ -69,8 +77,8 @@ _STEPS = 1.3
 """Least travel between two means, in steps of the encoder."""
 _DEVIATIONS = 3.5
 """Least change of the travel between two means that is no rest, in its standard deviations."""
-_MOST = 1e9
-"""Largest number of positions in a mean."""
+_LEAST, _MOST = 2, 1e9
+"""Least and largest number of positions in a mean."""
 _LEAST_STEPS = 3.5
 """Travel between two rests that is a slip, in steps of the encoder, at least."""
 _LEAST_NOISES = 5.0
@@ -160,6 +168,45 @@ def stick_slip(
         count *= _GROWTH
 
 
+def stick_share(
+    time: FloatArray,
+    position: FloatArray,
+    belt_velocity: float,
+    cycle: tuple[float, float],
+    noise: float,
+    step: float,
+) -> float:
+    """Return the share of a single cycle, from its start to its end, s, in which a slide rests.
+
+    Positions, m, at times, s, begin before the cycle and end after it, on a belt with this
+    velocity, m/s. `noise` and `step` are those of the sensor, m. NaN where they do not tell it.
+    """
+    start, end = cycle
+    period, relative = end - start, position - belt_velocity * (time - time[0])
+    size = abs(belt_velocity) * period or 2.0 * float(np.ptp(position))
+    travel = size / period * float(time[-1] - time[0]) / (len(time) - 1)
+    reach = _reach(travel, noise, step)
+    coarse = reach * travel > _COARSE * size
+    if travel <= 0.0 or len(time) < 2 * reach + 2 or (coarse and reach > _LEAST):
+        return nan
+    rests = _apart(_rests(relative, reach, _REST_SHARE * travel * reach), size, noise, step)
+    ends = [Rest(row, row, float(relative[row])) for row in (0, len(time) - 1)]
+    around = [ends[0], *(rest for rest in rests if time[rest.last] > start), ends[1]]
+    still = [
+        tuple(edge(time, relative, rest, other, noise, step)[0] for other in beside)
+        for *beside, rest in zip(around, around[2:], around[1:], strict=False)
+    ]
+    still = [(max(landing, start), min(release, end)) for landing, release in still]
+    stick_time = sum(max(release - landing, 0.0) for landing, release in still)
+    if stick_time == 0.0:
+        return nan if coarse else 0.0
+    creep, error = np.array(_creep(time, relative, still, noise, step)) * period / size
+    if abs(creep) > max(_CYCLE_PASSING, _PASSING * error):
+        return 0.0
+    known = abs(creep) <= max(_CREEP, _SURE * error) and error <= _CYCLE_CREEP_ERROR
+    return stick_time / period if known and stick_time < period else nan
+
+
 def resting_velocity(time: FloatArray, position: FloatArray) -> float:
     """Return the velocity, m/s, that positions, m, at times, s, have for longest.
 
@@ -189,8 +236,7 @@ def _measured(
     most_cycles: int,
     step: float,
 ) -> StickSlip | None:
-    goes_back = np.any(np.diff(time) < 0.0)
-    if len(time) < FEWEST_SAMPLES or goes_back or not time[-1] > time[0]:
+    if len(time) < FEWEST_SAMPLES or np.any(np.diff(time) < 0.0) or not time[-1] > time[0]:
         return None
     relative = position - guide_velocity * (time - time[0])
     step = max(step, encoder_step(relative[-_LOOK:], ROUNDING))
@@ -222,7 +268,8 @@ def _measured(
     extremes = _extremes(time, position, np.searchsorted(time, release).tolist(), width)
     columns = [*extremes, np.diff(release), 1.0 / np.diff(release), shares]
     means = CycleMeans.over([Cycle(*measures) for measures in np.transpose(columns).tolist()])
-    creep, creep_error = _creep(time, relative, used, noise, step)
+    still = [(before.landing, after.release) for before, after in pairwise(used)]
+    creep, creep_error = _creep(time, relative, still, noise, step)
     if creep_error == inf:
         return None
     unit = abs(belt_velocity) or speed
@@ -286,7 +333,7 @@ def _reach(travel: float, noise: float, step: float) -> int:
     if travel <= 0.0:
         return 0
     by_noise = (_DEVIATIONS * sqrt(2.0) * noise / (_REST_SHARE * travel)) ** (2.0 / 3.0)
-    return ceil(min(max(by_noise, _STEPS * step / travel, 2.0), _MOST))
+    return ceil(min(max(by_noise, _STEPS * step / travel, _LEAST), _MOST))
 
 
 def _changes(position: FloatArray, reach: int) -> FloatArray:
@@ -323,11 +370,18 @@ def _rests_apart(position: FloatArray, travel: float, noise: float, step: float)
     rests = _rests(position, reach, _REST_SHARE * travel * reach)
     if len(rests) < 2:
         return []
-    least = _LEAST_SHARE * _large(np.abs(np.diff([rest.level for rest in rests])))
-    least = max(_LEAST_STEPS * step, _LEAST_NOISES * noise, least)
-    # Between its slips a slide creeps, and seems to rest more than once.
-    apart, longest = rests[:1], rests[0]
-    for rest in rests[1:]:
+    large = _large(np.abs(np.diff([rest.level for rest in rests])))
+    return _apart(rests, large, noise, step)
+
+
+def _apart(rests: list[Rest], large: float, noise: float, step: float) -> list[Rest]:
+    """Return rests as one between which there is no slip; `large` is the travel of one, m.
+
+    Between its slips a slide creeps, and seems to rest more than once.
+    """
+    least = max(_LEAST_STEPS * step, _LEAST_NOISES * noise, _LEAST_SHARE * large)
+    apart, longest = list[Rest](), Rest(0, 0, inf)
+    for rest in rests:
         if abs(rest.level - longest.level) > least:
             apart.append(rest)
             longest = rest
@@ -390,13 +444,17 @@ def _extremes(time: FloatArray, position: FloatArray, rows: list[int], width: fl
 
 
 def _creep(
-    time: FloatArray, position: FloatArray, slips: list[SlipEdges], noise: float, step: float
+    time: FloatArray,
+    position: FloatArray,
+    rests: Sequence[tuple[float, float]],
+    noise: float,
+    step: float,
 ) -> tuple[float, float]:
-    """Return the mean velocity in the rests between slips, m/s, and its standard error."""
+    """Return the mean velocity in rests between two times, s, in m/s, and its standard error."""
     products = squares = lasting = 0.0
-    for before, after in pairwise(slips):
-        margin = _CORE * (after.release - before.landing)
-        first, last = np.searchsorted(time, [before.landing + margin, after.release - margin])
+    for landing, release in rests:
+        margin = _CORE * (release - landing)
+        first, last = np.searchsorted(time, [landing + margin, release - margin])
         if last - first >= 2:
             part = time[first:last] - float(np.mean(time[first:last]))
             products += float(part @ position[first:last])

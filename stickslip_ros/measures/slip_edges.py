@@ -60,20 +60,28 @@ def slip_edges(
     time: FloatArray, position: FloatArray, before: Rest, after: Rest, noise: float, step: float
 ) -> SlipEdges:
     """Return the edges of the slip between two rests; SI units."""
-    first, last = ((rest.first + rest.last) // 2 for rest in (before, after))
-    travel = after.level - before.level
-    size = abs(travel)
-    course = (position[first : last + 1] - before.level) * (1.0 if travel > 0.0 else -1.0)
+    release, release_error = edge(time, position, before, after, noise, step)
+    landing, landing_error = edge(time, position, after, before, noise, step)
+    least = _SLIP_ERROR * (landing - release)
+    errors = hypot(release_error, least), hypot(landing_error, least)
+    return SlipEdges(release, landing, errors, after.level - before.level)
+
+
+def edge(
+    time: FloatArray, position: FloatArray, rest: Rest, other: Rest, noise: float, step: float
+) -> tuple[float, float]:
+    """Return when a slip from or to another rest begins or ends at a rest, s, and its error."""
+    first, last = ((still.first + still.last) // 2 for still in (rest, other))
+    way = 1 if last >= first else -1
+    rows = np.arange(first, last + way, way)
+    course, size = position[rows] - rest.level, abs(other.level - rest.level)
+    course *= 1.0 if other.level > rest.level else -1.0
     middle = int(np.argmax(course > size / 2.0))
     near = max(_NEAR_STEPS * step, _NEAR_NOISES * noise, _NEAR_SHARE * size)
-    start, start_error = _edge(course[: middle + 1], near, size, _RELEASE_POWERS)
-    end, end_error = _edge(size - course[middle:][::-1], near, size, _LANDING_POWERS)
-    rows = np.arange(last - first + 1)
-    release, landing = np.interp([start, len(rows) - 1 - end], rows, time[first : last + 1])
-    least = _SLIP_ERROR * float(landing - release)
-    period = float(time[last] - time[first]) / max(last - first, 1)
-    errors = hypot(start_error * period, least), hypot(end_error * period, least)
-    return SlipEdges(float(release), float(landing), errors, travel)
+    powers = _RELEASE_POWERS if way > 0 else _LANDING_POWERS
+    row, error = _edge(course[: middle + 1], near, size, powers)
+    period = abs(float(time[last] - time[first])) / max(abs(last - first), 1)
+    return float(np.interp(row, np.arange(len(rows)), time[rows])), error * period
 
 
 def _edge(

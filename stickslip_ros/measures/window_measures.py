@@ -18,6 +18,7 @@ from stickslip_ros.measures.cycle_measures import (
     LEAST_CYCLES,
     STALE_PERIODS,
     STEADY_CHANGE_UNDER_NOISE,
+    STICKING_SHARE,
     Cycle,
     CycleMeans,
     Measures,
@@ -25,7 +26,7 @@ from stickslip_ros.measures.cycle_measures import (
     Trend,
     without_cycles,
 )
-from stickslip_ros.measures.mean_cycle import STICKING_SHARE, MeanCycle, fit_mean_cycle
+from stickslip_ros.measures.mean_cycle import MeanCycle, fit_mean_cycle
 from stickslip_ros.measures.noise import (
     FEW_SAMPLES,
     FEWEST_SAMPLES,

@@ -131,7 +131,7 @@ AMPLITUDE: Topic[Any] = Topic(
 STICK_FRACTION: Topic[Any] = Topic(
     "limit_cycle/stick_fraction",
     _NUMBER,
-    meaning="Fraction of that cycle during which the slide stuck.",
+    meaning="Fraction of that cycle during which the slide stuck; NaN where noise hides it.",
 )
 FREQUENCY: Topic[Any] = Topic(
     "limit_cycle/frequency", _NUMBER, meaning="One over the period of that cycle, Hz."

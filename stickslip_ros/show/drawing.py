@@ -49,8 +49,6 @@ DOTS: Any = {"marker": ".", "ms": 2.0, "ls": "", "alpha": 0.4, "mew": 0.0, "rast
 _RAW: Any = DOTS | {"color": BLUE}
 _FITTED: Any = {"color": ORANGE, "lw": 1.2}
 _TIME = {False: "time within the cycle", True: "time"}
-_UNSEEN = 0.05
-"""Share of a run that a slide sticks, above which cycles without a stick do not tell theirs."""
 _CONFIDENCE = 1.96
 """Half of a 95 % interval, in standard errors."""
 _EQUAL_SPREAD = 1e-9
@@ -196,8 +194,8 @@ def draw_cycles(
         (panels[0], 1, label, scale, LEAST_SPAN * farthest),
         (panels[1], 2, fraction, 1.0, 0.0),
     ):
-        for history, run, look in zip(histories, cycles, looks, strict=False):
-            if column == 2 and _sticks_unseen(history):
+        for run, look in zip(cycles, looks, strict=False):
+            if len(run[0]) and np.isnan(run[column]).all():
                 say(axes, "not known of single cycles")
                 continue
             time, *columns = run
@@ -205,17 +203,9 @@ def draw_cycles(
             rows = peaks(intervals(time, length or 1.0), *columns)  # in each pixel column
             every = max(1, len(rows) // most)
             axes.plot(run[0][rows], run[column][rows] / size, markevery=every, **look)
-        largest = max(float(run[column].max(initial=0.0)) / size for run in cycles)
+        largest = max(float(np.nanmax(run[column], initial=0.0)) / size for run in cycles)
         axes.set_ylim(0.0, max(1.1 * largest, least) or 1.0)
         axes.set_ylabel(of_panel)
-
-
-def _sticks_unseen(history: RunHistory) -> bool:
-    """Return whether a slide sticks that does not in any cycle on its own: noise hides it there."""
-    time, *_, stick_time = history.motion
-    ends, _, stick_fraction = history.cycles
-    share = stick_time[-1] > _UNSEEN * (time[-1] - time[0]) if len(time) else False
-    return bool(share and len(ends) and not stick_fraction.any())
 
 
 def shade(axes: Axes, pane: Pane) -> None:

@@ -2,6 +2,7 @@
 
 import asyncio
 import time
+from math import isnan
 
 from nicegui import ui
 from nicegui.events import GenericEventArguments
@@ -52,7 +53,7 @@ class CyclesCard:
         texts: dict[str, str] = {}
         for topic, (label, unit, _), at_rest in _MEASURES:
             cycles = self._run.cycles[topic]
-            value = cycles[-1] if cycles else None
+            value = None if not cycles or isnan(cycles[-1]) else cycles[-1]
             texts[label] = self._run.units.text(at_rest if rests else value, unit)
         return texts
 
