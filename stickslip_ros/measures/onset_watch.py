@@ -63,18 +63,21 @@ class OnsetWatch:
         self._after = origin + finished[-1].end if finished else self._after
         return finished
 
-    def status(self, margin: float) -> tuple[str, bool]:
+    def status(self, margin: float, length: str = "m") -> tuple[str, bool]:
         """Return decay, onset and feed as text, and whether the feed is too near the onset.
 
-        It is unless a share `margin` of the feed is above the upper limit of the onset.
+        It is unless a share `margin` of the feed is above the upper limit of the onset. `length` is
+        the unit of positions, "" for a dimensionless drive.
         """
         if not self.ring_downs:
             return "", False
         onset, feed = self.onset, float(abs(self._kept.belt_velocity[-1]))
-        text = f"decay {self.ring_downs[-1].decay_rate:.2g} 1/s, "
+        scale, unit, rate = (1e3, f" m{length}/s", " 1/s") if length else (1.0, "", "")
+        text = f"decay {self.ring_downs[-1].decay_rate:.2g}{rate}, "
         if onset.speed and onset.lower and onset.upper:
-            half = 500.0 * (onset.upper - onset.lower)
-            text += f"onset {1e3 * onset.speed:.3g} +- {half:.2g} mm/s, "
+            half = scale * (onset.upper - onset.lower) / 2.0
+            text += f"onset {scale * onset.speed:.3g} +- {half:.2g}{unit}, "
         elif onset.upper:
-            text += f"onset below {1e3 * onset.upper:.3g} mm/s, "
-        return f"{text}feed {1e3 * feed:.3g} mm/s", (onset.upper or 0.0) > (1.0 - margin) * feed
+            text += f"onset below {scale * onset.upper:.3g}{unit}, "
+        near = (onset.upper or 0.0) > (1.0 - margin) * feed
+        return f"{text}feed {scale * feed:.3g}{unit}", near

@@ -88,7 +88,8 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         counts = {name: report[name] for name in ("regime", "steady", "samples", "lost_samples")}
         counts["trend"] = trend_text(report)
         notes = {"notes": "; ".join(report["notes"])}
-        stability, near = measures.watch.status(self.parameters.onset_margin)
+        margin = self.parameters.onset_margin
+        stability, near = measures.watch.status(margin, measures.length)
         values = {**counts, "stability": stability, **self.dropped.values, **notes, **bag}
         if failure := self._bag.failure:
             return ERROR, failure, {**values, FAILURE: failure}

@@ -35,6 +35,8 @@ def test_a_watch_warns_near_the_onset_however_samples_are_divided() -> None:
         assert not watch.status(margin=0.01)[1]
     (text,) = texts
     assert re.fullmatch(r"decay \S+ 1/s, onset 4\S+ \+- \S+ mm/s, feed 51 mm/s", text)
+    plain, _ = watch.status(margin=0.1, length="")
+    assert re.fullmatch(r"decay \S+, onset 0\.04\S+ \+- \S+, feed 0\.051", plain)
     again = samples[:5000]
     assert watch.feed(again)  # the clock is set back
     slowly = replace(samples, stamp=100 * stamp, belt_velocity=belt / 100.0)
