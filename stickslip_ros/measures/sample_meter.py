@@ -312,6 +312,11 @@ class SampleMeter:
         return not self.reading.noisy or self._observer is not None
 
     @property
+    def _by_reversals(self) -> bool:
+        """Whether single cycles are those of reversals: velocities do not tell a rest."""
+        return self.noisy or (self.reading.noisy is None and self._speeds.belt == 0.0)
+
+    @property
     def _by_window(self) -> bool:
         """Whether a window is needed: for samples with noise, few in a cycle, or beside a guide."""
         few = self._per_cycle < FEW_SAMPLES
@@ -336,9 +341,9 @@ class SampleMeter:
             under_noise = self._window.feed(
                 time[new], samples.position[new], samples.velocity[new], belt[new]
             )
-            cycles = under_noise if self.noisy else cycles
+            cycles = under_noise if self._by_reversals else cycles
             self.drift.resolution = self.step
-        ends = (self._window if self.noisy else self._meter).ends
+        ends = (self._window if self._by_reversals else self._meter).ends
         self.drift.feed_cycles(ends, cycles)
         if self._observer is not None and breakpoints is not None:
             observed = (stamp - self.origin) / NANOSECONDS

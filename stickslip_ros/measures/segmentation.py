@@ -43,6 +43,8 @@ _PASSING = 4.0
 """Speed in the rests, in its standard errors, from which the slide passes."""
 _CYCLE_PASSING = 0.1
 """Speed in what looks like the rest of a single cycle, in mean speeds, from which it moves."""
+_TURNING = 0.1
+"""Share of a single cycle on a guide at rest up to which it may be slow only where it turns."""
 _COARSE = 0.05
 """Length of a mean, in cycles, from which a single cycle does not show whether, and how long, it
 rests, unless the mean is one of the fewest samples."""
@@ -204,6 +206,7 @@ def stick_share(
     if abs(creep) > max(_CYCLE_PASSING, _PASSING * error):
         return 0.0
     known = abs(creep) <= max(_CREEP, _SURE * error) and error <= _CYCLE_CREEP_ERROR
+    known &= belt_velocity != 0.0 or stick_time > _TURNING * period
     return stick_time / period if known and stick_time < period else nan
 
 

@@ -10,7 +10,7 @@ from scipy.signal import find_peaks
 
 from stickslip_ros.measures import Regime
 from stickslip_ros.measures.noise import medians
-from stickslip_ros.measures.sample_assumptions import EXACT, SampleAssumptions
+from stickslip_ros.measures.sample_assumptions import EXACT, UNKNOWN, SampleAssumptions
 from stickslip_ros.measures.sample_meter import SampleMeter
 from stickslip_ros.measures.sample_window import Window
 from stickslip_ros.measures.single_cycles import (
@@ -118,3 +118,18 @@ def test_each_cycle_of_a_creeping_axis_has_its_stick_or_none(
     assert len(sticks) >= 7
     assert np.isfinite(sticks).mean() == known
     assert sticks[np.isfinite(sticks)] == pytest.approx(0.85, abs=0.02)
+
+
+def test_an_axis_that_hunts_at_standstill_has_its_rests_in_each_cycle_with_exact_velocities() -> (
+    None
+):
+    """To and fro on a guide at rest: of 1.6 s it moves in two times 60 ms."""
+    time = np.arange(0.0, 16.0, 0.002)
+    moved = np.minimum(time % 0.8 / 0.06, 1.0)
+    way = np.where(time // 0.8 % 2 > 0, -1.0, 1.0)
+    position = -2.5e-5 * way * np.cos(np.pi * moved)
+    meter = SampleMeter(20, reading=UNKNOWN)
+    record = columns(2 * milliseconds(len(time)), position, np.gradient(position, time), 0.0)
+    sticks = [cycle.stick_fraction for cycle in meter.feed(record)]
+    assert len(sticks) >= 8
+    assert sticks == pytest.approx([0.925] * len(sticks), abs=0.01)
