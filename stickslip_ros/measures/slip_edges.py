@@ -23,10 +23,10 @@ _FAR_SHARE = 0.25
 """Distance from a rest up to which an edge is fitted, as a share of the slip, at most."""
 _FAR_NEARS = 40.0
 """Distance from a rest up to which an edge is fitted, in distances that are none, at most."""
-_RELEASE_POWERS = (2.0, 3.0, 4.0, 6.0)
+_RELEASE_POWERS = np.array([[2.0], [3.0], [4.0], [6.0]])
 """Powers of time with which the distance may grow after a release: a friction that falls at once
 leaves a constant force, one that falls with the speed lets the motion grow slowly."""
-_LANDING_POWERS = (1.5, 2.0, 2.5)
+_LANDING_POWERS = np.array([[1.5], [2.0], [2.5]])
 """Powers of the time to a landing with which the distance may fall."""
 _ROW_ERROR = 0.3
 """Least standard error of an edge, in sample periods."""
@@ -84,9 +84,7 @@ def edge(
     return float(np.interp(row, np.arange(len(rows)), time[rows])), error * period
 
 
-def _edge(
-    course: FloatArray, near: float, size: float, powers: tuple[float, ...]
-) -> tuple[float, float]:
+def _edge(course: FloatArray, near: float, size: float, powers: FloatArray) -> tuple[float, float]:
     """Return the row at which a course leaves zero on its way to a slip of this size; its error."""
     inside = np.flatnonzero(np.abs(course) <= near)
     over = course < -_OVER * near
@@ -100,16 +98,14 @@ def _edge(
     rows = np.arange(last + 1, min(end, len(course)))
     if len(rows) < 3:
         return last + 0.5, hypot(_ROW_ERROR, 0.3)
-    values, middle = np.abs(course[rows]), (rows[0] + rows[-1]) / 2.0
-    lag, exponents = rows - middle, np.array(powers)[:, np.newaxis]
-    roots = values ** (1.0 / exponents)
-    offset, slope = roots.mean(axis=1), roots @ lag / (lag @ lag)
-    edges = np.full(len(powers), float(last))
-    np.divide(-offset, slope, out=edges, where=slope > 0.0)
-    edges[slope > 0.0] += middle
-    fitted = np.maximum(offset[:, np.newaxis] + slope[:, np.newaxis] * lag, 0.0) ** exponents
-    squares = np.sum((fitted - values) ** 2, axis=1) + (near / 3.0) ** 2
-    edges = np.clip(edges, 0.0, last + 1.0)
+    values, middle = np.abs(course[rows]), (last + 1.0 + rows[-1]) / 2.0
+    lag, roots = rows - middle, values ** (1.0 / powers)
+    offset, slope = roots.sum(axis=1) / len(rows), roots @ lag / (lag @ lag)
+    fitted = np.maximum(offset[:, np.newaxis] + slope[:, np.newaxis] * lag, 0.0) ** powers
+    squares = ((fitted - values) ** 2).sum(axis=1) + (near / 3.0) ** 2
+    with np.errstate(divide="ignore", invalid="ignore"):
+        edges = np.where(slope > 0.0, middle - offset / slope, last)
+    edges = np.minimum(np.maximum(edges, 0.0), last + 1.0)
     weight = (squares.min() / squares) ** 2
     weight /= weight.sum()
     mean = float(weight @ edges)
