@@ -3,7 +3,6 @@
 import struct
 from io import StringIO
 from itertools import zip_longest
-from math import isnan
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -89,9 +88,7 @@ class Frames:
         cycles = {
             "count": self._run.cycle_count,
             "amplitude": [a / length for a in list(self._run.cycles[AMPLITUDE])],
-            "stick_fraction": [
-                None if isnan(share) else share for share in list(self._run.cycles[STICK_FRACTION])
-            ],
+            "stick_fraction": list(self._run.cycles[STICK_FRACTION]),
             "label": axes[0].label.replace("displacement", "amplitude"),
         }
         body: dict[str, Any] = {"motion": None, "cycles": cycles}

@@ -115,6 +115,13 @@ def test_on_a_belt_at_rest_no_place_is_the_equilibrium() -> None:
     assert body["motion"]["equilibrium"] is None
 
 
+def test_a_cycle_that_does_not_tell_its_stick_has_none() -> None:
+    frames = fed({}, 5.0, 1000.0)
+    frames._run.take_cycle(STICK_FRACTION, float("nan"))
+    body, _ = decoded(frames.frame(PERIODS[0]))
+    assert body["cycles"]["stick_fraction"] == [0.1, None]
+
+
 def test_any_published_frequency_is_accepted() -> None:
     frames = fed({}, 5.0, 1000.0)
     for frequency in (0.0, 1e-300, 1e300, float("inf"), float("nan"), -1.0):
