@@ -40,7 +40,7 @@ class Predictor:
 
     def __init__(self, record: Record) -> None:
         self.record = record
-        self._force, self._disturbance = (force.tolist() for force in record.held_forces)
+        self._force, self._disturbance = record.held_forces
         self._steps = 1
         self._corners = _corners(record.belt_velocity)
 
@@ -71,8 +71,7 @@ class Predictor:
         moved = missing.sum(axis=1) / (_LAG_STEPS - 1)
         force[:, 0] += moved
         force[:, -1] -= moved
-        other._force = force.ravel().tolist()
-        other._disturbance, other._steps = disturbance.tolist(), _LAG_STEPS
+        other._force, other._disturbance, other._steps = force.ravel(), disturbance, _LAG_STEPS
         return other
 
     def positions(self, drive: Drive, velocity: float) -> FloatArray:
@@ -128,6 +127,7 @@ class Predictor:
         units = np.array([drive.length_scale, drive.speed_scale])[:count, np.newaxis, np.newaxis]
         motion = kind(self.with_belt(drive), *starts[0].tolist())
         varied = motion if isinstance(motion, VariationalMotion) else None
+        forces, durations = self._held(delay)
         for part, (position, velocity) in zip(parts, starts.tolist(), strict=True):
             memory = None
             if drive.friction.states:
@@ -136,36 +136,36 @@ class Predictor:
             motion.restart(position, velocity, memory)
             length = part.stop - part.start
             outputs = np.full((count, length), np.nan)
-            by = np.zeros((*outputs.shape, varied.derivatives.shape[1] if varied else 0))
-            for number in chain((0,), self._samples(motion, part.start, length, delay)):
+            by = np.zeros((length, *(varied.derivatives.shape if varied else (count, 0))))
+            acting, held = motion.force, chain(((),), forces[part.start : part.stop - 1])
+            for number, changes in enumerate(held):  # what is done for each sample takes most time
+                for force, duration in zip(changes, durations, strict=False):
+                    if force != acting:
+                        motion.force = acting = force
+                    motion.advance(duration)
+                if motion.unbounded:
+                    break
                 outputs[0, number] = motion.position
                 if count > 1:
                     outputs[1, number] = motion.velocity
                 if varied:
-                    by[:, number] = varied.derivatives[:count]
-            yield outputs.ravel(), (by * units).reshape(outputs.size, -1)
+                    by[number] = varied.derivatives
+            derivatives = by[:, :count].swapaxes(0, 1) * units
+            yield outputs.ravel(), derivatives.reshape(outputs.size, -1)
 
-    def _samples(self, motion: Motion, start: int, count: int, delay: float) -> Iterator[int]:
-        """Yield the number of each sample but the first when the motion has reached it."""
-        forces, others = self._force, self._disturbance
-        last, steps = len(forces) - 1, self._steps
-        period, start = self.record.period / steps, start * steps
+    def _held(self, delay: float) -> tuple[Sequence[Sequence[float]], Sequence[float]]:
+        """Return the forces on the slide from each sample on, N, and how long each acts, s."""
+        period, last = self.record.period / self._steps, len(self._force) - 1
         whole, rest = divmod(delay / period, 1.0)
-        shift, rest = int(whole), rest * period
-        advance, late = motion.advance, forces[min(max(start - 1 - shift, 0), last)]
-        motion.force = acting = late + others[start]
-        for number in range(1, (count - 1) * steps + 1):
-            place = start + number - 1
-            before, late = late, forces[min(max(place - shift, 0), last)]
-            for force, duration in ((before, rest), (late, period - rest)):
-                if duration > 0.0:
-                    if force + others[place] != acting:
-                        motion.force = acting = force + others[place]
-                    advance(duration)
-            if motion.unbounded:
-                break
-            if number % steps == 0:
-                yield number // steps
+        place, rest = np.arange(last + 1) - int(whole), rest * period
+        held = [
+            (self._force[np.clip(place - late, 0, last)] + self._disturbance, duration)
+            for late, duration in ((1, rest), (0, period - rest))
+            if duration > 0.0
+        ]
+        columns, durations = zip(*held, strict=True)
+        forces = np.column_stack(columns).reshape(len(self.record.position), -1)
+        return forces.tolist(), durations * self._steps
 
     def with_belt(self, drive: Drive) -> Drive:
         """Return the drive with the belt of the record."""

@@ -122,8 +122,10 @@ class Refinement(Errors, Fit):
     @cached_property
     def _more(self) -> Errors:
         """The same errors, with the derivatives by the constants that could be fitted besides."""
-        names = [name for name in (*OPTIONAL, *self.law.optional) if name not in self.names]
-        return Errors.at(self.task, names, self.values, self.starts)
+        names = {*OPTIONAL, *self.law.optional}.difference(self.names)
+        if not any(record.held_forces[0].any() for record in self.task.records):
+            names -= {DELAY, LAG}  # nothing is late
+        return Errors.at(self.task, sorted(names), self.values, self.starts)
 
     def gain(self, name: str) -> tuple[float, float]:
         """Return what fitting one more of `OPTIONAL`, or of those of the law, would bring.
@@ -132,6 +134,8 @@ class Refinement(Errors, Fit):
         of the square of the residual that would go; 0 for what the record cannot tell.
         """
         others, more = self._derivatives, self._more
+        if name not in more.names:
+            return 0.0, 0.0
         column = more.by_names[:, [[*more.names].index(name)]]
         norms = np.linalg.norm(others, axis=0)
         basis = np.linalg.qr(others / np.where(norms > 0.0, norms, 1.0))[0]

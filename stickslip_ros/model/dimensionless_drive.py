@@ -53,13 +53,14 @@ class DimensionlessDrive(HybridSystem):
         self._static_friction = law.coefficient if is_static else None
         # What is constant, mostly: these take longer to look up.
         self._speed, self._normal = self.drive.belt_speed, self.drive.normal_force
+        self._is_biased = drive.bias_force != 0.0 or isinstance(drive, ScaledDrive)
         if isinstance(drive, ScaledDrive):
             of_law = (name for name, _ in numbers(law, "friction"))
             self.free_constants = ("mass", "damping", "stiffness", "bias_force", *of_law)
         self.structure = structure_number(
             (
                 *(type(self), self.states, self.may_lift, drive.has_spring),
-                *(self.drive.bias_force != 0.0, self.has_guide_damping),
+                *(self._is_biased, self.has_guide_damping),
                 *((signal.switches, signal.has_sine) for signal in (belt, load)),
                 *map(structure, (law, actuator, self.control, motor)),
                 self.free_constants,
@@ -69,7 +70,7 @@ class DimensionlessDrive(HybridSystem):
 
     def _named_constants(self) -> Iterator[tuple[str, float]]:
         drive, law = self.drive, self.drive.friction
-        names = ["damping", "belt_speed", *(["bias_force"] if drive.bias_force != 0.0 else [])]
+        names = ["damping", "belt_speed", *(["bias_force"] if self._is_biased else [])]
         yield from ((name, getattr(drive, name)) for name in names)
         yield from numbers(law, "friction")
         if self.has_guide_damping:
