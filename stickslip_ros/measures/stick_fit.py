@@ -182,7 +182,9 @@ class _Motion:
             jacobian = np.concatenate([slopes, noise * _PRIOR[:, free]])
             return np.append(fitted[-1] - self._relative, noise * (_PRIOR @ values))
 
-        def rates(_: FloatArray) -> FloatArray:
+        def rates(part: FloatArray) -> FloatArray:
+            if not np.array_equal(part, values[free]):
+                residual(part)
             return jacobian
 
         while True:
