@@ -26,14 +26,16 @@ class Symbol:
 
     operation: str
     """Name of the input, state or function, or the operator."""
-    operands: tuple[Operand, ...] = ()
+    operands: tuple[Operand, ...]
     """What is operated on; nothing for an input."""
-    explorer: "_Explorer | None" = None
+    explorer: "_Explorer"
     """Runs the law of which the symbol is a part."""
 
     def _with(self, operation: str, *operands: Operand) -> "Symbol":
-        assert self.explorer is not None
         return self.explorer.symbol(operation, *operands)
+
+    def _of_self(self, operation: str, *others: Operand) -> "Symbol":
+        return self._with(operation, self, *others)
 
     def __add__(self, other: Operand) -> Operand:
         if _is(other, 0.0):
@@ -61,28 +63,16 @@ class Symbol:
     def __rmul__(self, other: float) -> Operand:
         return (self if other else 0.0) if other in (0.0, 1.0) else self._with("*", other, self)
 
-    def __truediv__(self, other: Operand) -> Operand:
-        return self._with("/", self, other)
-
     def __rtruediv__(self, other: Operand) -> Operand:
         return self._with("/", other, self)
 
     def __pow__(self, exponent: float) -> Operand:
         return self if _is(exponent, 1.0) else self._with("pow", self, exponent)
 
-    def __neg__(self) -> Operand:
-        return self._with("-", self)
-
-    def __abs__(self) -> Operand:
-        return self._with("fabs", self)
-
-    def exp(self) -> Operand:
-        """Return the exponential."""
-        return self._with("exp", self)
-
-    def expm1(self) -> Operand:
-        """Return the exponential less 1."""
-        return self._with("expm1", self)
+    __truediv__ = partialmethod(_of_self, "/")
+    __neg__ = partialmethod(_of_self, "-")
+    __abs__ = partialmethod(_of_self, "fabs")
+    exp, expm1 = partialmethod(_of_self, "exp"), partialmethod(_of_self, "expm1")
 
     def __eq__(self, other: object) -> bool:
         if other is self or not isinstance(other, int | float | Symbol):
@@ -97,8 +87,7 @@ class Symbol:
     def _decides(self, comparison: str, other: Operand) -> bool:
         if not isinstance(other, Symbol) and not isfinite(other):  # without a limit
             return (other > 0.0) == (comparison in ("<", "<="))
-        assert self.explorer is not None
-        return self.explorer.decide(self._with(comparison, self, other))
+        return self.explorer.decide(self._of_self(comparison, other))
 
     __lt__ = partialmethod(_decides, "<")
     __le__ = partialmethod(_decides, "<=")
