@@ -63,9 +63,7 @@ class Straightening:
     """
 
     names: Mapping[str, str]
-    """Name of the number in place of each coordinate."""
-    beside: Sequence[str]
-    """Coordinates that must be free besides."""
+    """Name of the number in place of each coordinate; its own if it only must be free, too."""
     bounds: Mapping[str, tuple[float, float]]
     """Bounds of the numbers; the others have those of the coordinate that they replace."""
     to_search: Callable[[Values, float], dict[str, float]]
@@ -74,7 +72,7 @@ class Straightening:
     """Returns the coordinates of numbers; they may be ones that the law refuses."""
 
 
-AS_THEY_ARE = Straightening({}, (), {}, lambda _, __: {}, lambda _, __: {})
+AS_THEY_ARE = Straightening({}, {}, lambda _, __: {}, lambda _, __: {})
 """Has no coordinate replaced."""
 
 

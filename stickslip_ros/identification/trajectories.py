@@ -16,6 +16,7 @@ from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.time_limit import TimeLimit
 from stickslip_ros.model.drive import Drive, in_units_of
 from stickslip_ros.model.drive_layout import MEMORY
+from stickslip_ros.model.friction import LAWS
 from stickslip_ros.model.plain_drive import drive_system
 from stickslip_ros.motion.motion import Motion
 from stickslip_ros.motion.variational import VariationalMotion
@@ -30,9 +31,9 @@ _ROUGH_SAMPLES = 5
 """Samples at the start of a record whose velocity is rough."""
 _LONG_DELAY = 100.0
 """Size of a delay and of a lag from which steps are made, in sample periods."""
-_RUN_TIME, _DIFFERENCE_TIME, _MEMORY_TIMES = 1e-5, 7e-6, 2.0
-"""Usual processor time of a sample with its derivatives, s, of each difference, s, and how many
-times as long a memory takes."""
+_RUN_TIME, _DIFFERENCE_TIME = 1e-5, 7e-6
+"""Usual processor time of a sample with its derivatives, s, and of each difference, s, without a
+memory; each of its states takes as long again."""
 _UNBOUNDED_ERROR = 10.0
 """Error of a motion that is not bounded, in spans of the record."""
 
@@ -115,7 +116,7 @@ class Trajectories:
     @cached_property
     def of_positions(self) -> BoolArray:
         """Which rows are those of positions."""
-        return self._joined(lambda predictor: np.arange(len(predictor.measured))[:, None] == 0)
+        return self._joined(lambda predictor: np.indices(predictor.measured.shape)[0] == 0)
 
     @property
     def _counts(self) -> Sequence[int]:
@@ -123,11 +124,8 @@ class Trajectories:
 
     def _joined(self, values: Callable[[Predictor], Any]) -> Any:
         """Return rows of all segments from values of shape (outputs, samples) of each record."""
-
-        def rows_of(predictor: Predictor, samples: slice) -> Any:
-            return np.broadcast_to(values(predictor), predictor.measured.shape)[:, samples]
-
-        return np.concatenate([rows_of(s.predictor, s.samples).ravel() for s in self.segments])
+        rows = [values(part.predictor)[:, part.samples].ravel() for part in self.segments]
+        return np.concatenate(rows)
 
     def sensitivities(
         self, values: Mapping[str, float], starts: FloatArray, names: Sequence[str]
@@ -143,7 +141,7 @@ class Trajectories:
         others = [name for name in names if name in (DELAY, LAG, *self.law.by_differences)]
         by_equations = [name for name in names if name not in others]
         work = _RUN_TIME + _DIFFERENCE_TIME * len(others)
-        self.limit.spend(count * work * (_MEMORY_TIMES if self.law.memory else 1.0))
+        self.limit.spend(count * work * (1.0 + len(LAWS[self.law.name].states)))
         # At 0 a constant may drop out of the equations, and its derivatives with it.
         zeros = [name for name in by_equations if values[name] == 0.0]
         values = {**values, **self._steps(values, zeros, _LEAST)}
