@@ -15,18 +15,12 @@ from stickslip_ros.identification.identified_law import DELAY, LAG, IdentifiedLa
 from stickslip_ros.identification.laws import EXPONENTIAL, TableAdapter
 from stickslip_ros.identification.predictor import Predictor
 from stickslip_ros.identification.record import Record
-from stickslip_ros.identification.refinement import OPTIONAL, Refinement
+from stickslip_ros.identification.refinement import OPTIONAL, Refinement, loss_of
 from stickslip_ros.identification.regression import Regression, regress
 from stickslip_ros.identification.regression_rows import LINEAR, Rows
 from stickslip_ros.identification.rests import static_force
 from stickslip_ros.identification.search import refine
 from stickslip_ros.identification.segment_starts import Errors, best_starts
-from stickslip_ros.identification.stopping_rules import (
-    is_given_up,
-    is_rounding,
-    is_white,
-    loss_of,
-)
 from stickslip_ros.identification.time_limit import TimeLimit
 from stickslip_ros.identification.trajectories import Trajectories, segments_of
 
@@ -50,6 +44,8 @@ _CLEAR_GAIN = 0.5
 is missing, it makes the standard error large."""
 _ZERO_ERRORS = 3.0
 """Standard errors by which such a constant must differ from zero."""
+_GIVEN_UP_LOSS_RATIO = 100.0
+"""A law whose squared error is larger by this factor is searched no further."""
 _SEARCH_SAMPLES, _MOST_SAMPLES = 4_000, 15_000
 """Samples of a drive in which a law is searched, and that are fitted: minutes of work."""
 _POINTS = 8
@@ -128,7 +124,7 @@ class LawSearch:
         the first steps is not searched further.
         """
         tried = [self.first(law)]
-        if is_white(tried[0]) or is_given_up(tried[0], noise):
+        if tried[0].is_white or _is_given_up(tried[0], noise):
             return tried
         fastest = float(self.rows.speeds[-1])
         thorough = law.one_way.shaped and noise == inf
@@ -145,13 +141,13 @@ class LawSearch:
             if self.limit.is_over or rms(tried[-1].residual) < _NEAR_SHARE * tried[-1].scale:
                 break
             tried.append(self._begun(law, values))
-            if is_white(tried[-1]):
+            if tried[-1].is_white:
                 return tried[-1:]
         finalists, most = (_FINALISTS, _STEPS) if noise == inf else (1, _RIVAL_STEPS)
         settled: list[Refinement] = []
         for near in sorted(tried, key=loss_of)[:finalists]:
             settled.append(self._settled(near, most))
-            if is_white(settled[-1]) or is_rounding(settled[-1]) or self.limit.is_over:
+            if settled[-1].is_white or settled[-1].is_rounding or self.limit.is_over:
                 break
         return settled
 
@@ -159,7 +155,7 @@ class LawSearch:
         """Return the best fit of a law with a memory to short segments, from a LuGre model."""
         # The static friction of Dahl's law is the kinetic one.
         begun = self._begun(law, {**like.values, "static": like.values["kinetic"]})
-        stays = is_white(begun) or is_given_up(begun, like.loss)
+        stays = begun.is_white or _is_given_up(begun, like.loss)
         return [begun if stays else self._settled(begun)]
 
     def extended(self, near: Sequence[Refinement], least: float) -> Refinement:
@@ -168,14 +164,14 @@ class LawSearch:
         `near` has its fits without them, in the order in which they are tried. Where the squared
         error of the best law so far is much less, `least`, they are as they are.
         """
-        if is_given_up(best := min(near, key=loss_of), least):
+        if _is_given_up(best := min(near, key=loss_of), least):
             return best
         extended: list[Refinement] = []
         for fit in near:
-            names = () if is_white(fit) else (*OPTIONAL, *fit.law.optional)
+            names = () if fit.is_white else (*OPTIONAL, *fit.law.optional)
             more = self._with(names, fit, least_share=_OPTIONAL_GAIN)
             extended.append(more)
-            if is_white(more) or is_rounding(more):
+            if more.is_white or more.is_rounding:
                 break
         return min(extended, key=loss_of)
 
@@ -300,6 +296,15 @@ class LawSearch:
             for name, value in self.friction.items()
         }
         return {DELAY: 0.0, LAG: 0.0, **values, **friction, **self.fixed}
+
+
+def _is_given_up(fit: Refinement, loss: float) -> bool:
+    """Return whether a fit is too far behind a squared error for a search to go on.
+
+    It is that of noise, that of LuGre's law after the first steps, or that of the best law before
+    constants are added that the records ask for.
+    """
+    return fit.loss > _GIVEN_UP_LOSS_RATIO * loss
 
 
 def _errors_from_zero(fit: Refinement, name: str) -> float:

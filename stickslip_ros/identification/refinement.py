@@ -3,11 +3,12 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from math import sqrt
 
 import numpy as np
 from typing_extensions import override
 
-from stickslip_ros.arrays import FloatArray
+from stickslip_ros.arrays import FloatArray, rms
 from stickslip_ros.identification.covariance import block_covariance
 from stickslip_ros.identification.filtered import filtered
 from stickslip_ros.identification.fit import Fit, ForceErrors, Residuals
@@ -19,6 +20,12 @@ from stickslip_ros.identification.trajectories import Trajectories, segments_of
 
 _OWN_SHARE = 1e-5
 """Least share of a derivative beside the others, for a coordinate that is identifiable."""
+_ROUNDING = 1.4
+"""Errors, in rounding errors of the encoder, up to which they are those of the encoder."""
+_WHITE_CORRELATION = 0.3
+"""Correlation of successive errors up to which they are noise: rounding leaves some."""
+_EXACT_SHARE = 1e-9
+"""Share of the motion up to which an error is none: recordings of simulations have no noise."""
 _SHORTEST_CYCLE, _REPEATED_CORRELATION = 20, 0.65
 """Samples of a cycle at least, and correlation of errors from which cycles are alike."""
 _UNLIKE_CORRELATION = 0.3
@@ -99,11 +106,22 @@ class Refinement(Errors, Fit):
         return replace(self.task, segments=segments_of([Predictor(record)], length))
 
     @property
-    def correlation(self) -> float:
-        """Correlation of successive errors."""
-        first, second = self.residual[:-1], self.residual[1:]
-        power = self.loss
-        return float(first @ second) / power if power > 0.0 else 0.0
+    def is_white(self) -> bool:
+        """Whether errors are noise, as far as their successive ones tell, or none."""
+        along = float(self.residual[:-1] @ self.residual[1:])
+        exact = rms(self.residual) < _EXACT_SHARE * self.scale
+        return exact or abs(along) < _WHITE_CORRELATION * self.loss
+
+    @property
+    def is_rounding(self) -> bool:
+        """Whether the errors of positions are as small as those of the encoder.
+
+        They repeat where a slide sticks and the belt moves by whole steps of it between samples.
+        """
+        task = self.task
+        step = min(record.resolution for record in task.records)
+        rows = task.of_positions
+        return rms(self.residual[rows]) < _ROUNDING * step / sqrt(12.0) * rms(task.weight[rows])
 
     @override
     def used(self, records: Sequence[Record]) -> float:
@@ -148,6 +166,11 @@ class Refinement(Errors, Fit):
         error = np.sqrt(block_covariance(alone[:, None], rest, 2 * len(self.starts))[0, 0])
         along = float(alone @ rest)
         return -along / size / float(error), along * along / size / float(rest @ rest)
+
+
+def loss_of(fit: Refinement) -> float:
+    """Return the squared error of a fit."""
+    return fit.loss
 
 
 def repetition_of(errors: FloatArray) -> int | None:

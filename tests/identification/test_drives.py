@@ -106,19 +106,6 @@ def test_a_law_that_another_excels_gets_no_further_constants() -> None:
     assert task.extended(near, 1e-3 * least) is near[0]
 
 
-@pytest.mark.long
-def test_the_search_of_a_law_leaves_time_for_others() -> None:
-    own = study.record("stribeck", "taps", seed=1, duration=1.5)
-    limit = TimeLimit(600.0)
-    task = LawSearch([own], {"normal_force": study.NORMAL_FORCE}, limit)
-    limit.begin_stage(0.5)
-    limit.begin_part(1e-9)
-    task.searched(KNOWN_LAWS["coulomb"])
-    assert limit.is_over
-    limit.begin_part(1.0)
-    assert not limit.is_over
-
-
 @pytest.mark.parametrize(
     ("law", "delay", "lag"),
     [
