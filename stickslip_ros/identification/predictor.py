@@ -5,7 +5,7 @@ from copy import copy
 from dataclasses import replace
 from functools import cached_property
 from itertools import chain
-from math import copysign, expm1
+from math import copysign, expm1, nan
 from typing import Any, Self
 
 import numpy as np
@@ -137,7 +137,7 @@ class Predictor:
             length = part.stop - part.start
             outputs = np.full((count, length), np.nan)
             by = np.zeros((length, *(varied.derivatives.shape if varied else (count, 0))))
-            acting, held = motion.force, chain(((),), forces[part.start : part.stop - 1])
+            acting, held = nan, chain(((),), forces[part.start : part.stop - 1])
             for number, changes in enumerate(held):  # what is done for each sample takes most time
                 for force, duration in zip(changes, durations, strict=False):
                     if force != acting:
