@@ -1,6 +1,7 @@
 """Short advances of a motion that stay in one phase, as those of a sampled loop mostly do."""
 
 from collections.abc import Callable
+from math import inf
 
 import heyoka as hy
 
@@ -70,13 +71,11 @@ def short_step(
             if epoch is not None:
                 parameters[epoch] = instant.time
             taylor.time = 0.0
-            if limits_steps:
-                longest = min(longest_step(instant), LONGEST_STEP)
+            longest = longest_step(instant) if limits_steps else inf
+            # Mostly one step, which takes less time by itself.
+            outcome = step(duration)[0].value if duration <= longest else _STEP_ENDED
+            if outcome == _STEP_ENDED:
                 outcome = propagate(duration, STEPS_PER_ADVANCE, longest)[0].value
-            else:  # mostly one step, which takes less time by itself
-                outcome = step(duration)[0].value
-                if outcome == _STEP_ENDED:
-                    outcome = propagate(duration, STEPS_PER_ADVANCE)[0].value
             if outcome == NO_EVENT:
                 return True
             taylor.reset_cooldowns()
