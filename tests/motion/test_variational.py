@@ -128,6 +128,15 @@ def test_a_slide_that_sticks_keeps_its_distance_and_forgets_its_speed() -> None:
     assert motion.derivatives[0].tolist() == [1.0, 0.0] + [0.0] * (motion.derivatives.shape[1] - 2)
 
 
+def test_a_bias_of_zero_needs_no_equations_of_its_own() -> None:
+    """Fits begin without one, and ask for derivatives by it all the same."""
+    none, some = (replace(PAPER, bias_force=force) for force in (0.0, 5.0))
+    systems = [drive_system(in_units_of(PAPER, drive)) for drive in (none, some)]
+    assert len({system.structure for system in systems}) == 1
+    assert [system.constants["bias_force"] != 0.0 for system in systems] == [False, True]
+    assert len({drive_system(drive).structure for drive in (none, some)}) == 2
+
+
 def test_the_motion_is_that_without_derivatives() -> None:
     drive = drive_of("lugre", moves=True)
     motion = VariationalMotion(in_units_of(drive, drive), *START)
