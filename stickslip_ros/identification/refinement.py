@@ -92,7 +92,8 @@ class Refinement(Errors, Fit):
 
     @override
     def residuals(self, record: Record) -> Residuals:
-        length = float(np.median(self.task.lengths)) * self.task.records[0].period
+        samples = np.bincount(self.task.block[self.task.of_positions])
+        length = float(np.median(samples)) * self.task.records[0].period
         task = self._divided(replace(record, velocity=None), length)
         away = task.positions - best_starts(task, self.values).restarted().outputs
         rows = np.arange(task.segments[0].samples.start, len(record.position))
@@ -125,7 +126,7 @@ class Refinement(Errors, Fit):
 
     @override
     def used(self, records: Sequence[Record]) -> float:
-        return sum(self.task.lengths) / sum(len(record.position) for record in records)
+        return len(self.task.positions) / sum(len(record.position) for record in records)
 
     @property
     @override

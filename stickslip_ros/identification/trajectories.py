@@ -77,11 +77,6 @@ class Trajectories:
         """Records of the segments."""
         return [*dict.fromkeys(segment.predictor.record for segment in self.segments)]
 
-    @property
-    def lengths(self) -> Sequence[int]:
-        """Number of samples of each segment."""
-        return [segment.samples.stop - segment.samples.start for segment in self.segments]
-
     @cached_property
     def starts(self) -> FloatArray:
         """Measured state at the start of each segment, m and m/s; shape (segments, 2)."""
