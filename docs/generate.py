@@ -340,7 +340,7 @@ def coverage() -> Iterator[str]:
             "“not identifiable”",
             "intervals of 95 % that cover: least to most covered constant (mean)",
             "largest bias, in standard errors",
-            "processor time (3 seeds), in that of the fastest",
+            "processor time (median of 2 or 3 seeds), in that of the fastest",
         ],
         rows,
     )
