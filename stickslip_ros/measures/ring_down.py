@@ -114,7 +114,7 @@ def _fit(
         return None
     steps = omega * np.array([1e-5, 1e-6, 1e-5])
     design = np.empty((0, 0))
-    linear = np.linalg.lstsq(_columns(time, shape), x)[0]
+    linear = _least_squares(_columns(time, shape), x)
     for _ in range(12):
         amplitude = float(np.hypot(*linear[2:]))
         least = max(abs(shape[0]), _DAMPING_RATIO * omega)
@@ -123,11 +123,11 @@ def _fit(
         row = np.zeros(design.shape[1])
         row[2] = noise / prior
         residual = np.append(x - design[:, 3:] @ linear, -shape[2] * row[2])
-        change = np.linalg.lstsq(np.vstack([design, row]), residual)[0][:3]
+        change = _least_squares(np.vstack([design, row]), residual)[:3]
         limits = omega * np.array([0.02, 0.02, 0.002])  # what the next step bears
         limits[2] += abs(shape[0]) / 4.0
         shape = shape + np.clip(change, -limits, limits)
-        linear = np.linalg.lstsq(_columns(time, shape), x)[0]
+        linear = _least_squares(_columns(time, shape), x)
         if np.all(np.abs(change) < 1e-7 * omega):
             break
     residual = x - _columns(time, shape) @ linear
@@ -151,6 +151,10 @@ def _fit(
     frequency = float(shape[1]) / turns, float(errors[1]) / turns
     decay = float(shape[0]), float(errors[0])
     return RingDown(0.0, float(time[-1]), belt_speed, *decay, *frequency, amplitude * size)
+
+
+def _least_squares(design: FloatArray, wanted: FloatArray) -> FloatArray:
+    return np.asarray(np.linalg.lstsq(design, wanted)[0], np.float64)
 
 
 def _design(
