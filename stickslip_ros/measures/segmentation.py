@@ -194,15 +194,11 @@ def stick_share(
     rests = _apart(_rests(relative, reach, _REST_SHARE * travel * reach), size, noise, step)
     ends = [Rest(row, row, float(relative[row])) for row in (0, len(time) - 1)]
     around = [ends[0], *(rest for rest in rests if time[rest.last] > start), ends[1]]
-    still: list[tuple[float, float]] = []
-    for before, rest, after in zip(around, around[1:], around[2:], strict=False):
-        landing, release = start, end
-        if start < time[rest.first] < end:
-            landing = max(edge(time, relative, rest, before, noise, step)[0], start)
-        if start < time[rest.last] < end:
-            release = min(edge(time, relative, rest, after, noise, step)[0], end)
-        if time[rest.first] < end:
-            still.append((landing, release))
+    still = [
+        tuple(edge(time, relative, rest, other, noise, step)[0] for other in beside)
+        for *beside, rest in zip(around, around[2:], around[1:], strict=False)
+    ]
+    still = [(max(landing, start), min(release, end)) for landing, release in still]
     stick_time = sum(max(release - landing, 0.0) for landing, release in still)
     if stick_time == 0.0:
         return nan if coarse else 0.0
