@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from enum import StrEnum
+from math import hypot, isnan, nan
 from typing import Annotated, Any, Generic, Self, TypeVar
 
 import numpy as np
@@ -195,7 +196,8 @@ class CycleMeans:
         """Return the means over single cycles, which stick if more than this share of them does.
 
         The error of a mean is the standard deviation of the cycles over the root of their number;
-        below three it is not known. Whether they stick, half of them must tell.
+        below three it is not known. Whether they stick, half of them must tell, and those that do
+        not tell may stick half as long as the others, or half longer.
         """
         values = np.array([[*vars(cycle).values()] for cycle in cycles])
         unknown = np.isnan(values[:, -1])
@@ -205,6 +207,9 @@ class CycleMeans:
         if count >= LEAST_CYCLES:  # as values.std(axis=0, ddof=1), in half of its time
             squares = (values - mean) ** 2
             scatter = np.sqrt(np.add.reduce(squares) / (count - 1)) / count**0.5
+            if unknown.any():
+                own = known.std(ddof=1) / len(known) ** 0.5 if len(known) >= LEAST_CYCLES else nan
+                scatter[-1] = hypot(own, 0.5 * mean[-1] * unknown.mean())
             errors = Cycle(*scatter.tolist())
         sticks = bool(np.count_nonzero(known) > share * len(known))
         told = 2 * len(known) >= count
@@ -216,15 +221,23 @@ class CycleMeans:
         if resting:
             regime = Regime.EQUILIBRIUM
             return without_cycles(self.cycle, regime, count, steady=steady, trend=trend)
-        regimes = {None: None, True: Regime.STICK_SLIP, False: Regime.PURE_SLIP}
-        return Measures(
-            **{**vars(self.cycle), **({} if self.sticks is not None else {"stick_fraction": None})},
+        measures = Measures(
+            **vars(self.cycle),
             cycles=count,
-            regime=regimes[self.sticks],
+            regime=Regime.STICK_SLIP if self.sticks else Regime.PURE_SLIP,
             steady=steady,
             trend=trend,
-            errors=None if self.errors is None else {**vars(self.errors)},
+            errors=self.errors and {n: e for n, e in vars(self.errors).items() if not isnan(e)},
         )
+        return undecided(measures) if self.sticks is None else measures
+
+
+def undecided(measures: Measures) -> Measures:
+    """Return measures that do not say whether the slide sticks."""
+    errors = measures.errors and {
+        name: error for name, error in measures.errors.items() if name != "stick_fraction"
+    }
+    return replace(measures, regime=None, stick_fraction=None, errors=errors)
 
 
 def with_drift(measures: Measures, drift: Drift) -> Measures:

@@ -191,14 +191,19 @@ def stick_share(
     coarse = reach * travel > _COARSE * size
     if travel <= 0.0 or len(time) < 2 * reach + 2 or (coarse and reach > _LEAST):
         return nan
-    rests = _apart(_rests(relative, reach, _REST_SHARE * travel * reach), size, noise, step)
+    least = _least_slip(size, noise, step)
+    rests = _apart(relative, _rests(relative, reach, _REST_SHARE * travel * reach), least)
     ends = [Rest(row, row, float(relative[row])) for row in (0, len(time) - 1)]
     around = [ends[0], *(rest for rest in rests if time[rest.last] > start), ends[1]]
-    still = [
-        tuple(edge(time, relative, rest, other, noise, step)[0] for other in beside)
-        for *beside, rest in zip(around, around[2:], around[1:], strict=False)
-    ]
-    still = [(max(landing, start), min(release, end)) for landing, release in still]
+    still: list[tuple[float, float]] = []
+    for before, rest, after in zip(around, around[1:], around[2:], strict=False):
+        edges = [start, end]
+        for side, other in enumerate((before, after)):
+            if abs(other.level - rest.level) <= least:  # it comes back, or does not leave
+                other = _farthest(relative, rest, other)
+            if abs(other.level - rest.level) > least:
+                edges[side] = edge(time, relative, rest, other, noise, step)[0]
+        still.append((max(edges[0], start), min(edges[1], end)))
     stick_time = sum(max(release - landing, 0.0) for landing, release in still)
     if stick_time == 0.0:
         return nan if coarse else 0.0
@@ -374,18 +379,32 @@ def _rests_apart(position: FloatArray, travel: float, noise: float, step: float)
     if len(rests) < 2:
         return []
     large = _large(np.abs(np.diff([rest.level for rest in rests])))
-    return _apart(rests, large, noise, step)
+    return _apart(position, rests, _least_slip(large, noise, step))
 
 
-def _apart(rests: list[Rest], large: float, noise: float, step: float) -> list[Rest]:
-    """Return rests as one between which there is no slip; `large` is the travel of one, m.
+def _least_slip(large: float, noise: float, step: float) -> float:
+    """Return the least travel between two rests that is a slip, m; `large` is a usual one."""
+    return max(_LEAST_STEPS * step, _LEAST_NOISES * noise, _LEAST_SHARE * large)
+
+
+def _farthest(position: FloatArray, rest: Rest, other: Rest) -> Rest:
+    """Return the row between two rests whose position is farthest from the first, as a rest."""
+    begin, end = sorted((rest, other))
+    rows = slice(begin.last, end.first + 1)
+    row = begin.last + int(np.argmax(np.abs(position[rows] - rest.level)))
+    return Rest(row, row, float(position[row]))
+
+
+def _apart(position: FloatArray, rests: list[Rest], least: float) -> list[Rest]:
+    """Return rests as one between which no slip of the `least` travel, m, leads away.
 
     Between its slips a slide creeps, and seems to rest more than once.
     """
-    least = max(_LEAST_STEPS * step, _LEAST_NOISES * noise, _LEAST_SHARE * large)
-    apart, longest = list[Rest](), Rest(0, 0, inf)
-    for rest in rests:
-        if abs(rest.level - longest.level) > least:
+    apart, longest = rests[:1], rests[0] if rests else None
+    for rest in rests[1:]:
+        assert longest is not None
+        away = abs(_farthest(position, longest, rest).level - longest.level)
+        if max(away, abs(rest.level - longest.level)) > least:
             apart.append(rest)
             longest = rest
         else:

@@ -32,6 +32,7 @@ from stickslip_ros.measures.cycle_measures import (
     Measures,
     Regime,
     Trend,
+    undecided,
     without_cycles,
 )
 from stickslip_ros.measures.mean_cycle import MeanCycle, fit_mean_cycle
@@ -83,7 +84,7 @@ def measure(
     if segmented is None or segmented.passes:
         measures, fit = _by_reversals(window, reading, quick=quick)
         if measures.regime is Regime.PURE_SLIP and _rests_where_it_turns(window):
-            measures = _undecided(measures)
+            measures = undecided(measures)
         return _as_it_passes(window, measures, fit), fit
     short = segmented.cycle.stick_fraction < _REFINED_SHARE
     short &= segmented.slip_samples >= _LEAST_SLIP
@@ -92,12 +93,7 @@ def measure(
         if segmented.agrees(refined):
             return _as_it_passes(window, _not_surer(refined, segmented), fit), fit
     measures = segmented_measures(window, segmented)
-    return measures if segmented.rests else _undecided(measures), None
-
-
-def _undecided(measures: Measures) -> Measures:
-    """Return measures that do not say whether the slide sticks."""
-    return replace(measures, regime=None, stick_fraction=None)
+    return measures if segmented.rests else undecided(measures), None
 
 
 def _as_it_passes(window: Window, measures: Measures, fit: MeanCycle | None) -> Measures:
@@ -110,7 +106,7 @@ def _as_it_passes(window: Window, measures: Measures, fit: MeanCycle | None) -> 
         part = window if len(window.samples) or window.before is None else window.before
         belt = abs(float(part.samples.belt[-1]))
         passes |= abs(fit.stick.fit.belt_speed - belt) > _OTHER_SPEED * belt
-    return _undecided(measures) if passes else measures
+    return undecided(measures) if passes else measures
 
 
 def _not_surer(refined: Measures, segmented: StickSlip) -> Measures:
@@ -242,14 +238,18 @@ def _by_reversals(
     # Half of the cycles: a single one may seem to stick for a moment.
     measures = _found(window, part.samples, CycleMeans.over(part.cycles, 0.5), window.noise)
     fastest = max(cycle.velocity_amplitude for cycle in part.cycles)
-    if measures.errors and fastest > STICKING_SHARE * float(np.abs(part.samples.belt).max()):
+    if (
+        measures.errors
+        and "stick_fraction" in measures.errors
+        and fastest > STICKING_SHARE * float(np.abs(part.samples.belt).max())
+    ):
         error = hypot(measures.errors["stick_fraction"], LEAST_STICK)
         measures = replace(measures, errors={**measures.errors, "stick_fraction": error})
     if measures.stick_fraction and measures.cycles < LEAST_CYCLES:  # nobody knows how much it errs
         measures = replace(measures, stick_fraction=None)
     periods = [cycle.period for cycle in part.cycles]
     unlike = np.std(periods) > _UNLIKE * np.mean(periods) * len(periods) ** 0.5
-    return _undecided(measures) if unlike else measures, None
+    return undecided(measures) if unlike else measures, None
 
 
 def _by_line(

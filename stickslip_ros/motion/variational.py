@@ -40,6 +40,10 @@ _LONGEST_SLIP = 30.0
 """Dimensionless time after which the effort of a slip is added up."""
 
 
+class TooStiffError(Exception):
+    """Raised when a motion takes too many steps; it does not depend on the speed of the machine."""
+
+
 class Derivatives:
     """Derivatives of the state of a motion by that at its start, and by the free constants.
 
@@ -49,39 +53,43 @@ class Derivatives:
     """
 
     def __init__(self) -> None:
-        self.matrix: FloatArray = np.empty((0, 0))
-        """Derivatives of the states (rows); may be a view that the next step overwrites."""
+        self._matrix: FloatArray = np.empty((0, 0))
         self._holder: CompiledFlow | None = None
 
     def start(self, system: DriveSystem, mode: Mode, instant: Instant) -> None:
         """Have derivatives by the state at present; see `PhaseObserver`."""
         order, count = len(system.states), len(system.free_constants)
-        self.matrix, self._holder = np.eye(order, order + count), None
+        self._matrix, self._holder = np.eye(order, order + count), None
         # A body that sticks has the speed of the belt.
         if mode.flow == STICK:
-            self.matrix[SPEED] = 0.0
+            self._matrix[SPEED] = 0.0
         if 0.0 in mode.switches[system.switch_slots.motor]:
-            self.matrix[system.slots.motor.stop - 1] = 0.0
+            self._matrix[system.slots.motor.stop - 1] = 0.0
+
+    @property
+    def matrix(self) -> FloatArray:
+        """Derivatives of the states (rows); may be a view that the next step overwrites."""
+        return self._matrix
 
     def _integrated(self, flow: CompiledFlow | None) -> FloatArray:
         """Return the derivatives in an integrator."""
         assert flow is not None
-        order = len(self.matrix)
+        order = len(self._matrix)
         return flow.state[order:].reshape(order, -1)
 
     def begin(self, mode: Mode, flow: CompiledFlow | None, now: float, end: float) -> float:
         """Hand the derivatives to the integrator; see `PhaseObserver`."""
         if flow is not self._holder:
             held = self._integrated(flow)
-            held[:] = self.matrix
-            self.matrix, self._holder = held, flow
+            held[:] = self._matrix
+            self._matrix, self._holder = held, flow
         return end
 
     def take(self, phase: Phase, system: DriveSystem, instant: Instant) -> None:
         """Let the derivatives jump at a guard; see `PhaseObserver`."""
         if phase.guard is None or phase.following is None:
             return
-        matrix, order = self.matrix.copy(), len(self.matrix)
+        matrix, order = self._matrix.copy(), len(self._matrix)
         state = np.array(phase.state_at_guard)
         before, gradients = rates(system, phase.mode, instant, state)
         gradient = gradients[order + phase.guard]
@@ -92,7 +100,7 @@ class Derivatives:
             after, _ = rates(system, phase.following, instant)
             change: Any = np.outer((after - before) / rate, normal)
             matrix += change
-        self.matrix, self._holder = matrix, None
+        self._matrix, self._holder = matrix, None
 
 
 def rates(
@@ -158,12 +166,12 @@ class Shot(Derivatives):
     def begin(self, mode: Mode, flow: CompiledFlow | None, now: float, end: float) -> float:
         """Start from the identity: heyoka's error is relative to the largest of the variables."""
         self._flow, self._begun, self._steps_before = flow, now, self._budget.taken
-        self._integrated(flow)[:] = np.eye(len(self.matrix))
+        self._integrated(flow)[:] = np.eye(len(self._matrix))
         return min(end, now + _LONGEST_SLIP) if mode.flow == SLIP else end
 
     def take(self, phase: Phase, system: DriveSystem, instant: Instant) -> None:
-        """Multiply the derivatives of the phases; raise RunError beyond the effort."""
-        self.matrix = self._integrated(self._flow) @ self.matrix
+        """Multiply the derivatives of the phases; raise TooStiffError beyond the effort."""
+        self._matrix = self._integrated(self._flow) @ self._matrix
         self._recorder.take(phase, system, instant)
         super().take(phase, system, instant)
         guard, following = phase.guard, phase.following
@@ -176,15 +184,15 @@ class Shot(Derivatives):
             stiffness = 1.0 + abs(float(gradients[SPEED, SPEED]))
             self._effort += (phase.end - self._begun) * stiffness
         if self._effort > _GREATEST_EFFORT:
-            raise RunError("the search for a limit cycle: the motion is too stiff to be followed")
+            raise TooStiffError
         self.landed |= guard is not None and following is not None and following.flow != SLIP
 
 
 class ShootingMotion(RecordedMotion):
     """Motion with the derivatives of its state by that at its start, for searches of cycles.
 
-    Breakpoints are recorded. `advance` raises RunError when the integration becomes too costly,
-    summed over all starts.
+    Breakpoints are recorded. `advance` raises TooStiffError when the integration becomes too
+    costly, summed over all starts.
     """
 
     def __init__(self, drive: Drive, control: ContinuousControl | None = None) -> None:
@@ -234,3 +242,10 @@ class ShootingMotion(RecordedMotion):
         if mode is not None and mode.flow == core.mode.flow:
             core.enter(mode)
         core.note_start()
+
+    def advance(self, duration: float) -> None:
+        """Integrate over a duration, s; raises TooStiffError."""
+        try:
+            super().advance(duration)
+        except RunError:
+            raise TooStiffError from None

@@ -87,16 +87,18 @@ def _without_lost_positions(cells: Cells, values: Values, rows: Rows) -> Iterato
     def line(row: Any) -> str:
         return table.line(int(rows[present[row]]))
 
-    wrap = jumps.wrap()
-    for row, size in jumps.shifts():
-        if turn := _turn_of_counter(cells, int(rows[present[row]]), size):
-            wrap = wrap or (turn, np.array([row]))
-    if wrap is not None:
+    turns = {
+        row: turn
+        for row, size in jumps.shifts()
+        if (turn := _turn_of_counter(cells, int(rows[present[row]]), size))
+    }
+    wrap = jumps.wrap() or (max(turns.values(), default=0.0), [*turns])
+    if wrap[0]:
         size, after = wrap
-        turn = f"{size / factor:.10g}"
+        turn, often = f"{size / factor:.10g}", "once" if len(after) == 1 else f"{len(after)} times"
         text = f"unwrap({cells.asked['position'].text}, {turn})"
         raise InvalidInputError(
-            f"{table.path}: the position jumps {len(after)} times by {turn}, the "
+            f"{table.path}: the position jumps {often} by {turn}, the "
             f"first time at {line(after[0])}, as of a counter that wraps: position="
             f"{text}{'' if factor == 1.0 else f'*{factor:.12g}'}"
         )

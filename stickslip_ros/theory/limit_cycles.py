@@ -10,13 +10,12 @@ from math import sqrt
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.errors import RunError
 from stickslip_ros.measures.cycle_measures import EQUILIBRIUM_SPEED
 from stickslip_ros.model.control import ContinuousControl
 from stickslip_ros.model.drive import UNBOUNDED_SPEED, Drive
 from stickslip_ros.model.drive_layout import POSITION, SPEED
 from stickslip_ros.model.functions import zero_between
-from stickslip_ros.motion.variational import ShootingMotion
+from stickslip_ros.motion.variational import ShootingMotion, TooStiffError
 from stickslip_ros.theory.cycle_bounds import (
     averaged_growth,
     largest_cycle,
@@ -89,7 +88,7 @@ def limit_cycle_of_run(
     motion.restart(position, velocity)
     try:
         return _cycle_ahead(motion)
-    except RunError:
+    except TooStiffError:
         return None
 
 
@@ -130,7 +129,7 @@ def limit_cycles(drive: Drive) -> list[LimitCycle]:
     try:
         distances = [zero_between(returns.growth, *bracket) for bracket in returns.brackets()]
         cycles = [returns.cycle(distance) for distance in distances]
-    except RunError:
+    except TooStiffError:
         return []
     return [cycle for cycle in cycles if cycle is not None]
 

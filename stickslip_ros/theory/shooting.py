@@ -14,7 +14,6 @@ from typing import Any, Self
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.errors import RunError
 from stickslip_ros.measures.breakpoints import Breakpoints
 from stickslip_ros.measures.cycle_measures import Measures
 from stickslip_ros.measures.cycle_meter import CycleMeter
@@ -22,7 +21,7 @@ from stickslip_ros.model.control import ContinuousControl
 from stickslip_ros.model.drive import Drive
 from stickslip_ros.model.drive_layout import SPEED
 from stickslip_ros.model.hybrid import Mode
-from stickslip_ros.motion.variational import ShootingMotion
+from stickslip_ros.motion.variational import ShootingMotion, TooStiffError
 from stickslip_ros.samples import RESTING_MOTOR, MotorSample
 from stickslip_ros.theory.cycle_bounds import first_found, longest_return
 from stickslip_ros.theory.requirements import require_equilibrium
@@ -112,7 +111,7 @@ def shoot(
     state = motion.state_at(position, filter_state, memory, motor)
     try:
         return solve(motion, state, period)
-    except RunError:
+    except TooStiffError:
         return None
 
 

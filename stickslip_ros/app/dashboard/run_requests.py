@@ -13,6 +13,7 @@ from lifecycle_msgs.srv import ChangeState
 from rclpy.clock import Clock
 from rclpy.duration import Duration
 from rclpy.node import Node
+from rclpy.qos import ReliabilityPolicy
 from rclpy.timer import Timer
 from std_srvs.srv import Trigger
 
@@ -138,11 +139,10 @@ class Impulse:
         self._force = node.create_publisher(
             WrenchStamped, DISTURBANCE_FORCE.name, qos_profile(DISTURBANCE_FORCE)
         )
-        self._applied = node.create_polled_subscription(
-            APPLIED_DISTURBANCE, qos_profile(APPLIED_DISTURBANCE)
-        )
-        self._duration = self._end = 0
-        """Duration, and stamp at which the force ends, ns."""
+        qos = qos_profile(APPLIED_DISTURBANCE, reliability=ReliabilityPolicy.BEST_EFFORT)
+        self._applied = node.create_polled_subscription(APPLIED_DISTURBANCE, qos)
+        self._asked = self._duration = self._end = 0
+        """Newest stamp when it was asked for, duration, and stamp at which the force ends, ns."""
         self._timer: Timer | None = None
 
     def apply(self, force: float, duration: float) -> Answer:
@@ -163,8 +163,8 @@ class Impulse:
             self._force.publish(pack_wrench(self._run.newest, force))
             begins = self._timer is None and self._applied.get_publisher_count()
             wait = _LATEST_START if begins else 0.0
-            self._duration = round(duration * NANOSECONDS)
-            self._end = self._run.newest + round(wait * NANOSECONDS) + self._duration
+            self._asked, self._duration = self._run.newest, round(duration * NANOSECONDS)
+            self._end = self._asked + round(wait * NANOSECONDS) + self._duration
             units = self._run.units
             push, lasting = units.text(force, "N"), units.text(duration, "s")
             self._run.add_event(f"impulse of {push} for {lasting}", push)
@@ -178,7 +178,8 @@ class Impulse:
     def end_if_due(self) -> None:
         """End it if the newest sample is at its end, counted from the first that it acted on."""
         for start in wrench_columns(list(waiting_messages(self._applied)))[0].stamp:
-            self._end = min(self._end, int(start) + self._duration)
+            if start > self._asked:
+                self._end = min(self._end, int(start) + self._duration)
         if self._timer is not None and self._run.newest >= self._end:
             self._stop(self._timer)
 
