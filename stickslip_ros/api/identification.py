@@ -21,6 +21,8 @@ from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.recordings import read_all, read_records
 from stickslip_ros.identification.scenario import written_scenario
 from stickslip_ros.model.drive import Drive
+from stickslip_ros.record.bag_layout import BagLayout
+from stickslip_ros.record.table_columns import TableFormat
 from stickslip_ros.scenarios.files import Scenario, load_scenario
 from stickslip_ros.show.identification_table import identification_tables
 from stickslip_ros.show.quantities import SI, Units
@@ -260,11 +262,23 @@ def identify(
     >>> f"{model.drive.stiffness:.4g} N/m"
     '1e+06 N/m'
     """
-    options = locals()  # all arguments
-    for name in ("recordings", "law", "fixed", "check", "progress", "time_limit"):
-        del options[name]
     fitted, others = ([*dict.fromkeys(map(Path, paths))] for paths in (recordings, check))
-    read = read_all([*fitted, *others], **with_forms(options))
+    read = read_all(
+        [*fitted, *others],
+        columns,
+        start=start,
+        end=end,
+        namespace=namespace,
+        belt_speed=belt_speed,
+        form=TableFormat(
+            *(decimal, skip, encoding, rotary, period, where, session),
+            second=None if second is None else Path(second),
+            shift=shift,
+            force_constant=force_constant,
+            pitch=pitch,
+        ),
+        layout=BagLayout(joint, belt_joint, states_topic, force_topic, time, force),
+    )
     records = [record for path in fitted for record in read[path]]
     findings = identify_records(records, law, constants(fixed or {}), progress, time_limit)
     predicted = {

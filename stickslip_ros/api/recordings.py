@@ -189,7 +189,7 @@ class Comparison(Result):
     @override
     def parts(self) -> Parts:
         several = len(self.runs) > 1
-        runs = {str(run.path) * several: run for run in self.runs}
+        runs = {str(run.path) if several else "": run for run in self.runs}
         title = "" if several else str(self.runs[0].path)
         reports = {name: run.report for name, run in runs.items()}
         yield measure_table(title, reports, {name: run.units for name, run in runs.items()})
@@ -266,12 +266,21 @@ def read_bag(
     >>> recorded.measures.regime.value, f"{recorded.measures.amplitude:.2e}"
     ('stick_slip', '3.26e-04')
     """
-    options = locals()  # all arguments
-    bag, others = Path(options.pop("path")), options.pop("continued")
-    runs = runs_of([bag, *map(Path, others)])
+    runs = runs_of(map(Path, (path, *continued)))
     if len(runs) > 1:
         raise InvalidInputError(f"{[*runs][1]} does not continue the run in {path}")
-    return recorded_run(bag, table=False, continued=runs[bag], **options)
+    return recorded_run(
+        Path(path),
+        table=False,
+        continued=runs[Path(path)],
+        start=start,
+        end=end,
+        namespace=namespace,
+        belt_speed=belt_speed,
+        layout=BagLayout(joint, belt_joint, states_topic, force_topic, time, force),
+        rotary=rotary,
+        slips=slips,
+    )
 
 
 def read_table(
@@ -353,8 +362,27 @@ def read_table(
     >>> run.measures.regime.value, round(1e6 * run.measures.amplitude)
     ('stick_slip', 434)
     """
-    options = locals()  # all arguments
-    return recorded_run(Path(options.pop("path")), table=True, **options)
+    return recorded_run(
+        Path(path),
+        table=True,
+        columns=columns,
+        start=start,
+        end=end,
+        stick_speed=stick_speed,
+        belt_speed=belt_speed,
+        rotary=rotary,
+        slips=slips,
+        decimal=decimal,
+        skip=skip,
+        encoding=encoding,
+        period=period,
+        where=where,
+        session=session,
+        second=None if second is None else Path(second),
+        shift=shift,
+        force_constant=force_constant,
+        pitch=pitch,
+    )
 
 
 def recorded_run(
@@ -388,8 +416,7 @@ def recorded_run(
     )
     samples = NO_SAMPLES.followed_by(*(t for t in taken if isinstance(t, SampleColumns)))
     forces = NO_FORCES.followed_by(*(t for t in taken if isinstance(t, ForceColumns)))
-    parts = samples, forces, report, drive, history, table, namespace, rotary
-    return RecordedRun(path, *parts)
+    return RecordedRun(path, samples, forces, report, drive, history, table, namespace, rotary)
 
 
 def with_forms(options: Mapping[str, Any]) -> dict[str, Any]:

@@ -150,7 +150,9 @@ class ExponentialAdapter(IdentifiedLaw):
     smallest = "kinetic"
     straightening = Straightening(
         {
-            **{"kinetic": "force_at_fastest", "rise": "sag", "viscous": "force_at_rest"},
+            "kinetic": "force_at_fastest",
+            "rise": "sag",
+            "viscous": "force_at_rest",
             "decay_speed": "decay_speed",
         },
         {"force_at_fastest": (-inf, inf), "force_at_rest": (0.0, inf)},

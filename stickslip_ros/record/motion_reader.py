@@ -216,9 +216,9 @@ class MachineMotion:
         with np.errstate(all="ignore"):  # values of others may overflow
             samples = self._with_values(samples)
             forces = ForceColumns(samples.stamp, samples.friction_force)
-            return self._completed(samples), forces if self._layout.force == "effort" else forces[
-                :0
-            ]
+            if self._layout.force != "effort":
+                forces = forces[:0]
+            return self._completed(samples), forces
 
     def without_lost_velocities(self, samples: SampleColumns) -> SampleColumns:
         """Return all samples with velocities that agree with the positions."""

@@ -195,14 +195,16 @@ def draw_cycles(
         (panels[1], 2, fraction, 1.0, 0.0),
     ):
         for run, look in zip(cycles, looks, strict=False):
-            if len(run[0]) and np.isnan(run[column]).all():
+            time, values = run[0], run[column]
+            told = ~np.isnan(values)
+            if len(time) and not told.any():
                 say(axes, "not known of single cycles")
                 continue
-            time, *columns = run
+            time, values = time[told], values[told]
             length = float(time[-1] - time[0]) / PIXELS if len(time) else 1.0
-            rows = peaks(intervals(time, length or 1.0), *columns)  # in each pixel column
+            rows = peaks(intervals(time, length or 1.0), values)  # in each pixel column
             every = max(1, len(rows) // most)
-            axes.plot(run[0][rows], run[column][rows] / size, markevery=every, **look)
+            axes.plot(time[rows], values[rows] / size, markevery=every, **look)
         largest = max(float(np.nanmax(run[column], initial=0.0)) / size for run in cycles)
         axes.set_ylim(0.0, max(1.1 * largest, least) or 1.0)
         axes.set_ylabel(of_panel)

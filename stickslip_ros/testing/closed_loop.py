@@ -441,12 +441,8 @@ def _target(override: str) -> str:
 
 
 def _check_controller(controller: object) -> None:
-    if callable(controller) or controller in (
-        _OF_SCENARIO,
-        _EXTERNAL,
-        None,
-        *CONTROLLER_PARAMETERS,
-    ):
+    known = _OF_SCENARIO, _EXTERNAL, None, *CONTROLLER_PARAMETERS
+    if callable(controller) or controller in known:
         return
     if isinstance(controller, Sequence) and not isinstance(controller, str | bytes):
         command = list[Any](controller)

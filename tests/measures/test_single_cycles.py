@@ -8,11 +8,12 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from scipy.signal import find_peaks
 
-from stickslip_ros.measures import Regime
+from stickslip_ros.measures import Measures, Regime
+from stickslip_ros.measures.cycle_measures import Cycle, CycleMeans
 from stickslip_ros.measures.noise import medians
 from stickslip_ros.measures.sample_assumptions import EXACT, UNKNOWN, SampleAssumptions
 from stickslip_ros.measures.sample_meter import SampleMeter
-from stickslip_ros.measures.sample_window import Window
+from stickslip_ros.measures.sample_window import Window, WindowMeter
 from stickslip_ros.measures.single_cycles import (
     NoisySamples,
     extreme_near,
@@ -109,3 +110,43 @@ def test_an_axis_that_hunts_at_standstill_has_its_rests_in_each_cycle_with_exact
     sticks = [cycle.stick_fraction for cycle in meter.feed(record)]
     assert len(sticks) >= 8
     assert sticks == pytest.approx([0.925] * len(sticks), abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("high", "low", "rate"), [(0.0, 0.5, 800.0), (0.1, 0.4, 200.0), (0.8, 0.0, 200.0)]
+)
+def test_rests_on_a_guide_at_rest_are_whole_wherever_noise_ends_a_cycle(
+    high: float, low: float, rate: float
+) -> None:
+    """It rests for these shares of each second at its highest and its lowest position."""
+    time = np.arange(0.0, 9.0, 1.0 / rate)
+    move = (1.0 - high - low) / 2.0
+    turns = np.array([0.0, low, low + move, 1.0 - move, 1.0])
+    course = np.interp(time % 1.0, turns, [0.0, 0.0, 1.0, 1.0, 0.0])
+    noise = 1e-3 * np.random.default_rng(1).standard_normal(len(time))
+    position = 0.5 - np.cos(np.pi * course) / 2.0 + noise
+    meter = WindowMeter(20)
+    cycles = meter.feed(time, position, np.gradient(position, time), 0.0 * time)
+    assert len(cycles) >= 6
+    sticks = [cycle.stick_fraction for cycle in cycles]
+    assert np.mean(sticks) == pytest.approx(high + low, abs=0.04)
+
+
+def test_cycles_that_do_not_tell_their_stick_make_the_mean_less_sure() -> None:
+    def means(sticks: list[float]) -> Measures:
+        cycles = [Cycle(1e-3, 1e-2, 0.0, 0.1, 10.0, stick) for stick in sticks]
+        return CycleMeans.over(cycles).measures(False, True, None)
+
+    told = [0.2, 0.3, 0.4, 0.5, 0.6]
+    known, partly = means(told), means([*told, *[np.nan] * 4])
+    assert known.errors is not None
+    assert partly.errors is not None
+    assert partly.stick_fraction == pytest.approx(known.stick_fraction)
+    assert partly.errors["stick_fraction"] > 1.5 * known.errors["stick_fraction"]
+    hidden = means([*told, *[np.nan] * 6])
+    assert hidden.regime is hidden.stick_fraction is None
+    assert hidden.errors is not None
+    assert "stick_fraction" not in hidden.errors
+    few = means([0.2, 0.2, np.nan, np.nan])
+    assert few.errors is not None
+    assert "stick_fraction" not in few.errors
