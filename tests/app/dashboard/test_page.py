@@ -343,7 +343,8 @@ def test_what_an_engineer_does(start_stickslip: Start, page: Page, tmp_path: Pat
     with page.expect_download() as download:
         page.get_by_role("button", name="CSV").click()
     rows = np.genfromtxt(download.value.path(), delimiter=",", names=True)
-    assert 1e6 * np.ptp(rows["position"]) == pytest.approx(swing(page), rel=1e-5)
+    # The first half of a period is in the samples, and may not be in the plot.
+    assert 1e6 * np.ptp(rows["position"]) == pytest.approx(swing(page), rel=0.01)
     with page.expect_download() as picture:
         page.get_by_role("button", name="PNG").click()
     assert picture.value.path().stat().st_size > 10_000
