@@ -53,14 +53,13 @@ class DimensionlessDrive(HybridSystem):
         self._static_friction = law.coefficient if is_static else None
         # What is constant, mostly: these take longer to look up.
         self._speed, self._normal = self.drive.belt_speed, self.drive.normal_force
-        self._is_biased = drive.bias_force != 0.0 or isinstance(drive, ScaledDrive)
         if isinstance(drive, ScaledDrive):
             of_law = (name for name, _ in numbers(law, "friction"))
             self.free_constants = ("mass", "damping", "stiffness", "bias_force", *of_law)
         self.structure = structure_number(
             (
                 *(type(self), self.states, self.may_lift, drive.has_spring),
-                *(self._is_biased, self.has_guide_damping),
+                *(self.is_biased, self.has_guide_damping),
                 *((signal.switches, signal.has_sine) for signal in (belt, load)),
                 *map(structure, (law, actuator, self.control, motor)),
                 self.free_constants,
@@ -70,7 +69,7 @@ class DimensionlessDrive(HybridSystem):
 
     def _named_constants(self) -> Iterator[tuple[str, float]]:
         drive, law = self.drive, self.drive.friction
-        names = ["damping", "belt_speed", *(["bias_force"] if self._is_biased else [])]
+        names = ["damping", "belt_speed", *(["bias_force"] if self.is_biased else [])]
         yield from ((name, getattr(drive, name)) for name in names)
         yield from numbers(law, "friction")
         if self.has_guide_damping:
@@ -87,6 +86,11 @@ class DimensionlessDrive(HybridSystem):
                 yield "step_limiter", 1.0 / (_CHANGE_IN_A_STEP * law.characteristic_speed)
         free = [name for name in self.free_constants if name in constants_of(DriveConstants)]
         yield from ((name, getattr(drive, name)) for name in free if name not in names)
+
+    @cached_property
+    def is_biased(self) -> bool:
+        """Whether a bias acts, or may act: a fit finds one."""
+        return self.drive.bias_force != 0.0 or "bias_force" in self.free_constants
 
     @cached_property
     def has_guide_damping(self) -> bool:
