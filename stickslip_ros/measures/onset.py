@@ -17,10 +17,11 @@ _SAME_SPEED, _LEAST_RANGE = 1.005, 1.03
 """Largest ratio of belt speeds that are one feed; least ratio of the fastest to the slowest."""
 _SYSTEMATIC, _SCATTER = 0.003, 4.0
 """Systematic error of a decay rate, as a share of it; chi^2 by degrees of freedom up to which decay
-rates count as having larger errors."""
-_INTERVAL, _RISES, _REJECTED = 3.84, 10.8, 0.01
+rates may have larger errors."""
+_INTERVAL, _RISES, _REJECTED, _UNLIKELY = 3.84, 10.8, 0.01, 0.05
 """Chi^2 of the ends of a 95 % interval beyond the least, and by which a constant decay must be
-worse (0.1 %); probability below which a family is rejected."""
+worse (0.1 %); probability below which a family is rejected, and of the likeliest one below which
+the errors are too small."""
 _ONSETS = np.append(0.0, np.geomspace(0.1, 1.0 - 1e-4, 1000))
 _SHAPES = np.geomspace(0.1, 5.0, 120)
 """Onsets, and speeds in a friction law, that are tried, in slowest feeds. Zero is a curve without
@@ -151,16 +152,16 @@ def onset_of(ring_downs: Sequence[RingDown], length: str = "m") -> Onset:
         runs = f"above {quantity(feeds[-1].belt_speed, unit)}" if beyond else lowest
         advice = "the decay does not rise with the feed by more than its errors: runs"
         return Onset(feeds, {}, advice=f"{advice} {runs}, or larger taps would tell")
-    kept = [name for name, family in families.items() if not family.rejected]
-    excess = least / max(len(feeds) - 3, 1)
-    if not kept and excess < _SCATTER:
-        factor = 1.1 * sqrt(max(excess, 1.0))
-        wider = [replace(ring, decay_error=factor * ring.decay_error) for ring in ring_downs]
-        return onset_of(wider, length)
-    if not kept:
+    if max(family.probability for family in families.values()) < _UNLIKELY:
+        excess = least / max(len(feeds) - 3, 1)
+        if excess < _SCATTER:
+            factor = 1.1 * sqrt(max(excess, 1.0))
+            wider = [replace(ring, decay_error=factor * ring.decay_error) for ring in ring_downs]
+            return onset_of(wider, length)
         runs = "runs at the same load, temperature and position"
         advice = f"no family of friction fits the decay: {runs} would tell whether friction changes"
         return Onset(feeds, families, advice=advice)
+    kept = [name for name, family in families.items() if not family.rejected]
     possible = [fits[name][1] <= families[name].chi_square + _INTERVAL for name in kept]
     rows = np.flatnonzero(np.any(possible, axis=0))  # of _ONSETS
     # The ends are between two of the speeds that are tried.

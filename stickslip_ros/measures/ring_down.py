@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from math import inf, pi, sqrt
+from typing import NamedTuple
 
 import numpy as np
 
@@ -90,14 +91,21 @@ def ring_downs(
         if rows.stop - rows.start < _SHORTEST * length or rows.start * period < after:
             continue
         guess = np.array([-np.log(abs(ratio)) / (length * period), omega, 0.0])
-        ring_down = _fit(position[rows], belt[rows], period, guess, step, noise)
+        amplitude = float(decay[slow[0]])
+        ring_down = _fit(position[rows], belt[rows], period, guess, amplitude, step, noise)
         if ring_down is not None:
             begin = period * rows.start
             yield replace(ring_down, start=begin, end=begin + ring_down.end)
 
 
 def _fit(
-    x: FloatArray, belt: FloatArray, period: float, shape: FloatArray, step: float, noise: float
+    x: FloatArray,
+    belt: FloatArray,
+    period: float,
+    guess: FloatArray,
+    amplitude: float,
+    step: float,
+    noise: float,
 ) -> RingDown | None:
     """Return the ring-down of a window; None if the vibration is another one.
 
@@ -106,66 +114,93 @@ def _fit(
     Oscillations, section 3.3); s is the decay rate. What q may be, the belt speed bounds. Errors
     are those of least squares with correlated residuals, and of rounding.
     """
+    if float(np.ptp(belt)) > _BELT_CHANGE * float(np.mean(belt)):
+        return None
     size = float(np.ptp(x))
-    x, step, noise = (x - x[0]) / size, step / size, noise / size
+    x, belt, step, noise = (x - x[0]) / size, belt / size, step / size, noise / size
     time: FloatArray = period * np.arange(len(x), dtype=np.float64)
-    belt_speed, omega, amplitude, prior = float(np.mean(belt)), float(shape[1]), 0.0, 1.0
-    if float(np.ptp(belt)) > _BELT_CHANGE * belt_speed:
+    belt_speed = float(np.mean(belt))
+    fit = _best(time, x, guess, amplitude / size, belt_speed, noise)
+    if fit is None:
         return None
-    steps = omega * np.array([1e-5, 1e-6, 1e-5])
-    design = np.empty((0, 0))
-    linear = _least_squares(_columns(time, shape), x)
-    for _ in range(12):
-        amplitude = float(np.hypot(*linear[2:]))
-        least = max(abs(shape[0]), _DAMPING_RATIO * omega)
-        prior = _AMPLITUDE_EFFECT * least * (omega * amplitude * size / belt_speed) ** 2
-        design = _design(time, shape, linear, steps)
-        row = np.zeros(design.shape[1])
-        row[2] = noise / prior
-        residual = np.append(x - design[:, 3:] @ linear, -shape[2] * row[2])
-        change = _least_squares(np.vstack([design, row]), residual)[:3]
-        limits = omega * np.array([0.02, 0.02, 0.002])  # what the next step bears
-        limits[2] += abs(shape[0]) / 4.0
-        shape = shape + np.clip(change, -limits, limits)
-        linear = _least_squares(_columns(time, shape), x)
-        if np.all(np.abs(change) < 1e-7 * omega):
-            break
-    residual = x - _columns(time, shape) @ linear
-    variance = float(residual @ residual) / max(len(x) - design.shape[1], 1)
-    if not (sqrt(variance) <= 3.0 * noise + _UNLIKE * amplitude and shape[1] > 0.0):
+    decay, omega, _ = fit.shape
+    residual, amplitude = x - _columns(time, fit.shape) @ fit.linear, fit.amplitude
+    variance = float(residual @ residual) / max(len(x) - len(fit.shape) - len(fit.linear), 1)
+    if not (sqrt(variance) <= 3.0 * noise + _UNLIKE * amplitude and omega > 0.0):
         return None
-    variance = max(variance, noise**2 / 2.0) * _correlation(residual, shape[1] * period)
-    information = design.T @ design / variance
-    information[2, 2] += 1.0 / prior**2
+    variance = max(variance, noise**2 / 2.0) * _correlation(residual, omega * period)
+    information = fit.slopes.T @ fit.slopes / variance
+    information[2, 2] += 1.0 / fit.effect**2
     covariance = np.linalg.pinv(information)
     rounding = _ROUNDING * min(2.0 * step / amplitude, 1.0) ** 1.5
-    rounding *= max(1.0 / float(time[-1]), abs(shape[0]))
+    rounding *= max(1.0 / float(time[-1]), abs(decay))
     # A decay rate that changes evenly is found as it is at this time.
-    energy = np.exp(-2.0 * shape[0] * time)
+    energy = np.exp(-2.0 * decay * time)
     middle = float(energy @ time / energy.sum())
     middle += float(energy @ (time - middle) ** 3) / float(energy @ (time - middle) ** 2) / 2.0
-    belt_speed = float(np.interp(middle, time, belt))
     # What the amplitude does beyond r^2 is of the order of its square.
-    higher = 2.0 * prior * (omega * amplitude * size / float(np.mean(belt))) ** 2
-    turns, errors = 2.0 * pi, np.sqrt(np.diag(covariance) + rounding**2 + higher**2)
-    frequency = float(shape[1]) / turns, float(errors[1]) / turns
-    decay = float(shape[0]), float(errors[0])
-    return RingDown(0.0, float(time[-1]), belt_speed, *decay, *frequency, amplitude * size)
+    higher = 2.0 * fit.effect * (omega * amplitude / belt_speed) ** 2
+    errors = np.sqrt(np.diag(covariance) + rounding**2 + higher**2)
+    return RingDown(
+        start=0.0,
+        end=float(time[-1]),
+        belt_speed=size * float(np.interp(middle, time, belt)),
+        decay_rate=float(decay),
+        decay_error=float(errors[0]),
+        frequency=float(omega) / (2.0 * pi),
+        frequency_error=float(errors[1]) / (2.0 * pi),
+        amplitude=size * amplitude,
+    )
 
 
-def _least_squares(design: FloatArray, wanted: FloatArray) -> FloatArray:
-    return np.asarray(np.linalg.lstsq(design, wanted)[0], np.float64)
+class _Fit(NamedTuple):
+    """Least squares of `_columns`; amplitudes in those of the samples."""
+
+    shape: FloatArray
+    linear: FloatArray
+    """Coefficients of the columns."""
+    slopes: FloatArray
+    """Slopes of the fit by its shape."""
+    effect: float
+    """Standard deviation of the effect of the amplitude before the data tell it."""
+
+    @property
+    def amplitude(self) -> float:
+        """Amplitude at the start."""
+        return float(np.hypot(*self.linear[2:]))
 
 
-def _design(
-    time: FloatArray, shape: FloatArray, linear: FloatArray, steps: FloatArray
-) -> FloatArray:
-    """Return the derivatives of the fit by its shape, from differences, and its columns."""
-    slopes = [
-        (_columns(time, shape + change) - _columns(time, shape - change)) @ linear / (2.0 * step)
-        for step, change in zip(steps, np.diag(steps), strict=True)
-    ]
-    return np.column_stack([*slopes, _columns(time, shape)])
+def _best(
+    time: FloatArray,
+    x: FloatArray,
+    shape: FloatArray,
+    amplitude: float,
+    belt_speed: float,
+    noise: float,
+) -> _Fit | None:
+    """Return the best fit, from a shape and an amplitude near it; None if it does not converge.
+
+    The coefficients are the best ones of each shape (variable projection: G. Golub, V. Pereyra,
+    SIAM Journal on Numerical Analysis 10, 1973).
+    """
+    from scipy.optimize import least_squares  # takes long to import
+
+    def linear(shape: FloatArray) -> FloatArray:
+        return np.asarray(np.linalg.lstsq(_columns(time, shape), x)[0], np.float64)
+
+    def residual(shape: FloatArray, weight: float) -> FloatArray:
+        return np.append(x - _columns(time, shape) @ linear(shape), weight * shape[2])
+
+    best = None
+    for _ in range(2):  # what the amplitude may do follows from the fit
+        least = max(abs(shape[0]), _DAMPING_RATIO * shape[1])
+        effect = _AMPLITUDE_EFFECT * least * (shape[1] * amplitude / belt_speed) ** 2
+        found = least_squares(residual, shape, "3-point", x_scale="jac", args=(noise / effect,))
+        if not found.success:
+            return None
+        best = _Fit(found.x, linear(found.x), found.jac[:-1], effect)
+        shape, amplitude = best.shape, best.amplitude
+    return best
 
 
 def _columns(time: FloatArray, shape: FloatArray) -> FloatArray:
