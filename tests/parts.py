@@ -9,7 +9,6 @@ import numpy as np
 from stickslip_ros.model.actuator import Actuator
 from stickslip_ros.model.constants import constant
 from stickslip_ros.model.control import ControlLaw, Reference
-from stickslip_ros.model.drive import Drive
 from stickslip_ros.model.friction import FrictionLaw
 from stickslip_ros.samples import Sample
 
@@ -17,22 +16,6 @@ from stickslip_ros.samples import Sample
 def lag(time_constant: float) -> Actuator:
     """An actuator that only lags, by a time constant in s."""
     return Actuator(time_constant=time_constant)
-
-
-@dataclass(frozen=True)
-class OneSided(FrictionLaw):
-    """Coulomb friction that is stronger backward than forward."""
-
-    name = "one_sided"
-    backward: Any = constant(0.6, "Coefficient of backward slip.", at_least=0.0)
-
-    def coefficient(self, relative_speed: Any, sign: Any) -> Any:
-        forward, backward = 0.5 * (1.0 + sign), 0.5 * (1.0 - sign)
-        return backward * self.backward - forward * self.static + 0.0 * relative_speed
-
-    @property
-    def limits(self) -> tuple[Any, Any]:
-        return self.static, self.backward
 
 
 @dataclass(frozen=True)
@@ -72,74 +55,6 @@ class Iwan(FrictionLaw):
         self, margin: int, sign: float, switches: Sequence[float]
     ) -> Sequence[float]:
         return (1.0,)
-
-
-@dataclass(frozen=True)
-class Pieces(FrictionLaw):
-    """Falls in a straight line up to a speed, then stays: two pieces."""
-
-    name = "pieces"
-    switches: ClassVar[Sequence[str]] = ("fast",)
-    corner: Any = constant(0.5, "Speed from which the coefficient is constant.", "m/s")
-    drop: Any = constant(0.3, "Share of the coefficient that is lost.")
-
-    def coefficient(self, relative_speed: Any, sign: Any) -> Any:
-        fast = np.abs(relative_speed) >= self.corner
-        return self.friction(relative_speed, sign, (), (1.0 * fast,))
-
-    def friction(
-        self, relative_speed: Any, sign: Any, memory: Sequence[Any], switches: Sequence[Any]
-    ) -> Any:
-        lost = switches[0] + (1.0 - switches[0]) * sign * relative_speed / self.corner
-        return -sign * self.static * (1.0 - self.drop * lost)
-
-    def margins(
-        self, relative_speed: Any, sign: Any, memory: Sequence[Any], switches: Sequence[Any]
-    ) -> Sequence[Any]:
-        return ((2.0 * switches[0] - 1.0) * (sign * relative_speed - self.corner),)
-
-    def switches_at(
-        self, relative_speed: float, sign: float, memory: Sequence[float]
-    ) -> Sequence[float]:
-        return (1.0 if abs(relative_speed) >= self.corner else 0.0,)
-
-    def switches_after(
-        self, margin: int, sign: float, switches: Sequence[float]
-    ) -> Sequence[float]:
-        return (1.0 - switches[0],)
-
-
-@dataclass(frozen=True)
-class TwoLags:
-    """Force k2 b by two states in a row: a' = d (y - a), b' = d (a - b), and k1 y."""
-
-    states: ClassVar[Sequence[str]] = ("a", "b")
-    rate: Any
-    gain: Any
-    lagging: Any
-
-    def scaled(self, drive: Drive) -> "TwoLags":
-        unit = drive.normal_force / drive.speed_scale
-        return TwoLags(self.rate / drive.angular_frequency, self.gain / unit, self.lagging / unit)
-
-    def silenced(self) -> "TwoLags":
-        return TwoLags(self.rate, 0.0, 0.0)
-
-    def rest(self, position: Any, speed: Any) -> Sequence[Any]:
-        return speed, speed
-
-    def state_rates(self, position: Any, speed: Any, states: Sequence[Any]) -> Sequence[Any]:
-        first, second = states
-        return self.rate * (speed - first), self.rate * (first - second)
-
-    def control_force(self, position: Any, speed: Any, states: Sequence[Any]) -> Any:
-        return self.gain * speed + self.lagging * states[1]
-
-    def state_scales(self, drive: Drive) -> Sequence[float]:
-        return (drive.speed_scale, drive.speed_scale)
-
-    def bound(self, speed: Any) -> Any:
-        return np.full(np.shape(speed), np.inf)
 
 
 @dataclass(frozen=True)

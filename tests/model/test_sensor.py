@@ -59,9 +59,9 @@ def test_a_difference_spans_samples_and_fewer_at_the_start(spans: int) -> None:
         assert velocity[number] == pytest.approx(change / (back * PERIOD), rel=1e-12, abs=1e-9)
 
 
-@pytest.mark.parametrize("count", [100_000, pytest.param(1_000_000, marks=pytest.mark.long)])
-def test_the_noise_of_many_samples_is_normal_and_white(count: int) -> None:
+def test_the_noise_of_many_samples_is_normal_and_white() -> None:
     """Each statistic within five of its own standard deviations."""
+    count = 100_000
     found = measured(Sensor(position_noise=2.0, velocity_noise=3.0, seed=7), np.zeros(count))
     for values, deviation in zip(found, (2.0, 3.0), strict=True):
         noise = values / deviation
@@ -96,15 +96,3 @@ def test_noise_stays_the_same_in_all_versions() -> None:
     assert told == pytest.approx(
         [-0.5199535734446672, -2.743804532142861, 0.985968313441401], rel=1e-12
     )
-
-
-@pytest.mark.parametrize("spans", [0, 1, 4])
-def test_a_constant_velocity_is_told_within_the_error(spans: int) -> None:
-    sensor = Sensor(1e-6, 1e-7, velocity_noise=1e-4)
-    if spans:
-        sensor = replace(DIFFERENCE, position_resolution=1e-6, difference_samples=spans)
-    measure = sensor.start(PERIOD)
-    told = [measure(0.0123 * n * PERIOD, 0.0123)[1] for n in range(2000)][spans + 1 :]
-    worst = np.abs(np.array(told) - 0.0123).max()
-    error = 1e-6 / (spans * PERIOD) if spans else 4.0 * 1e-4
-    assert 0.5 * error < worst <= error

@@ -118,10 +118,10 @@ def test_velocity_and_acceleration_are_derivatives(case: Case, time: float) -> N
 @examples(quick=15, thorough=40)
 def test_bounds_and_steepest_are_the_extremes(case: Case) -> None:
     ends, signal = case.corners, case.signal
-    times = [*np.linspace(0.0, 30.0, 30_001).tolist(), *ends, *(end - 1e-12 for end in ends)]
+    times = [*np.linspace(0.0, 12.0, 3001).tolist(), *ends, *(end - 1e-12 for end in ends)]
     found = [signal.at(time) for time in times if time >= 0.0]
     low, high = signal.bounds
-    spacing = 2.0 * (2.0 * pi * 3.0) ** 2 * 1e-3**2
+    spacing = 2.0 * (2.0 * pi * 3.0) ** 2 * 4e-3**2
     assert low - 1e-9 <= min(found) <= low + spacing
     assert high - spacing <= max(found) <= high + 1e-9
     for time in np.linspace(0.0, 12.0, 200).tolist():

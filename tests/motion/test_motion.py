@@ -123,20 +123,6 @@ def test_a_belt_that_changes_speed_leaves_the_slide_behind() -> None:
     assert motion.velocity == 0.04
 
 
-def test_restart_puts_the_slide_somewhere_else_and_keeps_the_force() -> None:
-    motion = Motion(PAPER, 0.0, 0.0)
-    motion.force = 0.2
-    motion.advance(3.0)
-    motion.restart(0.3, -0.1)
-    fresh = Motion(PAPER, 0.3, -0.1)
-    fresh.force = 0.2
-    assert (motion.position, motion.velocity) == (0.3, -0.1)
-    motion.advance(2.0)
-    fresh.advance(2.0)
-    assert motion.position == fresh.position
-    assert motion.velocity == fresh.velocity
-
-
 def test_restart_puts_the_filter_of_the_continuous_controller_to_rest() -> None:
     motion = Motion(FEED_DRIVE, 0.0, 0.0, Washout(20.0, -3000.0, 0.0))
     motion.advance(0.3)

@@ -1,8 +1,6 @@
 """The sampled loop: stamps, changes under way, the sensor and the actuator."""
 
-from dataclasses import dataclass, replace
-from itertools import count
-from random import Random
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,7 +10,7 @@ from hypothesis import strategies as st
 from stickslip_ros.measures import CycleMeter
 from stickslip_ros.model.actuator import Actuator
 from stickslip_ros.model.control import VelocityFeedback
-from stickslip_ros.model.sensor import Measure, Sensor
+from stickslip_ros.model.sensor import MeasuredVelocity, Sensor
 from stickslip_ros.model.signals import sine, step
 from stickslip_ros.motion import Motion, RecordedMotion
 from stickslip_ros.motion.controller import Controller
@@ -182,28 +180,12 @@ def test_drive_and_position_may_change_at_once() -> None:
 RATE = 10.0
 
 
-@dataclass(frozen=True)
-class Encoder(Sensor):
-    """Noise on the position, rounded; the velocity is a difference, zero at first."""
-
-    noise: float = 0.01
-    resolution: float = 0.005
-
-    def start(self, period: float, number: int = 0) -> Measure:
-        last, numbers = list[float](), count(number)
-
-        def measure(position: float, velocity: float) -> tuple[float, float]:
-            noise = Random(next(numbers)).gauss(0.0, self.noise)
-            measured = self.resolution * round((position + noise) / self.resolution)
-            speed = (measured - last[0]) / period if last else 0.0
-            last[:] = [measured]
-            return measured, speed
-
-        return measure
+ENCODER = Sensor(0.005, 0.01, MeasuredVelocity.DIFFERENCE)
+"""Resolution and noise in m."""
 
 
 def test_a_reset_starts_its_history_again() -> None:
-    loop = SampledLoop(Motion(PAPER, 0.1, -0.2), RATE, SECOND, sensor=Encoder())
+    loop = SampledLoop(Motion(PAPER, 0.1, -0.2), RATE, SECOND, sensor=ENCODER)
     for _ in range(5):
         loop.advance()
     assert loop.sample.velocity != 0.0
@@ -226,21 +208,17 @@ def test_a_controller_sees_what_is_measured_and_the_record_is_true() -> None:
 
     law = VelocityFeedback(velocity_gain=-0.2)
     motion = RecordedMotion(PAPER, 0.1, -0.2)
-    loop = SampledLoop(motion, RATE, SECOND, sensor=Encoder())
+    loop = SampledLoop(motion, RATE, SECOND, sensor=ENCODER)
     recorder = TrajectoryRecorder(RATE)
     simulate_sampled(loop, motion, Watching(law), 3.0, CycleMeter(2), recorder=recorder)
     trajectory = recorder.trajectory()
 
-    hand, last = Motion(PAPER, 0.1, -0.2), None
+    hand, measure = Motion(PAPER, 0.1, -0.2), ENCODER.start(1.0 / RATE)
     for number, sample in enumerate(seen):
-        noise = Random(number).gauss(0.0, 0.01)
-        position = 0.005 * round((hand.position + noise) / 0.005)
-        velocity = 0.0 if last is None else (position - last) * RATE
-        last = position
-        assert (sample.position, sample.velocity) == pytest.approx((position, velocity), rel=1e-13)
+        assert (sample.position, sample.velocity) == measure(hand.position, hand.velocity)
         row = trajectory[number : number + 1]
         assert (row.position[0], row.velocity[0]) == (hand.position, hand.velocity)
-        assert row.control_force[0] == pytest.approx(-0.2 * velocity, rel=1e-13)
+        assert row.control_force[0] == pytest.approx(-0.2 * sample.velocity, rel=1e-13)
         hand.force = -0.2 * sample.velocity
         hand.advance(1.0 / RATE)
     assert len(seen) == len(trajectory) == 31

@@ -23,13 +23,14 @@ from stickslip_ros.model.friction import (
     LuGre,
     MaxwellSlip,
     Stribeck,
+    Table,
 )
 from stickslip_ros.model.plain_drive import drive_system
 from stickslip_ros.model.signals import table
 from stickslip_ros.motion import Motion
 from stickslip_ros.motion.variational import ShootingMotion, VariationalMotion
 from tests.drives import PAPER
-from tests.parts import Iwan, OneSided, Pieces
+from tests.parts import Iwan
 
 CURVE = Exponential(static=0.4, kinetic=0.25, decay_speed=0.02, viscous=0.5)
 LAWS: dict[str, FrictionLaw] = {
@@ -152,7 +153,12 @@ STARTED = [
     replace(PAPER, belt_speed=0.2, damping=0.2, friction=Linear(0.4, 0.45)),
     *(
         replace(SLOW, friction=law)
-        for law in (OneSided(static=0.3), Pieces(static=0.4), Dahl(0.4, 20.0), Iwan(static=0.4))
+        for law in (
+            Directional(Coulomb(0.3), Coulomb(0.6)),
+            Table(((0.0, 0.4), (0.5, 0.28))),
+            Dahl(0.4, 20.0),
+            Iwan(static=0.4),
+        )
     ),
 ]
 

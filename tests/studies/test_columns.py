@@ -144,16 +144,6 @@ def test_of_a_sample_there_are_the_values_of_each_point(study: Study, columns: C
     assert read["plan"]["seed"] == 4
 
 
-def test_whole_numbers_stay_whole_in_a_table() -> None:
-    seeds = Axis("plant.force_jitter_seed", 0.0, 10.0, 3)
-    study = Study(free(), Grid((seeds,)), SHORT)
-    columns = compute_columns(study)
-    assert [repr(value) for value in as_json(study, columns)["values"][0]] == ["0", "5", "10"]
-    write_csv(stream := StringIO(), columns, {})
-    rows = csv.reader(StringIO(stream.getvalue()))
-    assert [row[0] for row in rows] == ["plant.force_jitter_seed", "0", "5", "10"]
-
-
 def test_any_reason_is_read_back() -> None:
     reason = 'a, "b"\n c; \u00e4'
     study = speeds(2)

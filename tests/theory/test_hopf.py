@@ -1,7 +1,6 @@
 """Hopf points against the paper and the motion; test_critical_gains has the closed forms."""
 
 from dataclasses import replace
-from math import sqrt
 
 import numpy as np
 import pytest
@@ -15,16 +14,6 @@ from stickslip_ros.theory.critical_gains import critical_gains
 from stickslip_ros.theory.hopf import hopf_distance, hopf_points, hopf_ratio
 from stickslip_ros.theory.linear import expand, hurwitz_determinants, jacobians
 from tests.drives import FEED_DRIVE, PAPER, settled
-
-
-@pytest.mark.parametrize(("damping", "speed"), [(0.01, sqrt(0.44 / 1.8)), (0.02, 0.48876261)])
-def test_hopf_speed_of_the_paper(damping: float, speed: float) -> None:
-    (point,) = hopf_points(replace(PAPER, damping=damping))
-    assert point.belt_speed == pytest.approx(speed, rel=1e-8)
-    assert point.angular_frequency == pytest.approx(1.0, rel=1e-12)
-    assert point.crossing_speed == pytest.approx(-1.8 * speed, rel=1e-8)
-    assert point.first_lyapunov_coefficient == pytest.approx(-0.225, rel=1e-12)
-    assert point.supercritical
 
 
 @pytest.mark.parametrize(
@@ -72,16 +61,10 @@ def test_the_coefficient_is_that_of_the_motion_in_the_open_loop() -> None:
     assert amplitude**2 == pytest.approx(-alpha / point.first_lyapunov_coefficient, rel=0.01)
 
 
-@pytest.mark.parametrize(
-    ("corner_frequency", "cubic", "excess"),
-    [pytest.param(0.2, 0.0, 4e-4, marks=pytest.mark.long), (2.0, -3.0, 4e-3)],
-)
-def test_the_coefficient_is_that_of_the_motion_in_the_closed_loop(
-    corner_frequency: float, cubic: float, excess: float
-) -> None:
-    gains = Washout(corner_frequency, 0.0, cubic)
+def test_the_coefficient_is_that_of_the_motion_in_the_closed_loop() -> None:
+    gains = Washout(2.0, 0.0, -3.0)
     critical = critical_gains(PAPER, gains)
-    above = replace(gains, linear_gain=critical.linear + excess)
+    above = replace(gains, linear_gain=critical.linear + 4e-3)
     expansion = expand(PAPER, above)
     alpha = float(expansion.eigenvalues[0].real)
     amplitude = speed_amplitude(PAPER, above, 12000)

@@ -122,15 +122,6 @@ def test_the_critical_gain_tends_to_that_of_the_continuous_loop(
     assert max(errors) < 100.0 * (1.0 + corner_frequency) ** 4
 
 
-def test_units_do_not_matter() -> None:
-    """The feed drive is the paper's drive at 100 rad/s, with 1e4 N s/m for a gain of one."""
-    paper, feed = loop_of(PAPER, 10.0, 0.13), loop_of(FEED_DRIVE, 1000.0, 0.0013)
-    assert feed.critical_linear_gain(20.0) == pytest.approx(1e4 * paper.critical_linear_gain(0.2))
-    one, other = Washout(0.2, -0.3, 0.0), Washout(20.0, -3000.0, 0.0)
-    assert feed.spectral_radius(other) == pytest.approx(paper.spectral_radius(one), rel=1e-12)
-    assert feed.decay_rate(other) == pytest.approx(100.0 * paper.decay_rate(one))
-
-
 def test_the_settling_time_is_that_to_a_hundredth() -> None:
     assert settling_time(0.1) == pytest.approx(10.0 * log(100.0))
     assert settling_time(-0.1) is None

@@ -10,7 +10,7 @@ from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.model.actuator import Actuator
 from stickslip_ros.model.control import Washout
 from stickslip_ros.model.drive import Drive
-from stickslip_ros.model.friction import Dahl
+from stickslip_ros.model.friction import Coulomb, Dahl, Directional
 from stickslip_ros.model.signals import sine
 from stickslip_ros.theory.critical_gains import critical_gains, limit_cycle_from_hopf
 from stickslip_ros.theory.cycle_bounds import (
@@ -28,14 +28,13 @@ from stickslip_ros.theory.linear_sampled_loop import LinearSampledLoop
 from stickslip_ros.theory.shooting import shoot
 from stickslip_ros.theory.sticking import sticking_onset
 from tests.drives import PAPER
-from tests.parts import OneSided
 
 GAINS = Washout(2.0, -1.0, -1.0)
 
 
 SWING = sine(0.05)
 REMEMBERS = replace(PAPER, friction=Dahl(static=0.4, bristle_stiffness=5.0))
-ONE_WAY = replace(PAPER, friction=OneSided())
+ONE_WAY = replace(PAPER, friction=Directional(Coulomb(0.4), Coulomb(0.6)))
 LOADED = replace(PAPER, load=SWING)
 CARRIED = replace(PAPER, belt=SWING, load=SWING)
 
@@ -43,7 +42,7 @@ LAGGING = replace(PAPER, actuator=Actuator(time_constant=0.5))
 
 SENTENCES = {
     "memory": (REMEMBERS, "the friction law dahl has a memory (z)"),
-    "one way": (ONE_WAY, "the friction law one_sided differs between forward and backward slip"),
+    "one way": (ONE_WAY, "the friction law coulomb differs between forward and backward slip"),
     "load": (LOADED, "the drive has a signal of its load"),
     "spring": (replace(PAPER, stiffness=0.0), "needs a spring: the drive has stiffness = 0 N/m"),
     "belt and load": (CARRIED, "the drive has a signal of its belt and its load"),
