@@ -8,7 +8,6 @@ import pytest
 from scipy.linalg import expm
 from scipy.optimize import brentq
 
-from stickslip_ros.model.drive import Drive
 from stickslip_ros.model.friction import Coulomb, Dahl, Stribeck
 from stickslip_ros.model.signals import ramp
 from stickslip_ros.motion import Motion, RecordedMotion
@@ -114,25 +113,6 @@ def test_a_lag_may_come_and_go() -> None:
     assert motion.applied_force == pytest.approx(120.0, rel=1e-12)
     motion.set_forces(50.0, 0.0)
     assert motion.applied_force == pytest.approx(50.0, rel=1e-12)
-
-
-@pytest.mark.parametrize("drive", [FEED_DRIVE, replace(FEED_DRIVE, belt=ramp(0.01, duration=0.5))])
-def test_drives_with_and_without_lag_of_one_class_do_not_share_equations(drive: Drive) -> None:
-    ends: list[float] = []
-    for actuator in (
-        lag(0.0),
-        lag(0.004),
-        lag(0.0),
-    ):
-        motion = Motion(replace(drive, actuator=actuator), 0.0, 0.0)
-        motion.set_forces(100.0, 0.0)
-        motion.advance(0.02)
-        ends.append(motion.position)
-    ideal = Motion(drive, 0.0, 0.0)
-    ideal.set_forces(100.0, 0.0)
-    ideal.advance(0.02)
-    assert ends[0] == ends[2] == ideal.position
-    assert abs(ends[1] - ends[0]) > 1e-6
 
 
 def test_friction_is_that_under_the_lagged_force() -> None:

@@ -11,7 +11,6 @@ from stickslip_ros.model import signals
 from stickslip_ros.model.drive import Drive
 from stickslip_ros.model.friction import Coulomb, Directional, Exponential
 from stickslip_ros.motion import Motion
-from stickslip_ros.motion.sampled_loop import SampledLoop
 from tests.drives import FEED_DRIVE
 
 # Of Janot, Gautier, Brunot, 2019: friction in N over 1000 N, and an offset.
@@ -102,25 +101,6 @@ def test_stick_is_stick(drive: Drive, sign: float) -> None:
             motion.advance(HOUR / steps)
         assert motion.sticking
         assert (motion.position, motion.velocity) == (before, 0.0)
-
-
-@pytest.mark.parametrize("drive", HELD)
-def test_stick_is_stick_in_the_sampled_loop(drive: Drive) -> None:
-    force = break_away(drive, 1.0, 0.1)
-    loop = SampledLoop(Motion(drive, 0.1, 0.0), rate=5.0, start=0, force_delay=0.07)
-    assert loop.offer(loop.sample.stamp, force)
-    loop.advance()  # up to its arrival the first force is zero: the slide may move
-    for _ in range(10):
-        loop.offer(loop.sample.stamp, force)
-        sample = loop.advance()
-    loop.reset(0.1, 0.0)
-    loop.offer(loop.sample.stamp, force)
-    first = sample = loop.advance()
-    for _ in range(round(HOUR * 5.0)):
-        loop.offer(sample.stamp, force)
-        sample = loop.advance()
-        assert (sample.position, sample.velocity) == (first.position, 0.0)
-    assert sample.stamp - first.stamp == HOUR * 1_000_000_000
 
 
 STEP = 0.05  # s

@@ -40,11 +40,11 @@ def check(drive: RandomDrive, periods: float = PERIODS) -> None:
 
 
 def random_cases() -> Generator[Any]:
-    """Two drives for each course in each place, and some more where time is short."""
+    """One drive for each course in each place, and some more where time is short."""
     for seed, (i, kind), (j, place) in product(range(5), enumerate(KINDS), enumerate(PLACES)):
         law = LAWS[(seed + i) % len(LAWS)]
         quick = (seed + i + 3 * j) % 10 == 0
-        if quick or seed < 2:
+        if quick or seed == 0:
             yield pytest.param(law, kind, place, seed, marks=() if quick else pytest.mark.long)
 
 

@@ -106,12 +106,6 @@ def test_an_elasto_plastic_contact_does_not_drift_below_its_break_away() -> None
     assert np.all(np.diff(above) > 1e-3 * DEFLECTION)
 
 
-def test_a_load_below_break_away_moves_a_dahl_contact_by_its_logarithm() -> None:
-    """From z' = v (1 - S z/f_c): S x = -f_c ln(1 - 0.9), 2.303 f_c."""
-    (found,) = displacements(Dahl(COEFFICIENT, STIFFNESS), [0.9 * LIMIT], hold=100.0)
-    assert found == pytest.approx(DEFLECTION * log(10.0), rel=1e-9)
-
-
 @pytest.mark.parametrize("by_signal", [True, False])
 @pytest.mark.parametrize("faster", [0.06, 0.02])
 def test_elements_slip_on_where_the_belt_jumps_without_a_change_of_direction(
