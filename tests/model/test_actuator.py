@@ -38,7 +38,7 @@ def test_a_command_is_limited_rounded_and_limited(
 
 
 @given(st.floats(1.0, 1e6), st.floats(1e-3, 10.0), st.floats(-1e7, 1e7))
-@examples(quick=50, thorough=500)
+@examples(quick=50, thorough=100)
 def test_the_force_is_within_the_limit_and_near_the_command(
     limit: float, resolution: float, command: float
 ) -> None:

@@ -28,7 +28,7 @@ def test_an_exact_sensor_measures_nothing() -> None:
 
 
 @given(st.floats(-1e3, 1e3), st.floats(1e-9, 1.0))
-@examples(quick=50, thorough=500)
+@examples(quick=50, thorough=100)
 def test_a_position_is_rounded_to_the_nearest_step(position: float, resolution: float) -> None:
     told, _ = measured(Sensor(resolution), np.array([position]))
     assert abs(told[0] - position) <= resolution * (0.5 + 1e-6)
@@ -81,7 +81,7 @@ def test_the_noise_of_many_samples_is_normal_and_white() -> None:
 
 
 @given(st.integers(0, 5000), st.integers(0, 2**62))
-@examples(quick=20, thorough=200)
+@examples(quick=20, thorough=60)
 def test_noise_depends_on_seed_and_number_only(first: int, seed: int) -> None:
     sensor = Sensor(position_noise=1.0, seed=seed)
     whole, _ = measured(sensor, np.zeros(first + 30))

@@ -80,7 +80,7 @@ def cases(draw: st.DrawFn) -> Case:
 
 
 @given(cases(), st.floats(0.0, 12.0))
-@examples(quick=100, thorough=500)
+@examples(quick=100, thorough=200)
 def test_values_are_those_of_the_definition(case: Case, time: float) -> None:
     assume(all(abs(time - corner) > 1e-9 for corner in case.corners))
     assert case.signal.at(time) == pytest.approx(case.defined(time), abs=1e-9)
@@ -90,7 +90,7 @@ def test_values_are_those_of_the_definition(case: Case, time: float) -> None:
 
 
 @given(cases(), st.floats(0.0, 8.0), st.floats(0.0, 4.0))
-@examples(quick=20, thorough=500)
+@examples(quick=20, thorough=100)
 def test_the_integral_is_exact(case: Case, start: float, length: float) -> None:
     end = start + length
     places = sorted({start, end, *(c for c in case.corners if start < c < end)})
@@ -102,7 +102,7 @@ def test_the_integral_is_exact(case: Case, start: float, length: float) -> None:
 
 
 @given(cases(), st.floats(0.0, 8.0))
-@examples(quick=50, thorough=500)
+@examples(quick=50, thorough=200)
 def test_velocity_and_acceleration_are_derivatives(case: Case, time: float) -> None:
     step, signal = 1e-4, case.signal
     assume(all(abs(time - corner) > 2.0 * step for corner in case.corners))

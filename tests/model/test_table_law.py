@@ -20,9 +20,7 @@ def tables(draw: st.DrawFn) -> Table:
 
 
 @given(tables(), st.floats(0.0, 10.0))
-def test_a_table_is_exact_at_its_points_and_between_them_elsewhere(
-    law: Table, elsewhere: float
-) -> None:
+def test_a_table_is_exact_at_its_points_and_between_them(law: Table, elsewhere: float) -> None:
     assert law.refusal() is None
     for speed, value in law.points:
         assert law.coefficient(speed, 1.0) == pytest.approx(-value, rel=1e-14, abs=1e-15)

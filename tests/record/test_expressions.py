@@ -80,7 +80,7 @@ def test_a_list_is_split_at_commas_outside_of_brackets_and_quotes() -> None:
     assert parts_of(",".join(parts)) == parts
 
 
-@examples(quick=200, thorough=2000, deadline=None)
+@examples(quick=200, thorough=500, deadline=None)
 @given(st.text(alphabet="xt#12.+-*/()'\"e, unwrap[]", max_size=30))
 def test_any_text_has_a_value_or_is_refused(text: str) -> None:
     try:

@@ -401,7 +401,7 @@ def test_topics_of_ros2_control_are_joint_states(tmp_path: Path, kind: str) -> N
         ss.read_bag(tmp_path / "bag")
 
 
-@examples(quick=4, thorough=100, deadline=None)
+@examples(quick=4, thorough=40, deadline=None)
 @given(seed=st.integers(0, 2**32), kind=st.sampled_from(KINDS))
 def test_damaged_topics_of_ros2_control_are_measured_or_refused(
     tmp_path_factory: pytest.TempPathFactory, seed: int, kind: str
@@ -434,7 +434,7 @@ def machine(chance: random.Random) -> list[tuple[str, int, bytes]]:
     return messages
 
 
-@examples(quick=15, thorough=250, deadline=None)
+@examples(quick=15, thorough=80, deadline=None)
 @given(
     seed=st.integers(0, 2**32),
     layout=st.builds(

@@ -223,15 +223,6 @@ def test_coarse_data_do_not_tell_whether_it_sticks(tmp_path: Path) -> None:
     )
 
 
-def test_a_few_samples_in_each_rest_tell_that_it_sticks(tmp_path: Path) -> None:
-    time, position = stairs(8.0, 30.0)
-    path = csv_of(tmp_path / "log.csv", **lists(t=time, x=np.round(position / 1e-6) * 1e-6))
-    report = report_of_recording(path, {"time": "t", "position": "x"})
-    assert report["regime"] == "stick_slip"
-    error = report["errors"]["stick_fraction"]
-    assert report["stick_fraction"] == pytest.approx(0.75, abs=2.0 * error)
-
-
 @pytest.mark.parametrize(
     ("name", "form", "newtons"),
     [

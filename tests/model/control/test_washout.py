@@ -39,7 +39,7 @@ def filtered(corner_frequency: float, steps: Sequence[tuple[int, float]]) -> lis
 
 
 @given(st.floats(0.01, 100.0), measurements)
-def test_the_force_is_linear_plus_cubic_in_the_filter_that_is_exact_for_held_measurements(
+def test_the_force_is_linear_and_cubic_in_the_exactly_filtered_velocity(
     corner_frequency: float, steps: list[tuple[int, float]]
 ) -> None:
     washout = Controller(Washout(corner_frequency, linear_gain=-3.0, cubic_gain=-5.0))
