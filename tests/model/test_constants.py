@@ -6,10 +6,8 @@ from typing import Any
 import pytest
 
 from stickslip_ros.model.constants import (
-    Parameter,
     Scales,
     constant,
-    constants_of,
     scaled,
     unit_powers,
 )
@@ -24,19 +22,6 @@ class Part:
     loss: Any = constant(0.5, "Loss of the part.", at_least=0.0)
     amplitude: Any = constant(6.0, "Amplitude of the part.", "N")
     note: str = "not a constant"
-
-
-def test_the_constants_of_a_part() -> None:
-    assert dict(constants_of(Part)) == {
-        "stiffness": Parameter(
-            "stiffness", 3.0, "Stiffness of the part.", "N/m", float("-inf"), positive=True
-        ),
-        "loss": Parameter("loss", 0.5, "Loss of the part.", None, 0.0, positive=False),
-        "amplitude": Parameter(
-            "amplitude", 6.0, "Amplitude of the part.", "N", float("-inf"), positive=False
-        ),
-    }
-    assert list(constants_of(Part)) == ["stiffness", "loss", "amplitude"]
 
 
 @pytest.mark.parametrize(

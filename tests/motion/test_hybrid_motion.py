@@ -148,7 +148,7 @@ ROUNDED = Case(Drive(1.0, 0.0, 1e8, 1.0, 0.0, Stribeck(1.0, 0.0, 1e-4)), 0.0, 0.
 @example(STARTING, [])
 @example(SUDDEN, [])
 @example(ROUNDED, [0.71875, 2.2250738585e-313])
-@examples(quick=25, thorough=100)
+@examples(quick=25, thorough=60)
 def test_cutting_a_motion_anywhere_changes_nothing(case: Case, cuts: list[float]) -> None:
     duration = 5.0 / case.drive.angular_frequency
     whole, cut = case.motion(RecordedMotion), case.motion(RecordedMotion)
@@ -162,7 +162,7 @@ def test_cutting_a_motion_anywhere_changes_nothing(case: Case, cuts: list[float]
 
 
 @given(cases())
-@examples(quick=15, thorough=40)
+@examples(quick=15, thorough=30)
 def test_a_plain_drive_moves_as_any_other(case: Case) -> None:
     """The quick system of a plain drive, recorded or not, and the general one move alike."""
     quick, recorded = case.motion(), case.motion(RecordedMotion)
@@ -178,7 +178,7 @@ def test_a_plain_drive_moves_as_any_other(case: Case) -> None:
 
 
 @given(cases(), cases())
-@examples(quick=15, thorough=40)
+@examples(quick=15, thorough=30)
 def test_motions_do_not_disturb_each_other(case: Case, other: Case) -> None:
     def run(one: Case, between: Callable[[], object] = lambda: None) -> tuple[float, float]:
         motion = one.motion()
@@ -195,7 +195,7 @@ def test_motions_do_not_disturb_each_other(case: Case, other: Case) -> None:
 
 
 @given(cases())
-@examples(quick=25, thorough=100)
+@examples(quick=25, thorough=60)
 def test_time_never_goes_back_and_there_is_no_endless_chatter(case: Case) -> None:
     check_phases(case)
 
@@ -262,7 +262,7 @@ def margins_of(motion: Motion, time: float) -> FloatArray:
 
 
 @given(cases())
-@examples(quick=15, thorough=75)
+@examples(quick=15, thorough=30)
 def test_no_guard_is_passed_over(case: Case) -> None:
     motion = case.motion()
     omega = case.drive.angular_frequency
@@ -286,7 +286,7 @@ NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)
 
 
 @given(cases())
-@examples(quick=10, thorough=50)
+@examples(quick=10, thorough=30)
 def test_the_energy_gained_is_the_work_done(case: Case) -> None:
     drive, duration = case.drive, 5.0 / case.drive.angular_frequency
     recorded = case.motion(RecordedMotion)

@@ -61,7 +61,7 @@ def motion_of(drive: Drive, control: Washout | None) -> RecordedMotion:
     st.integers(0, 1000),
     st.none() | st.tuples(st.floats(0.1, 2.0), st.floats(-0.5, 0.2)),
 )
-@examples(quick=3, thorough=20)
+@examples(quick=3, thorough=12)
 def test_what_recurs_is_equal_to_the_last_bit(
     law: str, seed: int, gains: tuple[float, float] | None
 ) -> None:
@@ -150,7 +150,7 @@ def observed(law: str, kind: str, place: str, seed: int, part: str) -> list[obje
     st.integers(0, 1000),
     st.sampled_from([*PARTS]),
 )
-@examples(quick=4, thorough=25)
+@examples(quick=4, thorough=12)
 def test_the_motion_is_that_of_the_general_case(
     law: str, kind: str, place: str, seed: int, part: str
 ) -> None:

@@ -92,15 +92,6 @@ def test_a_bad_force_is_dropped(realtime: bool, stamp: int, force: float, verdic
     assert loop.acting == 0.75
 
 
-def test_lockstep_takes_no_answer_to_a_sample_that_has_passed() -> None:
-    loop = Loop()
-    loop.advance_by(2)
-    assert loop.answer(1, 0.5) is Verdict.TOO_LATE
-    assert dict(loop.answers.dropped) == {Verdict.TOO_LATE: 1}
-    loop.advance()
-    assert loop.acting == 0.0
-
-
 def test_a_late_force_that_a_newer_one_replaces_before_it_acts_is_told() -> None:
     told: list[tuple[int, float]] = []
     loop = Loop(realtime=True, overtaken=lambda *force: told.append(force))
@@ -191,17 +182,6 @@ def test_a_bad_force_does_not_bring_the_controller_back(stamp: int, force: float
     loop.advance_by(3)
     loop.offer(stamp, force)
     assert not loop.answers.controller_present
-
-
-def test_realtime_holds_the_newest_force_and_counts_what_is_late() -> None:
-    loop = Loop(realtime=True)
-    loop.advance()
-    assert (loop.acting, loop.answers.late_forces) == (0.0, 1)
-    loop.answer(1, 0.5)
-    loop.advance()
-    assert (loop.acting, loop.answers.late_forces) == (0.5, 1)
-    loop.advance_by(2)
-    assert (loop.acting, loop.answers.late_forces) == (0.5, 3)
 
 
 def test_realtime_takes_a_late_answer_if_it_is_the_newest() -> None:

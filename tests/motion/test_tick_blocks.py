@@ -134,7 +134,7 @@ def run(drive: Drive, law: ControlLaw, samples: int, *, blocks: bool) -> Run:
     st.sampled_from([0.01, 0.15]),
     st.integers(0, 1000),
 )
-@examples(quick=3, thorough=20)
+@examples(quick=3, thorough=12)
 def test_the_motion_is_that_of_single_ticks(
     friction: str, control: str, limit: float, step: float, seed: int
 ) -> None:

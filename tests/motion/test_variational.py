@@ -121,14 +121,6 @@ def moved_law(drive: Drive, law: Any, path: list[str], change: float) -> Any:
     return replace(law, **{path[0]: getattr(law, path[0]) + change * unit})
 
 
-def test_a_slide_that_sticks_keeps_its_distance_and_forgets_its_speed() -> None:
-    drive = drive_of("stribeck", moves=False)
-    motion = VariationalMotion(in_units_of(drive, drive), 0.0, 0.02)
-    motion.advance(PERIOD)
-    assert motion.sticking
-    assert motion.derivatives[0].tolist() == [1.0, 0.0] + [0.0] * (motion.derivatives.shape[1] - 2)
-
-
 def test_a_bias_of_zero_needs_no_equations_of_its_own() -> None:
     """Fits begin without one, and ask for derivatives by it all the same."""
     none, some = (replace(PAPER, bias_force=force) for force in (0.0, 5.0))

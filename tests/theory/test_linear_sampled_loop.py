@@ -261,33 +261,9 @@ def test_the_stable_gains(drive: Drive, delay: float, lag: float, spans: int) ->
 
 @pytest.mark.parametrize(("delay", "spans"), [(0.0, 0), (2.7e-3, 0), (2.7e-3, 6), (6e-3, 3)])
 def test_the_loop_of_a_slower_controller_is_one_sampled_as_slowly(delay: float, spans: int) -> None:
-    """The motion, with the same jitter of the forces, and the matrix."""
-    law = Washout(20.0, -3000.0, 0.0)
-    motions: list[list[float]] = []
-    for every in (3, 1):
-        motion = Motion(FEED_DRIVE, FEED_DRIVE.equilibrium_position + 1e-5, 0.0)
-        measured = sensor(spans * every // 3)
-        loop = SampledLoop(
-            motion,
-            300.0 * every,
-            LOCKSTEP_START,
-            force_delay=delay,
-            force_jitter=delay,
-            sensor=measured,
-            answer_every=every,
-        )
-        controller, found = Controller(law), list[float]()
-        for number in range(80 * every):
-            answer(loop, controller)
-            if number % every == 0:
-                found.append(loop.true_sample.position)
-            loop.advance()
-        motions.append(found)
-    fast, slow = np.array(motions)
-    assert np.ptp(fast) > 1e-5
-    assert fast == pytest.approx(slow, rel=1e-10)
     loop = LinearSampledLoop.from_drive(FEED_DRIVE, 900.0, delay, sensor(spans), answer_every=3)
     slower = loop_of(FEED_DRIVE, 300.0, delay, sensor(spans // 3))
+    law = CONTROL_LAWS[0]
     assert np.array_equal(loop.transition_matrix(law), slower.transition_matrix(law))
 
 
