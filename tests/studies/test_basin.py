@@ -60,7 +60,7 @@ def share(basins: Basins, *regimes: Regime) -> float:
 
 @pytest.mark.parametrize(
     ("belt_speed", "count"),
-    [(1.5, 60), *(pytest.param(v, 400, marks=pytest.mark.long) for v in [*PUBLISHED][::2])],
+    [(1.5, 60), *(pytest.param(v, 200, marks=pytest.mark.long) for v in [*PUBLISHED][::2])],
 )
 def test_the_shares_are_the_published_ones(belt_speed: float, count: int) -> None:
     scenario = free(*EXPONENTIAL, f"plant.belt_speed={belt_speed}")

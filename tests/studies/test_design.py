@@ -117,9 +117,8 @@ def test_gains_beyond_a_limit_are_no_proposal_and_it_is_told_by_how_much() -> No
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("seed", [8, 58])  # with 58 a reserve would cost most of the rate
-def test_a_grid_of_gains_is_not_faster(seed: int) -> None:
-    found = compare(seed)
+def test_a_grid_of_gains_is_not_faster() -> None:
+    found = compare(58)  # of which a reserve would cost most of the rate
     assert found.decay_rate is not None
     assert found.found
     assert all(found.held)

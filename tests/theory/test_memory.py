@@ -6,7 +6,6 @@ from math import sqrt
 import numpy as np
 import pytest
 
-from stickslip_ros.measures import CycleMeter
 from stickslip_ros.model.control import Washout
 from stickslip_ros.model.drive import Drive
 from stickslip_ros.model.friction import (
@@ -23,6 +22,7 @@ from stickslip_ros.theory.hopf import hopf_points
 from stickslip_ros.theory.limit_cycles import limit_cycles
 from stickslip_ros.theory.linear import expand
 from stickslip_ros.theory.shooting import LimitCycle, shoot
+from tests.drives import settled
 
 CURVE = Exponential(static=0.4, kinetic=0.25, decay_speed=0.02)
 FEED = Drive(100.0, 200.0, 1e6, 1000.0, 0.04, LuGre(CURVE, 1e5, 100.0))
@@ -91,19 +91,6 @@ def test_the_critical_gain_divides_stable_from_unstable(
         assert bool(np.all(expansion.eigenvalues.real < 0.0)) is stable
 
 
-def cycle_by_simulation(drive: Drive, duration: float) -> tuple[float, float, float]:
-    motion = RecordedMotion(drive, 0.0, 0.0)
-    motion.recording = False
-    motion.advance(duration)
-    motion.recording = True
-    motion.take_breakpoints()
-    motion.advance(duration)
-    meter = CycleMeter(10)
-    meter.feed(motion.take_breakpoints(), drive.belt_speed)
-    measures = meter.measures()
-    return measures.amplitude, measures.period, measures.stick_fraction
-
-
 @pytest.mark.parametrize(
     "drive",
     [
@@ -115,10 +102,11 @@ def cycle_by_simulation(drive: Drive, duration: float) -> tuple[float, float, fl
 def test_the_stable_cycle_is_that_of_a_long_run(drive: Drive) -> None:
     cycles = [cycle for cycle in limit_cycles(drive) if cycle.stable]
     assert len(cycles) == 1
-    amplitude, period, fraction = cycle_by_simulation(drive, 3.0)
+    run = settled(RecordedMotion(drive, 0.0, 0.0), 50.0, 50.0, window=10)
     measures = cycles[0].measures
-    assert (measures.amplitude, measures.period) == pytest.approx((amplitude, period), rel=1e-9)
-    assert measures.stick_fraction == pytest.approx(fraction, rel=1e-6)
+    found = measures.amplitude, measures.period
+    assert found == pytest.approx((run.amplitude, run.period), rel=1e-9)
+    assert measures.stick_fraction == pytest.approx(run.stick_fraction, rel=1e-6)
 
 
 def by_differences(drive: Drive, cycle: LimitCycle) -> float:
