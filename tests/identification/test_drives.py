@@ -64,12 +64,6 @@ def check_constants(found: Findings, true: Mapping[str, float]) -> None:
     assert notes(found) == []
 
 
-def test_constants_are_within_their_errors() -> None:
-    own = study.record("coulomb", "ramp", seed=7, duration=2.5)
-    found = identify([own], "coulomb", {"normal_force": study.NORMAL_FORCE})
-    check_constants(found, study.truth("coulomb", "ramp"))
-
-
 def test_a_search_ends_with_the_best_so_far() -> None:
     """The law with the best regression is fitted in any case."""
     own = study.record("stribeck", "stick", seed=7, duration=1.0)

@@ -82,16 +82,6 @@ def test_no_gain_stabilises_at_the_very_end(slope: float, corner_frequency: floa
     assert critical_gains(drive, Washout(corner_frequency, 0.0, -1.0)) is None
 
 
-def test_no_gain_stabilises_where_the_filter_passes_too_little() -> None:
-    drive = replace(PAPER, belt_speed=0.2)  # p = 0.358
-    too_fast = Washout(3.0, 0.0, 0.0)
-    assert critical_gains(drive, too_fast) is None
-    for linear in (-1e3, -10.0, -1.0, 0.0, 1.0, 1e3):
-        expansion = expand(drive, replace(too_fast, linear_gain=linear))
-        assert not expansion.stable
-    assert critical_gains(replace(PAPER, belt_speed=0.0), too_fast) is None
-
-
 SUBCRITICAL = Washout(0.2, -0.16, 2.0)
 """Beyond the critical gain (-0.148), with more cubic gain than the critical one (0.649)."""
 
@@ -136,4 +126,5 @@ def test_none_on_the_other_side_of_the_critical_gain() -> None:
     assert limit_cycle_from_hopf(PAPER, replace(SUBCRITICAL, linear_gain=-0.13)) is None
     assert limit_cycle_from_hopf(PAPER, Washout(10.0, -1.0, 0.0)) is None
     resting = replace(PAPER, belt_speed=0.0)
+    assert critical_gains(resting, SUBCRITICAL) is None
     assert limit_cycle_from_hopf(resting, SUBCRITICAL) is None
