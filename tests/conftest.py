@@ -45,13 +45,7 @@ if "HEYOKA_CACHE_DIR" not in os.environ:
         rmtree(_compiled)
     os.environ["HEYOKA_CACHE_DIR"] = str(_compiled)
 
-STARTING_FIXTURES = {
-    "cluster",
-    "processes",
-    "start",
-    "start_stickslip",
-    "with_packages",
-}
+STARTING_FIXTURES = {"cluster", "processes", "start", "start_stickslip", "with_packages"}
 
 _STARTS = {"os.fork", "os.forkpty", "os.posix_spawn", "os.system", "subprocess.Popen"}
 _FOUND_BY_LIBRARIES = {"fc-list", "ldconfig", "/sbin/ldconfig"}

@@ -20,12 +20,7 @@ SATURATING = Table(
 def axis(friction: FrictionLaw) -> Drive:
     """Return an axis of 95 kg."""
     return Drive(
-        mass=95.0,
-        damping=0.0,
-        stiffness=0.0,
-        normal_force=1.0,
-        belt_speed=0.0,
-        friction=friction,
+        mass=95.0, damping=0.0, stiffness=0.0, normal_force=1.0, belt_speed=0.0, friction=friction
     )
 
 

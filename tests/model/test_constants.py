@@ -5,12 +5,7 @@ from typing import Any
 
 import pytest
 
-from stickslip_ros.model.constants import (
-    Scales,
-    constant,
-    scaled,
-    unit_powers,
-)
+from stickslip_ros.model.constants import Scales, constant, scaled, unit_powers
 
 SCALES = Scales(length=2.0, speed=8.0, force=32.0)
 """A unit of time of 2 / 8 = 0.25 s and a unit of mass of 32 0.25^2 / 2 = 1 kg."""

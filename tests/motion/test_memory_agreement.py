@@ -45,10 +45,7 @@ def test_many_elements_are_compiled_in_another_way_and_move_as_their_reference()
     law: Any = drive.drive.friction
     both = (replace(each, elements=8) for each in (law.forward, law.reverse))
     drive = replace(
-        drive,
-        drive=replace(drive.drive, friction=Directional(*both)),
-        forward=ahead,
-        backward=back,
+        drive, drive=replace(drive.drive, friction=Directional(*both)), forward=ahead, backward=back
     )
     assert drive.error(drive.motion(), drive.reference(1e-10)) < REQUIRED["maxwell_slip"]
 

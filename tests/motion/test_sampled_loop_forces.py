@@ -417,13 +417,7 @@ def test_a_force_acts_or_is_told_to_be_overtaken_or_is_still_under_way(
 def controlled(delay: float, jitter: float) -> Measures:
     """The feed drive with its washout, from half a second on; 1 ms from sample to sample."""
     motion = RecordedMotion(FEED_DRIVE, 0.0, 0.0)
-    loop = SampledLoop(
-        motion,
-        1000.0,
-        LOCKSTEP_START,
-        force_delay=delay,
-        force_jitter=jitter,
-    )
+    loop = SampledLoop(motion, 1000.0, LOCKSTEP_START, force_delay=delay, force_jitter=jitter)
     law = Controller(Washout(20.0, -3000.0, 0.0, start_after=0.5))
     return simulate_sampled(loop, motion, law, 5.0, CycleMeter(20))
 

@@ -36,10 +36,7 @@ def sampled(
 
 
 def continuous(
-    washout: Washout | None,
-    duration: float,
-    drive: Drive = PAPER,
-    position: float = 0.0,
+    washout: Washout | None, duration: float, drive: Drive = PAPER, position: float = 0.0
 ) -> tuple[Measures, Motion]:
     motion = RecordedMotion(drive, position, 0.0, washout)
     return simulate_continuous(motion, washout, duration, CycleMeter(20)), motion

@@ -290,10 +290,7 @@ def test_choices_that_a_bag_cannot_meet_are_refused(tmp_path: Path) -> None:
     for options, reason in (
         ({"force": "effort"}, "have no effort of axis: .* --force-topic names"),
         ({"force_topic": "/u"}, "force_topic = '/u' is refused: .* are /machine/commands, /mach"),
-        (
-            {"states_topic": COMMANDS},
-            "states_topic = .* that are sensor_msgs/.*, .* are /mach",
-        ),
+        ({"states_topic": COMMANDS}, "states_topic = .* that are sensor_msgs/.*, .* are /mach"),
         ({"force_topic": COMMANDS}, r"has 2 numbers: --force-topic 'NAME\[1\]' takes the first"),
         ({"force": "torque"}, "force = 'torque' is invalid: must be one of topic, effort"),
     ):

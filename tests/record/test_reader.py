@@ -143,11 +143,7 @@ def test_a_damaged_chunk_is_skipped_and_reported(bag, scratch):
     assert set(stamps) < set(range(COUNT))
 
 
-NO_INDEX = {
-    "index_types": IndexType.NONE,
-    "use_statistics": False,
-    "use_summary_offsets": False,
-}
+NO_INDEX = {"index_types": IndexType.NONE, "use_statistics": False, "use_summary_offsets": False}
 OPTIONS_OF_WRITERS = (
     {"use_chunking": False},
     {"compression": CompressionType.ZSTD},

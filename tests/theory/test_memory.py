@@ -31,12 +31,7 @@ MAXWELL_SLIP = replace(FEED, friction=MaxwellSlip(CURVE, 1e5, 3, 1000.0))
 ELASTO_PLASTIC = replace(FEED, friction=ElastoPlastic(CURVE, 1e5, 100.0))
 GAINS = Washout(20.0, linear_gain=-3000.0, cubic_gain=0.0)
 
-LAWS = [
-    FEED.friction,
-    ELASTO_PLASTIC.friction,
-    MAXWELL_SLIP.friction,
-    Dahl(0.4, 1e5),
-]
+LAWS = [FEED.friction, ELASTO_PLASTIC.friction, MAXWELL_SLIP.friction, Dahl(0.4, 1e5)]
 
 
 @pytest.mark.parametrize("law", LAWS, ids=lambda law: law.name)
