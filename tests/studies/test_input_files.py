@@ -102,7 +102,7 @@ def test_a_study_has_the_content_that_it_began_with(name: str, curve: Path, part
         assert list(journal.columns.points()) == expected
 
 
-@pytest.mark.parametrize("trials", [4, pytest.param(100, marks=pytest.mark.long)])
+@pytest.mark.parametrize("trials", [4, pytest.param(40, marks=pytest.mark.long)])
 def test_random_interruptions_neither_mix_nor_lose_a_point(
     trials: int, curve: Path, part: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
