@@ -122,13 +122,6 @@ def test_the_committed_study() -> None:
     assert 0.92 <= np.average([case["covered"] for case in cases], weights=counts) <= 0.98
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("case", conditions.CASES[1:10:2])
-def test_a_twentieth_of_the_study(case: str) -> None:
-    """Of 25 intervals of 95 %."""
-    assert conditions.summary(case, 5)["covered"] > 0.8
-
-
 def test_what_is_known_is_not_fitted(coulomb: Findings) -> None:
     """The normal force scales the coefficients only."""
     fixed = {"force_delay": 0.0, "normal_force": 50.0, "mass": 95.0}
