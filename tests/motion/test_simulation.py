@@ -57,18 +57,6 @@ def test_without_control_it_is_the_motion_alone(simulate: Simulate) -> None:
     assert measures.stick_fraction == pytest.approx(cycle.stick_fraction, abs=1e-8)
 
 
-def test_the_controller_is_switched_on_after_a_while() -> None:
-    washout = replace(PAPER_GAINS, start_after=30.0)
-    for simulate in (sampled, continuous):
-        _, before = simulate(washout, 30.0)
-        alone = Motion(PAPER, 0.0, 0.0)
-        alone.advance(30.0)
-        assert before.position == pytest.approx(alone.position, abs=1e-10)
-        _, after = simulate(washout, 35.0)
-        alone.advance(5.0)
-        assert abs(after.position - alone.position) > 1e-2
-
-
 @pytest.mark.parametrize("simulate", [sampled, continuous])
 def test_a_motion_that_runs_away_ends_early_as_unbounded(simulate: Simulate) -> None:
     drive = replace(PAPER, friction=Linear(static=0.4, slope=0.9))
