@@ -71,21 +71,6 @@ def test_the_shares_are_the_published_ones(belt_speed: float, count: int) -> Non
     assert cycle + share(basins, Regime.EQUILIBRIUM) == pytest.approx(1.0)
 
 
-def test_under_the_papers_law_everything_leads_to_the_one_attractor() -> None:
-    # Rest loses stability at 0.48876 m/s, and the cycle is born there.
-    reach = Axis(POSITION, -1.0, 1.0, 3), Axis(VELOCITY, -1.0, 1.0, 3)
-    for belt_speed, regime in (
-        (0.2, Regime.STICK_SLIP),
-        (0.47, Regime.PURE_SLIP),
-        (0.51, Regime.EQUILIBRIUM),
-    ):
-        scenario = free(f"plant.belt_speed={belt_speed}")
-        (attractor,) = basins_of(scenario, Grid(reach)).attractors
-        assert attractor.regime is regime
-        assert attractor.steady
-        assert (attractor.count, attractor.share, attractor.standard_error) == (9, 1.0, 0.0)
-
-
 def test_beyond_the_critical_cubic_gain_rest_cycle_and_running_away_coexist() -> None:
     corner = "washout_controller.corner_frequency=0.5"
     drive = paper().plant.as_drive()

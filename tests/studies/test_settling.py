@@ -156,21 +156,6 @@ def test_a_slide_that_only_rode_the_belt_is_not_in_equilibrium() -> None:
     assert not settled.steady
 
 
-def _decaying(belt_speed: float) -> Settled:
-    """Return a small motion of the paper's drive near its Hopf point, at 0.4888 m/s."""
-    drive = replace(PAPER, belt_speed=belt_speed)
-    return settle(ControlledDrive(drive), MotionState(drive.equilibrium_position + 0.05, 0.0))
-
-
-def test_a_decaying_vibration_is_not_steady_and_a_limit_cycle_is() -> None:
-    dying, living = _decaying(0.4892), _decaying(0.48)
-    assert dying.measures.regime is Regime.PURE_SLIP
-    assert not dying.steady
-    assert living.measures.regime is Regime.PURE_SLIP
-    assert living.steady
-    assert settle(ControlledDrive(PAPER)).steady
-
-
 NEAR_HOPF = ((0.48623, 0.09960403562), (0.48667, 0.09052509850))
 """Belt speeds, and amplitudes of the stable limit cycles there, as shooting and runs of 20,000 s
 give them."""
