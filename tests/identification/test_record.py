@@ -222,24 +222,17 @@ def test_forces_of_a_bag_are_those_that_the_actuator_applies(tmp_path: Path) -> 
     messages: list[tuple[str, int, bytes]] = []
     for number in range(600):
         stamp = start + number * period
-        messages.append(
-            (STATES, stamp, pack_joint_state(stamp, (1e-6 * number, 0.0), (0.0,) * 2, (0.0,) * 2))
-        )
+        state = pack_joint_state(stamp, (1e-6 * number, 0.0), (0.0, 0.0), (0.0, 0.0))
+        messages.append((STATES, stamp, state))
         force = {0: 0.9, 300: 5.0}.get(number)
         if force is not None:
             messages.append((FORCES, stamp, pack_wrench(stamp, force)))
-    messages.append(
-        (
-            "/feed_drive/applied_disturbance",
-            start + 100 * period,
-            pack_wrench(start + 100 * period, 7.0),
-        )
-    )
+    at = start + 100 * period
+    messages.append(("/feed_drive/applied_disturbance", at, pack_wrench(at, 7.0)))
     messages.append(("/feed_drive/reference", start, pack_reference(start, Reference(0.25, None))))
     actuator = {"limit": "2.0", "resolution": "0.5", "time_constant": "0.001"}
-    plant = {f"actuator.{name}": value for name, value in actuator.items()} | {
-        "force_delay": "0.002"
-    }
+    plant = {f"actuator.{name}": value for name, value in actuator.items()}
+    plant["force_delay"] = "0.002"
     write_bag(tmp_path / "bag", messages, tables={"stickslip_ros/plant": plant})
     (record,) = read_records(tmp_path / "bag", {})
     assert record.delay == 0.002

@@ -70,10 +70,8 @@ def test_a_refusal_names_the_law_that_is_refused() -> None:
     good, bad = Stribeck(0.4, 0.25, 0.5), Stribeck(0.2, 0.25, 0.5)
     assert Directional(good, good).refusal() is None
     assert Directional(bad, good).refusal() == "minimum = 0.25 must not exceed static = 0.2"
-    assert (
-        Directional(good, bad).refusal()
-        == "reverse.minimum = 0.25 must not exceed reverse.static = 0.2"
-    )
+    reverse = "reverse.minimum = 0.25 must not exceed reverse.static = 0.2"
+    assert Directional(good, bad).refusal() == reverse
     assert Directional(Dahl(0.4, 20.0), Dahl(0.3, 20.0)).refusal() is None
     assert "bristle_stiffness" in Directional(Dahl(0.4, 20.0), Dahl(0.4, 30.0)).refusal()
 

@@ -141,13 +141,7 @@ def test_a_controller_that_comes_after_a_gap_counts_from_its_first_sample(realti
     loop = Loop(realtime, answer_every=3, force_timeout=0.0)
     loop.advance_by(5)
     assert loop.answer(4, 0.5) is (Verdict.ACCEPTED if realtime else Verdict.TOO_LATE)
-    assert [loop.answers.asks(number) for number in range(4, 9)] == [
-        True,
-        False,
-        False,
-        True,
-        False,
-    ]
+    assert [number for number in range(4, 9) if loop.answers.asks(number)] == [4, 7]
     loop.advance_by(2)
     assert not loop.answered
     assert loop.answer(7, 0.5) is Verdict.ACCEPTED

@@ -233,12 +233,8 @@ def test_columns_hold_what_the_single_messages_say(states, choices):
         except MessageError as error:
             refusals.append(str(error))
     columns, refused = joint_state_columns(messages)
-    assert (
-        str(rows(columns))
-        == str(  # NaN is NaN
-            [(*sample[:6], *(sample.motor or (math.nan, math.nan))) for sample in expected]
-        )
-    )
+    wanted = [(*sample[:6], *(sample.motor or (math.nan, math.nan))) for sample in expected]
+    assert str(rows(columns)) == str(wanted)  # NaN is NaN
     assert columns.stamp.dtype == np.int64
     assert refused == (len(refusals), refusals[0] if refusals else "")
 

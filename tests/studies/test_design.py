@@ -295,18 +295,13 @@ def test_on_a_slow_belt_too_the_vibration_is_seen() -> None:
     assert proposal(found).linear_gain < 0.0
 
 
-@pytest.mark.parametrize(
-    ("belt_speed", "said"),
-    [
-        (40.0, "40 m/s is 818.4 times the critical speed of 48.88 mm/s (belt speeds are in m/s)"),
-        (0.05, "(belt speeds are in m/s), with a very small margin"),
-    ],
-)
-def test_where_nothing_vibrates_it_is_told(belt_speed: float, said: str) -> None:
+@pytest.mark.parametrize("belt_speed", [40.0, 0.05])
+def test_where_nothing_vibrates_it_is_told(belt_speed: float) -> None:
     found = designed(belt_speeds=(belt_speed, belt_speed))
     remark = found.remark or ""
     assert remark.startswith("nothing vibrates")
-    assert said in remark
+    assert "(belt speeds are in m/s)" in remark
+    assert ("with a very small margin" in remark) is (belt_speed == 0.05)
     assert not any(check.vibrates for check in found.checks)
 
 

@@ -251,9 +251,7 @@ def test_continuous_control_refuses_what_it_does_not_have() -> None:
 def test_without_control_and_disturbance_nothing_is_sampled() -> None:
     without = "plant.expects_control=false"
     assert ControlledDrive.from_scenario(paper(without)) == ControlledDrive(PAPER)
-    assert (
-        ControlledDrive.from_scenario(paper(without, "plant.disturbance.kind=step")).sampled
-        is not None
-    )
+    disturbed = paper(without, "plant.disturbance.kind=step")
+    assert ControlledDrive.from_scenario(disturbed).sampled is not None
     assert ControlledDrive.from_scenario(paper()).sampled is not None
     assert ControlledDrive.from_scenario(paper(), continuous=True).sampled is None
