@@ -5,6 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from stickslip_ros.model.control import Washout
+from stickslip_ros.model.drive import Drive
 from stickslip_ros.model.friction import Coulomb, Exponential, FrictionLaw, Linear, Stribeck
 from stickslip_ros.theory.linear import expand, hurwitz_determinants
 from tests.drives import PAPER
@@ -42,6 +44,13 @@ def test_derivatives_are_those_of_the_law(law: FrictionLaw) -> None:
 
 def test_nothing_smooth_surrounds_a_slide_on_a_belt_at_rest() -> None:
     assert expand(replace(PAPER, belt_speed=0.0)) is None
+
+
+def test_continuous_control_is_the_jacobian_of_the_paper() -> None:
+    drive = Drive(1.0, 0.01, 1.0, 1.0, 0.49, Stribeck(0.4, 0.25, 0.5))
+    expansion = expand(drive, Washout(2.0, -0.3, 7.0))
+    rows = [[0.0, 1.0, 0.0], [-1.0, 0.44 - 1.8 * 0.49**2 - 0.3, 0.6], [0.0, 1.0, -2.0]]
+    assert expansion.jacobian == pytest.approx(np.array(rows), abs=1e-15)
 
 
 def test_a_neutral_equilibrium_is_neither_stable_nor_unstable() -> None:
