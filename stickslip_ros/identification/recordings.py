@@ -1,8 +1,6 @@
 """Reads what recordings, bags or tables, have for identification."""
 
-import json
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from dataclasses import replace
 from math import inf, isfinite, nan
 from pathlib import Path
@@ -17,6 +15,7 @@ from stickslip_ros.identification.record import FEWEST, Record, lagged
 from stickslip_ros.model.actuator import Actuator
 from stickslip_ros.record.bag_layout import ANY_LAYOUT, BagLayout
 from stickslip_ros.record.reader import Recording
+from stickslip_ros.record.report import values_of
 from stickslip_ros.record.table_clock import stamps_of
 from stickslip_ros.record.table_columns import ANY_FORM, Table, TableFormat
 from stickslip_ros.record.table_file import is_table, table_of
@@ -139,13 +138,9 @@ def _of_bag(
         forces, disturbances = recording.control_forces, recording.applied_disturbances
         references = recording.references
         notes = recording.notes
-        texts = recording.metadata("stickslip_ros/plant") or {}
+        plant = values_of(recording.metadata("stickslip_ros/plant") or {})
     if states.has_motor:
         raise _has_motor(path)
-    plant: dict[str, Any] = {}
-    for name, text in texts.items():
-        with suppress(ValueError, RecursionError):
-            plant[name] = json.loads(text)
     stamp = states.stamp
     columns = {"position": states.position, "belt_velocity": states.belt_velocity}
     columns["velocity"] = states.velocity

@@ -19,7 +19,7 @@ _SLOW_ROUNDING = 1e-9
 class BreakpointRecorder:
     """Keeps the breakpoints of the phases of a drive, until they are taken."""
 
-    def __init__(self, clock: MotionClock, stick_speed: float | None = None) -> None:
+    def __init__(self, clock: MotionClock, stick_speed: float | None) -> None:
         """Follow the clock of a motion; see `RecordedMotion` for the stick speed, m/s."""
         self._clock, self._stick_speed = clock, stick_speed
         self._recorded: list[tuple[float, float, float, bool]] = []

@@ -119,8 +119,8 @@ class DriveView:
         self,
         x: float,
         y: float,
-        memory: Sequence[float] | None = None,
-        motor: Sequence[float] | None = None,
+        memory: Sequence[float] | None,
+        motor: Sequence[float] | None,
     ) -> list[float]:
         """Return the dimensionless state at X and Y, with memory and motor in SI units.
 

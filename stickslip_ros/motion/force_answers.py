@@ -38,7 +38,7 @@ class Answers:
         hold_late: bool,
         expects_control: bool,
         overtaken: Callable[[int, float], None],
-        every: int = 1,
+        every: int,
     ) -> None:
         """Take answers to samples with these stamps, `period` (s) apart; see `SampledLoop`."""
         self.every = every

@@ -72,9 +72,7 @@ class HybridMotion:
     until the next one is entered. Keep no view of it.
     """
 
-    def __init__(
-        self, system: DriveSystem, state: list[float], detail: Detail = Detail.STATES
-    ) -> None:
+    def __init__(self, system: DriveSystem, state: list[float], detail: Detail) -> None:
         """Start at time zero with all inputs at zero."""
         self.budget = StepBudget()
         """Work that the motion may still take."""

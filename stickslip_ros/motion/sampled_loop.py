@@ -157,11 +157,13 @@ class SampledLoop:
         return (
             self._line.immediate
             and self.answers.every == 1
-            and self._line.limiter is self._scenario_disturbance is None
+            and self._line.limiter is None
+            and self._scenario_disturbance is None
             and self.disturbance == self.asked_disturbance == 0.0
             and self._sampler.is_plain
             and self.stamps.period.denominator == 1
-            and self._next_drive is self._next_start is None
+            and self._next_drive is None
+            and self._next_start is None
             and self._advance == self._motion.advance_under
         )
 

@@ -124,14 +124,8 @@ class VariationalMotion(Motion):
     are by the state then.
     """
 
-    def __init__(
-        self,
-        drive: Drive,
-        position: float,
-        velocity: float,
-        control: ContinuousControl | None = None,
-    ) -> None:
-        super().__init__(drive, position, velocity, control, Detail.DERIVATIVES | Detail.ROUGH)
+    def __init__(self, drive: Drive, position: float, velocity: float) -> None:
+        super().__init__(drive, position, velocity, detail=Detail.DERIVATIVES | Detail.ROUGH)
         self._derivatives = self.core.observer = Derivatives()
         self.core.note_start()
 

@@ -75,35 +75,26 @@ _HEADER = struct.Struct("<4s iI 5s")
 _HELD = struct.Struct("<4s iI 9s")
 
 
-def pack_joint_state(
-    stamp: int,
-    position: tuple[float, float],
-    velocity: tuple[float, float],
-    effort: tuple[float, float],
-) -> bytes:
-    """Serialize a sensor_msgs/msg/JointState of slide and belt, in this order, with no frame.
+def joint_state_packer(
+    *names: str, frame: str = ""
+) -> Callable[[int, Sequence[float], Sequence[float], Sequence[float]], bytes]:
+    """Return what serializes a sensor_msgs/msg/JointState of joints in this order, and its frame.
 
-    Stamp in ns, positions in m, velocities in m/s, efforts in N. Raises MessageError for a stamp
-    outside ROS time (32-bit seconds).
+    It takes the stamp in ns, and for each joint a position in m, a velocity in m/s and an effort in
+    N. It raises MessageError for a stamp outside ROS time (32-bit seconds).
     """
-    return _pack_joint_state(_JOINT_STATE, _JOINTS, stamp, position, velocity, effort)
+    (layout, joints), n = _joint_state_structure(*names, frame=frame), len(names)
+
+    def pack(
+        stamp: int, position: Sequence[float], velocity: Sequence[float], effort: Sequence[float]
+    ) -> bytes:
+        return _packed("joint state", layout, stamp, joints, n, *position, n, *velocity, n, *effort)
+
+    return pack
 
 
-def joint_state_packer(*names: str, frame: str = "") -> Callable[..., bytes]:
-    """Return `pack_joint_state` for joints of other names, or more of them, or with a frame."""
-    return partial(_pack_joint_state, *_joint_state_structure(*names, frame=frame))
-
-
-def _pack_joint_state(
-    layout: struct.Struct,
-    joints: bytes,
-    stamp: int,
-    position: tuple[float, ...],
-    velocity: tuple[float, ...],
-    effort: tuple[float, ...],
-) -> bytes:
-    n = len(position)
-    return _packed("joint state", layout, stamp, joints, n, *position, n, *velocity, n, *effort)
+pack_joint_state = joint_state_packer(SLIDE, BELT)
+"""Serializes a joint state of slide and belt."""
 
 
 def pack_reference(stamp: int, reference: Reference) -> bytes:
@@ -270,9 +261,7 @@ def joint_state_layout(data: bytes) -> Layout:
     return joints.layout(SLIDE, BELT, MOTOR)
 
 
-def joint_layout(
-    data: bytes, joint: str, belt: str | None, kind: str = "sensor_msgs/msg/JointState"
-) -> Layout:
+def joint_layout(data: bytes, joint: str, belt: str | None, kind: str) -> Layout:
     """Return where a message has position, velocity and effort of a joint, and those of a belt.
 
     The message is of one of `STATE_TYPES`. What it lacks is missing: each sequence may be empty,

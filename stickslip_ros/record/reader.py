@@ -386,7 +386,7 @@ def read_forces(
     messages: Messages,
     log_time: IntArray,
     *,
-    by_log: bool = False,
+    by_log: bool,
 ) -> tuple[ForceColumns, bool, Refused]:
     """Return forces, whether one has no stamp, and what was refused.
 

@@ -166,7 +166,7 @@ def _completed(
 
 
 def reading_at_recording(
-    recording: Recording | TableRecording, given: float | None = None
+    recording: Recording | TableRecording, given: float | None
 ) -> SampleAssumptions:
     """Return how the samples of a recording are to be read, with a stick speed that is `given`."""
     analyzer = recording.metadata("stickslip_ros/analyzer") or {}
@@ -175,11 +175,16 @@ def reading_at_recording(
         with suppress(KeyError, ValueError):
             recorded = float(analyzer["stick_speed"])
             given = recorded if 0.0 <= recorded < inf else None
-    known: dict[str, Any] = {}
-    for name, text in plant.items():
+    return reading_of(values_of(plant), given=given)
+
+
+def values_of(recorded: Mapping[str, str]) -> dict[str, Any]:
+    """Return recorded parameters, of which a bag has texts; what is no JSON is left out."""
+    values: dict[str, Any] = {}
+    for name, text in recorded.items():
         with suppress(RecursionError, ValueError):
-            known[name] = json.loads(text)
-    return reading_of(known, given=given)
+            values[name] = json.loads(text)
+    return values
 
 
 def _timing_of_recording(recording: Recording | TableRecording) -> Timing | None:

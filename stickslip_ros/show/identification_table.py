@@ -55,7 +55,7 @@ def identification_tables(
         yield f"plant.{name} is not identifiable: {why}"
 
 
-def constants_table(title: str, constants: Mapping[str, Estimate], units: Units = SI) -> TextTable:
+def constants_table(title: str, constants: Mapping[str, Estimate], units: Units) -> TextTable:
     """Return the table of constants by parameter, such as `plant.mass`, with intervals."""
     known = {f"plant.{p.name}": p.unit or "" for p in PlantParameters().known.values()}
     rows = [

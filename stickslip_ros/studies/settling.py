@@ -301,7 +301,7 @@ def _alike(before: Measures, after: Measures, resolution: float) -> bool:
 class _Section:
     """Measures a motion, keeps its Poincare section, and counts the measured cycles."""
 
-    def __init__(self, meter: CycleMeter, cycles: int, *, once: bool = False) -> None:
+    def __init__(self, meter: CycleMeter, cycles: int, *, once: bool) -> None:
         """Measure at least `cycles`; keep a turning point `once` if the slide sticks there."""
         self.meter = meter
         self._missing, self._once = max(cycles, _LEAST_CYCLES), once

@@ -82,7 +82,7 @@ class GainBoundary:
         whole_delay: int,
         period: float,
         corner_frequency: float,
-        difference_samples: int = 0,
+        difference_samples: int,
     ) -> None:
         """Take the open loop, see `LinearSampledLoop`, and a cutoff frequency; dimensionless."""
         slide, starting, ending = held

@@ -1,6 +1,7 @@
 """Stability of the sampled loop over its gains, over rate and delay, and over the belt speed."""
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Self
 
 import numpy as np
@@ -127,8 +128,8 @@ def stable_feeds(
     except InvalidInputError:
         return None
     ends = speeds[:1] * known[0]
-    for low, high, *states in zip(speeds, speeds[1:], known, known[1:], strict=False):
-        if states[0] != states[1]:
+    for (low, before), (high, after) in pairwise(zip(speeds, known, strict=True)):
+        if before != after:
             ends.append(bisect(sign, low, high, rtol=1e-4))
     ends += speeds[-1:] * known[-1]
     return [*zip(ends[::2], ends[1::2], strict=True)]
