@@ -59,17 +59,20 @@ _COORDINATES = {
 class Straightening:
     """Numbers in which fits are nearly linear, which a search has in place of coordinates.
 
-    They replace these where all are free. Both functions take the fastest speed, too.
+    They replace these where all are free, and those of `with_free`, too. Both functions take the
+    fastest speed.
     """
 
     names: Mapping[str, str]
-    """Name of the number in place of each coordinate; its own if it only must be free, too."""
+    """Name of the number in place of each coordinate."""
     bounds: Mapping[str, tuple[float, float]]
     """Bounds of the numbers; the others have those of the coordinate that they replace."""
     to_search: Callable[[Values, float], dict[str, float]]
     """Returns the numbers of coordinates."""
     from_search: Callable[[Values, float], dict[str, float]]
     """Returns the coordinates of numbers; they may be ones that the law refuses."""
+    with_free: Sequence[str] = ()
+    """Further coordinates that must be free: what the numbers are depends on them."""
 
 
 AS_THEY_ARE = Straightening({}, {}, lambda _, __: {}, lambda _, __: {})

@@ -149,15 +149,11 @@ class ExponentialAdapter(IdentifiedLaw):
     by_differences = ("exponent",)
     smallest = "kinetic"
     straightening = Straightening(
-        {
-            "kinetic": "force_at_fastest",
-            "rise": "sag",
-            "viscous": "force_at_rest",
-            "decay_speed": "decay_speed",
-        },
+        {"kinetic": "force_at_fastest", "rise": "sag", "viscous": "force_at_rest"},
         {"force_at_fastest": (-inf, inf), "force_at_rest": (0.0, inf)},
         _forces,
         _of_forces,
+        with_free=("decay_speed",),
     )
 
     def __init__(self, exponent: float = 1.0) -> None:

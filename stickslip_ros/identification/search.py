@@ -74,7 +74,7 @@ class _Search:
         self._task, self._free, self._values = task, free, values
         self._scale = 1.0 / (1e-3 * float(np.ptp(task.positions)))
         straight = law.straightening
-        if not straight.names.keys() <= {*free}:
+        if not {*straight.names, *straight.with_free} <= {*free}:
             straight = AS_THEY_ARE
         self._straight, self._names = straight, [straight.names.get(name, name) for name in free]
         to_search = {**values, **straight.to_search(values, fastest)}
