@@ -131,8 +131,9 @@ class Sweep(Points):
         Parameters
         ----------
         colour : str
-            What the map of a sweep over two parameters shows: "regime", or a measure of `columns`,
-            such as "amplitude".
+            What the cells of a map, over two parameters, have their colours by: "regime", or a
+            measure of `columns` that is a number, such as "amplitude". The diagram of one
+            parameter takes "regime" only.
         style : {"screen", "paper", "paper-double"}
             What the figure is for: a screen, or one column or two of a journal.
 
