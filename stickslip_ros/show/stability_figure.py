@@ -30,7 +30,11 @@ from stickslip_ros.show.style import (
     title_of,
 )
 from stickslip_ros.studies.design import Design
-from stickslip_ros.theory.bifurcation_branches import BifurcationBranches, Branch
+from stickslip_ros.theory.bifurcation_branches import (
+    BifurcationBranches,
+    Branch,
+    require_branches,
+)
 from stickslip_ros.theory.gain_intervals import gains_of, why_no_gains
 from stickslip_ros.theory.linear_sampled_loop import (
     LONGEST_DELAY,
@@ -81,7 +85,7 @@ def why_no_figure(scenario: Scenario) -> str | None:
     """
     plant, law = scenario.plant, scenario.control_law
     if law is None:
-        return covered(lambda: BifurcationBranches.check(plant.as_drive()))[1]
+        return covered(lambda: require_branches(plant.as_drive()))[1]
     drive = plant.as_drive()
     no_loop = why_no_linear_loop(drive, *plant.linear_sampling)
     _, no_map = covered(lambda: require("the stability map", drive, ONE_MASS))

@@ -93,23 +93,6 @@ class BifurcationBranches:
         )
         return sorted(speed for (speed, _), count in ends.items() if count == 2)
 
-    @staticmethod
-    def check(drive: Drive) -> None:
-        """Refuse a drive that the theory does not cover, see `over`, before anything is computed.
-
-        Parameters
-        ----------
-        drive : Drive
-            Drive in SI units.
-
-        Raises
-        ------
-        NotCoveredError
-            If friction differs between the directions, belt or load follow a signal, or the drive
-            has no spring.
-        """
-        require("the bifurcation diagram", drive, *ONE_DEGREE, SYMMETRIC)
-
     @classmethod
     def over(cls, drive: Drive, belt_speeds: FloatArray) -> Self:
         """Return the branches over a range of belt speeds.
@@ -132,7 +115,7 @@ class BifurcationBranches:
         RunError
             If the motion is too stiff to follow.
         """
-        cls.check(drive)
+        require_branches(drive)
         ascending = len(belt_speeds) > 1 and np.all(np.diff(belt_speeds) > 0.0)
         one_sign = ascending and belt_speeds[0] * belt_speeds[-1] > 0.0
         if not (one_sign and np.all(np.isfinite(belt_speeds))):
@@ -162,7 +145,7 @@ class BifurcationBranches:
         RunError
             If the motion is too stiff to follow.
         """
-        cls.check(drive)
+        require_branches(drive)
         hopf, onset = hopf_points(drive), _onset(drive)
         known = [abs(point.belt_speed) for point in hopf]
         known += [abs(drive.belt_speed)] if drive.belt_speed else []
@@ -199,6 +182,11 @@ class BifurcationBranches:
             hopf_points=tuple(points),
             sticking_onset=sticking if sticking is not None and low < sticking < high else None,
         )
+
+
+def require_branches(drive: Drive) -> None:
+    """Raise NotCoveredError for a drive that has no `BifurcationBranches`."""
+    require("the bifurcation diagram", drive, *ONE_DEGREE, SYMMETRIC)
 
 
 def _onset(drive: Drive) -> StickingOnset | None:

@@ -1,6 +1,6 @@
 """The belt speeds at which the slide sticks once a cycle, and the highest of them, the onset."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import tanh
@@ -94,7 +94,7 @@ def sticking_onset(drive: Drive) -> StickingOnset:
         exact=exact,
         no_approximate=no_approximate,
         no_exact=no_exact,
-        ranges=tuple(_ranges(drive, speeds, exact)),
+        ranges=_ranges(drive, speeds, exact),
         followed=(speeds[-1], speeds[0]),
     )
 
@@ -156,8 +156,8 @@ def _followed(drive: Drive, speeds: Sequence[float]) -> _Onset:
 
 def _ranges(
     drive: Drive, speeds: Sequence[float], onset: float | None
-) -> Iterator[tuple[float, float]]:
-    """Yield the ranges of belt speeds, ascending, at which a slide that stuck sticks again."""
+) -> tuple[tuple[float, float], ...]:
+    """Return the ranges of belt speeds, ascending, at which a slide that stuck sticks again."""
 
     def margin(speed: float) -> float:
         return tanh(_at_speed(drive, speed, release_margin))
@@ -166,18 +166,14 @@ def _ranges(
     if onset is not None:  # below it there is a range, however narrow
         tried.insert(0, (onset * (1.0 - 1e-9), 1.0))
     tried.reverse()
-    low = tried[0][0] if tried[0][1] > 0.0 else None
-    for (speed, before), (next_speed, now) in pairwise(tried):
-        if (before > 0.0) == (now > 0.0):
-            continue
-        edge = zero_between(margin, speed, next_speed)
-        if now > 0.0:
-            low = edge
-        elif low is not None:
-            yield low, edge
-            low = None
-    if low is not None:
-        yield low, tried[-1][0] if onset is None else onset
+    edges = [
+        zero_between(margin, speed, next_speed)
+        for (speed, before), (next_speed, now) in pairwise(tried)
+        if (before > 0.0) != (now > 0.0)
+    ]
+    (lowest, first), (highest, last) = tried[0], tried[-1]
+    ends = [lowest] * (first > 0.0) + edges + [onset or highest] * (last > 0.0)
+    return tuple(zip(ends[::2], ends[1::2], strict=True))
 
 
 def _at_speed(drive: Drive, speed: float, margin: Callable[[Drive], float]) -> float:
