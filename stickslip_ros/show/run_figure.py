@@ -14,6 +14,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from stickslip_ros.arrays import FloatArray
+from stickslip_ros.model.drive import Drive
 from stickslip_ros.show import AMBER, BLUE, GREEN, GREY, LIGHT_GREY, ORANGE, PURPLE, SKY_BLUE
 from stickslip_ros.show.drawing import (
     BELT,
@@ -96,7 +97,7 @@ def _single(run: DrawnRun, style: FigureStyle) -> Figure:
     lower_rows = (  # each with three panels
         (_OneRun.following, analysis.followed is not None),
         (_OneRun.analysis, analysis.mean_cycle is not None or analysis.slips is not None),
-        (_OneRun.behind_the_screw, has_motor and len(history.motor.columns()[0]) > 0),
+        (_OneRun.behind_the_screw, has_motor and len(history.motor) > 0),
     )
     rows = [draw for draw, is_shown in lower_rows if is_shown]
     size = (12.0, 10.0 + 2.5 * len(rows))
@@ -171,6 +172,10 @@ class _OneRun(_Panels):
         super().__init__(runs, narrow=narrow, short=short)
         (run,) = runs
         self._history, self._drive, self._disturbed = run.history, run.drive, run.disturbed
+        self._balanced: Drive | None = None
+        """The drive, if its spring and its friction balance at a known displacement."""
+        if run.drive is not None and run.drive.has_spring and run.drive.motor is None:
+            self._balanced = run.drive
         last = run.last_cycles
         self._last = last if len(last.time) > 1 else run.history.end(float("inf"))
         self._whole = Pane.covering("whole run", self._motions[0], *self._force_times)
@@ -239,13 +244,12 @@ class _OneRun(_Panels):
     def _draw_motion(self, position: Axes, velocity: Axes, pane: Pane) -> None:
         rows, gap = pane.rows, self._history.gap
         length, speed = self._length[0], self._speed[0]
-        if self._drive is not None and self._drive.has_spring and self._drive.motor is None:
+        if (drive := self._balanced) is not None:
             # On a belt at rest any position within the static friction is an equilibrium.
             belt = np.where(rows.belt_velocity == 0.0, np.nan, rows.belt_velocity)
-            bent = self._drive.normal_force / self._drive.stiffness
-            by_friction = self._drive.friction.at_rest(belt) * bent
-            dragged = self._drive.bias_force + self._drive.guide_damping * belt
-            rest = by_friction + dragged / self._drive.stiffness
+            by_friction = drive.friction.at_rest(belt) * (drive.normal_force / drive.stiffness)
+            dragged = drive.bias_force + drive.guide_damping * belt
+            rest = by_friction + dragged / drive.stiffness
             draw_line(position, pane, (rows.time, rest), length, gap, **_REST)
         draw_line(position, pane, (rows.time, rows.position), length, gap, **MOTION)
         draw_line(velocity, pane, (rows.time, rows.belt_velocity), speed, gap, **BELT)
@@ -269,9 +273,8 @@ class _OneRun(_Panels):
             axes.plot(np.where(stuck, position, np.nan) / length, belt / speed, **_STICKS)
         belt_speed = float(self._last.belt_velocity[-1])
         axes.axhline(belt_speed / speed, **BELT)
-        fixed = self._drive is not None and self._drive.motor is None and belt_speed != 0.0
-        if fixed and self._drive is not None and self._drive.has_spring:
-            axes.plot(self._drive.equilibrium_position / length, 0.0, zorder=3.0, **POINT)
+        if self._balanced is not None and belt_speed != 0.0:
+            axes.plot(self._balanced.equilibrium_position / length, 0.0, zorder=3.0, **POINT)
         axes.set_xlim(widened(*axes.get_xlim()))
         axes.set_ylim(widened(*axes.get_ylim()))
 
@@ -346,32 +349,25 @@ class _OneRun(_Panels):
         axes.legend(handles=[*handles, rest], loc="best")
         return []
 
-    def handles(self) -> list[Any]:
+    def handles(self) -> list[Artist]:
         """Return the entries of the legend, but for the friction law."""
-        history, drive = self._history, self._drive
+        history = self._history
         force = "control force and disturbance" if self._disturbed else "control force"
         sticks = "sticks" if self.short else "sticks (paler: part of the time)"
-        handles: list[Any] = [
-            Line2D([], [], **MOTION, label="slide"),
-            Line2D([], [], **BELT, label="belt speed"),
-            Patch(color=GREY, alpha=0.6, lw=0.0, label=sticks),
-            *(
-                Line2D([], [], **look, label=label)
-                for trace, look, label in (
-                    (history.control, _CONTROL, force),
-                    (history.friction, _FRICTION, "friction force"),
-                )
-                if len(trace.columns()[0])
+        visible: dict[Artist, bool] = {
+            Line2D([], [], **MOTION, label="slide"): True,
+            Line2D([], [], **BELT, label="belt speed"): True,
+            Line2D([], [], **POINT | _REST, label="equilibrium"): self._balanced is not None,
+            Patch(color=GREY, alpha=0.6, lw=0.0, label=sticks): True,
+            Line2D([], [], **_CONTROL, label=force): len(history.control) > 0,
+            Line2D([], [], **_FRICTION, label="friction force"): len(history.friction) > 0,
+            Line2D([], [], **_EARLIER | {"lw": 4.0}, label="start of the run"): True,
+            Line2D([], [], **HELD, label="no new force: last one"): self.holds,
+            Line2D([], [], **_DROPPED | {"ms": 6.0}, label="sent, did not act"): (
+                len(history.dropped) > 0
             ),
-            Line2D([], [], **_EARLIER | {"lw": 4.0}, label="start of the run"),
-        ]
-        if drive is not None and drive.has_spring and drive.motor is None:
-            handles.insert(2, Line2D([], [], **POINT | _REST, label="equilibrium"))
-        if self.holds:
-            handles.append(Line2D([], [], **HELD, label="no new force: last one"))
-        if len(history.dropped.columns()[0]):
-            handles.append(Line2D([], [], **_DROPPED | {"ms": 6.0}, label="sent, did not act"))
-        return handles
+        }
+        return [entry for entry, is_visible in visible.items() if is_visible]
 
 
 class _SeveralRuns(_Panels):

@@ -68,6 +68,9 @@ class Trace:
         self.interval = 0.0
         """Longest time between rows that results from thinning."""
 
+    def __len__(self) -> int:
+        return self._size
+
     @property
     def last(self) -> list[float]:
         """Time and columns of the last row; a time of minus infinity if there is none."""

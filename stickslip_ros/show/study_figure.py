@@ -174,7 +174,7 @@ def map_figure(
                     theory.first, theory.second, margins, levels=[0.0],
                     colors="black" if black else "white", linewidths=width, linestyles=pattern,
                 )  # fmt: skip
-        if axes in (panels[-1], *panels[: 0 if style.narrow else count]):
+        if axes is panels[-1] or not style.narrow:
             _name_axis(axes.xaxis, first, units)
         if axes is panels[0] or style.narrow:
             _name_axis(axes.yaxis, second, units)
