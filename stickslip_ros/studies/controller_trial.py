@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from stickslip_ros.arrays import FloatArray
+from stickslip_ros.arrays import FloatArray, rms
 from stickslip_ros.measures.cycle_measures import Measures, Regime
 from stickslip_ros.measures.cycle_meter import CycleMeter
 from stickslip_ros.model.control import Washout
@@ -224,8 +224,7 @@ class Bench:
                 rows.append((loop.true_sample.position, force))
             loop.advance()
         position, force = np.array(rows).T
-        rms = float(np.sqrt(np.mean(force**2)))
-        return Rest(float(np.ptp(position)) / 2.0, float(np.abs(force).max()), rms)
+        return Rest(float(np.ptp(position)) / 2.0, float(np.abs(force).max()), rms(force))
 
     def _measure(self, before: Sequence[tuple[float, float]]) -> Measure | None:
         """Return what measures, after it has measured these positions and velocities."""

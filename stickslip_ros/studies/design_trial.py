@@ -10,9 +10,9 @@ from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.model.constants import LARGEST, SMALLEST
 from stickslip_ros.model.control import ControlLaw, Washout
 from stickslip_ros.model.drive import Drive, number_text
-from stickslip_ros.quantities import Quantity
+from stickslip_ros.quantities import Quantity, quantities_of
 from stickslip_ros.scenarios.files import Scenario
-from stickslip_ros.studies.case_outcome import Disturbance, simulate_case
+from stickslip_ros.studies.case_outcome import OUTCOMES, Disturbance, simulate_case
 from stickslip_ros.studies.controller_trial import FILTER_SETTLED, Rest, Vibration
 from stickslip_ros.studies.drive_loops import DriveLoops, linear_part
 from stickslip_ros.studies.goal import Goal
@@ -158,6 +158,10 @@ class Check:
     """Motion and force that noise and rounding leave at rest, simulated; of a vibration only."""
 
 
+_SIMULATED = quantities_of(Check).keys() & OUTCOMES.keys()
+"""What a check has of the outcome of a simulated case."""
+
+
 class Trial:
     """Checks of control laws under disturbances, and with the vibration to catch."""
 
@@ -199,24 +203,23 @@ class Trial:
     def _caught(self, check: Check, vibration: Vibration, law: Any) -> Check:
         """Return the check with the vibration caught, and what is left at rest."""
         drive, predicted = vibration.drive, check.predicted_settling_time
-        caught = rest = reason = None
-        if vibration.vibrates:
-            patience = 5.0 * predicted + 20.0 * drive.natural_period
-            caught = self.loops.bench.catch(vibration, law, patience)
-            reason = self._failure(drive.belt_speed, caught.settling_time, caught.peak_force)
+        rest = None
         if self.rough:
             settled = max(predicted, FILTER_SETTLED / law.corner_frequency)
             rest = self.loops.bench.rest(drive, law, settled)
+        force = vibration.peak_force(law)
+        check = replace(check, vibrates=vibration.vibrates, predicted_peak_force=force, rest=rest)
+        if not vibration.vibrates:
+            return check
+        patience = 5.0 * predicted + 20.0 * drive.natural_period
+        caught = self.loops.bench.catch(vibration, law, patience)
         return replace(
             check,
-            vibrates=vibration.vibrates,
-            predicted_peak_force=vibration.peak_force(law),
-            held=None if caught is None else caught.settling_time is not None,
-            settling_time=None if caught is None else caught.settling_time,
-            disturbed_force=None if caught is None else caught.peak_force,
-            peak_force=None if caught is None else caught.peak_force,
-            reason=reason,
-            rest=rest,
+            held=caught.settling_time is not None,
+            settling_time=caught.settling_time,
+            disturbed_force=caught.peak_force,
+            peak_force=caught.peak_force,
+            reason=self._failure(drive.belt_speed, caught.settling_time, caught.peak_force),
         )
 
     def _failure(self, belt_speed: float, settles: float | None, peak: float) -> str | None:
@@ -251,9 +254,7 @@ class Trial:
                 both = outcome.rms_velocity, FEED_TOLERANCE * abs(check.belt_speed)
                 rms, allowed = (number_text(drive, value, "m/s") for value in both)
                 reason = f"{reason}: its rms velocity is {rms}, and must be at most {allowed}"
-        measures = ("held", "settling_time", "disturbed_force", "peak_force")
-        names = (*measures, "rms_velocity", "mean_force", "rms_force")
-        values = {name: getattr(outcome, name) for name in names}
+        values = {name: getattr(outcome, name) for name in _SIMULATED}
         return replace(check, disturbance=str(disturbance), reason=reason, **values)
 
     def throw_from_high_speeds(self, law: Any) -> tuple[str | None, str | None]:
