@@ -67,11 +67,10 @@ class Findings:
     @cached_property
     def fitted(self) -> Mapping[str, Estimate]:
         """Constants by parameter of the plant, such as `friction.static`; SI units."""
-        names, values, covariance = self._constants
-        errors = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+        names, values, _ = self._constants
         return {
             name: Estimate(float(value), float(error))
-            for name, value, error in zip(names, values, errors, strict=True)
+            for name, value, error in zip(names, values, self._errors, strict=True)
         }
 
     @cached_property
@@ -87,6 +86,11 @@ class Findings:
         return self.chosen.parameters(self.normal_force)
 
     @property
+    def _errors(self) -> FloatArray:
+        """Standard errors of these constants."""
+        return np.sqrt(np.maximum(np.diag(self._constants[2]), 0.0))
+
+    @property
     def spread(self) -> dict[str, list[Any]]:
         """What the fit leaves open, as a scenario keeps it; see `Scenario.fit`."""
         columns = (
@@ -99,10 +103,8 @@ class Findings:
     @cached_property
     def _correlation(self) -> FloatArray:
         """Correlations of the constants; 0 where one is unbounded or exact."""
-        _, _, covariance = self._constants
-        errors = np.sqrt(np.maximum(np.diag(covariance), 0.0))
         with np.errstate(invalid="ignore", divide="ignore"):
-            shares = covariance / np.outer(errors, errors)
+            shares = self._constants[2] / np.outer(self._errors, self._errors)
         shares = np.where(np.isfinite(shares), shares, 0.0)
         np.fill_diagonal(shares, 1.0)
         return shares

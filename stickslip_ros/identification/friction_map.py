@@ -69,7 +69,7 @@ def _best(speed: FloatArray, force: FloatArray, law: str) -> FittedCurve:
 
 
 def _criterion(curves: Sequence[FittedCurve]) -> float:
-    pairs, squares = (sum(getattr(fit, name) for fit in curves) for name in ("pairs", "squares"))
+    pairs, squares = sum(fit.pairs for fit in curves), sum(fit.squares for fit in curves)
     constants = sum(len(fit.estimates) for fit in curves)
     return pairs * log(squares / pairs) + constants * log(pairs)
 

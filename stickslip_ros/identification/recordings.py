@@ -27,6 +27,8 @@ _OPTIONAL = ("velocity", "disturbance", "reference")
 """Quantities that a table may lack if another one of the same machine has them."""
 _MAY_LACK_VALUES = ("velocity", "reference")
 """Quantities without which samples are used."""
+_Contents = tuple[IntArray, dict[str, FloatArray], float | None, Sequence[str]]
+"""Stamps, ns, columns of a `Record`, the delay of the force, s, if it is known, and notes."""
 
 
 def read_all(
@@ -81,12 +83,11 @@ def read_records(
     """
     if table is None and is_table(path):
         table = table_of(path, form)
-    notes: Sequence[str] = ()
-    if table is not None:
-        stamp, quantities, notes = _of_table(table, columns, belt_speed)
-        delay = None
-    else:
-        stamp, quantities, delay, notes = _of_bag(path, namespace, belt_speed, layout)
+    stamp, quantities, delay, notes = (
+        _of_bag(path, namespace, belt_speed, layout)
+        if table is None
+        else _of_table(table, columns, belt_speed)
+    )
     since = (stamp - stamp[0]) / NANOSECONDS
     part = (since >= start) & (since < end)
     if not part.any():
@@ -99,7 +100,7 @@ def read_records(
 
 def _of_table(
     table: Table, columns: Mapping[str, str] | None, belt_speed: float | None
-) -> tuple[IntArray, dict[str, FloatArray], Sequence[str]]:
+) -> _Contents:
     path = table.path
     if columns is None and "motor_position" in table.columns:
         raise _has_motor(path)
@@ -117,7 +118,7 @@ def _of_table(
                 f"{path}: {name.replace('_', ' ')} (column {columns[name]}) has {count} finite "
                 f"numbers in {len(values)} rows: identification needs at least {FEWEST}"
             )
-    return stamps_of(path, time), used, notes
+    return stamps_of(path, time), used, None, notes
 
 
 def _has_motor(path: Path) -> InvalidInputError:
@@ -129,7 +130,7 @@ def _has_motor(path: Path) -> InvalidInputError:
 
 def _of_bag(
     path: Path, namespace: str | None, belt_speed: float | None, layout: BagLayout
-) -> tuple[IntArray, dict[str, FloatArray], float | None, Sequence[str]]:
+) -> _Contents:
     with Recording(path, namespace, belt_speed=belt_speed, layout=layout) as recording:
         states = recording.joint_states
         states = states[states.is_valid]

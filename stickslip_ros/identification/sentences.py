@@ -156,12 +156,12 @@ def unidentified(findings: Findings) -> Mapping[str, str]:
     for name, estimate in findings.fitted.items():
         if estimate.standard_error < _VAGUE_ERROR * abs(estimate.value) or name in why:
             continue
-        sure = f"{estimate.value:.4g} has a standard error of {estimate.standard_error:.2g}"
-        if isinf(estimate.standard_error):
-            sure = f"{estimate.value:.4g} is one of many values that fit alike"
         if findings.chosen.remark == OUT_OF_TIME:
             why[name] = f"{estimate.value:.4g} is from a fit that the limit of work ended"
             continue
+        sure = f"{estimate.value:.4g} has a standard error of {estimate.standard_error:.2g}"
+        if isinf(estimate.standard_error):
+            sure = f"{estimate.value:.4g} is one of many values that fit alike"
         why[name] = f"{sure}; a run with other speeds and forces may identify it"
     return why
 

@@ -5,7 +5,7 @@ from math import inf
 
 import numpy as np
 
-from stickslip_ros.arrays import FloatArray
+from stickslip_ros.arrays import FloatArray, rms
 from stickslip_ros.identification.filtered import START
 from stickslip_ros.identification.predictor import Predictor
 from stickslip_ros.identification.record import FEWEST, Record
@@ -89,8 +89,8 @@ def servo_of(record: Record) -> Servo | None:
             left = np.abs(force - terms @ gains)
             # Forces that were added to the command are none of the controller's.
             used = free & (left <= _OUTLIER_RATIO * float(np.quantile(left[free], _INLIER_SHARE)))
-        left, scale = left[used], float(np.sqrt(np.mean(force[used] ** 2)))
-        share = float(np.sqrt(np.mean(left**2))) / scale
+        left = left[used]
+        share = rms(left) / rms(force[used])
         if np.count_nonzero(used) > _INLIER_SHARE * np.count_nonzero(free) and (
             best is None or share < best[0]
         ):

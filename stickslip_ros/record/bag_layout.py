@@ -134,11 +134,11 @@ class DriveInBag:
         Raises BagError if there are several drives, and if the topic that was chosen is not there,
         or of another type.
         """
-        chosen = {JOINT_STATES: "states_topic", CONTROL_FORCE: "force_topic"}.get(topic, "")
-        given = getattr(self.layout, chosen, None)
-        topics, types = self.source.topics, (topic.type_name,)
-        if topic in (JOINT_STATES, CONTROL_FORCE):
-            types = (*STATE_TYPES,) if topic == JOINT_STATES else FORCE_TYPES
+        chosen, types = {
+            JOINT_STATES: ("states_topic", (*STATE_TYPES,)),
+            CONTROL_FORCE: ("force_topic", FORCE_TYPES),
+        }.get(topic, ("", (topic.type_name,)))
+        given, topics = getattr(self.layout, chosen, None), self.source.topics
         fitting = sorted(name for name, kind in topics.items() if kind in types)
         name = self.prefix + topic.name if given is None else numbered(given)[0]
         if name in fitting:
