@@ -45,7 +45,7 @@ def release_position(drive: Drive) -> float:
     return (limit - reaction(drive, 0.0, drive.belt_speed, 0.0)) / drive.stiffness
 
 
-def longest_return(drive: Drive, control: ContinuousControl | None) -> float:
+def longest_return(drive: Drive, control: ContinuousControl | None = None) -> float:
     """Return a time (s) within which a slide comes back if it ever does; the belt moves.
 
     It may stick, and creep at a similar speed, as far as static friction can bend the spring.
