@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -23,23 +24,19 @@ PAPER_GAINS = Washout(corner_frequency=2.0, linear_gain=-1.0, cubic_gain=-1.0)
 
 
 def sampled(
-    washout: Washout | None,
-    duration: float,
-    rate: float = 100.0,
-    drive: Drive = PAPER,
-    position: float = 0.0,
+    washout: Washout | None, duration: float, drive: Drive = PAPER, **options: Any
 ) -> tuple[Measures, Motion]:
-    motion = RecordedMotion(drive, position, 0.0)
-    loop = SampledLoop(motion, rate, SECOND)
-    controller = Controller(washout) if washout is not None else None
-    return simulate_sampled(loop, motion, controller, duration, CycleMeter(20)), motion
+    motion = RecordedMotion(drive, 0.0, 0.0)
+    loop = SampledLoop(motion, 100.0, SECOND)
+    controller = None if washout is None else Controller(washout)
+    return simulate_sampled(loop, motion, controller, duration, CycleMeter(20), **options), motion
 
 
 def continuous(
-    washout: Washout | None, duration: float, drive: Drive = PAPER, position: float = 0.0
+    washout: Washout | None, duration: float, drive: Drive = PAPER, **options: Any
 ) -> tuple[Measures, Motion]:
-    motion = RecordedMotion(drive, position, 0.0, washout)
-    return simulate_continuous(motion, washout, duration, CycleMeter(20)), motion
+    motion = RecordedMotion(drive, 0.0, 0.0, washout)
+    return simulate_continuous(motion, washout, duration, CycleMeter(20), **options), motion
 
 
 @pytest.mark.parametrize("simulate", [sampled, continuous])
@@ -69,15 +66,7 @@ def test_a_motion_that_runs_away_ends_early_as_unbounded(simulate: Simulate) -> 
 @pytest.mark.parametrize("simulate", [sampled, continuous])
 def test_progress_rises_to_one(simulate: Simulate) -> None:
     shares: list[float] = []
-    control = PAPER_GAINS if simulate is continuous else None
-    motion = RecordedMotion(PAPER, 0.0, 0.0, control)
-    if simulate is sampled:
-        loop = SampledLoop(motion, 100.0, SECOND)
-        simulate_sampled(
-            loop, motion, Controller(PAPER_GAINS), 100.0, CycleMeter(20), shares.append
-        )
-    else:
-        simulate_continuous(motion, PAPER_GAINS, 300.0, CycleMeter(20), shares.append)
+    simulate(PAPER_GAINS, 300.0, progress=shares.append)
     assert len(shares) > 3
     assert np.all(np.diff(shares) > 0.0)
     assert shares[-1] == pytest.approx(1.0)
