@@ -7,7 +7,7 @@ import struct
 import subprocess
 import sys
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -43,26 +43,30 @@ TITLE = "\x1b]0;owned\x07"
 
 READER = """
 import json, os, resource, sys
+from itertools import product
 from pathlib import Path
 from stickslip_ros.record.repair import repair
 from stickslip_ros.record.report import report_of_recording
 from stickslip_ros.errors import StickslipError
 
-def outcome_of(action):
+def outcome_of(action, bag):
     try:
-        return str(action())
+        return str(action(bag))
     except StickslipError as error:
         return str(error)
     except BaseException as error:
         return f"CRASH {type(error).__name__}: {error}"
 
-bag, out = map(Path, sys.argv[1:])
-for action in (lambda: report_of_recording(bag)["missing"], lambda: repair(bag, out).missing):
+ACTIONS = (
+    lambda bag: report_of_recording(bag)["missing"],
+    lambda bag: repair(bag, bag.with_suffix(".out")).missing,
+)
+for bag, action in product(map(Path, sys.argv[1:]), ACTIONS):
     ours, theirs = os.pipe()
     if (child := os.fork()) == 0:
         taken = int(open("/proc/self/statm").read().split()[0]) * resource.getpagesize()
         resource.setrlimit(resource.RLIMIT_AS, (taken + (600 << 20),) * 2)
-        os.write(theirs, outcome_of(action)[:10_000].encode())
+        os.write(theirs, outcome_of(action, bag)[:10_000].encode())
         os._exit(0)
     os.close(theirs)
     before = int(open("/proc/self/statm").read().split()[1]) * resource.getpagesize()
@@ -200,46 +204,44 @@ REPEATED = "a0: &a0 [xxxxxxxxxx]\n" + "".join(
 REPEATED += "rosbag2_bagfile_information: {relative_file_paths: [*a9]}"
 
 
-def read_by_a_child(bag: Path, out: Path) -> list[tuple[str, int]]:
-    """Return what report and repair said in a process of their own, and what memory they took."""
+def read_by_children(bags: Sequence[Path]) -> list[tuple[str, int]]:
+    """Return what report and repair of each bag said, and what memory they took.
+
+    Each is a process of its own, a fork of one that has imported the package.
+    """
     output = subprocess.run(
-        [sys.executable, "-c", READER, str(bag), str(out)],
-        check=True,
-        capture_output=True,
-        text=True,
+        [sys.executable, "-c", READER, *bags], check=True, capture_output=True, text=True
     ).stdout
     return [(said, used) for said, used in map(json.loads, output.splitlines())]
 
 
+OTHERS = [
+    summary_of_a_gigabyte,
+    described(lambda file: (file.touch(), os.truncate(file, HUGE))),
+    described(lambda file: file.symlink_to("/dev/zero")),
+    described(os.mkfifo),
+    described(lambda file: file.write_text(REPEATED)),
+    definitions_without_end,
+    messages_packed_small,
+    profiles_without_end,
+    *(lambda path, parts=parts: bag_of(path, *parts) for parts in records_of_a_gigabyte()),
+]
+
+
 @pytest.mark.process
 @pytest.mark.parametrize(
-    "make",
-    [
-        attachment_of_a_gigabyte,
-        *(
-            pytest.param(make, marks=pytest.mark.long)
-            for make in (
-                summary_of_a_gigabyte,
-                described(lambda file: (file.touch(), os.truncate(file, HUGE))),
-                described(lambda file: file.symlink_to("/dev/zero")),
-                described(os.mkfifo),
-                described(lambda file: file.write_text(REPEATED)),
-                definitions_without_end,
-                messages_packed_small,
-                profiles_without_end,
-                *(
-                    lambda path, records=records: bag_of(path, *records)
-                    for records in records_of_a_gigabyte()
-                ),
-            )
-        ),
-    ],
+    "makers",
+    [[attachment_of_a_gigabyte], pytest.param(OTHERS, marks=pytest.mark.long)],
+    ids=["attachment", "others"],
 )
-def test_memory_is_bounded(tmp_path: Path, make: Callable[[Path], Path]) -> None:
-    for said, used in read_by_a_child(make(tmp_path / "bag"), tmp_path / "out"):
-        assert not said.startswith("CRASH")
-        assert "\n" not in said
-        assert used < MUCH_MEMORY
+def test_memory_is_bounded(tmp_path: Path, makers: Sequence[Callable[[Path], Path]]) -> None:
+    bags = [make(tmp_path / f"bag{number}") for number, make in enumerate(makers)]
+    outcomes = read_by_children(bags)
+    assert len(outcomes) == 2 * len(bags)
+    for number, (said, used) in enumerate(outcomes):
+        assert not said.startswith("CRASH"), number
+        assert "\n" not in said, number
+        assert used < MUCH_MEMORY, number
 
 
 FIRST, SIZE = len(schema() + channel()), len(message(state(1)))
