@@ -11,7 +11,6 @@ import stickslip_ros as ss
 from stickslip_ros.api.recordings import recorded_drive
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.measures.slips import SlipThreshold
-from stickslip_ros.model.drive import Drive
 from stickslip_ros.record.codec import pack_joint_state
 from stickslip_ros.record.reader import Recording
 from stickslip_ros.record.recorder import Recorder
@@ -99,39 +98,29 @@ def test_notes_have_the_units_of_the_drive(name: str, drop: str, tmp_path: Path)
     assert any(note.startswith(f"the least drop of a slip, {drop}, is within") for note in notes)
 
 
-def recorded_with(
-    folder: Path, parameters: dict[str, str], curves: dict[str, str] | None = None
-) -> Drive | None:
-    """Return the drive of a bag with the parameters of feed_drive, but for some, and curves."""
-    with Recorder(folder / "bag") as recorder:
-        everything = ss.scenario("feed_drive").plant.flat()
-        given = {name: json.dumps(value) for name, value in everything.items()}
-        recorder.add_metadata("stickslip_ros/plant", given | parameters)
-        recorder.add_metadata("stickslip_ros/curves", curves or {})
-    return recorded_drive(folder / "bag")
-
-
-@pytest.mark.parametrize("group", ["friction", "disturbance"])
-def test_a_bag_does_not_have_other_files_read(group: str, tmp_path: Path) -> None:
-    """Numbers in a file of the reader would end up in figures of whoever wrote the bag."""
+def test_bad_parameters_or_curves_make_no_drive_nor_does_a_file_of_the_reader(
+    tmp_path: Path,
+) -> None:
+    """The numbers of the file would end up in figures of whoever wrote the bag."""
     own = tmp_path / "own.csv"
     own.write_text("0,0.4\n1,0.3\n")
-    kind = {"friction": "law", "disturbance": "kind"}[group]
-    parameters = {f"{group}.{kind}": '"table"', f"{group}.file": f'"{own}"'}
-    assert recorded_with(tmp_path, parameters) is None
-
-
-@pytest.mark.parametrize("mass", ["[" * 100_000, "-1", "NaN"])
-def test_parameters_that_are_none_are_no_drive(mass: str, tmp_path: Path) -> None:
-    assert recorded_with(tmp_path, {"mass": mass}) is None
-
-
-@pytest.mark.parametrize(
-    "curve", ['[[0, 0.4], [0.5, "x"]]', "3", "[[0, 1e999], [1, 1]]", "[[1]]", "["]
-)
-def test_a_curve_that_is_none_makes_no_drive(curve: str, tmp_path: Path) -> None:
-    parameters = {"friction.law": '"table"', "friction.file": '"/none.csv"'}
-    assert recorded_with(tmp_path, parameters, {"/none.csv": curve}) is None
+    table = {"friction.law": '"table"', "friction.file": f'"{own}"'}
+    curves = '[[0, 0.4], [0.5, "x"]]', "3", "[[0, 1e999], [1, 1]]", "[[1]]", "["
+    everything = ss.scenario("feed_drive").plant.flat()
+    given = {name: json.dumps(value) for name, value in everything.items()}
+    for number, (parameters, kept) in enumerate(
+        [
+            (table, {}),
+            ({"disturbance.kind": '"table"', "disturbance.file": f'"{own}"'}, {}),
+            *(({"mass": mass}, {}) for mass in ("[" * 100_000, "-1", "NaN")),
+            *((table, {str(own): curve}) for curve in curves),
+        ]
+    ):
+        bag = tmp_path / f"bag_{number}"
+        with Recorder(bag) as recorder:
+            recorder.add_metadata("stickslip_ros/plant", given | parameters)
+            recorder.add_metadata("stickslip_ros/curves", kept)
+        assert recorded_drive(bag) is None
 
 
 @pytest.fixture(scope="module")

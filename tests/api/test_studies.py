@@ -98,35 +98,29 @@ def test_points_without_a_result_are_nan_and_none() -> None:
 
 
 def test_refusals() -> None:
-    ends: list[tuple[dict[str, Any], dict[str, Any], str]] = [
-        ({"belt_sped": (0.1, 0.2, 3)}, {}, "did you mean belt_speed?"),
-        ({"belt_speed": (0.1, 0.2)}, {}, "(first, last, count) or (first, last, count, 'log')"),
-        ({"belt_speed": (0.1, 0.2, 3, "lin")}, {}, "must be (first, last, count)"),
-        ({"belt_speed": 0.1}, {}, "belt_speed = 0.1 is invalid"),
-        ({"belt_speed": "abc"}, {}, "belt_speed = 'abc' is invalid"),
-        ({"belt_speed": (0.1, 0.2, 2.5)}, {}, "must be (first, last, count)"),
-        ({"window": (1, 3, 3)}, {}, "analyzer"),
-        ({"belt_speed": (0.1, 0.2, 3)}, {"carry": "left"}, "carry = 'left' is invalid"),
-        ({"belt_speed": (0.1, 0.2, 3)}, {"workers": 0}, "0 workers"),
-        ({"autostart": (0, 1, 2)}, {}, "several nodes"),
+    refused: list[tuple[Any, dict[str, Any], str]] = [
+        (ss.sweep, {"belt_sped": (0.1, 0.2, 3)}, "did you mean belt_speed?"),
+        (ss.sweep, {"belt_speed": (0.1, 0.2)}, "(first, last, count) or (first, last, count, 'l"),
+        (ss.sweep, {"belt_speed": (0.1, 0.2, 3, "lin")}, "must be (first, last, count)"),
+        (ss.sweep, {"belt_speed": 0.1}, "belt_speed = 0.1 is invalid"),
+        (ss.sweep, {"belt_speed": "abc"}, "belt_speed = 'abc' is invalid"),
+        (ss.sweep, {"belt_speed": (0.1, 0.2, 2.5)}, "must be (first, last, count)"),
+        (ss.sweep, {"window": (1, 3, 3)}, "analyzer"),
+        (ss.sweep, {"belt_speed": (0.1, 0.2, 3), "carry": "left"}, "carry = 'left' is invalid"),
+        (ss.sweep, {"belt_speed": (0.1, 0.2, 3), "workers": 0}, "0 workers"),
+        (ss.sweep, {"autostart": (0, 1, 2)}, "several nodes"),
+        (ss.basin, {"position": (0.0, 1.0)}, "position = (0.0, 1.0) is invalid"),
+        (ss.basin, {"velocity": 1.0}, "velocity = 1.0 is invalid"),
+        (ss.basin, {"velocity": 1.0, "sample": 3}, "velocity = 1.0 is invalid"),
+        (ss.basin, {"sample": 3, "seed": -1}, "seed -1"),
     ]
     lists = [], [0.02], ["a", "b"], np.zeros((2, 2)), [0.02, float("nan")]
-    ends += [({"belt_speed": values}, {}, "belt_speed") for values in lists]
-    for axes, options, meant in ends:
+    refused += [(ss.sweep, {"belt_speed": values}, "belt_speed") for values in lists]
+    for study, options, meant in refused:
         with pytest.raises(InvalidInputError) as refusal:
-            ss.sweep(FREE, **axes, **options)
+            study(FREE, **options)
         assert meant in str(refusal.value)
         assert "\n" not in str(refusal.value)
-    starts: list[tuple[dict[str, Any], str]] = [
-        ({"position": (0.0, 1.0)}, "position = (0.0, 1.0) is invalid"),
-        ({"velocity": 1.0}, "velocity = 1.0 is invalid"),
-        ({"velocity": 1.0, "sample": 3}, "velocity = 1.0 is invalid"),
-        ({"sample": 3, "seed": -1}, "seed -1"),
-    ]
-    for options, meant in starts:
-        with pytest.raises(InvalidInputError) as refusal:
-            ss.basin(FREE, **options)
-        assert meant in str(refusal.value)
 
 
 def test_controlled_and_continuous() -> None:

@@ -65,14 +65,6 @@ def test_without_a_linear_loop_there_is_no_system(monkeypatch: pytest.MonkeyPatc
         ss.stability("paper").to_control()
 
 
-@pytest.mark.long
-def test_without_control_the_figure_is_the_bifurcation_diagram() -> None:
-    figure = ss.stability(ss.scenario("paper", expects_control=False)).plot()
-    assert figure.get_suptitle() == "Bifurcation diagram, paper, no control"
-    (axes,) = figure.axes
-    assert axes.get_xlabel() == "belt speed $v_0$ (dimensionless)"
-
-
 def test_what_cannot_be_drawn_or_designed_is_refused() -> None:
     scenario = load_scenario("feed_drive", controller="velocity_feedback")
     with pytest.raises(InvalidInputError, match="nothing to draw: this exists for the washout law"):

@@ -224,22 +224,6 @@ def test_an_impossible_tap_is_refused(
     assert outcome(graph, observer.requests.reset()) == "plant does not answer"
 
 
-def test_a_node_that_was_started_again_before_it_seems_silent_is_asked_again(
-    graph: Graph, observer: ListenerNode, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(run_state, "SILENCE", float("inf"))
-    first = graph.add(PlantNode, pace="realtime", expects_control=False, damping=0.1)
-    graph.wait_until(
-        lambda: int(observer.run.health["plant"].figures.get("samples", 0)) > 150, "samples"
-    )
-    graph.executor.remove_node(first)
-    first.destroy_node()
-    graph.add(PlantNode, pace="realtime", expects_control=False, damping=0.3)
-    graph.wait_until(
-        lambda: observer.run.parameters["plant"].get("damping") == 0.3, "the other's parameters"
-    )
-
-
 def test_the_health_of_a_limited_number_of_nodes_is_kept(
     graph: Graph, observer: ListenerNode
 ) -> None:
