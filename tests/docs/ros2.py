@@ -28,15 +28,6 @@ _interrupted = Event()
 class Ros2(Graph):
     """The verbs, each with the names that follow it."""
 
-    def topic_list(self) -> None:
-        self.run_for(2.0)
-        for name, types in self.observer.get_topic_names_and_types():
-            print(name, types)
-
-    def topic_info(self, topic: str) -> None:
-        print("Type:", self._type_of(topic))
-        print("Publisher count:", self.observer.count_publishers(topic))
-
     def topic_hz(self, topic: str) -> None:
         heard = self._hear(topic)
         while not _interrupted.is_set():
@@ -101,7 +92,6 @@ def main() -> int:
     parser.add_argument("command")
     parser.add_argument("verb")
     parser.add_argument("names", nargs="*")
-    parser.add_argument("-t", action="store_true", help="always, of a list")
     parser.add_argument("--once", action="store_true", help="always, of an echo")
     parser.add_argument("--field", default="")
     arguments = parser.parse_intermixed_args([word for word in sys.argv[1:] if word != "--"])
