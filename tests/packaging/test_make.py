@@ -25,19 +25,16 @@ def set_up(tmp_path):
     return run
 
 
-@pytest.fixture
-def fake_python(tmp_path):
-    """Makes a Python of which only this much goes wrong."""
+def script(file, text):
+    file.write_text(f"#!/bin/sh\n{text}\n")
+    file.chmod(0o755)
+    return file
 
-    def make(pattern, action):
-        python = tmp_path / "python3"
-        python.write_text(
-            f'#!/bin/sh\ncase "$*" in {pattern}) {action};; *) exec {sys.executable} "$@";; esac\n'
-        )
-        python.chmod(0o755)
-        return python
 
-    return make
+def fake_python(folder, pattern, action):
+    """Make a Python of which only this much goes wrong."""
+    text = f'case "$*" in {pattern}) {action};; *) exec {sys.executable} "$@";; esac'
+    return script(folder / "python3", text)
 
 
 @pytest.fixture
@@ -53,7 +50,7 @@ def uv(tmp_path, log):
 
 
 @pytest.fixture
-def python(tmp_path, fake_python, uv, log):
+def python(tmp_path, uv, log):
     """A Python that makes environments whose pip installs nothing but uv."""
     template = tmp_path / "template"
     (template / "share" / "ament_index" / "resource_index" / "packages").mkdir(parents=True)
@@ -62,13 +59,7 @@ def python(tmp_path, fake_python, uv, log):
     get_uv = f'case "$*" in *pip*" uv") cp {uv} $(dirname $0);; esac'
     script(template / "bin" / "python", f'echo "python $*" >>{log}; {get_uv}')
     venv = tmp_path / "venv"
-    return fake_python("*--clear*", f"rm -rf {venv}; cp -r {template} {venv}")
-
-
-def script(file, text):
-    file.write_text(f"#!/bin/sh\n{text}\n")
-    file.chmod(0o755)
-    return file
+    return fake_python(tmp_path, "*--clear*", f"rm -rf {venv}; cp -r {template} {venv}")
 
 
 @pytest.fixture
@@ -147,13 +138,9 @@ def test_what_was_interrupted_is_cleared(set_up, python, uv, installed, tmp_path
     assert installed() == [("python", NEEDED)]
 
 
-def test_says_in_a_line_which_python_to_install(set_up):
-    refused = set_up("false")
-    assert refused.returncode != 0
-    assert "install python3 python3-venv" in refused.stderr.splitlines()[0]
-
-
-def test_says_in_a_line_what_to_install_where_venv_is_missing(set_up, fake_python):
-    refused = set_up(fake_python("*ensurepip*", "exit 1"))
-    assert refused.returncode != 0
-    assert "-venv" in refused.stderr.splitlines()[0]
+def test_says_in_a_line_what_to_install_where_python_or_venv_is_missing(set_up, tmp_path):
+    without_venv = fake_python(tmp_path, "*ensurepip*", "exit 1")
+    for python, named in (("false", "install python3 python3-venv"), (without_venv, "-venv")):
+        refused = set_up(python)
+        assert refused.returncode != 0
+        assert named in refused.stderr.splitlines()[0]

@@ -77,24 +77,22 @@ def test_both_ask_for_the_same_to_test(manifest):
 
 
 def test_the_manifest_tells_what_has_no_key():
-    text = " ".join((SOURCE / "package.xml").read_text().split())
-    keyless = sorted(name for name in required("") if not KEYS[name])
-    assert f"for want of a rosdep key: {', '.join(keyless)}." in text
-    (extra,) = required("dask")
-    assert not KEYS[extra]
-    assert f"to test them: {extra}." in text
+    text = " ".join((SOURCE / "package.xml").read_text().split()).replace("[python]", "")
+    for extra, sentence in {
+        "": "for want of a rosdep key: {keyless}.",
+        "dask": "to test them: {keyless}.",
+        "dashboard": "For the dashboard: {keys}, and {last} from PyPI;",
+        "analysis": "For to_xarray and to_control: {last} from PyPI.",
+        "matlab": "For MAT files of version 7.3: {keys}.",
+        "formats": "For recordings of other tools: {keys}, and {last} from PyPI.",
+    }.items():
+        names = required(extra)
+        keys = sorted({key for name in names for key in KEYS[name]})
+        keyless = sorted(name for name in names if not KEYS[name])
+        lists = {"keys": ", ".join(keys), "keyless": ", ".join(keyless)}
+        assert sentence.format(**lists, last=" and ".join(keyless)) in text
     site = ", ".join(sorted(required("docs"), key=str.lower))
-    assert f"from PyPI: {site}." in text.replace("[python]", "")
-    keys = sorted(key for name in required("dashboard") for key in KEYS[name])
-    keyless = " and ".join(sorted(name for name in required("dashboard") if not KEYS[name]))
-    assert f"For the dashboard: {', '.join(keys)}, and {keyless} from PyPI;" in text
-    keyless = " and ".join(sorted(name for name in required("analysis") if not KEYS[name]))
-    assert f"For to_xarray and to_control: {keyless} from PyPI." in text
-    ((key,),) = (KEYS[name] for name in required("matlab"))
-    assert f"For MAT files of version 7.3: {key}." in text
-    keys = ", ".join(sorted(set().union(*(KEYS[name] for name in required("formats")))))
-    keyless = " and ".join(sorted(name for name in required("formats") if not KEYS[name]))
-    assert f"For recordings of other tools: {keys}, and {keyless} from PyPI." in text
+    assert f"from PyPI: {site}." in text
 
 
 def test_the_docs_install_in_a_workspace_all_that_is_asked_for():

@@ -2,6 +2,11 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
+from rclpy.context import Context
+from rclpy.node import Node
+
+from stickslip_ros.nodes.base.network import this_machine_only
+from stickslip_ros.testing import own_domain
 
 ReadByRos = Callable[..., dict[str, Any]]
 
@@ -12,17 +17,12 @@ OWN = {"use_sim_time": False, "start_type_description_service": True}
 @pytest.fixture
 def read_by_ros(monkeypatch: pytest.MonkeyPatch) -> Iterator[ReadByRos]:
     """Parameters that ROS itself gives to a node from a file; RuntimeError if there are none."""
-    context_module = pytest.importorskip("rclpy.context")
-    node_module = pytest.importorskip("rclpy.node")
-    from stickslip_ros.nodes.base.network import this_machine_only
-    from stickslip_ros.testing import own_domain
-
     for name, value in this_machine_only().items():
         monkeypatch.setenv(name, value)
-    context = context_module.Context()
+    context = Context()
 
     def read(path: str, namespace: str = "/feed_drive", node: str = "plant") -> dict[str, Any]:
-        made = node_module.Node(
+        made = Node(
             node,
             namespace=namespace,
             context=context,
